@@ -125,7 +125,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   output_params.kind = *kind;
 
   // What fails on this machine is found before the server is bothered.
-  if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable) return usable;
+  if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
+    return usable;
   if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
   std::optional<audio::WavRecorder> recorder;
   audio::SynthParams synth_params;
@@ -134,10 +135,10 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   Result<std::unique_ptr<audio::AudioOutput>> output = audio::open_output(output_params, engine);
   if (!output) return tl::unexpected(output.error());
 
-  Result<wire::JoinedRoom> room =
-      wire::join_room(options.server, wire::ClientKind::audio, options.name,
-                      std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)),
-                      [&] { return stop.requested(); }, options.room, *credentials);
+  Result<wire::JoinedRoom> room = wire::join_room(
+      options.server, wire::ClientKind::audio, options.name,
+      std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)), [&] { return stop.requested(); },
+      options.room, *credentials);
   // A stop is what was asked for, also before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
@@ -157,8 +158,8 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   // The reader and this thread deliver in turns.
   std::mutex delivering;
   std::optional<Clock::time_point> heard;  // guarded: when the last message came, none while all is at rest
-  auto watch =
-      StateSubscription::start(std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
+  auto watch = StateSubscription::start(
+      std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
         const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
         const std::lock_guard lock(delivering);
         engine.deliver(scene);

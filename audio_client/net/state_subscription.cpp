@@ -55,7 +55,8 @@ Error StateSubscription::Impl::read() {
   if (status.error_code() == grpc::StatusCode::UNIMPLEMENTED)
     return {ErrorCode::unsupported,
             "the server does not stream cutting states; it is not an Osteon server of this version"};
-  if (status.error_code() == grpc::StatusCode::PERMISSION_DENIED || status.error_code() == grpc::StatusCode::UNAUTHENTICATED)
+  if (status.error_code() == grpc::StatusCode::PERMISSION_DENIED ||
+      status.error_code() == grpc::StatusCode::UNAUTHENTICATED)
     return {ErrorCode::denied, "the server ended the session: " + status.error_message()};
   return {ErrorCode::unavailable, "the server went away; start it again and then osteon-audio"};
 }

@@ -8,8 +8,8 @@
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/drill_synth.hpp"
 #include "common/runtime/spsc_queue.hpp"
-#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/tick_stats.hpp"
+#include "common/runtime/triple_buffer.hpp"
 
 namespace osteon::audio {
 

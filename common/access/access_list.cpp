@@ -47,8 +47,9 @@ Result<AccessList> AccessList::parse(std::string_view text, const std::string& n
     std::getline(words, rest);
     rest = trimmed(rest);
     const auto wrong = [&](const char* what) {
-      return failure(ErrorCode::invalid_input, name + ":" + std::to_string(number) + ": " + what +
-                                                   "; a line is \"revoke certificate|user|ticket WHICH\" or \"role NAME ROLE [ROOM]\"");
+      return failure(ErrorCode::invalid_input,
+                     name + ":" + std::to_string(number) + ": " + what +
+                         "; a line is \"revoke certificate|user|ticket WHICH\" or \"role NAME ROLE [ROOM]\"");
     };
     if (first == "revoke" && rest.empty() && !third.empty()) {
       if (second == "user") {
@@ -73,16 +74,20 @@ Result<AccessList> AccessList::parse(std::string_view text, const std::string& n
   return list;
 }
 
-std::optional<std::string> AccessList::refuses(std::string_view serial, std::string_view user, std::string_view ticket_id) const {
-  if (serials_.contains(number_of(serial))) return "the certificate " + std::string(serial) + " was revoked; ask for a new one";
+std::optional<std::string> AccessList::refuses(std::string_view serial, std::string_view user,
+                                               std::string_view ticket_id) const {
+  if (serials_.contains(number_of(serial)))
+    return "the certificate " + std::string(serial) + " was revoked; ask for a new one";
   if (users_.contains(user)) return "the user " + std::string(user) + " was revoked; ask whoever runs the server";
-  if (tickets_.contains(number_of(ticket_id))) return "the ticket " + std::string(ticket_id) + " was revoked; ask for a new one";
+  if (tickets_.contains(number_of(ticket_id)))
+    return "the ticket " + std::string(ticket_id) + " was revoked; ask for a new one";
   return {};
 }
 
 Role AccessList::role(std::string_view user, std::string_view room, Role of_ticket) const {
   for (const std::string_view where : {room, std::string_view()})
-    if (const auto found = roles_.find({std::string(user), std::string(where)}); found != roles_.end()) return found->second;
+    if (const auto found = roles_.find({std::string(user), std::string(where)}); found != roles_.end())
+      return found->second;
   return of_ticket;
 }
 
@@ -91,10 +96,12 @@ Result<bool> AccessFile::refresh() {
   if (!text_ && !std::filesystem::exists(file_, error) && !error) return false;
   const std::uintmax_t size = std::filesystem::file_size(file_, error);
   if (!error && size > kMostFileBytes)
-    return failure(ErrorCode::invalid_input, file_.string() + " is larger than 4 MiB; this is no list of who was revoked");
+    return failure(ErrorCode::invalid_input,
+                   file_.string() + " is larger than 4 MiB; this is no list of who was revoked");
   std::ifstream in(file_, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(in), {}};
-  if (error || !in) return failure(ErrorCode::not_found, file_.string() + " cannot be read; what it said before goes on to hold");
+  if (error || !in)
+    return failure(ErrorCode::not_found, file_.string() + " cannot be read; what it said before goes on to hold");
   if (text_ == text) return false;
   text_ = text;  // one that is wrong is said once
   Result<AccessList> read = AccessList::parse(text, file_.string());

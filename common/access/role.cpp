@@ -5,7 +5,8 @@
 namespace osteon {
 namespace {
 
-constexpr std::array<std::string_view, kRoles> kNames{"none", "observer", "trainee", "collaborator", "instructor", "operator"};
+constexpr std::array<std::string_view, kRoles> kNames{"none",         "observer",   "trainee",
+                                                      "collaborator", "instructor", "operator"};
 
 }  // namespace
 

@@ -53,7 +53,7 @@ constexpr std::array kCalls{
 
 // In the order of the enumerations.
 constexpr std::array<RoleSet, kDatagrams> kCarried{kHands, kHands, kHands, kHands, kHands, kHands, kHands, kHands};
-constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom, kInRoom,     kHands,    kInRoom,
+constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kHands,     kInRoom,
                                                          kInRoom, kInstructor, kInRoom, kInstructor};
 constexpr std::array<RoleSet, kRights> kGranted{kHands, kHands, kPartners, kInstructor};
 

@@ -1,5 +1,5 @@
-// Which role may do what: the one table for calls, for the datagrams of a session, and for what streams carry. What is not in
-// it is refused.
+// Which role may do what: the one table for calls, for the datagrams of a session, and for what streams carry. What is
+// not in it is refused.
 #pragma once
 #include <cstdint>
 #include <initializer_list>

@@ -117,19 +117,23 @@ Result<std::array<std::uint8_t, 32>> parse_hex(std::string_view text, const char
   while (!text.empty() && space(text.front())) text.remove_prefix(1);
   while (!text.empty() && space(text.back())) text.remove_suffix(1);
   const Result<Digest> bytes = digest_from_hex(text);
-  if (!bytes) return failure(ErrorCode::invalid_input, std::string("the ") + what + " is not 64 hexadecimal digits (0-9, a-f); make one with deploy/certs");
+  if (!bytes)
+    return failure(ErrorCode::invalid_input,
+                   std::string("the ") + what + " is not 64 hexadecimal digits (0-9, a-f); make one with deploy/certs");
   return bytes->bytes;
 }
 
 tl::unexpected<Error> no_ticket(const char* why) {
-  return failure(ErrorCode::invalid_input, std::string("the ticket is malformed (") + why + "); ask for a new one, and copy all of it");
+  return failure(ErrorCode::invalid_input,
+                 std::string("the ticket is malformed (") + why + "); ask for a new one, and copy all of it");
 }
 
 }  // namespace
 
 bool is_user_name(std::string_view text) {
   return !text.empty() && text.size() <= 64 && std::ranges::all_of(text, [](char c) {
-    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' || c == '_' || c == '-' || c == '@';
+    return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '.' || c == '_' ||
+           c == '-' || c == '@';
   });
 }
 
@@ -178,8 +182,10 @@ std::string to_text(const TicketKey& key) { return to_hex(Digest{key.seed}); }
 std::string to_text(const TicketCheckKey& key) { return to_hex(Digest{key.bytes}); }
 
 Result<Ticket> make_ticket(std::string room, std::string user, Role role, UnixTime expires) {
-  if (!is_room_name(room)) return failure(ErrorCode::invalid_input, "a ticket's room needs a name of 1 to 255 bytes, or * for any room");
-  if (!is_user_name(user)) return failure(ErrorCode::invalid_input, "a ticket's user needs a name of 1 to 64 letters, digits and . _ - @");
+  if (!is_room_name(room))
+    return failure(ErrorCode::invalid_input, "a ticket's room needs a name of 1 to 255 bytes, or * for any room");
+  if (!is_user_name(user))
+    return failure(ErrorCode::invalid_input, "a ticket's user needs a name of 1 to 64 letters, digits and . _ - @");
   if (role == Role::none) return failure(ErrorCode::invalid_input, "a ticket needs a role");
   Ticket ticket{.id = {}, .room = std::move(room), .user = std::move(user), .role = role, .expires = expires};
   OSTEON_CHECK(sodium_init() >= 0);
@@ -203,11 +209,13 @@ Result<Ticket> open_ticket(std::string_view text, const TicketCheckKey& key) {
   const std::size_t dot = text.find('.');
   if (dot == std::string_view::npos) return no_ticket("it has no signature");
   const auto contents = from_base64(text.substr(0, dot)), signature = from_base64(text.substr(dot + 1));
-  if (!contents || !signature || signature->size() != crypto_sign_BYTES) return no_ticket("it is not base64 of the right length");
+  if (!contents || !signature || signature->size() != crypto_sign_BYTES)
+    return no_ticket("it is not base64 of the right length");
   // Nothing of the contents is looked at before they are known to be the signer's.
   const Bytes said = signed_bytes(*contents);
   if (crypto_sign_verify_detached(signature->data(), said.data(), said.size(), key.bytes.data()) != 0)
-    return failure(ErrorCode::invalid_input, "the ticket's signature is not this server's; ask whoever runs the server for a ticket");
+    return failure(ErrorCode::invalid_input,
+                   "the ticket's signature is not this server's; ask whoever runs the server for a ticket");
   const std::optional<Ticket> ticket = parse_contents(*contents);
   if (!ticket) return no_ticket("its contents are of another version");
   return *ticket;
@@ -229,7 +237,8 @@ Result<void> check_life(const Ticket& ticket, UnixTime now, std::chrono::hours m
 
 Result<void> check_room(const Ticket& ticket, std::string_view room) {
   if (ticket.room == kAnyRoom || ticket.room == room) return {};
-  return failure(ErrorCode::unsupported, "the ticket is for room " + ticket.room + " and not for this one; ask for one for this room");
+  return failure(ErrorCode::unsupported,
+                 "the ticket is for room " + ticket.room + " and not for this one; ask for one for this room");
 }
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// Join tickets: who may come into which room in what role, until when. Signed with Ed25519 by whoever runs the server; a
-// person's certificate says who they are, the ticket what they may do.
+// Join tickets: who may come into which room in what role, until when. Signed with Ed25519 by whoever runs the server;
+// a person's certificate says who they are, the ticket what they may do.
 #pragma once
 #include <array>
 #include <chrono>
@@ -43,8 +43,8 @@ struct TicketCheckKey {
 
 [[nodiscard]] TicketKey new_ticket_key();
 [[nodiscard]] TicketCheckKey check_key_of(const TicketKey& key);
-// 64 hexadecimal digits; white space around them does not count. Error invalid_input: anything else, with a sentence without
-// the text.
+// 64 hexadecimal digits; white space around them does not count. Error invalid_input: anything else, with a sentence
+// without the text.
 [[nodiscard]] Result<TicketKey> parse_ticket_key(std::string_view text);
 [[nodiscard]] Result<TicketCheckKey> parse_check_key(std::string_view text);
 // One to four keys, a line each: while one takes over from another, tickets of both count. Empty lines do not matter.

@@ -34,7 +34,8 @@ std::string to_hex(const Digest& digest) {
 Result<Digest> digest_from_hex(std::string_view hex) {
   Digest digest;
   if (hex.size() != 2 * digest.bytes.size())
-    return failure(ErrorCode::invalid_input, "a hash needs 64 hexadecimal digits, this has " + std::to_string(hex.size()));
+    return failure(ErrorCode::invalid_input,
+                   "a hash needs 64 hexadecimal digits, this has " + std::to_string(hex.size()));
   for (std::size_t i = 0; i < digest.bytes.size(); ++i) {
     const int high = nibble(hex[2 * i]);
     const int low = nibble(hex[2 * i + 1]);

@@ -6,15 +6,15 @@
 namespace osteon {
 
 enum class ErrorCode {
-  invalid_input,   // a file, field or argument is not what it must be
-  not_found,       // a file, case, server or device is not there
-  unsupported,     // well-formed, but of a version or kind that this program does not know
-  unavailable,     // a peer or device does not answer now; trying again may help
-  cancelled,       // the user asked to stop
-  denied,          // the caller may not do that here
-  exhausted,       // more than a quota allows
-  exists,          // it is already there, or in use by another
-  internal,        // a library failed in a way that the user cannot mend
+  invalid_input,  // a file, field or argument is not what it must be
+  not_found,      // a file, case, server or device is not there
+  unsupported,    // well-formed, but of a version or kind that this program does not know
+  unavailable,    // a peer or device does not answer now; trying again may help
+  cancelled,      // the user asked to stop
+  denied,         // the caller may not do that here
+  exhausted,      // more than a quota allows
+  exists,         // it is already there, or in use by another
+  internal,       // a library failed in a way that the user cannot mend
 };
 
 // One sentence for a person: it names the file, the field and the remedy.

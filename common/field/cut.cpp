@@ -24,7 +24,8 @@ QuantisedPose quantise(const Pose& pose_bone_tool) {
 Pose dequantise(const QuantisedPose& pose) {
   Pose result;
   result.position_mm = {pose.position[0] * kQuantum_mm, pose.position[1] * kQuantum_mm, pose.position[2] * kQuantum_mm};
-  result.rotation = Eigen::Quaterniond(pose.rotation[3], pose.rotation[0], pose.rotation[1], pose.rotation[2]).normalized();
+  result.rotation =
+      Eigen::Quaterniond(pose.rotation[3], pose.rotation[0], pose.rotation[1], pose.rotation[2]).normalized();
   return result;
 }
 

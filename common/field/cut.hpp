@@ -23,14 +23,14 @@ struct QuantisedPose {
 
 struct Cut {
   AuthorId author;
-  std::uint64_t author_seq = 0;   // 1, 2, 3, … for each author
+  std::uint64_t author_seq = 0;  // 1, 2, 3, … for each author
   std::uint64_t lease_epoch = 0;
   BodyId body;
-  Digest tool;                    // hash of the tool's definition, which names the body that cuts
+  Digest tool;  // hash of the tool's definition, which names the body that cuts
   int level = 0;
   std::vector<QuantisedPose> path;  // at least one pose; the first is the previous cut's last
   std::uint32_t spindle_rpm = 0;
-  std::uint32_t path_us = 0;        // time in which the tool went this way
+  std::uint32_t path_us = 0;  // time in which the tool went this way
   friend bool operator==(const Cut&, const Cut&) = default;
 };
 

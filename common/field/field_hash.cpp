@@ -13,7 +13,9 @@ void FieldLeaf::expand() {
 }
 
 void FieldLeaf::compact() {
-  if (values.empty() || is_constant() || !std::ranges::all_of(values, [&](std::int16_t v) { return v == values.front(); })) return;
+  if (values.empty() || is_constant() ||
+      !std::ranges::all_of(values, [&](std::int16_t v) { return v == values.front(); }))
+    return;
   values = std::vector<std::int16_t>{values.front()};
 }
 

@@ -14,11 +14,13 @@ namespace osteon {
 struct FieldLeaf {
   BodyId body;
   int level = 0;
-  Coord origin;  // samples of the level; a multiple of kLeafSize
+  Coord origin;                      // samples of the level; a multiple of kLeafSize
   std::vector<std::int16_t> values;  // kLeafVoxels, or one that all samples have
   // A leaf of one value; one that lists them all need not be seen as such.
   [[nodiscard]] bool is_constant() const { return values.size() == 1; }
-  [[nodiscard]] std::int16_t value(std::size_t sample) const { return values.size() == 1 ? values.front() : values[sample]; }
+  [[nodiscard]] std::int16_t value(std::size_t sample) const {
+    return values.size() == 1 ? values.front() : values[sample];
+  }
   [[nodiscard]] bool holds_values() const { return values.size() == 1 || values.size() == std::size_t{kLeafVoxels}; }
   void expand();   // lists every sample
   void compact();  // keeps one value where all are equal

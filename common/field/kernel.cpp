@@ -76,7 +76,8 @@ struct Rows {
   decltype(&narrow::take_lower) take_lower;
 };
 
-#define OSTEON_ROWS(name) {name::kLanes, name::middles, name::point_distance, name::highest, name::evaluate, name::take_lower}
+#define OSTEON_ROWS(name) \
+  { name::kLanes, name::middles, name::point_distance, name::highest, name::evaluate, name::take_lower }
 constexpr Rows kNarrow = OSTEON_ROWS(narrow);
 #ifdef OSTEON_WIDE_ROWS
 constexpr Rows kWide = OSTEON_ROWS(wide);
@@ -131,7 +132,8 @@ double mm(std::int32_t quanta) { return quanta * kQuantum_mm; }
 double reach_of(const CutBody& body) {
   double farthest = 0.0;
   if (body.kind == CutKind::turned) {
-    for (const ProfileCorner& c : body.profile) farthest = std::max(farthest, root(mm(c.r) * mm(c.r) + mm(c.z) * mm(c.z)));
+    for (const ProfileCorner& c : body.profile)
+      farthest = std::max(farthest, root(mm(c.r) * mm(c.r) + mm(c.z) * mm(c.z)));
     return farthest;
   }
   for (std::size_t k = 0; k < 3; ++k) {
@@ -204,8 +206,8 @@ struct Candidate {
   float middle_mm;
 };
 
-// Distances change at most as fast as the place, so the distance at a leaf's middle bounds those of its samples: a sweep
-// farther than the band changes none, and one that is everywhere farther than another adds nothing to it.
+// Distances change at most as fast as the place, so the distance at a leaf's middle bounds those of its samples: a
+// sweep farther than the band changes none, and one that is everywhere farther than another adds nothing to it.
 void plan_leaf(CutPlan& plan, Coord origin, std::span<const Candidate> candidates, float radius, float band) {
   float farthest = band;
   for (const Candidate& c : candidates) farthest = std::min(farthest, c.middle_mm + radius);
@@ -237,7 +239,8 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
   double slack = 0.001;
   if (body.kind == CutKind::turned) slack += 0.06 * level_pitch_mm_;
   if (body.kind == CutKind::sampled) {
-    OSTEON_CHECK(sampled_ != nullptr && sampled_->box.dims().x > 1 && sampled_->box.dims().y > 1 && sampled_->box.dims().z > 1);
+    OSTEON_CHECK(sampled_ != nullptr && sampled_->box.dims().x > 1 && sampled_->box.dims().y > 1 &&
+                 sampled_->box.dims().z > 1);
     // Between samples the distance is off by less than a cell's diagonal.
     slack += 1.75 * mm(sampled_->pitch);
     const Coord last = sampled_->box.dims() - Coord{1, 1, 1};
@@ -278,8 +281,8 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
     turn_at(1.0, last_turn);
     for (int k = 0; k < 3; ++k) tilt[k] = last_turn[2][k] - first_turn[2][k];
 
-    // A turn is cut at sub-poses between which no point of the cutting part moves by more than a quarter pitch. Half the
-    // angle is the chord between the quaternions, to second order; a turned body's spin moves none of its points. A
+    // A turn is cut at sub-poses between which no point of the cutting part moves by more than a quarter pitch. Half
+    // the angle is the chord between the quaternions, to second order; a turned body's spin moves none of its points. A
     // ball's centre runs on an arc, replaced by chords that leave it by less than a 32nd of a pitch.
     int parts = 1;
     if (body.kind == CutKind::ball) {
@@ -324,8 +327,10 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
         continue;
       }
       turn_at(0.5 * (t0 + t1), turn);
-      if (body.kind == CutKind::turned) add_turned(body, start, end, turn[2]);
-      else add_hull(body, start, end, turn);
+      if (body.kind == CutKind::turned)
+        add_turned(body, start, end, turn[2]);
+      else
+        add_hull(body, start, end, turn);
     }
   }
 }
@@ -360,7 +365,8 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
     const int steps = 1 + static_cast<int>(sideways / (0.25 * level_pitch_mm_));
     for (int step = 0; step < steps; ++step) {
       // Each step moves along the axis, at the middle of its part of the way across.
-      const double t0 = static_cast<double>(step) / steps, t1 = static_cast<double>(step + 1) / steps, middle = 0.5 * (t0 + t1);
+      const double t0 = static_cast<double>(step) / steps, t1 = static_cast<double>(step + 1) / steps,
+                   middle = 0.5 * (t0 + t1);
       double start[3], end[3];
       for (int k = 0; k < 3; ++k) {
         start[k] = from[k] + middle * across[k] + t0 * along * axis[k];
@@ -446,7 +452,8 @@ void SweptTool::add_hull(const CutBody& body, const double from[3], const double
   };
   for (std::size_t i = 0; i < count; ++i) {
     const HullPlane& plane = body.planes[i];
-    const double n[3] = {plane.normal[0] * kDirectionStep, plane.normal[1] * kDirectionStep, plane.normal[2] * kDirectionStep};
+    const double n[3] = {plane.normal[0] * kDirectionStep, plane.normal[1] * kDirectionStep,
+                         plane.normal[2] * kDirectionStep};
     const double length = length_of(n);
     OSTEON_CHECK(length > 0.0);
     Plane& p = planes[i];
@@ -587,7 +594,8 @@ std::vector<Coord> SweptTool::leaves() const {
   return origins;
 }
 
-LeafChange SweptTool::cut_leaf(const CutPlan& plan, const CutPlan::Leaf& leaf, std::span<float, kLeafVoxels> values) const {
+LeafChange SweptTool::cut_leaf(const CutPlan& plan, const CutPlan::Leaf& leaf,
+                               std::span<float, kLeafVoxels> values) const {
   const float band = band_mm(level_pitch_mm_);
   if (leaf.removed) {
     LeafChange change{0, false, true};
@@ -606,7 +614,8 @@ LeafChange SweptTool::cut_leaf(const CutPlan& plan, const CutPlan::Leaf& leaf, s
   for (std::uint32_t i = 0; i < leaf.count; ++i) {
     const CutPlan::Near& near = plan.near[leaf.first + i];
     if (near.nearest_mm >= enough) continue;
-    rows().evaluate(sweeps_[near.sweep], body, leaf.origin, level_pitch_mm_, leaf_radius_mm_, first, enough, band, distances);
+    rows().evaluate(sweeps_[near.sweep], body, leaf.origin, level_pitch_mm_, leaf_radius_mm_, first, enough, band,
+                    distances);
     first = false;
   }
   if (first) return {};

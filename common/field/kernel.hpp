@@ -27,31 +27,32 @@ inline constexpr int kBandVoxels = 4;
 // How one translation of the cutting body is evaluated. The distance to a convex body is convex along a line, and that
 // to a body of revolution that reaches its axis grows with the distance from the axis. What follows from it:
 enum class SweepKind : std::uint8_t {
-  ball,      // a capsule, in closed form
-  axial,     // a turned body moving along its axis is a turned body with a stretched outline
-  across,    // a turned body moving across its axis: the nearest pose is the one whose axis is nearest
-  oblique,   // both: search for the nearest pose by golden section
-  hull,      // a translated hull is a hull again
-  sampled,   // one pose; translations come as several
+  ball,     // a capsule, in closed form
+  axial,    // a turned body moving along its axis is a turned body with a stretched outline
+  across,   // a turned body moving across its axis: the nearest pose is the one whose axis is nearest
+  oblique,  // both: search for the nearest pose by golden section
+  hull,     // a translated hull is a hull again
+  sampled,  // one pose; translations come as several
 };
 
 // The cutting body at one rotation, translated. Places in mm relative to `start_mm`, directions in the bone frame.
 struct ToolSweep {
   SweepKind kind;
-  int search_steps;            // oblique
-  double start_mm[3];          // a ball's centre, else the tip
-  double min_mm[3], max_mm[3]; // box of everything that the sweep removes
-  float motion_mm[3];          // ball
-  float inverse_square;        // ball: 1 / |motion|², 0 without motion
-  float radius;                // ball; turned with a dome: the widest
-  float axis[3], u[3], v[3];   // turned: +z of the tool, and two directions across it; sampled: +z, +x, +y
-  float across_mm, along_mm;   // turned: motion along u and along the axis
-  float length_mm;             // oblique: of the motion
-  float dome, up_mm, down_mm;  // turned: radius of the ball, 0 for none, and how far the sweep moves its centre
-  std::uint32_t first, count;  // turned: edges; hull: planes
+  int search_steps;             // oblique
+  double start_mm[3];           // a ball's centre, else the tip
+  double min_mm[3], max_mm[3];  // box of everything that the sweep removes
+  float motion_mm[3];           // ball
+  float inverse_square;         // ball: 1 / |motion|², 0 without motion
+  float radius;                 // ball; turned with a dome: the widest
+  float axis[3], u[3], v[3];    // turned: +z of the tool, and two directions across it; sampled: +z, +x, +y
+  float across_mm, along_mm;    // turned: motion along u and along the axis
+  float length_mm;              // oblique: of the motion
+  float dome, up_mm, down_mm;   // turned: radius of the ball, 0 for none, and how far the sweep moves its centre
+  std::uint32_t first, count;   // turned: edges; hull: planes
 };
 
-// An edge of a turned body's outline, counter-clockwise: from (r, s), `length` along (er, es), outward normal (es, -er).
+// An edge of a turned body's outline, counter-clockwise: from (r, s), `length` along (er, es), outward normal (es,
+// -er).
 struct OutlineEdge {
   float r, s, er, es, length;
 };
@@ -71,20 +72,20 @@ struct CutPlan {
     std::uint32_t sweep;
     float nearest_mm;  // lower bound of the distance to it in the leaf
   };
-  std::vector<Leaf> leaves;      // sorted
+  std::vector<Leaf> leaves;  // sorted
   std::vector<Near> near;
-  std::int64_t visited = 0;      // leaves of the world bounding block, the planned ones among them
+  std::int64_t visited = 0;  // leaves of the world bounding block, the planned ones among them
 };
 
 struct LeafChange {
-  int modified = 0;         // samples
-  bool computed = false;    // whether distances had to be evaluated
-  bool removed = false;     // of a changed leaf: every sample is now at the lower end of the band
+  int modified = 0;       // samples
+  bool computed = false;  // whether distances had to be evaluated
+  bool removed = false;   // of a changed leaf: every sample is now at the lower end of the band
 };
 
 // A cut made ready for one pitch: its path as translations of the cutting body. They are exact, but for those of rings
-// and sampled bodies, which are taken in steps of a quarter pitch, and for the search of oblique ones, which leaves 0.03
-// pitches. Rotations are taken in steps that move no point by more than a quarter pitch.
+// and sampled bodies, which are taken in steps of a quarter pitch, and for the search of oblique ones, which leaves
+// 0.03 pitches. Rotations are taken in steps that move no point by more than a quarter pitch.
 class SweptTool {
  public:
   // `body`: of the cut's tool. `pitch_mm`: h of the case; the level comes from the cut.

@@ -1,5 +1,5 @@
-// Part of kernel.cpp, which includes it once for each width of the processor's registers: kLanes samples at a time. Each
-// lane does the same operations in the same order for every width.
+// Part of kernel.cpp, which includes it once for each width of the processor's registers: kLanes samples at a time.
+// Each lane does the same operations in the same order for every width.
 
 typedef float Row __attribute__((vector_size(kLanes * 4)));
 typedef std::int32_t RowInt __attribute__((vector_size(kLanes * 4)));
@@ -104,12 +104,15 @@ OSTEON_INLINE Row axial_distance(const ToolSweep& s, const Turned& turned, Row p
 template <bool kDome>
 OSTEON_INLINE Row across_distance(const ToolSweep& s, const Turned& turned, Row px, Row py, Row pz) {
   const Row u = dot(px, py, pz, s.u);
-  return turned_distance<kDome>(s, turned, u - clamp(u, 0.0f, s.across_mm), dot(px, py, pz, s.v), dot(px, py, pz, s.axis));
+  return turned_distance<kDome>(s, turned, u - clamp(u, 0.0f, s.across_mm), dot(px, py, pz, s.v),
+                                dot(px, py, pz, s.axis));
 }
 
-// Samples where even the nearest pose is at least `enough` away, or the middle one deeper than the band, need no search.
+// Samples where even the nearest pose is at least `enough` away, or the middle one deeper than the band, need no
+// search.
 template <bool kDome>
-OSTEON_INLINE Row oblique_distance(const ToolSweep& s, const Turned& turned, Row px, Row py, Row pz, float enough, float band) {
+OSTEON_INLINE Row oblique_distance(const ToolSweep& s, const Turned& turned, Row px, Row py, Row pz, float enough,
+                                   float band) {
   const Row u = dot(px, py, pz, s.u), v = dot(px, py, pz, s.v), w = dot(px, py, pz, s.axis);
   const auto at = [&](Row t) OSTEON_INLINE_LAMBDA {
     return turned_distance<kDome>(s, turned, u - t * s.across_mm, v, w - t * s.along_mm);
@@ -149,8 +152,8 @@ OSTEON_INLINE Row hull_distance(const SweptPlane* planes, std::uint32_t count, R
   return distance;
 }
 
-// Trilinear in the lattice. Outside its box: at least what the nearest point of the box has, and at least the way to the
-// box and the least that its faces have; both grow no faster than the distance itself.
+// Trilinear in the lattice. Outside its box: at least what the nearest point of the box has, and at least the way to
+// the box and the least that its faces have; both grow no faster than the distance itself.
 OSTEON_INLINE Row sampled_distance(const ToolSweep& s, const SweptTool::Body& body, Row px, Row py, Row pz) {
   const SampledDistance& lattice = *body.sampled;
   const Coord dims = lattice.box.dims();
@@ -182,7 +185,8 @@ OSTEON_INLINE Row sampled_distance(const ToolSweep& s, const SweptTool::Body& bo
     }
   }
   Row line[4];
-  for (int k = 0; k < 4; ++k) line[k] = load(corner[2 * k]) + weight[2] * (load(corner[2 * k + 1]) - load(corner[2 * k]));
+  for (int k = 0; k < 4; ++k)
+    line[k] = load(corner[2 * k]) + weight[2] * (load(corner[2 * k + 1]) - load(corner[2 * k]));
   const Row near_x = line[0] + weight[1] * (line[1] - line[0]), far_x = line[2] + weight[1] * (line[3] - line[2]);
   const Row inside = (near_x + weight[0] * (far_x - near_x)) * (1.0f / 1024.0f);
   return square > 0.0f ? high(inside, root(square) + body.sampled_outside) : inside;
@@ -191,10 +195,14 @@ OSTEON_INLINE Row sampled_distance(const ToolSweep& s, const SweptTool::Body& bo
 // Distances of a sweep at points given one by one.
 inline Row distance_at(const ToolSweep& s, const SweptTool::Body& body, Row px, Row py, Row pz) {
   switch (s.kind) {
-    case SweepKind::ball: return ball_distance(s, px, py, pz);
-    case SweepKind::hull: return hull_distance(body.planes.data() + s.first, s.count, px, py, pz);
-    case SweepKind::sampled: return sampled_distance(s, body, px, py, pz);
-    default: break;
+    case SweepKind::ball:
+      return ball_distance(s, px, py, pz);
+    case SweepKind::hull:
+      return hull_distance(body.planes.data() + s.first, s.count, px, py, pz);
+    case SweepKind::sampled:
+      return sampled_distance(s, body, px, py, pz);
+    default:
+      break;
   }
   Turned turned;
   turned.count = s.count;
@@ -270,7 +278,8 @@ OSTEON_INLINE void each_bar(const LeafPlaces& at, bool first, const Spare& spare
   }
   for (int bar = 0; bar < kBars; ++bar) {
     float* out = distances + 2 * kLeafSize * bar;
-    const bool far = middles_mm[bar] - spare.radius >= spare.enough, deep = middles_mm[bar] + spare.radius <= -spare.band;
+    const bool far = middles_mm[bar] - spare.radius >= spare.enough,
+               deep = middles_mm[bar] + spare.radius <= -spare.band;
     if (far && !first) continue;
     if (far || deep) {
       std::fill_n(out, 2 * kLeafSize, deep ? -spare.band : spare.band);
@@ -339,23 +348,26 @@ template <bool kDome>
 void turned_rows(const ToolSweep& s, const Turned& turned, const LeafPlaces& at, bool first, const Spare& spare,
                  float* distances) {
   if (s.kind == SweepKind::axial) {
-    const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return axial_distance<kDome>(s, turned, x, y, z); };
+    const auto distance = [&](Row x, Row y, Row z)
+                              OSTEON_INLINE_LAMBDA { return axial_distance<kDome>(s, turned, x, y, z); };
     each_bar(at, first, spare, distances, distance, distance);
   } else if (s.kind == SweepKind::across) {
-    const auto distance = [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return across_distance<kDome>(s, turned, x, y, z); };
+    const auto distance = [&](Row x, Row y, Row z)
+                              OSTEON_INLINE_LAMBDA { return across_distance<kDome>(s, turned, x, y, z); };
     each_bar(at, first, spare, distances, distance, distance);
   } else {
     constexpr float kFar = 1e9f;
-    each_bar(at, first, spare, distances,
-             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA {
-               return oblique_distance<kDome>(s, turned, x, y, z, spare.enough, spare.band);
-             },
-             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, kFar, kFar); });
+    each_bar(
+        at, first, spare, distances,
+        [&](Row x, Row y, Row z)
+            OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, spare.enough, spare.band); },
+        [&](Row x, Row y, Row z)
+            OSTEON_INLINE_LAMBDA { return oblique_distance<kDome>(s, turned, x, y, z, kFar, kFar); });
   }
 }
 
-void hull_rows(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces& at, float radius, bool first, const Spare& spare,
-               float* distances) {
+void hull_rows(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces& at, float radius, bool first,
+               const Spare& spare, float* distances) {
   // Planes that can be the highest somewhere in the leaf.
   const float px = 0.5f * (at.x[3] + at.x[4]), py = 0.5f * (at.y[3] + at.y[4]), pz = 0.5f * (at.z[3] + at.z[4]);
   const SweptPlane* planes = body.planes.data() + s.first;
@@ -372,8 +384,8 @@ void hull_rows(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces
   each_bar(at, first, spare, distances, distance, distance);
 }
 
-void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, double pitch, float radius, bool first, float enough,
-              float band, float* distances) {
+void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, double pitch, float radius, bool first,
+              float enough, float band, float* distances) {
   LeafPlaces at;
   for (int i = 0; i < kLeafSize; ++i) {
     at.x[i] = static_cast<float>((origin.x + i) * pitch - s.start_mm[0]);
@@ -383,10 +395,11 @@ void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, dou
   // From a leaf's radius to a bar's: what is left of it is room for rounding and search.
   const Spare spare{radius + (kBarRadius - 6.0621778f) * static_cast<float>(pitch), enough, band};
   if (s.kind == SweepKind::ball) {
-    // A copy: a compiler that knows that nothing written can be part of it keeps it in registers. A ball's distance costs
-    // no more than sparing it.
+    // A copy: a compiler that knows that nothing written can be part of it keeps it in registers. A ball's distance
+    // costs no more than sparing it.
     const ToolSweep ball = s;
-    each_row(at, first, distances, [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return ball_distance(ball, x, y, z); });
+    each_row(at, first, distances,
+             [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return ball_distance(ball, x, y, z); });
   } else if (s.kind == SweepKind::hull) {
     hull_rows(s, body, at, radius, first, spare, distances);
   } else if (s.kind == SweepKind::sampled) {
@@ -395,8 +408,10 @@ void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, dou
   } else {
     const ToolSweep copy = s;
     const Turned turned = near_edges(s, body, at, radius);
-    if (s.dome > 0.0f) turned_rows<true>(copy, turned, at, first, spare, distances);
-    else turned_rows<false>(copy, turned, at, first, spare, distances);
+    if (s.dome > 0.0f)
+      turned_rows<true>(copy, turned, at, first, spare, distances);
+    else
+      turned_rows<false>(copy, turned, at, first, spare, distances);
   }
 }
 

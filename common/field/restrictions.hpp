@@ -1,5 +1,5 @@
-// What an instructor has decided about one hand: all that holds, not what has changed. A row of the room; the hand's own
-// loop keeps to it as well, so that nothing is predicted that the room would refuse.
+// What an instructor has decided about one hand: all that holds, not what has changed. A row of the room; the hand's
+// own loop keeps to it as well, so that nothing is predicted that the room would refuse.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -24,14 +24,14 @@ struct ZoneLimit {
 };
 
 struct Restrictions {
-  bool stopped = false;        // may not cut
-  AuthorId taken_by{};           // who holds its tool; null: itself
-  AuthorId guide{};              // along whose tool the hand is pulled; null: nobody's
-  int guide_share = 0;         // how firmly, 1000: as firmly as the device may
-  int force_limit = 0;         // most that the hand is made to feel and cuts with, steps of 0.01 N; 0: no such limit
+  bool stopped = false;  // may not cut
+  AuthorId taken_by{};   // who holds its tool; null: itself
+  AuthorId guide{};      // along whose tool the hand is pulled; null: nobody's
+  int guide_share = 0;   // how firmly, 1000: as firmly as the device may
+  int force_limit = 0;   // most that the hand is made to feel and cuts with, steps of 0.01 N; 0: no such limit
   std::optional<ZoneLimit> zone{};  // where the tip must be to cut; none: anywhere
-  std::vector<Digest> tools{};   // that it may cut with, sorted; none: all
-  std::string words{};           // why, shown to the trainee
+  std::vector<Digest> tools{};      // that it may cut with, sorted; none: all
+  std::string words{};              // why, shown to the trainee
 
   [[nodiscard]] bool may_cut() const { return !stopped && !taken_by; }
   [[nodiscard]] double force_limit_n() const { return 0.01 * force_limit; }

@@ -69,8 +69,8 @@ struct Box {
   [[nodiscard]] Box grown(double by_mm) const { return {min_mm.array() - by_mm, max_mm.array() + by_mm}; }
 };
 
-// Pitch of a level, mm; below 0 the coarser ones in which far surfaces are drawn. Halving is exact in binary, so it is the
-// same number everywhere.
+// Pitch of a level, mm; below 0 the coarser ones in which far surfaces are drawn. Halving is exact in binary, so it is
+// the same number everywhere.
 [[nodiscard]] constexpr double level_pitch_mm(double pitch_mm, int level) {
   return level < 0 ? pitch_mm * static_cast<double>(1 << -level) : pitch_mm / static_cast<double>(1 << level);
 }

@@ -21,8 +21,10 @@ EdgeFaults edge_faults(const TriangleMesh& mesh) {
     int balance = 0;
     for (; end < edges.size() && edges[end].first == edges[i].first; ++end) balance += edges[end].second;
     // Two solids may touch in an edge, which then has four sides that balance.
-    if (balance != 0) ++faults.open;
-    else if (end - i > 2) ++faults.non_manifold;
+    if (balance != 0)
+      ++faults.open;
+    else if (end - i > 2)
+      ++faults.non_manifold;
     i = end;
   }
   return faults;

@@ -30,8 +30,8 @@ tl::unexpected<Error> bad(const fs::path& file, const std::string& what) {
 }
 
 bool finite(const std::vector<Point>& corners) {
-  return std::ranges::all_of(corners,
-                             [](const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); });
+  return std::ranges::all_of(
+      corners, [](const Point& p) { return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]); });
 }
 
 std::vector<Point> binary_corners(std::string_view bytes, std::size_t count) {
@@ -55,7 +55,8 @@ class Words {
   }
   void skip_line() { at_ = std::min(text_.find('\n', at_), text_.size()); }
   [[nodiscard]] std::size_t line() const {
-    return 1 + static_cast<std::size_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
+    return 1 +
+           static_cast<std::size_t>(std::count(text_.begin(), text_.begin() + static_cast<std::ptrdiff_t>(at_), '\n'));
   }
 
  private:
@@ -82,7 +83,8 @@ Result<std::vector<Point>> ascii_corners(std::string_view text, const fs::path& 
   std::vector<Point> corners;
   Words words(text);
   const auto fault = [&](const std::string& what) {
-    return bad(file, "is not a whole ASCII STL: line " + std::to_string(words.line()) + " " + what + "; export it again");
+    return bad(file,
+               "is not a whole ASCII STL: line " + std::to_string(words.line()) + " " + what + "; export it again");
   };
   words.skip_line();  // "solid" and its name
   for (std::string_view word = words.next(); word != "endsolid"; word = words.next()) {
@@ -96,7 +98,8 @@ Result<std::vector<Point>> ascii_corners(std::string_view text, const fs::path& 
       if (words.next() != "vertex" || !read_point(words, p)) return fault("should be a vertex with three numbers");
       corners.push_back(p);
     }
-    if (words.next() != "endloop" || words.next() != "endfacet") return fault("should end the facet after three vertices");
+    if (words.next() != "endloop" || words.next() != "endfacet")
+      return fault("should end the facet after three vertices");
   }
   return corners;
 }
@@ -107,8 +110,9 @@ TriangleMesh welded(std::vector<Point> corners) {
   std::vector<std::uint32_t> order(corners.size()), vertex(corners.size());
   std::iota(order.begin(), order.end(), 0u);
   // By place, then by first use: vertices keep the order of the file.
-  std::ranges::sort(order,
-                    [&](std::uint32_t a, std::uint32_t b) { return corners[a] != corners[b] ? corners[a] < corners[b] : a < b; });
+  std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
+    return corners[a] != corners[b] ? corners[a] < corners[b] : a < b;
+  });
   std::vector<std::uint32_t> first(corners.size());
   for (std::size_t i = 0; i < order.size(); ++i)
     first[order[i]] = i > 0 && corners[order[i]] == corners[order[i - 1]] ? first[order[i - 1]] : order[i];
@@ -149,14 +153,16 @@ Result<void> write_whole(const fs::path& file, const std::string& bytes) {
     stream.flush();
     if (!stream) {
       fs::remove(partial, error);
-      return failure(ErrorCode::unavailable, file.string() + " cannot be written; check its folder and the space on the disk");
+      return failure(ErrorCode::unavailable,
+                     file.string() + " cannot be written; check its folder and the space on the disk");
     }
   }
   fs::rename(partial, file, error);
   if (error) {
     std::error_code ignored;
     fs::remove(partial, ignored);
-    return failure(ErrorCode::unavailable, file.string() + " cannot be written (" + error.message() + "); choose another name");
+    return failure(ErrorCode::unavailable,
+                   file.string() + " cannot be written (" + error.message() + "); choose another name");
   }
   return {};
 }
@@ -182,8 +188,8 @@ Result<TriangleMesh> read_stl(const fs::path& file) {
     auto read = ascii_corners(bytes, file);
     if (!read) return tl::unexpected(read.error());
     corners = std::move(*read);
-  } else if (bytes.size() >= kHeader && count > 0 && count <= kMostTriangles && bytes.size() < kHeader + count * kFacet &&
-             bytes.size() > kHeader) {
+  } else if (bytes.size() >= kHeader && count > 0 && count <= kMostTriangles &&
+             bytes.size() < kHeader + count * kFacet && bytes.size() > kHeader) {
     return bad(file, "is cut off: it should have " + std::to_string(count) + " triangles and has " +
                          std::to_string((bytes.size() - kHeader) / kFacet) + "; copy or export it again");
   } else {
@@ -213,9 +219,11 @@ Result<void> write_stl(const TriangleMesh& mesh, const fs::path& file) {
 Result<void> write_ply(const TriangleMesh& mesh, const fs::path& file) {
   const bool normals = !mesh.normals.empty();
   std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment Osteon, millimetres\nelement vertex " +
-                      std::to_string(mesh.positions_mm.size()) + "\nproperty float x\nproperty float y\nproperty float z\n";
+                      std::to_string(mesh.positions_mm.size()) +
+                      "\nproperty float x\nproperty float y\nproperty float z\n";
   if (normals) bytes += "property float nx\nproperty float ny\nproperty float nz\n";
-  bytes += "element face " + std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  bytes += "element face " + std::to_string(mesh.triangles.size()) +
+           "\nproperty list uchar int vertex_indices\nend_header\n";
   for (std::size_t i = 0; i < mesh.positions_mm.size(); ++i) {
     append(bytes, mesh.positions_mm[i]);
     if (normals) append(bytes, mesh.normals[i]);

@@ -201,8 +201,7 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
     return tl::unexpected(left.error());
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (candidate->values[i] == 0) found->values[i] = 0;
-  auto around =
-      within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
+  auto around = within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
   if (!around) return around;
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (around->values[i] == 0) found->values[i] = 0;

@@ -200,8 +200,7 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
       centres.values[i] = wall->values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
     auto reach = within_mm(centres, spacing_mm, params.bridged_mm, part(keep_going, 0.35, 0.5));
     if (!reach) return reach;
-    auto grown =
-        grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
+    auto grown = grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
     if (!grown) return grown;
     for (std::size_t i = 0; i < closed.values.size(); ++i)
       if (grown->values[i] != 0) closed.values[i] = 1;

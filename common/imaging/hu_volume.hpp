@@ -11,18 +11,19 @@
 namespace osteon::imaging {
 
 struct HuVolume {
-  std::array<int, 3> dims{};                                   // columns, rows, slices
-  Vec3 spacing_mm = Vec3::Ones();                              // between neighbours along each
-  Vec3 origin_mm = Vec3::Zero();                               // centre of the first voxel, LPS
-  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();    // orthonormal: the way columns, rows, slices go, LPS
-  std::vector<std::int16_t> values;                            // columns fastest, then rows, then slices
+  std::array<int, 3> dims{};                                 // columns, rows, slices
+  Vec3 spacing_mm = Vec3::Ones();                            // between neighbours along each
+  Vec3 origin_mm = Vec3::Zero();                             // centre of the first voxel, LPS
+  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  // orthonormal: the way columns, rows, slices go, LPS
+  std::vector<std::int16_t> values;                          // columns fastest, then rows, then slices
 
   [[nodiscard]] std::size_t count() const {
     return static_cast<std::size_t>(dims[0]) * static_cast<std::size_t>(dims[1]) * static_cast<std::size_t>(dims[2]);
   }
   [[nodiscard]] std::size_t index(int column, int row, int slice) const {
     return (static_cast<std::size_t>(slice) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(row)) *
-               static_cast<std::size_t>(dims[0]) + static_cast<std::size_t>(column);
+               static_cast<std::size_t>(dims[0]) +
+           static_cast<std::size_t>(column);
   }
   [[nodiscard]] std::int16_t at(int column, int row, int slice) const { return values[index(column, row, slice)]; }
 

@@ -13,7 +13,7 @@ namespace osteon::imaging {
 namespace {
 
 constexpr float kUnshrink = 1.02f;  // μ: a little above the blur's 1, so that what should stay is not lost in 16 steps
-constexpr int kDensityReach = 2;  // voxels beyond the bone that have its density
+constexpr int kDensityReach = 2;    // voxels beyond the bone that have its density
 
 // work(i) for i in [0, count) on all cores; each i is done by one thread, so results do not depend on their number.
 // False when keep_going, asked from the caller's thread only, wanted it stopped.
@@ -37,7 +37,9 @@ bool each_in_parallel(int count, const std::function<void(int)>& work, const Kee
   return !stopped && keep_going(1.0);
 }
 
-tl::unexpected<Error> stopped_smoothing() { return failure(ErrorCode::cancelled, "stopped while smoothing the labels"); }
+tl::unexpected<Error> stopped_smoothing() {
+  return failure(ErrorCode::cancelled, "stopped while smoothing the labels");
+}
 
 // [1 2 1]/4 on `count` rows of `width` values each, `step` apart; rows beyond the ends are as the end ones.
 void filter_rows(float* values, std::ptrdiff_t step, int count, int width, std::vector<float>& before) {
@@ -68,10 +70,12 @@ struct Bracket {
   float part = 0;
 };
 
-std::vector<Bracket> brackets(int first_sample, int last_sample, double pitch_mm, double spacing_mm, int first_voxel, int last_voxel) {
+std::vector<Bracket> brackets(int first_sample, int last_sample, double pitch_mm, double spacing_mm, int first_voxel,
+                              int last_voxel) {
   std::vector<Bracket> out;
   for (int i = first_sample; i <= last_sample; ++i) {
-    const double at = std::clamp(i * pitch_mm / spacing_mm, static_cast<double>(first_voxel), static_cast<double>(last_voxel));
+    const double at =
+        std::clamp(i * pitch_mm / spacing_mm, static_cast<double>(first_voxel), static_cast<double>(last_voxel));
     const int low = std::min(static_cast<int>(std::floor(at)), std::max(first_voxel, last_voxel - 1));
     out.push_back({low - first_voxel, std::min(low + 1, last_voxel) - first_voxel, static_cast<float>(at - low)});
   }
@@ -94,14 +98,16 @@ CoordBox bone_voxels(const LabelVolume& volume) {
   return box;
 }
 
-Result<DenseVolume<float>> smooth_labels(const LabelVolume& volume, const SmoothingParams& params, const KeepGoing& keep_going) {
+Result<DenseVolume<float>> smooth_labels(const LabelVolume& volume, const SmoothingParams& params,
+                                         const KeepGoing& keep_going) {
   const DenseVolume<std::uint8_t>& labels = volume.labels;
   const Coord n = labels.box.dims();
   OSTEON_CHECK(!labels.box.empty() && params.rounds >= 0 && params.least >= 0.0f && params.least < 1.0f);
   DenseVolume<float> field;
   field.box = labels.box;
   field.values.resize(labels.values.size());
-  std::ranges::transform(labels.values, field.values.begin(), [](std::uint8_t label) { return label != 0 ? 1.0f : -1.0f; });
+  std::ranges::transform(labels.values, field.values.begin(),
+                         [](std::uint8_t label) { return label != 0 ? 1.0f : -1.0f; });
 
   const std::ptrdiff_t plane = static_cast<std::ptrdiff_t>(n.y) * n.z;
   std::vector<float> blurred(field.values.size());
@@ -111,55 +117,72 @@ Result<DenseVolume<float>> smooth_labels(const LabelVolume& volume, const Smooth
       return [&, begin, end](double f) { return keep_going((step + begin + (end - begin) * f) / (2 * params.rounds)); };
     };
     // Along y and z in planes of one x, then along x in columns of one y, where the bound is put on as well.
-    const bool first = each_in_parallel(n.x, [&](int x) {
-      thread_local std::vector<float> before;
-      float* values = blurred.data() + x * plane;
-      std::copy_n(field.values.data() + x * plane, plane, values);
-      filter_rows(values, n.z, n.y, n.z, before);
-      for (int y = 0; y < n.y; ++y) filter_line(values + static_cast<std::ptrdiff_t>(y) * n.z, n.z);
-    }, part(0.0, 0.5));
+    const bool first = each_in_parallel(
+        n.x,
+        [&](int x) {
+          thread_local std::vector<float> before;
+          float* values = blurred.data() + x * plane;
+          std::copy_n(field.values.data() + x * plane, plane, values);
+          filter_rows(values, n.z, n.y, n.z, before);
+          for (int y = 0; y < n.y; ++y) filter_line(values + static_cast<std::ptrdiff_t>(y) * n.z, n.z);
+        },
+        part(0.0, 0.5));
     if (!first) return stopped_smoothing();
-    const bool second = each_in_parallel(n.y, [&](int y) {
-      thread_local std::vector<float> before;
-      const std::ptrdiff_t start = static_cast<std::ptrdiff_t>(y) * n.z;
-      filter_rows(blurred.data() + start, plane, n.x, n.z, before);
-      for (int x = 0; x < n.x; ++x)
-        for (std::ptrdiff_t i = start + x * plane; i < start + x * plane + n.z; ++i) {
-          const auto at = static_cast<std::size_t>(i);
-          const float value = sharpen ? field.values[at] + kUnshrink * (field.values[at] - blurred[at]) : blurred[at];
-          field.values[at] = labels.values[at] != 0 ? std::max(value, params.least) : std::min(value, -params.least);
-        }
-    }, part(0.5, 1.0));
+    const bool second = each_in_parallel(
+        n.y,
+        [&](int y) {
+          thread_local std::vector<float> before;
+          const std::ptrdiff_t start = static_cast<std::ptrdiff_t>(y) * n.z;
+          filter_rows(blurred.data() + start, plane, n.x, n.z, before);
+          for (int x = 0; x < n.x; ++x)
+            for (std::ptrdiff_t i = start + x * plane; i < start + x * plane + n.z; ++i) {
+              const auto at = static_cast<std::size_t>(i);
+              const float value =
+                  sharpen ? field.values[at] + kUnshrink * (field.values[at] - blurred[at]) : blurred[at];
+              field.values[at] =
+                  labels.values[at] != 0 ? std::max(value, params.least) : std::min(value, -params.least);
+            }
+        },
+        part(0.5, 1.0));
     if (!second) return stopped_smoothing();
   }
   return field;
 }
 
-Result<DenseVolume<float>> resample(const DenseVolume<float>& field, const Vec3& spacing_mm, const CoordBox& box, double pitch_mm,
-                                    const KeepGoing& keep_going) {
+Result<DenseVolume<float>> resample(const DenseVolume<float>& field, const Vec3& spacing_mm, const CoordBox& box,
+                                    double pitch_mm, const KeepGoing& keep_going) {
   const CoordBox& from = field.box;
   const auto xs = brackets(box.min.x, box.max.x, pitch_mm, spacing_mm.x(), from.min.x, from.max.x);
   const auto ys = brackets(box.min.y, box.max.y, pitch_mm, spacing_mm.y(), from.min.y, from.max.y);
   const auto zs = brackets(box.min.z, box.max.z, pitch_mm, spacing_mm.z(), from.min.z, from.max.z);
   DenseVolume<float> out(box, 0.0f);
   const std::ptrdiff_t row = from.dims().z, plane = row * from.dims().y;
-  const bool done = each_in_parallel(static_cast<int>(xs.size()), [&](int x) {
-    float* value = out.values.data() + static_cast<std::ptrdiff_t>(x) * static_cast<std::ptrdiff_t>(ys.size() * zs.size());
-    const Bracket& i = xs[static_cast<std::size_t>(x)];
-    for (const Bracket& j : ys) {
-      const float* line[4] = {field.values.data() + i.low * plane + j.low * row, field.values.data() + i.low * plane + j.high * row,
-                              field.values.data() + i.high * plane + j.low * row, field.values.data() + i.high * plane + j.high * row};
-      const float weight[4] = {(1.0f - i.part) * (1.0f - j.part), (1.0f - i.part) * j.part, i.part * (1.0f - j.part), i.part * j.part};
-      const auto at = [&](int k) { return weight[0] * line[0][k] + weight[1] * line[1][k] + weight[2] * line[2][k] + weight[3] * line[3][k]; };
-      for (const Bracket& k : zs) *value++ = k.part == 0.0f ? at(k.low) : (1.0f - k.part) * at(k.low) + k.part * at(k.high);
-    }
-  }, keep_going);
+  const bool done = each_in_parallel(
+      static_cast<int>(xs.size()),
+      [&](int x) {
+        float* value =
+            out.values.data() + static_cast<std::ptrdiff_t>(x) * static_cast<std::ptrdiff_t>(ys.size() * zs.size());
+        const Bracket& i = xs[static_cast<std::size_t>(x)];
+        for (const Bracket& j : ys) {
+          const float* line[4] = {
+              field.values.data() + i.low * plane + j.low * row, field.values.data() + i.low * plane + j.high * row,
+              field.values.data() + i.high * plane + j.low * row, field.values.data() + i.high * plane + j.high * row};
+          const float weight[4] = {(1.0f - i.part) * (1.0f - j.part), (1.0f - i.part) * j.part,
+                                   i.part * (1.0f - j.part), i.part * j.part};
+          const auto at = [&](int k) {
+            return weight[0] * line[0][k] + weight[1] * line[1][k] + weight[2] * line[2][k] + weight[3] * line[3][k];
+          };
+          for (const Bracket& k : zs)
+            *value++ = k.part == 0.0f ? at(k.low) : (1.0f - k.part) * at(k.low) + k.part * at(k.high);
+        }
+      },
+      keep_going);
   if (!done) return stopped_smoothing();
   return out;
 }
 
-Result<DenseVolume<float>> label_density(const LabelVolume& volume, std::span<const float> density_g_cm3, const CoordBox& box,
-                                         double pitch_mm, const KeepGoing& keep_going) {
+Result<DenseVolume<float>> label_density(const LabelVolume& volume, std::span<const float> density_g_cm3,
+                                         const CoordBox& box, double pitch_mm, const KeepGoing& keep_going) {
   // The largest label within reach along every axis in turn, for voxels that are not bone.
   const Coord n = volume.labels.box.dims();
   const std::ptrdiff_t strides[3] = {static_cast<std::ptrdiff_t>(n.y) * n.z, n.z, 1};
@@ -167,21 +190,25 @@ Result<DenseVolume<float>> label_density(const LabelVolume& volume, std::span<co
   std::vector<std::uint8_t> spread = volume.labels.values;
   for (int axis = 0; axis < 3; ++axis) {
     const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;  // v has the smaller stride of the others
-    const bool done = each_in_parallel(sizes[u], [&](int i) {
-      thread_local std::vector<std::uint8_t> line;
-      line.resize(static_cast<std::size_t>(sizes[axis]));
-      for (int j = 0; j < sizes[v]; ++j) {
-        std::uint8_t* at = spread.data() + i * strides[u] + j * strides[v];
-        for (int k = 0; k < sizes[axis]; ++k) line[static_cast<std::size_t>(k)] = at[k * strides[axis]];
-        for (int k = 0; k < sizes[axis]; ++k) {
-          if (line[static_cast<std::size_t>(k)] != 0) continue;
-          std::uint8_t most = 0;
-          const int end = std::min(sizes[axis] - 1, k + kDensityReach);
-          for (int m = std::max(0, k - kDensityReach); m <= end; ++m) most = std::max(most, line[static_cast<std::size_t>(m)]);
-          at[k * strides[axis]] = most;
-        }
-      }
-    }, [&](double f) { return keep_going(0.25 * (axis + f)); });
+    const bool done = each_in_parallel(
+        sizes[u],
+        [&](int i) {
+          thread_local std::vector<std::uint8_t> line;
+          line.resize(static_cast<std::size_t>(sizes[axis]));
+          for (int j = 0; j < sizes[v]; ++j) {
+            std::uint8_t* at = spread.data() + i * strides[u] + j * strides[v];
+            for (int k = 0; k < sizes[axis]; ++k) line[static_cast<std::size_t>(k)] = at[k * strides[axis]];
+            for (int k = 0; k < sizes[axis]; ++k) {
+              if (line[static_cast<std::size_t>(k)] != 0) continue;
+              std::uint8_t most = 0;
+              const int end = std::min(sizes[axis] - 1, k + kDensityReach);
+              for (int m = std::max(0, k - kDensityReach); m <= end; ++m)
+                most = std::max(most, line[static_cast<std::size_t>(m)]);
+              at[k * strides[axis]] = most;
+            }
+          }
+        },
+        [&](double f) { return keep_going(0.25 * (axis + f)); });
     if (!done) return stopped_smoothing();
   }
 
@@ -196,13 +223,17 @@ Result<DenseVolume<float>> label_density(const LabelVolume& volume, std::span<co
   const auto ys = nearest(box.min.y, box.max.y, volume.spacing_mm.y(), from.min.y, from.max.y);
   const auto zs = nearest(box.min.z, box.max.z, volume.spacing_mm.z(), from.min.z, from.max.z);
   DenseVolume<float> out(box, 0.0f);
-  const bool done = each_in_parallel(static_cast<int>(xs.size()), [&](int x) {
-    float* value = out.values.data() + static_cast<std::ptrdiff_t>(x) * static_cast<std::ptrdiff_t>(ys.size() * zs.size());
-    for (const std::ptrdiff_t y : ys) {
-      const std::uint8_t* line = spread.data() + xs[static_cast<std::size_t>(x)] * strides[0] + y * strides[1];
-      for (const std::ptrdiff_t z : zs) *value++ = density_g_cm3[line[z]];
-    }
-  }, [&](double f) { return keep_going(0.75 + 0.25 * f); });
+  const bool done = each_in_parallel(
+      static_cast<int>(xs.size()),
+      [&](int x) {
+        float* value =
+            out.values.data() + static_cast<std::ptrdiff_t>(x) * static_cast<std::ptrdiff_t>(ys.size() * zs.size());
+        for (const std::ptrdiff_t y : ys) {
+          const std::uint8_t* line = spread.data() + xs[static_cast<std::size_t>(x)] * strides[0] + y * strides[1];
+          for (const std::ptrdiff_t z : zs) *value++ = density_g_cm3[line[z]];
+        }
+      },
+      [&](double f) { return keep_going(0.75 + 0.25 * f); });
   if (!done) return stopped_smoothing();
   return out;
 }

@@ -63,10 +63,13 @@ Error hid_open_error(const std::string& what, const std::string& path, int numbe
     case ENOENT:
     case ENODEV:
     case ENOTTY:  // the node is there for a moment yet, but no device behind it
-    case ENXIO: return say(what + " at " + path + " was unplugged; plug it in again");
-    case EBUSY: return say("another program uses " + what + " at " + path + "; end it");
+    case ENXIO:
+      return say(what + " at " + path + " was unplugged; plug it in again");
+    case EBUSY:
+      return say("another program uses " + what + " at " + path + "; end it");
     default:
-      return say(what + " at " + path + " cannot be opened (" + (number != 0 ? std::strerror(number) : "hidapi gives no reason") +
+      return say(what + " at " + path + " cannot be opened (" +
+                 (number != 0 ? std::strerror(number) : "hidapi gives no reason") +
                  "); unplug it and plug it in again");
   }
 }
@@ -95,7 +98,8 @@ Result<std::size_t> HidPort::read(std::span<std::uint8_t> into, std::chrono::mil
 
 Result<void> HidPort::write(std::span<const std::uint8_t> report) {
   if (hid_write(handle_->device, report.data(), report.size()) >= 0) return {};
-  return failure(ErrorCode::unavailable, handle_->what + " does not take what it is sent; unplug it and plug it in again");
+  return failure(ErrorCode::unavailable,
+                 handle_->what + " does not take what it is sent; unplug it and plug it in again");
 }
 
 std::vector<std::uint8_t> HidPort::descriptor() const {

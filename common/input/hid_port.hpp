@@ -17,8 +17,8 @@ namespace osteon {
 
 struct HidFound {
   std::string path, product, serial;
-  std::uint16_t vendor = 0, model = 0;         // USB ids
-  std::uint16_t usage_page = 0, usage = 0;     // of the collection: 1/8 a multi-axis controller, 1/4 a joystick
+  std::uint16_t vendor = 0, model = 0;      // USB ids
+  std::uint16_t usage_page = 0, usage = 0;  // of the collection: 1/8 a multi-axis controller, 1/4 a joystick
 };
 
 // Any thread.
@@ -55,7 +55,8 @@ class HidReader {
   using Take = std::function<void(std::span<const std::uint8_t>)>;
   ~HidReader() { stop(); }
 
-  // `at_end` is called on the reading thread when the device has gone, `before_close` when it is stopped and still there.
+  // `at_end` is called on the reading thread when the device has gone, `before_close` when it is stopped and still
+  // there.
   struct Calls {
     Take take;
     std::function<void()> at_end;

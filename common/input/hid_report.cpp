@@ -34,9 +34,23 @@ std::int32_t sign_extended(std::uint32_t value, std::uint32_t bits) {
 
 // Tags with their type, size bits cleared.
 enum Item : std::uint8_t {
-  kInput = 0x80, kOutput = 0x90, kFeature = 0xb0, kCollection = 0xa0, kEndCollection = 0xc0,
-  kUsagePage = 0x04, kLogicalMinimum = 0x14, kLogicalMaximum = 0x24, kReportSize = 0x74, kReportId = 0x84, kReportCount = 0x94,
-  kPush = 0xa4, kPop = 0xb4, kUsage = 0x08, kUsageMinimum = 0x18, kUsageMaximum = 0x28, kLong = 0xfe,
+  kInput = 0x80,
+  kOutput = 0x90,
+  kFeature = 0xb0,
+  kCollection = 0xa0,
+  kEndCollection = 0xc0,
+  kUsagePage = 0x04,
+  kLogicalMinimum = 0x14,
+  kLogicalMaximum = 0x24,
+  kReportSize = 0x74,
+  kReportId = 0x84,
+  kReportCount = 0x94,
+  kPush = 0xa4,
+  kPop = 0xb4,
+  kUsage = 0x08,
+  kUsageMinimum = 0x18,
+  kUsageMaximum = 0x28,
+  kLong = 0xfe,
 };
 constexpr std::uint32_t kConstant = 1, kVariable = 2;
 constexpr std::uint32_t kMostFields = 1024, kMostBits = 1u << 16;
@@ -50,7 +64,8 @@ std::optional<std::int32_t> HidField::value(std::span<const std::uint8_t> read) 
   }
   if (bits == 0 || bits > 32 || bit + bits > read.size() * 8) return std::nullopt;
   std::uint32_t raw = 0;
-  for (std::uint32_t i = 0; i < bits; ++i) raw |= static_cast<std::uint32_t>((read[(bit + i) / 8] >> ((bit + i) % 8)) & 1) << i;
+  for (std::uint32_t i = 0; i < bits; ++i)
+    raw |= static_cast<std::uint32_t>((read[(bit + i) / 8] >> ((bit + i) % 8)) & 1) << i;
   return lowest < 0 ? sign_extended(raw, bits) : static_cast<std::int32_t>(raw);
 }
 
@@ -82,28 +97,44 @@ std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor)
     const std::int32_t number = sign_extended(data, static_cast<std::uint32_t>(8 * size));
 
     switch (prefix & 0xfc) {
-      case kUsagePage: globals.page = static_cast<std::uint16_t>(data); break;
-      case kLogicalMinimum: globals.lowest = number; break;
+      case kUsagePage:
+        globals.page = static_cast<std::uint16_t>(data);
+        break;
+      case kLogicalMinimum:
+        globals.lowest = number;
+        break;
       case kLogicalMaximum:
         globals.highest = number;
         globals.highest_unsigned = data;
         break;
-      case kReportSize: globals.bits = data; break;
-      case kReportCount: globals.count = data; break;
-      case kReportId: globals.report = static_cast<std::uint8_t>(data); break;
-      case kPush: stack.push_back(globals); break;
+      case kReportSize:
+        globals.bits = data;
+        break;
+      case kReportCount:
+        globals.count = data;
+        break;
+      case kReportId:
+        globals.report = static_cast<std::uint8_t>(data);
+        break;
+      case kPush:
+        stack.push_back(globals);
+        break;
       case kPop:
         if (stack.empty()) return fields;
         globals = stack.back();
         stack.pop_back();
         break;
       // A usage of four bytes brings its own page.
-      case kUsage: locals.usages.push_back(size == 4 ? data : std::uint32_t{globals.page} << 16 | data); break;
+      case kUsage:
+        locals.usages.push_back(size == 4 ? data : std::uint32_t{globals.page} << 16 | data);
+        break;
       case kUsageMinimum:
         locals.first = size == 4 ? data : std::uint32_t{globals.page} << 16 | data;
         locals.ranged = true;
         break;
-      case kUsageMaximum: locals.last = size == 4 ? data : std::uint32_t{globals.page} << 16 | data; break;
+      case kUsageMaximum:
+        locals.last = size == 4 ? data : std::uint32_t{globals.page} << 16 | data;
+        break;
       case kInput: {
         std::uint32_t& end = ends[globals.report];
         if (globals.count > kMostFields || globals.bits > 32 * 8 || end > kMostBits) return fields;
@@ -129,8 +160,11 @@ std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor)
       case kOutput:
       case kFeature:
       case kCollection:
-      case kEndCollection: locals = {}; break;
-      default: break;
+      case kEndCollection:
+        locals = {};
+        break;
+      default:
+        break;
     }
   }
   return fields;

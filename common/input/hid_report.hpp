@@ -9,8 +9,8 @@ namespace osteon {
 
 struct HidField {
   std::uint16_t page = 0, usage = 0;
-  std::uint8_t report = 0;          // its id; 0: the device numbers no reports
-  std::uint32_t bit = 0;            // from the report's first byte, behind the id if there is one
+  std::uint8_t report = 0;  // its id; 0: the device numbers no reports
+  std::uint32_t bit = 0;    // from the report's first byte, behind the id if there is one
   std::uint32_t bits = 0;
   std::int32_t lowest = 0, highest = 0;
 

@@ -27,7 +27,9 @@ constexpr auto kDeflectionHeld = 500ms;
 constexpr std::chrono::milliseconds kLookAgain{1000}, kLookAfter{100};  // for one that is not there; after one that is
 
 bool is_space_mouse(const HidFound& device) {
-  const auto known = [&](const auto& models) { return std::find(models.begin(), models.end(), device.model) != models.end(); };
+  const auto known = [&](const auto& models) {
+    return std::find(models.begin(), models.end(), device.model) != models.end();
+  };
   const bool one = (device.vendor == kLogitech && known(kLogitechModels)) ||
                    (device.vendor == k3Dconnexion && known(k3DconnexionModels));
   // A receiver has other collections beside the cap's; where the system tells no usage it is the only one.
@@ -54,17 +56,19 @@ Result<HidFound> SpaceMousePort::open(bool light, Calls calls) {
   battery_ = -1;
   moved_ = Clock::now();
   reader_.start(std::move(*port), kPause,
-                {.take = [this, moved = std::move(calls.moved)](std::span<const std::uint8_t> report) {
-                   const auto now = Clock::now();
-                   if (!report.empty() && take_report(state_, report)) moved_ = now;
-                   if (now - moved_ > kDeflectionHeld) state_.push = state_.twist = Vec3::Zero();
-                   battery_ = state_.battery_percent;
-                   moved(state_);
-                 },
+                {.take =
+                     [this, moved = std::move(calls.moved)](std::span<const std::uint8_t> report) {
+                       const auto now = Clock::now();
+                       if (!report.empty() && take_report(state_, report)) moved_ = now;
+                       if (now - moved_ > kDeflectionHeld) state_.push = state_.twist = Vec3::Zero();
+                       battery_ = state_.battery_percent;
+                       moved(state_);
+                     },
                  .at_end = std::move(calls.lost),
-                 .before_close = [light](HidPort& open_port) {
-                   if (light) (void)open_port.write(kLightOff);
-                 }});
+                 .before_close =
+                     [light](HidPort& open_port) {
+                       if (light) (void)open_port.write(kLightOff);
+                     }});
   return found.front();
 }
 

@@ -20,8 +20,9 @@ namespace osteon {
 class SpaceMousePort {
  public:
   struct Calls {
-    std::function<void(const SpaceMouseState&)> moved;  // [its reading thread] after each report, and every millisecond without
-    std::function<void()> lost;                         // [its reading thread]
+    std::function<void(const SpaceMouseState&)>
+        moved;                   // [its reading thread] after each report, and every millisecond without
+    std::function<void()> lost;  // [its reading thread]
   };
   // `light`: its LED shines while it is open. Errors: not_found, unavailable.
   [[nodiscard]] Result<HidFound> open(bool light, Calls calls);
@@ -34,7 +35,7 @@ class SpaceMousePort {
   SpaceMouseState state_;  // reading thread, while it runs
   std::chrono::steady_clock::time_point moved_;
   std::atomic<int> battery_{-1};
-  HidReader reader_;       // last: its thread ends before what it uses
+  HidReader reader_;  // last: its thread ends before what it uses
 };
 
 // One that is looked for, read and looked for again by a thread of its own.

@@ -45,7 +45,8 @@ bool take_report(SpaceMouseState& state, std::span<const std::uint8_t> report) n
       if (report.size() < 2 || report[1] > 100) return false;
       state.battery_percent = report[1];
       return true;
-    default: return false;
+    default:
+      return false;
   }
 }
 

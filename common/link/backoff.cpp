@@ -6,7 +6,8 @@
 
 namespace osteon {
 
-Backoff::Backoff(std::uint64_t seed, const BackoffBounds& bounds) : bounds_(bounds), limit_(bounds.least), random_(seed) {
+Backoff::Backoff(std::uint64_t seed, const BackoffBounds& bounds)
+    : bounds_(bounds), limit_(bounds.least), random_(seed) {
   OSTEON_CHECK(bounds.least.count() > 0 && bounds.least <= bounds.most);
 }
 

@@ -11,8 +11,8 @@ struct BackoffBounds {
   std::chrono::nanoseconds most = std::chrono::seconds{5};
 };
 
-// Evenly between `least` and a limit that doubles with each failure, from twice `least` up to `most`: clients that lost a
-// server at the same moment do not come back at the same moment.
+// Evenly between `least` and a limit that doubles with each failure, from twice `least` up to `most`: clients that lost
+// a server at the same moment do not come back at the same moment.
 class Backoff {
  public:
   explicit Backoff(std::uint64_t seed, const BackoffBounds& bounds = {});

@@ -13,7 +13,8 @@ bool near(std::chrono::nanoseconds time) { return time > -kFarthest && time < kF
 }  // namespace
 
 bool ClockOffset::add(const ClockSample& sample) noexcept {
-  if (!near(sample.sent) || !near(sample.peer_received) || !near(sample.peer_sent) || !near(sample.received)) return false;
+  if (!near(sample.sent) || !near(sample.peer_received) || !near(sample.peer_sent) || !near(sample.received))
+    return false;
   const auto away = sample.received - sample.sent, kept = sample.peer_sent - sample.peer_received;
   if (kept < std::chrono::nanoseconds{0} || away < kept) return false;
   const auto there = sample.peer_received - sample.sent, back = sample.peer_sent - sample.received;

@@ -18,14 +18,15 @@ struct ClockSample {
 struct ClockReading {
   std::chrono::nanoseconds offset{};      // the peer's clock minus this one's
   std::chrono::nanoseconds round_trip{};  // without the time that the peer kept it
-  // The true offset at the time of the sample is within `error` of this one: it is off by half the difference of the two
-  // ways, and neither way takes less than no time.
+  // The true offset at the time of the sample is within `error` of this one: it is off by half the difference of the
+  // two ways, and neither way takes less than no time.
   std::chrono::nanoseconds error{};
 };
 
-// After RFC 5905, sections 8 and 10: offset ((t2 - t1) + (t3 - t4)) / 2, and among the latest samples the one of the least
-// round trip, for what a queue adds to one way it takes for a difference of the clocks. Clocks drift by up to 0.1 ms a
-// second, hence the age limit. For showing and measuring only: nothing that must be right may be decided by it. One thread.
+// After RFC 5905, sections 8 and 10: offset ((t2 - t1) + (t3 - t4)) / 2, and among the latest samples the one of the
+// least round trip, for what a queue adds to one way it takes for a difference of the clocks. Clocks drift by up to 0.1
+// ms a second, hence the age limit. For showing and measuring only: nothing that must be right may be decided by it.
+// One thread.
 class ClockOffset {
  public:
   static constexpr std::size_t kSamples = 16;

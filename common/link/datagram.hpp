@@ -28,15 +28,17 @@ struct Datagram {
   std::span<const std::uint8_t> bytes;  // within the buffer that it was received into
 };
 
-// One socket, of a server with many peers or of a client with one. It is polled, so that one loop drives a session on a real
-// network and in a simulation alike: receive what there is (a bounded number, as there are floods), do what is due, then wait
-// (UdpPort::wait) or let virtual time go on. What is sent may be lost, repeated, late or out of order. One thread.
+// One socket, of a server with many peers or of a client with one. It is polled, so that one loop drives a session on a
+// real network and in a simulation alike: receive what there is (a bounded number, as there are floods), do what is
+// due, then wait (UdpPort::wait) or let virtual time go on. What is sent may be lost, repeated, late or out of order.
+// One thread.
 class DatagramPort {
  public:
   virtual ~DatagramPort() = default;
   // At most kMostDatagramBytes. Never blocks; what cannot be sent now is lost, as on the way.
   virtual void send(const Endpoint& to, std::span<const std::uint8_t> bytes) = 0;
-  // The oldest that has arrived and was not yet taken; nothing when there is none. Never blocks. `into`: kMostDatagramBytes.
+  // The oldest that has arrived and was not yet taken; nothing when there is none. Never blocks. `into`:
+  // kMostDatagramBytes.
   [[nodiscard]] virtual std::optional<Datagram> receive(std::span<std::uint8_t> into) = 0;
   // Where others reach it; a port bound to any address says the address that it is bound to.
   [[nodiscard]] virtual Endpoint local() const = 0;

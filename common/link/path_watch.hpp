@@ -22,9 +22,9 @@ struct PathRules {
 };
 
 // A server's view of one session. Addresses are written by whoever sends, so a datagram from a new one moves nothing by
-// itself: it must be authentic and newer than all before, which no copy of an old one is; then a challenge goes to the new
-// address, and only its echo, authentic and from there, makes it the peer's. Until then all else goes where it went. The
-// first address of a session is proven in the same way. After RFC 9000, section 8.2 and 9.3. One thread.
+// itself: it must be authentic and newer than all before, which no copy of an old one is; then a challenge goes to the
+// new address, and only its echo, authentic and from there, makes it the peer's. Until then all else goes where it
+// went. The first address of a session is proven in the same way. After RFC 9000, section 8.2 and 9.3. One thread.
 class PathWatch {
  public:
   explicit PathWatch(FillRandom random, const PathRules& rules = {});
@@ -39,7 +39,8 @@ class PathWatch {
     Endpoint to;
     PathToken token;
   };
-  // A challenge that is due, to be sent at once in a datagram of `bytes`, all counted; called at every turn of the loop.
+  // A challenge that is due, to be sent at once in a datagram of `bytes`, all counted; called at every turn of the
+  // loop.
   [[nodiscard]] std::optional<Challenge> challenge_due(std::size_t bytes, std::chrono::nanoseconds now);
 
   // Where everything but challenges goes; not set before the first address is proven.

@@ -16,7 +16,8 @@ struct PoseDeadband {
 [[nodiscard]] inline bool has_moved(const Pose& said, const Pose& now, const PoseDeadband& band = {}) {
   // The quaternion between the two has a vector part of sin(half the angle); q and -q are one rotation.
   const double half_sine = (said.rotation.conjugate() * now.rotation).vec().norm();
-  return (now.position_mm - said.position_mm).norm() > band.position_mm || half_sine > std::sin(band.rotation_rad / 2.0);
+  return (now.position_mm - said.position_mm).norm() > band.position_mm ||
+         half_sine > std::sin(band.rotation_rad / 2.0);
 }
 
 }  // namespace osteon

@@ -20,7 +20,8 @@ template <class Item>
 class ReceiveWindow {
  public:
   // `first`: number of the first item to come out. `most_ahead`: how far beyond it items are kept; bounds the memory.
-  explicit ReceiveWindow(std::uint64_t first = 1, std::uint64_t most_ahead = 1024) : next_(first), most_ahead_(most_ahead) {}
+  explicit ReceiveWindow(std::uint64_t first = 1, std::uint64_t most_ahead = 1024)
+      : next_(first), most_ahead_(most_ahead) {}
 
   // False for an item that came before or is too far ahead.
   bool offer(std::uint64_t number, Item item) {
@@ -54,11 +55,11 @@ class ReceiveWindow {
     next_ = upto + 1;
   }
 
-  // Every item up to this number was taken, or skipped. To be acknowledged at once, or later where taking is not yet keeping:
-  // a cut when it is committed.
+  // Every item up to this number was taken, or skipped. To be acknowledged at once, or later where taking is not yet
+  // keeping: a cut when it is committed.
   [[nodiscard]] std::uint64_t acknowledged() const { return next_ - 1; }
-  // Of the 64 items from upto + 2 on those that have come, taken or not, the lowest bit for upto + 2: what need not be sent
-  // again. `upto`: what is acknowledged in the same packet.
+  // Of the 64 items from upto + 2 on those that have come, taken or not, the lowest bit for upto + 2: what need not be
+  // sent again. `upto`: what is acknowledged in the same packet.
   [[nodiscard]] std::uint64_t beyond(std::uint64_t upto) const {
     const std::uint64_t last = held_.empty() ? next_ - 1 : held_.rbegin()->first;
     std::uint64_t bits = 0;

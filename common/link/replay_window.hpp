@@ -5,8 +5,8 @@
 
 namespace osteon {
 
-// The last kSpan counters up to the newest; what is older counts as seen. The ring of RFC 6479, section 2: one word more
-// than the window has, so that moving on clears whole words and shifts nothing.
+// The last kSpan counters up to the newest; what is older counts as seen. The ring of RFC 6479, section 2: one word
+// more than the window has, so that moving on clears whole words and shifts nothing.
 class ReplayWindow {
  public:
   static constexpr std::uint64_t kSpan = 2048;
@@ -20,7 +20,9 @@ class ReplayWindow {
 
  private:
   static constexpr std::uint64_t kWords = kSpan / 64 + 1;
-  [[nodiscard]] static constexpr std::uint64_t bit(std::uint64_t counter) noexcept { return std::uint64_t{1} << counter % 64; }
+  [[nodiscard]] static constexpr std::uint64_t bit(std::uint64_t counter) noexcept {
+    return std::uint64_t{1} << counter % 64;
+  }
 
   std::array<std::uint64_t, kWords> seen_{};  // word of counter c: c / 64 mod kWords
   std::uint64_t newest_ = 0;

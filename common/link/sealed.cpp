@@ -34,10 +34,12 @@ struct Nonce {
   explicit Nonce(std::uint64_t counter) { put_little(counter, std::span(bytes).subspan<4>()); }
 };
 
-bool authentic(std::span<const std::uint8_t> datagram, const Nonce& nonce, const SealKey& key, std::span<std::uint8_t> into) {
+bool authentic(std::span<const std::uint8_t> datagram, const Nonce& nonce, const SealKey& key,
+               std::span<std::uint8_t> into) {
   const auto header = datagram.first(kHeaderBytes), body = datagram.subspan(kHeaderBytes);
-  return crypto_aead_chacha20poly1305_ietf_decrypt(into.data(), nullptr, nullptr, body.data(), body.size(), header.data(),
-                                                   header.size(), nonce.bytes.data(), key.bytes.data()) == 0;
+  return crypto_aead_chacha20poly1305_ietf_decrypt(into.data(), nullptr, nullptr, body.data(), body.size(),
+                                                   header.data(), header.size(), nonce.bytes.data(),
+                                                   key.bytes.data()) == 0;
 }
 
 }  // namespace
@@ -84,8 +86,9 @@ std::span<const std::uint8_t> Sealer::seal(std::span<const std::uint8_t> plain, 
   put_little(session_, header.first(kGenerationAt));
   header[kGenerationAt] = static_cast<std::uint8_t>(generation_);
   put_little(counter_, header.subspan(kCounterAt));
-  crypto_aead_chacha20poly1305_ietf_encrypt(datagram.data() + kHeaderBytes, nullptr, plain.data(), plain.size(), header.data(),
-                                            header.size(), nullptr, Nonce(counter_).bytes.data(), key_.bytes.data());
+  crypto_aead_chacha20poly1305_ietf_encrypt(datagram.data() + kHeaderBytes, nullptr, plain.data(), plain.size(),
+                                            header.data(), header.size(), nullptr, Nonce(counter_).bytes.data(),
+                                            key_.bytes.data());
   ++counter_;
   return datagram;
 }

@@ -1,11 +1,12 @@
-// Sealed datagrams: ChaCha20-Poly1305 (RFC 8439) with a counter, a key for each session and direction, and a new key every
-// two minutes.
+// Sealed datagrams: ChaCha20-Poly1305 (RFC 8439) with a counter, a key for each session and direction, and a new key
+// every two minutes.
 //
 //   session (4 bytes) | generation of the key, its low 8 bits | counter (8) | ciphertext | tag (16)      little endian
 //
-// The first 13 bytes are authenticated with the rest. The nonce is 4 zero bytes and the counter, which counts on from key
-// to key, so that one window against replay serves all of them. The next key follows from the present one by keyed BLAKE2b:
-// whoever learns a key cannot go back to those before it. Keys are made by the server and handed out over mutual TLS.
+// The first 13 bytes are authenticated with the rest. The nonce is 4 zero bytes and the counter, which counts on from
+// key to key, so that one window against replay serves all of them. The next key follows from the present one by keyed
+// BLAKE2b: whoever learns a key cannot go back to those before it. Keys are made by the server and handed out over
+// mutual TLS.
 #pragma once
 #include <array>
 #include <chrono>
@@ -59,8 +60,8 @@ class Sealer {
   Sealer(const Sealer&) = delete;
   Sealer& operator=(const Sealer&) = delete;
 
-  // The datagram of `plain` (at most kMostPlainBytes), at the beginning of `into`, which has room for it and lies apart from
-  // `plain`. `now`: since any start, the same for all calls. One thread.
+  // The datagram of `plain` (at most kMostPlainBytes), at the beginning of `into`, which has room for it and lies apart
+  // from `plain`. `now`: since any start, the same for all calls. One thread.
   std::span<const std::uint8_t> seal(std::span<const std::uint8_t> plain, std::chrono::nanoseconds now,
                                      std::span<std::uint8_t> into) noexcept;
   // Of the next datagram.
@@ -92,15 +93,17 @@ struct OpenCounts {
 // The receiving end of one direction.
 class Opener {
  public:
-  // A peer whose datagrams were lost for longer than this many keys is not understood again: the session is joined anew.
+  // A peer whose datagrams were lost for longer than this many keys is not understood again: the session is joined
+  // anew.
   static constexpr std::uint64_t kMostAhead = 8;
 
   Opener(std::uint32_t session, const SealKey& key, const SealRules& rules = {});
   Opener(const Opener&) = delete;
   Opener& operator=(const Opener&) = delete;
 
-  // Nothing when it is not the peer's or was opened before; then nothing has changed but the counts. The plain bytes lie at
-  // the beginning of `into` (kMostPlainBytes, apart from `datagram`), whose content is lost in any case. One thread.
+  // Nothing when it is not the peer's or was opened before; then nothing has changed but the counts. The plain bytes
+  // lie at the beginning of `into` (kMostPlainBytes, apart from `datagram`), whose content is lost in any case. One
+  // thread.
   [[nodiscard]] std::optional<Opened> open(std::span<const std::uint8_t> datagram, std::chrono::nanoseconds now,
                                            std::span<std::uint8_t> into) noexcept;
   // Erases the previous key when its time is over. open() does it too: to be called now and then while nothing arrives.

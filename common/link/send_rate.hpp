@@ -1,5 +1,5 @@
-// When the next packet goes, how large it may be, and in how many packets each item is repeated: the pace of one end of a
-// session. Pure: time is a parameter. One thread.
+// When the next packet goes, how large it may be, and in how many packets each item is repeated: the pace of one end of
+// a session. Pure: time is a parameter. One thread.
 #pragma once
 #include <algorithm>
 #include <chrono>
@@ -11,7 +11,7 @@
 namespace osteon {
 
 struct SendRateParams {
-  std::chrono::nanoseconds interval = std::chrono::milliseconds(8);         // between packets while there is something to say
+  std::chrono::nanoseconds interval = std::chrono::milliseconds(8);  // between packets while there is something to say
   // The same where it is new, as long as the rate allows: a cut that is sooner on its way is sooner felt.
   std::chrono::nanoseconds fresh_interval = std::chrono::milliseconds(4);
   std::chrono::nanoseconds idle_interval = std::chrono::milliseconds(250);  // between packets that only keep alive
@@ -31,17 +31,17 @@ class SendRate {
 
   explicit SendRate(SendRateParams params = {}) : params_(params), tokens_(static_cast<double>(params.burst_bytes)) {}
 
-  // When the next packet may go, at `now` or later. `wanted`: when there will be something to say, `now` or earlier for at
-  // once, Time::max() for nothing; then it is one that keeps the session alive. `needed_bytes`: the least budget() that it is
-  // worth going with, such as for one long item. `fresh`: it was never sent before.
+  // When the next packet may go, at `now` or later. `wanted`: when there will be something to say, `now` or earlier for
+  // at once, Time::max() for nothing; then it is one that keeps the session alive. `needed_bytes`: the least budget()
+  // that it is worth going with, such as for one long item. `fresh`: it was never sent before.
   [[nodiscard]] Time next(Time now, Time wanted, std::size_t needed_bytes = 0, bool fresh = false) const;
   // Largest whole datagram that may go now, at most kMostDatagramBytes; 0 where next() is later.
   [[nodiscard]] std::size_t budget(Time now, bool fresh = false) const;
   // A datagram of so many bytes went.
   void sent(Time now, std::size_t bytes);
 
-  // What the other end says of our packets in each of its own: the newest counter that it has seen and how many have come in
-  // all, repeats of the network not counted. Anything that does not move forward is ignored.
+  // What the other end says of our packets in each of its own: the newest counter that it has seen and how many have
+  // come in all, repeats of the network not counted. Anything that does not move forward is ignored.
   void heard(std::uint64_t newest_counter, std::uint64_t received);
   void set_round_trip(Time round_trip) { round_trip_ = round_trip; }
   // Share of packets lost lately, 0 to 1; smoothed over about 64 packets, 0.1 before the first.
@@ -53,11 +53,11 @@ class SendRate {
   [[nodiscard]] double tokens(Time now) const;
 
   SendRateParams params_;
-  Time last_ = Time::min();   // packet, min: none yet
-  Time filled_{};             // when tokens_ was counted
-  double tokens_;             // bytes that may go
+  Time last_ = Time::min();  // packet, min: none yet
+  Time filled_{};            // when tokens_ was counted
+  double tokens_;            // bytes that may go
   Time round_trip_ = std::chrono::milliseconds(200);
-  double loss_ = 0.1;         // may leave 0 to 1 while late packets are counted
+  double loss_ = 0.1;  // may leave 0 to 1 while late packets are counted
   std::uint64_t newest_ = 0, received_ = 0;
 };
 

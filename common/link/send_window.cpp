@@ -139,13 +139,14 @@ class SendWindow::Filling {
 SendWindow::Picked SendWindow::pick(Time now, std::size_t budget_bytes, int repeats) {
   if (waiting_.empty()) return {};
   Filling packet(*this, budget_bytes);
-  // Of what is on its way the oldest has mostly arrived, and is no neighbour of the others: alone it would take a head of its
-  // own in every packet.
+  // Of what is on its way the oldest has mostly arrived, and is no neighbour of the others: alone it would take a head
+  // of its own in every packet.
   if (oldest_overdue(now)) packet.add(oldest_);
   const std::uint64_t fresh = next() - unsent_;
   for (std::uint64_t number = fresh; number < next(); ++number)
     if (!packet.add(number)) return packet.take(now);
-  // What was in flight when many packets were lost in a row comes before others' repeats: all that follows waits for it.
+  // What was in flight when many packets were lost in a row comes before others' repeats: all that follows waits for
+  // it.
   for (std::uint64_t number = oldest_; number < fresh; ++number) {
     Waiting& waiting = *find(number);
     if (waiting.arrived) continue;

@@ -1,11 +1,11 @@
-// What was said and is not yet known to have arrived: numbered items that go into packet after packet until the other end
-// acknowledges them. Pure: time is a parameter, bytes are opaque. One thread.
+// What was said and is not yet known to have arrived: numbered items that go into packet after packet until the other
+// end acknowledges them. Pure: time is a parameter, bytes are opaque. One thread.
 //
-// Which items a packet takes decides how long the receiver waits, since it passes items on in order and one that is missing
-// holds up all that follow. With packets every T, a share p of them lost and a round trip R, an item in k packets is missing
-// with p^k, and what is missing then is noticed a round trip later: so of all items about p^k R/T wait that long. For
-// p = 0.3, R = 200 ms and T = 8 ms that is 6 % at k = 5, 0.2 % at k = 8 and 0.01 % at k = 10. SendRate chooses k;
-// SendWindow.Table in unit.link prints delays and bytes for each.
+// Which items a packet takes decides how long the receiver waits, since it passes items on in order and one that is
+// missing holds up all that follow. With packets every T, a share p of them lost and a round trip R, an item in k
+// packets is missing with p^k, and what is missing then is noticed a round trip later: so of all items about p^k R/T
+// wait that long. For p = 0.3, R = 200 ms and T = 8 ms that is 6 % at k = 5, 0.2 % at k = 8 and 0.01 % at k = 10.
+// SendRate chooses k; SendWindow.Table in unit.link prints delays and bytes for each.
 #pragma once
 #include <chrono>
 #include <cstddef>
@@ -18,8 +18,8 @@
 
 namespace osteon {
 
-// `bytes` are the same in every packet. Items of one kind are shortest one after the other: a packet that also holds item
-// `follows` needs no `head` before this one, any other packet does.
+// `bytes` are the same in every packet. Items of one kind are shortest one after the other: a packet that also holds
+// item `follows` needs no `head` before this one, any other packet does.
 struct SendItem {
   std::string bytes;
   std::string head;
@@ -49,23 +49,27 @@ class SendWindow {
 
   // The item's number, one above the last; none while it would go beyond the limits. An empty window takes any item.
   std::optional<std::uint64_t> push(SendItem item);
-  // All up to this number have arrived, and of those after the missing upto + 1 those whose bit in `beyond` is set, the lowest
-  // for upto + 2: ReceiveWindow::acknowledged() and beyond(). True when that is news; numbers that were never sent change
-  // nothing.
+  // All up to this number have arrived, and of those after the missing upto + 1 those whose bit in `beyond` is set, the
+  // lowest for upto + 2: ReceiveWindow::acknowledged() and beyond(). True when that is news; numbers that were never
+  // sent change nothing.
   bool acknowledge(std::uint64_t upto, std::uint64_t beyond = 0);
-  // The other end has begun anew and has all up to this number, and nothing else: the rest goes as if never sent. False, and
-  // nothing changes, where it cannot be the same window: it lacks what was acknowledged, or has what was never pushed.
+  // The other end has begun anew and has all up to this number, and nothing else: the rest goes as if never sent.
+  // False, and nothing changes, where it cannot be the same window: it lacks what was acknowledged, or has what was
+  // never pushed.
   bool restart(std::uint64_t upto);
 
   struct Picked {
-    std::vector<std::uint64_t> numbers;  // rising; every item's predecessor in its run is there, or its head is paid for
-    std::size_t bytes = 0;               // with heads; at most the budget
+    std::vector<std::uint64_t>
+        numbers;            // rising; every item's predecessor in its run is there, or its head is paid for
+    std::size_t bytes = 0;  // with heads; at most the budget
   };
-  // What the packet that goes now takes, as far as there is room: the oldest item from when its acknowledgement is overdue,
-  // so that it is in every packet until it has arrived; those never sent, in order and without a gap; those that were last
-  // sent longer ago than the retransmission time; and those in fewer than `repeats` packets, the least often sent first.
+  // What the packet that goes now takes, as far as there is room: the oldest item from when its acknowledgement is
+  // overdue, so that it is in every packet until it has arrived; those never sent, in order and without a gap; those
+  // that were last sent longer ago than the retransmission time; and those in fewer than `repeats` packets, the least
+  // often sent first.
   Picked pick(Time now, std::size_t budget_bytes, int repeats);
-  // Room that pick() must be given for what goes first to go: with less, packet after packet, a long item would never be sent.
+  // Room that pick() must be given for what goes first to go: with less, packet after packet, a long item would never
+  // be sent.
   [[nodiscard]] std::size_t least_room(Time now) const;
   // When pick() will next have something to send; none when all is acknowledged.
   [[nodiscard]] std::optional<Time> next_due(Time now, int repeats) const;
@@ -106,7 +110,7 @@ class SendWindow {
   std::uint64_t oldest_;
   std::deque<Waiting> waiting_;  // of oldest_ and on
   std::size_t bytes_ = 0;
-  std::uint64_t unsent_ = 0;     // items at the end that were never sent
+  std::uint64_t unsent_ = 0;  // items at the end that were never sent
   Time round_trip_ = std::chrono::milliseconds(200);
   SendCounts counts_;
 };

@@ -20,7 +20,8 @@ constexpr int kMostTurns = 64;
 
 Endpoint endpoint_of(const udp::endpoint& from) {
   const asio::ip::address address = from.address();
-  const auto bytes = (address.is_v4() ? make_address_v6(asio::ip::v4_mapped, address.to_v4()) : address.to_v6()).to_bytes();
+  const auto bytes =
+      (address.is_v4() ? make_address_v6(asio::ip::v4_mapped, address.to_v4()) : address.to_v6()).to_bytes();
   Endpoint endpoint{0, 0, from.port()};
   for (std::size_t i = 0; i < 8; ++i) {
     endpoint.high = endpoint.high << 8 | bytes[i];
@@ -64,8 +65,8 @@ Result<std::unique_ptr<UdpPort>> UdpPort::open(const UdpPortOptions& options) {
     return failure(ErrorCode::invalid_input,
                    "\"" + options.address + "\" is no numeric address for UDP; give one such as 0.0.0.0");
   const auto refused = [&](const char* what) {
-    return failure(ErrorCode::unavailable, std::string("UDP on ") + name + " cannot be " + what + " (" + error.message() +
-                                               "); give an address of this machine and a free port");
+    return failure(ErrorCode::unavailable, std::string("UDP on ") + name + " cannot be " + what + " (" +
+                                               error.message() + "); give an address of this machine and a free port");
   };
   auto socket = std::make_unique<Socket>();
   socket->is_v4 = address.is_v4();
@@ -90,7 +91,8 @@ std::optional<Datagram> UdpPort::receive(std::span<std::uint8_t> into) {
   OSTEON_CHECK(into.size() >= kMostDatagramBytes);
   // One byte more than is allowed, as the system cuts off silently what does not fit.
   std::array<std::uint8_t, 1> beyond{};
-  const std::array<asio::mutable_buffer, 2> buffers{asio::buffer(into.data(), kMostDatagramBytes), asio::buffer(beyond)};
+  const std::array<asio::mutable_buffer, 2> buffers{asio::buffer(into.data(), kMostDatagramBytes),
+                                                    asio::buffer(beyond)};
   for (int turn = 0; turn < kMostTurns; ++turn) {
     udp::endpoint from;
     asio::error_code error;
@@ -117,7 +119,8 @@ bool UdpPort::wait(std::chrono::nanoseconds patience) {
   Socket* const socket = socket_.get();
   if (!socket->watched) {
     socket->watched = true;
-    socket->datagrams.async_wait(udp::socket::wait_read, [socket](const asio::error_code&) { socket->watched = false; });
+    socket->datagrams.async_wait(udp::socket::wait_read,
+                                 [socket](const asio::error_code&) { socket->watched = false; });
   }
   // run_one_for() looks at nothing when its time is over at once.
   return (patience.count() > 0 ? socket->context.run_one_for(patience) : socket->context.poll_one()) > 0;

@@ -12,8 +12,9 @@
 namespace osteon {
 
 struct UdpPortOptions {
-  std::string address = "127.0.0.1";   // a numeric address of this machine; "0.0.0.0" or "::" for all, "::" hears IPv4 too
-  std::uint16_t port = 0;              // 0: the system chooses
+  std::string address =
+      "127.0.0.1";         // a numeric address of this machine; "0.0.0.0" or "::" for all, "::" hears IPv4 too
+  std::uint16_t port = 0;  // 0: the system chooses
   int receive_buffer_bytes = 1 << 21;  // what arrives between two turns of the loop; the system may grant less
 };
 
@@ -21,7 +22,7 @@ struct UdpPortOptions {
 struct UdpPortCounts {
   std::uint64_t sent = 0, send_failed = 0;  // failed: the system had no room for it, or knows no way there
   std::uint64_t received = 0, dropped = 0;  // dropped: longer than kMostDatagramBytes
-  std::uint64_t receive_failed = 0;         // the system reported something else, such as that a peer has no program there
+  std::uint64_t receive_failed = 0;  // the system reported something else, such as that a peer has no program there
 };
 
 // Closed by its destructor. What the network does (a peer that refuses, no way to it) is counted and never ends it.
@@ -34,7 +35,8 @@ class UdpPort final : public DatagramPort {
   void send(const Endpoint& to, std::span<const std::uint8_t> bytes) override;
   [[nodiscard]] std::optional<Datagram> receive(std::span<std::uint8_t> into) override;
   [[nodiscard]] Endpoint local() const override;
-  // Until there may be something to receive, wake() was called, or `patience` is over: false then. By the thread that receives.
+  // Until there may be something to receive, wake() was called, or `patience` is over: false then. By the thread that
+  // receives.
   bool wait(std::chrono::nanoseconds patience);
   // Ends a wait, the next one if none is under way. Any thread.
   void wake();
@@ -49,8 +51,8 @@ class UdpPort final : public DatagramPort {
   std::atomic<std::uint64_t> sent_{0}, send_failed_{0}, received_{0}, dropped_{0}, receive_failed_{0};
 };
 
-// The endpoint of a server's name or numeric address. Asks the system's resolver, which may take seconds: not on a thread
-// that anything waits for. IPv4 first where it has both. Error: not_found, naming the host.
+// The endpoint of a server's name or numeric address. Asks the system's resolver, which may take seconds: not on a
+// thread that anything waits for. IPv4 first where it has both. Error: not_found, naming the host.
 [[nodiscard]] Result<Endpoint> find_endpoint(const std::string& host, std::uint16_t port);
 
 }  // namespace osteon

@@ -22,11 +22,8 @@ FeedLaw broaching_law(const BroachingParams& params, RevolutionsPerMinute blows,
                       GramsPerCm3 density) noexcept {
   const double feed = blow_advance_mm(params, engaged_area_mm2, density) * blows.value() / 60.0;
   if (!(feed > 0.0)) return {};
-  return {.offset_n = 0.0,
-          .scale_n = params.hold_n / feed,
-          .exponent = 1.0,
-          .max_feed_mm_per_s = feed,
-          .threshold_n = 0.0};
+  return {
+      .offset_n = 0.0, .scale_n = params.hold_n / feed, .exponent = 1.0, .max_feed_mm_per_s = feed, .threshold_n = 0.0};
 }
 
 }  // namespace osteon

@@ -23,8 +23,8 @@ Newtons agus_friction(const AgusParams& params, Newtons normal, double axis_dist
   const double contact_mm = std::sqrt(agus_depth_mm(params, normal) * params.radius_mm);  // Hertz: a^2 = h R
   if (!(contact_mm > 0.0)) return Newtons{0.0};
   const double away = axis_distance_mm / contact_mm;
-  // The share of the pressure's friction that points along omega x r at the contact's middle. Far out 1 - <s^2>/(4 d^2) with
-  // Hertz's mean <s^2> = 2/5 a^2.
+  // The share of the pressure's friction that points along omega x r at the contact's middle. Far out 1 - <s^2>/(4 d^2)
+  // with Hertz's mean <s^2> = 2/5 a^2.
   double share = 1.0 - 0.1 / (away * away);
   if (away < 4.0) {
     // Over rings s of the disc, each weighted by its length and Hertz's pressure, sqrt(1 - (s/a)^2).
@@ -47,7 +47,8 @@ Newtons agus_friction(const AgusParams& params, Newtons normal, double axis_dist
 MillimetresPerSecond agus_erosion(const AgusParams& params, RevolutionsPerMinute speed, Newtons force,
                                   double axis_distance_mm, double area_mm2, GramsPerCm3 density) noexcept {
   const double energy = params.wear * params.energy_n_per_mm2 * relative_strength(density.value());
-  if (!(force.value() > 0.0) || !(area_mm2 > 0.0) || !(energy > 0.0) || axis_distance_mm < params.pole_radius * params.radius_mm)
+  if (!(force.value() > 0.0) || !(area_mm2 > 0.0) || !(energy > 0.0) ||
+      axis_distance_mm < params.pole_radius * params.radius_mm)
     return MillimetresPerSecond{0.0};
   const double omega = speed.value() * 2.0 * std::numbers::pi / 60.0;
   return MillimetresPerSecond{params.friction * force.value() * omega * axis_distance_mm / (energy * area_mm2)};

@@ -1,10 +1,10 @@
-// Burring after Agus, Giachetti, Gobbetti, Zanetti and Zorcolo (2002), equations (7.4) to (7.6): a sphere of radius R that
-// turns at omega is pressed h deep into bone. Hertz gives the elastic force F_e = C1 R^2 (h/R)^1.5, friction under the
-// contact's pressure F_mu, and the power of that friction erodes: v = mu F omega r / (u A), with the energy u of a unit
-// of volume, the contact's projected area A and its mean distance r from the axis.
+// Burring after Agus, Giachetti, Gobbetti, Zanetti and Zorcolo (2002), equations (7.4) to (7.6): a sphere of radius R
+// that turns at omega is pressed h deep into bone. Hertz gives the elastic force F_e = C1 R^2 (h/R)^1.5, friction under
+// the contact's pressure F_mu, and the power of that friction erodes: v = mu F omega r / (u A), with the energy u of a
+// unit of volume, the contact's projected area A and its mean distance r from the axis.
 //
-// C1 = 4/3 E* is about 25 GPa for bone, so h is some microns: the elastic depth is not what a hand feels, the erosion is.
-// At the pole r = 0: there a burr does not cut.
+// C1 = 4/3 E* is about 25 GPa for bone, so h is some microns: the elastic depth is not what a hand feels, the erosion
+// is. At the pole r = 0: there a burr does not cut.
 #pragma once
 #include "common/core/units.hpp"
 #include "common/mechanics/feed_law.hpp"
@@ -13,11 +13,11 @@ namespace osteon {
 
 struct AgusParams {
   double radius_mm = 2.5;
-  double elastic_n_per_mm2 = 25'000.0;   // C1
-  double friction = 0.3;                 // mu [A]
-  double energy_n_per_mm2 = 1'000.0;     // u at 1.9 g/cm3: 1 J/mm3 [A]; grows with density as (7.3) does [A]
-  double wear = 1.0;                     // 1 sharp: a blunt burr needs more force for the same power of cutting
-  double pole_radius = 0.01;             // share of R below which nothing is cut
+  double elastic_n_per_mm2 = 25'000.0;  // C1
+  double friction = 0.3;                // mu [A]
+  double energy_n_per_mm2 = 1'000.0;    // u at 1.9 g/cm3: 1 J/mm3 [A]; grows with density as (7.3) does [A]
+  double wear = 1.0;                    // 1 sharp: a blunt burr needs more force for the same power of cutting
+  double pole_radius = 0.01;            // share of R below which nothing is cut
 };
 
 // (7.4) and its inverse, h = R (F / (C1 R^2))^(2/3).

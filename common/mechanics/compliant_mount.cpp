@@ -28,7 +28,9 @@ double braking_step(double way, double less) {
   return less * whole + (way - 0.5 * less * whole * (whole + 1.0)) / (whole + 1.0);
 }
 
-double against(const Vec3& step, const Vec3& load) { return load.isZero() ? 0.0 : std::max(0.0, -step.dot(load) / load.norm()); }
+double against(const Vec3& step, const Vec3& load) {
+  return load.isZero() ? 0.0 : std::max(0.0, -step.dot(load) / load.norm());
+}
 
 // What the load is given by braking after a step.
 double braking_mj(const Vec3& last, const Vec3& load, double less) {
@@ -37,7 +39,8 @@ double braking_mj(const Vec3& last, const Vec3& load, double less) {
 
 // A step against the load only so long that funds pay for it and for braking after it.
 Vec3 slowed(const Vec3& step, const Vec3& load, double less, double funds_mj) {
-  const double size = load.norm(), wanted = against(step, load), most = wanted > 0.0 ? braking_step(funds_mj / size, less) : 0.0;
+  const double size = load.norm(), wanted = against(step, load),
+               most = wanted > 0.0 ? braking_step(funds_mj / size, less) : 0.0;
   return wanted > most ? Vec3(step + load * ((wanted - most) / size)) : step;
 }
 
@@ -129,10 +132,13 @@ MountFollower::MountFollower(const MountFollowerParams& params)
 }
 
 void MountFollower::see(const MountPose& seen) noexcept {
-  if (seen.seen_seq <= seen_seq_ || !seen.shift.finite() || !std::isfinite(seen.energy_mj) || !std::isfinite(seen.lag_s)) return;
+  if (seen.seen_seq <= seen_seq_ || !seen.shift.finite() || !std::isfinite(seen.energy_mj) ||
+      !std::isfinite(seen.lag_s))
+    return;
   seen_seq_ = seen.seen_seq;
   since_seen_s_ = 0.0;
-  told_ = {clamped(seen.shift.place_mm, params_.mount.most_mm), quaternion(clamped(seen.shift.turn_rad, params_.mount.most_rad))};
+  told_ = {clamped(seen.shift.place_mm, params_.mount.most_mm),
+           quaternion(clamped(seen.shift.turn_rad, params_.mount.most_rad))};
   slowest_s_ = std::clamp(seen.lag_s, 0.0, kMostLag_s);
   if (timed_seq_ > 0 && seen.push_seq >= timed_seq_) {
     lag_s_ = smoothed_lag(lag_s_, now_s_ - timed_s_);
@@ -153,16 +159,19 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   since_seen_s_ += dt_s;
 
   // Two passes, so that neither the pose nor its speed jumps at a pose told.
-  low_pass_s_ = std::clamp(params_.per_lag * (std::max(lag_s_, slowest_s_) + mount_lag_s_), params_.least_s, params_.most_s);
+  low_pass_s_ =
+      std::clamp(params_.per_lag * (std::max(lag_s_, slowest_s_) + mount_lag_s_), params_.least_s, params_.most_s);
   const double share = -std::expm1(-dt_s / low_pass_s_), share_again = -std::expm1(-dt_s / params_.least_s);
   if (since_seen_s_ <= params_.silent_s) {
     smooth_.mm += share * (told_.mm - smooth_.mm);
-    smooth_.turn = (quaternion(share * rotation_vector(told_.turn * smooth_.turn.conjugate())) * smooth_.turn).normalized();
+    smooth_.turn =
+        (quaternion(share * rotation_vector(told_.turn * smooth_.turn.conjugate())) * smooth_.turn).normalized();
   } else {
     smooth_ = shown_;
   }
   Vec3 move_mm = clamped(share_again * (smooth_.mm - shown_.mm), params_.most_mm_per_s * dt_s);
-  Vec3 turn_rad = clamped(share_again * rotation_vector(smooth_.turn * shown_.turn.conjugate()), params_.most_rad_per_s * dt_s);
+  Vec3 turn_rad =
+      clamped(share_again * rotation_vector(smooth_.turn * shown_.turn.conjugate()), params_.most_rad_per_s * dt_s);
   // Slowed ahead of what funds compel, and setting out and stopping no faster than a bone does.
   const double most_mm = params_.most_mm_per_s2 * dt_s * dt_s, most_rad = params_.most_rad_per_s2 * dt_s * dt_s;
   // Move and turn each get what they need for braking, and a half of what is left of the funds where both ask for it.
@@ -183,7 +192,8 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   move_mm = move_mm_ + clamped(paid_mm - move_mm_, most_mm);
   turn_rad = turn_rad_ + clamped(paid_rad - turn_rad_, most_rad);
 
-  // What the step takes from the hand, and what it gives: only along force and moment, and only as far as there are funds.
+  // What the step takes from the hand, and what it gives: only along force and moment, and only as far as there are
+  // funds.
   double by_move_mj = load_.force_n.dot(move_mm), by_turn_mj = load_.moment_nmm.dot(turn_rad);
   const double taken_mj = std::max(0.0, by_move_mj) + std::max(0.0, by_turn_mj);
   const double wanted_mj = std::max(0.0, -by_move_mj) + std::max(0.0, -by_turn_mj);

@@ -48,15 +48,17 @@ void BreakthroughGrab::step(const GrabParams& params, double engaged, bool cutti
 
 double BreakthroughGrab::pull_n(const GrabParams& params) const noexcept { return params.ratio * whole_n_ * rim(); }
 
-double BreakthroughGrab::torque_factor(const GrabParams& params) const noexcept { return 1.0 + params.torque_gain * rim(); }
+double BreakthroughGrab::torque_factor(const GrabParams& params) const noexcept {
+  return 1.0 + params.torque_gain * rim();
+}
 
 void SawBinding::step(const BindingParams& params, double pressure_n) noexcept {
   pressure_n_ = std::max(0.0, pressure_n);
   jammed_ = jammed_ ? pressure_n_ > params.release * params.jam_n : pressure_n_ >= params.jam_n;
 }
 
-double BroachDrive::step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
-                         double held_n, double gone_mm, double dt_s) noexcept {
+double BroachDrive::step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2,
+                         double density_g_cm3, double held_n, double gone_mm, double dt_s) noexcept {
   // The way of a step is known in the next one, so a blow lasts one more.
   lasts_s_ -= dt_s;
   left_mm_ = lasts_s_ > -1.5 * dt_s ? std::max(0.0, left_mm_ - std::max(0.0, gone_mm)) : 0.0;

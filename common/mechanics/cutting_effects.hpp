@@ -1,9 +1,9 @@
-// What a surgeon misses at once if it is not there: bluntness, clogged flutes, the grab at breakthrough, a saw that binds,
-// a broach that goes by blows. Small state machines, each stepped by what the tool did in a tick; their sums do not depend
-// on the tick's length. All [haptic]: no allocation, clock or random number in any of them.
+// What a surgeon misses at once if it is not there: bluntness, clogged flutes, the grab at breakthrough, a saw that
+// binds, a broach that goes by blows. Small state machines, each stepped by what the tool did in a tick; their sums do
+// not depend on the tick's length. All [haptic]: no allocation, clock or random number in any of them.
 //
-// Those that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. The grab pulls by itself: it
-// belongs to the port of the motor's forces, which bounds it and shuts it with the pedal.
+// Those that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. The grab pulls by
+// itself: it belongs to the port of the motor's forces, which bounds it and shuts it with the pedal.
 #pragma once
 #include <cstdint>
 
@@ -31,20 +31,21 @@ class Bluntness {
   double wear_;
 };
 
-// Flutes fill with chips by the bone drilled in one go, and empty as the drill is drawn back. From `onset` on, full ones
-// need more torque, and some more thrust [A]: nobody clears a drill for a bicortical hole, nor leaves it in for ten
-// diameters of cortical bone.
+// Flutes fill with chips by the bone drilled in one go, and empty as the drill is drawn back. From `onset` on, full
+// ones need more torque, and some more thrust [A]: nobody clears a drill for a bicortical hole, nor leaves it in for
+// ten diameters of cortical bone.
 struct CloggingParams {
-  double capacity_diameters = 10.0;  // depth in cortical bone until they are full; of softer bone there is less to carry
-  double cleared_diameters = 1.5;    // way back until full ones are empty
-  double onset = 0.5;                // level up to which chips find their way out
-  double torque_gain = 5.0;          // torque of full flutes over that of empty ones, less one
+  double capacity_diameters =
+      10.0;                        // depth in cortical bone until they are full; of softer bone there is less to carry
+  double cleared_diameters = 1.5;  // way back until full ones are empty
+  double onset = 0.5;              // level up to which chips find their way out
+  double torque_gain = 5.0;        // torque of full flutes over that of empty ones, less one
   double thrust_gain = 0.5;
 };
 class FluteClogging {
  public:
-  // `cut_mm`: advance into bone; `back_mm`: withdrawal; both of this tick and not negative. `engaged`: share of the point
-  // that took bone of that density.
+  // `cut_mm`: advance into bone; `back_mm`: withdrawal; both of this tick and not negative. `engaged`: share of the
+  // point that took bone of that density.
   void step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged, double density_g_cm3,
             double back_mm) noexcept;
   [[nodiscard]] double level() const noexcept { return level_; }  // 0 empty, 1 full
@@ -60,19 +61,19 @@ class FluteClogging {
 [[nodiscard]] bool has_flutes(ToolKind kind) noexcept;
 
 // When the point comes out on the far side, the lips catch the rim that is left and the flutes screw the drill forward:
-// a pull of ratio · (the last whole thrust) · 4 e (1 - e) with the engaged share e, and as much more torque. Only after the
-// whole point was in bone: going in, it does nothing.
+// a pull of ratio · (the last whole thrust) · 4 e (1 - e) with the engaged share e, and as much more torque. Only after
+// the whole point was in bone: going in, it does nothing.
 struct GrabParams {
-  double whole = 0.9;         // share from which the point counts as whole
-  double gone = 0.02;         // and below which as out
-  double ratio = 0.15;        // of the thrust [A]
-  double torque_gain = 1.0;   // [A]
+  double whole = 0.9;        // share from which the point counts as whole
+  double gone = 0.02;        // and below which as out
+  double ratio = 0.15;       // of the thrust [A]
+  double torque_gain = 1.0;  // [A]
 };
 class BreakthroughGrab {
  public:
   void step(const GrabParams& params, double engaged, bool cutting, double cutting_n, bool drawn_back) noexcept;
   [[nodiscard]] bool grabbing() const noexcept { return phase_ == Phase::breaking; }
-  [[nodiscard]] double pull_n(const GrabParams& params) const noexcept;         // along the feed, on the tool
+  [[nodiscard]] double pull_n(const GrabParams& params) const noexcept;  // along the feed, on the tool
   [[nodiscard]] double torque_factor(const GrabParams& params) const noexcept;
 
  private:
@@ -82,13 +83,13 @@ class BreakthroughGrab {
   double engaged_ = 0, whole_n_ = 0;
 };
 
-// A blade that is pressed aside in its kerf presses on the wall: friction drags, and from jam_n on it stands until the pressure
-// is down to `release` of that. One that is turned beyond its play is no matter of this: the kerf's walls are in its way. No
-// kerf closes by itself here.
+// A blade that is pressed aside in its kerf presses on the wall: friction drags, and from jam_n on it stands until the
+// pressure is down to `release` of that. One that is turned beyond its play is no matter of this: the kerf's walls are
+// in its way. No kerf closes by itself here.
 struct BindingParams {
-  double friction = 0.3;           // [A]
-  double jam_n = 30.0;             // [A]
-  double release = 0.5;            // [A]
+  double friction = 0.3;  // [A]
+  double jam_n = 30.0;    // [A]
+  double release = 0.5;   // [A]
 };
 class SawBinding {
  public:
@@ -110,10 +111,11 @@ struct BlowParams {
 };
 class BroachDrive {
  public:
-  // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. `gone_mm`: its way since the last
-  // step; what the hand does not follow of a blow while it lasts is lost. Returns how far it may go until the next step, mm.
-  double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3, double held_n,
-              double gone_mm, double dt_s) noexcept;
+  // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. `gone_mm`: its way since the
+  // last step; what the hand does not follow of a blow while it lasts is lost. Returns how far it may go until the next
+  // step, mm.
+  double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
+              double held_n, double gone_mm, double dt_s) noexcept;
   [[nodiscard]] bool seated() const noexcept { return seated_; }
   [[nodiscard]] int blows() const noexcept { return blows_; }
 
@@ -123,8 +125,8 @@ class BroachDrive {
   bool seated_ = false, striking_ = false;
 };
 
-// The motor that drives a tool of this kind, by the power of such handpieces [A]: what drills, as the drill of 1000 rpm;
-// burs, saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
+// The motor that drives a tool of this kind, by the power of such handpieces [A]: what drills, as the drill of 1000
+// rpm; burs, saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
 [[nodiscard]] SpindleParams motor_of(const Tool& tool) noexcept;
 
 // What the tool did in a tick.
@@ -134,10 +136,10 @@ struct EffectMoment {
   double engaged_area_mm2 = 0;
   double density_g_cm3 = 0;
   bool cutting = false;
-  double cutting_n = 0;      // of the tool on the bone, along the feed
-  double torque_nmm = 0;     // as felt, see CuttingEffects::torque_nmm()
-  double advance_mm = 0;     // along the feed, negative when drawn back
-  double push_n = 0;         // of the hand along the feed
+  double cutting_n = 0;   // of the tool on the bone, along the feed
+  double torque_nmm = 0;  // as felt, see CuttingEffects::torque_nmm()
+  double advance_mm = 0;  // along the feed, negative when drawn back
+  double push_n = 0;      // of the hand along the feed
   double kerf_pressure_n = 0;
 };
 

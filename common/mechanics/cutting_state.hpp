@@ -13,19 +13,19 @@ enum class CuttingPhase : std::uint8_t { idle = 1, free = 2, cutting = 3, rubbin
 struct CuttingState {
   AuthorId author;
   std::uint64_t state_seq = 0;
-  Pose pose_bone_tool;             // the proxy
-  Pose pose_bone_device;           // the hand
+  Pose pose_bone_tool;    // the proxy
+  Pose pose_bone_device;  // the hand
   std::string tool_name;
   double spindle_rpm = 0;
   double feed_mm_per_s = 0;
-  double density_g_cm3 = 0;        // engaged-area weighted
-  double engaged_fraction = 0;     // 0 to 1
+  double density_g_cm3 = 0;              // engaged-area weighted
+  double engaged_fraction = 0;           // 0 to 1
   Vec3 force_physical_N = Vec3::Zero();  // of the bone on the tool, bone frame
   double torque_Nmm = 0;
-  double depth_mm = 0;             // of the tip from the entry of the step under way, along the axis of its site;
-                                   // negative before the bone, 0 before the first step
+  double depth_mm = 0;  // of the tip from the entry of the step under way, along the axis of its site;
+                        // negative before the bone, 0 before the first step
   CuttingPhase phase = CuttingPhase::idle;
-  bool on_metal = false;           // it turns, and metal is in its way: it cuts nothing
+  bool on_metal = false;  // it turns, and metal is in its way: it cuts nothing
 };
 
 }  // namespace osteon

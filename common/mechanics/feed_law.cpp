@@ -33,8 +33,7 @@ FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double ex
     return stiffness_n_per_mm * (extension_mm - feed * dt_s) - resistance_n(law, feed);
   };
   double low = 0.0, high = std::min(law.max_feed_mm_per_s, extension_mm / dt_s);
-  if (surplus_n(high) >= 0.0)
-    return {high, resistance_n(law, high), high == law.max_feed_mm_per_s, false};
+  if (surplus_n(high) >= 0.0) return {high, resistance_n(law, high), high == law.max_feed_mm_per_s, false};
 
   // Bisection: 48 halvings are far below any force a hand feels, and the time is the same in every tick.
   for (int i = 0; i < 48; ++i) {

@@ -6,11 +6,11 @@ namespace osteon {
 // resistance(v) = offset + scale · v^exponent for v > 0 in mm/s, N. What a force law leaves once speed, density and
 // engagement of the moment are put in.
 struct FeedLaw {
-  double offset_n = 0;             // N at the slowest feed: edges that plough, a spring; below it nothing advances
-  double scale_n = 0;              // N at 1 mm/s, beyond the offset
-  double exponent = 1;             // > 0
-  double max_feed_mm_per_s = 0;    // heel contact: the tool's flank touches the bone and cannot go faster
-  double threshold_n = 0;          // below this force the tool rubs and does not advance
+  double offset_n = 0;           // N at the slowest feed: edges that plough, a spring; below it nothing advances
+  double scale_n = 0;            // N at 1 mm/s, beyond the offset
+  double exponent = 1;           // > 0
+  double max_feed_mm_per_s = 0;  // heel contact: the tool's flank touches the bone and cannot go faster
+  double threshold_n = 0;        // below this force the tool rubs and does not advance
 };
 
 [[nodiscard]] double resistance_n(const FeedLaw& law, double feed_mm_per_s) noexcept;
@@ -29,8 +29,8 @@ struct FeedSolution {
 };
 
 // Solves stiffness · (extension − v·dt) = resistance(v) for v in [0, min(cap, extension/dt)]. Both sides are monotone,
-// so the root is bracketed and unique. Below threshold or offset the tool rubs. Fails soft: no extension or no law gives
-// zero feed.
+// so the root is bracketed and unique. Below threshold or offset the tool rubs. Fails soft: no extension or no law
+// gives zero feed.
 [[nodiscard]] FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double extension_mm,
                                       double dt_s) noexcept;
 

@@ -1,5 +1,5 @@
-// Exponentially weighted moving average, equation (7.15): F_i = E_i (1 - alpha) + F_(i-1) alpha. For the cutting force only:
-// in the coupling that holds the hand a filter makes energy (5 ms of it some joules in 10 s of stroking).
+// Exponentially weighted moving average, equation (7.15): F_i = E_i (1 - alpha) + F_(i-1) alpha. For the cutting force
+// only: in the coupling that holds the hand a filter makes energy (5 ms of it some joules in 10 s of stroking).
 #pragma once
 #include <cmath>
 
@@ -7,8 +7,8 @@ namespace osteon {
 
 inline constexpr double kCuttingFilter_s = 2e-3;  // tau
 
-// `T`: double, or a vector with + and *. The factor follows from the tick, alpha = exp(-dt/tau), so that what is felt does
-// not depend on the loop's rate.
+// `T`: double, or a vector with + and *. The factor follows from the tick, alpha = exp(-dt/tau), so that what is felt
+// does not depend on the loop's rate.
 template <class T>
 class ForceFilter {
  public:

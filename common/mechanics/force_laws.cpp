@@ -21,7 +21,9 @@ constexpr double kReferenceDiameter_mm = 3.2;
 
 RevolutionsPerMinute speed_of(const LawInputs& in) noexcept { return RevolutionsPerMinute{in.spindle_rpm}; }
 GramsPerCm3 density_of(const LawInputs& in) noexcept { return GramsPerCm3{in.density_g_cm3}; }
-double heel_feed(const LawTool& tool, const LawInputs& in) noexcept { return tool.heel_mm_per_rev * in.spindle_rpm / 60.0; }
+double heel_feed(const LawTool& tool, const LawInputs& in) noexcept {
+  return tool.heel_mm_per_rev * in.spindle_rpm / 60.0;
+}
 double arm_mm(const LawTool& tool, const LawInputs& in) noexcept {
   return in.mean_arm_mm > 0.0 ? in.mean_arm_mm : tool.arm_mm;
 }
@@ -44,7 +46,8 @@ double lips_torque(const LawTool& tool, const LawInputs& in, double thrust_n) no
   return drilling_torque(drilling_of(tool, in), Newtons{thrust_n}).value();
 }
 double rubbing_below_n(const LawTool& tool, const LawInputs& in) noexcept {
-  return drilling_law(drilling_of(tool, in), RevolutionsPerMinute{kMinCuttingRpm}, density_of(in), in.engaged).threshold_n;
+  return drilling_law(drilling_of(tool, in), RevolutionsPerMinute{kMinCuttingRpm}, density_of(in), in.engaged)
+      .threshold_n;
 }
 
 FeedLaw chi(const LawTool& tool, const LawInputs& in) noexcept {
@@ -89,7 +92,8 @@ FeedLaw milling(const LawTool& tool, const LawInputs& in) noexcept {
   const MillingParams params = milling_of(tool, in);
   // Without a sum over points: the whole engaged area at the mean distance.
   const double mean = milling_resistance(params, area_mm2(tool, in), arm_mm(tool, in), in.density_g_cm3);
-  return milling_law(params, speed_of(in), in.milling_sum > 0.0 ? in.milling_sum : mean, edges_mm(tool, in), density_of(in));
+  return milling_law(params, speed_of(in), in.milling_sum > 0.0 ? in.milling_sum : mean, edges_mm(tool, in),
+                     density_of(in));
 }
 double milling_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
   const MillingParams params = milling_of(tool, in);
@@ -117,8 +121,9 @@ FeedLaw spring_damper(const LawTool& tool, const LawInputs& in) noexcept {
 FeedLaw multi_point(const LawTool& tool, const LawInputs& in) noexcept {
   if (stands(in)) return {};
   // Without a sum over points: the point's cone, whose normals lean by half its angle.
-  const double directed = in.directed_density > 0.0 ? in.directed_density
-                                                    : in.engaged * in.density_g_cm3 * std::sin(0.5 * tool.point_angle_rad);
+  const double directed = in.directed_density > 0.0
+                              ? in.directed_density
+                              : in.engaged * in.density_g_cm3 * std::sin(0.5 * tool.point_angle_rad);
   const double per_newton = multi_point_feed_mm_per_s({.wear = in.wear}, 1.0, directed);
   return {.offset_n = 0.0,
           .scale_n = per_newton > 0.0 ? 1.0 / per_newton : 0.0,
@@ -140,7 +145,8 @@ double saw_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noe
   return thrust_n > 0.0 ? sawing_torque(sawing_of(tool, in.wear), density_of(in), teeth_in(tool, in)).value() : 0.0;
 }
 double saw_across(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
-  return thrust_n > 0.0 ? sawing_cutting_force(sawing_of(tool, in.wear), density_of(in), teeth_in(tool, in)).value() : 0.0;
+  return thrust_n > 0.0 ? sawing_cutting_force(sawing_of(tool, in.wear), density_of(in), teeth_in(tool, in)).value()
+                        : 0.0;
 }
 
 ReamingParams reaming_of(const LawTool& tool, const LawInputs& in) noexcept {
@@ -150,7 +156,8 @@ FeedLaw reamer(const LawTool& tool, const LawInputs& in) noexcept {
   return reaming_law(reaming_of(tool, in), speed_of(in), edges_mm(tool, in), density_of(in));
 }
 double reamer_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
-  return reaming_torque(reaming_of(tool, in), Newtons{thrust_n}, edges_mm(tool, in), density_of(in), arm_mm(tool, in)).value();
+  return reaming_torque(reaming_of(tool, in), Newtons{thrust_n}, edges_mm(tool, in), density_of(in), arm_mm(tool, in))
+      .value();
 }
 
 FeedLaw broach(const LawTool& tool, const LawInputs& in) noexcept {
@@ -166,7 +173,8 @@ bool is_drill(ToolKind kind) noexcept {
 }
 bool is_round_burr(ToolKind kind) noexcept { return kind == ToolKind::round_burr; }
 bool mills(ToolKind kind) noexcept {
-  return is_round_burr(kind) || kind == ToolKind::barrel_burr || kind == ToolKind::contoured_burr || kind == ToolKind::mesh;
+  return is_round_burr(kind) || kind == ToolKind::barrel_burr || kind == ToolKind::contoured_burr ||
+         kind == ToolKind::mesh;
 }
 bool is_reamer(ToolKind kind) noexcept {
   return kind == ToolKind::sphere_reamer || kind == ToolKind::cylinder_reamer || kind == ToolKind::outside_reamer;
@@ -183,8 +191,9 @@ constexpr std::array kLaws{
              .constants = "rubs below 1 N at 1.9 g/cm3 [A]; heel at 0.33 D a turn [A]",
              .wear = "T and M in proportion; a blunt drill (2) needs twice the thrust and advances at 0.26 of the feed",
              .range = "drills and pins of 1.6 to 10 mm [A], 0.3 to 2.0 g/cm3, 500 to 3000 rpm, 0.5 to 3 mm/s",
-             .notes = "The drill of the regression is not stated: thrust grows as D/3.2 [A]. It gives no torque; that is "
-                      "of two lips [A]. No limit at N = 0: a spindle below 50 rpm counts as standing.",
+             .notes =
+                 "The drill of the regression is not stated: thrust grows as D/3.2 [A]. It gives no torque; that is "
+                 "of two lips [A]. No limit at N = 0: a spindle below 50 rpm counts as standing.",
              .limits = {.spindle_rpm = {500, 3000},
                         .feed_mm_per_s = {0.5, 3.0},
                         .density_g_cm3 = {0.3, 2.0},
@@ -192,101 +201,112 @@ constexpr std::array kLaws{
              .fits = is_drill,
              .feed_law = chi,
              .torque_nmm = lips_torque},
-    ForceLaw{.name = "allotta",
-             .title = "Drilling thrust and torque from the energy of a unit of volume",
-             .equation = "T = K_s a (D/2) sin(beta/2), K_s = 5 R_u; M = 5 R_u a D^2/8; a = 60 v/N",
-             .number = "7.1-7.2",
-             .source = "Allotta et al. 1996",
-             .inputs = "a mm per turn, N rpm, v mm/s, D mm, beta rad, R_u MPa; T N, M N mm",
-             .constants = "R_u = 130 (rho/1.9)^2 MPa [A]; beta is the tool's own; heel at 0.33 D a turn [A]",
-             .wear = "K_s in proportion, so T and M; a blunt drill (2) advances at half the feed",
-             .range = "drills and pins of 2.5 to 8 mm in cortical bone, K_s 4.8 to 6 R_u",
-             .notes = "a is for a turn, not a second. The torque's work in a turn is K_s for each mm3. About 1.85 times Chi at "
-                      "1000 rpm, 1 mm/s, 3.2 mm.",
-             .limits = {.density_g_cm3 = {1.5, 2.1}, .diameter_mm = {2.5, 8.0}},
-             .fits = is_drill,
-             .feed_law = allotta,
-             .torque_nmm = lips_torque},
-    ForceLaw{.name = "agus",
-             .title = "Burring as erosion under Hertz's contact",
-             .equation = "F_e = C1 R^2 (h/R)^1.5, F_mu = mu F_e along omega x r; v = mu F omega r / (u A)",
-             .number = "7.4-7.6",
-             .source = "Agus et al. 2002",
-             .inputs = "h mm, R mm, omega rad/s, r mm (mean distance from the axis), A mm2 (on the feed), rho g/cm3; F N, "
-                       "v mm/s",
-             .constants = "C1 25 GPa; mu 0.3 [A]; u 1 J/mm3 at 1.9 g/cm3 [A], growing as rho^1.1841 [A]; heel at 5 usual "
-                          "feeds a turn [A]",
-             .wear = "u in proportion: a blunt burr (2) erodes at half the feed",
-             .range = "round burs on cortical bone, 10000 to 80000 rpm [A]",
-             .notes = "The elastic depth is microns: what a hand feels along the feed is the erosion. h is asked only for "
-                      "how wide the contact is: across the feed and as torque comes F_mu, mu F but for places within some "
-                      "widths of the pole. Nothing is cut at the pole.",
-             .limits = {.spindle_rpm = {10'000, 80'000}, .density_g_cm3 = {1.5, 2.1}},
-             .fits = is_round_burr,
-             .feed_law = agus,
-             .torque_nmm = agus_torque,
-             .across_n = agus_across},
-    ForceLaw{.name = "milling",
-             .title = "Milling force from the rate of removal",
-             .equation = "F_t = K_t MRR / v_c + k_e L, v_c = omega r; F_r = K_r (F_t - k_e L) [A]",
-             .number = "7.7-7.8",
-             .source = "Yang and Chen 2003; Choi and Jerard 1998; Eriksson et al. 2005 for bone",
-             .inputs = "MRR mm3/s, v_c mm/s, L mm of edge in bone, rho g/cm3; F N",
-             .constants = "K_t 200 N/mm2, K_r 0.5, k_e 0.01 N/mm at 1.9 g/cm3 [A], growing as rho^1.1841 [A]; heel at 5 "
-                          "usual feeds a turn [A]",
-             .wear = "K_t and k_e in proportion, so F_t and F_r",
-             .range = "burs and other solids of any form; assumed: 5000 to 80000 rpm, 0.2 to 2.1 g/cm3 [A]",
-             .notes = "As printed, K_t MRR / f with the feed f, the force does not depend on the feed and cannot be solved "
-                      "for it; and F_r is of all of F_t, here not of the edges that only plough [A]. F_t is felt against the "
-                      "feed and as torque, F_r across the feed [A]. Below 0.15 R the cutting speed is taken as constant: at "
-                      "the pole it hardly cuts.",
-             .limits = {.spindle_rpm = {5'000, 80'000}, .density_g_cm3 = {0.2, 2.1}},
-             .fits = mills,
-             .feed_law = milling,
-             .torque_nmm = milling_torque,
-             .across_n = milling_across},
-    ForceLaw{.name = "spring-damper",
-             .title = "Spring and damper of the surface",
-             .equation = "F = t_s N/|N| - t_r V, along the feed t_s + t_r v",
-             .number = "7.9-7.11",
-             .source = "Avila and Sobierajski 1996; McNeely et al. 1999; Hua and Qin 2002",
-             .inputs = "v mm/s, rho g/cm3; F N",
-             .constants = "t_s 5 N, t_r 24 N s/mm at 1.9 g/cm3 [A: fitted to Chi at 1 mm/s], growing as rho^1.1841 and "
-                          "D/3.2 [A]",
-             .wear = "t_s and t_r in proportion",
-             .range = "near the fit: 0.5 to 2 mm/s, 0.3 to 2.0 g/cm3",
-             .notes = "It does not know the spindle's speed. The surface's normal is taken as the feed's own direction [A], "
-                      "so the spring is felt inside even bone too, where the density's gradient, which gives N, vanishes. It "
-                      "gives no torque; that is of two lips [A].",
-             .limits = {.feed_mm_per_s = {0.5, 2.0}, .density_g_cm3 = {0.3, 2.0}},
-             .fits = any,
-             .feed_law = spring_damper,
-             .torque_nmm = lips_torque},
-    ForceLaw{.name = "multi-point",
-             .title = "Sum over the contact points",
-             .equation = "along the feed F = K1 v sum K2_i D_i max(0, -n_i v/|v|), of K1 K2_i D_i |v| n_i where -n_i v > 0",
-             .number = "7.12, 7.14",
-             .source = "Niu 2008; there is no 7.13",
-             .inputs = "v mm/s, D g/cm3, K2 share of the active area, n inward normal; F N",
-             .constants = "K1 17.7 N s/mm per g/cm3 [A: fitted to Chi at 1 mm/s, 1.9 g/cm3 and a 118 degree point]",
-             .wear = "K1 in proportion",
-             .range = "near the fit: 0.5 to 2 mm/s",
-             .notes = "As printed it pushes during retraction too: here only points that move into bone count. A "
-                      "tool cuts as it is fed, so every point's own velocity is the feed's; turning it cuts nothing. It knows "
-                      "neither the spindle's speed nor the diameter. It gives no torque; that is of two lips [A].",
-             .limits = {.feed_mm_per_s = {0.5, 2.0}},
-             .fits = any,
-             .feed_law = multi_point,
-             .torque_nmm = lips_torque},
+    ForceLaw{
+        .name = "allotta",
+        .title = "Drilling thrust and torque from the energy of a unit of volume",
+        .equation = "T = K_s a (D/2) sin(beta/2), K_s = 5 R_u; M = 5 R_u a D^2/8; a = 60 v/N",
+        .number = "7.1-7.2",
+        .source = "Allotta et al. 1996",
+        .inputs = "a mm per turn, N rpm, v mm/s, D mm, beta rad, R_u MPa; T N, M N mm",
+        .constants = "R_u = 130 (rho/1.9)^2 MPa [A]; beta is the tool's own; heel at 0.33 D a turn [A]",
+        .wear = "K_s in proportion, so T and M; a blunt drill (2) advances at half the feed",
+        .range = "drills and pins of 2.5 to 8 mm in cortical bone, K_s 4.8 to 6 R_u",
+        .notes =
+            "a is for a turn, not a second. The torque's work in a turn is K_s for each mm3. About 1.85 times Chi at "
+            "1000 rpm, 1 mm/s, 3.2 mm.",
+        .limits = {.density_g_cm3 = {1.5, 2.1}, .diameter_mm = {2.5, 8.0}},
+        .fits = is_drill,
+        .feed_law = allotta,
+        .torque_nmm = lips_torque},
+    ForceLaw{
+        .name = "agus",
+        .title = "Burring as erosion under Hertz's contact",
+        .equation = "F_e = C1 R^2 (h/R)^1.5, F_mu = mu F_e along omega x r; v = mu F omega r / (u A)",
+        .number = "7.4-7.6",
+        .source = "Agus et al. 2002",
+        .inputs = "h mm, R mm, omega rad/s, r mm (mean distance from the axis), A mm2 (on the feed), rho g/cm3; F N, "
+                  "v mm/s",
+        .constants = "C1 25 GPa; mu 0.3 [A]; u 1 J/mm3 at 1.9 g/cm3 [A], growing as rho^1.1841 [A]; heel at 5 usual "
+                     "feeds a turn [A]",
+        .wear = "u in proportion: a blunt burr (2) erodes at half the feed",
+        .range = "round burs on cortical bone, 10000 to 80000 rpm [A]",
+        .notes = "The elastic depth is microns: what a hand feels along the feed is the erosion. h is asked only for "
+                 "how wide the contact is: across the feed and as torque comes F_mu, mu F but for places within some "
+                 "widths of the pole. Nothing is cut at the pole.",
+        .limits = {.spindle_rpm = {10'000, 80'000}, .density_g_cm3 = {1.5, 2.1}},
+        .fits = is_round_burr,
+        .feed_law = agus,
+        .torque_nmm = agus_torque,
+        .across_n = agus_across},
+    ForceLaw{
+        .name = "milling",
+        .title = "Milling force from the rate of removal",
+        .equation = "F_t = K_t MRR / v_c + k_e L, v_c = omega r; F_r = K_r (F_t - k_e L) [A]",
+        .number = "7.7-7.8",
+        .source = "Yang and Chen 2003; Choi and Jerard 1998; Eriksson et al. 2005 for bone",
+        .inputs = "MRR mm3/s, v_c mm/s, L mm of edge in bone, rho g/cm3; F N",
+        .constants = "K_t 200 N/mm2, K_r 0.5, k_e 0.01 N/mm at 1.9 g/cm3 [A], growing as rho^1.1841 [A]; heel at 5 "
+                     "usual feeds a turn [A]",
+        .wear = "K_t and k_e in proportion, so F_t and F_r",
+        .range = "burs and other solids of any form; assumed: 5000 to 80000 rpm, 0.2 to 2.1 g/cm3 [A]",
+        .notes =
+            "As printed, K_t MRR / f with the feed f, the force does not depend on the feed and cannot be solved "
+            "for it; and F_r is of all of F_t, here not of the edges that only plough [A]. F_t is felt against the "
+            "feed and as torque, F_r across the feed [A]. Below 0.15 R the cutting speed is taken as constant: at "
+            "the pole it hardly cuts.",
+        .limits = {.spindle_rpm = {5'000, 80'000}, .density_g_cm3 = {0.2, 2.1}},
+        .fits = mills,
+        .feed_law = milling,
+        .torque_nmm = milling_torque,
+        .across_n = milling_across},
+    ForceLaw{
+        .name = "spring-damper",
+        .title = "Spring and damper of the surface",
+        .equation = "F = t_s N/|N| - t_r V, along the feed t_s + t_r v",
+        .number = "7.9-7.11",
+        .source = "Avila and Sobierajski 1996; McNeely et al. 1999; Hua and Qin 2002",
+        .inputs = "v mm/s, rho g/cm3; F N",
+        .constants = "t_s 5 N, t_r 24 N s/mm at 1.9 g/cm3 [A: fitted to Chi at 1 mm/s], growing as rho^1.1841 and "
+                     "D/3.2 [A]",
+        .wear = "t_s and t_r in proportion",
+        .range = "near the fit: 0.5 to 2 mm/s, 0.3 to 2.0 g/cm3",
+        .notes =
+            "It does not know the spindle's speed. The surface's normal is taken as the feed's own direction [A], "
+            "so the spring is felt inside even bone too, where the density's gradient, which gives N, vanishes. It "
+            "gives no torque; that is of two lips [A].",
+        .limits = {.feed_mm_per_s = {0.5, 2.0}, .density_g_cm3 = {0.3, 2.0}},
+        .fits = any,
+        .feed_law = spring_damper,
+        .torque_nmm = lips_torque},
+    ForceLaw{
+        .name = "multi-point",
+        .title = "Sum over the contact points",
+        .equation = "along the feed F = K1 v sum K2_i D_i max(0, -n_i v/|v|), of K1 K2_i D_i |v| n_i where -n_i v > 0",
+        .number = "7.12, 7.14",
+        .source = "Niu 2008; there is no 7.13",
+        .inputs = "v mm/s, D g/cm3, K2 share of the active area, n inward normal; F N",
+        .constants = "K1 17.7 N s/mm per g/cm3 [A: fitted to Chi at 1 mm/s, 1.9 g/cm3 and a 118 degree point]",
+        .wear = "K1 in proportion",
+        .range = "near the fit: 0.5 to 2 mm/s",
+        .notes =
+            "As printed it pushes during retraction too: here only points that move into bone count. A "
+            "tool cuts as it is fed, so every point's own velocity is the feed's; turning it cuts nothing. It knows "
+            "neither the spindle's speed nor the diameter. It gives no torque; that is of two lips [A].",
+        .limits = {.feed_mm_per_s = {0.5, 2.0}},
+        .fits = any,
+        .feed_law = multi_point,
+        .torque_nmm = lips_torque},
     ForceLaw{.name = "saw",
              .title = "Sawing from single teeth",
-             .equation = "F = 0.15 n 7.5 (1 + 0.30 (d - 2)/8) N, v pitch = 0.15 d 2 stroke strokes/s; F_c = 0.15 n 4 N along "
-                         "the stroke; M = F_c stroke/pi",
+             .equation =
+                 "F = 0.15 n 7.5 (1 + 0.30 (d - 2)/8) N, v pitch = 0.15 d 2 stroke strokes/s; F_c = 0.15 n 4 N along "
+                 "the stroke; M = F_c stroke/pi",
              .number = "",
              .source = "James, Pearlman and Saigal 2012, 2013",
              .inputs = "n teeth in bone, d um of depth per tooth, v mm/s, stroke mm, pitch mm, rho g/cm3; F N, M N mm",
-             .constants = "7.5 N of thrust at 2 um, 4 N along the cut at 1.9 g/cm3 [A: resultant 8 to 11 N]; 0.15 of the teeth "
-                          "bear at a time [A]; at most 20 um [A]",
+             .constants =
+                 "7.5 N of thrust at 2 um, 4 N along the cut at 1.9 g/cm3 [A: resultant 8 to 11 N]; 0.15 of the teeth "
+                 "bear at a time [A]; at most 20 um [A]",
              .wear = "thrust and cutting force of each tooth in proportion",
              .range = "saws: 2 to 10 um a tooth, teeth at 1700 to 7000 mm/s, cortical bone",
              .notes = "At the same depth of cut the speed has no effect. Below the thrust at no depth the teeth rub.",
@@ -300,8 +320,9 @@ constexpr std::array kLaws{
              .equation = "T = (K_r K_t t + k_e) L, t = 60 v/(N Z); M = (K_t t + k_e) L r",
              .number = "",
              .source = "as milling, 7.7-7.8 [A]",
-             .inputs = "L mm of edge in bone, Z teeth, N rpm, v mm/s, r mm (mean distance from the axis), rho g/cm3; T N, "
-                       "M N mm",
+             .inputs =
+                 "L mm of edge in bone, Z teeth, N rpm, v mm/s, r mm (mean distance from the axis), rho g/cm3; T N, "
+                 "M N mm",
              .constants = "K_t 200 N/mm2, K_r 0.5, k_e 0.01 N/mm at 1.9 g/cm3 [A]; heel at 5 usual feeds a turn [A]",
              .wear = "K_t and k_e in proportion, so T and M",
              .range = "reamers; assumed: 50 to 600 rpm, 0.1 to 2.0 g/cm3 [A]",
@@ -315,7 +336,8 @@ constexpr std::array kLaws{
              .equation = "advance = 0.7 J^2/(2 m R), R = 130 (rho/1.9)^2 A; seated below 0.1 mm a blow",
              .number = "",
              .source = "work and energy [A]",
-             .inputs = "J N s of a blow, m kg of the mallet, A mm2 of wall and face in bone (on the advance), rho g/cm3; R N",
+             .inputs =
+                 "J N s of a blow, m kg of the mallet, A mm2 of wall and face in bone (on the advance), rho g/cm3; R N",
              .constants = "J 2.8 N s, m 0.7 kg, at most 5 mm a blow, held with 5 N [A]",
              .wear = "R in proportion: a blunt broach (2) advances half as far at a blow",
              .range = "broaches; assumed: 0.1 to 1.0 g/cm3, 20 to 120 blows a minute [A]",
@@ -380,7 +402,8 @@ Result<const ForceLaw*> choose_law(const Tool& tool, std::string_view name) {
   return failure(ErrorCode::invalid_input, tool.name + ": " + what + "; choose one of " + fitting);
 }
 
-unsigned out_of_range(const ForceLaw& law, const LawTool& tool, const LawInputs& inputs, double feed_mm_per_s) noexcept {
+unsigned out_of_range(const ForceLaw& law, const LawTool& tool, const LawInputs& inputs,
+                      double feed_mm_per_s) noexcept {
   unsigned bits = 0;
   const auto check = [&](OutOfRange bit, const Span& span, double value) {
     if (outside(span, value)) bits |= static_cast<unsigned>(bit);
@@ -414,7 +437,8 @@ std::string out_of_range_words(unsigned bits) {
 std::string out_of_range_sentence(const ForceLaw& law, unsigned bits) {
   const std::string what = out_of_range_words(bits);
   if (what.empty()) return {};
-  return "the law \"" + std::string(law.name) + "\" is used outside its range (" + std::string(law.range) + "): " + what;
+  return "the law \"" + std::string(law.name) + "\" is used outside its range (" + std::string(law.range) +
+         "): " + what;
 }
 
 }  // namespace osteon

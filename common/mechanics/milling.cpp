@@ -18,8 +18,8 @@ Newtons milling_ploughing(const MillingParams& params, double edge_length_mm, Gr
   return Newtons{params.wear * params.edge_n_per_mm * edge_length_mm * relative_strength(density.value())};
 }
 
-FeedLaw milling_law(const MillingParams& params, RevolutionsPerMinute speed, double resistance_sum, double edge_length_mm,
-                    GramsPerCm3 density) noexcept {
+FeedLaw milling_law(const MillingParams& params, RevolutionsPerMinute speed, double resistance_sum,
+                    double edge_length_mm, GramsPerCm3 density) noexcept {
   if (speed.value() < kMinCuttingRpm) return {};
   const double omega = speed.value() * 2.0 * std::numbers::pi / 60.0;
   return {.offset_n = milling_ploughing(params, edge_length_mm, density).value(),

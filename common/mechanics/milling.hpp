@@ -3,7 +3,8 @@
 // swept area: it does not depend on the feed, and no feed follows from a force. So f is read as the cutting speed:
 // F_t = K_t MRR / v_c + edge force, with the removal rate MRR in mm3/s and v_c = omega r of each point in mm/s.
 // The page has F_r of all of F_t; of the edges' ploughing, which takes no chip, we leave it out [A].
-// [A] K_t 200 N/mm2 at 1.9 g/cm3, K_r 0.5, 0.01 N for each mm of edge that ploughs; all grow with density as Chi's thrust.
+// [A] K_t 200 N/mm2 at 1.9 g/cm3, K_r 0.5, 0.01 N for each mm of edge that ploughs; all grow with density as Chi's
+// thrust.
 #pragma once
 #include "common/core/units.hpp"
 #include "common/mechanics/feed_law.hpp"
@@ -20,14 +21,14 @@ struct MillingParams {
   double heel_mm_per_rev = 0.1;       // how far the teeth stand out for a turn's feed [A]
 };
 
-// What one patch of the burr's surface adds: its area projected on the feed, its distance from the axis, its density. Of a
-// sharp tool, whatever `params.wear` says.
-// The sum over patches is N·s/mm per rad/s of spindle speed: divide by omega. Near the pole the cutting speed vanishes
-// and the resistance grows: there a burr does not cut.
+// What one patch of the burr's surface adds: its area projected on the feed, its distance from the axis, its density.
+// Of a sharp tool, whatever `params.wear` says. The sum over patches is N·s/mm per rad/s of spindle speed: divide by
+// omega. Near the pole the cutting speed vanishes and the resistance grows: there a burr does not cut.
 [[nodiscard]] double milling_resistance(const MillingParams& params, double projected_area_mm2, double axis_distance_mm,
                                         double density_g_cm3) noexcept;
 // Force of edges that plough and take no chip, k_e L.
-[[nodiscard]] Newtons milling_ploughing(const MillingParams& params, double edge_length_mm, GramsPerCm3 density) noexcept;
+[[nodiscard]] Newtons milling_ploughing(const MillingParams& params, double edge_length_mm,
+                                        GramsPerCm3 density) noexcept;
 // (7.7) at a moment, along the feed: `resistance_sum` of milling_resistance(), and the length of edge in bone.
 [[nodiscard]] FeedLaw milling_law(const MillingParams& params, RevolutionsPerMinute speed, double resistance_sum,
                                   double edge_length_mm, GramsPerCm3 density) noexcept;

@@ -22,8 +22,8 @@ Oscillator of_turn(const MountParams& p) {
   return {mass, p.damping * 2.0 * std::sqrt(p.stiffness_nmm_per_rad * mass), p.stiffness_nmm_per_rad, p.most_rad};
 }
 
-// Spring and damper as they are at the end of the step. A stop takes the motion away, which can only lose energy: it lies
-// on the way that the load and the spring would go.
+// Spring and damper as they are at the end of the step. A stop takes the motion away, which can only lose energy: it
+// lies on the way that the load and the spring would go.
 void advance(const Oscillator& o, const Vec3& load, double dt, Vec3& at, Vec3& speed) {
   speed = (speed + dt / o.mass * (load - o.stiffness * at)) / (1.0 + dt / o.mass * (o.damping + dt * o.stiffness));
   const Vec3 next = at + dt * speed;
@@ -40,9 +40,9 @@ void advance(const Oscillator& o, const Vec3& load, double dt, Vec3& at, Vec3& s
 
 bool MountParams::good() const {
   const auto positive = [](double value) { return std::isfinite(value) && value > 0.0; };
-  return positive(mass_kg) && positive(inertia_kg_mm2) && positive(stiffness_n_per_mm) && positive(stiffness_nmm_per_rad) &&
-         std::isfinite(damping) && damping >= 0.0 && positive(most_mm) && positive(most_rad) && most_rad < 3.0 &&
-         centre_mm.allFinite() && pose_world_rest.position_mm.allFinite() &&
+  return positive(mass_kg) && positive(inertia_kg_mm2) && positive(stiffness_n_per_mm) &&
+         positive(stiffness_nmm_per_rad) && std::isfinite(damping) && damping >= 0.0 && positive(most_mm) &&
+         positive(most_rad) && most_rad < 3.0 && centre_mm.allFinite() && pose_world_rest.position_mm.allFinite() &&
          std::abs(pose_world_rest.rotation.norm() - 1.0) < 1e-6;
 }
 

@@ -1,10 +1,11 @@
-// The bone on a compliant mount: one rigid body on a spring and a damper in all six degrees of freedom about a centre, so that
-// users who push it feel each other through it (Morris et al., 2004). World frame: axes through the centre where it rests.
+// The bone on a compliant mount: one rigid body on a spring and a damper in all six degrees of freedom about a centre,
+// so that users who push it feel each other through it (Morris et al., 2004). World frame: axes through the centre
+// where it rests.
 //
 //   M x'' + B x' + K x = F,   J t'' + B_t t' + K_t t = T,   t: rotation vector, a fraction of a radian
 //
-// At rest x = F / K and t = T / K_t, with F the sum of all forces and T that of their moments about the centre. Two users who
-// press on springs k1, k2 from e1, e2 along one line through the centre meet at
+// At rest x = F / K and t = T / K_t, with F the sum of all forces and T that of their moments about the centre. Two
+// users who press on springs k1, k2 from e1, e2 along one line through the centre meet at
 //
 //   x = (k1 e1 + k2 e2) / (K + k1 + k2),   f1 = k1 (e1 - x)
 //
@@ -33,17 +34,17 @@ struct Shift {
 };
 
 struct MountParams {
-  double mass_kg = 2.0;                        // of the bone and what moves with it [A]
-  double inertia_kg_mm2 = 5000.0;              // about every axis through the centre [A]
-  double stiffness_n_per_mm = 5.0;             // [A]
-  double stiffness_nmm_per_rad = 20000.0;      // [A]
-  double damping = 1.0;                        // of the critical one, both ways
+  double mass_kg = 2.0;                    // of the bone and what moves with it [A]
+  double inertia_kg_mm2 = 5000.0;          // about every axis through the centre [A]
+  double stiffness_n_per_mm = 5.0;         // [A]
+  double stiffness_nmm_per_rad = 20000.0;  // [A]
+  double damping = 1.0;                    // of the critical one, both ways
   // Stops: beyond them the bone does not go, whatever pushes. A turn is not small beyond that, nor the spring linear.
   double most_mm = 20.0, most_rad = 0.35;
-  Pose pose_world_rest;                        // of the bone, unloaded
-  Vec3 centre_mm = Vec3::Zero();               // world
+  Pose pose_world_rest;           // of the bone, unloaded
+  Vec3 centre_mm = Vec3::Zero();  // world
 
-  [[nodiscard]] bool good() const;             // all finite, masses, springs and stops positive, damping not negative
+  [[nodiscard]] bool good() const;  // all finite, masses, springs and stops positive, damping not negative
 };
 
 // The mount of a room's bone, as all its members know it: about this place, where it rests as it was imported.
@@ -52,8 +53,8 @@ struct MountParams {
 // Where that puts the bone.
 [[nodiscard]] Pose pose_world_bone(const MountParams& mount, const Shift& shift);
 
-// No clock, no thread. Implicit Euler: stable for any step, exact at rest, first order in the step on the way there, and
-// never with more energy than the loads put in: S' - S <= F·dx + T·dt.
+// No clock, no thread. Implicit Euler: stable for any step, exact at rest, first order in the step on the way there,
+// and never with more energy than the loads put in: S' - S <= F·dx + T·dt.
 class Mount {
  public:
   // Aborts unless the parameters are good().

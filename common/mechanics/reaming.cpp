@@ -30,8 +30,8 @@ FeedLaw reaming_law(const ReamingParams& params, RevolutionsPerMinute speed, dou
           .threshold_n = 0.0};
 }
 
-NewtonMillimetres reaming_torque(const ReamingParams& params, Newtons thrust, double edge_length_mm, GramsPerCm3 density,
-                                 double arm_mm) noexcept {
+NewtonMillimetres reaming_torque(const ReamingParams& params, Newtons thrust, double edge_length_mm,
+                                 GramsPerCm3 density, double arm_mm) noexcept {
   const double ploughing_n = std::min(thrust.value(), edge_n(params, edge_length_mm, density));
   const double cutting_n = (thrust.value() - ploughing_n) / params.radial_ratio;
   return NewtonMillimetres{(cutting_n + ploughing_n) * arm_mm};

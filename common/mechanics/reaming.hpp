@@ -1,7 +1,7 @@
 // Reaming as milling along the axis [A]: every millimetre of cutting edge takes a chip as thick as the feed of a tooth,
-// t = 60 v / (N Z), and needs the tangential force K_t t + k_e. Radially, which here is along the feed, it is K_r of what
-// cuts. Sum over the engaged edge length L of all teeth: thrust = (K_r K_t t + k_e) L. It is the milling law of the same
-// face: the edges of Z teeth over a ring of radius r and width dr sweep 2 pi r dr, and their length is Z dr.
+// t = 60 v / (N Z), and needs the tangential force K_t t + k_e. Radially, which here is along the feed, it is K_r of
+// what cuts. Sum over the engaged edge length L of all teeth: thrust = (K_r K_t t + k_e) L. It is the milling law of
+// the same face: the edges of Z teeth over a ring of radius r and width dr sweep 2 pi r dr, and their length is Z dr.
 #pragma once
 #include "common/core/units.hpp"
 #include "common/mechanics/feed_law.hpp"

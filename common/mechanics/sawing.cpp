@@ -33,7 +33,8 @@ double depth_of_cut_um(const SawingParams& params, RevolutionsPerMinute strokes,
   return speed > 0.0 ? 1e3 * feed.value() * params.tooth_pitch_mm / (params.bearing_share * speed) : 0.0;
 }
 
-FeedLaw sawing_law(const SawingParams& params, RevolutionsPerMinute strokes, GramsPerCm3 density, double teeth) noexcept {
+FeedLaw sawing_law(const SawingParams& params, RevolutionsPerMinute strokes, GramsPerCm3 density,
+                   double teeth) noexcept {
   const double um_per_feed = depth_of_cut_um(params, strokes, MillimetresPerSecond{1.0});
   if (strokes.value() < kMinCuttingRpm || !(um_per_feed > 0.0) || !(teeth > 0.0)) return {};
   const double bearing_n = params.bearing_share * teeth * tooth_n(params, density);

@@ -13,14 +13,14 @@
 namespace osteon {
 
 struct SawingParams {
-  double stroke_mm = 7.85;             // way of the teeth from end to end, twice in a period
+  double stroke_mm = 7.85;  // way of the teeth from end to end, twice in a period
   double tooth_pitch_mm = 1.39;
-  double thrust_n = 7.5;               // of a tooth at 2 micrometres, 1.9 g/cm3 [A]
-  double rise = 0.30;                  // of the thrust from 2 to 10 micrometres
-  double cutting_n = 4.0;              // of a tooth along its motion [A]
-  double bearing_share = 0.15;         // [A]
-  double most_um = 20.0;               // the gullets are full; twice what was measured [A]
-  double wear = 1.0;                   // 1 sharp
+  double thrust_n = 7.5;        // of a tooth at 2 micrometres, 1.9 g/cm3 [A]
+  double rise = 0.30;           // of the thrust from 2 to 10 micrometres
+  double cutting_n = 4.0;       // of a tooth along its motion [A]
+  double bearing_share = 0.15;  // [A]
+  double most_um = 20.0;        // the gullets are full; twice what was measured [A]
+  double wear = 1.0;            // 1 sharp
 };
 
 // One tooth at a depth of cut in micrometres, in newtons.

@@ -68,11 +68,13 @@ void Hand::step(const HandCommand& command, const Vec3& force_n, double dt_s) no
     }
     const Vec3 stretch = rest_mm_ - position_mm_;
     const double axial_force_n = push_n_ + params_.stiffness_n_per_mm * stretch.dot(axis) + force_n.dot(axis);
-    const Vec3 lateral_force_n = params_.lateral_n_per_mm * (stretch - stretch.dot(axis) * axis) + force_n - force_n.dot(axis) * axis;
+    const Vec3 lateral_force_n =
+        params_.lateral_n_per_mm * (stretch - stretch.dot(axis) * axis) + force_n - force_n.dot(axis) * axis;
     const double axial_speed = velocity_mm_per_s_.dot(axis);
     // Damping implicitly, so that a light hand of a scaled-down device stays stable.
     const double axial = (axial_speed + dt * axial_force_n / mass) / (1.0 + dt * params_.damping_n_s_per_mm / mass);
-    const Vec3 lateral = (velocity_mm_per_s_ - axial_speed * axis + dt / mass * lateral_force_n) / (1.0 + dt * lateral_damping / mass);
+    const Vec3 lateral =
+        (velocity_mm_per_s_ - axial_speed * axis + dt / mass * lateral_force_n) / (1.0 + dt * lateral_damping / mass);
     velocity_mm_per_s_ = axial * axis + lateral;
     position_mm_ += dt * velocity_mm_per_s_;
   }

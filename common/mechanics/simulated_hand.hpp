@@ -1,6 +1,6 @@
-// The surgeon's hand on the handle: a mass on a spring and a damper whose rest place follows the tool, pushing along the
-// axis, M a = F g(t) + K (x_e - x) - B v - f, x_e' = (x - x_e) / 0.3 s. At breakthrough the rest place freezes, and after
-// the reaction time the push dies away. Across the axis the hand is stiff. Frame: that of the caller.
+// The surgeon's hand on the handle: a mass on a spring and a damper whose rest place follows the tool, pushing along
+// the axis, M a = F g(t) + K (x_e - x) - B v - f, x_e' = (x - x_e) / 0.3 s. At breakthrough the rest place freezes, and
+// after the reaction time the push dies away. Across the axis the hand is stiff. Frame: that of the caller.
 #pragma once
 #include <cstdint>
 
@@ -14,10 +14,10 @@ struct HandParams {
   double damping_n_s_per_mm = 0.235;
   double stiffness_n_per_mm = 5.5;
   double push_n = 29.0;
-  double follow_s = 0.3;       // the rest place follows the tool with this time constant
-  double rise_s = 0.15;        // from touching to the full push
-  double reaction_s = 0.15;    // after breakthrough until the push begins to die away
-  double release_s = 0.05;     // time constant of its dying away
+  double follow_s = 0.3;     // the rest place follows the tool with this time constant
+  double rise_s = 0.15;      // from touching to the full push
+  double reaction_s = 0.15;  // after breakthrough until the push begins to die away
+  double release_s = 0.05;   // time constant of its dying away
   double lateral_n_per_mm = 20.0;
 };
 [[nodiscard]] HandParams expert_hand();
@@ -35,8 +35,8 @@ enum class HandMode : std::uint8_t {
 
 struct HandCommand {
   HandMode mode = HandMode::carry;
-  Vec3 target_mm = Vec3::Zero();      // rest place (carry), held place (rig), any point of the line of push
-  Vec3 axis = Vec3::UnitZ();          // unit direction of push
+  Vec3 target_mm = Vec3::Zero();  // rest place (carry), held place (rig), any point of the line of push
+  Vec3 axis = Vec3::UnitZ();      // unit direction of push
 };
 
 class Hand {

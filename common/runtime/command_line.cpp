@@ -13,7 +13,8 @@ std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* a
   } catch (const CLI::ParseError& error) {
     // Help is an "error" of code 0 to the library.
     if (error.get_exit_code() == 0) return app.exit(error);
-    return log::exit_with(app.get_name(), {ErrorCode::invalid_input, std::string(error.what()) + "; see " + app.get_name() + " --help"});
+    return log::exit_with(
+        app.get_name(), {ErrorCode::invalid_input, std::string(error.what()) + "; see " + app.get_name() + " --help"});
   }
 }
 

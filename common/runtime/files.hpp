@@ -14,6 +14,7 @@ namespace osteon {
 [[nodiscard]] Result<std::string> read_file(const std::filesystem::path& file);
 // Whether a file could be written there; what it holds stays. No file is always well. `what` ("the recording") and
 // `option` ("--wav") are for the sentence. Error: internal.
-[[nodiscard]] Result<void> check_writable(const std::filesystem::path& file, const std::string& what, const std::string& option);
+[[nodiscard]] Result<void> check_writable(const std::filesystem::path& file, const std::string& what,
+                                          const std::string& option);
 
 }  // namespace osteon

@@ -7,8 +7,8 @@ namespace osteon {
 // For a thread that applies cuts: those of a tick or of a moment take less. One cut takes about 0.2 MB.
 inline constexpr std::size_t kCutReserve = std::size_t{4} << 20;
 
-// Of the thread that makes and refills it: what a thread takes comes from its own part of the heap. Small blocks that it
-// takes later are then memory that it has held before. The first reserve tells the heap to keep what it was given.
+// Of the thread that makes and refills it: what a thread takes comes from its own part of the heap. Small blocks that
+// it takes later are then memory that it has held before. The first reserve tells the heap to keep what it was given.
 class MemoryReserve {
  public:
   explicit MemoryReserve(std::size_t bytes);

@@ -36,7 +36,8 @@ bool try_fifo(int priority) noexcept {
 }
 
 bool try_slack() noexcept {
-  return ::prctl(PR_SET_TIMERSLACK, kExactSlack_ns) == 0 && ::prctl(PR_GET_TIMERSLACK) == static_cast<int>(kExactSlack_ns);
+  return ::prctl(PR_SET_TIMERSLACK, kExactSlack_ns) == 0 &&
+         ::prctl(PR_GET_TIMERSLACK) == static_cast<int>(kExactSlack_ns);
 }
 
 std::string first_line(const std::filesystem::path& file) {
@@ -99,7 +100,8 @@ MachineFacts look_at_machine(int priority) {
   }
   if (::geteuid() == 0) facts.memlock_limit_kib = LONG_MAX;  // the limit does not bind root
   for (int core = 0; core < facts.cores; ++core) {
-    const std::string governor = first_line("/sys/devices/system/cpu/cpu" + std::to_string(core) + "/cpufreq/scaling_governor");
+    const std::string governor =
+        first_line("/sys/devices/system/cpu/cpu" + std::to_string(core) + "/cpufreq/scaling_governor");
     if (!governor.empty()) facts.governors.push_back(governor);
   }
   facts.preemption = preemption();
@@ -129,14 +131,16 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
                             ", \"@audio - rtprio 95\" and \"@audio - memlock unlimited\", "
                             "add yourself to that group (sudo usermod -aG audio $USER) and log in again";
 
-  if (facts.fifo_works) say(Finding::fine, "Threads may run at real-time priority " + std::to_string(priority) + ".");
+  if (facts.fifo_works)
+    say(Finding::fine, "Threads may run at real-time priority " + std::to_string(priority) + ".");
   else
     say(Finding::lacking,
         "Threads may not run at real-time priority " + std::to_string(priority) + " (the limit is " +
             std::to_string(std::max(0L, facts.rtprio_limit)) + "), so other programs delay the haptic loop.",
         lines);
 
-  if (facts.lock_works && facts.memlock_limit_kib >= memory_kib) say(Finding::fine, "Memory may be locked.");
+  if (facts.lock_works && facts.memlock_limit_kib >= memory_kib)
+    say(Finding::fine, "Memory may be locked.");
   else
     say(Finding::lacking,
         "No more than " + kib(facts.lock_works ? facts.memlock_limit_kib : 0) + " of memory may be locked and " +
@@ -155,7 +159,8 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
   if (facts.cores < 2)
     say(Finding::lacking, "There is one core; the haptic loop spins and would take it from all else.",
         "give the machine at least two cores");
-  else say(Finding::fine, "There are " + std::to_string(facts.cores) + " cores.");
+  else
+    say(Finding::fine, "There are " + std::to_string(facts.cores) + " cores.");
 
   if (facts.rt_runtime_told && facts.rt_runtime_us >= 0 && facts.rt_runtime_us < 500'000)
     say(Finding::lacking,
@@ -164,19 +169,23 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
 
   const auto slow = std::ranges::count_if(facts.governors, [](const std::string& g) { return g != "performance"; });
   if (slow > 0)
-    say(Finding::note, "The clock of " + std::to_string(slow) + " cores is governed by \"" +
-                           *std::ranges::find_if(facts.governors, [](const std::string& g) { return g != "performance"; }) +
-                           "\" and slows down between ticks.",
+    say(Finding::note,
+        "The clock of " + std::to_string(slow) + " cores is governed by \"" +
+            *std::ranges::find_if(facts.governors, [](const std::string& g) { return g != "performance"; }) +
+            "\" and slows down between ticks.",
         "sudo cpupower frequency-set -g performance");
-  else if (!facts.governors.empty()) say(Finding::fine, "All cores run at full clock.");
-  else say(Finding::fine, "The clock of the cores is not governed from here.");
+  else if (!facts.governors.empty())
+    say(Finding::fine, "All cores run at full clock.");
+  else
+    say(Finding::fine, "The clock of the cores is not governed from here.");
 
   if (facts.preemption == "rt" || facts.preemption == "full")
     say(Finding::fine, facts.preemption == "rt" ? "The kernel is a real-time one." : "The kernel can be preempted.");
   else
     say(Finding::note,
-        facts.preemption == "dynamic" ? "The kernel's preemption was chosen at boot and is not told."
-                                      : "The kernel is preempted only where it offers to be (" + facts.preemption + ").",
+        facts.preemption == "dynamic"
+            ? "The kernel's preemption was chosen at boot and is not told."
+            : "The kernel is preempted only where it offers to be (" + facts.preemption + ").",
         "boot with preempt=full, or install linux-image-rt-amd64");
 
   if (facts.clock_source != "tsc" && facts.clock_source != "kvm-clock" && facts.clock_source != "arch_sys_counter" &&
@@ -184,10 +193,12 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
     say(Finding::note, "The clock is read from \"" + facts.clock_source + "\", which takes microseconds.",
         "boot with clocksource=tsc tsc=reliable");
   if (facts.virtual_machine)
-    say(Finding::note, "This is a virtual machine: its host may stop it for milliseconds, which nothing in it can prevent.",
+    say(Finding::note,
+        "This is a virtual machine: its host may stop it for milliseconds, which nothing in it can prevent.",
         "run the haptic client on real hardware");
 
-  std::ranges::stable_sort(findings, [](Finding a, Finding b) { return a > b; }, &MachineFinding::kind);
+  std::ranges::stable_sort(
+      findings, [](Finding a, Finding b) { return a > b; }, &MachineFinding::kind);
   return findings;
 }
 

@@ -21,7 +21,8 @@ void raise_flag() noexcept {
   stop_requests.fetch_add(1, std::memory_order_acq_rel);
   const std::uint64_t one = 1;
   const int descriptor = wake_descriptor.load(std::memory_order_acquire);
-  if (descriptor >= 0) [[maybe_unused]] const auto written = ::write(descriptor, &one, sizeof one);
+  if (descriptor >= 0) [[maybe_unused]]
+    const auto written = ::write(descriptor, &one, sizeof one);
 }
 
 void on_signal(int) { raise_flag(); }

@@ -4,8 +4,8 @@
 
 namespace osteon {
 
-// One per process, made in main before other threads start. A second signal ends nothing by itself: an impatient person must
-// not leave half-written files; it may shorten a wait. SIGQUIT still ends a process that hangs.
+// One per process, made in main before other threads start. A second signal ends nothing by itself: an impatient person
+// must not leave half-written files; it may shorten a wait. SIGQUIT still ends a process that hangs.
 class StopSignal {
  public:
   StopSignal();

@@ -10,9 +10,9 @@ namespace osteon {
 
 class Watchdog {
  public:
-  // `late` is called on the watchdog's own thread, once for each stall, as soon as no beat has come for `patience`, or after
-  // it, where the watchdog stood as well; the watch begins with the first beat. `priority`: of that thread, above the loop's;
-  // 0 or what the machine refuses: ordinary.
+  // `late` is called on the watchdog's own thread, once for each stall, as soon as no beat has come for `patience`, or
+  // after it, where the watchdog stood as well; the watch begins with the first beat. `priority`: of that thread, above
+  // the loop's; 0 or what the machine refuses: ordinary.
   Watchdog(std::chrono::nanoseconds patience, int priority, std::function<void()> late);
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;

@@ -16,18 +16,21 @@ void gather_level(const Gather& gather, int level, const CoordBox& box, std::vec
   std::vector<float> plane;
   std::size_t i = 0;
   for (std::int32_t x = box.min.x; x <= box.max.x; ++x) {
-    const CoordBox at{{every * x, every * box.min.y, every * box.min.z}, {every * x, every * box.max.y, every * box.max.z}};
+    const CoordBox at{{every * x, every * box.min.y, every * box.min.z},
+                      {every * x, every * box.max.y, every * box.max.z}};
     const Coord d = at.dims();
     plane.resize(static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z));
     gather(0, at, std::span<float>(plane));
     for (std::int32_t y = 0; y < d.y; y += every)
-      for (std::int32_t z = 0; z < d.z; z += every) out[i++] = plane[static_cast<std::size_t>(y) * static_cast<std::size_t>(d.z) + static_cast<std::size_t>(z)];
+      for (std::int32_t z = 0; z < d.z; z += every)
+        out[i++] = plane[static_cast<std::size_t>(y) * static_cast<std::size_t>(d.z) + static_cast<std::size_t>(z)];
   }
 }
 
 // Fills `out`, using again what it has room for. kWhollyCovered where it sees that there is no surface.
 template <class Field>
-void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKey& key, double pitch_mm, BlockSamples& out) {
+void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKey& key, double pitch_mm,
+                  BlockSamples& out) {
   out.key = key;
   out.level_pitch_mm = level_pitch_mm(pitch_mm, key.level);
   out.covered = blocks.covered(key);
@@ -37,7 +40,9 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
   if (out.covered == kWhollyCovered) return;
   out.seams = blocks.seams(key);
   const auto solid = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_solid(level, box, to); };
-  const auto surface = [&](int level, const CoordBox& box, std::span<float> to) { field.gather_surface(level, box, to); };
+  const auto surface = [&](int level, const CoordBox& box, std::span<float> to) {
+    field.gather_surface(level, box, to);
+  };
   const CoordBox box = block_samples(key);
   if (key.level >= 0) {
     constexpr std::size_t kSamples = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
@@ -66,7 +71,8 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
   for (const std::uint8_t steps : out.seams.coarser) meets[steps] = true;
   for (int steps = 1; steps <= kSeamSteps; ++steps)
     if (meets[static_cast<std::size_t>(steps)])
-      gather_level(solid, key.level - steps, coarse_samples(key, steps), out.coarse_mm[static_cast<std::size_t>(steps - 1)]);
+      gather_level(solid, key.level - steps, coarse_samples(key, steps),
+                   out.coarse_mm[static_cast<std::size_t>(steps - 1)]);
 }
 
 }  // namespace osteon

@@ -58,7 +58,9 @@ void Contour::build(const SolidRows& solid, CoveredGroups covered, const SeamRul
     }
   if (covered != 0) {
     // Only edges of drawn cells. A crossed edge's cells are crossed, so crossed cells tell as well as drawn ones.
-    const auto cells = [&](int x, int y) { return x >= 0 && y >= 0 && x < kBlockCells && y < kBlockCells ? cells_[x][y] : 0u; };
+    const auto cells = [&](int x, int y) {
+      return x >= 0 && y >= 0 && x < kBlockCells && y < kBlockCells ? cells_[x][y] : 0u;
+    };
     const auto both = [](std::uint32_t row) { return row | row << 1; };  // samples of a row's cells
     for (int x = 0; x < kN; ++x)
       for (int y = 0; y < kN; ++y) {
@@ -111,8 +113,8 @@ void Contour::collapse(const SeamRule& seams) {
   }
 }
 
-// Follows the contour through the fine faces of one coarse face from each of its ends, and moves the vertices between to
-// the nearer end.
+// Follows the contour through the fine faces of one coarse face from each of its ends, and moves the vertices between
+// to the nearer end.
 void Contour::collapse_face(const std::array<int, 3>& origin, int axis, int cells) {
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   const int first = sample_number(origin[0], origin[1], origin[2]);

@@ -43,7 +43,8 @@ class Contour {
         const std::uint32_t row10 = solid_[x + 1][y], row11 = solid_[x + 1][y + 1];
         for (std::uint32_t left = cells_[x][y]; left != 0; left &= left - 1) {
           const int z = std::countr_zero(left);
-          const unsigned corners = (row00 >> z & 3) | (row01 >> z & 3) << 2 | (row10 >> z & 3) << 4 | (row11 >> z & 3) << 6;
+          const unsigned corners =
+              (row00 >> z & 3) | (row01 >> z & 3) << 2 | (row10 >> z & 3) << 4 | (row11 >> z & 3) << 6;
           const CaseTriangles& cell = cases[corners];
           const std::uint16_t* at = vertex_of_edge_.data() + sample_number(x, y, z);
           for (std::size_t i = 0; i < cell.corners; i += 3) {

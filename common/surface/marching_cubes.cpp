@@ -12,7 +12,8 @@ int edge_between(const MarchingCubesTable& table, int a, int b) {
   const int low = a & b, axis_bit = a ^ b;
   const int axis = axis_bit == 4 ? 0 : axis_bit == 2 ? 1 : 2;
   for (int e = 0; e < kCellEdges; ++e)
-    if (table.edges[static_cast<std::size_t>(e)].corner == low && table.edges[static_cast<std::size_t>(e)].axis == axis) return e;
+    if (table.edges[static_cast<std::size_t>(e)].corner == low && table.edges[static_cast<std::size_t>(e)].axis == axis)
+      return e;
   OSTEON_CHECK(false);
 }
 

@@ -24,12 +24,13 @@ constexpr std::uint8_t kHasCovered = 1, kHasSeams = 2, kAllCut = 4, kSomeCut = 8
 constexpr std::array kTissues{Tissue::none, Tissue::metal, Tissue::enamel};
 constexpr std::size_t kGathered = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
 
-// Solid bits go row by row, x slowest, as the difference from what the three rows before suggest: a plane continues. One
-// byte is a run of rows without difference, or one run of differing bits by length and start; other rows take four.
+// Solid bits go row by row, x slowest, as the difference from what the three rows before suggest: a plane continues.
+// One byte is a run of rows without difference, or one run of differing bits by length and start; other rows take four.
 constexpr unsigned kSameRows = 64, kDifferenceLengths = 11, kRawRow = 255;
 
 std::uint32_t expected_row(const SolidRows& rows, std::size_t x, std::size_t y) {
-  const std::uint32_t a = y > 0 ? rows[x][y - 1] : 0, b = x > 0 ? rows[x - 1][y] : 0, c = x > 0 && y > 0 ? rows[x - 1][y - 1] : 0;
+  const std::uint32_t a = y > 0 ? rows[x][y - 1] : 0, b = x > 0 ? rows[x - 1][y] : 0,
+                      c = x > 0 && y > 0 ? rows[x - 1][y - 1] : 0;
   return (a & b) | (~c & (a ^ b));
 }
 
@@ -50,7 +51,8 @@ void write_rows(const SolidRows& rows, std::vector<std::uint8_t>& out) {
       const auto start = static_cast<unsigned>(std::countr_zero(difference));
       const std::uint32_t run = difference >> start;
       if ((run & (run + 1)) == 0 && std::bit_width(run) <= static_cast<int>(kDifferenceLengths)) {
-        out.push_back(static_cast<std::uint8_t>(kSameRows + (static_cast<unsigned>(std::bit_width(run)) - 1) * kN + start));
+        out.push_back(
+            static_cast<std::uint8_t>(kSameRows + (static_cast<unsigned>(std::bit_width(run)) - 1) * kN + start));
       } else {
         for (const std::uint32_t byte : {kRawRow, difference & 255u, difference >> 8 & 255u, difference >> 16})
           out.push_back(static_cast<std::uint8_t>(byte));
@@ -217,8 +219,8 @@ class Mesher {
     return begin(samples, samples.solid_mm, surface, samples.covered, samples.seams);
   }
 
-  bool begin(const BlockSamples& samples, std::span<const float> solid, std::span<const float> surface, CoveredGroups covered,
-             const Seams& seams) {
+  bool begin(const BlockSamples& samples, std::span<const float> solid, std::span<const float> surface,
+             CoveredGroups covered, const Seams& seams) {
     if (covered == kWhollyCovered) return false;
     OSTEON_CHECK(solid.size() == kGathered && surface.size() == kGathered);
     samples_ = &samples;
@@ -282,7 +284,8 @@ class Mesher {
     from[axis] = at[axis] / cells * cells;
     for (const int c : from)
       if (c % cells != 0) return false;
-    const std::size_t a = gathered(static_cast<std::size_t>(from[0]), static_cast<std::size_t>(from[1]), static_cast<std::size_t>(from[2]));
+    const std::size_t a = gathered(static_cast<std::size_t>(from[0]), static_cast<std::size_t>(from[1]),
+                                   static_cast<std::size_t>(from[2]));
     const std::size_t b = a + static_cast<std::size_t>(cells) * kNeighbour[axis];
     const float fa = field_[a], fb = field_[b];
     if ((fa < 0.0f) == (fb < 0.0f)) return false;
@@ -302,8 +305,8 @@ class Mesher {
   }
 
   const BlockSamples* samples_ = nullptr;
-  const float* raw_ = nullptr;      // as gathered
-  const float* field_ = nullptr;    // with the seams' contour
+  const float* raw_ = nullptr;    // as gathered
+  const float* field_ = nullptr;  // with the seams' contour
   const float* surface_ = nullptr;
   const Tissue* tissue_ = nullptr;  // null: none at all
   SeamRule rule_{Seams{}};
@@ -346,8 +349,7 @@ BlockPayload encode(Mesher& at, CoveredGroups covered, const Seams& seams, doubl
     cut += vertex.cut;
     hard |= vertex.tissue != Tissue::none;
   });
-  if (cut == 0 || cut == count)
-    bytes.resize(bytes.size() - cut_bytes);
+  if (cut == 0 || cut == count) bytes.resize(bytes.size() - cut_bytes);
   if (hard) {
     const std::size_t begin = bytes.size();
     bytes.resize(begin + (count + 3) / 4);
@@ -409,7 +411,8 @@ BlockPayload encode_block(std::span<const float> solid_mm, std::span<const float
                           double level_pitch_mm) {
   const BlockSamples no_seams;
   Mesher& at = mesher();
-  return at.begin(no_seams, solid_mm, surface_mm, covered, {}) ? encode(at, covered, {}, level_pitch_mm) : BlockPayload{};
+  return at.begin(no_seams, solid_mm, surface_mm, covered, {}) ? encode(at, covered, {}, level_pitch_mm)
+                                                               : BlockPayload{};
 }
 
 void mesh_block(const BlockSamples& samples, Mesh& mesh) {
@@ -423,12 +426,13 @@ void mesh_block(const BlockSamples& samples, Mesh& mesh) {
   mesh.triangles.clear();
   if (!any) return;
   const Places places(samples.key, samples.level_pitch_mm);
-  at.for_vertices(samples.level_pitch_mm, [&](std::size_t v, unsigned x, unsigned y, unsigned z, unsigned axis, const Vertex& vertex) {
-    places.put(x, y, z, axis, vertex.place, mesh.positions_mm[v]);
-    mesh.normals[v] = vertex.gradient;
-    mesh.cut_face[v] = vertex.cut;
-    if (!mesh.tissue.empty()) mesh.tissue[v] = vertex.tissue;
-  });
+  at.for_vertices(samples.level_pitch_mm,
+                  [&](std::size_t v, unsigned x, unsigned y, unsigned z, unsigned axis, const Vertex& vertex) {
+                    places.put(x, y, z, axis, vertex.place, mesh.positions_mm[v]);
+                    mesh.normals[v] = vertex.gradient;
+                    mesh.cut_face[v] = vertex.cut;
+                    if (!mesh.tissue.empty()) mesh.tissue[v] = vertex.tissue;
+                  });
   // Roots and quotients several at a time.
   static thread_local std::array<float, 3 * kBlockSampleCount> scales;
   for (std::size_t v = 0; v < count; ++v) {
@@ -454,11 +458,13 @@ Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, doub
   if (payload.bytes.empty()) return mesh;
   std::span<const std::uint8_t> bytes(payload.bytes);
   const auto broken = [&](const std::string& why) {
-    return failure(ErrorCode::invalid_input, "a mesh block of " + std::to_string(payload.bytes.size()) + " bytes " + why);
+    return failure(ErrorCode::invalid_input,
+                   "a mesh block of " + std::to_string(payload.bytes.size()) + " bytes " + why);
   };
   const unsigned flags = bytes.front();
   bytes = bytes.subspan(1);
-  if (flags > kFlags || (flags & (kAllCut | kSomeCut)) == (kAllCut | kSomeCut)) return broken("has flags that mean nothing");
+  if (flags > kFlags || (flags & (kAllCut | kSomeCut)) == (kAllCut | kSomeCut))
+    return broken("has flags that mean nothing");
   CoveredGroups covered = 0;
   if (flags & kHasCovered) {
     if (bytes.size() < sizeof covered) return broken("ends before its covered groups");
@@ -498,7 +504,9 @@ Result<Mesh> decode_block(const BlockKey& key, const BlockPayload& payload, doub
     mesh.tissue[v] = kTissues[bits];
   }
   mesh.triangles.reserve(2 * count);
-  contour.for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) { mesh.triangles.push_back({a, b, c}); });
+  contour.for_triangles([&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    mesh.triangles.push_back({a, b, c});
+  });
   return mesh;
 }
 

@@ -15,10 +15,10 @@
 
 namespace osteon {
 
-inline constexpr int kBlockCells = 16;                  // cells along a block's edge: 2 leaves
-inline constexpr int kBlockSamples = kBlockCells + 1;   // samples along it
-inline constexpr int kBlockApron = kBlockCells + 3;     // with one more on every side, for normals
-inline constexpr int kCoarsestLevel = -2;               // pitch 4 h, for what is far away
+inline constexpr int kBlockCells = 16;                           // cells along a block's edge: 2 leaves
+inline constexpr int kBlockSamples = kBlockCells + 1;            // samples along it
+inline constexpr int kBlockApron = kBlockCells + 3;              // with one more on every side, for normals
+inline constexpr int kCoarsestLevel = -2;                        // pitch 4 h, for what is far away
 inline constexpr int kSeamSteps = kLevels - 1 - kCoarsestLevel;  // levels between the finest and the coarsest
 
 struct BlockKey {
@@ -56,11 +56,11 @@ struct Seams {
 struct BlockSamples {
   BlockKey key;
   double level_pitch_mm = 0;
-  std::vector<float> solid_mm;     // f on block_samples(key), negative where bone is left
-  std::vector<float> surface_mm;   // S on the same samples: a vertex below the imported surface lies on a cut face
-  bool uncut = false;              // solid_mm is S as well, and surface_mm is not read
-  std::vector<Tissue> tissue;      // metal, enamel or none on the same samples; empty: none at all
-  CoveredGroups covered = 0;       // kWhollyCovered: the block is not drawn, and nothing else here is read
+  std::vector<float> solid_mm;    // f on block_samples(key), negative where bone is left
+  std::vector<float> surface_mm;  // S on the same samples: a vertex below the imported surface lies on a cut face
+  bool uncut = false;             // solid_mm is S as well, and surface_mm is not read
+  std::vector<Tissue> tissue;     // metal, enamel or none on the same samples; empty: none at all
+  CoveredGroups covered = 0;      // kWhollyCovered: the block is not drawn, and nothing else here is read
   Seams seams;
   // For each number of levels that seams has: f on coarse_samples(key, steps), for the normals on that seam.
   std::array<std::vector<float>, kSeamSteps> coarse_mm;
@@ -74,8 +74,8 @@ struct BlockPayload {
   friend bool operator==(const BlockPayload&, const BlockPayload&) = default;
 };
 
-// Marching cubes, leaving out covered cells. Vertex places are quantised along their edges, so neighbouring blocks of one
-// level meet bit for bit; on a seam the finer block takes the coarser one's contour, so they do as well.
+// Marching cubes, leaving out covered cells. Vertex places are quantised along their edges, so neighbouring blocks of
+// one level meet bit for bit; on a seam the finer block takes the coarser one's contour, so they do as well.
 [[nodiscard]] BlockPayload encode_block(const BlockSamples& samples);
 // The same for a block without seams.
 [[nodiscard]] BlockPayload encode_block(std::span<const float> solid_mm, std::span<const float> surface_mm,

@@ -44,7 +44,8 @@ class Ruling {
 
   // All samples inside one coarse face, whose edges are done: u and v its axes.
   void face(const std::array<int, 3>& origin, int u, int v) {
-    const int first = gathered(origin), du = kStride[static_cast<std::size_t>(u)], dv = kStride[static_cast<std::size_t>(v)];
+    const int first = gathered(origin), du = kStride[static_cast<std::size_t>(u)],
+              dv = kStride[static_cast<std::size_t>(v)];
     const auto value = [&](int i, int j) -> float& { return f_[static_cast<std::size_t>(first + i * du + j * dv)]; };
     const int n = cells_;
     // Where the contour enters and leaves, in half cells: midway between the fine samples on both sides of it.
@@ -74,7 +75,8 @@ class Ruling {
         } else if (count == 4) {
           solid = false;  // two solid corners across from each other stay apart
         }
-        const float s = static_cast<float>(i) / static_cast<float>(n), t = static_cast<float>(j) / static_cast<float>(n);
+        const float s = static_cast<float>(i) / static_cast<float>(n),
+                    t = static_cast<float>(j) / static_cast<float>(n);
         value(i, j) = on_side((1 - s) * ((1 - t) * f00 + t * f01) + s * ((1 - t) * f10 + t * f11), solid);
       }
   }

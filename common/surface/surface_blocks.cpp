@@ -107,7 +107,8 @@ Seams SurfaceBlocks::seams(const BlockKey& key) const {
 bool SurfaceBlocks::meets(const BlockKey& key, int steps) const {
   const bool no_coarse = std::ranges::all_of(coarse_, [](const Indices& drawn) { return drawn.empty(); });
   if (key.level - steps < kCoarsestLevel || (key.level - steps < 0 && no_coarse)) return false;
-  const std::int32_t wide = key.level == kFinest ? 1 : 2;  // half blocks along a block; at the finest level only whole ones
+  const std::int32_t wide =
+      key.level == kFinest ? 1 : 2;  // half blocks along a block; at the finest level only whole ones
   bool found = false;
   for_each({{-1, -1, -1}, {wide, wide, wide}}, [&](Coord at) {
     const auto inside = [wide](std::int32_t i) { return i >= 0 && i < wide; };
@@ -208,7 +209,8 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
   return stale;
 }
 
-std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const CoordBox& bone_samples, double pitch_mm) {
+std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const CoordBox& bone_samples,
+                                           double pitch_mm) {
   std::set<BlockKey> stale;
   if (bone_samples.empty()) return {};
   const auto near = [&](int level, Coord index, double Focus::*limit, bool is_finer) {
@@ -231,7 +233,8 @@ std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const
   for (int level = 1; level < kLevels; ++level)
     for (const Coord index : fine_[static_cast<std::size_t>(level - 1)]) {
       const Coord block = shift_down(index, level);
-      for_each({shift_down(block - Coord{1, 1, 1}, 1), shift_down(block + Coord{1, 1, 1}, 1)}, [&](Coord c) { in_full.insert(c); });
+      for_each({shift_down(block - Coord{1, 1, 1}, 1), shift_down(block + Coord{1, 1, 1}, 1)},
+               [&](Coord c) { in_full.insert(c); });
     }
   const CoordBox roots = blocks_of_bone(kCoarsestLevel);
   for_each(CoordBox{2 * roots.min, 2 * roots.max + Coord{1, 1, 1}}, [&](Coord child) {
@@ -241,18 +244,24 @@ std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const
   std::set<Coord> changed;  // blocks of level -1 whose level became another
   for_each(roots, [&](Coord root) {
     const bool was_quarter = quarters.contains(root);
-    // Levels change by one step at a time: where a coarse contour and one four times finer meet, the surface could fold.
+    // Levels change by one step at a time: where a coarse contour and one four times finer meet, the surface could
+    // fold.
     bool quarter = !near(kCoarsestLevel, root, &Focus::half_mm, !was_quarter);
-    for_each({2 * root - Coord{1, 1, 1}, 2 * root + Coord{2, 2, 2}}, [&](Coord c) { quarter = quarter && !in_full.contains(c); });
+    for_each({2 * root - Coord{1, 1, 1}, 2 * root + Coord{2, 2, 2}},
+             [&](Coord c) { quarter = quarter && !in_full.contains(c); });
     for_each({2 * root, 2 * root + Coord{1, 1, 1}}, [&](Coord child) {
       const bool was_half = halves.contains(child);
       const bool half = !quarter && !in_full.contains(child);
       if (quarter != was_quarter || half != was_half) changed.insert(child);
-      if (half) halves.insert(child);
-      else halves.erase(child);
+      if (half)
+        halves.insert(child);
+      else
+        halves.erase(child);
     });
-    if (quarter) quarters.insert(root);
-    else quarters.erase(root);
+    if (quarter)
+      quarters.insert(root);
+    else
+      quarters.erase(root);
   });
   if (changed.empty()) return {};
 

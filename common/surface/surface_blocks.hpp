@@ -18,8 +18,8 @@ struct Focus {
 // What was drawn finer stays so up to this many times the distance, so that a trembling hand changes nothing.
 inline constexpr double kFocusHysteresis = 1.25;
 
-// A block is drawn at a finer level where any of that level's samples in it, apron included, is cut, and at a coarser one
-// where it is far from every focus. Blocks of different levels may lie side by side: the finer one knows its seams.
+// A block is drawn at a finer level where any of that level's samples in it, apron included, is cut, and at a coarser
+// one where it is far from every focus. Blocks of different levels may lie side by side: the finer one knows its seams.
 class SurfaceBlocks {
  public:
   explicit SurfaceBlocks(BodyId body) : body_(body) {}
@@ -27,11 +27,11 @@ class SurfaceBlocks {
   // After a cut changed these leaves (origins at `level`): marks fine blocks as drawn and returns every block whose
   // payload must be made again, each once.
   std::vector<BlockKey> touch(int level, const std::vector<Coord>& changed_leaves);
-  // Draws the bone, whose samples of level 0 lie in the box, for these focuses. Returns every block whose payload must be
-  // made again, those included that are no longer drawn; sorted, each once.
+  // Draws the bone, whose samples of level 0 lie in the box, for these focuses. Returns every block whose payload must
+  // be made again, those included that are no longer drawn; sorted, each once.
   std::vector<BlockKey> focus(std::span<const Focus> focuses, const CoordBox& bone_samples, double pitch_mm);
 
-  [[nodiscard]] bool drawn(const BlockKey& key) const;  // as a whole or in part
+  [[nodiscard]] bool drawn(const BlockKey& key) const;             // as a whole or in part
   [[nodiscard]] CoveredGroups covered(const BlockKey& key) const;  // kWhollyCovered where it is not drawn
   [[nodiscard]] Seams seams(const BlockKey& key) const;
   // Blocks other than those of level 0 that cuts or focuses have drawn; sorted.
@@ -44,8 +44,12 @@ class SurfaceBlocks {
   [[nodiscard]] int level_at(Coord finest) const;
   [[nodiscard]] bool meets(const BlockKey& key, int steps) const;
   [[nodiscard]] int base_level(Coord block) const;  // of a block of level 0: 0 or below
-  [[nodiscard]] bool cut_at(int level, Coord index) const { return fine_[static_cast<std::size_t>(level - 1)].contains(index); }
-  [[nodiscard]] bool coarse_at(int level, Coord index) const { return coarse_[static_cast<std::size_t>(-1 - level)].contains(index); }
+  [[nodiscard]] bool cut_at(int level, Coord index) const {
+    return fine_[static_cast<std::size_t>(level - 1)].contains(index);
+  }
+  [[nodiscard]] bool coarse_at(int level, Coord index) const {
+    return coarse_[static_cast<std::size_t>(-1 - level)].contains(index);
+  }
 
   BodyId body_;
   std::array<Indices, kLevels - 1> fine_;        // blocks of level 1 and 2 that are cut

@@ -30,7 +30,8 @@ Mesh weld(std::span<const Mesh> blocks) {
   for (const Mesh& block : blocks) {
     joined.clear();
     for (std::size_t v = 0; v < block.positions_mm.size(); ++v) {
-      const auto [place, fresh] = places.try_emplace(block.positions_mm[v], static_cast<std::uint32_t>(whole.positions_mm.size()));
+      const auto [place, fresh] =
+          places.try_emplace(block.positions_mm[v], static_cast<std::uint32_t>(whole.positions_mm.size()));
       joined.push_back(place->second);
       if (!fresh) continue;
       whole.positions_mm.push_back(block.positions_mm[v]);

@@ -18,19 +18,19 @@ enum class AnnotationKind : std::uint8_t {
 };
 
 struct Annotation {
-  std::uint32_t id = 0;   // given by the room, from 1
+  std::uint32_t id = 0;  // given by the room, from 1
   AuthorId author{};
   AnnotationKind kind = AnnotationKind::pointer;
   std::vector<std::array<std::int32_t, 3>> points{};  // bone frame, in steps of 2^-10 mm
   std::string words{};
-  std::uint32_t colour = 0xffd040;                  // red, green, blue
+  std::uint32_t colour = 0xffd040;  // red, green, blue
   friend bool operator==(const Annotation&, const Annotation&) = default;
 };
 
 inline constexpr std::size_t kMostAnnotations = 256, kMostAnnotationPoints = 1024, kMostAnnotationWords = 256;
 
-// Error invalid_input: points too few or too many for its kind, words too long or missing, a colour of more than 24 bits.
-// Names the field.
+// Error invalid_input: points too few or too many for its kind, words too long or missing, a colour of more than 24
+// bits. Names the field.
 [[nodiscard]] Result<void> check(const Annotation& drawn);
 
 }  // namespace osteon

@@ -40,9 +40,9 @@ struct HullPlane {
 
 // Signed distance of a solid on the samples of a lattice in the tool's frame, negative inside; trilinear between them.
 struct SampledDistance {
-  CoordBox box;                       // sample (i, j, k) lies at (i, j, k) · pitch
-  std::int32_t pitch = 0;             // kQuantum_mm
-  std::vector<std::int16_t> values;   // kQuantum_mm, clipped; z fastest, then y, then x
+  CoordBox box;                      // sample (i, j, k) lies at (i, j, k) · pitch
+  std::int32_t pitch = 0;            // kQuantum_mm
+  std::vector<std::int16_t> values;  // kQuantum_mm, clipped; z fastest, then y, then x
   friend bool operator==(const SampledDistance&, const SampledDistance&) = default;
 };
 
@@ -51,12 +51,12 @@ inline constexpr std::size_t kMostHullPlanes = 20;
 
 struct CutBody {
   CutKind kind = CutKind::none;
-  std::int32_t radius = 0;              // ball
+  std::int32_t radius = 0;  // ball
   // turned: counter-clockwise in (r, z) seen with r to the right and z up, convex, r ≥ 0. A body that reaches the
   // axis has two corners on it (or one, a point); one that does not is a ring, as a hollow mill is.
   std::vector<ProfileCorner> profile;
-  std::int32_t dome = 0;                // turned: radius of the ball, 0 for none; it ends at the tip like CutKind::ball
-  std::vector<HullPlane> planes;        // hull
+  std::int32_t dome = 0;          // turned: radius of the ball, 0 for none; it ends at the tip like CutKind::ball
+  std::vector<HullPlane> planes;  // hull
   // Shared by all copies of one tool's body: immutable, and up to megabytes.
   std::shared_ptr<const SampledDistance> sampled;
 

@@ -20,10 +20,12 @@ constexpr double kStraightAt = 0.8, kChamferAt = 0.6;
 void add_pin_holes(const Tool& block, GuideShape& shape) {
   const double x = 0.5 * block.width_mm - kPinFromEnd * block.diameter_mm;
   for (const double side : {-1.0, 1.0})
-    shape.pin_holes.push_back({{side * x, 0, -block.cutting_length_mm}, Vec3::UnitZ(), block.diameter_mm, block.cutting_length_mm});
+    shape.pin_holes.push_back(
+        {{side * x, 0, -block.cutting_length_mm}, Vec3::UnitZ(), block.diameter_mm, block.cutting_length_mm});
 }
 
-// The lead-in: a cone of 45 degrees before the mouth, as deep as half the opening is wide, in which the tip is led to it.
+// The lead-in: a cone of 45 degrees before the mouth, as deep as half the opening is wide, in which the tip is led to
+// it.
 constexpr double kLeadIn = 0.5;
 // Slope of the tool against the opening, beyond which it is not going in.
 constexpr double kMostSlope = 1.0;
@@ -45,8 +47,8 @@ struct Opening {
 };
 
 bool turns(ToolKind kind) {
-  return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::cylinder_reamer || kind == ToolKind::pin ||
-         kind == ToolKind::screw;
+  return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::cylinder_reamer ||
+         kind == ToolKind::pin || kind == ToolKind::screw;
 }
 bool saws(ToolKind kind) { return kind == ToolKind::oscillating_saw || kind == ToolKind::reciprocating_saw; }
 
@@ -58,7 +60,8 @@ Opening opening_for(const GuideShape& shape, std::size_t index, const Tool& tool
   Opening opening;
   const std::size_t holes = shape.bores.size() + shape.pin_holes.size();
   if (index < holes) {
-    const GuideBore& bore = index < shape.bores.size() ? shape.bores[index] : shape.pin_holes[index - shape.bores.size()];
+    const GuideBore& bore =
+        index < shape.bores.size() ? shape.bores[index] : shape.pin_holes[index - shape.bores.size()];
     opening.axes = pose_along(Vec3::Zero(), bore.direction).rotation.toRotationMatrix();
     opening.mouth_mm = bore.entry_mm;
     opening.length_mm = bore.length_mm;
@@ -87,7 +90,9 @@ struct Line {
   double roll = 0;    // slot: slope of the blade along x
 };
 
-Vec2 at(const Line& line, double z_mm, double length_mm) { return line.middle_mm + (z_mm - 0.5 * length_mm) * line.slope; }
+Vec2 at(const Line& line, double z_mm, double length_mm) {
+  return line.middle_mm + (z_mm - 0.5 * length_mm) * line.slope;
+}
 
 // One condition on the line: at this depth it is no farther from the middle than this.
 struct Hold {
@@ -110,8 +115,10 @@ Holds holds_of(double tip_mm, double length_mm) {
 template <class V>  // Vec2 in a bore, double in a slot
 void nearest(V& middle, V& slope, const Holds& holds, double length_mm, double radius_mm) {
   const auto size = [](const V& v) {
-    if constexpr (std::is_same_v<V, double>) return std::abs(v);
-    else return v.norm();
+    if constexpr (std::is_same_v<V, double>)
+      return std::abs(v);
+    else
+      return v.norm();
   };
   const double weight_mm = kSlopeWeight * length_mm;
   const auto row = [&](int i) { return (holds.hold[static_cast<std::size_t>(i)].z_mm - 0.5 * length_mm) / weight_mm; };
@@ -160,7 +167,8 @@ double change(double middle, double slope, const Line& wanted, double length_mm)
 void nearest_in_slot(Line& line, const Holds& holds, const Opening& opening) {
   nearest(line.middle_mm.x(), line.slope.x(), holds, opening.length_mm, opening.play_mm.x());
   const Line wanted = line;
-  const double play = opening.play_mm.y(), arm = std::max(1e-6, opening.roll_arm_mm), weight = kSlopeWeight * opening.length_mm;
+  const double play = opening.play_mm.y(), arm = std::max(1e-6, opening.roll_arm_mm),
+               weight = kSlopeWeight * opening.length_mm;
   const auto across = [&](double lift) {
     line.middle_mm.y() = wanted.middle_mm.y();
     line.slope.y() = wanted.slope.y();
@@ -193,8 +201,10 @@ Line line_of(const Opening& opening, const Pose& tool) {
   Line line;
   const Vec3 axis = tool.direction(Vec3::UnitZ());
   const double across = std::hypot(axis.x(), axis.y());
-  if (axis.z() * kMostSlope >= across) line.slope = axis.head<2>() / axis.z();
-  else line.slope = across > 0.0 ? Vec2(axis.head<2>() * (kMostSlope / across)) : Vec2(kMostSlope, 0.0);
+  if (axis.z() * kMostSlope >= across)
+    line.slope = axis.head<2>() / axis.z();
+  else
+    line.slope = across > 0.0 ? Vec2(axis.head<2>() * (kMostSlope / across)) : Vec2(kMostSlope, 0.0);
   line.tip_mm = tool.position_mm.z();
   line.middle_mm = tool.position_mm.head<2>() + (0.5 * opening.length_mm - line.tip_mm) * line.slope;
   if (opening.slot) {
@@ -206,9 +216,7 @@ Line line_of(const Opening& opening, const Pose& tool) {
   return line;
 }
 
-bool same(const Line& a, const Line& b) {
-  return a.middle_mm == b.middle_mm && a.slope == b.slope && a.roll == b.roll;
-}
+bool same(const Line& a, const Line& b) { return a.middle_mm == b.middle_mm && a.slope == b.slope && a.roll == b.roll; }
 
 Pose pose_of(const Opening& opening, const Line& line, const Pose& wanted) {
   Pose pose;
@@ -216,7 +224,8 @@ Pose pose_of(const Opening& opening, const Line& line, const Pose& wanted) {
   pose.position_mm = {tip.x(), tip.y(), line.tip_mm};
   const Vec3 axis = Vec3(line.slope.x(), line.slope.y(), 1.0).normalized();
   if (!opening.slot) {
-    pose.rotation = (Eigen::Quaterniond::FromTwoVectors(wanted.direction(Vec3::UnitZ()), axis) * wanted.rotation).normalized();
+    pose.rotation =
+        (Eigen::Quaterniond::FromTwoVectors(wanted.direction(Vec3::UnitZ()), axis) * wanted.rotation).normalized();
     return pose;
   }
   Vec3 normal = Vec3(-line.roll, 1.0, line.roll * line.slope.x() - line.slope.y()).normalized();
@@ -232,8 +241,10 @@ Pose pose_of(const Opening& opening, const Line& line, const Pose& wanted) {
 Line nearest_line(const Opening& opening, const Line& wanted) {
   Line line = wanted;
   const Holds holds = holds_of(line.tip_mm, opening.length_mm);
-  if (opening.slot) nearest_in_slot(line, holds, opening);
-  else nearest(line.middle_mm, line.slope, holds, opening.length_mm, opening.play_mm.x());
+  if (opening.slot)
+    nearest_in_slot(line, holds, opening);
+  else
+    nearest(line.middle_mm, line.slope, holds, opening.length_mm, opening.play_mm.x());
   return line;
 }
 
@@ -242,8 +253,12 @@ Pose pose_bone_opening(const Opening& opening, const Pose& pose_bone_guide) {
 }
 
 GuideSlot straight_slot(const Tool& block, double y) {
-  return {{0, y, -block.cutting_length_mm}, Vec3::UnitZ(), Vec3::UnitY(), block.bore_mm,
-          block.width_mm - 2.0 * kSlotFromEnd * block.diameter_mm, block.cutting_length_mm};
+  return {{0, y, -block.cutting_length_mm},
+          Vec3::UnitZ(),
+          Vec3::UnitY(),
+          block.bore_mm,
+          block.width_mm - 2.0 * kSlotFromEnd * block.diameter_mm,
+          block.cutting_length_mm};
 }
 
 GuideSlot chamfer_slot(const Tool& block, double exit_y) {
@@ -275,7 +290,8 @@ GuideShape guide_shape(const Tool& guide) {
       add_pin_holes(guide, shape);
       break;
     }
-    default: break;
+    default:
+      break;
   }
   return shape;
 }
@@ -308,8 +324,8 @@ std::optional<std::size_t> entered(const GuideShape& shape, const Pose& pose_bon
   return std::nullopt;
 }
 
-std::optional<GuidedPose> constrain(const GuideShape& shape, std::size_t opening, const Pose& pose_bone_guide, const Tool& tool,
-                                    const Pose& wanted_bone_tool) noexcept {
+std::optional<GuidedPose> constrain(const GuideShape& shape, std::size_t opening, const Pose& pose_bone_guide,
+                                    const Tool& tool, const Pose& wanted_bone_tool) noexcept {
   const Opening its = opening_for(shape, opening, tool);
   const Pose pose_bone_its = pose_bone_opening(its, pose_bone_guide);
   const Pose wanted = pose_bone_its.inverse() * wanted_bone_tool;
@@ -318,8 +334,9 @@ std::optional<GuidedPose> constrain(const GuideShape& shape, std::size_t opening
   GuidedPose guided;
   guided.depth_mm = wanted.position_mm.z();
   const double play = its.play_mm.y();
-  guided.play_mm = guided.depth_mm < 0.0 ? play - guided.depth_mm
-                                         : play * (1.0 + 2.0 * std::max(0.0, guided.depth_mm - its.length_mm) / its.length_mm);
+  guided.play_mm = guided.depth_mm < 0.0
+                       ? play - guided.depth_mm
+                       : play * (1.0 + 2.0 * std::max(0.0, guided.depth_mm - its.length_mm) / its.length_mm);
   const Line asked = line_of(its, wanted), line = nearest_line(its, asked);
   const Vec3 axis = wanted.direction(Vec3::UnitZ());
   if (same(asked, line) && axis.z() * kMostSlope >= std::hypot(axis.x(), axis.y())) {

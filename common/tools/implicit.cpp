@@ -102,7 +102,8 @@ std::vector<std::vector<Vec3>> face_polygons(const std::vector<HalfSpace>& faces
         const Vec3 p = (faces[i].offset_mm * jk + faces[j].offset_mm * faces[k].normal.cross(faces[i].normal) +
                         faces[k].offset_mm * faces[i].normal.cross(faces[j].normal)) /
                        volume;
-        if (std::ranges::any_of(faces, [&](const HalfSpace& f) { return f.normal.dot(p) > f.offset_mm + kSameCorner_mm; }))
+        if (std::ranges::any_of(faces,
+                                [&](const HalfSpace& f) { return f.normal.dot(p) > f.offset_mm + kSameCorner_mm; }))
           continue;
         for (const std::size_t face : {i, j, k}) add(polygons[face], p);
       }
@@ -149,17 +150,20 @@ Implicit convex(std::vector<HalfSpace> faces) {
 
 Implicit unite(Implicit a, Implicit b) {
   const Box bounds{a.bounds.min_mm.cwiseMin(b.bounds.min_mm), a.bounds.max_mm.cwiseMax(b.bounds.max_mm)};
-  return {[a = std::move(a.distance_mm), b = std::move(b.distance_mm)](const Vec3& p) { return std::min(a(p), b(p)); }, bounds};
+  return {[a = std::move(a.distance_mm), b = std::move(b.distance_mm)](const Vec3& p) { return std::min(a(p), b(p)); },
+          bounds};
 }
 
 Implicit intersect(Implicit a, Implicit b) {
   const Box bounds{a.bounds.min_mm.cwiseMax(b.bounds.min_mm), a.bounds.max_mm.cwiseMin(b.bounds.max_mm)};
-  return {[a = std::move(a.distance_mm), b = std::move(b.distance_mm)](const Vec3& p) { return std::max(a(p), b(p)); }, bounds};
+  return {[a = std::move(a.distance_mm), b = std::move(b.distance_mm)](const Vec3& p) { return std::max(a(p), b(p)); },
+          bounds};
 }
 
 Implicit subtract(Implicit a, Implicit b) {
   const Box bounds = a.bounds;
-  return {[a = std::move(a.distance_mm), b = std::move(b.distance_mm)](const Vec3& p) { return std::max(a(p), -b(p)); }, bounds};
+  return {[a = std::move(a.distance_mm), b = std::move(b.distance_mm)](const Vec3& p) { return std::max(a(p), -b(p)); },
+          bounds};
 }
 
 Implicit placed(Implicit solid, const Pose& pose) {

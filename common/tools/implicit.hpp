@@ -29,7 +29,8 @@ struct HalfSpace {
 [[nodiscard]] Implicit ball(const Vec3& centre_mm, double radius_mm);
 [[nodiscard]] Implicit cylinder(double radius_mm, double bottom_mm, double top_mm);  // about the z axis
 [[nodiscard]] Implicit cuboid(const Box& box);
-// A convex outline turned about the z axis: counter-clockwise with r to the right and z up, at most one edge on the axis.
+// A convex outline turned about the z axis: counter-clockwise with r to the right and z up, at most one edge on the
+// axis.
 [[nodiscard]] Implicit turned(std::vector<Corner> outline);
 // The points behind all half-spaces, which must enclose a bounded solid with a point inside.
 [[nodiscard]] Implicit convex(std::vector<HalfSpace> faces);

@@ -1,4 +1,5 @@
-// Ways for an item to come to stand that the bone decides: set down on its surface, turned along its thread, driven home.
+// Ways for an item to come to stand that the bone decides: set down on its surface, turned along its thread, driven
+// home.
 #pragma once
 #include <optional>
 #include <variant>
@@ -34,6 +35,7 @@ struct Placed {
 };
 // `before`: the item as it stands, or null; where it moves from there, `wanted` gives no more than its tool. Errors:
 // invalid_input, with the remedy.
-[[nodiscard]] Result<Placed> placed(const Placing& how, const Standing* before, const Standing& wanted, const BoneQuery& bone);
+[[nodiscard]] Result<Placed> placed(const Placing& how, const Standing* before, const Standing& wanted,
+                                    const BoneQuery& bone);
 
 }  // namespace osteon

@@ -15,7 +15,8 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 // One ring of points at (r, z) whose normal into the tool is `inward` in the (radial, axial) plane.
-void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing, bool active) {
+void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing,
+              bool active) {
   const int count = std::max(3, static_cast<int>(std::ceil(2.0 * kPi * r / spacing)));
   // Successive rings are turned against each other, so that no straight seam is left unsampled.
   const double turn = 0.5 * static_cast<double>(points.size());
@@ -76,7 +77,9 @@ std::vector<SamplePoint> points_on_rings(const Tool& tool, int count) {
 }
 
 // What is bored forwards cuts with its end only: its sides run in the hole that it has made.
-bool cuts_forwards_only(ToolKind kind) { return kind == ToolKind::end_drill || kind == ToolKind::pin || kind == ToolKind::screw; }
+bool cuts_forwards_only(ToolKind kind) {
+  return kind == ToolKind::end_drill || kind == ToolKind::pin || kind == ToolKind::screw;
+}
 
 }  // namespace
 

@@ -54,7 +54,8 @@ struct Motion {
 Motion motion(const Pose& from, const Pose& to) {
   const Pose by = from.inverse() * to;
   const Vec3 axis = by.direction(Vec3::UnitZ()), x = by.direction(Vec3::UnitX());
-  return {by.position_mm.z(), by.position_mm.head<2>().norm(), std::atan2(axis.head<2>().norm(), axis.z()), std::atan2(x.y(), x.x())};
+  return {by.position_mm.z(), by.position_mm.head<2>().norm(), std::atan2(axis.head<2>().norm(), axis.z()),
+          std::atan2(x.y(), x.x())};
 }
 
 // The part of an implant's surface that faces the way in: its end and its outside, not what is hollow.
@@ -68,7 +69,8 @@ std::vector<SamplePoint> facing_points(const Tool& implant, int count) {
   return points;
 }
 
-Fit fit_of_points(const std::vector<SamplePoint>& points, const Pose& pose, const BoneQuery& bone, const FitParams& params) {
+Fit fit_of_points(const std::vector<SamplePoint>& points, const Pose& pose, const BoneQuery& bone,
+                  const FitParams& params) {
   Fit fit;
   double area = 0.0, contact = 0.0;
   for (const SamplePoint& point : points) {
@@ -140,9 +142,12 @@ std::optional<SurfacePlace> nearest_surface(const BoneQuery& bone, const Vec3& n
   return SurfacePlace{at, outward};
 }
 
-Result<Pose> place_on_bone(const BoneQuery& bone, const Vec3& near_mm, const std::optional<Vec3>& axis, const Vec3& across) {
+Result<Pose> place_on_bone(const BoneQuery& bone, const Vec3& near_mm, const std::optional<Vec3>& axis,
+                           const Vec3& across) {
   const auto place = nearest_surface(bone, near_mm);
-  if (!place) return failure(ErrorCode::invalid_input, "no bone lies within 20 mm of " + shown(near_mm) + "; choose a point nearer to it");
+  if (!place)
+    return failure(ErrorCode::invalid_input,
+                   "no bone lies within 20 mm of " + shown(near_mm) + "; choose a point nearer to it");
   const Vec3 z = axis && axis->norm() > 1e-9 ? Vec3(axis->normalized()) : Vec3(-place->outward);
   const bool has_side = (across - across.dot(z) * z).norm() > 1e-6;
   return pose_across(place->point_mm, z, has_side ? across : z.unitOrthogonal());
@@ -166,17 +171,21 @@ int pins_in(const Tool& guide, const Pose& pose_bone_guide, std::span<const Stan
   return count;
 }
 
-Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* before, const Standing& wanted, const BoneQuery& bone) {
+Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* before, const Standing& wanted,
+                               const BoneQuery& bone) {
   constexpr double kAcross_mm = 0.01, kTilt_rad = 1e-3, kThread_mm = 0.02;
   SceneItem item = wanted.item;
   const Tool& tool = wanted.tool;
   const std::string name = "\"" + tool.name + "\"";
-  if (before && before->item.tool != item.tool) return failure(ErrorCode::invalid_input, "an item cannot become another tool; take it out and set " + name);
+  if (before && before->item.tool != item.tool)
+    return failure(ErrorCode::invalid_input, "an item cannot become another tool; take it out and set " + name);
   if (tool.cuts() && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw && tool.kind != ToolKind::mesh)
-    return failure(ErrorCode::invalid_input, name + " is a tool for the hand; guides, pins, screws and implants are left on the bone");
+    return failure(ErrorCode::invalid_input,
+                   name + " is a tool for the hand; guides, pins, screws and implants are left on the bone");
   const Motion moved = before ? motion(before->item.pose_bone_item, item.pose_bone_item) : Motion{};
-  const bool moves = before && (std::abs(moved.along_mm) > kAcross_mm || moved.across_mm > kAcross_mm || moved.tilt_rad > kTilt_rad ||
-                                (std::abs(moved.turn_rad) > kTilt_rad && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw));
+  const bool moves =
+      before && (std::abs(moved.along_mm) > kAcross_mm || moved.across_mm > kAcross_mm || moved.tilt_rad > kTilt_rad ||
+                 (std::abs(moved.turn_rad) > kTilt_rad && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw));
   if (is_guide(tool.kind)) {
     if (moves && pins_in(tool, before->item.pose_bone_item, scene) >= kPinsThatFix)
       return failure(ErrorCode::invalid_input, name + " is fixed by pins and cannot be moved; draw a pin first");
@@ -185,7 +194,8 @@ Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* 
   }
   if (tool.kind == ToolKind::pin || tool.kind == ToolKind::screw) {
     if (moves && (moved.across_mm > kAcross_mm || moved.tilt_rad > kTilt_rad))
-      return failure(ErrorCode::invalid_input, name + " is in its hole and moves along its axis only; take it out to set it elsewhere");
+      return failure(ErrorCode::invalid_input,
+                     name + " is in its hole and moves along its axis only; take it out to set it elsewhere");
     if (tool.kind == ToolKind::pin) return item;
     if (before && std::abs(moved.along_mm - tool.thread_pitch_mm * (item.turns - before->item.turns)) > kThread_mm)
       return failure(ErrorCode::invalid_input, name + " follows its thread: its way must be its pitch times its turns");
@@ -227,13 +237,17 @@ Fit fit_of(const Tool& implant, const Pose& pose_bone_implant, const BoneQuery& 
   return fit_of_points(facing_points(implant, params.points), pose_bone_implant, bone, params);
 }
 
-Result<Seating> drive_home(const Tool& implant, const Pose& pose_bone_implant, double most_mm, const BoneQuery& bone, const FitParams& params) {
+Result<Seating> drive_home(const Tool& implant, const Pose& pose_bone_implant, double most_mm, const BoneQuery& bone,
+                           const FitParams& params) {
   const std::vector<SamplePoint> points = facing_points(implant, params.points);
   const auto blocked = [&](double along_mm) {
     const Pose pose = advanced(pose_bone_implant, along_mm);
-    return std::ranges::any_of(points, [&](const SamplePoint& point) { return bone(pose.point(point.position_mm)) < -params.most_overlap_mm; });
+    return std::ranges::any_of(points, [&](const SamplePoint& point) {
+      return bone(pose.point(point.position_mm)) < -params.most_overlap_mm;
+    });
   };
-  if (blocked(0.0)) return failure(ErrorCode::invalid_input, "\"" + implant.name + "\" meets bone where it starts; draw it back");
+  if (blocked(0.0))
+    return failure(ErrorCode::invalid_input, "\"" + implant.name + "\" meets bone where it starts; draw it back");
   constexpr double kStep_mm = 0.1;
   Seating seating;
   while (seating.advance_mm < most_mm && !seating.stopped) {

@@ -11,8 +11,8 @@
 
 namespace osteon {
 
-// The remaining bone: a signed distance at a point of its frame, negative inside. Exact near the surface, beyond that it
-// need only have the right sign and not exceed the distance.
+// The remaining bone: a signed distance at a point of its frame, negative inside. Exact near the surface, beyond that
+// it need only have the right sign and not exceed the distance.
 using BoneQuery = std::function<double(const Vec3& point_bone_mm)>;
 
 struct SurfacePlace {
@@ -20,11 +20,13 @@ struct SurfacePlace {
   Vec3 outward;  // unit normal out of the bone, over about a millimetre
 };
 // The point of the surface nearest to a point that lies no farther from it than `reach_mm`.
-[[nodiscard]] std::optional<SurfacePlace> nearest_surface(const BoneQuery& bone, const Vec3& near_mm, double reach_mm = 20.0);
+[[nodiscard]] std::optional<SurfacePlace> nearest_surface(const BoneQuery& bone, const Vec3& near_mm,
+                                                          double reach_mm = 20.0);
 
 // An item set down on the bone near a point: its origin on the surface, +z into the bone, along `axis` or, without one,
 // against the surface's normal; its x as near to `across` as that allows. Error invalid_input: no bone there.
-[[nodiscard]] Result<Pose> place_on_bone(const BoneQuery& bone, const Vec3& near_mm, const std::optional<Vec3>& axis, const Vec3& across);
+[[nodiscard]] Result<Pose> place_on_bone(const BoneQuery& bone, const Vec3& near_mm, const std::optional<Vec3>& axis,
+                                         const Vec3& across);
 
 // An item with its definition.
 struct Standing {
@@ -37,11 +39,12 @@ struct Standing {
 inline constexpr int kPinsThatFix = 2;
 
 // What setting an item does to the scene, by what it is. A guide that is fixed by pins cannot be moved; it is `seated`
-// while two pins or more are in it. Pins and screws move along and about their axis only; a screw goes by its thread, one
-// pitch in a turn, in both directions. `before`: the same item as it stands, or null for a new one. `bone`: may be empty
-// where none is known; then nothing is said about seats that depend on it. Errors: invalid_input, with the remedy.
-[[nodiscard]] Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* before, const Standing& wanted,
-                                             const BoneQuery& bone);
+// while two pins or more are in it. Pins and screws move along and about their axis only; a screw goes by its thread,
+// one pitch in a turn, in both directions. `before`: the same item as it stands, or null for a new one. `bone`: may be
+// empty where none is known; then nothing is said about seats that depend on it. Errors: invalid_input, with the
+// remedy.
+[[nodiscard]] Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* before,
+                                             const Standing& wanted, const BoneQuery& bone);
 
 // A screw turned by some turns from where it stands, in (positive) or out. It ends when the underside of its head meets
 // bone: the turns made are then fewer.
@@ -54,17 +57,18 @@ struct Driven {
 
 // How an implant lies in its cavity, over the part of its surface that faces the way in.
 struct Fit {
-  double contact_fraction = 0;     // share of that surface within the tolerance of bone
-  double largest_gap_mm = 0;       // as far as `bone` is exact
+  double contact_fraction = 0;  // share of that surface within the tolerance of bone
+  double largest_gap_mm = 0;    // as far as `bone` is exact
   double largest_overlap_mm = 0;
 };
 struct FitParams {
-  double tolerance_mm = 0.2;       // counts as contact
-  double most_overlap_mm = 0.02;   // an implant that meets this much bone goes no farther
-  double least_contact = 0.5;      // to be seated
+  double tolerance_mm = 0.2;      // counts as contact
+  double most_overlap_mm = 0.02;  // an implant that meets this much bone goes no farther
+  double least_contact = 0.5;     // to be seated
   int points = 2000;
 };
-[[nodiscard]] Fit fit_of(const Tool& implant, const Pose& pose_bone_implant, const BoneQuery& bone, const FitParams& params = {});
+[[nodiscard]] Fit fit_of(const Tool& implant, const Pose& pose_bone_implant, const BoneQuery& bone,
+                         const FitParams& params = {});
 
 struct Seating {
   Pose pose_bone_item;
@@ -74,7 +78,7 @@ struct Seating {
   Fit fit;
 };
 // Drives an implant along its axis until bone stops it. Error invalid_input: it meets bone where it starts.
-[[nodiscard]] Result<Seating> drive_home(const Tool& implant, const Pose& pose_bone_implant, double most_mm, const BoneQuery& bone,
-                                         const FitParams& params = {});
+[[nodiscard]] Result<Seating> drive_home(const Tool& implant, const Pose& pose_bone_implant, double most_mm,
+                                         const BoneQuery& bone, const FitParams& params = {});
 
 }  // namespace osteon

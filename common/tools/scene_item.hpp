@@ -10,13 +10,13 @@
 namespace osteon {
 
 struct SceneItem {
-  std::uint32_t id = 0;          // given by the room, from 1
-  BodyId body;                   // the bone it stands on
-  Digest tool;                   // its definition
+  std::uint32_t id = 0;  // given by the room, from 1
+  BodyId body;           // the bone it stands on
+  Digest tool;           // its definition
   Pose pose_bone_item;
-  double turns = 0;              // screw: how far it was turned in
-  bool seated = false;           // guide: fixed by two pins or more; screw: head on the bone; implant: driven home
-  std::uint64_t set_at = 0;      // room_seq
+  double turns = 0;          // screw: how far it was turned in
+  bool seated = false;       // guide: fixed by two pins or more; screw: head on the bone; implant: driven home
+  std::uint64_t set_at = 0;  // room_seq
   friend bool operator==(const SceneItem& a, const SceneItem& b);
 };
 

@@ -34,7 +34,8 @@ std::optional<Candidate> settled(const Implicit& solid, Vec3 p) {
     outward = gradient(solid, p);
   }
   if (std::abs(off) > 1e-10) return std::nullopt;
-  const bool on_edge = solid(p - kProbe_mm * outward) > -0.6 * kProbe_mm || solid(p + kProbe_mm * outward) < 0.6 * kProbe_mm;
+  const bool on_edge =
+      solid(p - kProbe_mm * outward) > -0.6 * kProbe_mm || solid(p + kProbe_mm * outward) < 0.6 * kProbe_mm;
   return Candidate{p, outward, on_edge};
 }
 
@@ -100,9 +101,11 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
   if (pieces.empty()) return {};
 
   // Of equal circles in the densest packing, each owns sqrt(3)/2 of its spacing squared.
-  const double wanted =
-      spread.count > 0 ? spread.count : std::max(1.0, area / (0.5 * std::sqrt(3.0) * spread.spacing_mm * spread.spacing_mm));
-  const int number = std::min(kMostCandidates, kCandidatesPerPoint * static_cast<int>(std::ceil(std::min(wanted, 1e6))) + 64);
+  const double wanted = spread.count > 0
+                            ? spread.count
+                            : std::max(1.0, area / (0.5 * std::sqrt(3.0) * spread.spacing_mm * spread.spacing_mm));
+  const int number =
+      std::min(kMostCandidates, kCandidatesPerPoint * static_cast<int>(std::ceil(std::min(wanted, 1e6))) + 64);
   std::vector<Candidate> candidates;
   std::size_t piece = 0;
   for (int i = 0; i < number; ++i) {
@@ -137,7 +140,8 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
   if (kept.empty()) kept.push_back(order.front());  // all on edges: one is better than none
 
   std::vector<SamplePoint> points;
-  for (const std::uint32_t index : kept) points.push_back({candidates[index].point, -candidates[index].outward, 0.0, false});
+  for (const std::uint32_t index : kept)
+    points.push_back({candidates[index].point, -candidates[index].outward, 0.0, false});
   const double share = area / static_cast<double>(candidates.size());
   for (const Candidate& candidate : candidates) {
     double nearest = std::numeric_limits<double>::infinity();

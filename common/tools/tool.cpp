@@ -29,7 +29,8 @@ double drill_distance(const Tool& tool, Outline p) {
   const double inside = std::max({(p.r * height + p.z * radius) / slant, p.r - radius, -p.z - length});
   if (inside <= 0.0) return inside;
   const Outline tip{0, 0}, shoulder{radius, -height}, heel{radius, -length}, back{0, -length};
-  return std::min({segment_distance(p, tip, shoulder), segment_distance(p, shoulder, heel), segment_distance(p, heel, back)});
+  return std::min(
+      {segment_distance(p, tip, shoulder), segment_distance(p, shoulder, heel), segment_distance(p, heel, back)});
 }
 
 double cylinder_distance(double radius, double top, double bottom, Outline p) {
@@ -68,8 +69,10 @@ void make_hull(CutBody& body, const std::vector<HalfSpace>& faces) {
   const Box box = box_of(face_polygons(planes));
   constexpr double kRounding = 1e-6;  // of the corners' own arithmetic
   for (int k = 0; k < 3; ++k) {
-    body.lowest[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::floor(box.min_mm[k] / kQuantum_mm + kRounding));
-    body.highest[static_cast<std::size_t>(k)] = static_cast<std::int32_t>(std::ceil(box.max_mm[k] / kQuantum_mm - kRounding));
+    body.lowest[static_cast<std::size_t>(k)] =
+        static_cast<std::int32_t>(std::floor(box.min_mm[k] / kQuantum_mm + kRounding));
+    body.highest[static_cast<std::size_t>(k)] =
+        static_cast<std::int32_t>(std::ceil(box.max_mm[k] / kQuantum_mm - kRounding));
   }
 }
 
@@ -129,16 +132,16 @@ Digest Tool::hash() const {
   hasher.text(name);
   hasher.text(title);
   hasher.integer(static_cast<std::uint64_t>(kind));
-  for (const double value : {diameter_mm, cutting_length_mm, point_angle_rad, shank_diameter_mm, shank_length_mm, width_mm,
-                             thickness_mm, set_mm, swing_rad, stroke_mm, pivot_mm, taper_rad, corner_mm, bore_mm, thread_pitch_mm,
-                             core_diameter_mm, spindle_rpm, feed_mm_per_rev})
+  for (const double value : {diameter_mm, cutting_length_mm, point_angle_rad, shank_diameter_mm, shank_length_mm,
+                             width_mm, thickness_mm, set_mm, swing_rad, stroke_mm, pivot_mm, taper_rad, corner_mm,
+                             bore_mm, thread_pitch_mm, core_diameter_mm, spindle_rpm, feed_mm_per_rev})
     hasher.number(value);
   hasher.integer(static_cast<std::uint64_t>(teeth));
   hasher.integer(static_cast<std::uint64_t>(cut_level));
   hasher.integer(mesh ? mesh->values.size() : 0);
   if (mesh) {
-    for (const std::int32_t value :
-         {mesh->box.min.x, mesh->box.min.y, mesh->box.min.z, mesh->box.max.x, mesh->box.max.y, mesh->box.max.z, mesh->pitch})
+    for (const std::int32_t value : {mesh->box.min.x, mesh->box.min.y, mesh->box.min.z, mesh->box.max.x,
+                                     mesh->box.max.y, mesh->box.max.z, mesh->pitch})
       hasher.integer(static_cast<std::uint32_t>(value));
     for (const std::int16_t value : mesh->values) hasher.integer(static_cast<std::uint16_t>(value));
   }
@@ -163,8 +166,9 @@ double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm) {
   if (tool.kind != ToolKind::drill && tool.kind != ToolKind::round_burr) return tool_solid(tool)(point_tool_mm);
   const Outline p{std::hypot(point_tool_mm.x(), point_tool_mm.y()), point_tool_mm.z()};
   const double shank = cylinder_distance(0.5 * tool.shank_diameter_mm, shank_start_mm(tool), -tool.reach_mm(), p);
-  const double cutting = tool.kind == ToolKind::drill ? drill_distance(tool, p)
-                                                      : std::hypot(p.r, p.z + 0.5 * tool.diameter_mm) - 0.5 * tool.diameter_mm;
+  const double cutting = tool.kind == ToolKind::drill
+                             ? drill_distance(tool, p)
+                             : std::hypot(p.r, p.z + 0.5 * tool.diameter_mm) - 0.5 * tool.diameter_mm;
   return std::min(cutting, shank);
 }
 

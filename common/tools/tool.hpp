@@ -17,60 +17,62 @@
 namespace osteon {
 
 enum class ToolKind : std::uint8_t {
-  drill = 1,              // cone point and cylindrical flutes
-  round_burr = 2,         // sphere on a shank
-  end_drill = 3,          // flat end: opens the medullary canal
-  barrel_burr = 4,        // bulging cylinder
-  contoured_burr = 5,     // tapered, with a rounded end
-  oscillating_saw = 6,    // a blade that swings about a pivot behind it
-  reciprocating_saw = 7,  // a blade that moves to and fro along its axis
-  sphere_reamer = 8,      // hemisphere for the acetabulum
-  cylinder_reamer = 9,    // for a canal
-  outside_reamer = 10,    // hollow: planes the outside of a femoral head
-  broach = 11,            // tapered stem, driven in by blows
-  drill_sleeve = 12,      // guide 1: a tube that holds a drill
-  distal_block = 13,      // guide 2: distal cutting block, one slot
-  four_in_one_block = 14, // guide 3: four slots for anterior, posterior and chamfer cuts
+  drill = 1,               // cone point and cylindrical flutes
+  round_burr = 2,          // sphere on a shank
+  end_drill = 3,           // flat end: opens the medullary canal
+  barrel_burr = 4,         // bulging cylinder
+  contoured_burr = 5,      // tapered, with a rounded end
+  oscillating_saw = 6,     // a blade that swings about a pivot behind it
+  reciprocating_saw = 7,   // a blade that moves to and fro along its axis
+  sphere_reamer = 8,       // hemisphere for the acetabulum
+  cylinder_reamer = 9,     // for a canal
+  outside_reamer = 10,     // hollow: planes the outside of a femoral head
+  broach = 11,             // tapered stem, driven in by blows
+  drill_sleeve = 12,       // guide 1: a tube that holds a drill
+  distal_block = 13,       // guide 2: distal cutting block, one slot
+  four_in_one_block = 14,  // guide 3: four slots for anterior, posterior and chamfer cuts
   pin = 15,
   screw = 16,
-  trial_cup = 17,         // trial implant for a reamed acetabulum
-  trial_stem = 18,        // trial implant for a broached canal
-  mesh = 19,              // any solid, from a triangle mesh
+  trial_cup = 17,   // trial implant for a reamed acetabulum
+  trial_stem = 18,  // trial implant for a broached canal
+  mesh = 19,        // any solid, from a triangle mesh
 };
 
 // Every kind uses the dimensions that its comment names; the others are zero.
 struct Tool {
-  std::string name;                // "burr-round-5": lower case, digits, '-' and '.'
-  std::string title;               // shown to people
+  std::string name;   // "burr-round-5": lower case, digits, '-' and '.'
+  std::string title;  // shown to people
   ToolKind kind = ToolKind::drill;
-  double diameter_mm = 0;          // of the cutting part, pin, screw's thread; outside of a sleeve or cup; pin holes of blocks
-  double cutting_length_mm = 0;    // from the tip along the axis, of a saw the toothed part; whole length of what does not cut
-  double point_angle_rad = 0;      // drill, pin, screw: full angle of the point
+  double diameter_mm = 0;  // of the cutting part, pin, screw's thread; outside of a sleeve or cup; pin holes of blocks
+  double cutting_length_mm =
+      0;  // from the tip along the axis, of a saw the toothed part; whole length of what does not cut
+  double point_angle_rad = 0;  // drill, pin, screw: full angle of the point
   double shank_diameter_mm = 0;
-  double shank_length_mm = 0;      // saw: the plate behind the toothed part
-  double width_mm = 0;             // blade, block; broach, stem: of the upper end; along x
-  double thickness_mm = 0;         // blade's plate, block; broach, stem: of the upper end; along y. Cup: wall; outside reamer: back
-  double set_mm = 0;               // saw: by how much its teeth cut wider than the plate, both sides together
-  double swing_rad = 0;            // oscillating saw: full angle of the stroke
-  double stroke_mm = 0;            // reciprocating saw: full way of the stroke
-  double pivot_mm = 0;             // oscillating saw: from the tooth line back to the pivot
-  double taper_rad = 0;            // broach, stem, contoured burr: side against the axis
-  double corner_mm = 0;            // radius of a barrel's bulge, of a canal reamer's edge; bevel of a broach or stem
-  double bore_mm = 0;              // outside reamer, sleeve: inner diameter; blocks: height of a slot
-  double thread_pitch_mm = 0;      // screw: advance in one turn
-  double core_diameter_mm = 0;     // screw: below the thread
-  double spindle_rpm = 0;          // turns, strokes or blows a minute
-  int teeth = 0;                   // flutes, teeth
-  double feed_mm_per_rev = 0;      // what it is made to advance in a turn or stroke
-  int cut_level = 2;               // the level its cuts go to: pitch h / 2^level
-  std::string law = {};            // name of the force law by which it resists, for who renders force; empty: its kind's
+  double shank_length_mm = 0;  // saw: the plate behind the toothed part
+  double width_mm = 0;         // blade, block; broach, stem: of the upper end; along x
+  double thickness_mm =
+      0;              // blade's plate, block; broach, stem: of the upper end; along y. Cup: wall; outside reamer: back
+  double set_mm = 0;  // saw: by how much its teeth cut wider than the plate, both sides together
+  double swing_rad = 0;         // oscillating saw: full angle of the stroke
+  double stroke_mm = 0;         // reciprocating saw: full way of the stroke
+  double pivot_mm = 0;          // oscillating saw: from the tooth line back to the pivot
+  double taper_rad = 0;         // broach, stem, contoured burr: side against the axis
+  double corner_mm = 0;         // radius of a barrel's bulge, of a canal reamer's edge; bevel of a broach or stem
+  double bore_mm = 0;           // outside reamer, sleeve: inner diameter; blocks: height of a slot
+  double thread_pitch_mm = 0;   // screw: advance in one turn
+  double core_diameter_mm = 0;  // screw: below the thread
+  double spindle_rpm = 0;       // turns, strokes or blows a minute
+  int teeth = 0;                // flutes, teeth
+  double feed_mm_per_rev = 0;   // what it is made to advance in a turn or stroke
+  int cut_level = 2;            // the level its cuts go to: pitch h / 2^level
+  std::string law = {};         // name of the force law by which it resists, for who renders force; empty: its kind's
   // Kind mesh: shared by all copies of the definition, immutable, up to megabytes. Else null.
   std::shared_ptr<const SampledDistance> mesh = nullptr;
 
-  [[nodiscard]] bool cuts() const;        // whether it takes bone; guides, cups and stems do not
-  [[nodiscard]] CutBody cut_body() const; // kind none for one that does not cut
+  [[nodiscard]] bool cuts() const;         // whether it takes bone; guides, cups and stems do not
+  [[nodiscard]] CutBody cut_body() const;  // kind none for one that does not cut
   [[nodiscard]] double reach_mm() const { return cutting_length_mm + shank_length_mm; }
-  [[nodiscard]] Digest hash() const;      // over every field
+  [[nodiscard]] Digest hash() const;  // over every field
 };
 
 // The tools that come with Osteon, by name: the 24 of Niu 2008, Appendix B, and some more.
@@ -87,10 +89,10 @@ struct Tool {
 [[nodiscard]] Box world_bounds(const Tool& tool, const Pose& pose_bone_tool);
 
 struct SamplePoint {
-  Vec3 position_mm;   // on the surface, tool frame
-  Vec3 inward;        // unit normal into the tool (Niu 2008, §6.1)
-  double area_mm2;    // of the surface it stands for
-  bool active;        // on the cutting part
+  Vec3 position_mm;  // on the surface, tool frame
+  Vec3 inward;       // unit normal into the tool (Niu 2008, §6.1)
+  double area_mm2;   // of the surface it stands for
+  bool active;       // on the cutting part
 };
 
 // Points spread evenly over the surface, at least `count` of them on the cutting part, or on the whole of a tool that

@@ -24,7 +24,8 @@ Result<Tool> ToolBox::find(std::string_view name) const {
   for (const Entry* entry : entries()) {
     known.insert(entry->tool.name);
     if (entry->tool.name != name) continue;
-    if (found) return failure(ErrorCode::invalid_input, "two tools of the room have the name \"" + std::string(name) + '"');
+    if (found)
+      return failure(ErrorCode::invalid_input, "two tools of the room have the name \"" + std::string(name) + '"');
     found = entry;
   }
   if (found) return found->tool;

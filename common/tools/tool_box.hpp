@@ -23,7 +23,7 @@ class ToolBox {
   [[nodiscard]] const Entry* find(const Digest& hash) const;  // null when unknown
   // The tool of this name. Errors: not_found (names those that there are), invalid_input (two bear it).
   [[nodiscard]] Result<Tool> find(std::string_view name) const;
-  [[nodiscard]] std::vector<const Entry*> entries() const;    // in the order of their hashes
+  [[nodiscard]] std::vector<const Entry*> entries() const;  // in the order of their hashes
 
  private:
   mutable std::mutex mutex_;

@@ -61,7 +61,8 @@ std::optional<double> exact_degrees(double rad) {
   const double about = rad / kDegree;
   std::array<char, 32> text{};
   for (int digits = 1; digits <= 17; ++digits) {
-    const auto end = std::to_chars(text.data(), text.data() + text.size(), about, std::chars_format::general, digits).ptr;
+    const auto end =
+        std::to_chars(text.data(), text.data() + text.size(), about, std::chars_format::general, digits).ptr;
     double candidate = 0.0;
     std::from_chars(text.data(), end, candidate);
     if (candidate * kDegree == rad) return candidate;
@@ -158,14 +159,15 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
         tool.mesh = read_samples(entry.second);
       continue;
     }
-    const auto rule = std::ranges::find_if(
-        rules, [&](const FieldRule& r) { return r.name == field || (r.name.ends_with("_rad") && in_degrees(r.name) == field); });
+    const auto rule = std::ranges::find_if(rules, [&](const FieldRule& r) {
+      return r.name == field || (r.name.ends_with("_rad") && in_degrees(r.name) == field);
+    });
     if (rule == rules.end()) {
       std::string names;
       for (const FieldRule& r : rules)
         names += (names.empty() ? "" : ", ") + (r.name.ends_with("_rad") ? in_degrees(r.name) : std::string(r.name));
-      throw Fault{"\"" + field + "\" is not a field of a " + kind + "; remove it or choose one of name, title, kind, " + names +
-                  (tool.cuts() ? ", cut_level, law" : "")};
+      throw Fault{"\"" + field + "\" is not a field of a " + kind + "; remove it or choose one of name, title, kind, " +
+                  names + (tool.cuts() ? ", cut_level, law" : "")};
     }
     if (std::ranges::find(given, &*rule) != given.end()) throw Fault{"\"" + field + "\" is there twice; remove one"};
     const bool degrees = field != rule->name;
@@ -177,12 +179,14 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
       const std::string field = rule.name.ends_with("_rad") ? in_degrees(rule.name) : std::string(rule.name);
       throw Fault{"\"" + field + "\" is missing; the kind " + kind + " needs it, " + limits_sentence(rule)};
     }
-  if (tool.cuts() && !has_level) throw Fault{"\"cut_level\" is missing; choose 0 for large cutters, 2 for small ones and blades"};
+  if (tool.cuts() && !has_level)
+    throw Fault{"\"cut_level\" is missing; choose 0 for large cutters, 2 for small ones and blades"};
   if (tool.kind == ToolKind::mesh && !tool.mesh) {
     if (mesh_file.empty()) throw Fault{"\"mesh\" is missing; name the STL file of its solid"};
     if (!(mesh_pitch_mm >= 0.05 && mesh_pitch_mm <= 5.0))
       throw Fault{"\"mesh_pitch_mm\" must be from 0.05 to 5; half the smallest thickness of the solid is good"};
-    if (!load_mesh) throw Fault{"\"mesh\" names a file, and this program reads none; write its samples into the tool file"};
+    if (!load_mesh)
+      throw Fault{"\"mesh\" names a file, and this program reads none; write its samples into the tool file"};
     auto mesh = load_mesh(mesh_file, mesh_pitch_mm);
     if (!mesh) throw Fault{"\"mesh\": " + mesh.error().message};
     tool.mesh = *mesh;
@@ -209,9 +213,11 @@ Result<Tool> parse_tool(std::string_view text, const std::string& file_name, con
 Result<Tool> load_tool(const std::filesystem::path& file, const MeshLoader& load_mesh) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
-  if (error) return failure(ErrorCode::not_found, "there is no tool file " + file.string() + "; give the path of a YAML file");
+  if (error)
+    return failure(ErrorCode::not_found, "there is no tool file " + file.string() + "; give the path of a YAML file");
   if (size > kLargestFile)
-    return failure(ErrorCode::invalid_input, file.string() + " is too large for a tool file; use a coarser mesh_pitch_mm");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is too large for a tool file; use a coarser mesh_pitch_mm");
   std::ifstream stream(file, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(stream), {}};
   if (!stream) return failure(ErrorCode::unavailable, file.string() + " cannot be read; check its permissions");

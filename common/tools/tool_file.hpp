@@ -24,10 +24,12 @@
 namespace osteon {
 
 // Makes the distances of a kind `mesh` from the triangle file that its tool file names, on a lattice of that pitch.
-using MeshLoader = std::function<Result<std::shared_ptr<const SampledDistance>>(const std::string& file, double pitch_mm)>;
+using MeshLoader =
+    std::function<Result<std::shared_ptr<const SampledDistance>>(const std::string& file, double pitch_mm)>;
 
 // `file_name`: for messages. Every error is one sentence that names the file, the field and the remedy.
-[[nodiscard]] Result<Tool> parse_tool(std::string_view text, const std::string& file_name, const MeshLoader& load_mesh = {});
+[[nodiscard]] Result<Tool> parse_tool(std::string_view text, const std::string& file_name,
+                                      const MeshLoader& load_mesh = {});
 [[nodiscard]] Result<Tool> load_tool(const std::filesystem::path& file, const MeshLoader& load_mesh = {});
 
 // A tool file that gives back the same tool, bit for bit, and so the same hash. A mesh goes along as its samples.
@@ -40,7 +42,7 @@ using MeshLoader = std::function<Result<std::shared_ptr<const SampledDistance>>(
 struct EditableField {
   std::string name;  // "diameter_mm"
   double lowest, highest;
-  bool whole;        // a number of teeth
+  bool whole;  // a number of teeth
 };
 [[nodiscard]] std::vector<EditableField> editable_fields(ToolKind kind);
 

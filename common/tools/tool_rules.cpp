@@ -80,8 +80,8 @@ std::string shown_name(const FieldRule& rule) {
 
 bool good_name(const std::string& name) {
   return !name.empty() && name.size() <= 64 && name.front() != '-' && name.front() != '.' &&
-         std::ranges::all_of(name,
-                             [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; });
+         std::ranges::all_of(
+             name, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; });
 }
 
 // UTF-8 without control characters: anything else could be neither written to a tool file nor sent.
@@ -144,7 +144,8 @@ std::optional<std::string> fit_fault(const Tool& t) {
     case ToolKind::contoured_burr:
       if (shank > radius) return at_most("shank_diameter_mm", t.shank_diameter_mm, "the cutting part", t.diameter_mm);
       if (end_radius_mm(t) < 0.5 * kThinnest_mm)
-        return "\"taper_deg\" comes to a point before the tip; make it smaller, or diameter_mm larger, or cutting_length_mm "
+        return "\"taper_deg\" comes to a point before the tip; make it smaller, or diameter_mm larger, or "
+               "cutting_length_mm "
                "shorter";
       if (end_radius_mm(t) * (1.0 - std::sin(t.taper_rad)) > t.cutting_length_mm)
         return "\"cutting_length_mm\" is " + written(t.cutting_length_mm) +
@@ -153,7 +154,8 @@ std::optional<std::string> fit_fault(const Tool& t) {
     case ToolKind::cylinder_reamer:
       if (t.corner_mm > radius - kThinnest_mm || t.corner_mm > t.cutting_length_mm)
         return "\"corner_mm\" is " + written(t.corner_mm) +
-               ", more than the reamer's end has room for; make it smaller than half of diameter_mm and than cutting_length_mm";
+               ", more than the reamer's end has room for; make it smaller than half of diameter_mm and than "
+               "cutting_length_mm";
       break;
     case ToolKind::outside_reamer:
       if (t.bore_mm > t.diameter_mm - 2.0 * kThinnest_mm)
@@ -161,7 +163,8 @@ std::optional<std::string> fit_fault(const Tool& t) {
       break;
     case ToolKind::oscillating_saw: {
       if (t.pivot_mm < t.width_mm)
-        return "\"pivot_mm\" is " + written(t.pivot_mm) + ", nearer than the blade is wide; make it larger than width_mm";
+        return "\"pivot_mm\" is " + written(t.pivot_mm) +
+               ", nearer than the blade is wide; make it larger than width_mm";
       if (t.cutting_length_mm < tooth_line_drop_mm(t) + kThinnest_mm)
         return "\"cutting_length_mm\" is " + written(t.cutting_length_mm) +
                ", less than the bow of its tooth line; make it at least " +
@@ -175,7 +178,8 @@ std::optional<std::string> fit_fault(const Tool& t) {
     case ToolKind::trial_stem: {
       const double narrow = std::min(t.width_mm, t.thickness_mm) - 2.0 * t.cutting_length_mm * std::tan(t.taper_rad);
       if (narrow < 2.0 * kThinnest_mm)
-        return "\"taper_deg\" comes to an edge before the tip; make it smaller, or cutting_length_mm shorter, or width_mm and "
+        return "\"taper_deg\" comes to an edge before the tip; make it smaller, or cutting_length_mm shorter, or "
+               "width_mm and "
                "thickness_mm larger";
       if (t.corner_mm > 0.9 * narrow)
         return "\"corner_mm\" is " + written(t.corner_mm) + ", more than the tip is wide; make it smaller";
@@ -211,7 +215,8 @@ std::optional<std::string> fit_fault(const Tool& t) {
       break;
     case ToolKind::trial_cup:
       if (t.thickness_mm > radius - kThinnest_mm)
-        return "\"thickness_mm\" is " + written(t.thickness_mm) + ", thicker than the cup; make it less than half of diameter_mm";
+        return "\"thickness_mm\" is " + written(t.thickness_mm) +
+               ", thicker than the cup; make it less than half of diameter_mm";
       break;
     default:
       break;
@@ -355,7 +360,8 @@ void set_field(Tool& tool, const FieldRule& rule, double value) {
 
 void derive_fields(Tool& tool) {
   if (tool.kind == ToolKind::round_burr) tool.cutting_length_mm = tool.diameter_mm;
-  if (tool.kind == ToolKind::sphere_reamer || tool.kind == ToolKind::trial_cup) tool.cutting_length_mm = 0.5 * tool.diameter_mm;
+  if (tool.kind == ToolKind::sphere_reamer || tool.kind == ToolKind::trial_cup)
+    tool.cutting_length_mm = 0.5 * tool.diameter_mm;
   if (tool.kind == ToolKind::mesh && tool.mesh) {
     // The lattice holds the solid: its size is a bound of the solid's.
     const CoordBox& box = tool.mesh->box;
@@ -385,7 +391,8 @@ std::optional<std::string> tool_fault(const Tool& tool) {
   if (std::ranges::find(kKinds, tool.kind, &KindName::kind) == kKinds.end())
     return "its kind is unknown; use a newer version of this program";
   if (!good_name(tool.name))
-    return "\"name\" is \"" + tool.name + "\"; use up to 64 lower-case letters, digits, '-' and '.', a letter or digit first";
+    return "\"name\" is \"" + tool.name +
+           "\"; use up to 64 lower-case letters, digits, '-' and '.', a letter or digit first";
   if (tool.title.empty() || tool.title.size() > 200 || !is_plain_text(tool.title))
     return "\"title\" must have from 1 to 200 letters in UTF-8 without control characters; write what people shall "
            "read";

@@ -18,10 +18,10 @@ struct KindName {
 [[nodiscard]] std::span<const KindName> tool_kinds();
 
 struct FieldRule {
-  std::string_view name;             // of the member of Tool
+  std::string_view name;  // of the member of Tool
   double Tool::*number = nullptr;
-  int Tool::*count = nullptr;        // instead of `number`
-  double lowest = 0, highest = 0;    // both allowed
+  int Tool::*count = nullptr;      // instead of `number`
+  double lowest = 0, highest = 0;  // both allowed
   bool required = true;
   bool editable = false;
   [[nodiscard]] bool whole() const { return count != nullptr; }

@@ -82,7 +82,8 @@ std::vector<HalfSpace> swung_blade(const Tool& tool, double swing_rad, double th
     faces.push_back({{std::sin(a), 0, std::cos(a)}, pivot * (1.0 - std::cos(a))});
   }
   for (const double side : {1.0, -1.0})
-    faces.push_back({{side * std::cos(half_swing), 0, -std::sin(half_swing)}, half_width + pivot * std::sin(half_swing)});
+    faces.push_back(
+        {{side * std::cos(half_swing), 0, -std::sin(half_swing)}, half_width + pivot * std::sin(half_swing)});
   for (const double side : {1.0, -1.0}) faces.push_back({{0, side, 0}, 0.5 * thickness_mm});
   faces.push_back({{0, 0, -1}, tool.cutting_length_mm});
   return faces;
@@ -143,7 +144,8 @@ Implicit without_openings(const Tool& guide, Implicit body) {
   const GuideShape shape = guide_shape(guide);
   const auto drill_hole = [&](const GuideBore& bore) {
     const Pose along = pose_along(bore.entry_mm, bore.direction);
-    body = subtract(std::move(body), placed(cylinder(0.5 * bore.diameter_mm, -kOver_mm, bore.length_mm + kOver_mm), along));
+    body = subtract(std::move(body),
+                    placed(cylinder(0.5 * bore.diameter_mm, -kOver_mm, bore.length_mm + kOver_mm), along));
   };
   for (const GuideBore& bore : shape.bores) drill_hole(bore);
   for (const GuideBore& bore : shape.pin_holes) drill_hole(bore);
@@ -179,11 +181,12 @@ Implicit sampled_solid(std::shared_ptr<const SampledDistance> mesh) {
     double value = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
       const int i = corner >> 2, j = (corner >> 1) & 1, k = corner & 1;
-      const auto index =
-          (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(base[1] + j)) *
-              static_cast<std::size_t>(size[2]) +
-          static_cast<std::size_t>(base[2] + k);
-      value += mesh->values[index] * kQuantum_mm * (i ? t[0] : 1.0 - t[0]) * (j ? t[1] : 1.0 - t[1]) * (k ? t[2] : 1.0 - t[2]);
+      const auto index = (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) +
+                          static_cast<std::size_t>(base[1] + j)) *
+                             static_cast<std::size_t>(size[2]) +
+                         static_cast<std::size_t>(base[2] + k);
+      value += mesh->values[index] * kQuantum_mm * (i ? t[0] : 1.0 - t[0]) * (j ? t[1] : 1.0 - t[1]) *
+               (k ? t[2] : 1.0 - t[2]);
     }
     return value + (p - nearest).norm();
   };
@@ -198,7 +201,9 @@ Implicit of_outline(const CutOutline& outline) {
 }
 
 // Straight behind the cutting part.
-Implicit shank(const Tool& tool) { return cylinder(0.5 * tool.shank_diameter_mm, -tool.reach_mm(), shank_start_mm(tool)); }
+Implicit shank(const Tool& tool) {
+  return cylinder(0.5 * tool.shank_diameter_mm, -tool.reach_mm(), shank_start_mm(tool));
+}
 
 }  // namespace
 
@@ -214,11 +219,13 @@ double shank_start_mm(const Tool& tool) {
 
 double end_radius_mm(const Tool& tool) {
   const double t = tool.taper_rad;
-  return (0.5 * tool.diameter_mm - tool.cutting_length_mm * std::tan(t)) / (std::cos(t) - (1.0 - std::sin(t)) * std::tan(t));
+  return (0.5 * tool.diameter_mm - tool.cutting_length_mm * std::tan(t)) /
+         (std::cos(t) - (1.0 - std::sin(t)) * std::tan(t));
 }
 
 double tooth_line_drop_mm(const Tool& tool) {
-  return tool.pivot_mm * (1.0 - std::cos(std::asin(std::min(1.0, 0.5 * tool.width_mm / tool.pivot_mm)) + 0.5 * tool.swing_rad));
+  return tool.pivot_mm *
+         (1.0 - std::cos(std::asin(std::min(1.0, 0.5 * tool.width_mm / tool.pivot_mm)) + 0.5 * tool.swing_rad));
 }
 
 CutOutline cut_outline(const Tool& tool) {
@@ -302,7 +309,8 @@ Implicit cutting_part(const Tool& tool) {
     }
     case ToolKind::trial_cup: {
       const Vec3 centre(0, 0, -half);
-      const Implicit outside = intersect(ball(centre, half), cuboid({Vec3(-half, -half, -length), Vec3(half, half, 0)}));
+      const Implicit outside =
+          intersect(ball(centre, half), cuboid({Vec3(-half, -half, -length), Vec3(half, half, 0)}));
       return subtract(outside, ball(centre, half - tool.thickness_mm));
     }
     case ToolKind::trial_stem:

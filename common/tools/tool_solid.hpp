@@ -16,10 +16,10 @@ namespace osteon {
 // The same as outlines, mm; empty where the cutting body is of another kind.
 struct CutOutline {
   CutKind kind = CutKind::none;
-  double radius_mm = 0;            // ball
-  std::vector<Corner> profile;     // turned
-  double dome_mm = 0;              // turned: radius of the ball that clips it; 0 for none
-  std::vector<HalfSpace> planes;   // hull
+  double radius_mm = 0;           // ball
+  std::vector<Corner> profile;    // turned
+  double dome_mm = 0;             // turned: radius of the ball that clips it; 0 for none
+  std::vector<HalfSpace> planes;  // hull
 };
 [[nodiscard]] CutOutline cut_outline(const Tool& tool);
 

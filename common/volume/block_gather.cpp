@@ -34,8 +34,8 @@ inline void cut_lanes(const float* from, const float* cuts, float uncut, float* 
   std::memcpy(to, &made, sizeof made);
 }
 
-// visit(first sample of the row, pointers to it in the four leaves along z) for each row. A leaf of one value is a row of it
-// that is read again and again.
+// visit(first sample of the row, pointers to it in the four leaves along z) for each row. A leaf of one value is a row
+// of it that is read again and again.
 template <class Visit>
 void for_rows(std::span<const LeafView, kBlockLeaves> leaves, Visit visit) {
   std::array<std::array<float, kLeafSize>, kBlockLeaves> constants;
@@ -89,8 +89,10 @@ void interpolate(const float* coarse, float* out) {
     const std::size_t phase = (x + kMask) % kFine;
     if (x == 0 || phase == 0) {
       const std::size_t cx = (x + kMask) / kFine;
-      if (x == 0) fill_plane(cx, near_plane);
-      else std::swap(near_plane, far_plane);
+      if (x == 0)
+        fill_plane(cx, near_plane);
+      else
+        std::swap(near_plane, far_plane);
       fill_plane(cx + 1, far_plane);
     }
     const float weight = static_cast<float>(phase) * kStep;
@@ -129,10 +131,12 @@ void cut_block(std::span<const LeafView, kBlockLeaves> leaves, float uncut, std:
 }
 
 void interpolate_block(std::span<const float> coarse, int shift, std::span<float, kBlockVolume> out) {
-  OSTEON_CHECK((shift == 1 || shift == 2) && coarse.size() == static_cast<std::size_t>(coarse_side(shift) * coarse_side(shift) *
-                                                                                         coarse_side(shift)));
-  if (shift == 1) interpolate<1>(coarse.data(), out.data());
-  else interpolate<2>(coarse.data(), out.data());
+  OSTEON_CHECK((shift == 1 || shift == 2) &&
+               coarse.size() == static_cast<std::size_t>(coarse_side(shift) * coarse_side(shift) * coarse_side(shift)));
+  if (shift == 1)
+    interpolate<1>(coarse.data(), out.data());
+  else
+    interpolate<2>(coarse.data(), out.data());
 }
 
 }  // namespace osteon

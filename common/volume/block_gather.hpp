@@ -28,8 +28,8 @@ void copy_block(std::span<const LeafView, kBlockLeaves> leaves, std::span<float,
 // to = max(from, −R), but `from` where R is at its clip `uncut`. `to` may be `from`.
 void cut_block(std::span<const LeafView, kBlockLeaves> leaves, float uncut, std::span<const float, kBlockVolume> from,
                std::span<float, kBlockVolume> to);
-// Trilinear from a lattice 2 or 4 times (shift 1, 2) as coarse, one axis after the other: z, y, x. `coarse` begins at the
-// sample at or before the block's first, and has coarse_side() samples along an axis.
+// Trilinear from a lattice 2 or 4 times (shift 1, 2) as coarse, one axis after the other: z, y, x. `coarse` begins at
+// the sample at or before the block's first, and has coarse_side() samples along an axis.
 [[nodiscard]] constexpr std::int32_t coarse_side(int shift) {
   return ((kBlockSide - 1 + (1 << shift) - 1) >> shift) + 2;
 }

@@ -62,7 +62,8 @@ void read_leaf(const CoordBox& part, const std::vector<T>& from, Coord origin, T
   for (std::int32_t x = std::max(origin.x, part.min.x); x <= std::min(origin.x + kLeafSize - 1, part.max.x); ++x)
     for (std::int32_t y = std::max(origin.y, part.min.y); y <= std::min(origin.y + kLeafSize - 1, part.max.y); ++y) {
       const std::size_t row = (static_cast<std::size_t>(x - part.min.x) * static_cast<std::size_t>(dims.y) +
-                               static_cast<std::size_t>(y - part.min.y)) * static_cast<std::size_t>(dims.z);
+                               static_cast<std::size_t>(y - part.min.y)) *
+                              static_cast<std::size_t>(dims.z);
       for (std::int32_t z = first; z <= last; ++z)
         out[static_cast<std::size_t>((x - origin.x) * 64 + (y - origin.y) * 8 + (z - origin.z))] =
             from[row + static_cast<std::size_t>(z - part.min.z)];
@@ -258,8 +259,10 @@ SparseVolume make_clearance(const SparseVolume& surface, double pitch) {
   for (const Coord origin : occupied) squared.at(shift_down(origin, 3)) = 0.0;
 
   const Coord dims = squared.box.dims();
-  const std::size_t strides[3] = {static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z), static_cast<std::size_t>(dims.z), 1};
-  const std::size_t sizes[3] = {static_cast<std::size_t>(dims.x), static_cast<std::size_t>(dims.y), static_cast<std::size_t>(dims.z)};
+  const std::size_t strides[3] = {static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z),
+                                  static_cast<std::size_t>(dims.z), 1};
+  const std::size_t sizes[3] = {static_cast<std::size_t>(dims.x), static_cast<std::size_t>(dims.y),
+                                static_cast<std::size_t>(dims.z)};
   std::vector<double> line;
   for (int axis = 0; axis < 3; ++axis) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
@@ -290,8 +293,9 @@ json to_json(const Case::Grids& grids) {
           {"title", info.title},
           {"source", info.source},
           {"pitch_mm", info.pitch_mm},
-          {"calibration", {{"slope_g_cm3_per_hu", info.calibration.slope_g_cm3_per_hu},
-                           {"intercept_g_cm3", info.calibration.intercept_g_cm3}}},
+          {"calibration",
+           {{"slope_g_cm3_per_hu", info.calibration.slope_g_cm3_per_hu},
+            {"intercept_g_cm3", info.calibration.intercept_g_cm3}}},
           {"segmentation", {{"threshold_hu", info.threshold_hu}}},
           {"content_hash", to_hex(grids.hash)}};
 }
@@ -314,8 +318,17 @@ void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>&
 Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
   if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
   const float band = band_mm(info.pitch_mm);
-  auto grids = std::make_shared<Grids>(Grids{std::move(info), {}, SparseVolume(band), SparseVolume(0.0f), SparseVolume(0.0f),
-                                             SparseVolume(0.0f), SparseVolume(0.0f), {}, 0.0, {}, {}});
+  auto grids = std::make_shared<Grids>(Grids{std::move(info),
+                                             {},
+                                             SparseVolume(band),
+                                             SparseVolume(0.0f),
+                                             SparseVolume(0.0f),
+                                             SparseVolume(0.0f),
+                                             SparseVolume(0.0f),
+                                             {},
+                                             0.0,
+                                             {},
+                                             {}});
   PartSamples samples;
   constexpr std::int32_t kPart = kPartSamples;
   const Coord first = floor_to(box.min, kPart), last = box.max;
@@ -342,7 +355,8 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fil
           for (std::int32_t y = leaf.y; y <= part.max.y; y += kLeafSize)
             for (std::int32_t z = leaf.z; z <= part.max.z; z += kLeafSize)
               if (!add_leaf(*grids, part, samples, {x, y, z}))
-                return failure(ErrorCode::invalid_input, "the bone's distance or density has values that are not numbers");
+                return failure(ErrorCode::invalid_input,
+                               "the bone's distance or density has values that are not numbers");
       }
   }
   measure(*grids);
@@ -376,10 +390,12 @@ Result<Case> Case::build(CaseInfo info, const DenseVolume<float>& surface_mm, co
 Result<Case> Case::load(const std::filesystem::path& folder) {
   const auto file = folder / kInfoFile;
   if (!std::filesystem::is_directory(folder))
-    return failure(ErrorCode::not_found, "there is no case folder " + folder.string() + "; make one with osteon-import");
+    return failure(ErrorCode::not_found,
+                   "there is no case folder " + folder.string() + "; make one with osteon-import");
   std::ifstream in(file);
   if (!in)
-    return failure(ErrorCode::invalid_input, folder.string() + " is not a case: it has no " + kInfoFile + "; make one with osteon-import");
+    return failure(ErrorCode::invalid_input,
+                   folder.string() + " is not a case: it has no " + kInfoFile + "; make one with osteon-import");
   std::error_code unknown;
   if (std::filesystem::file_size(file, unknown) > kMostInfoBytes && !unknown)
     return failure(ErrorCode::invalid_input,
@@ -404,17 +420,28 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
     if (!hash) return failure(ErrorCode::invalid_input, file.string() + ": content_hash: " + hash.error().message);
     named = *hash;
   } catch (const std::exception& e) {
-    return failure(ErrorCode::invalid_input, file.string() + " is not a case description (" + e.what() + "); import the case again");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is not a case description (" + e.what() + "); import the case again");
   }
   if (!(info.pitch_mm > 0.0))
     return failure(ErrorCode::invalid_input, file.string() + ": pitch_mm must be above zero; import the case again");
   auto volumes = load_volumes(folder / kVolumeFile, kGridNames, limits_for(folder / kVolumeFile));
   if (!volumes) return tl::unexpected(volumes.error());
   auto& v = *volumes;
-  auto grids = std::make_shared<Grids>(Grids{std::move(info), named, std::move(v[0]), std::move(v[1]), std::move(v[2]), std::move(v[3]),
-                                             std::move(v[4]), {}, 0.0, {}, {}});
+  auto grids = std::make_shared<Grids>(Grids{std::move(info),
+                                             named,
+                                             std::move(v[0]),
+                                             std::move(v[1]),
+                                             std::move(v[2]),
+                                             std::move(v[3]),
+                                             std::move(v[4]),
+                                             {},
+                                             0.0,
+                                             {},
+                                             {}});
   if (content_hash(*grids) != named)
-    return failure(ErrorCode::invalid_input, folder.string() + ": the content does not match content_hash of " + kInfoFile + "; import the case again");
+    return failure(ErrorCode::invalid_input, folder.string() + ": the content does not match content_hash of " +
+                                                 kInfoFile + "; import the case again");
   measure(*grids);
   find_hard_leaves(*grids);
   Case result;
@@ -439,17 +466,23 @@ Result<void> Case::save(const std::filesystem::path& folder, const KeepGoing& ke
   const auto write = [&]() -> Result<void> {
     const auto& g = *grids_;
     if (auto saved = save_volumes(partial / kVolumeFile, g.info.pitch_mm,
-                                  {{"surface", &g.surface}, {"density", &g.density}, {"clearance", &g.clearance},
-                                   {"bone", &g.bone}, {"tissue", &g.tissue}});
+                                  {{"surface", &g.surface},
+                                   {"density", &g.density},
+                                   {"clearance", &g.clearance},
+                                   {"bone", &g.bone},
+                                   {"tissue", &g.tissue}});
         !saved)
       return saved;
     std::ofstream out(partial / kInfoFile);
     out << to_json(g).dump(2) << '\n';
     out.close();
-    if (!out) return failure(ErrorCode::internal, "cannot write " + (partial / kInfoFile).string() + "; is the disk full?");
+    if (!out)
+      return failure(ErrorCode::internal, "cannot write " + (partial / kInfoFile).string() + "; is the disk full?");
     if (stopped()) return failure(ErrorCode::cancelled, "stopped; nothing was written");
     fs::rename(partial, target, error);
-    if (error) return failure(ErrorCode::internal, "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
+    if (error)
+      return failure(ErrorCode::internal,
+                     "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
     return {};
   };
   Result<void> written = write();
@@ -464,7 +497,8 @@ double Case::volume_mm3() const { return grids_->volume_mm3; }
 
 std::size_t Case::memory_bytes() const {
   std::size_t bytes = 0;
-  for (const SparseVolume* volume : {&grids_->surface, &grids_->density, &grids_->clearance, &grids_->bone, &grids_->tissue})
+  for (const SparseVolume* volume :
+       {&grids_->surface, &grids_->density, &grids_->clearance, &grids_->bone, &grids_->tissue})
     bytes += volume->memory_bytes();
   return bytes;
 }
@@ -484,7 +518,8 @@ double Case::density_g_cm3(const Vec3& point_mm) const { return grids_->density.
 
 double Case::clearance_mm(const Vec3& point_mm) const {
   const Vec3 leaf = point_mm / (kLeafSize * pitch_mm());
-  return static_cast<double>(grids_->clearance.value({static_cast<std::int32_t>(std::floor(leaf.x())), static_cast<std::int32_t>(std::floor(leaf.y())),
+  return static_cast<double>(grids_->clearance.value({static_cast<std::int32_t>(std::floor(leaf.x())),
+                                                      static_cast<std::int32_t>(std::floor(leaf.y())),
                                                       static_cast<std::int32_t>(std::floor(leaf.z()))}));
 }
 

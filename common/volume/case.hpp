@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "common/core/digest.hpp"
-#include "common/volume/block_gather.hpp"
 #include "common/core/result.hpp"
 #include "common/field/tissue.hpp"
+#include "common/volume/block_gather.hpp"
 #include "common/volume/dense_volume.hpp"
 #include "common/volume/iso_surface.hpp"
 
@@ -26,11 +26,11 @@ struct DensityCalibration {
 };
 
 struct CaseInfo {
-  std::string title;                // shown to people; no patient identity
-  std::string source;               // kind and geometry of the input, e.g. "DICOM CT, 512x512x46, 0.84x0.84x3 mm"
-  double pitch_mm = 0;              // h, isotropic
+  std::string title;    // shown to people; no patient identity
+  std::string source;   // kind and geometry of the input, e.g. "DICOM CT, 512x512x46, 0.84x0.84x3 mm"
+  double pitch_mm = 0;  // h, isotropic
   DensityCalibration calibration;
-  double threshold_hu = 0;          // bone is at or above it
+  double threshold_hu = 0;  // bone is at or above it
   friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
 };
 
@@ -49,10 +49,10 @@ enum class PartKind {
 };
 // Samples of a part, z fastest.
 struct PartSamples {
-  std::vector<float> surface_mm;     // signed distance; beyond the band only the sign matters
+  std::vector<float> surface_mm;  // signed distance; beyond the band only the sign matters
   std::vector<float> density_g_cm3;
-  std::vector<std::uint8_t> bone;    // as SampleLabels; empty unless it is filled
-  std::vector<Tissue> tissue;        // the same
+  std::vector<std::uint8_t> bone;  // as SampleLabels; empty unless it is filled
+  std::vector<Tissue> tissue;      // the same
 };
 // Fills the samples of a box. Distance and density have its size, the labels are empty. Asked once for each part,
 // always in the same order, by one thread.
@@ -67,7 +67,8 @@ class Case {
                                           const DenseVolume<float>& density_g_cm3, const SampleLabels& labels = {},
                                           const KeepGoing& keep_going = {});
   // The same from parts of at most kPartSamples³, without ever holding the whole in memory: for large bones. Leaves of
-  // one density are kept as one number. `keep_going` is asked between parts, and with a false answer the error is cancelled.
+  // one density are kept as one number. `keep_going` is asked between parts, and with a false answer the error is
+  // cancelled.
   static constexpr std::int32_t kPartSamples = 64;
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});

@@ -21,7 +21,8 @@ bool locate(const Vec3& point_mm, double pitch_mm, const CoordBox& samples, Coor
   const Vec3 p = point_mm / pitch_mm - Vec3{static_cast<double>(samples.min.x), static_cast<double>(samples.min.y),
                                             static_cast<double>(samples.min.z)};
   // Also false for what is not a number.
-  if (!(p.x() >= 0.0 && p.y() >= 0.0 && p.z() >= 0.0 && p.x() < cells.x && p.y() < cells.y && p.z() < cells.z)) return false;
+  if (!(p.x() >= 0.0 && p.y() >= 0.0 && p.z() >= 0.0 && p.x() < cells.x && p.y() < cells.y && p.z() < cells.z))
+    return false;
   place.cell = {static_cast<std::int32_t>(p.x()), static_cast<std::int32_t>(p.y()), static_cast<std::int32_t>(p.z())};
   place.x = p.x() - place.cell.x;
   place.y = p.y() - place.cell.y;
@@ -39,7 +40,10 @@ std::optional<std::size_t> first_inside(std::span<const SamplePoint> points, con
 }  // namespace
 
 BoneCells::BoneCells(const CutField& field, int level, const CoordBox& samples)
-    : level_(level), pitch_mm_(level_pitch_mm(field.bone().pitch_mm(), level)), samples_(samples), cells_(samples.dims() - Coord{1, 1, 1}) {
+    : level_(level),
+      pitch_mm_(level_pitch_mm(field.bone().pitch_mm(), level)),
+      samples_(samples),
+      cells_(samples.dims() - Coord{1, 1, 1}) {
   OSTEON_CHECK(cells_.x > 0 && cells_.y > 0 && cells_.z > 0);
   codes_.resize(count(cells_));
   update(field, samples);
@@ -74,7 +78,8 @@ bool BoneCells::inside(const Vec3& point_mm, MixedCell rule) const {
   const unsigned code = codes_[(at(p.cell.x) * at(cells_.y) + at(p.cell.y)) * at(cells_.z) + at(p.cell.z)];
   if (code == 0) return false;
   if (code == 255) return true;
-  if (rule == MixedCell::nearest) return code >> ((p.x >= 0.5 ? 4 : 0) + (p.y >= 0.5 ? 2 : 0) + (p.z >= 0.5 ? 1 : 0)) & 1u;
+  if (rule == MixedCell::nearest)
+    return code >> ((p.x >= 0.5 ? 4 : 0) + (p.y >= 0.5 ? 2 : 0) + (p.z >= 0.5 ? 1 : 0)) & 1u;
   double bone = 0.0;
   for (unsigned i = 0; i < 8; ++i)
     if (code >> i & 1u) bone += (i & 4 ? p.x : 1.0 - p.x) * (i & 2 ? p.y : 1.0 - p.y) * (i & 1 ? p.z : 1.0 - p.z);
@@ -107,7 +112,8 @@ std::optional<std::size_t> first_contact(const BoneCells& bone, MixedCell rule, 
   return first_inside(points, pose_bone_tool, [&](const Vec3& p) { return bone.inside(p, rule); });
 }
 
-std::optional<std::size_t> first_contact(const BoneDistance& bone, std::span<const SamplePoint> points, const Pose& pose_bone_tool) {
+std::optional<std::size_t> first_contact(const BoneDistance& bone, std::span<const SamplePoint> points,
+                                         const Pose& pose_bone_tool) {
   return first_inside(points, pose_bone_tool, [&](const Vec3& p) { return bone.inside(p); });
 }
 

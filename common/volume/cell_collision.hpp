@@ -17,8 +17,8 @@ enum class MixedCell : std::uint8_t {
   trilinear,  // the eight, weighted by their nearness, against one half
 };
 
-// The segmentation of a box of samples of one level, as codes of its cells: one bit for each corner, so that a cell that is
-// all bone or all empty is told by one byte.
+// The segmentation of a box of samples of one level, as codes of its cells: one bit for each corner, so that a cell
+// that is all bone or all empty is told by one byte.
 class BoneCells {
  public:
   BoneCells(const CutField& field, int level, const CoordBox& samples);
@@ -37,7 +37,8 @@ class BoneCells {
   std::vector<std::uint8_t> codes_;  // bit 4x + 2y + z: the sample at that corner is bone
 };
 
-// The distance field of a box of samples, trilinear between them: the same question, asked of how far instead of whether.
+// The distance field of a box of samples, trilinear between them: the same question, asked of how far instead of
+// whether.
 class BoneDistance {
  public:
   BoneDistance(const CutField& field, int level, const CoordBox& samples);
@@ -53,8 +54,8 @@ class BoneDistance {
 };
 
 // The first of a tool's points that is on or in the bone, as in Niu 2008, §7.2; none when the tool is free.
-[[nodiscard]] std::optional<std::size_t> first_contact(const BoneCells& bone, MixedCell rule, std::span<const SamplePoint> points,
-                                                       const Pose& pose_bone_tool);
+[[nodiscard]] std::optional<std::size_t> first_contact(const BoneCells& bone, MixedCell rule,
+                                                       std::span<const SamplePoint> points, const Pose& pose_bone_tool);
 [[nodiscard]] std::optional<std::size_t> first_contact(const BoneDistance& bone, std::span<const SamplePoint> points,
                                                        const Pose& pose_bone_tool);
 

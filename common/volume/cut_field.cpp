@@ -42,8 +42,8 @@ CoordBox coarse_box(const CoordBox& box, int level) {
 }
 
 // Linear interpolation from a coarser lattice, one axis after the other: `fine` samples per coarse one.
-void interpolate(const CoordBox& coarse, std::span<const float> from, const CoordBox& box, int shift, std::span<float> out,
-                 std::vector<float>& lines) {
+void interpolate(const CoordBox& coarse, std::span<const float> from, const CoordBox& box, int shift,
+                 std::span<float> out, std::vector<float>& lines) {
   const std::int32_t fine = 1 << shift, mask = fine - 1;
   const float step = 1.0f / static_cast<float>(fine);
   const Coord cd = coarse.dims(), d = box.dims();
@@ -67,7 +67,8 @@ void interpolate(const CoordBox& coarse, std::span<const float> from, const Coor
   const auto fill_plane = [&](std::int32_t x, float* to) {
     for (std::size_t j = 0; j < ny; ++j) {
       const std::int32_t y = box.min.y + static_cast<std::int32_t>(j);
-      const std::size_t line = static_cast<std::size_t>(x - coarse.min.x) * cy + static_cast<std::size_t>((y >> shift) - coarse.min.y);
+      const std::size_t line =
+          static_cast<std::size_t>(x - coarse.min.x) * cy + static_cast<std::size_t>((y >> shift) - coarse.min.y);
       const float* a = lines.data() + line * nz;
       lerp(a, a + nz, static_cast<float>(y & mask) * step, to + j * nz);
     }
@@ -79,8 +80,10 @@ void interpolate(const CoordBox& coarse, std::span<const float> from, const Coor
     if ((x >> shift) != at) {
       const bool first = x == box.min.x;
       at = x >> shift;
-      if (first) fill_plane(at, near_plane);
-      else std::swap(near_plane, far_plane);
+      if (first)
+        fill_plane(at, near_plane);
+      else
+        std::swap(near_plane, far_plane);
       fill_plane(at + 1, far_plane);
     }
     const float wx = static_cast<float>(x & mask) * step;
@@ -93,8 +96,10 @@ void interpolate(const CoordBox& coarse, std::span<const float> from, const Coor
 void gather_at_level(const SparseVolume& cuts, int from_level, int level, const CoordBox& box, std::span<float> out,
                      GatherScratch& scratch) {
   if (from_level >= level) {
-    if (from_level == level) cuts.gather(box, out);
-    else cuts.gather_every(1 << (from_level - level), box, out);
+    if (from_level == level)
+      cuts.gather(box, out);
+    else
+      cuts.gather_every(1 << (from_level - level), box, out);
     return;
   }
   const int shift = level - from_level;
@@ -220,8 +225,10 @@ CutReport cut_leaves(CutField::Grids& grids, const SweptTool& swept, int level, 
     if (job.change.modified == 0) continue;
     report.modified += job.change.modified;
     report.changed_leaves.push_back(job.leaf->origin);
-    if (job.change.removed) cuts.set_constant(job.leaf->origin, -background);
-    else if (job.made) cuts.put(std::move(job.made));
+    if (job.change.removed)
+      cuts.set_constant(job.leaf->origin, -background);
+    else if (job.made)
+      cuts.put(std::move(job.made));
   }
   return report;
 }
@@ -230,9 +237,12 @@ CutReport cut_leaves(CutField::Grids& grids, const SweptTool& swept, int level, 
 
 CutField::CutField(Case bone, BodyId body, std::shared_ptr<const ToolBox> tools) {
   const double h = bone.pitch_mm();
-  grids_ = std::make_unique<Grids>(Grids{std::move(bone), body, std::move(tools),
-                                         {SparseVolume(band_mm(level_pitch_mm(h, 0))), SparseVolume(band_mm(level_pitch_mm(h, 1))),
-                                          SparseVolume(band_mm(level_pitch_mm(h, 2)))}});
+  grids_ = std::make_unique<Grids>(
+      Grids{std::move(bone),
+            body,
+            std::move(tools),
+            {SparseVolume(band_mm(level_pitch_mm(h, 0))), SparseVolume(band_mm(level_pitch_mm(h, 1))),
+             SparseVolume(band_mm(level_pitch_mm(h, 2)))}});
 }
 CutField::~CutField() = default;
 CutField::CutField(CutField&&) noexcept = default;
@@ -276,8 +286,10 @@ void CutField::restore(const FieldLeaf& leaf) {
   if (leaf.is_constant()) {
     const float value = mm(leaf.values.front());
     // Nothing but what is gone throughout, or was never cut, is kept without samples.
-    if (value == cuts.background()) cuts.set_constant(leaf.origin, value);
-    else std::fill_n(cuts.edit_leaf(leaf.origin), kLeafVoxels, value);
+    if (value == cuts.background())
+      cuts.set_constant(leaf.origin, value);
+    else
+      std::fill_n(cuts.edit_leaf(leaf.origin), kLeafVoxels, value);
     return;
   }
   std::ranges::transform(leaf.values, cuts.edit_leaf(leaf.origin), mm);
@@ -454,14 +466,16 @@ double CutField::solid_mm(const Vec3& point_mm) const {
 }
 
 double CutField::removed_mm3() const {
-  // Every cell of 8³ voxels of level 0 that any level cut into, at the finest level that did. A cell ends where the next
-  // one begins, at that one's first samples: so those before a cut leaf lose bone too.
+  // Every cell of 8³ voxels of level 0 that any level cut into, at the finest level that did. A cell ends where the
+  // next one begins, at that one's first samples: so those before a cut leaf lose bone too.
   std::set<Coord> touched;
   for (int level = 0; level < kLevels; ++level)
-    for (const auto& origins : {grids_->cuts[static_cast<std::size_t>(level)].leaves(), grids_->cuts[static_cast<std::size_t>(level)].constants()})
+    for (const auto& origins : {grids_->cuts[static_cast<std::size_t>(level)].leaves(),
+                                grids_->cuts[static_cast<std::size_t>(level)].constants()})
       for (const Coord origin : origins)
         for (int before = 0; before < 8; ++before)
-          touched.insert(floor_to(shift_down(origin - Coord{before & 1, before >> 1 & 1, before >> 2}, level), kLeafSize));
+          touched.insert(
+              floor_to(shift_down(origin - Coord{before & 1, before >> 1 & 1, before >> 2}, level), kLeafSize));
 
   double removed = 0.0;
   std::vector<float> before, after;

@@ -17,9 +17,9 @@ namespace osteon {
 // lower is seen at its middle, so its samples are visited only; those wholly within it are modified without being
 // computed.
 struct CutReport {
-  std::int64_t visited = 0;    // of the leaves of the swept tool's world bounding block, grown by the band
+  std::int64_t visited = 0;  // of the leaves of the swept tool's world bounding block, grown by the band
   std::int64_t computed = 0;
-  std::int64_t modified = 0;   // those that changed
+  std::int64_t modified = 0;  // those that changed
   int level = 0;
   std::vector<Coord> changed_leaves;  // origins, samples of the level
   std::vector<Coord> reached_leaves;  // those of bone that the cut can change, on any field of the case: reach()
@@ -58,7 +58,7 @@ class CutField {
   // then the present values of one of them: one value where all are gone. A leaf stays in its place for ever.
   [[nodiscard]] std::vector<FieldLeaf> leaf_places() const;
   void read(FieldLeaf& leaf) const;
-  [[nodiscard]] Digest hash() const;                    // field_hash of leaves()
+  [[nodiscard]] Digest hash() const;                                  // field_hash of leaves()
   [[nodiscard]] bool has_cuts(int level, const CoordBox& box) const;  // any R below the band in the box of that level
 
   // R of one level, samples of that level, z fastest; the band where nothing was cut.
@@ -70,8 +70,8 @@ class CutField {
   // band of a level, its R says nothing and f has the depth of S.
   void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
   void gather_solid(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const;
-  // Both at once for a mesh block of 19³ samples. Nothing is written where all samples are on one side of the surface and no
-  // cut is stored, and f alone where there is no cut: S is the same.
+  // Both at once for a mesh block of 19³ samples. Nothing is written where all samples are on one side of the surface
+  // and no cut is stored, and f alone where there is no cut: S is the same.
   enum class Gathered { nothing, solid, both };
   Gathered gather_block(int level, const CoordBox& box, std::span<float> solid, std::span<float> surface) const;
   // f at a point, each grid trilinear.

@@ -75,8 +75,10 @@ std::vector<LevelLeaves> CutHistory::redo(CutField& field, std::span<const RoomS
 void CutHistory::note_undone(std::span<const RoomSeq> places, bool undone) {
   for (const RoomSeq place : places) {
     if (!contains(place)) continue;
-    if (undone) undone_.insert(place);
-    else undone_.erase(place);
+    if (undone)
+      undone_.insert(place);
+    else
+      undone_.erase(place);
   }
 }
 
@@ -103,8 +105,10 @@ std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const Ro
   for (const RoomSeq place : places) {
     const Part* part = part_of(place);
     if (!part || this->undone(place) == undone) continue;
-    if (undone) undone_.insert(place);
-    else undone_.erase(place);
+    if (undone)
+      undone_.insert(place);
+    else
+      undone_.erase(place);
     const Leaves leaves = reached(field, *part, place);
     for (int level = 0; level < kLevels; ++level)
       touched[at(level)].insert(touched[at(level)].end(), leaves[at(level)].begin(), leaves[at(level)].end());

@@ -1,5 +1,5 @@
-// What a body was made by, so that some of it can be taken back: every cut, and every mask by which a split took a piece
-// away, with the leaves that it reaches. Undo rebuilds those leaves from what remains.
+// What a body was made by, so that some of it can be taken back: every cut, and every mask by which a split took a
+// piece away, with the leaves that it reaches. Undo rebuilds those leaves from what remains.
 #pragma once
 #include <array>
 #include <map>
@@ -22,10 +22,10 @@ struct LevelLeaves {
 
 // What one undo or redo did.
 struct RebuildCost {
-  std::size_t leaves = 0;         // rebuilt
-  std::size_t cuts = 0;           // evaluated again, each on its part of the leaves
-  std::size_t leaf_cuts = 0;      // leaf and cut pairs evaluated: what the time goes with
-  std::size_t masks = 0;          // leaves of masks merged again
+  std::size_t leaves = 0;     // rebuilt
+  std::size_t cuts = 0;       // evaluated again, each on its part of the leaves
+  std::size_t leaf_cuts = 0;  // leaf and cut pairs evaluated: what the time goes with
+  std::size_t masks = 0;      // leaves of masks merged again
 };
 
 // Owners: the split that made a piece and the histories that hold it; never changed.
@@ -42,8 +42,8 @@ class CutHistory {
   void add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves);
   void add_mask(RoomSeq place, Mask mask);  // R = min(R, mask); sorted by (level, origin)
   void add_mask(RoomSeq place, std::vector<FieldLeaf> mask);
-  // Another history with the same events, that goes its own way from here. What was added before is shared, so this costs
-  // the same for any number of events.
+  // Another history with the same events, that goes its own way from here. What was added before is shared, so this
+  // costs the same for any number of events.
   [[nodiscard]] CutHistory fork();
 
   [[nodiscard]] bool contains(RoomSeq place) const;
@@ -51,8 +51,8 @@ class CutHistory {
   [[nodiscard]] const Cut* find_cut(RoomSeq place) const;  // null: unknown, or a mask; until the next add()
   [[nodiscard]] std::size_t size() const;
 
-  // Takes events back, or applies them again, and returns the leaves that changed, by level. Places that are unknown, or
-  // in that state already, are passed over. The field must be the one that the events were applied to.
+  // Takes events back, or applies them again, and returns the leaves that changed, by level. Places that are unknown,
+  // or in that state already, are passed over. The field must be the one that the events were applied to.
   std::vector<LevelLeaves> undo(CutField& field, std::span<const RoomSeq> places);
   std::vector<LevelLeaves> redo(CutField& field, std::span<const RoomSeq> places);
   // The same without a field: for one that will be brought as it is after them.
@@ -61,10 +61,11 @@ class CutHistory {
 
  private:
   struct Event {
-    Cut cut;    // without path: a mask
+    Cut cut;  // without path: a mask
     Mask mask;
   };
-  // Events in a row, and which of their cuts reach a leaf, in the order in which they were added. Masks name their leaves.
+  // Events in a row, and which of their cuts reach a leaf, in the order in which they were added. Masks name their
+  // leaves.
   struct Part {
     std::map<RoomSeq, Event> events;
     std::array<std::unordered_map<Coord, std::vector<RoomSeq>, CoordHash>, kLevels> reach;

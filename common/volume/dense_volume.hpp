@@ -9,8 +9,8 @@ namespace osteon {
 
 template <class T>
 struct DenseVolume {
-  CoordBox box;          // samples of level 0, in the bone's lattice
-  std::vector<T> values; // z fastest, then y, then x
+  CoordBox box;           // samples of level 0, in the bone's lattice
+  std::vector<T> values;  // z fastest, then y, then x
 
   DenseVolume() = default;
   DenseVolume(CoordBox extent, T fill)
@@ -22,7 +22,8 @@ struct DenseVolume {
   [[nodiscard]] std::size_t index(Coord c) const {
     const Coord d = box.dims();
     return (static_cast<std::size_t>(c.x - box.min.x) * static_cast<std::size_t>(d.y) +
-            static_cast<std::size_t>(c.y - box.min.y)) * static_cast<std::size_t>(d.z) +
+            static_cast<std::size_t>(c.y - box.min.y)) *
+               static_cast<std::size_t>(d.z) +
            static_cast<std::size_t>(c.z - box.min.z);
   }
   [[nodiscard]] T at(Coord c) const { return values[index(c)]; }

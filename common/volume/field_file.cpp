@@ -58,7 +58,8 @@ std::string grid_name(BodyId body, int level) {
 std::optional<std::pair<BodyId, int>> parse_name(const std::string& name) {
   unsigned body = 0, level = 0;
   if (std::sscanf(name.c_str(), "cuts.body%9u.level%1u", &body, &level) != 2) return std::nullopt;
-  if (level >= static_cast<unsigned>(kLevels) || grid_name({body}, static_cast<int>(level)) != name) return std::nullopt;
+  if (level >= static_cast<unsigned>(kLevels) || grid_name({body}, static_cast<int>(level)) != name)
+    return std::nullopt;
   return std::pair(BodyId{body}, static_cast<int>(level));
 }
 
@@ -71,13 +72,12 @@ void put_leaf(Grid& grid, const FieldLeaf& leaf) {
   }
   auto* node = grid.tree().touchLeaf(origin);
   node->setValuesOn();
-  std::ranges::transform(leaf.values, node->buffer().data(), [](std::int16_t v) {
-    return static_cast<float>(v) * static_cast<float>(kQuantum_mm);
-  });
+  std::ranges::transform(leaf.values, node->buffer().data(),
+                         [](std::int16_t v) { return static_cast<float>(v) * static_cast<float>(kQuantum_mm); });
 }
 
-// After the .vdb stand a word and the SHA-256 of all before it. OpenVDB finds its grids by their offsets and never looks
-// there. A damaged file must not reach OpenVDB's reader, which believes every length that it reads.
+// After the .vdb stand a word and the SHA-256 of all before it. OpenVDB finds its grids by their offsets and never
+// looks there. A damaged file must not reach OpenVDB's reader, which believes every length that it reads.
 constexpr std::string_view kSeal = "osteon-fields-1\n";
 constexpr std::size_t kSealBytes = kSeal.size() + sizeof(Digest::bytes);
 
@@ -86,7 +86,8 @@ Result<Digest> digest_of(std::ifstream& in, const fs::path& file, std::uintmax_t
   std::vector<char> part(std::size_t{1} << 20);
   while (bytes > 0) {
     const auto count = static_cast<std::size_t>(std::min<std::uintmax_t>(bytes, part.size()));
-    if (!in.read(part.data(), static_cast<std::streamsize>(count))) return failure(ErrorCode::invalid_input, "cannot read " + file.string());
+    if (!in.read(part.data(), static_cast<std::streamsize>(count)))
+      return failure(ErrorCode::invalid_input, "cannot read " + file.string());
     hasher.bytes(std::as_bytes(std::span(part.data(), count)));
     bytes -= count;
   }
@@ -132,16 +133,17 @@ Result<void> sync(const fs::path& path) {
   return {};
 }
 
-// A line for each item: its number, body, tool, place, rotation (x y z w), turns, whether it is seated, when it was set.
+// A line for each item: its number, body, tool, place, rotation (x y z w), turns, whether it is seated, when it was
+// set.
 std::string text_of(const std::vector<SceneItem>& items) {
   std::string text;
   for (const SceneItem& item : items) {
     const Vec3& p = item.pose_bone_item.position_mm;
     const Eigen::Quaterniond& q = item.pose_bone_item.rotation;
     std::array<char, 400> line{};
-    std::snprintf(line.data(), line.size(), "%u %u %s %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %d %llu\n", item.id, item.body.value,
-                  to_hex(item.tool).c_str(), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w(), item.turns, item.seated ? 1 : 0,
-                  static_cast<unsigned long long>(item.set_at));
+    std::snprintf(line.data(), line.size(), "%u %u %s %.17g %.17g %.17g %.17g %.17g %.17g %.17g %.17g %d %llu\n",
+                  item.id, item.body.value, to_hex(item.tool).c_str(), p.x(), p.y(), p.z(), q.x(), q.y(), q.z(), q.w(),
+                  item.turns, item.seated ? 1 : 0, static_cast<unsigned long long>(item.set_at));
     text += line.data();
   }
   return text;
@@ -160,8 +162,10 @@ std::optional<std::vector<SceneItem>> items_of(const std::string& text) {
     for (double& value : number) in >> value;
     in >> seated >> item.set_at;
     const auto hash = digest_from_hex(tool);
-    if (!in || in >> rest || !hash || item.id == 0 || seated < 0 || seated > 1 || items.size() >= kMostItems) return std::nullopt;
-    if (!std::ranges::all_of(number, [](double v) { return std::isfinite(v) && std::abs(v) < 1e6; })) return std::nullopt;
+    if (!in || in >> rest || !hash || item.id == 0 || seated < 0 || seated > 1 || items.size() >= kMostItems)
+      return std::nullopt;
+    if (!std::ranges::all_of(number, [](double v) { return std::isfinite(v) && std::abs(v) < 1e6; }))
+      return std::nullopt;
     item.tool = *hash;
     item.pose_bone_item.position_mm = {number[0], number[1], number[2]};
     item.pose_bone_item.rotation = Eigen::Quaterniond(number[6], number[3], number[4], number[5]);
@@ -244,10 +248,11 @@ Result<SavedFields> read_head(const fs::path& file, const openvdb::MetaMap& meta
   const auto pitch = meta.getMetadata<openvdb::DoubleMetadata>(kPitchKey);
   const auto bodies = meta.getMetadata<openvdb::StringMetadata>(kBodiesKey);
   if (!format || !kernel || !seq || !name || !pitch || !bodies)
-    return failure(ErrorCode::invalid_input, file.string() + " is not a file of cut fields: it does not say of which case and place it is");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is not a file of cut fields: it does not say of which case and place it is");
   if (*format != kFormatVersion)
-    return failure(ErrorCode::unsupported, file.string() + ": format " + std::to_string(*format) + ", but this program reads " +
-                                               std::to_string(kFormatVersion));
+    return failure(ErrorCode::unsupported, file.string() + ": format " + std::to_string(*format) +
+                                               ", but this program reads " + std::to_string(kFormatVersion));
   if (*kernel != kKernelVersion)
     return failure(ErrorCode::unsupported, file.string() + " was cut by kernel version " + std::to_string(*kernel) +
                                                ", but this program has version " + std::to_string(kKernelVersion));
@@ -280,9 +285,11 @@ Result<SavedFields> read_head(const fs::path& file, const openvdb::MetaMap& meta
 }
 
 // Appends one grid's leaves; what is wrong, if anything.
-std::optional<std::string> read_grid(const Grid& grid, BodyId body, int level, double pitch_mm, std::vector<FieldLeaf>& out) {
+std::optional<std::string> read_grid(const Grid& grid, BodyId body, int level, double pitch_mm,
+                                     std::vector<FieldLeaf>& out) {
   const std::int32_t band = band_quanta(level_pitch_mm(pitch_mm, level));
-  if (grid.background() != band_mm(level_pitch_mm(pitch_mm, level))) return "its background is not the band of its level";
+  if (grid.background() != band_mm(level_pitch_mm(pitch_mm, level)))
+    return "its background is not the band of its level";
   const auto add = [&](const openvdb::Coord& at, const float* values, bool constant) -> std::optional<std::string> {
     FieldLeaf leaf{body, level, {at.x(), at.y(), at.z()}, {}};
     for (const std::int32_t c : {at.x(), at.y(), at.z()})
@@ -338,7 +345,9 @@ Result<void> save_fields(const fs::path& file, const SavedFields& fields) {
   if (written) written = sync(partial);
   if (written) {
     fs::rename(partial, file, error);
-    if (error) written = failure(ErrorCode::internal, "cannot rename " + partial.string() + " to " + file.string() + ": " + error.message());
+    if (error)
+      written = failure(ErrorCode::internal,
+                        "cannot rename " + partial.string() + " to " + file.string() + ": " + error.message());
   }
   if (!written) {
     fs::remove(partial, error);
@@ -364,9 +373,11 @@ Result<SavedFields> load_fields(const fs::path& file) {
       const std::string& text = name.gridName();
       const auto key = parse_name(text);
       if (!key || !std::ranges::binary_search(fields->bodies, key->first))
-        return failure(ErrorCode::invalid_input, file.string() + " has a grid \"" + text + "\", which is of no body and level of it");
+        return failure(ErrorCode::invalid_input,
+                       file.string() + " has a grid \"" + text + "\", which is of no body and level of it");
       const auto grid = openvdb::gridPtrCast<Grid>(in.readGrid(text));
-      if (!grid) return failure(ErrorCode::invalid_input, "grid \"" + text + "\" of " + file.string() + " is not a float grid");
+      if (!grid)
+        return failure(ErrorCode::invalid_input, "grid \"" + text + "\" of " + file.string() + " is not a float grid");
       if (const auto wrong = read_grid(*grid, key->first, key->second, fields->pitch_mm, fields->leaves))
         return failure(ErrorCode::invalid_input, "grid \"" + text + "\" of " + file.string() + ": " + *wrong);
     }
@@ -383,8 +394,8 @@ Result<SavedFields> load_fields(const fs::path& file, const Case& bone) {
   auto fields = load_fields(file);
   if (!fields) return fields;
   if (fields->case_hash != bone.hash() || fields->pitch_mm != bone.pitch_mm())
-    return failure(ErrorCode::invalid_input, file.string() + " is of case " + to_hex(fields->case_hash).substr(0, 12) + ", not of " +
-                                                 to_hex(bone.hash()).substr(0, 12));
+    return failure(ErrorCode::invalid_input, file.string() + " is of case " + to_hex(fields->case_hash).substr(0, 12) +
+                                                 ", not of " + to_hex(bone.hash()).substr(0, 12));
   return fields;
 }
 

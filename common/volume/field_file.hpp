@@ -13,9 +13,9 @@ struct SavedFields {
   Digest case_hash;
   std::uint32_t kernel_version = 0;
   RoomSeq room_seq;
-  double pitch_mm = 0;            // h of the case
-  std::vector<FieldLeaf> leaves;  // of all bodies, sorted by (body, level, origin); none at full band everywhere
-  std::vector<BodyId> bodies;     // those that exist, also without leaves; sorted
+  double pitch_mm = 0;                // h of the case
+  std::vector<FieldLeaf> leaves;      // of all bodies, sorted by (body, level, origin); none at full band everywhere
+  std::vector<BodyId> bodies;         // those that exist, also without leaves; sorted
   std::vector<SceneItem> items = {};  // what stands on the bone
   std::vector<Tool> tools = {};       // that are not built in
 };

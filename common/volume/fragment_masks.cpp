@@ -10,11 +10,11 @@
 #include "common/volume/solid_labels.hpp"
 
 // The masks. Let M be −band on the piece's samples and +band on the rest's; on air beside the piece −band, beside the
-// rest +band, beside both 0. The parent takes R = min(R, M), the piece R = min(R, −M): trilinear M is negative round the
-// piece and positive round the rest, so the parent keeps the points where M > 0, the piece those where M < 0, and no
-// point is kept by both. M is written on one lattice wherever piece and rest are within a cell of each other: that of
-// the finest cut there. Farther off nothing of the other is near, and whole leaves of level 0 are constants, which go on
-// for one sample over the seam so that both lattices cover it.
+// rest +band, beside both 0. The parent takes R = min(R, M), the piece R = min(R, −M): trilinear M is negative round
+// the piece and positive round the rest, so the parent keeps the points where M > 0, the piece those where M < 0, and
+// no point is kept by both. M is written on one lattice wherever piece and rest are within a cell of each other: that
+// of the finest cut there. Farther off nothing of the other is near, and whole leaves of level 0 are constants, which
+// go on for one sample over the seam so that both lattices cover it.
 namespace osteon {
 namespace {
 
@@ -31,7 +31,9 @@ struct Sides {
   std::int32_t n = 0;
   std::vector<std::uint8_t> side;
   [[nodiscard]] std::size_t index(Coord c) const { return at((c.x * n + c.y) * n + c.z); }
-  [[nodiscard]] bool contains(Coord c) const { return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < n && c.y < n && c.z < n; }
+  [[nodiscard]] bool contains(Coord c) const {
+    return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < n && c.y < n && c.z < n;
+  }
 };
 
 constexpr Coord kSix[6] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
@@ -143,7 +145,8 @@ Sides with_margin(const SidesOf& all, Coord origin) {
         for (std::int32_t x = x0; x < x1; ++x)
           for (std::int32_t y = y0; y < y1; ++y)
             for (std::int32_t z = z0; z < z1; ++z)
-              grown.side[grown.index(Coord{x, y, z} + Coord{1, 1, 1} + n * Coord{dx, dy, dz})] = cell->second.side[cell->second.index({x, y, z})];
+              grown.side[grown.index(Coord{x, y, z} + Coord{1, 1, 1} + n * Coord{dx, dy, dz})] =
+                  cell->second.side[cell->second.index({x, y, z})];
       }
   return grown;
 }
@@ -165,7 +168,8 @@ std::vector<std::uint8_t> near_sides(const Sides& sides) {
   return now;
 }
 
-void add_leaves(BodyId body, int level, Coord cell, const std::vector<std::int16_t>& values, std::int16_t band, std::vector<FieldLeaf>& out) {
+void add_leaves(BodyId body, int level, Coord cell, const std::vector<std::int16_t>& values, std::int16_t band,
+                std::vector<FieldLeaf>& out) {
   const std::int32_t n = kLeafSize << level;
   for (std::int32_t lx = 0; lx < n; lx += kLeafSize)
     for (std::int32_t ly = 0; ly < n; ly += kLeafSize)
@@ -209,8 +213,8 @@ void add_interface(const CutField& field, const SidesOf& all, int level, Coord o
 
 // Constants on whole cells of level 0 that have no other side near, and on the one layer of samples around them: at the
 // seam both lattices cover what is solid.
-void add_constants(const CutField& field, const CellMap& map, std::span<const PieceCell> cells, std::span<const std::uint8_t> whole,
-                   std::vector<FieldLeaf>& out) {
+void add_constants(const CutField& field, const CellMap& map, std::span<const PieceCell> cells,
+                   std::span<const std::uint8_t> whole, std::vector<FieldLeaf>& out) {
   const std::int16_t band = band_of(field.bone(), 0), none = static_cast<std::int16_t>(-band);
   std::map<Coord, std::vector<std::int16_t>> beyond;
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -252,12 +256,13 @@ void sort_and_unite(std::vector<FieldLeaf>& leaves) {
   leaves.resize(std::min(leaves.size(), last + 1));
 }
 
-// The volume of a piece, cell by cell. A cell's samples and those of the planes after it, each end with half its weight,
-// cover the cell exactly, so cells of different levels do not overlap. A sample within half a pitch of a surface is bone
-// in part; what is in air is shared by the solid samples beside it.
+// The volume of a piece, cell by cell. A cell's samples and those of the planes after it, each end with half its
+// weight, cover the cell exactly, so cells of different levels do not overlap. A sample within half a pitch of a
+// surface is bone in part; what is in air is shared by the solid samples beside it.
 class Measure {
  public:
-  Measure(const CutField& field, const CellMap& map, std::span<const PieceCell> cells) : field_(field), map_(map), cells_(cells) {}
+  Measure(const CutField& field, const CellMap& map, std::span<const PieceCell> cells)
+      : field_(field), map_(map), cells_(cells) {}
 
   void add(const PieceCell& cell, Fragment& fragment) {
     const double pitch = level_pitch_mm(field_.bone().pitch_mm(), cell.level);
@@ -302,7 +307,8 @@ class Measure {
     auto found = labels_.find(i);
     if (found == labels_.end()) found = labels_.emplace(i, own_labels(field_, cell)).first;
     const std::int32_t n = kLeafSize << cell.level;
-    const Coord there = cell.level >= level ? (1 << (cell.level - level)) * sample : shift_down(sample, level - cell.level);
+    const Coord there =
+        cell.level >= level ? (1 << (cell.level - level)) * sample : shift_down(sample, level - cell.level);
     const Coord c = there - (1 << cell.level) * cell.origin;
     const std::uint16_t label = found->second[at((c.x * n + c.y) * n + c.z)];
     return label && cell.in_piece[label - 1u];
@@ -318,7 +324,8 @@ class Measure {
 bool is_deep(const CellMap& map, std::span<const PieceCell> cells, const PieceCell& cell) {
   if (!cell.full) return false;
   for (int around = 0; around < 27; ++around) {
-    const std::int32_t next = map.find(cell.origin + kLeafSize * Coord{around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1});
+    const std::int32_t next =
+        map.find(cell.origin + kLeafSize * Coord{around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1});
     if (next < 0 || !cells[at(next)].full) return false;
   }
   return true;
@@ -331,7 +338,8 @@ CellMap::CellMap(const CoordBox& bounds_samples, const std::vector<Coord>& origi
   box_ = CoordBox{shift_down(bounds_samples.min, 3), shift_down(bounds_samples.max, 3)}.grown(1);
   const Coord d = box_.dims();
   cells_.assign(at(d.x) * at(d.y) * at(d.z), -1);
-  for (std::size_t i = 0; i < origins.size(); ++i) cells_[index(shift_down(origins[i], 3))] = static_cast<std::int32_t>(i);
+  for (std::size_t i = 0; i < origins.size(); ++i)
+    cells_[index(shift_down(origins[i], 3))] = static_cast<std::int32_t>(i);
 }
 
 std::size_t CellMap::index(Coord cell) const {
@@ -353,7 +361,8 @@ std::vector<std::uint8_t> CellMap::dilated(std::span<const std::uint8_t> marked)
   // The border is never marked, so what wraps round it is nothing.
   for (const std::size_t stride : {at(d.y) * at(d.z), at(d.z), std::size_t{1}}) {
     for (std::size_t i = 0; i < now.size(); ++i)
-      next[i] = static_cast<std::uint8_t>(now[i] | (i >= stride ? now[i - stride] : 0) | (i + stride < now.size() ? now[i + stride] : 0));
+      next[i] = static_cast<std::uint8_t>(now[i] | (i >= stride ? now[i - stride] : 0) |
+                                          (i + stride < now.size() ? now[i + stride] : 0));
     std::swap(now, next);
   }
   std::vector<std::uint8_t> result(count_, 0);

@@ -1,4 +1,5 @@
-// Of a piece that came apart: its volume, and the masks that take it out of the parent and leave it in a field of its own.
+// Of a piece that came apart: its volume, and the masks that take it out of the parent and leave it in a field of its
+// own.
 #pragma once
 #include <span>
 #include <vector>
@@ -32,7 +33,7 @@ class CellMap {
 // What a cell holds of one piece and of the rest.
 struct PieceCell {
   Coord origin;
-  int level = 0;               // at which its components are labelled
+  int level = 0;  // at which its components are labelled
   bool full = false;
   std::vector<bool> in_piece;  // of each component of label_solid() at that level, in order
   bool has_piece = false, has_rest = false;

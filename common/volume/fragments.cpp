@@ -13,7 +13,7 @@
 namespace osteon {
 namespace {
 
-constexpr std::int32_t kNoPart = -1;       // no bone of the case
+constexpr std::int32_t kNoPart = -1;  // no bone of the case
 constexpr std::int32_t kSeveralParts = -2;
 constexpr int kFinest = kLevels - 1;
 
@@ -23,15 +23,15 @@ std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
 using Link = std::pair<std::uint16_t, std::uint16_t>;
 
 struct Cell {
-  Coord origin;       // samples of level 0
-  int level = 0;      // at which it is labelled
-  bool full = false;  // solid throughout
-  std::vector<std::uint32_t> counts;                  // samples of each component
-  std::vector<std::int32_t> parts;                    // of each component, where the cell has several
-  std::array<std::vector<std::uint16_t>, 6> faces;    // labels of the first and last layer along x, y, z; none when full
+  Coord origin;                                     // samples of level 0
+  int level = 0;                                    // at which it is labelled
+  bool full = false;                                // solid throughout
+  std::vector<std::uint32_t> counts;                // samples of each component
+  std::vector<std::int32_t> parts;                  // of each component, where the cell has several
+  std::array<std::vector<std::uint16_t>, 6> faces;  // labels of the first and last layer along x, y, z; none when full
   std::array<std::int32_t, 3> next{-1, -1, -1}, previous{-1, -1, -1};  // cells along x, y, z
-  std::array<std::vector<Link>, 3> links;             // to the next ones
-  std::int32_t home = kNoPart;                        // part of the case, or kSeveralParts
+  std::array<std::vector<Link>, 3> links;                              // to the next ones
+  std::int32_t home = kNoPart;                                         // part of the case, or kSeveralParts
 
   [[nodiscard]] std::uint16_t face(int which, std::size_t i) const {
     if (full) return 1;
@@ -108,7 +108,9 @@ struct FragmentFinder::Parts {
     for (std::int32_t x = 0; x < n; ++x)
       for (std::int32_t y = 0; y < n; ++y)
         for (std::int32_t z = 0; z < n; ++z) {
-          const std::uint16_t label = cell.full ? std::uint16_t{1} : labels.empty() ? std::uint16_t{0} : labels[at((x * n + y) * n + z)];
+          const std::uint16_t label = cell.full        ? std::uint16_t{1}
+                                      : labels.empty() ? std::uint16_t{0}
+                                                       : labels[at((x * n + y) * n + z)];
           const Coord c = shift_down({x, y, z}, cell.level);
           const std::uint16_t in_case = home.labels[at((c.x * kLeafSize + c.y) * kLeafSize + c.z)];
           if (label && in_case) ++votes[label - 1u][home.parts[in_case]];
@@ -156,7 +158,8 @@ struct FragmentFinder::Parts {
     for (std::size_t i = 0; i < cells.size(); ++i)
       for (std::size_t axis = 0; axis < 3; ++axis)
         for (const Link& link : cells[i].links[axis])
-          sets.unite(result.first_node[i] + link.first - 1u, result.first_node[at(cells[i].next[axis])] + link.second - 1u);
+          sets.unite(result.first_node[i] + link.first - 1u,
+                     result.first_node[at(cells[i].next[axis])] + link.second - 1u);
     result.root.resize(nodes);
     for (std::uint32_t node = 0; node < nodes; ++node) result.root[node] = sets.find(node);
     return result;
@@ -167,7 +170,9 @@ struct FragmentFinder::Parts {
     const Walk all = walk();
     for (std::size_t i = 0; i < cells.size(); ++i) {
       Cell& cell = cells[i];
-      const auto part = [&](std::size_t component) { return static_cast<std::int32_t>(all.root[all.first_node[i] + component]); };
+      const auto part = [&](std::size_t component) {
+        return static_cast<std::int32_t>(all.root[all.first_node[i] + component]);
+      };
       for (std::size_t c = 0; c < cell.counts.size(); ++c)
         cell.home = cell.home == kNoPart || cell.home == part(c) ? part(c) : kSeveralParts;
     }
@@ -180,7 +185,8 @@ struct FragmentFinder::Parts {
       std::int32_t part = kNoPart;
       std::uint64_t in_part = 0;
     };
-    std::map<std::pair<std::uint32_t, std::int32_t>, std::uint64_t> elsewhere;  // volume in a second part, which is rare
+    std::map<std::pair<std::uint32_t, std::int32_t>, std::uint64_t>
+        elsewhere;  // volume in a second part, which is rare
     std::vector<Component> components(all.root.size());
     for (std::size_t i = 0; i < cells.size(); ++i)
       for (std::size_t c = 0; c < cells[i].counts.size(); ++c) {
@@ -197,7 +203,8 @@ struct FragmentFinder::Parts {
           elsewhere[{root, part}] += volume;
       }
     for (const auto& [key, volume] : elsewhere)
-      if (volume > components[key.first].in_part) components[key.first].part = key.second, components[key.first].in_part = volume;
+      if (volume > components[key.first].in_part)
+        components[key.first].part = key.second, components[key.first].in_part = volume;
 
     std::map<std::int32_t, std::uint32_t> largest;
     std::vector<std::uint32_t> roots;
@@ -256,7 +263,8 @@ FragmentFinder::FragmentFinder(const CutField& field) : parts_(std::make_unique<
     bone.gather_surface(cell_box(cell.origin, 0), s);
     label_solid({kLeafSize, kLeafSize, kLeafSize}, s, home.labels);
     home.parts.push_back(kNoPart);
-    for (std::size_t c = 0; c < cell.counts.size(); ++c) home.parts.push_back(static_cast<std::int32_t>(all.root[all.first_node[i] + c]));
+    for (std::size_t c = 0; c < cell.counts.size(); ++c)
+      home.parts.push_back(static_cast<std::int32_t>(all.root[all.first_node[i] + c]));
     parts_->shared.emplace(static_cast<std::int32_t>(i), std::move(home));
     parts_->vote(cell, parts_->shared.at(static_cast<std::int32_t>(i)).labels);
   }
@@ -264,7 +272,8 @@ FragmentFinder::FragmentFinder(const CutField& field) : parts_(std::make_unique<
   // What was cut already.
   for (Cell& cell : parts_->cells) {
     bool cut = false;
-    for (int level = 0; level < kLevels && !cut; ++level) cut = field.has_cuts(level, cell_box(cell.origin, level).grown(1));
+    for (int level = 0; level < kLevels && !cut; ++level)
+      cut = field.has_cuts(level, cell_box(cell.origin, level).grown(1));
     if (cut) parts_->label(cell, &field, bone);
   }
   link_all();
@@ -279,7 +288,8 @@ TouchCost FragmentFinder::touch(const CutField& field, int level, const std::vec
   std::vector<std::int32_t> touched;
   for (const Coord origin : changed_leaves) {
     // A sample of the level reaches the finer samples of the cell before it.
-    const Coord own = floor_to(shift_down(origin, level), kLeafSize), low = floor_to(shift_down(origin - Coord{1, 1, 1}, level), kLeafSize);
+    const Coord own = floor_to(shift_down(origin, level), kLeafSize),
+                low = floor_to(shift_down(origin - Coord{1, 1, 1}, level), kLeafSize);
     for (std::int32_t x = low.x; x <= own.x; x += kLeafSize)
       for (std::int32_t y = low.y; y <= own.y; y += kLeafSize)
         for (std::int32_t z = low.z; z <= own.z; z += kLeafSize) {

@@ -14,9 +14,9 @@ inline constexpr double kDebris_mm3 = 1.0;
 // The masks are the two sides of one function on one lattice, so where both apply no point is solid in both bodies.
 struct Fragment {
   double volume_mm3 = 0;
-  Box bounds;                        // of its solid samples, mm
-  std::vector<FieldLeaf> taken;      // mask for the parent: its field R becomes min(R, mask), and the piece is gone
-  std::vector<FieldLeaf> left;       // mask for the piece's own field, a copy of the parent's: all but the piece is gone
+  Box bounds;                    // of its solid samples, mm
+  std::vector<FieldLeaf> taken;  // mask for the parent: its field R becomes min(R, mask), and the piece is gone
+  std::vector<FieldLeaf> left;   // mask for the piece's own field, a copy of the parent's: all but the piece is gone
   [[nodiscard]] bool debris() const { return volume_mm3 < kDebris_mm3; }
 };
 

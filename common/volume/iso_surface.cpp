@@ -86,7 +86,8 @@ class Slab {
   }
   [[nodiscard]] Coord clamped(int x, int y, int z) const {
     const Coord d = field_.box.dims();
-    return {std::clamp(first_x_ + x - kMargin, 0, d.x - 1), std::clamp(y - kMargin, 0, d.y - 1), std::clamp(z - kMargin, 0, d.z - 1)};
+    return {std::clamp(first_x_ + x - kMargin, 0, d.x - 1), std::clamp(y - kMargin, 0, d.y - 1),
+            std::clamp(z - kMargin, 0, d.z - 1)};
   }
   [[nodiscard]] std::int32_t index(int x, int y, int z) const { return (x * ny_ + y) * nz_ + z; }
   [[nodiscard]] Vec3f position(std::int32_t i) const {
@@ -180,12 +181,14 @@ class Slab {
       const Vec3f &a = points_[at(triangles_[t][0])], &b = points_[at(triangles_[t][1])],
                   &c = points_[at(triangles_[t][2])];
       const Vec3f low = a.cwiseMin(b).cwiseMin(c), high = a.cwiseMax(b).cwiseMax(c);
-      const int x_end = std::min(nx_ - 1, static_cast<int>(high.x()) + 1), y_end = std::min(ny_ - 1, static_cast<int>(high.y()) + 1),
+      const int x_end = std::min(nx_ - 1, static_cast<int>(high.x()) + 1),
+                y_end = std::min(ny_ - 1, static_cast<int>(high.y()) + 1),
                 z_end = std::min(nz_ - 1, static_cast<int>(high.z()) + 1);
       for (int x = static_cast<int>(low.x()); x <= x_end; ++x)
         for (int y = static_cast<int>(low.y()); y <= y_end; ++y)
           for (int z = static_cast<int>(low.z()); z <= z_end; ++z)
-            offer(static_cast<std::int32_t>(t), index(x, y, z), Vec3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)));
+            offer(static_cast<std::int32_t>(t), index(x, y, z),
+                  Vec3f(static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)));
     }
   }
 
@@ -302,7 +305,7 @@ class Slab {
   const std::atomic<bool>& stopped_;
   int first_x_ = 0, nx_ = 0, ny_ = 0, nz_ = 0;
   std::vector<float> values_;
-  std::vector<std::int32_t> cells_;    // that have a point, in the order of the points
+  std::vector<std::int32_t> cells_;  // that have a point, in the order of the points
   std::vector<Vec3f> points_;
   std::vector<std::array<std::int32_t, 3>> triangles_;
   // Of each sample; before, while the surface is meshed, the point of each cell.
@@ -319,7 +322,9 @@ class Slab {
 Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, float iso, double pitch_mm,
                                               const KeepGoing& keep_going) {
   OSTEON_CHECK(!field.box.empty() && pitch_mm > 0);
-  const auto stopped_by_caller = [] { return failure(ErrorCode::cancelled, "stopped while measuring the bone surface"); };
+  const auto stopped_by_caller = [] {
+    return failure(ErrorCode::cancelled, "stopped while measuring the bone surface");
+  };
   // Asked once before any work: the threads below may be done before they are first looked at.
   if (!keep_going(0.0)) return stopped_by_caller();
   DenseVolume<float> out;

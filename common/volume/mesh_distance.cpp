@@ -25,12 +25,14 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_t
   char text[200];
   if (mesh.triangles.empty()) return failure(ErrorCode::invalid_input, "the mesh has no triangles");
   if (mesh.triangles.size() > most_triangles) {
-    std::snprintf(text, sizeof text, "the mesh has %zu triangles, more than %zu; simplify it", mesh.triangles.size(), most_triangles);
+    std::snprintf(text, sizeof text, "the mesh has %zu triangles, more than %zu; simplify it", mesh.triangles.size(),
+                  most_triangles);
     return failure(ErrorCode::invalid_input, text);
   }
   for (const auto& t : mesh.triangles)
     for (const std::uint32_t vertex : t)
-      if (vertex >= mesh.positions_mm.size()) return failure(ErrorCode::invalid_input, "the mesh has triangles without corners");
+      if (vertex >= mesh.positions_mm.size())
+        return failure(ErrorCode::invalid_input, "the mesh has triangles without corners");
   for (const auto& p : mesh.positions_mm)
     for (const float x : p) {
       if (!std::isfinite(x)) return failure(ErrorCode::invalid_input, "the mesh has corners that are not numbers");
@@ -43,16 +45,19 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_t
     }
   const Vec3 size = bounds(mesh).size_mm();
   if (size.maxCoeff() > largest_mm) {
-    std::snprintf(text, sizeof text, "the mesh is %.3g mm long, more than %.3g mm; its unit must be the millimetre", size.maxCoeff(),
-                  largest_mm);
+    std::snprintf(text, sizeof text, "the mesh is %.3g mm long, more than %.3g mm; its unit must be the millimetre",
+                  size.maxCoeff(), largest_mm);
     return failure(ErrorCode::invalid_input, text);
   }
   if (const std::size_t open = open_edges(mesh); open > 0) {
-    std::snprintf(text, sizeof text, "the mesh is not the closed surface of a solid: %zu of its edges are open; repair it", open);
+    std::snprintf(text, sizeof text,
+                  "the mesh is not the closed surface of a solid: %zu of its edges are open; repair it", open);
     return failure(ErrorCode::invalid_input, text);
   }
   if (std::abs(enclosed_mm3(mesh)) < pitch_mm * pitch_mm * pitch_mm)
-    return failure(ErrorCode::invalid_input, "the mesh encloses less than one sample; its unit must be the millimetre, or choose a smaller pitch");
+    return failure(
+        ErrorCode::invalid_input,
+        "the mesh encloses less than one sample; its unit must be the millimetre, or choose a smaller pitch");
   return {};
 }
 
@@ -84,7 +89,8 @@ struct Band {
 Band measure_band(const TriangleMesh& mesh, double pitch_mm, int width, const KeepGoing& keep_going) {
   std::vector<openvdb::Vec3s> points;
   for (const auto& p : mesh.positions_mm)
-    points.emplace_back(static_cast<float>(p[0] / pitch_mm), static_cast<float>(p[1] / pitch_mm), static_cast<float>(p[2] / pitch_mm));
+    points.emplace_back(static_cast<float>(p[0] / pitch_mm), static_cast<float>(p[1] / pitch_mm),
+                        static_cast<float>(p[2] / pitch_mm));
   std::vector<openvdb::Vec3I> triangles;
   for (const auto& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
   const openvdb::tools::QuadAndTriangleDataAdapter<openvdb::Vec3s, openvdb::Vec3I> adapter(points, triangles);
@@ -92,7 +98,8 @@ Band measure_band(const TriangleMesh& mesh, double pitch_mm, int width, const Ke
   Interrupter interrupter(keep_going);
   Band band;
   band.width = static_cast<float>(width);
-  band.value = openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, adapter, *transform, band.width, band.width, 0, &band.nearest);
+  band.value = openvdb::tools::meshToVolume<openvdb::FloatGrid>(interrupter, adapter, *transform, band.width,
+                                                                band.width, 0, &band.nearest);
   band.stopped = interrupter.wasInterrupted();
   return band;
 }
@@ -102,7 +109,10 @@ Band measure_band(const TriangleMesh& mesh, double pitch_mm, int width, const Ke
 class BandDistance {
  public:
   BandDistance(const Band& band, const TriangleMesh& mesh, double pitch_mm)
-      : width_(static_cast<double>(band.width)), mesh_(mesh), pitch_mm_(pitch_mm), value_(band.value->getConstAccessor()),
+      : width_(static_cast<double>(band.width)),
+        mesh_(mesh),
+        pitch_mm_(pitch_mm),
+        value_(band.value->getConstAccessor()),
         nearest_(band.nearest.getConstAccessor()) {}
 
   // mm; outside of the band as wide as it is.
@@ -116,7 +126,9 @@ class BandDistance {
       for (int around = 0; around < 27; ++around) {
         const openvdb::Coord beside = here.offsetBy(around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1);
         std::int32_t t = 0;
-        if (!nearest_.probeValue(beside, t) || t == last || t < 0 || static_cast<std::size_t>(t) >= mesh_.triangles.size()) continue;
+        if (!nearest_.probeValue(beside, t) || t == last || t < 0 ||
+            static_cast<std::size_t>(t) >= mesh_.triangles.size())
+          continue;
         last = t;
         const auto& [a, b, c] = mesh_.triangles[static_cast<std::size_t>(t)];
         mm = std::min(
@@ -146,8 +158,10 @@ Result<std::shared_ptr<const SampledDistance>> measure(const TriangleMesh& mesh,
   const double samples = static_cast<double>(dims.x) * dims.y * dims.z;
   if (samples > kMostMeshSamples) {
     char text[160];
-    std::snprintf(text, sizeof text, "a pitch of %.3g mm needs %.0f million samples for this mesh, more than %.0f million; choose a larger one",
-                  pitch, samples * 1e-6, kMostMeshSamples * 1e-6);
+    std::snprintf(
+        text, sizeof text,
+        "a pitch of %.3g mm needs %.0f million samples for this mesh, more than %.0f million; choose a larger one",
+        pitch, samples * 1e-6, kMostMeshSamples * 1e-6);
     return failure(ErrorCode::invalid_input, text);
   }
 
@@ -169,7 +183,8 @@ Result<std::shared_ptr<const SampledDistance>> measure(const TriangleMesh& mesh,
 Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMesh& mesh, double pitch_mm) {
   const auto quanta = pitch_mm > 0.0 && pitch_mm < 8.0 ? static_cast<std::int32_t>(std::lround(pitch_mm * 1024.0)) : 0;
   if (quanta < 1) return failure(ErrorCode::invalid_input, "the pitch of a mesh must be between 0.001 and 8 mm");
-  if (const auto good = check(mesh, pitch_mm, kMostMeshTriangles, kLargestMesh_mm); !good) return tl::unexpected(good.error());
+  if (const auto good = check(mesh, pitch_mm, kMostMeshTriangles, kLargestMesh_mm); !good)
+    return tl::unexpected(good.error());
   try {
     start_openvdb();
     return measure(mesh, quanta);
@@ -203,10 +218,12 @@ Shells shells_of(const TriangleMesh& mesh) {
   const Vec3 origin = position(mesh, 0);
   std::vector<double> six_volumes(mesh.positions_mm.size(), 0.0);
   for (const auto& [a, b, c] : mesh.triangles)
-    six_volumes[root(a)] += (position(mesh, a) - origin).dot((position(mesh, b) - origin).cross(position(mesh, c) - origin));
+    six_volumes[root(a)] +=
+        (position(mesh, a) - origin).dot((position(mesh, b) - origin).cross(position(mesh, c) - origin));
   const double outwards = enclosed_mm3(mesh);
   Shells out{{mesh.positions_mm, {}, {}}, {mesh.positions_mm, {}, {}}};
-  for (const auto& t : mesh.triangles) (six_volumes[root(t[0])] * outwards < 0.0 ? out.cavities : out.bone).triangles.push_back(t);
+  for (const auto& t : mesh.triangles)
+    (six_volumes[root(t[0])] * outwards < 0.0 ? out.cavities : out.bone).triangles.push_back(t);
   return out;
 }
 
@@ -214,8 +231,11 @@ Shells shells_of(const TriangleMesh& mesh) {
 class PartDistance {
  public:
   PartDistance(const TriangleMesh& mesh, double pitch_mm, int width, const KeepGoing& keep_going)
-      : band_(measure_band(mesh, pitch_mm, width, keep_going)), distance_(band_, mesh, pitch_mm), sign_(band_.value->getConstAccessor()) {
-    for (auto leaf = band_.value->tree().cbeginLeaf(); leaf; ++leaf) near_.insert(part_of({leaf->origin().x(), leaf->origin().y(), leaf->origin().z()}));
+      : band_(measure_band(mesh, pitch_mm, width, keep_going)),
+        distance_(band_, mesh, pitch_mm),
+        sign_(band_.value->getConstAccessor()) {
+    for (auto leaf = band_.value->tree().cbeginLeaf(); leaf; ++leaf)
+      near_.insert(part_of({leaf->origin().x(), leaf->origin().y(), leaf->origin().z()}));
   }
   [[nodiscard]] bool stopped() const { return band_.stopped; }
   [[nodiscard]] bool near(Coord first) const { return near_.contains(part_of(first)); }
@@ -240,7 +260,8 @@ Result<Case> build_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densi
   const PartDistance bone(shells.bone, pitch, kWidth, waiting);
   std::optional<PartDistance> cavities;
   if (!bone.stopped() && !shells.cavities.triangles.empty()) cavities.emplace(shells.cavities, pitch, kWidth, waiting);
-  if (bone.stopped() || (cavities && cavities->stopped())) return failure(ErrorCode::cancelled, "stopped while measuring the mesh");
+  if (bone.stopped() || (cavities && cavities->stopped()))
+    return failure(ErrorCode::cancelled, "stopped while measuring the mesh");
 
   const auto fill = [&](const CoordBox& part, PartSamples& samples) {
     std::ranges::fill(samples.density_g_cm3, static_cast<float>(density_g_cm3));
@@ -256,7 +277,8 @@ Result<Case> build_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densi
         }
     return PartKind::samples;
   };
-  return Case::build(std::move(info), box, fill, [&](double done) { return keep_going(kBandShare + (1.0 - kBandShare) * done); });
+  return Case::build(std::move(info), box, fill,
+                     [&](double done) { return keep_going(kBandShare + (1.0 - kBandShare) * done); });
 }
 
 }  // namespace
@@ -267,18 +289,22 @@ Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densit
   if (!mesh.triangles.empty()) {
     const double longest = bounds(mesh).size_mm().maxCoeff();
     if (longest < kSmallestBone_mm || longest > kLargestBone_mm) {
-      std::snprintf(text, sizeof text, "the mesh is %.3g mm long, and a bone has %g to %g mm; say which unit its numbers have", longest,
+      std::snprintf(text, sizeof text,
+                    "the mesh is %.3g mm long, and a bone has %g to %g mm; say which unit its numbers have", longest,
                     kSmallestBone_mm, kLargestBone_mm);
       return failure(ErrorCode::invalid_input, text);
     }
   }
-  if (const auto good = check(mesh, pitch, kMostBoneTriangles, kLargestBone_mm); !good) return tl::unexpected(good.error());
+  if (const auto good = check(mesh, pitch, kMostBoneTriangles, kLargestBone_mm); !good)
+    return tl::unexpected(good.error());
   // The band is ten samples deep, and its leaves reach some seven beyond it.
   const double bytes = area_mm2(mesh) / (pitch * pitch) * 17.0 * kBytesPerSample;
   const Vec3 samples = bounds(mesh).size_mm() / pitch;
   if (bytes > kMostBytes || samples.prod() > kMostLattice) {
-    const double finest = std::max(pitch * std::sqrt(bytes / kMostBytes), pitch * std::cbrt(samples.prod() / kMostLattice));
-    std::snprintf(text, sizeof text, "a pitch of %.3g mm would take some %.0f GB of memory; this bone allows %.2g mm and coarser", pitch,
+    const double finest =
+        std::max(pitch * std::sqrt(bytes / kMostBytes), pitch * std::cbrt(samples.prod() / kMostLattice));
+    std::snprintf(text, sizeof text,
+                  "a pitch of %.3g mm would take some %.0f GB of memory; this bone allows %.2g mm and coarser", pitch,
                   bytes * 1e-9, 1.05 * finest);
     return failure(ErrorCode::invalid_input, text);
   }
@@ -294,7 +320,8 @@ MeshLoader stl_beside(const std::filesystem::path& folder) {
   return [folder](const std::string& name, double pitch_mm) -> Result<std::shared_ptr<const SampledDistance>> {
     // A tool file may come from anyone; it names no files elsewhere.
     if (name.empty() || name == "." || name == ".." || name.find_first_of("/\\") != std::string::npos)
-      return failure(ErrorCode::invalid_input, "\"" + name + "\" must be the plain name of an STL file beside the tool file");
+      return failure(ErrorCode::invalid_input,
+                     "\"" + name + "\" must be the plain name of an STL file beside the tool file");
     const auto mesh = read_stl(folder / name);
     if (!mesh) return tl::unexpected(mesh.error());
     auto distance = sampled_distance(*mesh, pitch_mm);
@@ -303,6 +330,8 @@ MeshLoader stl_beside(const std::filesystem::path& folder) {
   };
 }
 
-Result<Tool> load_tool_file(const std::filesystem::path& file) { return load_tool(file, stl_beside(file.parent_path())); }
+Result<Tool> load_tool_file(const std::filesystem::path& file) {
+  return load_tool(file, stl_beside(file.parent_path()));
+}
 
 }  // namespace osteon

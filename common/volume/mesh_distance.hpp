@@ -19,17 +19,19 @@ inline constexpr double kMeshBand_mm = 3.0;
 
 // The distance to the triangles at every sample of the band, rounded to kQuantum_mm: exact near the surface, and within
 // some hundredths of a pitch at the end of the band, where a triangle beside the nearest may stand for it. The mesh may
-// turn either way, and its parts may overlap; the solid is what cannot be reached from outside. Error: invalid_input, for one that is not closed, flat,
-// or too large for the pitch.
-[[nodiscard]] Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMesh& mesh, double pitch_mm);
+// turn either way, and its parts may overlap; the solid is what cannot be reached from outside. Error: invalid_input,
+// for one that is not closed, flat, or too large for the pitch.
+[[nodiscard]] Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMesh& mesh,
+                                                                              double pitch_mm);
 
 inline constexpr std::size_t kMostBoneTriangles = 20'000'000;
 inline constexpr double kSmallestBone_mm = 5.0, kLargestBone_mm = 2000.0;  // longest side; else the unit is another
 
-// Bone of one density from a closed mesh, of info.pitch_mm, in the mesh's own frame. Shells that turn the other way than
-// the whole are cavities; bone loose in a cavity is lost. Memory goes with the surface.
-// Errors: invalid_input (not closed, a size no bone has, too fine a pitch for the memory), cancelled.
-[[nodiscard]] Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double density_g_cm3, const KeepGoing& keep_going);
+// Bone of one density from a closed mesh, of info.pitch_mm, in the mesh's own frame. Shells that turn the other way
+// than the whole are cavities; bone loose in a cavity is lost. Memory goes with the surface. Errors: invalid_input (not
+// closed, a size no bone has, too fine a pitch for the memory), cancelled.
+[[nodiscard]] Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double density_g_cm3,
+                                        const KeepGoing& keep_going);
 
 // Reads STL files that lie beside a tool file, by their plain names: what load_tool() and parse_tool() need for a mesh.
 [[nodiscard]] MeshLoader stl_beside(const std::filesystem::path& folder);

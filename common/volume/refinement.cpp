@@ -29,11 +29,12 @@ SubVolumeField::SubVolumeField(Case bone, int level, std::shared_ptr<const ToolB
 RefineReport SubVolumeField::apply(const Cut& cut) {
   OSTEON_CHECK(cut.level == level_);
   RefineReport report;
-  // The cut itself tells which leaves it reached, so its way through the bone is worked out once. Leaves that it has made
-  // are left alone by what is resampled after it.
+  // The cut itself tells which leaves it reached, so its way through the bone is worked out once. Leaves that it has
+  // made are left alone by what is resampled after it.
   report.cut = field_.apply(cut);
   std::set<Coord> touched;
-  for (const Coord leaf : report.cut.reached_leaves) touched.insert(floor_to(shift_down(leaf, level_), kSubVolumeSamples));
+  for (const Coord leaf : report.cut.reached_leaves)
+    touched.insert(floor_to(shift_down(leaf, level_), kSubVolumeSamples));
   for (const Coord origin : touched) {
     if (surface_.contains(origin)) continue;
     resample(origin);
@@ -57,7 +58,8 @@ void SubVolumeField::resample(Coord origin) {
         const Coord last = leaf.origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1};
         if (field_.has_cuts(level_, {leaf.origin, last})) continue;
         // Leaves without bone are kept by neither method.
-        if (field_.bone().has_bone({shift_down(leaf.origin, level_), shift_down(last, level_) + Coord{1, 1, 1}})) field_.restore(leaf);
+        if (field_.bone().has_bone({shift_down(leaf.origin, level_), shift_down(last, level_) + Coord{1, 1, 1}}))
+          field_.restore(leaf);
       }
 }
 
@@ -72,8 +74,9 @@ void SubVolumeField::gather_solid(const CoordBox& box, std::span<float> out) con
       for (std::int32_t sz = first.z; sz <= last.z; sz += kSubVolumeSamples) {
         const auto found = surface_.find({sx, sy, sz});
         const CoordBox sub = sub_volume_box({sx, sy, sz}, level_);
-        const CoordBox part{{std::max(sub.min.x, box.min.x), std::max(sub.min.y, box.min.y), std::max(sub.min.z, box.min.z)},
-                            {std::min(sub.max.x, box.max.x), std::min(sub.max.y, box.max.y), std::min(sub.max.z, box.max.z)}};
+        const CoordBox part{
+            {std::max(sub.min.x, box.min.x), std::max(sub.min.y, box.min.y), std::max(sub.min.z, box.min.z)},
+            {std::min(sub.max.x, box.max.x), std::min(sub.max.y, box.max.y), std::min(sub.max.z, box.max.z)}};
         const Coord d = part.dims();
         cuts.resize(at(d.x) * at(d.y) * at(d.z));
         if (found == surface_.end())
@@ -85,13 +88,15 @@ void SubVolumeField::gather_solid(const CoordBox& box, std::span<float> out) con
         std::size_t i = 0;
         for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
           for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
-            float* row = out.data() + (at(x - box.min.x) * at(dims.y) + at(y - box.min.y)) * at(dims.z) + at(part.min.z - box.min.z);
+            float* row = out.data() + (at(x - box.min.x) * at(dims.y) + at(y - box.min.y)) * at(dims.z) +
+                         at(part.min.z - box.min.z);
             if (found == surface_.end()) {
               std::copy_n(cuts.data() + i, d.z, row);
               i += at(d.z);
               continue;
             }
-            const float* s = found->second.data() + (at(x - sub.min.x) * at(n) + at(y - sub.min.y)) * at(n) + at(part.min.z - sub.min.z);
+            const float* s = found->second.data() + (at(x - sub.min.x) * at(n) + at(y - sub.min.y)) * at(n) +
+                             at(part.min.z - sub.min.z);
             for (std::int32_t z = 0; z < d.z; ++z, ++i) row[z] = cuts[i] < band ? std::max(s[z], -cuts[i]) : s[z];
           }
       }

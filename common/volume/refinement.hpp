@@ -17,9 +17,9 @@ struct RefineReport {
   std::size_t resampled = 0;  // sub-volumes that this cut touched first
 };
 
-// Cuts of one level, by method 1: at the first touch the surface S of a sub-volume is resampled to the level's lattice and
-// kept, and every leaf of the level that it has is made, cut or not. From then on there is one sample set: f needs no
-// interpolation. The bone is the same as by method 2, and so is its hash.
+// Cuts of one level, by method 1: at the first touch the surface S of a sub-volume is resampled to the level's lattice
+// and kept, and every leaf of the level that it has is made, cut or not. From then on there is one sample set: f needs
+// no interpolation. The bone is the same as by method 2, and so is its hash.
 class SubVolumeField {
  public:
   SubVolumeField(Case bone, int level, std::shared_ptr<const ToolBox> tools = builtin_tool_box());
@@ -30,8 +30,8 @@ class SubVolumeField {
 
   [[nodiscard]] const CutField& field() const { return field_; }
   [[nodiscard]] Digest hash() const { return field_.hash(); }
-  [[nodiscard]] std::vector<Coord> sub_volumes() const;    // origins in samples of level 0; sorted
-  [[nodiscard]] std::size_t memory_bytes() const;          // of what was resampled, and of R
+  [[nodiscard]] std::vector<Coord> sub_volumes() const;  // origins in samples of level 0; sorted
+  [[nodiscard]] std::size_t memory_bytes() const;        // of what was resampled, and of R
 
  private:
   void resample(Coord origin);

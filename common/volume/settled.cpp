@@ -17,8 +17,10 @@ Settled settle(CutField whole) {
   std::uint32_t last = whole.body().value;
   std::vector<CutField> pieces;
   for (const Fragment& fragment : fragments)
-    if (fragment.debris()) ++result.debris;
-    else pieces.push_back(piece_of(whole, fragment, BodyId{++last}));
+    if (fragment.debris())
+      ++result.debris;
+    else
+      pieces.push_back(piece_of(whole, fragment, BodyId{++last}));
   for (Fragment& fragment : fragments) {
     for (const FieldLeaf& mask : fragment.taken) whole.merge(mask);
     result.taken.push_back(std::move(fragment.taken));

@@ -45,7 +45,8 @@ int label_solid(Coord dims, std::span<const float> solid_mm, std::vector<std::ui
           before = 0;
           continue;
         }
-        const std::uint16_t below = y > 0 ? labels[i - nz] : std::uint16_t{0}, beside = x > 0 ? labels[i - nyz] : std::uint16_t{0};
+        const std::uint16_t below = y > 0 ? labels[i - nz] : std::uint16_t{0},
+                            beside = x > 0 ? labels[i - nyz] : std::uint16_t{0};
         std::uint16_t label = before ? before : below ? below : beside;
         if (!label) label = static_cast<std::uint16_t>(sets.add());
         if (below && below != label) sets.unite(label, below);

@@ -43,7 +43,8 @@ float SparseVolume::value(Coord sample) const { return impl_->grid->tree().getVa
 void SparseVolume::gather(const CoordBox& box, std::span<float> out) const {
   if (box.empty()) return;
   const Coord dims = box.dims();
-  OSTEON_CHECK(out.size() == static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
+  OSTEON_CHECK(out.size() ==
+               static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
   const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
   const Coord first = floor_to(box.min, kLeafSize);
   for (std::int32_t lx = first.x; lx <= box.max.x; lx += kLeafSize)
@@ -57,8 +58,10 @@ void SparseVolume::gather(const CoordBox& box, std::span<float> out) const {
         const std::int32_t z0 = std::max(lz, box.min.z), z1 = std::min(lz + kLeafSize - 1, box.max.z);
         for (std::int32_t x = x0; x <= x1; ++x)
           for (std::int32_t y = y0; y <= y1; ++y) {
-            float* row = out.data() + (static_cast<std::size_t>(x - box.min.x) * static_cast<std::size_t>(dims.y) +
-                                       static_cast<std::size_t>(y - box.min.y)) * static_cast<std::size_t>(dims.z) +
+            float* row = out.data() +
+                         (static_cast<std::size_t>(x - box.min.x) * static_cast<std::size_t>(dims.y) +
+                          static_cast<std::size_t>(y - box.min.y)) *
+                             static_cast<std::size_t>(dims.z) +
                          (z0 - box.min.z);
             if (data) {
               // A whole row of a leaf is two registers; the few samples at a box's ends are not worth a call.
@@ -78,7 +81,8 @@ void SparseVolume::gather_every(std::int32_t stride, const CoordBox& box, std::s
   if (box.empty()) return;
   const Coord dims = box.dims();
   OSTEON_CHECK(stride > 0 && kLeafSize % stride == 0);
-  OSTEON_CHECK(out.size() == static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
+  OSTEON_CHECK(out.size() ==
+               static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
   const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
   const std::int32_t in_leaf = kLeafSize / stride;  // samples of ours along a leaf
   const Coord first = floor_to(box.min, in_leaf);
@@ -92,7 +96,8 @@ void SparseVolume::gather_every(std::int32_t stride, const CoordBox& box, std::s
         for (std::int32_t x = std::max(lx, box.min.x); x <= std::min(lx + in_leaf - 1, box.max.x); ++x)
           for (std::int32_t y = std::max(ly, box.min.y); y <= std::min(ly + in_leaf - 1, box.max.y); ++y) {
             float* row = out.data() + (static_cast<std::size_t>(x - box.min.x) * static_cast<std::size_t>(dims.y) +
-                                       static_cast<std::size_t>(y - box.min.y)) * static_cast<std::size_t>(dims.z);
+                                       static_cast<std::size_t>(y - box.min.y)) *
+                                          static_cast<std::size_t>(dims.z);
             for (std::int32_t z = std::max(lz, box.min.z); z <= std::min(lz + in_leaf - 1, box.max.z); ++z)
               row[z - box.min.z] = data ? data[((x - lx) * 64 + (y - ly) * 8 + (z - lz)) * stride] : constant;
           }
@@ -245,10 +250,12 @@ Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file
     std::vector<SparseVolume> volumes;
     for (const std::string& name : names) {
       if (!in.hasGrid(name))
-        return failure(ErrorCode::invalid_input, file.string() + " has no grid \"" + name + "\"; import the case again");
+        return failure(ErrorCode::invalid_input,
+                       file.string() + " has no grid \"" + name + "\"; import the case again");
       const auto grid = openvdb::gridPtrCast<Grid>(in.readGrid(name));
       if (!grid)
-        return failure(ErrorCode::invalid_input, "grid \"" + name + "\" of " + file.string() + " is not a float grid; import the case again");
+        return failure(ErrorCode::invalid_input,
+                       "grid \"" + name + "\" of " + file.string() + " is not a float grid; import the case again");
       SparseVolume volume(grid->background());
       volume.impl_->grid = grid;
       volumes.push_back(std::move(volume));

@@ -31,7 +31,7 @@ class SparseVolume {
   bool view(const CoordBox& box, std::span<LeafView> leaves) const;
   // Whether any leaf, or constant other than the background, meets the box.
   [[nodiscard]] bool any_stored(const CoordBox& box) const;
-  [[nodiscard]] double trilinear(const Vec3& index) const;       // at a point in samples
+  [[nodiscard]] double trilinear(const Vec3& index) const;  // at a point in samples
 
   // Leaves are named by their first sample, a multiple of kLeafSize. Without a leaf, all its samples have value().
   [[nodiscard]] const float* leaf(Coord origin) const;  // kLeafVoxels, z fastest, or null
@@ -54,7 +54,7 @@ class SparseVolume {
   [[nodiscard]] static NewLeaf make_leaf(Coord origin, std::span<const float, kLeafVoxels> samples);
   void put(NewLeaf leaf);  // in place of what was there
 
-  [[nodiscard]] std::size_t memory_bytes() const;       // of the whole tree
+  [[nodiscard]] std::size_t memory_bytes() const;  // of the whole tree
 
   struct Impl;
 

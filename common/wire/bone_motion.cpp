@@ -71,7 +71,8 @@ v1::MountPose to_wire(const MountPose& seen) {
   set(*out.mutable_turn(), seen.shift.turn_rad, kPerRadian);
   out.set_energy(energy_steps(seen.energy_mj));
   out.set_push_seq(seen.push_seq);
-  const double lag_ms = std::isfinite(seen.lag_s) ? std::clamp(std::round(1e3 * seen.lag_s), 0.0, double{kMostLag_ms}) : 0.0;
+  const double lag_ms =
+      std::isfinite(seen.lag_s) ? std::clamp(std::round(1e3 * seen.lag_s), 0.0, double{kMostLag_ms}) : 0.0;
   out.set_lag_ms(static_cast<std::uint32_t>(lag_ms));
   return out;
 }
@@ -92,7 +93,8 @@ Result<MountPose> from_wire(const v1::MountPose& seen) {
   const Vec3 turn_rad = read.vector(seen.turn(), kPerRadian, "bone.turn");
   read.expect(turn_rad.norm() <= std::numbers::pi, "bone.turn", "is more than half a turn");
   const double energy_mj = read.energy_mj(seen.energy(), "bone.energy");
-  read.expect(seen.lag_ms() <= kMostLag_ms, "bone.lag_ms", "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
+  read.expect(seen.lag_ms() <= kMostLag_ms, "bone.lag_ms",
+              "is " + std::to_string(seen.lag_ms()) + " and must be at most 60000");
   return read.of(MountPose{seen.seen_seq(), {place_mm, turn_rad}, energy_mj, seen.push_seq(), 1e-3 * seen.lag_ms()});
 }
 

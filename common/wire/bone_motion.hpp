@@ -10,8 +10,8 @@ namespace osteon::wire {
 [[nodiscard]] v1::MountLoad to_wire(const MountLoad& push);
 [[nodiscard]] v1::MountPose to_wire(const MountPose& seen);
 
-// Error invalid_input, naming the field, for what a correct peer never sends: numbers missing, no push_seq or seen_seq, energy
-// below zero, a turn of more than pi, a lag of more than a minute.
+// Error invalid_input, naming the field, for what a correct peer never sends: numbers missing, no push_seq or seen_seq,
+// energy below zero, a turn of more than pi, a lag of more than a minute.
 [[nodiscard]] Result<MountLoad> from_wire(const v1::MountLoad& push);
 [[nodiscard]] Result<MountPose> from_wire(const v1::MountPose& seen);
 

@@ -28,8 +28,7 @@ bool has_news(const HeardState& said, const HeardState& now, const PoseDeadband&
 
 ClientLink::ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq, std::uint64_t first_index,
                        const LinkOptions& options)
-    : half_(keys.session, keys.up, keys.down, first_author_seq, options),
-      rows_(first_index, options.most_ahead) {}
+    : half_(keys.session, keys.up, keys.down, first_author_seq, options), rows_(first_index, options.most_ahead) {}
 
 bool ClientLink::push(const Cut& cut) {
   if (half_.begin(cut.author_seq) && fits_a_packet(cut)) {
@@ -60,7 +59,10 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   std::size_t left_out = 0;
   const auto rows = rows_of(packet, tools_, &left_out);
   if (!rows) return half_.malformed();
-  if (std::ranges::any_of(*rows, [](const IndexedRow& one) { return one.row.kind != SessionRowKind::streamed && !fits_a_packet(one.row); })) return half_.malformed();
+  if (std::ranges::any_of(*rows, [](const IndexedRow& one) {
+        return one.row.kind != SessionRowKind::streamed && !fits_a_packet(one.row);
+      }))
+    return half_.malformed();
   std::vector<HeardState> states;
   for (const v1::ToolState& sent : packet.partners()) {
     const auto known = partners_.find(sent.author());
@@ -168,7 +170,8 @@ std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t>
     pushed_at_ = now;
   }
   const v1::UpPacket state = state_part(now);
-  if (state.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(state)) said_state(state, now);
+  if (state.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(state))
+    said_state(state, now);
   half_.add_items(filler, now);
   return half_.seal(filler.take(), now, into);
 }

@@ -1,8 +1,8 @@
-// A haptic client's end of the fast path: its cuts and its tool's state go up in sealed datagrams, what the room decided and
-// what partners' tools do comes down. A state machine that is polled: no socket, no clock, no thread.
+// A haptic client's end of the fast path: its cuts and its tool's state go up in sealed datagrams, what the room
+// decided and what partners' tools do comes down. A state machine that is polled: no socket, no clock, no thread.
 //
-// The stream is always there beside it. What cannot go in datagrams goes over the stream, and both ends put the two together
-// by number: which copy comes first does not matter.
+// The stream is always there beside it. What cannot go in datagrams goes over the stream, and both ends put the two
+// together by number: which copy comes first does not matter.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -38,8 +38,8 @@ class ClientLink {
   [[nodiscard]] bool push(const Cut& cut);
   // The stream's word: cuts up to here are decided and kept.
   void acknowledge(std::uint64_t author_seq) { half_.acknowledge(author_seq); }
-  // Newest state of the tool, to be called at every state, whose state_seq rises. It goes at once where the tool has moved by
-  // more than the deadband, some 30 times a second while it is at the bone, and now and then in any case.
+  // Newest state of the tool, to be called at every state, whose state_seq rises. It goes at once where the tool has
+  // moved by more than the deadband, some 30 times a second while it is at the bone, and now and then in any case.
   void set_state(const CuttingState& state, std::uint32_t buttons);
   // Newest push on a bone on its mount: it goes once, soon, where none newer comes before.
   void set_push(const MountLoad& push) { push_ = push; }
@@ -58,9 +58,11 @@ class ClientLink {
   // The datagram that is due, to the server, within `into` (kMostDatagramBytes); empty: none.
   [[nodiscard]] std::span<const std::uint8_t> send(Time now, std::span<std::uint8_t> into);
 
-  // Datagrams get through both ways: one has come lately that a server sends only where it knows the client to be, and it
-  // was said that one that went not long ago has arrived.
-  [[nodiscard]] bool alive(Time now) const { return half_.alive(now) && now - arrived_at_ < 2 * half_.options().alive_for; }
+  // Datagrams get through both ways: one has come lately that a server sends only where it knows the client to be, and
+  // it was said that one that went not long ago has arrived.
+  [[nodiscard]] bool alive(Time now) const {
+    return half_.alive(now) && now - arrived_at_ < 2 * half_.options().alive_for;
+  }
   // Cuts up to this one are decided and kept.
   [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
   // Rows up to this one have come, and were taken.
@@ -90,20 +92,22 @@ class ClientLink {
 
   LinkEndpoint half_;
   ToolNumbers tools_;
-  std::optional<CutSender> sender_;  // codes each cut against the one before it; a new one where that is not in the window
-  std::uint64_t coded_ = 0;          // the last cut that it coded
+  std::optional<CutSender>
+      sender_;               // codes each cut against the one before it; a new one where that is not in the window
+  std::uint64_t coded_ = 0;  // the last cut that it coded
   ReceiveWindow<SessionRow> rows_;
   std::map<std::uint64_t, Partner> partners_;  // by author
   std::uint64_t lease_epoch_ = 0;
   bool frozen_ = false;
-  Time arrived_at_ = -std::chrono::hours(1);   // when the newest packet went of which the server says that it has arrived
+  Time arrived_at_ =
+      -std::chrono::hours(1);  // when the newest packet went of which the server says that it has arrived
 
   std::optional<HeardState> state_, said_;  // newest, and last sent
   bool moved_ = false;                      // from the one to the other, by more than the deadband
   Time said_at_ = -std::chrono::hours(1), effort_at_ = said_at_;
-  std::optional<MountLoad> push_;            // newest that has not gone
+  std::optional<MountLoad> push_;  // newest that has not gone
   Time pushed_at_ = -std::chrono::hours(1);
-  std::optional<MountPose> bone_;            // newest that was not taken
+  std::optional<MountPose> bone_;  // newest that was not taken
   std::uint64_t bone_seq_ = 0;
   PathToken echo_{};
   int echoes_left_ = 0;

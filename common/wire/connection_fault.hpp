@@ -12,8 +12,8 @@ struct ConnectionFault {
   Error error;         // one sentence: what is wrong, and the remedy
   bool lasts = false;  // it does not go away by waiting
 };
-// `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds; carries no call
-// and no ticket. deploy/docs/troubleshooting.md lists the sentences.
+// `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds; carries no
+// call and no ticket. deploy/docs/troubleshooting.md lists the sentences.
 [[nodiscard]] ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials);
 
 }  // namespace osteon::wire

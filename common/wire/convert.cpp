@@ -12,9 +12,11 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
   return failure(ErrorCode::invalid_input, field + " " + what);
 }
 
-constexpr double kMostOfATool = 1e6;  // of its force in N, its speed in 1/min and so on: beyond it the steps of packets end
+constexpr double kMostOfATool =
+    1e6;  // of its force in N, its speed in 1/min and so on: beyond it the steps of packets end
 bool all_of_a_tool(std::initializer_list<double> values) {
-  return std::ranges::all_of(values, [](double v) { return std::abs(v) <= kMostOfATool; });  // also not where it is no number
+  return std::ranges::all_of(values,
+                             [](double v) { return std::abs(v) <= kMostOfATool; });  // also not where it is no number
 }
 
 constexpr double kFurthest_mm = 1e5;  // no bone is there, and beyond it the steps of packets end
@@ -22,7 +24,8 @@ constexpr double kFurthest_mm = 1e5;  // no bone is there, and beyond it the ste
 constexpr double kUnitWithin = 1e-3, kLeastAcross = 0.01;
 
 bool is_up(const Vec3& up, const Vec3& sight) {
-  return up.allFinite() && std::abs(up.norm() - 1.0) <= kUnitWithin && up.cross(sight).norm() > kLeastAcross * sight.norm();
+  return up.allFinite() && std::abs(up.norm() - 1.0) <= kUnitWithin &&
+         up.cross(sight).norm() > kLeastAcross * sight.norm();
 }
 
 }  // namespace
@@ -114,7 +117,8 @@ v1::FieldLeaf to_wire(const FieldLeaf& leaf) {
 }
 
 Result<Pose> from_wire(const v1::Pose& pose) {
-  if (pose.rotation_size() != 4) return bad("rotation", "needs 4 entries, this has " + std::to_string(pose.rotation_size()));
+  if (pose.rotation_size() != 4)
+    return bad("rotation", "needs 4 entries, this has " + std::to_string(pose.rotation_size()));
   const Vec3 position = from_wire(pose.position_mm());
   const Eigen::Quaterniond rotation(pose.rotation(3), pose.rotation(0), pose.rotation(1), pose.rotation(2));
   if (!position.allFinite()) return bad("position_mm", "is not finite");
@@ -124,7 +128,8 @@ Result<Pose> from_wire(const v1::Pose& pose) {
 
 Result<Digest> digest_from_wire(const std::string& bytes) {
   Digest digest;
-  if (bytes.size() != digest.bytes.size()) return bad("hash", "needs 32 bytes, this has " + std::to_string(bytes.size()));
+  if (bytes.size() != digest.bytes.size())
+    return bad("hash", "needs 32 bytes, this has " + std::to_string(bytes.size()));
   std::ranges::transform(bytes, digest.bytes.begin(), [](char c) { return static_cast<std::uint8_t>(c); });
   return digest;
 }
@@ -142,7 +147,8 @@ Result<Cut> from_wire(const v1::Cut& cut) {
   out.level = static_cast<int>(cut.level());
   if (cut.path().empty()) return bad("path", "needs at least one pose");
   for (const v1::QuantisedPose& knot : cut.path()) {
-    if (knot.position_size() != 3 || knot.rotation_size() != 4) return bad("path", "has a pose without 3 positions and 4 rotations");
+    if (knot.position_size() != 3 || knot.rotation_size() != 4)
+      return bad("path", "has a pose without 3 positions and 4 rotations");
     QuantisedPose pose;
     double norm = 0.0;
     for (int i = 0; i < 3; ++i) pose.position[static_cast<std::size_t>(i)] = knot.position(i);
@@ -151,7 +157,8 @@ Result<Cut> from_wire(const v1::Cut& cut) {
       pose.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(knot.rotation(i));
       norm += static_cast<double>(knot.rotation(i)) * knot.rotation(i);
     }
-    if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3) return bad("path", "has a rotation that is not a unit quaternion");
+    if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3)
+      return bad("path", "has a rotation that is not a unit quaternion");
     out.path.push_back(pose);
   }
   out.spindle_rpm = cut.spindle_rpm();
@@ -173,8 +180,8 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   out.pose_bone_device = *device;
   out.tool_name = state.tool_name();
   out.force_physical_N = from_wire(state.force_physical_n());
-  if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(), state.torque_n_mm(),
-                      state.depth_mm(), out.force_physical_N.norm()}))
+  if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
+                      state.torque_n_mm(), state.depth_mm(), out.force_physical_N.norm()}))
     return bad("cutting state", "has a number that is not finite, or that no tool has");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
@@ -200,7 +207,8 @@ Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf) {
   if (size != 2 && size != std::size_t{2} * kLeafVoxels)
     return bad("values", "needs 1024 bytes or 2, this has " + std::to_string(size));
   const auto value = [&](std::size_t i) {
-    const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]), high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
+    const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]),
+               high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
     return static_cast<std::int16_t>(low | high << 8);
   };
   out.values.resize(size / 2);
@@ -246,7 +254,8 @@ Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request) {
       if (given.has_axis()) onto.axis = from_wire(given.axis());
       if (given.has_across()) onto.across = from_wire(given.across());
       if (!onto.near_mm.allFinite()) return bad("onto_bone.near_mm", "is not finite");
-      if (onto.axis && !(onto.axis->allFinite() && onto.axis->norm() > 1e-9)) return bad("onto_bone.axis", "has no direction");
+      if (onto.axis && !(onto.axis->allFinite() && onto.axis->norm() > 1e-9))
+        return bad("onto_bone.axis", "has no direction");
       if (!(onto.across.allFinite() && onto.across.norm() > 1e-9)) return bad("onto_bone.across", "has no direction");
       return Placing(onto);
     }
@@ -256,7 +265,8 @@ Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request) {
     case v1::SetSceneItemRequest::kDriveHomeMm:
       if (!std::isfinite(request.drive_home_mm())) return bad("drive_home_mm", "is not finite");
       return Placing(DriveHome{request.drive_home_mm()});
-    case v1::SetSceneItemRequest::PLACING_NOT_SET: break;
+    case v1::SetSceneItemRequest::PLACING_NOT_SET:
+      break;
   }
   return Placing{};
 }
@@ -331,7 +341,8 @@ Result<Restrictions> from_wire(const v1::Restrictions& supervision) {
   out.force_limit = static_cast<int>(std::min<std::uint32_t>(supervision.force_limit(), INT32_MAX));
   if (supervision.has_zone()) {
     const v1::ZoneLimit& zone = supervision.zone();
-    if (zone.centre_size() != 3) return bad("supervision.zone.centre", "needs 3 numbers, this has " + std::to_string(zone.centre_size()));
+    if (zone.centre_size() != 3)
+      return bad("supervision.zone.centre", "needs 3 numbers, this has " + std::to_string(zone.centre_size()));
     out.zone = ZoneLimit{{zone.centre(0), zone.centre(1), zone.centre(2)}, zone.radius()};
   }
   for (const std::string& hash : supervision.tools()) {

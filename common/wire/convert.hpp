@@ -6,8 +6,8 @@
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
 #include "common/field/restrictions.hpp"
-#include "common/surface/view_frustum.hpp"
 #include "common/mechanics/cutting_state.hpp"
+#include "common/surface/view_frustum.hpp"
 #include "common/tools/annotation.hpp"
 #include "common/tools/placing.hpp"
 #include "common/wire/version.hpp"
@@ -45,7 +45,7 @@ namespace osteon::wire {
 [[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
 [[nodiscard]] Result<ViewFrustum> from_wire(const v1::ViewFrustum& look);
 [[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);  // by check(); tools in any order
-[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);     // by check()
+[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);       // by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

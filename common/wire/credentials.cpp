@@ -14,7 +14,8 @@ namespace osteon::wire {
 namespace {
 
 constexpr const char* kWays =
-    "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on this machine";
+    "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on "
+    "this machine";
 
 // Without the line's end. Empty: there is nothing, or it cannot be read.
 std::string first_word(const std::filesystem::path& file) {
@@ -32,23 +33,29 @@ bool is_ascii(const std::string& text) {
 }  // namespace
 
 void add_credential_options(CLI::App& app, CredentialArguments& arguments) {
-  app.add_option("--certificates", arguments.certificates, "Folder with ca.pem, person.pem and person.key: who the server is, and who you are");
-  app.add_option("--ticket", arguments.ticket, "File with the ticket that says which room you may come into, and in what role");
-  app.add_flag("--plain", arguments.plain, "Plain text without a certificate, to a server on this machine that was started so");
+  app.add_option("--certificates", arguments.certificates,
+                 "Folder with ca.pem, person.pem and person.key: who the server is, and who you are");
+  app.add_option("--ticket", arguments.ticket,
+                 "File with the ticket that says which room you may come into, and in what role");
+  app.add_flag("--plain", arguments.plain,
+               "Plain text without a certificate, to a server on this machine that was started so");
 }
 
 Result<ClientCredentials> client_credentials(const CredentialArguments& arguments) {
   if (arguments.plain && (!arguments.certificates.empty() || !arguments.ticket.empty()))
     return failure(ErrorCode::invalid_input, "--plain goes without --certificates and --ticket; give one or the other");
   if (arguments.plain) return ClientCredentials{};
-  if (arguments.certificates.empty() || arguments.ticket.empty()) return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
+  if (arguments.certificates.empty() || arguments.ticket.empty())
+    return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
   ClientCredentials credentials{.certificates = arguments.certificates, .ticket = arguments.ticket};
   const std::string ticket = first_word(credentials.ticket);
   if (ticket.empty())
-    return failure(ErrorCode::not_found, credentials.ticket.string() + ", the ticket, is missing or empty; ask whoever runs " +
-                                             "the server for it");
+    return failure(
+        ErrorCode::not_found,
+        credentials.ticket.string() + ", the ticket, is missing or empty; ask whoever runs " + "the server for it");
   if (!is_ascii(ticket))
-    return failure(ErrorCode::invalid_input, credentials.ticket.string() + ", the ticket, is no plain text (it may be " +
+    return failure(ErrorCode::invalid_input, credentials.ticket.string() +
+                                                 ", the ticket, is no plain text (it may be " +
                                                  "UTF-16, or begin with a byte order mark); save it as ASCII");
   if (const Result<ProbeFiles> files = read_certificate_files(credentials.certificates); !files)
     return tl::unexpected(files.error());
@@ -69,10 +76,12 @@ bool is_loopback(const std::string& host) {
   return at == last && parts[0] == 127;
 }
 
-Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const ClientCredentials& credentials, const std::string& address) {
+Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const ClientCredentials& credentials,
+                                                                      const std::string& address) {
   if (credentials.certificates.empty()) {
     if (is_loopback(address.substr(0, address.rfind(':')))) return grpc::InsecureChannelCredentials();
-    return failure(ErrorCode::invalid_input, "plain text goes to a server on this machine alone, and " + address + " is another; give --certificates DIR with --ticket FILE");
+    return failure(ErrorCode::invalid_input, "plain text goes to a server on this machine alone, and " + address +
+                                                 " is another; give --certificates DIR with --ticket FILE");
   }
   const Result<ProbeFiles> files = read_certificate_files(credentials.certificates);
   if (!files) return tl::unexpected(files.error());

@@ -16,8 +16,9 @@ class ChannelCredentials;
 namespace osteon::wire {
 
 struct ClientCredentials {
-  std::filesystem::path certificates;  // folder with ca.pem, person.pem, person.key; empty: plain text, to this machine alone
-  std::filesystem::path ticket;        // file with the ticket; read again for every call, so that it can be renewed
+  std::filesystem::path
+      certificates;              // folder with ca.pem, person.pem, person.key; empty: plain text, to this machine alone
+  std::filesystem::path ticket;  // file with the ticket; read again for every call, so that it can be renewed
 };
 
 // What a program is told on its command line.
@@ -34,7 +35,8 @@ void add_credential_options(CLI::App& app, CredentialArguments& arguments);
 // Whether only this machine is reached there: localhost, [::1] or four numbers that begin with 127.
 [[nodiscard]] bool is_loopback(const std::string& host);
 // Errors: those of read_certificate_files, invalid_input (plain text to `address`, HOST:PORT, of another machine).
-[[nodiscard]] Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const ClientCredentials& credentials, const std::string& address);
+[[nodiscard]] Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(
+    const ClientCredentials& credentials, const std::string& address);
 // As it goes with a call; empty where there is none to be read, or not in ASCII.
 [[nodiscard]] std::string ticket_text(const ClientCredentials& credentials);
 

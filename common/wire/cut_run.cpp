@@ -50,7 +50,8 @@ struct Reader {
   }
 };
 
-// A pose as its seven numbers; those of the rotation count in 16 bits, and all wrap round, so that any pose can follow any.
+// A pose as its seven numbers; those of the rotation count in 16 bits, and all wrap round, so that any pose can follow
+// any.
 using Numbers = std::array<std::uint32_t, 7>;
 constexpr std::size_t kPositions = 3;
 constexpr std::uint8_t kSecondOrder = 128;
@@ -102,7 +103,8 @@ void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, const 
   const bool own_first = cut.path.empty() || cut.path.front() != from;
   const bool own_time = cut.path_us != before.path_us, own_speed = cut.spindle_rpm != before.spindle_rpm;
   const std::size_t first = own_first ? 0 : 1;
-  put_varint(out, (cut.path.size() - first) << 3 | (own_speed ? 4u : 0u) | (own_first ? 2u : 0u) | (own_time ? 1u : 0u));
+  put_varint(out,
+             (cut.path.size() - first) << 3 | (own_speed ? 4u : 0u) | (own_first ? 2u : 0u) | (own_time ? 1u : 0u));
   if (own_time) put_varint(out, cut.path_us);
   if (own_speed) put_varint(out, zigzag(std::int64_t{cut.spindle_rpm} - std::int64_t{before.spindle_rpm}));
   Numbers last = numbers_of(from), by{};
@@ -152,7 +154,8 @@ bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
 
 // Everything that the cuts of a run have in common.
 bool same_run(const Cut& a, const Cut& b) {
-  return a.author == b.author && a.lease_epoch == b.lease_epoch && a.body == b.body && a.tool == b.tool && a.level == b.level;
+  return a.author == b.author && a.lease_epoch == b.lease_epoch && a.body == b.body && a.tool == b.tool &&
+         a.level == b.level;
 }
 
 RunState state_before(const Cut& first) {
@@ -172,8 +175,10 @@ v1::CutRun head_of(const Cut& cut, const RunState& before, const ToolNumbers& to
   head.set_author_seq(cut.author_seq);
   head.set_lease_epoch(cut.lease_epoch);
   head.set_body(cut.body.value);
-  if (const auto number = tools.number_of(cut.tool)) head.set_tool_number(*number);
-  else head.set_tool_hash(to_wire(cut.tool));
+  if (const auto number = tools.number_of(cut.tool))
+    head.set_tool_number(*number);
+  else
+    head.set_tool_hash(to_wire(cut.tool));
   head.set_level(static_cast<std::uint32_t>(cut.level));
   head.set_spindle_rpm(before.last.spindle_rpm);
   for (const std::int32_t p : before.pose.position) head.add_start(p);
@@ -202,7 +207,8 @@ Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNum
   }
   if (head.tool_case() == v1::CutRun::kToolNumber) {
     const auto tool = tools.tool_of(head.tool_number());
-    if (!tool) return failure(ErrorCode::not_found, "tool_number " + std::to_string(head.tool_number()) + " is not known yet");
+    if (!tool)
+      return failure(ErrorCode::not_found, "tool_number " + std::to_string(head.tool_number()) + " is not known yet");
     state.last.tool = *tool;
   } else {
     const auto tool = digest_from_wire(head.tool_hash());
@@ -353,15 +359,22 @@ Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const Tool
     if (left_out != nullptr) ++*left_out;
   }
   for (const v1::RejectedRow& row : packet.rejected()) {
-    rows.push_back({row.index(), {.room_seq = {row.room_seq()}, .kind = SessionRowKind::rejected, .author_seq = row.author_seq(),
-                                  .reason = row.reason(), .lease_epoch = row.lease_epoch()}});
+    rows.push_back({row.index(),
+                    {.room_seq = {row.room_seq()},
+                     .kind = SessionRowKind::rejected,
+                     .author_seq = row.author_seq(),
+                     .reason = row.reason(),
+                     .lease_epoch = row.lease_epoch()}});
   }
   for (const v1::SupervisedRow& row : packet.supervised()) {
     Result<Restrictions> supervision = from_wire(row.supervision());
     if (!supervision) return tl::unexpected(supervision.error());
-    rows.push_back({row.index(), {.room_seq = {row.room_seq()}, .kind = SessionRowKind::supervised,
-                                  .lease_epoch = row.lease_epoch(), .supervision = std::move(*supervision),
-                                  .by = {AuthorId{row.decided_by()}, row.decided_by_name()}}});
+    rows.push_back({row.index(),
+                    {.room_seq = {row.room_seq()},
+                     .kind = SessionRowKind::supervised,
+                     .lease_epoch = row.lease_epoch(),
+                     .supervision = std::move(*supervision),
+                     .by = {AuthorId{row.decided_by()}, row.decided_by_name()}}});
   }
   for (const v1::StreamedRow& row : packet.streamed()) rows.push_back({row.index(), {.room_seq = {row.room_seq()}}});
   std::ranges::sort(rows, {}, &IndexedRow::index);

@@ -1,17 +1,18 @@
 // Cuts in few bytes: those of one author, one after the other, as items of a SendWindow.
 //
-// A cut is coded against the one before it: of its first pose, which is that one's last, nothing is sent; each further pose
-// is a byte that says which of its seven numbers differ from what was expected, and these differences as zigzag varints.
-// Expected is the pose before, or that pose moved on by the step before, whichever takes fewer bytes. What cuts of a stretch
-// have in common, and the pose to go on from, is the head of a run; it goes before the first of neighbouring items only. The
-// speed of the spindle is no part of that: under load it is another in every cut, by a little.
+// A cut is coded against the one before it: of its first pose, which is that one's last, nothing is sent; each further
+// pose is a byte that says which of its seven numbers differ from what was expected, and these differences as zigzag
+// varints. Expected is the pose before, or that pose moved on by the step before, whichever takes fewer bytes. What
+// cuts of a stretch have in common, and the pose to go on from, is the head of a run; it goes before the first of
+// neighbouring items only. The speed of the spindle is no part of that: under load it is another in every cut, by a
+// little.
 //
 //   cut:   knots << 3 | speed differs << 2 | own first << 1 | time differs, [path_us], [difference of spindle_rpm],
 //          knots x (second order << 7 | which of x y z qx qy qz qw, ...)
 //   row:   (index step - 1) << 1 | more, [room_seq step - index step, author_seq step - 1], cut
 //
-// The steps of a run's first row are passed over, since its head says where it is. Every cut comes back as it was, whatever
-// its numbers; whether they make sense is for the room to judge.
+// The steps of a run's first row are passed over, since its head says where it is. Every cut comes back as it was,
+// whatever its numbers; whether they make sense is for the room to judge.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -27,8 +28,9 @@
 
 namespace osteon::wire {
 
-// Short names of tools, as the room has told them to this session in a way that does not lose anything. A sender uses what
-// is here and the whole hash otherwise; a receiver that does not know a number yet drops the run, which will come again.
+// Short names of tools, as the room has told them to this session in a way that does not lose anything. A sender uses
+// what is here and the whole hash otherwise; a receiver that does not know a number yet drops the run, which will come
+// again.
 class ToolNumbers {
  public:
   void add(std::uint32_t number, const Digest& tool);  // from 1; one that is known keeps its tool
@@ -42,8 +44,8 @@ class ToolNumbers {
 
 // What of a stretch of cuts is known before the next.
 struct RunState {
-  Cut last;             // without its path
-  QuantisedPose pose;   // that the next one goes on from
+  Cut last;            // without its path
+  QuantisedPose pose;  // that the next one goes on from
 };
 
 // Cuts of more knots may be too long for a packet, whatever their numbers: they go over the stream.
@@ -55,8 +57,8 @@ class CutSender {
  public:
   // Both must outlive this.
   CutSender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
-  // False, and nothing has changed, when the window is full. The cut's author_seq must be window.next(), and it must fit a
-  // packet.
+  // False, and nothing has changed, when the window is full. The cut's author_seq must be window.next(), and it must
+  // fit a packet.
   [[nodiscard]] bool push(const Cut& cut);
 
  private:
@@ -74,12 +76,13 @@ struct SessionRow {
   std::uint64_t author_seq = 0;                    // rejected: of the session's own cut
   std::uint32_t reason = 0;                        // rejected: as the room numbers its reasons
   std::uint64_t lease_epoch = 0;                   // rejected, supervised: of the session, from now on
-  Restrictions supervision{};                       // supervised: of the session's own hand, from now on
+  Restrictions supervision{};                      // supervised: of the session's own hand, from now on
   Decider by{};                                    // supervised: whose decision
   friend bool operator==(const SessionRow&, const SessionRow&) = default;
 };
 
-// The same of a row of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream too.
+// The same of a row of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream
+// too.
 inline constexpr std::size_t kMostToolsInPacket = 8, kMostNameInPacket = 64;
 [[nodiscard]] inline bool fits_a_packet(const SessionRow& row) {
   return row.kind != SessionRowKind::streamed && fits_a_packet(row.cut) &&
@@ -114,8 +117,8 @@ struct IndexedRow {
   std::uint64_t index = 0;
   SessionRow row;
 };
-// All rows of a packet in order of their index. Runs whose tool is not known yet are left out; `left_out` counts them where
-// it is given. Error invalid_input as above; then nothing of the packet is to be believed.
+// All rows of a packet in order of their index. Runs whose tool is not known yet are left out; `left_out` counts them
+// where it is given. Error invalid_input as above; then nothing of the packet is to be believed.
 [[nodiscard]] Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const ToolNumbers& tools,
                                                       std::size_t* left_out = nullptr);
 

@@ -11,7 +11,8 @@ namespace {
 using namespace std::chrono_literals;
 using Time = LinkEndpoint::Time;
 
-// What a packet holds beside items and states, at most: the seal, times, acknowledgement, a path token, epoch and frozen.
+// What a packet holds beside items and states, at most: the seal, times, acknowledgement, a path token, epoch and
+// frozen.
 constexpr std::size_t kFixedBytes = kSealBytes + 57 + 22 + 18 + 14;
 
 std::uint64_t in_us(Time time) { return static_cast<std::uint64_t>(time / 1us); }
@@ -32,7 +33,8 @@ LinkOptions server_link_options() {
   return options;
 }
 
-LinkEndpoint::LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options)
+LinkEndpoint::LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first,
+                           const LinkOptions& options)
     : options_(options),
       sealer_(session, out, options.seal),
       opener_(session, in, options.seal),
@@ -44,7 +46,8 @@ LinkEndpoint::LinkEndpoint(std::uint32_t session, const SealKey& out, const Seal
   OSTEON_CHECK(first > 0);
 }
 
-std::optional<Opened> LinkEndpoint::open(std::span<const std::uint8_t> datagram, Time now, std::span<std::uint8_t> into) {
+std::optional<Opened> LinkEndpoint::open(std::span<const std::uint8_t> datagram, Time now,
+                                         std::span<std::uint8_t> into) {
   const auto opened = opener_.open(datagram, now, into);
   if (!opened) return {};
   ++counts_.packets_received;
@@ -59,7 +62,8 @@ void LinkEndpoint::heard(const v1::PacketTimes& times, const Opened& opened, Tim
     peer_came_ = now;
   }
   // Nothing of ours had come yet, or it speaks of packets that never went.
-  if (times.heard_counter() == 0 || times.heard_counter() >= sealer_.counter() || times.heard_packets() > counts_.packets_sent)
+  if (times.heard_counter() == 0 || times.heard_counter() >= sealer_.counter() ||
+      times.heard_packets() > counts_.packets_sent)
     return;
   rate_.heard(times.heard_counter(), times.heard_packets());
   const auto sent = from_us(times.echo_sent_us()), peer_received = from_us(times.echo_received_us()),
@@ -90,7 +94,8 @@ bool LinkEndpoint::begin(std::uint64_t number) {
   if (window_.empty() && window_.next() != number) {
     // All before went over the stream.
     window_ = SendWindow(options_.window, number);
-    if (const auto reading = peer_came_ ? clock_.at(*peer_came_) : std::nullopt) window_.set_round_trip(reading->round_trip);
+    if (const auto reading = peer_came_ ? clock_.at(*peer_came_) : std::nullopt)
+      window_.set_round_trip(reading->round_trip);
     sent_upto_ = number - 1;
   }
   while (window_.next() < number)
@@ -99,8 +104,9 @@ bool LinkEndpoint::begin(std::uint64_t number) {
 }
 
 Time LinkEndpoint::keep_alive_interval() const {
-  // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One more, as
-  // delays vary. Before anything is known of the path it is taken for a bad one, so that the first packet soon gets through.
+  // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One
+  // more, as delays vary. Before anything is known of the path it is taken for a bad one, so that the first packet soon
+  // gets through.
   const double loss = heard_at_ ? std::clamp(rate_.loss(), 0.01, 0.5) : 0.5;
   const auto packets = static_cast<int>(std::ceil(std::log(1e-4) / std::log(loss))) + 1;
   return options_.alive_for / packets;
@@ -141,7 +147,8 @@ std::span<const std::uint8_t> LinkEndpoint::seal(std::string_view plain, Time no
   return seal_beside(plain, now, into);
 }
 
-std::span<const std::uint8_t> LinkEndpoint::seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into) {
+std::span<const std::uint8_t> LinkEndpoint::seal_beside(std::string_view plain, Time now,
+                                                        std::span<std::uint8_t> into) {
   const auto datagram = sealer_.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, into);
   ++counts_.packets_sent;
   counts_.bytes_sent += datagram.size();

@@ -1,5 +1,5 @@
-// What the two ends of the fast path have in common: sealing, when a packet goes, which items it repeats, and what the other
-// end says of those that came. ClientLink and ServerLink add what is in the packets.
+// What the two ends of the fast path have in common: sealing, when a packet goes, which items it repeats, and what the
+// other end says of those that came. ClientLink and ServerLink add what is in the packets.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -26,10 +26,11 @@ struct LinkOptions {
   // At 30 % loss each way all challenges are lost in one move of 1000, and the others take less than a second.
   PathRules path{.retry_after = std::chrono::milliseconds(100), .tries = 6};
   PoseDeadband deadband;
-  std::chrono::nanoseconds effort_interval = std::chrono::milliseconds(33);   // between forces and the like of one tool
-  std::chrono::nanoseconds state_interval = std::chrono::milliseconds(16);    // between states of one tool that moves
-  std::chrono::nanoseconds bone_interval = std::chrono::milliseconds(8);      // between pushes, and between places of the bone
-  std::chrono::nanoseconds times_interval = std::chrono::milliseconds(30);    // between packets that hold times
+  std::chrono::nanoseconds effort_interval = std::chrono::milliseconds(33);  // between forces and the like of one tool
+  std::chrono::nanoseconds state_interval = std::chrono::milliseconds(16);   // between states of one tool that moves
+  std::chrono::nanoseconds bone_interval =
+      std::chrono::milliseconds(8);  // between pushes, and between places of the bone
+  std::chrono::nanoseconds times_interval = std::chrono::milliseconds(30);  // between packets that hold times
 };
 // The way down has no limit as tight as the way up, and what a session is told waits for its next packet.
 [[nodiscard]] LinkOptions server_link_options();
@@ -37,26 +38,28 @@ struct LinkOptions {
 struct LinkCounts {
   std::uint64_t packets_sent = 0, bytes_sent = 0;          // sealed, without headers of UDP and IP
   std::uint64_t packets_received = 0, bytes_received = 0;  // authentic ones, each once
-  std::uint64_t malformed = 0;      // authentic, but not what a correct peer sends: nothing was taken from them
-  std::uint64_t left_out = 0;       // runs whose tool was not known yet
-  std::uint64_t streamed = 0;       // items that could only go over the stream
+  std::uint64_t malformed = 0;  // authentic, but not what a correct peer sends: nothing was taken from them
+  std::uint64_t left_out = 0;   // runs whose tool was not known yet
+  std::uint64_t streamed = 0;   // items that could only go over the stream
 };
 
-// Items are numbered one by one. Those that cannot go in packets come to the other end over the stream, under their number;
-// to the window they are items without bytes, which are acknowledged as all others are. One thread; times since any start,
-// not before it.
+// Items are numbered one by one. Those that cannot go in packets come to the other end over the stream, under their
+// number; to the window they are items without bytes, which are acknowledged as all others are. One thread; times since
+// any start, not before it.
 class LinkEndpoint {
  public:
   using Time = std::chrono::nanoseconds;
 
   // `first`: number of the first item to go out.
-  LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first, const LinkOptions& options);
+  LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first,
+               const LinkOptions& options);
   LinkEndpoint(const LinkEndpoint&) = delete;
   LinkEndpoint& operator=(const LinkEndpoint&) = delete;
 
   // --- what comes
   // The plain bytes of an authentic datagram that was not here before, within `into` (kMostDatagramBytes).
-  [[nodiscard]] std::optional<Opened> open(std::span<const std::uint8_t> datagram, Time now, std::span<std::uint8_t> into);
+  [[nodiscard]] std::optional<Opened> open(std::span<const std::uint8_t> datagram, Time now,
+                                           std::span<std::uint8_t> into);
   void malformed() { ++counts_.malformed; }
   void left_out(std::uint64_t runs) { counts_.left_out += runs; }
   // What a packet says of ours. What no correct peer says is ignored.

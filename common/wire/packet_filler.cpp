@@ -55,8 +55,10 @@ SendWindow::Picked PacketFiller<Packet>::add_items(SendWindow& window, SendWindo
       continue;
     }
     std::size_t run = runs.size();
-    if (window.needs_head(number, picked)) runs.push_back({item.head, {}});
-    else run = run_of.at(item.follows);
+    if (window.needs_head(number, picked))
+      runs.push_back({item.head, {}});
+    else
+      run = run_of.at(item.follows);
     runs[run].items += item.bytes;
     run_of[number] = run;
   }

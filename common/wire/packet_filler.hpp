@@ -20,8 +20,8 @@ class PacketFiller {
   // `most_bytes`: of the plain packet, before sealing.
   explicit PacketFiller(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  // A packet with only some fields set. False, and nothing is added, where it does not fit. Messages within must not be in
-  // two parts, or they would be merged; repeated fields go on.
+  // A packet with only some fields set. False, and nothing is added, where it does not fit. Messages within must not be
+  // in two parts, or they would be merged; repeated fields go on.
   bool add(const Packet& part);
   // The items that the window picks for what room there is.
   SendWindow::Picked add_items(SendWindow& window, SendWindow::Time now, int repeats);

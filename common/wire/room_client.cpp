@@ -26,9 +26,9 @@ constexpr auto kAnswerTime = 5s;                   // for one request to a serve
 constexpr auto kAgainTime = 1s;                    // for one attempt to come back to a server that was lost
 // For one attempt to connect: TCP, TLS and HTTP/2 take four round trips. gRPC calls this time a back-off.
 constexpr int kConnectMs = 3000;
-// A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server allows
-// pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the bone: it waits
-// longer than its RoomWatch does.
+// A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server
+// allows pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the
+// bone: it waits longer than its RoomWatch does.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
 // The room that a channel's calls are to: empty, the only one that is open.
@@ -67,7 +67,8 @@ class RoomNamer final : public grpc::experimental::Interceptor {
 
 class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  RoomNamers(std::shared_ptr<const RoomName> room, ClientCredentials credentials) : room_(std::move(room)), credentials_(std::move(credentials)) {}
+  RoomNamers(std::shared_ptr<const RoomName> room, ClientCredentials credentials)
+      : room_(std::move(room)), credentials_(std::move(credentials)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
     return new RoomNamer(room_ ? room_->get() : std::string(), ticket_text(credentials_));  // which the call deletes
   }
@@ -77,8 +78,10 @@ class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInte
   const ClientCredentials credentials_;
 };
 
-std::shared_ptr<grpc::Channel> make_channel(const std::string& address, const std::shared_ptr<grpc::ChannelCredentials>& tls,
-                                            ClientKind kind, const std::shared_ptr<const RoomName>& room, const ClientCredentials& credentials) {
+std::shared_ptr<grpc::Channel> make_channel(const std::string& address,
+                                            const std::shared_ptr<grpc::ChannelCredentials>& tls, ClientKind kind,
+                                            const std::shared_ptr<const RoomName>& room,
+                                            const ClientCredentials& credentials) {
   // What fails is told in one sentence by the program, not in gRPC's own lines.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
@@ -100,8 +103,9 @@ bool is_host_port(const std::string& address) {
   const std::size_t colon = address.rfind(':');
   if (colon == std::string::npos || colon == 0 || address.find('/') != std::string::npos) return false;
   const std::string port = address.substr(colon + 1);
-  return !port.empty() && port.size() <= 5 && std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }) &&
-         std::stoi(port) > 0 && std::stoi(port) <= 65535;
+  return !port.empty() && port.size() <= 5 &&
+         std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }) && std::stoi(port) > 0 &&
+         std::stoi(port) <= 65535;
 }
 
 // gRPC's words for an answer in HTTP alone, of a proxy or of a server that knows no gRPC.
@@ -121,11 +125,15 @@ std::optional<Error> error_of_http(const std::string& said, const std::string& s
 Error error_of(const grpc::Status& status, const std::string& server) {
   if (std::optional<Error> http = error_of_http(status.error_message(), server)) return std::move(*http);
   switch (status.error_code()) {
-    case grpc::StatusCode::FAILED_PRECONDITION: return {ErrorCode::unsupported, status.error_message()};
-    case grpc::StatusCode::INVALID_ARGUMENT: return {ErrorCode::invalid_input, status.error_message()};
-    case grpc::StatusCode::NOT_FOUND: return {ErrorCode::not_found, status.error_message()};
+    case grpc::StatusCode::FAILED_PRECONDITION:
+      return {ErrorCode::unsupported, status.error_message()};
+    case grpc::StatusCode::INVALID_ARGUMENT:
+      return {ErrorCode::invalid_input, status.error_message()};
+    case grpc::StatusCode::NOT_FOUND:
+      return {ErrorCode::not_found, status.error_message()};
     case grpc::StatusCode::UNAUTHENTICATED:
-    case grpc::StatusCode::PERMISSION_DENIED: return {ErrorCode::denied, "the server lets you in no further: " + status.error_message()};
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return {ErrorCode::denied, "the server lets you in no further: " + status.error_message()};
     case grpc::StatusCode::UNIMPLEMENTED:
       return {ErrorCode::unsupported, server + " is not an Osteon server of this version"};
     default:
@@ -133,8 +141,9 @@ Error error_of(const grpc::Status& status, const std::string& server) {
   }
 }
 
-Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room, ClientKind kind,
-                                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const ClientCredentials& credentials) {
+Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room,
+                                             ClientKind kind, std::chrono::milliseconds patience,
+                                             const std::function<bool()>& stop, const ClientCredentials& credentials) {
   if (!is_host_port(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as " +
@@ -167,7 +176,8 @@ v1::JoinRequest request_of(ClientKind kind) {
 }
 
 // Over `room`'s channel; `server` is for sentences.
-Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, const std::string& server, grpc::ClientContext& context) {
+Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, const std::string& server,
+                               grpc::ClientContext& context) {
   v1::JoinResponse response;
   const grpc::Status status = v1::RoomService::NewStub(room.channel)->Join(&context, request, &response);
   if (!status.ok()) return tl::unexpected(error_of(status, server));
@@ -190,14 +200,16 @@ Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, 
 
 }  // namespace
 
-Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind, std::chrono::milliseconds patience,
-                                                    const std::function<bool()>& stop, const ClientCredentials& credentials) {
+Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
+                                                    std::chrono::milliseconds patience,
+                                                    const std::function<bool()>& stop,
+                                                    const ClientCredentials& credentials) {
   return reach(address, nullptr, kind, patience, stop, credentials);
 }
 
 Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
-                             std::chrono::milliseconds patience, const std::function<bool()>& stop, const std::string& named,
-                             const ClientCredentials& credentials) {
+                             std::chrono::milliseconds patience, const std::function<bool()>& stop,
+                             const std::string& named, const ClientCredentials& credentials) {
   const auto calls_to = std::make_shared<RoomName>(named);  // shared with the channel
   Result<std::shared_ptr<grpc::Channel>> channel = reach(address, calls_to, kind, patience, stop, credentials);
   if (!channel) return tl::unexpected(channel.error());

@@ -31,29 +31,32 @@ struct JoinedRoom {
   double pitch_mm = 0;
   Box bounds;
   RoomSeq room_seq;
-  std::string secret;                      // proves that a later connection is this one's
+  std::string secret;  // proves that a later connection is this one's
 };
 
 // A channel to the server, over which no room is named. Errors: invalid_input (`address` is not HOST:PORT), those of
 // connection_fault (no connection within `patience`, or one that waiting does not bring), cancelled (`stop` returned
 // true), and those of channel_credentials.
 [[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
-                                                                  std::chrono::milliseconds patience, const std::function<bool()>& stop,
+                                                                  std::chrono::milliseconds patience,
+                                                                  const std::function<bool()>& stop,
                                                                   const ClientCredentials& credentials = {});
 
-// `name`: the caller's, shown to others. `room`: which one; empty, the only one that is open. Errors: those of reach_server, and
-// unsupported (protocol or kernel version differ; the room is closed), not_found (there is no such room), denied (who you are,
-// your ticket or your role does not let you in).
+// `name`: the caller's, shown to others. `room`: which one; empty, the only one that is open. Errors: those of
+// reach_server, and unsupported (protocol or kernel version differ; the room is closed), not_found (there is no such
+// room), denied (who you are, your ticket or your role does not let you in).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                                            std::chrono::milliseconds patience, const std::function<bool()>& stop,
                                            const std::string& room = {}, const ClientCredentials& credentials = {});
 
-// The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that the
-// server said is kept, its chain and the server's seal. Errors: unavailable (try again), any other (the room knows this client no more).
+// The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that
+// the server said is kept, its chain and the server's seal. Errors: unavailable (try again), any other (the room knows
+// this client no more).
 struct DurableSeq {
   RoomSeq room_seq;
   Digest chain, seal;
 };
-[[nodiscard]] Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std::optional<DurableSeq>& kept);
+[[nodiscard]] Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind,
+                                            const std::optional<DurableSeq>& kept);
 
 }  // namespace osteon::wire

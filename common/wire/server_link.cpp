@@ -41,8 +41,10 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
   for (const v1::CutRun& run : packet.cuts()) {
     auto read = cuts_of(run, author_, tools_);
     if (!read && read.error().code != ErrorCode::not_found) return half_.malformed();
-    if (!read) ++left_out;
-    else std::ranges::move(*read, std::back_inserter(cuts));
+    if (!read)
+      ++left_out;
+    else
+      std::ranges::move(*read, std::back_inserter(cuts));
   }
   if (!std::ranges::all_of(cuts, [](const Cut& cut) { return fits_a_packet(cut); })) return half_.malformed();
   HeardState state = state_;

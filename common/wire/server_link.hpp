@@ -1,5 +1,5 @@
-// The room's end of the fast path of one session: the other end of ClientLink. A state machine that is polled: no socket, no
-// clock, no thread.
+// The room's end of the fast path of one session: the other end of ClientLink. A state machine that is polled: no
+// socket, no clock, no thread.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -22,8 +22,8 @@ class ServerLink {
   using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
-  // The first cut to come has `first_author_seq`, and the first row to be pushed `first_index`. `random`: for the tokens of
-  // challenges.
+  // The first cut to come has `first_author_seq`, and the first row to be pushed `first_index`. `random`: for the
+  // tokens of challenges.
   ServerLink(const SessionKeys& keys, AuthorId author, FillRandom random, std::uint64_t first_author_seq = 1,
              std::uint64_t first_index = 1, const LinkOptions& options = server_link_options());
 
@@ -36,20 +36,21 @@ class ServerLink {
   bool offer(const Cut& cut) { return cuts_.offer(cut.author_seq, cut); }
   // Cuts in order of their author_seq, each once.
   [[nodiscard]] std::optional<Cut> take_cut() { return cuts_.take(); }
-  // Cuts up to here were decided, and what was decided is kept: they are acknowledged. Also cuts that came by an earlier
-  // session of this author, and are decided only now.
+  // Cuts up to here were decided, and what was decided is kept: they are acknowledged. Also cuts that came by an
+  // earlier session of this author, and are decided only now.
   void decided(std::uint64_t author_seq);
   // Newest state of the tool, once.
   [[nodiscard]] std::optional<HeardState> take_state();
   // Newest push on the bone, once.
   [[nodiscard]] std::optional<MountLoad> take_push() { return std::exchange(push_, std::nullopt); }
 
-  // Every row of the session, in order of its index. False: the client gets it over the stream only, since it is of kind
-  // streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every row above
-  // acknowledged() goes over the stream too.
+  // Every row of the session, in order of its index. False: the client gets it over the stream only, since it is of
+  // kind streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every
+  // row above acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const IndexedRow& row);
-  // A row that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which raises
-  // the lease too. It is pushed, unless `index` is 0: it has no number, having been among what the client was sent first.
+  // A row that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which
+  // raises the lease too. It is pushed, unless `index` is 0: it has no number, having been among what the client was
+  // sent first.
   bool tell(std::uint64_t index, const SessionRow& row);
   // The session's word over the stream: it has taken the rows up to here.
   void acknowledge(std::uint64_t index) { half_.acknowledge(index); }
@@ -102,9 +103,9 @@ class ServerLink {
   std::uint64_t decided_;
   HeardState state_;
   bool state_is_new_ = false;
-  std::optional<MountLoad> push_;   // newest that was not taken
+  std::optional<MountLoad> push_;  // newest that was not taken
   std::uint64_t push_seq_ = 0;
-  std::optional<MountPose> bone_;   // newest that has not gone
+  std::optional<MountPose> bone_;  // newest that has not gone
   Time bone_at_ = -std::chrono::hours(1);
 
   RowSender sender_;

@@ -41,7 +41,8 @@ Result<Pose> pose_from(const v1::QuantisedPose& pose, const std::string& field) 
     out.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(r);
     norm += static_cast<double>(r) * r;
   }
-  if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3) return bad(field, "has a rotation that is not a unit quaternion");
+  if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3)
+    return bad(field, "has a rotation that is not a unit quaternion");
   return dequantise(out);
 }
 
@@ -90,7 +91,8 @@ Result<bool> take_over(const v1::ToolState& sent, HeardState& known) {
   next.on_metal = sent.on_metal();
   if (sent.has_effort()) {
     const v1::ToolEffort& effort = sent.effort();
-    if (effort.force_size() != 3) return bad("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
+    if (effort.force_size() != 3)
+      return bad("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
     if (effort.engaged() > 1000) return bad("effort.engaged", "must be at most 1000");
     if (effort.tool_name().size() > kMostNameBytes) return bad("effort.tool_name", "is longer than 64 bytes");
     next.tool_name = effort.tool_name();

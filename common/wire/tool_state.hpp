@@ -15,8 +15,8 @@ struct HeardState {
   CuttingState state;
   std::uint32_t buttons = 0;
 };
-// Takes a newer state over into what is known of the tool; what is not sent stays as it was. False where it is no newer.
-// Error invalid_input, naming the field, for what a correct peer never sends; then nothing has changed.
+// Takes a newer state over into what is known of the tool; what is not sent stays as it was. False where it is no
+// newer. Error invalid_input, naming the field, for what a correct peer never sends; then nothing has changed.
 [[nodiscard]] Result<bool> take_over(const v1::ToolState& sent, HeardState& known);
 
 }  // namespace osteon::wire

@@ -13,9 +13,12 @@ std::uint32_t version_of(v1::SessionResponse::MessageCase kind) {
 // Where an event has its place in the room's order; 0: it is none.
 std::uint64_t place_of(const v1::SessionResponse& row) {
   switch (row.message_case()) {
-    case v1::SessionResponse::kSupervised: return row.supervised().room_seq();
-    case v1::SessionResponse::kSaid: return row.said().room_seq();
-    default: return 0;
+    case v1::SessionResponse::kSupervised:
+      return row.supervised().room_seq();
+    case v1::SessionResponse::kSaid:
+      return row.said().room_seq();
+    default:
+      return 0;
   }
 }
 
@@ -26,9 +29,10 @@ Result<void> check_protocol_version(std::uint32_t clients) {
   const std::string versions = "the client speaks protocol version " + std::to_string(clients) +
                                " and the server protocol version " + std::to_string(kProtocolVersion) + ", or " +
                                std::to_string(kOldestProtocolVersion);
-  return failure(ErrorCode::unsupported, versions + (clients < kOldestProtocolVersion
-                                                         ? "; install a newer Osteon where the client runs"
-                                                         : "; install a newer Osteon where the server runs, before the clients"));
+  return failure(ErrorCode::unsupported,
+                 versions + (clients < kOldestProtocolVersion
+                                 ? "; install a newer Osteon where the client runs"
+                                 : "; install a newer Osteon where the server runs, before the clients"));
 }
 
 std::optional<v1::SessionResponse> row_in(std::uint32_t version, const v1::SessionResponse& row) {

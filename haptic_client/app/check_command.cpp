@@ -29,9 +29,11 @@ std::uint64_t measure(double seconds) {
       timer.done(stats);
     }
   }).join();
-  std::printf("%.0f ticks of an empty loop%s woke late by %.1f us (median), %.1f us (99 of 100), %.1f us at most; %llu missed.\n",
-              1000.0 * seconds, fifo ? "" : ", without real-time priority,", stats.lateness.percentile_us(50),
-              stats.lateness.percentile_us(99), stats.lateness.max_us(), static_cast<unsigned long long>(stats.missed));
+  std::printf(
+      "%.0f ticks of an empty loop%s woke late by %.1f us (median), %.1f us (99 of 100), %.1f us at most; %llu "
+      "missed.\n",
+      1000.0 * seconds, fifo ? "" : ", without real-time priority,", stats.lateness.percentile_us(50),
+      stats.lateness.percentile_us(99), stats.lateness.max_us(), static_cast<unsigned long long>(stats.missed));
   return stats.missed;
 }
 
@@ -50,17 +52,23 @@ int run_check(int argc, char** argv) {
 
   int lacking = 0;
   for (const MachineFinding& finding : judge(look_at_machine(kPriority), kPriority, kMemory_kib)) {
-    const char* const mark = finding.kind == Finding::lacking ? "LACKING" : finding.kind == Finding::note ? "note" : "ok";
+    const char* const mark = finding.kind == Finding::lacking ? "LACKING"
+                             : finding.kind == Finding::note  ? "note"
+                                                              : "ok";
     std::printf("%-8s %s\n", mark, finding.sentence.c_str());
     if (!finding.remedy.empty()) std::printf("%-8s   To change it: %s.\n", "", finding.remedy.c_str());
     lacking += finding.kind == Finding::lacking;
   }
   const std::uint64_t missed = seconds > 0.0 ? measure(seconds) : 0;
   if (lacking == 0 && missed > 0)
-    std::printf("This machine is set for the haptic loop, yet an empty one missed ticks: end what else runs, or look for what "
-                "holds up its cores (power saving, a virtual machine's host), and measure longer with --seconds.\n");
-  else if (lacking == 0) std::printf("This machine lacks nothing for the haptic loop.\n");
-  else std::printf("This machine lacks %d of what the haptic loop needs: force may be late or stop for moments.\n", lacking);
+    std::printf(
+        "This machine is set for the haptic loop, yet an empty one missed ticks: end what else runs, or look for what "
+        "holds up its cores (power saving, a virtual machine's host), and measure longer with --seconds.\n");
+  else if (lacking == 0)
+    std::printf("This machine lacks nothing for the haptic loop.\n");
+  else
+    std::printf("This machine lacks %d of what the haptic loop needs: force may be late or stop for moments.\n",
+                lacking);
   return lacking == 0 && missed == 0 ? 0 : 1;
 }
 

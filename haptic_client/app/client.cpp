@@ -15,18 +15,18 @@
 #include <variant>
 
 #include "common/field/rejection.hpp"
-#include "common/runtime/spsc_queue.hpp"
-#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/memory_reserve.hpp"
 #include "common/runtime/periodic.hpp"
+#include "common/runtime/spsc_queue.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/watchdog.hpp"
 #include "haptic_client/app/cut_log.hpp"
-#include "haptic_client/control/guiding.hpp"
+#include "haptic_client/control/confirmation_monitor.hpp"
 #include "haptic_client/control/felt_mount.hpp"
+#include "haptic_client/control/guiding.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/replica.hpp"
-#include "haptic_client/control/confirmation_monitor.hpp"
 
 namespace osteon::haptic {
 namespace {
@@ -37,13 +37,13 @@ using Clock = std::chrono::steady_clock;
 constexpr auto kTick = 1ms;
 constexpr auto kSpin = 150us;
 constexpr int kPriority = 80;
-constexpr auto kStall = 4ms;                  // more than three periods: the force is zero by then
-constexpr std::uint64_t kLiveTicks = 1000;    // between two statistics of the haptic loop
+constexpr auto kStall = 4ms;                // more than three periods: the force is zero by then
+constexpr std::uint64_t kLiveTicks = 1000;  // between two statistics of the haptic loop
 constexpr auto kConfirmPatience = 20s;
-constexpr auto kStopPatience = 2s;            // once it was asked to stop
-constexpr auto kJoinPatience = 30s;           // without anything from the room
-constexpr std::size_t kMostFromRoom = 4096;   // events that may wait for the replica; the network waits beyond that
-constexpr std::size_t kTickTimes = 8192;  // ticks whose wake-up time is remembered
+constexpr auto kStopPatience = 2s;           // once it was asked to stop
+constexpr auto kJoinPatience = 30s;          // without anything from the room
+constexpr std::size_t kMostFromRoom = 4096;  // events that may wait for the replica; the network waits beyond that
+constexpr std::size_t kTickTimes = 8192;     // ticks whose wake-up time is remembered
 
 std::int64_t ns(Clock::time_point t) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
@@ -73,9 +73,8 @@ struct ToolNamed {
 struct Interrupted {
   std::string why;  // the line to the room is down, and is being made again
 };
-using FromRoom =
-    std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid, ToolNamed, Noted,
-                 Interrupted>;
+using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid,
+                              ToolNamed, Noted, Interrupted>;
 
 // Others' tools, as they were heard of last.
 struct Partners {
@@ -125,8 +124,12 @@ struct ToolPlace {
 class Client {
  public:
   Client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop)
-      : room_(room), options_(options), stop_(stop), session_(session),
-        mounted_(mount_about(room.bone().bounds().centre_mm())), replica_(room.bone(), BodyId{}, room.tools()),
+      : room_(room),
+        options_(options),
+        stop_(stop),
+        session_(session),
+        mounted_(mount_about(room.bone().bounds().centre_mm())),
+        replica_(room.bone(), BodyId{}, room.tools()),
         lease_epoch_(room.room().lease_epoch) {
     for (auto& time : tick_times_) time.store(0, std::memory_order_relaxed);
     for (const ToolModel& model : session_.plan().tools) tool_names_.push_back(model.tool.name);
@@ -140,7 +143,8 @@ class Client {
   Result<ClientOutcome> run() {
     if (Result<void> opened = log_.open(options_.session_log, session_.device().info()); !opened)
       return tl::unexpected(opened.error());
-    if (Result<void> opened = recorder_.open(options_.record, recording_info()); !opened) return tl::unexpected(opened.error());
+    if (Result<void> opened = recorder_.open(options_.record, recording_info()); !opened)
+      return tl::unexpected(opened.error());
     open_room();
     std::thread replica([this] { replica_thread(); });
     std::thread reporter([this] { reporter_thread(); });
@@ -154,8 +158,8 @@ class Client {
     reporter.join();
     outcome_.fast_path = room_.fast_path();
     const MountFollower& shown = mounted_.shown();
-    outcome_.mount = {mounted_.there(), mounted_.most_mm(), mounted_.most_rad(), shown.put_in_mj(), shown.released_mj(),
-                      shown.given_mj(), shown.granted_mj(), shown.low_pass_s()};
+    outcome_.mount = {mounted_.there(),    mounted_.most_mm(), mounted_.most_rad(), shown.put_in_mj(),
+                      shown.released_mj(), shown.given_mj(),   shown.granted_mj(),  shown.low_pass_s()};
     room_.close();
     {
       const std::lock_guard lock(mutex_);
@@ -163,10 +167,10 @@ class Client {
     }
     outcome_.stopped = stop_.requested() && !session_.done() && !session_.endless();
     if (!outcome_.lost && !outcome_.stopped && outcome_.unconfirmed > 0)
-      outcome_.lost = Error{ErrorCode::unavailable, "the server has not confirmed the last " +
-                                                        std::to_string(outcome_.unconfirmed) + " cuts within " +
-                                                        std::to_string(kConfirmPatience.count()) +
-                                                        " s; look at the server's log"};
+      outcome_.lost =
+          Error{ErrorCode::unavailable, "the server has not confirmed the last " +
+                                            std::to_string(outcome_.unconfirmed) + " cuts within " +
+                                            std::to_string(kConfirmPatience.count()) + " s; look at the server's log"};
     // Some of the leaves are no bone that the room ever had.
     if (joined_ && !changing_) outcome_.field_hash = replica_.hash();
     const std::string hash = outcome_.field_hash ? to_hex(*outcome_.field_hash) : "";
@@ -229,14 +233,18 @@ class Client {
     };
     events.supervised = [this, pass](const HandSupervised& decided) {
       // At once to the loop, which may not wait for what the replica has to do before.
-      oversights_.store(haptic_restrictions(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
+      oversights_.store(
+          haptic_restrictions(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
       pass(decided);
     };
-    events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) { stop_flag_ = packed(StopFlag{lease_epoch, frozen}); };
+    events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) {
+      stop_flag_ = packed(StopFlag{lease_epoch, frozen});
+    };
     events.said = [pass](const WordsSaid& said) { pass(said); };
     events.partner = [this, pass](const CuttingState& state) {
       hear_partner(state);
-      if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost && named_tools_.insert(state.tool_name).second)
+      if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost &&
+          named_tools_.insert(state.tool_name).second)
         pass(ToolNamed{state.tool_name});
     };
     events.bone = [this](const MountPose& seen) { places_of_bone_.store(ToldPlace{line_, seen}); };
@@ -259,8 +267,8 @@ class Client {
       }
       if (partner.heard_ns < place->heard_ns) place = &partner;
     }
-    *place = {state.author, state.state_seq, state.pose_bone_tool, state.pose_bone_device, ns(Clock::now()),
-              std::hash<std::string>{}(state.tool_name)};
+    *place = {state.author,           state.state_seq,  state.pose_bone_tool,
+              state.pose_bone_device, ns(Clock::now()), std::hash<std::string>{}(state.tool_name)};
     partners_.store(heard_partners_);
   }
 
@@ -334,9 +342,11 @@ class Client {
       tick_times_[now.report.state_seq % kTickTimes].store(woke_ns, std::memory_order_relaxed);
       const bool idle = now.order.phase == SurgeonPhase::wait || now.order.phase == SurgeonPhase::done;
       ToolPlace& place = places_.writable();
-      place = {now.report.pose_bone_proxy, now.report.tool, static_cast<std::uint32_t>(now.order.step), taken_up_ |= !idle};
+      place = {now.report.pose_bone_proxy, now.report.tool, static_cast<std::uint32_t>(now.order.step),
+               taken_up_ |= !idle};
       places_.publish();
-      if (now.report.events & kUncovered && !idle && now.order.phase != SurgeonPhase::take_up) ++outcome_.uncovered_ticks;
+      if (now.report.events & kUncovered && !idle && now.order.phase != SurgeonPhase::take_up)
+        ++outcome_.uncovered_ticks;
       if (now.report.events & kCutsWaiting) ++outcome_.cuts_waiting_ticks;
 
       row_.mono_ns = woke_ns;
@@ -434,7 +444,8 @@ class Client {
       replica_.restore(leaf);
   }
   void take(const Interrupted& interrupted) {
-    // Contact goes on with what is held; the leaves that come take its place together, so that no bone is missed meanwhile.
+    // Contact goes on with what is held; the leaves that come take its place together, so that no bone is missed
+    // meanwhile.
     if (joined_ && !interrupted_) log::warn("the line to the server is interrupted", {{"reason", interrupted.why}});
     interrupted_ = joined_;
     renewed_.clear();
@@ -448,7 +459,8 @@ class Client {
     changing_ = interrupted_ = false;
     renewed_ = {};
     ++outcome_.interruptions;
-    log::info("the line to the server stands again", {{"room_seq", room.contained.value}, {"unconfirmed_cuts", replica_.unconfirmed()}});
+    log::info("the line to the server stands again",
+              {{"room_seq", room.contained.value}, {"unconfirmed_cuts", replica_.unconfirmed()}});
   }
   void take(const RoomAtJoin& room) {
     if (interrupted_) return renew(room);
@@ -535,11 +547,13 @@ class Client {
     const auto because = [&](Rejection reason) { return rejected.reason == sentence(reason); };
     if (because(Rejection::frozen)) return static_cast<void>(++outcome_.cuts_stopped);
     if (because(Rejection::taken)) return static_cast<void>(++outcome_.cuts_taken);
-    if (because(Rejection::zone) || because(Rejection::forbidden_tool)) return static_cast<void>(++outcome_.cuts_elsewhere);
+    if (because(Rejection::zone) || because(Rejection::forbidden_tool))
+      return static_cast<void>(++outcome_.cuts_elsewhere);
     if (!fell) return;  // it had fallen with an undo, or with one before it
     // One now and then gives its bone back; a room that takes none makes further work pointless.
     constexpr int kMostInARow = 20;
-    if (rejected_in_a_row_++ == 0) log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
+    if (rejected_in_a_row_++ == 0)
+      log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
     if (rejected_in_a_row_ != kMostInARow) return;
     give_up({ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason});
   }
@@ -552,12 +566,16 @@ class Client {
     unconfirmed_ = replica_.unconfirmed();
     const RoomHealth before = room_health_.exchange(health);
     if (health == before) return;
-    if (health == RoomHealth::follows) log::info("the server follows again");
-    else log::warn("the spindle is held", {{"because", name(health)}, {"unconfirmed_cuts", replica_.unconfirmed()}});
+    if (health == RoomHealth::follows)
+      log::info("the server follows again");
+    else
+      log::warn("the spindle is held", {{"because", name(health)}, {"unconfirmed_cuts", replica_.unconfirmed()}});
     if (health == RoomHealth::lost && link_ok_)
-      give_up({ErrorCode::unavailable, interrupted_ ? "the line to the server has not come back; see whether osteon-server still runs and can be reached"
-                                                    : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
-                                                          " cuts; see whether it runs and can be reached"});
+      give_up({ErrorCode::unavailable,
+               interrupted_
+                   ? "the line to the server has not come back; see whether osteon-server still runs and can be reached"
+                   : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
+                         " cuts; see whether it runs and can be reached"});
   }
 
   void build_patch() {
@@ -661,7 +679,8 @@ class Client {
     was_forbidden_ = forbidden;
     was_led_ = led;
     outcome_.forbidden_ticks += forbidden;
-    if (forbidden || led) outcome_.overseen_step_n = std::max(outcome_.overseen_step_n, row.force_rendered_n - force_before_n_);
+    if (forbidden || led)
+      outcome_.overseen_step_n = std::max(outcome_.overseen_step_n, row.force_rendered_n - force_before_n_);
     force_before_n_ = row.force_rendered_n;
     if (!led) return;
     outcome_.guide_mm = r.guide_distance_mm;
@@ -690,14 +709,17 @@ class Client {
 
   void print_status(const TickRow& row) {
     const LoopReport& r = row.report;
-    std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)", tool_name(row).c_str(), name(row.phase),
-                row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
-    if (r.out_of_range != 0) std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
+    std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)", tool_name(row).c_str(),
+                name(row.phase), row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm,
+                name(r.phase));
+    if (r.out_of_range != 0)
+      std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
     const RoomHealth health = room_health_;
     if (r.events & kOnMetal) std::printf(", on metal, which it does not cut");
     if (r.events & kForbidden) std::printf(", stopped by %s", overseer_.empty() ? "an instructor" : overseer_.c_str());
     if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guide_distance_mm);
-    if (health != RoomHealth::follows) std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
+    if (health != RoomHealth::follows)
+      std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
     if (live_.refresh()) {
       const TickStats now = live_.value().since(told_);
       told_ = live_.value();
@@ -712,39 +734,39 @@ class Client {
   RoomSession& room_;
   const ClientOptions& options_;
   const StopSignal& stop_;
-  Session& session_;           // haptic thread; its queue of cuts is emptied by the replica's thread
-  FeltMount mounted_;        // haptic thread
-  Replica replica_;            // replica thread, until it is joined
-  PatchBuilder builder_;       // replica thread
-  CutLog cut_log_;             // replica thread, until it is joined
-  SessionLog log_;             // reporter thread
-  Recorder recorder_;          // filled by the reporter thread
-  RangeWatch ranges_;          // reporter thread, until it is joined
-  MetalWatch metal_;           // reporter thread
+  Session& session_;                     // haptic thread; its queue of cuts is emptied by the replica's thread
+  FeltMount mounted_;                    // haptic thread
+  Replica replica_;                      // replica thread, until it is joined
+  PatchBuilder builder_;                 // replica thread
+  CutLog cut_log_;                       // replica thread, until it is joined
+  SessionLog log_;                       // reporter thread
+  Recorder recorder_;                    // filled by the reporter thread
+  RangeWatch ranges_;                    // reporter thread, until it is joined
+  MetalWatch metal_;                     // reporter thread
   std::vector<std::string> tool_names_;  // never changes
 
-  TripleBuffer<Patch> patches_;     // replica → haptic
-  TripleBuffer<ToolPlace> places_;  // haptic → replica
+  TripleBuffer<Patch> patches_;                    // replica → haptic
+  TripleBuffer<ToolPlace> places_;                 // haptic → replica
   TripleBuffer<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
-  TripleBuffer<HapticRestrictions> oversights_;             // what an instructor has decided, session → haptic
-  TripleBuffer<ToldPlace> places_of_bone_;         // session → haptic
-  std::atomic<std::uint64_t> line_{1};            // which one this is
-  TripleBuffer<MountLoad> pushes_;                  // haptic → reporter
-  std::atomic<std::uint64_t> stop_flag_{0};       // the newest datagram's word on it, likewise
-  TripleBuffer<Partners> partners_;                // others' tools, session → haptic
-  Partners heard_partners_;                       // of the session's, as the next
+  TripleBuffer<HapticRestrictions> oversights_;                   // what an instructor has decided, session → haptic
+  TripleBuffer<ToldPlace> places_of_bone_;                        // session → haptic
+  std::atomic<std::uint64_t> line_{1};                            // which one this is
+  TripleBuffer<MountLoad> pushes_;                                // haptic → reporter
+  std::atomic<std::uint64_t> stop_flag_{0};                       // the newest datagram's word on it, likewise
+  TripleBuffer<Partners> partners_;                               // others' tools, session → haptic
+  Partners heard_partners_;                                       // of the session's, as the next
   std::set<std::string> named_tools_;
-  TripleBuffer<PartnerSolids> partner_solids_;     // replica → haptic
-  PartnerSolids known_solids_;                    // replica thread
-  std::atomic<double> line_lag_s_{0};             // how old a partner's state is when it comes: both lines taken to be alike
-  SpscQueue<TickRow, 2048> rows_; // haptic → reporter
-  TripleBuffer<TickStats> live_;    // haptic → reporter, once a second
-  TickStats told_;                 // reporter: of the last line
+  TripleBuffer<PartnerSolids> partner_solids_;  // replica → haptic
+  PartnerSolids known_solids_;                  // replica thread
+  std::atomic<double> line_lag_s_{0};  // how old a partner's state is when it comes: both lines taken to be alike
+  SpscQueue<TickRow, 2048> rows_;      // haptic → reporter
+  TripleBuffer<TickStats> live_;       // haptic → reporter, once a second
+  TickStats told_;                     // reporter: of the last line
   std::optional<Clock::time_point> stall_told_;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
-  std::mutex mutex_;               // guards the three below; never taken by the haptic thread
+  std::mutex mutex_;  // guards the three below; never taken by the haptic thread
   bool replica_over_ = false;
   std::deque<FromRoom> from_room_;
   std::optional<Error> lost_why_;
@@ -769,15 +791,15 @@ class Client {
   double force_before_n_ = 0;
   std::vector<OversightNote> loop_notes_;
   // Replica thread.
-  bool supervised_ = false;        // something was decided about this hand
-  std::string overseer_;           // by whom, as far as the room says it
-  std::uint64_t lease_epoch_;      // of the room, as far as it was heard
-  std::deque<Cut> unsent_;         // as bounded as what is unconfirmed
+  bool supervised_ = false;    // something was decided about this hand
+  std::string overseer_;       // by whom, as far as the room says it
+  std::uint64_t lease_epoch_;  // of the room, as far as it was heard
+  std::deque<Cut> unsent_;     // as bounded as what is unconfirmed
   Pose built_at_;
   int built_tool_ = -1;
   int rejected_in_a_row_ = 0;
-  bool changing_ = false;             // a change of the bone has come in part
-  bool interrupted_ = false;          // since then leaves are gathered here
+  bool changing_ = false;     // a change of the bone has come in part
+  bool interrupted_ = false;  // since then leaves are gathered here
   std::vector<FieldLeaf> renewed_;
   ConfirmationMonitor watch_;
   std::size_t noted_steps_ = 0;
@@ -790,7 +812,8 @@ class Client {
 
 }  // namespace
 
-Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options, const StopSignal& stop) {
+Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options,
+                                 const StopSignal& stop) {
   // Large: its queues are part of it.
   const auto client = std::make_unique<Client>(room, session, options, stop);
   return client->run();

@@ -37,7 +37,8 @@ std::string list_devices(const std::vector<DeviceLine>& lines) {
 int run_devices(int argc, char** argv) {
   DeviceOptions options;
   CLI::App app(
-      "Lists the devices that --device can name, what of them is here, and what is missing. Exits with 1 when a file that "
+      "Lists the devices that --device can name, what of them is here, and what is missing. Exits with 1 when a file "
+      "that "
       "you name cannot be used.",
       "osteon-haptic devices");
   add_device_options(app, options);

@@ -66,8 +66,10 @@ struct Point {
 
 std::vector<Point> comparison_points() {
   std::vector<Point> points;
-  for (const double density : {0.3, 0.5, 1.0, 1.8, 1.9, 2.0}) points.push_back({"chi", "drill-3.2", 3.2, 1000, 1, density});
-  for (const double diameter : {2.5, 3.2, 4.5, 7.94}) points.push_back({"allotta", "drill-3.2", diameter, 1000, 1, 1.9});
+  for (const double density : {0.3, 0.5, 1.0, 1.8, 1.9, 2.0})
+    points.push_back({"chi", "drill-3.2", 3.2, 1000, 1, density});
+  for (const double diameter : {2.5, 3.2, 4.5, 7.94})
+    points.push_back({"allotta", "drill-3.2", diameter, 1000, 1, 1.9});
   points.push_back({"spring-damper", "drill-3.2", 3.2, 1000, 1, 1.9});
   points.push_back({"multi-point", "drill-3.2", 3.2, 1000, 1, 1.9});
   points.push_back({"agus", "burr-round-5", 5.0, 20000, 5, 1.9});
@@ -107,11 +109,13 @@ json computed(const Point& point) {
 
 std::string laws_text() {
   std::ostringstream out;
-  out << "Force laws of Osteon. Whole point or edge in bone; [A] marks an assumption. N rpm, v mm/s, rho g/cm3, D mm.\n";
+  out << "Force laws of Osteon. Whole point or edge in bone; [A] marks an assumption. N rpm, v mm/s, rho g/cm3, D "
+         "mm.\n";
   for (const ForceLaw& law : force_laws()) {
     out << "\n" << law.name << ": " << law.title << "\n";
-    paragraph(out, "equation", std::string(law.equation) +
-                                   (law.number.empty() ? "" : " (" + std::string(law.number) + " of the dissertation)"));
+    paragraph(out, "equation",
+              std::string(law.equation) +
+                  (law.number.empty() ? "" : " (" + std::string(law.number) + " of the dissertation)"));
     paragraph(out, "source", law.source);
     paragraph(out, "units", law.inputs);
     paragraph(out, "constants", law.constants);
@@ -121,7 +125,8 @@ std::string laws_text() {
     paragraph(out, "fits", tools_of(law));
     paragraph(out, "default of", defaults_of(law));
   }
-  out << "\nA tool file chooses with a line such as \"law: allotta\". The laws disagree with each other; wear 1 is sharp, a\n"
+  out << "\nA tool file chooses with a line such as \"law: allotta\". The laws disagree with each other; wear 1 is "
+         "sharp, a\n"
          "blunt tool needs about twice the force.\n";
   return out.str();
 }

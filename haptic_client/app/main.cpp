@@ -16,8 +16,8 @@
 #include "haptic_client/app/check_command.hpp"
 #include "haptic_client/app/client.hpp"
 #include "haptic_client/app/devices_command.hpp"
-#include "haptic_client/app/tool_operator.hpp"
 #include "haptic_client/app/laws_command.hpp"
+#include "haptic_client/app/tool_operator.hpp"
 
 namespace {
 
@@ -39,11 +39,14 @@ struct Options {
 json vector(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
 
 json means(const LayerMeans& m) {
-  return {{"force_n", m.force_n}, {"feed_mm_per_s", m.feed_mm_per_s}, {"density_g_cm3", m.density_g_cm3},
+  return {{"force_n", m.force_n},
+          {"feed_mm_per_s", m.feed_mm_per_s},
+          {"density_g_cm3", m.density_g_cm3},
           {"seconds", 1e-3 * static_cast<double>(m.ticks)}};
 }
 
-json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, const StepResult& result, double removed_mm3) {
+json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, const StepResult& result,
+                  double removed_mm3) {
   json out{{"completed", result.completed}, {"duration_s", result.duration_s}};
   if (result.gave_up) {
     out["gave_up_in"] = name(*result.gave_up);
@@ -103,7 +106,8 @@ json haptic_restrictions(const ClientOutcome& outcome) {
     if (note.room_seq != 0) notes.back()["room_seq"] = note.room_seq;
   }
   for (const WordsNote& note : outcome.words)
-    words.push_back({{"at_s", seconds(note.mono_ns)}, {"room_seq", note.room_seq}, {"from", note.from}, {"words", note.words}});
+    words.push_back(
+        {{"at_s", seconds(note.mono_ns)}, {"room_seq", note.room_seq}, {"from", note.from}, {"words", note.words}});
   return {{"oversight", notes},
           {"words", words},
           {"overseen",
@@ -125,66 +129,68 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     steps.push_back(step_summary(plan.steps[i], plan.tools, outcome.steps[i], outcome.removed_mm3[i]));
   json summary = {{"device", device},
-          {"device_losses", losses},
-          {"device_limits",
-           {{"peak_n", outcome.limits.peak_n},
-            {"continuous_n", outcome.limits.continuous_n},
-            {"stiffness_n_per_mm", outcome.limits.stiffness_n_per_mm},
-            {"workspace_radius_mm", outcome.limits.workspace_radius_mm}}},
-          {"force_scale", outcome.loop.force_scale},
-          {"coupling_n_per_mm", outcome.coupling_n_per_mm},
-          {"workspace_scale", outcome.workspace_scale},
-          {"loop",
-           {{"ticks", ticks.work.count()},
-            {"missed", ticks.missed},
-            {"stalls", outcome.stalls},
-            {"longest_stall_ms", outcome.longest_stall_ms},
-            {"realtime", outcome.realtime},
-            {"late_p50_us", ticks.lateness.percentile_us(50)},
-            {"late_p99_us", ticks.lateness.percentile_us(99)},
-            {"late_p999_us", ticks.lateness.percentile_us(99.9)},
-            {"late_max_us", ticks.lateness.max_us()},
-            {"work_p50_us", ticks.work.percentile_us(50)},
-            {"work_p99_us", ticks.work.percentile_us(99)},
-            {"work_p999_us", ticks.work.percentile_us(99.9)},
-            {"work_max_us", ticks.work.max_us()}}},
-          {"patches",
-           {{"built", outcome.patches},
-            {"p50_us", outcome.patch_p50_us},
-            {"p99_us", outcome.patch_p99_us},
-            {"uncovered_ticks", outcome.uncovered_ticks},
-            {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
-          {"held_for_room_ticks", outcome.held_for_room_ticks},
-          {"interruptions", outcome.interruptions},
-          {"fast_path",
-           {{"alive", outcome.fast_path.alive},
-            {"round_trip_ms", outcome.fast_path.round_trip_ms},
-            {"loss", outcome.fast_path.loss},
-            {"packets_sent", outcome.fast_path.packets_sent},
-            {"bytes_sent", outcome.fast_path.bytes_sent},
-            {"packets_received", outcome.fast_path.packets_received}}},
-          {"mount",
-           {{"there", outcome.mount.there},
-            {"most_mm", outcome.mount.most_mm},
-            {"most_rad", outcome.mount.most_rad},
-            {"put_in_mj", outcome.mount.put_in_mj},
-            {"released_mj", outcome.mount.released_mj},
-            {"given_mj", outcome.mount.given_mj},
-            {"granted_mj", outcome.mount.granted_mj},
-            {"low_pass_s", outcome.mount.low_pass_s}}},
-          {"rows_dropped", outcome.rows_dropped},
-          {"recording",
-           {{"rows", outcome.recording.rows}, {"dropped", outcome.recording.dropped}, {"trouble", outcome.recording.trouble}}},
-          {"cuts", outcome.cuts.size()},
-          {"rejected", outcome.rejected},
-          {"laws_outside_range", outside},
-          {"steps", steps},
-          {"removed_mm3", outcome.removed_total_mm3},
-          {"field_hash", outcome.field_hash ? json(to_hex(*outcome.field_hash)) : json(nullptr)},
-          {"unconfirmed", outcome.unconfirmed},
-          {"room_seq", outcome.room_seq.value},
-          {"stopped", outcome.stopped},
-          {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
+                  {"device_losses", losses},
+                  {"device_limits",
+                   {{"peak_n", outcome.limits.peak_n},
+                    {"continuous_n", outcome.limits.continuous_n},
+                    {"stiffness_n_per_mm", outcome.limits.stiffness_n_per_mm},
+                    {"workspace_radius_mm", outcome.limits.workspace_radius_mm}}},
+                  {"force_scale", outcome.loop.force_scale},
+                  {"coupling_n_per_mm", outcome.coupling_n_per_mm},
+                  {"workspace_scale", outcome.workspace_scale},
+                  {"loop",
+                   {{"ticks", ticks.work.count()},
+                    {"missed", ticks.missed},
+                    {"stalls", outcome.stalls},
+                    {"longest_stall_ms", outcome.longest_stall_ms},
+                    {"realtime", outcome.realtime},
+                    {"late_p50_us", ticks.lateness.percentile_us(50)},
+                    {"late_p99_us", ticks.lateness.percentile_us(99)},
+                    {"late_p999_us", ticks.lateness.percentile_us(99.9)},
+                    {"late_max_us", ticks.lateness.max_us()},
+                    {"work_p50_us", ticks.work.percentile_us(50)},
+                    {"work_p99_us", ticks.work.percentile_us(99)},
+                    {"work_p999_us", ticks.work.percentile_us(99.9)},
+                    {"work_max_us", ticks.work.max_us()}}},
+                  {"patches",
+                   {{"built", outcome.patches},
+                    {"p50_us", outcome.patch_p50_us},
+                    {"p99_us", outcome.patch_p99_us},
+                    {"uncovered_ticks", outcome.uncovered_ticks},
+                    {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
+                  {"held_for_room_ticks", outcome.held_for_room_ticks},
+                  {"interruptions", outcome.interruptions},
+                  {"fast_path",
+                   {{"alive", outcome.fast_path.alive},
+                    {"round_trip_ms", outcome.fast_path.round_trip_ms},
+                    {"loss", outcome.fast_path.loss},
+                    {"packets_sent", outcome.fast_path.packets_sent},
+                    {"bytes_sent", outcome.fast_path.bytes_sent},
+                    {"packets_received", outcome.fast_path.packets_received}}},
+                  {"mount",
+                   {{"there", outcome.mount.there},
+                    {"most_mm", outcome.mount.most_mm},
+                    {"most_rad", outcome.mount.most_rad},
+                    {"put_in_mj", outcome.mount.put_in_mj},
+                    {"released_mj", outcome.mount.released_mj},
+                    {"given_mj", outcome.mount.given_mj},
+                    {"granted_mj", outcome.mount.granted_mj},
+                    {"low_pass_s", outcome.mount.low_pass_s}}},
+                  {"rows_dropped", outcome.rows_dropped},
+                  {"recording",
+                   {{"rows", outcome.recording.rows},
+                    {"dropped", outcome.recording.dropped},
+                    {"trouble", outcome.recording.trouble}}},
+                  {"cuts", outcome.cuts.size()},
+                  {"rejected", outcome.rejected},
+                  {"laws_outside_range", outside},
+                  {"steps", steps},
+                  {"removed_mm3", outcome.removed_total_mm3},
+                  {"field_hash", outcome.field_hash ? json(to_hex(*outcome.field_hash)) : json(nullptr)},
+                  {"unconfirmed", outcome.unconfirmed},
+                  {"room_seq", outcome.room_seq.value},
+                  {"stopped", outcome.stopped},
+                  {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
   summary.update(haptic_restrictions(outcome));
   return summary;
 }
@@ -195,9 +201,15 @@ void tell(DeviceEvent event, std::string_view device, const std::string& sentenc
     case DeviceEvent::lost:
       log::warn("device lost", {{"device", device}, {"because", sentence}, {"force", "none until it is back"}});
       break;
-    case DeviceEvent::back: log::info("device back", {{"device", device}}); break;
-    case DeviceEvent::advice: log::warn("device waits", {{"device", device}, {"for", sentence}}); break;
-    case DeviceEvent::ready: log::info("device ready", {{"device", device}}); break;
+    case DeviceEvent::back:
+      log::info("device back", {{"device", device}});
+      break;
+    case DeviceEvent::advice:
+      log::warn("device waits", {{"device", device}, {"for", sentence}});
+      break;
+    case DeviceEvent::ready:
+      log::info("device ready", {{"device", device}});
+      break;
   }
 }
 
@@ -214,7 +226,8 @@ Result<void> check_outputs(const Options& options) {
   return check_writable(options.summary, "the summary", "--summary");
 }
 
-// Error unavailable: the first step whose time, or whose recording, ran out. One that a signal stopped is as it should be.
+// Error unavailable: the first step whose time, or whose recording, ran out. One that a signal stopped is as it should
+// be.
 Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     if (outcome.steps[i].gave_up)
@@ -224,8 +237,9 @@ Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
   if (outcome.stopped) return {};
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     if (!outcome.steps[i].completed && plan.steps[i].plan.action != Action::free_hand)
-      return failure(ErrorCode::unavailable, "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
-                                                 ") did not finish: the recording ends here; play one that was made to its end");
+      return failure(ErrorCode::unavailable,
+                     "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
+                         ") did not finish: the recording ends here; play one that was made to its end");
   return {};
 }
 
@@ -249,7 +263,9 @@ Result<void> run(Options& options, const StopSignal& stop) {
   Result<std::unique_ptr<Session>> session = hand->on(room->bone(), *room->tools(), options.force_scale.value_or(0.0));
   if (!session) return tl::unexpected(session.error());
   const LoopParams& shown = (*session)->loop().params();
-  log::info("in hand", {{"device", hand->device_name()}, {"peak_n", shown.peak_n}, {"continuous_n", shown.continuous_n},
+  log::info("in hand", {{"device", hand->device_name()},
+                        {"peak_n", shown.peak_n},
+                        {"continuous_n", shown.continuous_n},
                         {"force_scale", shown.force_scale}});
 
   options.client.played = hand->recorded();
@@ -269,13 +285,17 @@ Result<void> run(Options& options, const StopSignal& stop) {
   std::string unconfirmed;
   if (outcome->unconfirmed > 0)
     unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in what follows)";
-  std::printf("%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
-              "field %s at %llu; %llu of %llu ms missed\n",
-              kProgram, outcome->lost ? "broken off" : outcome->stopped ? "stopped" : "ended", static_cast<long long>(finished),
-              plan.steps.size(), outcome->cuts.size(), unconfirmed.c_str(), outcome->removed_total_mm3, field.c_str(),
-              static_cast<unsigned long long>(outcome->room_seq.value),
-              static_cast<unsigned long long>(outcome->ticks.missed),
-              static_cast<unsigned long long>(outcome->ticks.missed + outcome->ticks.work.count()));
+  std::printf(
+      "%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
+      "field %s at %llu; %llu of %llu ms missed\n",
+      kProgram,
+      outcome->lost      ? "broken off"
+      : outcome->stopped ? "stopped"
+                         : "ended",
+      static_cast<long long>(finished), plan.steps.size(), outcome->cuts.size(), unconfirmed.c_str(),
+      outcome->removed_total_mm3, field.c_str(), static_cast<unsigned long long>(outcome->room_seq.value),
+      static_cast<unsigned long long>(outcome->ticks.missed),
+      static_cast<unsigned long long>(outcome->ticks.missed + outcome->ticks.work.count()));
   if (outcome->lost) return tl::unexpected(*outcome->lost);
   if (!cut_log) return cut_log;
   if (!summary) return summary;
@@ -291,7 +311,8 @@ int main(int argc, char** argv) {
   if (argc > 1 && std::string_view(argv[1]) == "devices") return run_devices(argc - 1, argv + 1);
   Options options;
   CLI::App app(
-      "Feels and cuts the bone of a room at 1 kHz: with your hand at a haptic device, or with a simulated one that carries out a "
+      "Feels and cuts the bone of a room at 1 kHz: with your hand at a haptic device, or with a simulated one that "
+      "carries out a "
       "plan. "
       "Other commands: check, devices, laws (each with --help).",
       kProgram);
@@ -299,36 +320,42 @@ int main(int argc, char** argv) {
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, options.credentials);
   app.add_option("--name", options.room.name,
-                 "How others in the room see you called; over plain text also who you are, so that without it nobody is you again");
+                 "How others in the room see you called; over plain text also who you are, so that without it nobody "
+                 "is you again");
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");
   app.add_option("--device", options.hand.device,
-                 "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its --plan or "
+                 "simulated or simulated-3.3N (a simulated hand, with a --plan), recorded:FILE (a recording, with its "
+                 "--plan or "
                  "--tool), or for your hand "
                  "one of osteon-haptic devices, others added by \"+\": phantom, falcon+spacemouse+pedal")
       ->capture_default_str();
-  app.add_option("--view", options.hand.view,
-                 "Your hand: from where you look, front (unless said otherwise), back, left, right, top or bottom of the "
-                 "patient, or the direction x,y,z");
+  app.add_option(
+      "--view", options.hand.view,
+      "Your hand: from where you look, front (unless said otherwise), back, left, right, top or bottom of the "
+      "patient, or the direction x,y,z");
   app.add_option("--at", options.hand.at,
                  "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
   app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
-  app.add_option("--law", options.hand.law,
-                 "Your hand: the force law by which the tool resists, see osteon-haptic laws; by default the tool's own");
+  app.add_option(
+      "--law", options.hand.law,
+      "Your hand: the force law by which the tool resists, see osteon-haptic laws; by default the tool's own");
   app.add_option("--wear", options.hand.wear,
                  "Your hand: how blunt the tool is, from 1, sharp (unless said otherwise); about 2 is blunt");
   add_device_options(app, options.hand.devices);
   app.add_option("--scale", options.force_scale,
                  "Rendered over physical force; by default the device's continuous force / 30 N");
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
-  app.add_option("--record", options.client.record,
-                 "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A "
-                 "file that is there is left alone");
+  app.add_option(
+      "--record", options.client.record,
+      "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A "
+      "file that is there is left alone");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
-  app.add_option("--udp", options.room.fast_path,
-                 "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server says");
+  app.add_option(
+      "--udp", options.room.fast_path,
+      "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server says");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")->capture_default_str();
   app.add_flag("--status", options.client.status, "A short line on standard output each second");

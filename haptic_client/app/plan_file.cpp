@@ -21,7 +21,8 @@ double number(const json& object, const char* field, double otherwise, double lo
   if (!object.contains(field)) return otherwise;
   const json& value = object.at(field);
   if (!value.is_number() || !(value.get<double>() >= low && value.get<double>() <= high))
-    throw Wrong(std::string("\"") + field + "\" must be a number from " + json(low).dump() + " to " + json(high).dump());
+    throw Wrong(std::string("\"") + field + "\" must be a number from " + json(low).dump() + " to " +
+                json(high).dump());
   return value.get<double>();
 }
 
@@ -36,8 +37,9 @@ std::array<double, N> numbers(const json& object, const char* field) {
     right = value[i].is_number() && std::abs(value[i].get<double>()) <= kFarthest;
     if (right) result[i] = value[i].get<double>();
   }
-  if (!right) throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) +
-                          " numbers from -100000 to 100000");
+  if (!right)
+    throw Wrong(std::string("\"") + field + "\" must be a list of " + std::to_string(N) +
+                " numbers from -100000 to 100000");
   return result;
 }
 
@@ -68,7 +70,8 @@ PlanEntry read_entry(const json& step) {
   only(entry, {"toward", "point_mm", "axis", "beside_last_mm"});
   PlanEntry result;
   if (entry.contains("toward")) result.toward = vector(entry, "toward");
-  if (entry.contains("point_mm") != entry.contains("axis")) throw Wrong("\"entry\" needs \"point_mm\" and \"axis\" together");
+  if (entry.contains("point_mm") != entry.contains("axis"))
+    throw Wrong("\"entry\" needs \"point_mm\" and \"axis\" together");
   if (entry.contains("point_mm")) {
     result.point_mm = vector(entry, "point_mm");
     result.axis = vector(entry, "axis");
@@ -79,8 +82,8 @@ PlanEntry read_entry(const json& step) {
   return result;
 }
 
-// The force law; empty where none is named. A tool that is not of the box may be the room's own: of it only the room can
-// say whether it is there and which laws suit it.
+// The force law; empty where none is named. A tool that is not of the box may be the room's own: of it only the room
+// can say whether it is there and which laws suit it.
 std::string read_law(const json& object, const std::string& tool) {
   const std::string law = text(object, "law", "");
   if (const Result<void> well = check_law(tool, law); !well) throw Wrong("\"law\": " + well.error().message);
@@ -119,16 +122,37 @@ PlanStep read_step(const json& object) {
   if (action != "drill" && action != "burr")
     throw Wrong("\"action\" is \"" + action + "\"; choose \"drill\", \"burr\", \"screw\", \"place\" or \"wait\"");
   const bool drill = action == "drill";
-  only(object, {"action", "tool", "spindle_rpm", "hand", "feed_mm_per_s", "push_n", "entry", "beyond_mm", "window_mm",
-                "depth_mm", "sweep_mm_per_s", "wear", "law", "guide", "tremor_mm", "to_mm", "leave", "hand_stiffness_n_per_mm",
-                "hand_damping_n_s_per_mm", "hand_across_n_per_mm"});
+  only(object, {"action",
+                "tool",
+                "spindle_rpm",
+                "hand",
+                "feed_mm_per_s",
+                "push_n",
+                "entry",
+                "beyond_mm",
+                "window_mm",
+                "depth_mm",
+                "sweep_mm_per_s",
+                "wear",
+                "law",
+                "guide",
+                "tremor_mm",
+                "to_mm",
+                "leave",
+                "hand_stiffness_n_per_mm",
+                "hand_damping_n_s_per_mm",
+                "hand_across_n_per_mm"});
   step.action = drill ? Action::drill : Action::burr;
   step.tool = text(object, "tool", drill ? "drill-3.2" : "burr-round-5");
   const std::string hand = text(object, "hand", "expert");
-  if (hand == "expert") step.hand = HandKind::expert;
-  else if (hand == "novice") step.hand = HandKind::novice;
-  else if (hand == "rig") step.hand = HandKind::rig;
-  else throw Wrong("\"hand\" is \"" + hand + "\"; choose \"expert\", \"novice\" or \"rig\"");
+  if (hand == "expert")
+    step.hand = HandKind::expert;
+  else if (hand == "novice")
+    step.hand = HandKind::novice;
+  else if (hand == "rig")
+    step.hand = HandKind::rig;
+  else
+    throw Wrong("\"hand\" is \"" + hand + "\"; choose \"expert\", \"novice\" or \"rig\"");
   step.spindle_rpm = number(object, "spindle_rpm", 0.0, 100.0, 100000.0);
   step.feed_mm_per_s = number(object, "feed_mm_per_s", step.feed_mm_per_s, 0.01, 20.0);
   step.push_n = number(object, "push_n", step.push_n, 1.0, 200.0);
@@ -150,7 +174,8 @@ PlanStep read_step(const json& object) {
   }
   step.tremor_mm = number(object, "tremor_mm", 0.0, 0.0, 5.0);
   if (object.contains("guide")) {
-    if (!object.at("guide").is_boolean() || !drill) throw Wrong("\"guide\" must be true or false, and belongs to a drill");
+    if (!object.at("guide").is_boolean() || !drill)
+      throw Wrong("\"guide\" must be true or false, and belongs to a drill");
     step.through_guide = object.at("guide").get<bool>();
   }
   if (object.contains("leave")) {
@@ -180,7 +205,8 @@ Result<std::vector<PlanStep>> read_plan(const std::filesystem::path& file) {
   if (!content) return failure(content.error().code, "--plan: " + content.error().message);
   const json plan = json::parse(*content, nullptr, false);
   const std::string name = "the plan " + file.string();
-  if (plan.is_discarded()) return failure(ErrorCode::invalid_input, name + " is not JSON; see the plans that deploy/demo writes");
+  if (plan.is_discarded())
+    return failure(ErrorCode::invalid_input, name + " is not JSON; see the plans that deploy/demo writes");
   if (!plan.is_object() || !plan.contains("steps") || !plan.at("steps").is_array() || plan.at("steps").empty())
     return failure(ErrorCode::invalid_input, name + " needs \"steps\", a list with at least one step");
   std::vector<PlanStep> steps;
@@ -188,7 +214,8 @@ Result<std::vector<PlanStep>> read_plan(const std::filesystem::path& file) {
     try {
       steps.push_back(read_step(object));
     } catch (const std::exception& wrong) {
-      return failure(ErrorCode::invalid_input, name + ", step " + std::to_string(steps.size() + 1) + ": " + wrong.what());
+      return failure(ErrorCode::invalid_input,
+                     name + ", step " + std::to_string(steps.size() + 1) + ": " + wrong.what());
     }
   }
   return steps;

@@ -10,10 +10,14 @@ namespace osteon::haptic {
 
 const char* name(CuttingPhase phase) {
   switch (phase) {
-    case CuttingPhase::idle: return "idle";
-    case CuttingPhase::free: return "free";
-    case CuttingPhase::cutting: return "cutting";
-    case CuttingPhase::rubbing: return "rubbing";
+    case CuttingPhase::idle:
+      return "idle";
+    case CuttingPhase::free:
+      return "free";
+    case CuttingPhase::cutting:
+      return "cutting";
+    case CuttingPhase::rubbing:
+      return "rubbing";
   }
   return "unknown";
 }
@@ -21,10 +25,10 @@ const char* name(CuttingPhase phase) {
 std::string law_name(const ToolModel& model) { return std::string(model.law->name); }
 
 std::vector<std::string> event_names() {
-  constexpr std::array kNames{"uncovered", "force limited", "slew limited", "cuts waiting", "missed ticks",
-                              "heel contact", "guided", "stalled", "breakthrough", "pushed away",
-                              "energy limited", "ramping", "room held", "forbidden", "hand guided", "partner touched",
-                              "on metal"};
+  constexpr std::array kNames{"uncovered",       "force limited", "slew limited", "cuts waiting", "missed ticks",
+                              "heel contact",    "guided",        "stalled",      "breakthrough", "pushed away",
+                              "energy limited",  "ramping",       "room held",    "forbidden",    "hand guided",
+                              "partner touched", "on metal"};
   static_assert(kNames.size() == kLoopEvents);
   return {kNames.begin(), kNames.end()};
 }
@@ -67,7 +71,8 @@ Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInf
   if (file.empty()) return {};
   file_.open(file, std::ios::trunc);
   if (!file_)
-    return failure(ErrorCode::internal, "the session log " + file.string() + " cannot be written; choose another place");
+    return failure(ErrorCode::internal,
+                   "the session log " + file.string() + " cannot be written; choose another place");
   file_ << "time_s,mono_ns,state_seq,phase,tool,tip_x_mm,tip_y_mm,tip_z_mm,depth_mm,device_depth_mm,force_physical_n,"
            "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm,law_out_of_range\n";
   return {};
@@ -80,12 +85,12 @@ void SessionLog::write(const TickRow& row, const std::string& tool) {
   const Vec3& tip = r.pose_bone_proxy.position_mm;
   const double rendered_n = shows_force_ ? row.force_rendered_n : 0.0;
   char line[384];
-  const int size =
-      std::snprintf(line, sizeof line, "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u\n",
-                    1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
-                    static_cast<unsigned long long>(r.state_seq), name(r.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
-                    row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(), rendered_n, r.feed_mm_per_s,
-                    r.density_g_cm3, r.engaged, r.spindle_rpm, r.torque_nmm, r.out_of_range);
+  const int size = std::snprintf(
+      line, sizeof line, "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u\n",
+      1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
+      static_cast<unsigned long long>(r.state_seq), name(r.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
+      row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(), rendered_n, r.feed_mm_per_s, r.density_g_cm3,
+      r.engaged, r.spindle_rpm, r.torque_nmm, r.out_of_range);
   file_.write(line, size);
 }
 
@@ -93,7 +98,8 @@ Result<void> SessionLog::finish() {
   if (!file_.is_open()) return {};
   file_.close();
   if (!file_)
-    return failure(ErrorCode::internal, "the session log " + path_.string() + " could not be written whole; is the disk full?");
+    return failure(ErrorCode::internal,
+                   "the session log " + path_.string() + " could not be written whole; is the disk full?");
   return {};
 }
 
@@ -101,8 +107,8 @@ Result<void> write_cut_log(const std::filesystem::path& file, const std::vector<
   if (file.empty()) return {};
   std::string text = "author_seq,room_seq,closed_mono_ns,confirmed_mono_ns\n";
   for (const RecordedCut& row : rows)
-    text += std::to_string(row.author_seq) + ',' + std::to_string(row.room_seq) + ',' + std::to_string(row.closed_mono_ns) + ',' +
-            std::to_string(row.confirmed_mono_ns) + '\n';
+    text += std::to_string(row.author_seq) + ',' + std::to_string(row.room_seq) + ',' +
+            std::to_string(row.closed_mono_ns) + ',' + std::to_string(row.confirmed_mono_ns) + '\n';
   return write_file(file, text);
 }
 

@@ -22,10 +22,10 @@ struct TickRow {
   LoopReport report;
   DeviceReading reading;
   double commanded_rpm = 0;
-  DeviceOutput rendered;      // device frame
+  DeviceOutput rendered;  // device frame
   // In this tick the tool was taken up: where, and how the device lies in the bone's frame from then on.
   bool take_up = false;
-  Pose taken_up_at;           // bone frame
+  Pose taken_up_at;  // bone frame
   WorkspaceMapping mapping;
 };
 
@@ -61,11 +61,11 @@ class RangeWatch {
   static constexpr std::int64_t kLasting_ticks = 200;
   struct Use {
     const ForceLaw* law = nullptr;
-    unsigned bits = 0;         // of OutOfRange, all that were ever seen
-    std::uint64_t ticks = 0;   // spent outside
+    unsigned bits = 0;        // of OutOfRange, all that were ever seen
+    std::uint64_t ticks = 0;  // spent outside
   };
-  // To be asked of every tick that was outside, in order; it may be asked of others. A sentence when a law stays outside for
-  // the first time in the session, else nothing.
+  // To be asked of every tick that was outside, in order; it may be asked of others. A sentence when a law stays
+  // outside for the first time in the session, else nothing.
   [[nodiscard]] std::string note(const ToolModel& model, const LoopReport& report);
   [[nodiscard]] const std::vector<Use>& uses() const { return uses_; }  // each law once
 
@@ -76,7 +76,7 @@ class RangeWatch {
     bool told = false;
   };
   std::vector<Use> uses_;
-  std::vector<Stay> stays_;      // of each use
+  std::vector<Stay> stays_;  // of each use
 };
 
 // Rows are written as they come; a disk that is full shows at finish().

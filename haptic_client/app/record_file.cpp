@@ -21,16 +21,25 @@ namespace {
 static_assert(std::is_same_v<hid_t, std::int64_t>);
 
 constexpr const char* kReadme =
-    "One row for each millisecond, under `data` and in the groups of poses and wrenches; data/time holds as many rows as are "
-    "complete. Lengths are millimetres, forces newtons, torques newton-millimetres, times seconds since 1970 (UTC). Poses are "
-    "[x, y, z, qx, qy, qz, qw] of the tool, its tip at the origin and +z along its axis out of the tip. Frame `bone` is the "
-    "patient's (DICOM LPS: x to the left, y to the back, z to the head); frame `device` has x to the right, y up, z to the user. "
-    "drill_pose is the tool as the bone lets it be (the proxy), device_pose the tool as the hand holds it, handle_pose the "
+    "One row for each millisecond, under `data` and in the groups of poses and wrenches; data/time holds as many rows "
+    "as are "
+    "complete. Lengths are millimetres, forces newtons, torques newton-millimetres, times seconds since 1970 (UTC). "
+    "Poses are "
+    "[x, y, z, qx, qy, qz, qw] of the tool, its tip at the origin and +z along its axis out of the tip. Frame `bone` "
+    "is the "
+    "patient's (DICOM LPS: x to the left, y to the back, z to the head); frame `device` has x to the right, y up, z to "
+    "the user. "
+    "drill_pose is the tool as the bone lets it be (the proxy), device_pose the tool as the hand holds it, handle_pose "
+    "the "
     "device's handle; bone_pose is the bone on its mount, seen from where it rests: frame `bone` goes with it, that of "
-    "burr_change stays. Wrenches are [fx, fy, fz, tx, ty, tz] at the tip: `physical` of the bone on the tool, not scaled; "
-    "`wrench` in drill_force_feedback as it was shown by the device, s times as strong (data/force_scale), zero where it shows "
-    "none. burr_change has a row for each time that a tool was taken up: which, at which row, and how the device's frame lay in "
-    "the bone's from then on. Enumerations carry their names. Bone that was removed is named by metadata/field_hash and kept in "
+    "burr_change stays. Wrenches are [fx, fy, fz, tx, ty, tz] at the tip: `physical` of the bone on the tool, not "
+    "scaled; "
+    "`wrench` in drill_force_feedback as it was shown by the device, s times as strong (data/force_scale), zero where "
+    "it shows "
+    "none. burr_change has a row for each time that a tool was taken up: which, at which row, and how the device's "
+    "frame lay in "
+    "the bone's from then on. Enumerations carry their names. Bone that was removed is named by metadata/field_hash "
+    "and kept in "
     "the room's journal.";
 
 // The frames and units of columns.
@@ -91,7 +100,8 @@ bool make_texts(hid_t file, const char* path, const std::vector<std::string>& te
   const hsize_t count = texts.size();
   const Hdf5Handle type = text_type(longest), space(H5Screate_simple(1, &count, nullptr), H5Sclose);
   const Hdf5Handle dataset = make_dataset(file, path, type.id(), space.id(), H5P_DEFAULT);
-  return dataset.ok() && (texts.empty() || H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, flat.data()) >= 0);
+  return dataset.ok() &&
+         (texts.empty() || H5Dwrite(dataset.id(), type.id(), H5S_ALL, H5S_ALL, H5P_DEFAULT, flat.data()) >= 0);
 }
 
 struct Names {
@@ -198,15 +208,17 @@ bool make_column(hid_t file, Column<Row>& made, hsize_t chunk_rows) {
   const int rank = made.width > 1 ? 2 : 1;
   const hsize_t width = static_cast<hsize_t>(made.width);
   const hsize_t now[] = {0, width}, most[] = {H5S_UNLIMITED, width}, chunk[] = {chunk_rows, width};
-  const Hdf5Handle space(H5Screate_simple(rank, now, most), H5Sclose), creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
+  const Hdf5Handle space(H5Screate_simple(rank, now, most), H5Sclose),
+      creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   // Compressed as its neighbours' recordings are; poses hardly change from one row to the next.
-  if (H5Pset_chunk(creation.id(), rank, chunk) < 0 || H5Pset_shuffle(creation.id()) < 0 || H5Pset_deflate(creation.id(), 1) < 0)
+  if (H5Pset_chunk(creation.id(), rank, chunk) < 0 || H5Pset_shuffle(creation.id()) < 0 ||
+      H5Pset_deflate(creation.id(), 1) < 0)
     return false;
   made.dataset = make_dataset(file, made.path, made.type_id, space.id(), creation.id());
   if (!made.dataset.ok()) return false;
   const hid_t id = made.dataset.id();
-  return (made.units.empty() || set_text(id, "units", made.units)) && (made.frame.empty() || set_text(id, "frame", made.frame)) &&
-         set_text(id, "meaning", made.meaning);
+  return (made.units.empty() || set_text(id, "units", made.units)) &&
+         (made.frame.empty() || set_text(id, "frame", made.frame)) && set_text(id, "meaning", made.meaning);
 }
 
 template <class Row>
@@ -217,9 +229,11 @@ bool write_column(Column<Row>& made) {
   const int rank = made.width > 1 ? 2 : 1;
   const hsize_t size[] = {made.rows + rows, width}, from[] = {made.rows, 0}, count[] = {rows, width};
   if (H5Dset_extent(made.dataset.id(), size) < 0) return false;
-  const Hdf5Handle space(H5Dget_space(made.dataset.id()), H5Sclose), memory(H5Screate_simple(rank, count, nullptr), H5Sclose);
+  const Hdf5Handle space(H5Dget_space(made.dataset.id()), H5Sclose),
+      memory(H5Screate_simple(rank, count, nullptr), H5Sclose);
   if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from, nullptr, count, nullptr) < 0) return false;
-  if (H5Dwrite(made.dataset.id(), made.type_id, memory.id(), space.id(), H5P_DEFAULT, made.waiting.data()) < 0) return false;
+  if (H5Dwrite(made.dataset.id(), made.type_id, memory.id(), space.id(), H5P_DEFAULT, made.waiting.data()) < 0)
+    return false;
   made.rows += rows;
   made.waiting.clear();
   return H5Dflush(made.dataset.id()) >= 0;
@@ -294,7 +308,8 @@ void RecordFile::Impl::make_columns() {
   const auto add = [this](auto&& made) { columns.push_back(std::forward<decltype(made)>(made)); };
   add(column<double, R>(recording::kHandlePose, "mm, mm, mm, 1, 1, 1, 1", kDevice, "the device's handle",
                         [](const R& r) { return numbers(r.reading.pose_device_tool); }));
-  add(column<double, R>("high_frequency_poses/device_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone, "the tool as the hand holds it",
+  add(column<double, R>("high_frequency_poses/device_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
+                        "the tool as the hand holds it",
                         [](const R& r) { return numbers(r.report.pose_bone_device); }));
   add(column<double, R>("high_frequency_poses/drill_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
                         "the tool as the bone lets it be: the proxy",
@@ -302,22 +317,26 @@ void RecordFile::Impl::make_columns() {
   add(column<double, R>(recording::kBonePose, "mm, mm, mm, 1, 1, 1, 1", "rest",
                         "the bone on its mount, seen from where it rests",
                         [](const R& r) { return numbers(r.report.pose_rest_bone); }));
-  add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice, "shown by the device to the hand",
-                       [forces, torques](const R& r) {
+  add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice,
+                       "shown by the device to the hand", [forces, torques](const R& r) {
                          return wrench(forces ? r.rendered.force_n : Vec3(Vec3::Zero()),
                                        torques ? r.rendered.torque_nmm : Vec3(Vec3::Zero()));
                        }));
-  add(column<float, R>("drill_force_feedback/motor_force", "N, N, N", kDevice, "what of it is the motor's: drag, kick, vibration",
-                       [forces](const R& r) { return numbers(forces ? r.report.motor_device_n : Vec3(Vec3::Zero())); }));
-  add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone, "of the bone on the tool, not scaled",
+  add(column<float, R>(
+      "drill_force_feedback/motor_force", "N, N, N", kDevice, "what of it is the motor's: drag, kick, vibration",
+      [forces](const R& r) { return numbers(forces ? r.report.motor_device_n : Vec3(Vec3::Zero())); }));
+  add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone,
+                       "of the bone on the tool, not scaled",
                        [](const R& r) { return wrench(r.report.force_physical_n, r.report.torque_physical_nmm); }));
-  add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone, "of the tool on the bone, by the law alone",
+  add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone,
+                       "of the tool on the bone, by the law alone",
                        [](const R& r) { return numbers(r.report.cutting_force_n); }));
   add(column<std::int64_t, R>("data/mono_ns", "ns", "", "the machine's monotonic clock, as in every log of the session",
                               [](const R& r) { return r.mono_ns; }));
   add(column<std::uint64_t, R>(recording::kTick, "1", "", "number of the tick and of its cutting state",
                                [](const R& r) { return r.report.state_seq; }));
-  add(column<float, R>("data/spindle_rpm", "1/min", "", "speed of the spindle", [](const R& r) { return r.report.spindle_rpm; }));
+  add(column<float, R>("data/spindle_rpm", "1/min", "", "speed of the spindle",
+                       [](const R& r) { return r.report.spindle_rpm; }));
   add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal asks for",
                         [](const R& r) { return r.commanded_rpm; }));
   add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting",
@@ -330,18 +349,21 @@ void RecordFile::Impl::make_columns() {
                        [](const R& r) { return r.report.torque_nmm; }));
   add(column<float, R>("data/cutting_work", "mJ", "", "of the law's force over the way cut in the tick",
                        [](const R& r) { return r.report.cutting_work_mj; }));
-  add(column<float, R>("data/coupling_energy", "mJ", "", "given out by the coupling in this contact, less what the hand put in",
+  add(column<float, R>("data/coupling_energy", "mJ", "",
+                       "given out by the coupling in this contact, less what the hand put in",
                        [](const R& r) { return r.report.energy.episode_mj; }));
   add(column<float, R>("data/offset", "mm, mm, mm", kBone,
                        "of the hand's place: slack, and what pushing the tool away would have stretched",
                        [](const R& r) { return numbers(r.report.offset_mm); }));
   add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the step under way",
                        [](const R& r) { return r.depth_mm; }));
-  add(column<float, R>("data/device_depth", "mm", "", "the same of the hand", [](const R& r) { return r.device_depth_mm; }));
+  add(column<float, R>("data/device_depth", "mm", "", "the same of the hand",
+                       [](const R& r) { return r.device_depth_mm; }));
   add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));
   add(column<float, R>("data/guide_play", "mm", "", "while guided: how far the tip may be off the opening's middle",
                        [](const R& r) { return r.report.guide_play_mm; }));
-  add(enumeration<R>("data/state", "what the tool does to the bone", {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
+  add(enumeration<R>("data/state", "what the tool does to the bone",
+                     {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
                      [](const R& r) { return static_cast<int>(r.report.phase); }));
   Names phases;
   for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i)
@@ -358,7 +380,8 @@ void RecordFile::Impl::make_columns() {
   add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
                               "bits: outside of which of its limits the law was used, named in metadata/range_bits",
                               [](const R& r) { return r.report.out_of_range; }));
-  add(column<std::uint32_t, R>("data/events", "1", "", "bits: what the loop met in the tick, named in metadata/event_bits",
+  add(column<std::uint32_t, R>("data/events", "1", "",
+                               "bits: what the loop met in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));
   add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle",
                                [](const R& r) { return r.reading.buttons; }));
@@ -367,7 +390,8 @@ void RecordFile::Impl::make_columns() {
   add(enumeration<R>(recording::kDeviceStatus, "whether the device works",
                      {{{"ok", 0}, {"warm", 1}, {"fault", 2}, {"absent", 3}}},
                      [](const R& r) { return static_cast<int>(r.reading.status); }));
-  add(enumeration<R>(recording::kCalibration, "whether the device knows where its handle is", {{{"done", 0}, {"pending", 1}}},
+  add(enumeration<R>(recording::kCalibration, "whether the device knows where its handle is",
+                     {{{"done", 0}, {"pending", 1}}},
                      [](const R& r) { return static_cast<int>(r.reading.calibration); }));
   add(column<double, R>(recording::kTime, "s", "UTC, since 1970-01-01", "when the tick began",
                         [this](const R& r) { return epoch_minus_mono_s + 1e-9 * static_cast<double>(r.mono_ns); }));
@@ -382,8 +406,8 @@ void RecordFile::Impl::make_columns() {
                            [](const T& t) { return t.diameter_mm; }));
   change(column<double, T>("burr_change/pose", "mm, mm, mm, 1, 1, 1, 1", kBone, "where it was taken up",
                            [](const T& t) { return numbers(t.tick.taken_up_at); }));
-  change(column<double, T>("burr_change/view", "1, 1, 1, 1", "bone from device", "rotation of the workspace: qx, qy, qz, qw",
-                           [](const T& t) {
+  change(column<double, T>("burr_change/view", "1, 1, 1, 1", "bone from device",
+                           "rotation of the workspace: qx, qy, qz, qw", [](const T& t) {
                              const Eigen::Quaterniond& q = t.tick.mapping.view();
                              return std::array{q.x(), q.y(), q.z(), q.w()};
                            }));
@@ -393,7 +417,8 @@ void RecordFile::Impl::make_columns() {
                            [](const T& t) { return numbers(t.tick.mapping.device_mm()); }));
   change(column<double, T>("burr_change/anchor_bone", "mm, mm, mm", kBone, "is that place of the tip",
                            [](const T& t) { return numbers(t.tick.mapping.bone_mm()); }));
-  change(column<double, T>("burr_change/time_stamp", "s", "UTC, since 1970-01-01", "when", [](const T& t) { return t.time_s; }));
+  change(column<double, T>("burr_change/time_stamp", "s", "UTC, since 1970-01-01", "when",
+                           [](const T& t) { return t.time_s; }));
 }
 
 bool RecordFile::Impl::make_metadata() {
@@ -434,7 +459,8 @@ bool RecordFile::Impl::make_metadata() {
   const Hdf5Handle readme = make_value(file.id(), "metadata/README", readme_type.id(), kReadme);
   ok = ok && voxel.ok() && readme.ok() && set_text(voxel.id(), "units", "mm3") &&
        make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), "metadata/laws", laws) &&
-       make_texts(file.id(), "metadata/event_bits", event_names()) && make_texts(file.id(), "metadata/range_bits", range_names());
+       make_texts(file.id(), "metadata/event_bits", event_names()) &&
+       make_texts(file.id(), "metadata/range_bits", range_names());
   // What is known later only: there from the start, because nothing new may appear while others read.
   const std::string nothing(64, '\0');
   const std::uint64_t zero = 0;
@@ -445,7 +471,8 @@ bool RecordFile::Impl::make_metadata() {
   rows_dropped = make_value(file.id(), "metadata/rows_dropped", H5T_NATIVE_UINT64, &zero);
   finished = make_value(file.id(), "metadata/finished", H5T_NATIVE_UINT64, &zero);
   return ok && start_hash.ok() && hash.ok() && room_seq.ok() && rows_dropped.ok() && finished.ok() &&
-         set_text(start_hash.id(), "meaning", "of the whole bone as the room was joined, SHA-256 in hexadecimal digits") &&
+         set_text(start_hash.id(), "meaning",
+                  "of the whole bone as the room was joined, SHA-256 in hexadecimal digits") &&
          set_text(hash.id(), "meaning", "of the whole bone at room_seq, SHA-256 in hexadecimal digits") &&
          set_text(finished.id(), "meaning",
                   "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
@@ -456,8 +483,8 @@ bool RecordFile::Impl::make_links() {
   for (const char* group :
        {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose", "high_frequency_poses/drill_pose",
         "high_frequency_poses/bone_pose", "drill_force_feedback", "drill_force_physical"})
-    if (H5Lcreate_hard(file.id(), recording::kTime, file.id(), (std::string(group) + "/time_stamp").c_str(), H5P_DEFAULT,
-                       H5P_DEFAULT) < 0)
+    if (H5Lcreate_hard(file.id(), recording::kTime, file.id(), (std::string(group) + "/time_stamp").c_str(),
+                       H5P_DEFAULT, H5P_DEFAULT) < 0)
       return false;
   return H5Lcreate_hard(file.id(), "high_frequency_poses/drill_pose/pose", file.id(), "data/pose_drill", H5P_DEFAULT,
                         H5P_DEFAULT) >= 0;
@@ -478,14 +505,16 @@ Result<void> RecordFile::Impl::create() {
       1e-9 * static_cast<double>(std::chrono::nanoseconds(wall).count() - std::chrono::nanoseconds(mono).count());
   if (!set_text(file.id(), recording::kFormatName, recording::kFormat) ||
       !set_integer(file.id(), recording::kVersionName, recording::kVersion) ||
-      !set_text(file.id(), "began", utc(std::chrono::duration_cast<std::chrono::seconds>(wall).count())) || !make_metadata())
+      !set_text(file.id(), "began", utc(std::chrono::duration_cast<std::chrono::seconds>(wall).count())) ||
+      !make_metadata())
     return failed("made");
   make_columns();
   for (Column<TickRow>& made : columns)
     if (!make_column(file.id(), made, kChunkRows)) return failed("made");
   for (Column<TakeUp>& made : take_ups)
     if (!make_column(file.id(), made, 16)) return failed("made");
-  if (!make_links() || H5Fflush(file.id(), H5F_SCOPE_GLOBAL) < 0 || H5Fstart_swmr_write(file.id()) < 0) return failed("made");
+  if (!make_links() || H5Fflush(file.id(), H5F_SCOPE_GLOBAL) < 0 || H5Fstart_swmr_write(file.id()) < 0)
+    return failed("made");
   return {};
 }
 
@@ -526,7 +555,8 @@ Result<RecordFile> RecordFile::create(const std::filesystem::path& file, const R
 Result<void> RecordFile::begin_on(const std::string& field_hash) {
   be_quiet();
   errno = 0;
-  if (!impl_->set_hash(impl_->start_hash, field_hash) || H5Dflush(impl_->start_hash.id()) < 0) return impl_->failed("begun");
+  if (!impl_->set_hash(impl_->start_hash, field_hash) || H5Dflush(impl_->start_hash.id()) < 0)
+    return impl_->failed("begun");
   return {};
 }
 
@@ -546,7 +576,8 @@ Result<void> RecordFile::append(std::span<const TickRow> rows) {
     struct statvfs disk {};
     if (statvfs(impl.path.c_str(), &disk) == 0 &&
         static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < impl.keep_free_bytes)
-      return failure(ErrorCode::internal, "the recording " + impl.path.string() + " ends here: the disk is all but full");
+      return failure(ErrorCode::internal,
+                     "the recording " + impl.path.string() + " ends here: the disk is all but full");
     if (!impl.write_all()) return impl.failed("continued");
   }
   return {};
@@ -556,15 +587,17 @@ Result<void> RecordFile::finish(const RecordingEnd& end) {
   Impl& impl = *impl_;
   if (!impl.write_all()) return impl.failed("written whole");
   const std::uint64_t as_it_should = end.lost ? 0 : 1;
-  const bool ok = impl.set_hash(impl.hash, end.field_hash) &&
-                  H5Dwrite(impl.room_seq.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.room_seq) >= 0 &&
-                  H5Dwrite(impl.rows_dropped.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.rows_dropped) >= 0 &&
-                  H5Dwrite(impl.finished.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &as_it_should) >= 0 &&
-                  H5Fflush(impl.file.id(), H5F_SCOPE_GLOBAL) >= 0;
+  const bool ok =
+      impl.set_hash(impl.hash, end.field_hash) &&
+      H5Dwrite(impl.room_seq.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.room_seq) >= 0 &&
+      H5Dwrite(impl.rows_dropped.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &end.rows_dropped) >= 0 &&
+      H5Dwrite(impl.finished.id(), H5T_NATIVE_UINT64, H5S_ALL, H5S_ALL, H5P_DEFAULT, &as_it_should) >= 0 &&
+      H5Fflush(impl.file.id(), H5F_SCOPE_GLOBAL) >= 0;
   if (!ok) return impl.failed("written whole");
   impl.take_ups.clear();
   impl.columns.clear();
-  for (Hdf5Handle* handle : {&impl.start_hash, &impl.hash, &impl.room_seq, &impl.rows_dropped, &impl.finished, &impl.file})
+  for (Hdf5Handle* handle :
+       {&impl.start_hash, &impl.hash, &impl.room_seq, &impl.rows_dropped, &impl.finished, &impl.file})
     if (!handle->reset()) return impl.failed("closed");
   return {};
 }

@@ -21,7 +21,7 @@ struct RecordingInfo {
   LoopParams loop;
   std::string case_hash, case_title;
   std::string plan_digest;  // of plan_digest(), in hexadecimal digits
-  double pitch_mm = 0;  // h of the case
+  double pitch_mm = 0;      // h of the case
   std::uint64_t author = 0;
   struct Item {
     std::string name;
@@ -36,13 +36,14 @@ struct RecordingEnd {
   std::string field_hash;  // of the whole bone
   std::uint64_t room_seq = 0;
   std::uint64_t rows_dropped = 0;
-  bool lost = false;       // the session did not end as it should: its room was lost
+  bool lost = false;  // the session did not end as it should: its room was lost
 };
 
 class RecordFile {
  public:
-  static constexpr std::size_t kChunkRows = 500;               // rows are written so many at a time; a killed writer loses fewer
-  static constexpr std::uint64_t kKeepFree_bytes = 16u << 20;  // of the disk; a recording ends before it fills the last of it
+  static constexpr std::size_t kChunkRows = 500;  // rows are written so many at a time; a killed writer loses fewer
+  static constexpr std::uint64_t kKeepFree_bytes =
+      16u << 20;  // of the disk; a recording ends before it fills the last of it
 
   // Begins a recording; what was in the file is gone. Error internal: it cannot be made, and why.
   [[nodiscard]] static Result<RecordFile> create(const std::filesystem::path& file, const RecordingInfo& info,

@@ -40,7 +40,8 @@ void Recorder::run() {
   while (!over) {
     {
       std::unique_lock lock(mutex_);
-      wake_.wait(lock, [this] { return over_ || !start_hash_.empty() || waiting_.size() >= RecordFile::kChunkRows / 2; });
+      wake_.wait(lock,
+                 [this] { return over_ || !start_hash_.empty() || waiting_.size() >= RecordFile::kChunkRows / 2; });
       over = over_;
       start_hash = std::exchange(start_hash_, {});
       rows.swap(waiting_);

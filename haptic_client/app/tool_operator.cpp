@@ -39,8 +39,9 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, Devi
   for (const auto& [option, given] : said)
     if (given && !options.plan.empty())
       return failure(ErrorCode::invalid_input,
-                     std::string(option) + " is for a hand without a plan; leave it out, or write \"law\", \"wear\", \"entry\" "
-                                           "and \"spindle_rpm\" into the plan's steps");
+                     std::string(option) +
+                         " is for a hand without a plan; leave it out, or write \"law\", \"wear\", \"entry\" "
+                         "and \"spindle_rpm\" into the plan's steps");
   if (options.plan.empty()) {
     if (Result<void> taken = choice.take_tool(); !taken) return tl::unexpected(taken.error());
     if (Result<void> connected = choice.connect(notice); !connected) return tl::unexpected(connected.error());
@@ -75,7 +76,8 @@ Result<void> ToolOperator::take_tool() {
     return failure(ErrorCode::invalid_input, "--rpm must be from 0 to 200000");
   // One that is not of the box may be the room's own.
   if (const Result<Tool> tool = find_tool(free_.tool))
-    if (const Result<void> held = check_held(*tool); !held) return failure(held.error().code, "--tool: " + held.error().message);
+    if (const Result<void> held = check_held(*tool); !held)
+      return failure(held.error().code, "--tool: " + held.error().message);
   if (const Result<void> law = check_law(free_.tool, free_.law); !law)
     return failure(law.error().code, "--law: " + law.error().message);
   if (!(free_.wear >= 1.0 && free_.wear <= 5.0))
@@ -110,12 +112,13 @@ Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBo
   if (recorded_) {
     std::vector<std::string> names;
     for (const ToolModel& model : ready->tools) names.push_back(model.tool.name);
-    if (Result<void> played = check_played(recorded_->session(), "--device " + options_.device, to_hex(bone.hash()), names,
-                                           to_hex(plan_digest(*ready)));
+    if (Result<void> played = check_played(recorded_->session(), "--device " + options_.device, to_hex(bone.hash()),
+                                           names, to_hex(plan_digest(*ready)));
         !played)
       return tl::unexpected(played.error());
     if (recorded_->session().start_hash.empty())
-      log::warn("the recording does not say what bone it began on", {{"remedy", "see that the room's is as it was then"}});
+      log::warn("the recording does not say what bone it began on",
+                {{"remedy", "see that the room's is as it was then"}});
     // What a hand did against one force it would not have done against another.
     if (force_scale == 0.0) force_scale = recorded_->session().force_scale;
   }

@@ -1,4 +1,5 @@
-// Who holds the tool: the simulated hand with a plan, a recording of one, or a person at a device, as the command line says.
+// Who holds the tool: the simulated hand with a plan, a recording of one, or a person at a device, as the command line
+// says.
 #pragma once
 #include <memory>
 #include <optional>
@@ -15,8 +16,8 @@ namespace osteon::haptic {
 
 struct ToolOperatorOptions {
   std::string device = "simulated";
-  std::filesystem::path plan;     // a simulated hand's, or a recording's
-  std::string tool;               // a person's, or of a person's recording
+  std::filesystem::path plan;  // a simulated hand's, or a recording's
+  std::string tool;            // a person's, or of a person's recording
   // A person's; where nothing was said: from the front, over the bone's middle, the tool's own speed and law, sharp.
   std::optional<std::string> view, at;  // read_view(), read_point()
   std::optional<double> spindle_rpm;
@@ -32,8 +33,8 @@ class ToolOperator {
   [[nodiscard]] static Result<ToolOperator> make(const ToolOperatorOptions& options, DeviceNotice notice);
 
   // The session on a bone, with tools of `tools`, all that the room has; `force_scale` 0: from the device, or as it was
-  // recorded. Lives no longer than this choice. Errors: there is no such tool, its law does not suit it, plan or tool does
-  // not suit the bone, the recording is of another bone, tool or plan.
+  // recorded. Lives no longer than this choice. Errors: there is no such tool, its law does not suit it, plan or tool
+  // does not suit the bone, the recording is of another bone, tool or plan.
   [[nodiscard]] Result<std::unique_ptr<Session>> on(const Case& bone, const ToolBox& tools, double force_scale);
 
   // What moves the handle, where that is a recording; else none.

@@ -8,17 +8,21 @@ namespace osteon::haptic {
 
 enum class RoomHealth : std::uint8_t {
   follows,
-  behind,   // too many own cuts are unconfirmed
-  silent,   // nothing has come for a while although cuts are unconfirmed
-  lost,     // and for so long that waiting makes no sense
+  behind,  // too many own cuts are unconfirmed
+  silent,  // nothing has come for a while although cuts are unconfirmed
+  lost,    // and for so long that waiting makes no sense
 };
 
 [[nodiscard]] inline const char* name(RoomHealth health) {
   switch (health) {
-    case RoomHealth::follows: return "the server follows";
-    case RoomHealth::behind: return "the server is behind";
-    case RoomHealth::silent: return "the server is silent";
-    case RoomHealth::lost: return "the server is lost";
+    case RoomHealth::follows:
+      return "the server follows";
+    case RoomHealth::behind:
+      return "the server is behind";
+    case RoomHealth::silent:
+      return "the server is silent";
+    case RoomHealth::lost:
+      return "the server is lost";
   }
   return "unknown";
 }

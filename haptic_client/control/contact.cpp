@@ -38,10 +38,10 @@ struct Totals {
 
 struct Task {
   int first_group, last_group;
-  float rotation[9], at[3];           // pose, relative to the origin of the evaluation
+  float rotation[9], at[3];  // pose, relative to the origin of the evaluation
   float lift, margin;
   bool density, ahead;
-  float direction[3], toward[3];      // bone frame, tool frame
+  float direction[3], toward[3];  // bone frame, tool frame
   float ahead_mm, most_mm, least_facing;
   const float* strength;
   GridPlace fine, coarse, dense;
@@ -152,7 +152,8 @@ void order(std::span<ContactPoint> points) {
   for (const ContactPoint& point : points) box.include(point.inset_mm);
   int axis = 0;
   box.size_mm().maxCoeff(&axis);
-  const std::size_t groups = (points.size() + kGroupPoints - 1) / kGroupPoints, middle = (groups + 1) / 2 * kGroupPoints;
+  const std::size_t groups = (points.size() + kGroupPoints - 1) / kGroupPoints,
+                    middle = (groups + 1) / 2 * kGroupPoints;
   std::ranges::stable_sort(points, {}, [axis](const ContactPoint& point) { return point.inset_mm[axis]; });
   order(points.first(std::min(middle, points.size())));
   if (middle < points.size()) order(points.subspan(middle));
@@ -211,11 +212,13 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
   Task task{};
   task.first_group = query.first_group;
   task.last_group = query.first_group + query.groups;
-  OSTEON_CHECK(task.first_group >= 0 && task.last_group <= set.groups() && values.nearest_mm.size() >= set.balls.size());
+  OSTEON_CHECK(task.first_group >= 0 && task.last_group <= set.groups() &&
+               values.nearest_mm.size() >= set.balls.size());
   values.covered = true;
   // Floats count from a corner near the tool, so that they are exact to a hundred-thousandth of a millimetre.
-  const Vec3 origin_mm = patch.fine.pitch_mm() > 0.0 ? position_mm(kBrickCells * patch.fine.first(), patch.fine.pitch_mm())
-                                                     : query.pose_bone_tool.position_mm;
+  const Vec3 origin_mm = patch.fine.pitch_mm() > 0.0
+                             ? position_mm(kBrickCells * patch.fine.first(), patch.fine.pitch_mm())
+                             : query.pose_bone_tool.position_mm;
   const Eigen::Matrix3d rotation = query.pose_bone_tool.rotation.toRotationMatrix();
   const Vec3 at = query.pose_bone_tool.position_mm - origin_mm, toward = rotation.transpose() * query.direction_bone;
   for (int i = 0; i < 3; ++i) {
@@ -240,7 +243,8 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
     const Coord dims = clear.cells.dims();
     task.clearance = clear.mm.data();
     task.clear_inverse = static_cast<float>(1.0 / clear.cell_mm);
-    const std::int32_t first[3] = {clear.cells.min.x, clear.cells.min.y, clear.cells.min.z}, size[3] = {dims.x, dims.y, dims.z};
+    const std::int32_t first[3] = {clear.cells.min.x, clear.cells.min.y, clear.cells.min.z},
+                       size[3] = {dims.x, dims.y, dims.z};
     for (int k = 0; k < 3; ++k) {
       task.clear_dims[k] = size[k];
       task.clear_shift[k] = static_cast<float>(origin_mm[k] / clear.cell_mm - first[k]);
@@ -265,8 +269,8 @@ Lanes hull_distance_mm(const HullPlace& place, std::span<const HullFace> faces, 
   const Eigen::Matrix3f by_rows = place.rotation.transpose();  // stored by columns
   const float* const at[3] = {p[0].data(), p[1].data(), p[2].data()};
   chosen_rows.load(std::memory_order_relaxed)
-      ->hull_distance(by_rows.data(), place.at.data(), faces.empty() ? nullptr : faces[0].data(), static_cast<int>(faces.size()),
-                      at, distance.data());
+      ->hull_distance(by_rows.data(), place.at.data(), faces.empty() ? nullptr : faces[0].data(),
+                      static_cast<int>(faces.size()), at, distance.data());
   return distance;
 }
 

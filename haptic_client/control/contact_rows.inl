@@ -1,5 +1,5 @@
-// Part of contact.cpp, which includes it once for each width of the processor's registers: kLanes points at a time. Each
-// lane does the same operations in the same order for every width.
+// Part of contact.cpp, which includes it once for each width of the processor's registers: kLanes points at a time.
+// Each lane does the same operations in the same order for every width.
 
 typedef float Row __attribute__((vector_size(kLanes * 4)));
 typedef std::int32_t RowInt __attribute__((vector_size(kLanes * 4)));
@@ -31,12 +31,15 @@ OSTEON_INLINE void two_rows(const float* const* at, int offset, Row& first, Row&
 #define OSTEON_EVEN 0, 2, 4, 6
 #define OSTEON_ODD 1, 3, 5, 7
 #elif OSTEON_LANES == 8
-  const Pairs a = {OSTEON_P(0), OSTEON_P(1), OSTEON_P(4), OSTEON_P(5)}, b = {OSTEON_P(2), OSTEON_P(3), OSTEON_P(6), OSTEON_P(7)};
+  const Pairs a = {OSTEON_P(0), OSTEON_P(1), OSTEON_P(4), OSTEON_P(5)},
+              b = {OSTEON_P(2), OSTEON_P(3), OSTEON_P(6), OSTEON_P(7)};
 #define OSTEON_EVEN 0, 2, 8, 10, 4, 6, 12, 14
 #define OSTEON_ODD 1, 3, 9, 11, 5, 7, 13, 15
 #else
-  const Pairs a = {OSTEON_P(0), OSTEON_P(1), OSTEON_P(4), OSTEON_P(5), OSTEON_P(8), OSTEON_P(9), OSTEON_P(12), OSTEON_P(13)};
-  const Pairs b = {OSTEON_P(2), OSTEON_P(3), OSTEON_P(6), OSTEON_P(7), OSTEON_P(10), OSTEON_P(11), OSTEON_P(14), OSTEON_P(15)};
+  const Pairs a = {OSTEON_P(0), OSTEON_P(1), OSTEON_P(4),  OSTEON_P(5),
+                   OSTEON_P(8), OSTEON_P(9), OSTEON_P(12), OSTEON_P(13)};
+  const Pairs b = {OSTEON_P(2),  OSTEON_P(3),  OSTEON_P(6),  OSTEON_P(7),
+                   OSTEON_P(10), OSTEON_P(11), OSTEON_P(14), OSTEON_P(15)};
 #define OSTEON_EVEN 0, 2, 16, 18, 4, 6, 20, 22, 8, 10, 24, 26, 12, 14, 28, 30
 #define OSTEON_ODD 1, 3, 17, 19, 5, 7, 21, 23, 9, 11, 25, 27, 13, 15, 29, 31
 #endif
@@ -49,10 +52,10 @@ OSTEON_INLINE void two_rows(const float* const* at, int offset, Row& first, Row&
 }
 
 struct Cell {
-  RowInt brick;           // index in the grid's table
-  RowInt inside;          // all bits where the table has it
-  RowInt corner;          // sample of the brick
-  Row tx, ty, tz;         // 0 to 1 in the cell
+  RowInt brick;    // index in the grid's table
+  RowInt inside;   // all bits where the table has it
+  RowInt corner;   // sample of the brick
+  Row tx, ty, tz;  // 0 to 1 in the cell
 };
 
 OSTEON_INLINE Cell cell_of(const GridPlace& grid, Row px, Row py, Row pz) {
@@ -82,8 +85,10 @@ OSTEON_INLINE unsigned corners_of(const GridPlace& grid, const Cell& cell, unsig
   for (int i = 0; i < kLanes; ++i) {
     if (!(wanted >> i & 1u)) continue;
     const float* values = inside[i] ? grid.bricks[brick[i]] : nullptr;
-    if (values) at[i] = values + corner[i];
-    else missing |= 1u << i;
+    if (values)
+      at[i] = values + corner[i];
+    else
+      missing |= 1u << i;
   }
   return missing;
 }
@@ -122,8 +127,8 @@ struct RowSums {
   Row nearest;
 };
 
-OSTEON_INLINE void add_up(const ContactSet& set, const Task& task, std::size_t first, Row qx, Row qy, Row qz, Row facing,
-                          RowInt counts, Row distance, Row density, RowSums& sums) {
+OSTEON_INLINE void add_up(const ContactSet& set, const Task& task, std::size_t first, Row qx, Row qy, Row qz,
+                          Row facing, RowInt counts, Row distance, Row density, RowSums& sums) {
   const Row nothing{};
   const Row area = load(&set.area_mm2[first]), arm = load(&set.arm_mm[first]);
   const Row projected = counts ? area * facing : nothing;
@@ -238,8 +243,10 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
           for (int lane = 0; lane < kLanes; ++lane) {
             if (!(unknown >> lane & 1u)) continue;
             const float bound = task.clearance_at(px[lane], py[lane], pz[lane]);
-            if (bound > 0.0f) distance[lane] = bound;
-            else values.covered = false;
+            if (bound > 0.0f)
+              distance[lane] = bound;
+            else
+              values.covered = false;
           }
           gx = lanes_of(unknown, Row{}, gx);
           gy = lanes_of(unknown, Row{}, gy);
@@ -276,8 +283,9 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
     for (int lane = 1; lane < kLanes; ++lane) nearest = least[lane] < nearest ? least[lane] : nearest;
     values.nearest_mm[g] = nearest;
   }
-  const Row* const rows[] = {&sums.area, &sums.engaged, &sums.density, &sums.milling, &sums.arm, &sums.turned, &sums.edge,
-                             &sums.fx,   &sums.fy,      &sums.fz,      &sums.mx,      &sums.my,  &sums.mz};
+  const Row* const rows[] = {&sums.area,   &sums.engaged, &sums.density, &sums.milling, &sums.arm,
+                             &sums.turned, &sums.edge,    &sums.fx,      &sums.fy,      &sums.fz,
+                             &sums.mx,     &sums.my,      &sums.mz};
   for (int i = 0; i < kTotals; ++i) result.sum[i] = total(*rows[i]);
   for (int lane = 0; lane < kLanes; ++lane)
     if (sums.nearest[lane] < result.nearest) result.nearest = sums.nearest[lane];

@@ -8,8 +8,9 @@
 namespace osteon::haptic {
 namespace {
 
-constexpr double kBleed = 0.1;           // of the handle's free motion
-constexpr double kLeastToLetGo_n = 3.0;  // a burr leaves bone a hundred times a second with less; nobody feels that plunge [A]
+constexpr double kBleed = 0.1;  // of the handle's free motion
+constexpr double kLeastToLetGo_n =
+    3.0;  // a burr leaves bone a hundred times a second with less; nobody feels that plunge [A]
 constexpr double kNothing_mm = 1e-9;
 
 }  // namespace
@@ -60,7 +61,9 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
                              double smooth_s) noexcept {
   CouplingForce force;
   const double k = moment.stiffness_n_per_mm;
-  const auto stored_mj = [&](double extension_mm) { return 0.5 * k * moment.energy_scale * extension_mm * extension_mm; };
+  const auto stored_mj = [&](double extension_mm) {
+    return 0.5 * k * moment.energy_scale * extension_mm * extension_mm;
+  };
   // Of the turn's spring: what the device cannot show is not stored either.
   const auto turned_mj = [&](const Vec3& turn_rad) {
     const double size_rad = turn_rad.norm(), k_turn = moment.stiffness_nmm_per_rad;
@@ -84,8 +87,9 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   // Only bone that came back moves the proxy away from the handle, but for what that lets its turn come nearer.
   const double now_turned_mj = turned_mj(moment.turn_rad);
   const double relaxed_mj = turned_mj(moment.turn_before_rad) - now_turned_mj;
-  const double before_mm = std::sqrt(std::max(0.0, (moment.handle_mm + offset_mm() - moment.proxy_before_mm).squaredNorm() +
-                                                       2.0 * relaxed_mj / (k * moment.energy_scale)));
+  const double before_mm =
+      std::sqrt(std::max(0.0, (moment.handle_mm + offset_mm() - moment.proxy_before_mm).squaredNorm() +
+                                  2.0 * relaxed_mj / (k * moment.energy_scale)));
   if (e_mm.norm() > before_mm + kNothing_mm) {
     let_go(returned_mm_, e_mm, e_mm * (before_mm / e_mm.norm()));
     force.returned = true;
@@ -116,8 +120,8 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   }
 
   force.spring_n = -k * e_mm;
-  // A sampled spring needs k·T, and what a filter of the cutting force holds back by tau comes too late by as much as k·tau
-  // pays for; never more than the spring, so that it cannot pull.
+  // A sampled spring needs k·T, and what a filter of the cutting force holds back by tau comes too late by as much as
+  // k·tau pays for; never more than the spring, so that it cannot pull.
   force.damping_n = clamped(-std::max(1.0, smooth_s / dt_s) * k * (e_mm - extension_mm_), force.spring_n.norm());
 
   force.turn_spring_nmm = clamped(-moment.stiffness_nmm_per_rad * moment.turn_rad, moment.limit_nmm);
@@ -128,8 +132,10 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   // (7.15), EWMA, on the cutting force alone and only while it goes on: where cutting begins or ends the rest of the
   // coupling takes over at once, and a filter between them would pull.
   const Vec3& cutting_n = proxy.cutting_force_n;
-  if (proxy.cutting && cutting_) smooth_.step(cutting_n, dt_s, smooth_s);
-  else smooth_.reset(cutting_n);
+  if (proxy.cutting && cutting_)
+    smooth_.step(cutting_n, dt_s, smooth_s);
+  else
+    smooth_.reset(cutting_n);
   force.cutting_lag_n = clamped(cutting_n - smooth_.value(), force.spring_n.norm());
   cutting_ = proxy.cutting;
 

@@ -55,7 +55,8 @@ bool CutRecorder::close(CutPiece& piece) noexcept {
     int next = i + 1;
     while (next + 1 < count_ && straight(i, next + 1)) ++next;
     const QuantisedPose knot = quantise(poses_[static_cast<std::size_t>(next)]);
-    if (knot != piece.path[static_cast<std::size_t>(piece.knots - 1)]) piece.path[static_cast<std::size_t>(piece.knots++)] = knot;
+    if (knot != piece.path[static_cast<std::size_t>(piece.knots - 1)])
+      piece.path[static_cast<std::size_t>(piece.knots++)] = knot;
     i = next;
   }
   last_ = piece.path[static_cast<std::size_t>(piece.knots - 1)];

@@ -12,12 +12,12 @@ namespace osteon::haptic {
 struct CutPiece {
   static constexpr int kMostKnots = 12;
   std::uint64_t author_seq = 0;
-  int tool = 0;                // which of the loop's tools
+  int tool = 0;  // which of the loop's tools
   int knots = 0;
   std::array<QuantisedPose, kMostKnots> path{};
   std::uint32_t spindle_rpm = 0;
   std::int64_t closed_tick = 0;
-  int ticks = 0;               // that the path took
+  int ticks = 0;  // that the path took
 };
 
 // The whole cut; `model`: of the piece's tool, `tick_us`: of the loop that made it.

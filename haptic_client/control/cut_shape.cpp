@@ -23,11 +23,12 @@ double sampled_mm(const SampledDistance& mesh, const Vec3& p) noexcept {
   double value = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const int i = corner >> 2, j = (corner >> 1) & 1, k = corner & 1;
-    const auto index =
-        (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) + static_cast<std::size_t>(base[1] + j)) *
-            static_cast<std::size_t>(size[2]) +
-        static_cast<std::size_t>(base[2] + k);
-    value += mesh.values[index] * kQuantum_mm * (i ? t[0] : 1.0 - t[0]) * (j ? t[1] : 1.0 - t[1]) * (k ? t[2] : 1.0 - t[2]);
+    const auto index = (static_cast<std::size_t>(base[0] + i) * static_cast<std::size_t>(size[1]) +
+                        static_cast<std::size_t>(base[1] + j)) *
+                           static_cast<std::size_t>(size[2]) +
+                       static_cast<std::size_t>(base[2] + k);
+    value +=
+        mesh.values[index] * kQuantum_mm * (i ? t[0] : 1.0 - t[0]) * (j ? t[1] : 1.0 - t[1]) * (k ? t[2] : 1.0 - t[2]);
   }
   return value + pitch * std::sqrt(outside);
 }
@@ -38,7 +39,9 @@ CutShape::CutShape(const Tool& tool, bool open_behind) : open_behind_(open_behin
   const CutBody body = tool.cut_body();
   kind_ = body.kind;
   behind_mm_ = tool.cutting_length_mm;
-  const auto add = [&](const Vec3& n, double offset_mm) { planes_[static_cast<std::size_t>(count_++)] = {n, offset_mm}; };
+  const auto add = [&](const Vec3& n, double offset_mm) {
+    planes_[static_cast<std::size_t>(count_++)] = {n, offset_mm};
+  };
   constexpr double kSideways = 1e-9;
   if (kind_ == CutKind::ball) radius_mm_ = kQuantum_mm * body.radius;
   if (kind_ == CutKind::sampled) sampled_ = body.sampled;
@@ -54,7 +57,7 @@ CutShape::CutShape(const Tool& tool, bool open_behind) : open_behind_(open_behin
       narrowest = std::min(narrowest, kQuantum_mm * a.r);
       const double er = kQuantum_mm * (b.r - a.r), ez = kQuantum_mm * (b.z - a.z), length = std::hypot(er, ez);
       if (!(length > 0.0) || (a.r == 0 && b.r == 0)) continue;  // the axis is no face
-      if (open_behind && !(-er > kSideways)) continue;           // looks back or to the side
+      if (open_behind && !(-er > kSideways)) continue;          // looks back or to the side
       add({ez / length, 0.0, -er / length}, (ez * kQuantum_mm * a.r - er * kQuantum_mm * a.z) / length);
     }
     if (open_behind) {
@@ -107,7 +110,8 @@ double CutShape::distance_mm(const Vec3& p, Vec3& out) const noexcept {
   }
   out = normal;
   if (turned)
-    out = r > 0.0 ? Vec3(normal.x() * p.x() / r, normal.x() * p.y() / r, normal.z()) : Vec3(normal.x(), 0.0, normal.z());
+    out =
+        r > 0.0 ? Vec3(normal.x() * p.x() / r, normal.x() * p.y() / r, normal.z()) : Vec3(normal.x(), 0.0, normal.z());
   return distance;
 }
 

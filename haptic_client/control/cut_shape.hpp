@@ -1,5 +1,5 @@
-// What a tool takes away, as the proxy remembers it until the bone of its patch has caught up: the cutting body's distance
-// at a point, and the way out of it.
+// What a tool takes away, as the proxy remembers it until the bone of its patch has caught up: the cutting body's
+// distance at a point, and the way out of it.
 #pragma once
 #include <array>
 #include <memory>
@@ -43,7 +43,7 @@ class CutShape {
   std::array<Plane, kMostHullPlanes + 4> planes_;
   std::array<HullFace, kMostHullPlanes + 4> faces_;  // the same, single precision
   double behind_mm_ = 0;
-  double radius_mm_ = 0;  // ball, and the dome that rounds a turned body's end
+  double radius_mm_ = 0;                            // ball, and the dome that rounds a turned body's end
   std::shared_ptr<const SampledDistance> sampled_;  // shared with the tool, immutable
 };
 

@@ -46,8 +46,8 @@ void EnergyLedger::settle(double cutting_mj, double stored_mj, double turned_mj)
   account_mj_ -= cutting_mj;
   report_.episode_mj += cutting_mj;
   report_.stored_mj = stored_mj;
-  // The tank holds what damping took, as far as sampling has not given it back already. What the spring lost otherwise, by
-  // cutting, sliding or slack, is gone: it may not be given back later.
+  // The tank holds what damping took, as far as sampling has not given it back already. What the spring lost otherwise,
+  // by cutting, sliding or slack, is gone: it may not be given back later.
   report_.tank_mj = std::min({report_.tank_mj + filled_mj_, std::max(0.0, account_mj_ - stored_mj), params_.tank_mj});
   account_mj_ = std::min(account_mj_, stored_mj + report_.tank_mj);
 }
@@ -86,8 +86,8 @@ Wrench EnergyLedger::limited(const Wrench& wanted, const Wrench& damping, bool t
     return shown_;
   }
   open_ = true;
-  const double given_mj =
-      moves_.most_mj(wanted.force_n, params_.dt_s) + turns_.most_mj(wanted.torque_nmm / params_.turn_arm_mm, params_.dt_s);
+  const double given_mj = moves_.most_mj(wanted.force_n, params_.dt_s) +
+                          turns_.most_mj(wanted.torque_nmm / params_.turn_arm_mm, params_.dt_s);
   const double most_mj = std::max(0.0, account_mj_ + params_.allowance_mj);
   double share = 1.0;
   if (given_mj > most_mj) {

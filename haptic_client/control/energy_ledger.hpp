@@ -1,6 +1,7 @@
-// What the coupling between handle and tool takes from the hand and gives back, by its moves and by its turns: an account for
-// each contact, and the last monitor before the device. Time-domain passivity after Hannaford and Ryu (2002), made
-// predictive: force is held for a tick, so what it may give away is bounded before it is written, not mended after.
+// What the coupling between handle and tool takes from the hand and gives back, by its moves and by its turns: an
+// account for each contact, and the last monitor before the device. Time-domain passivity after Hannaford and Ryu
+// (2002), made predictive: force is held for a tick, so what it may give away is bounded before it is written, not
+// mended after.
 #pragma once
 #include <cstdint>
 
@@ -10,12 +11,12 @@ namespace osteon::haptic {
 
 struct EnergyParams {
   double dt_s = 1e-3;
-  double allowance_mj = 0.008;            // that one contact may give more than it got
-  double tank_mj = 2.0;                   // most of the damping's work that is kept for later
-  double surprise_mm_per_s2 = 10000.0;    // a hand and its device are taken to accelerate less than this [A]
-  double calm_mm_per_s2 = 2000.0;         // and less than this, or `wary` times what they did lately, while that is less [A]
-  double wary = 2.0, lately_s = 0.2;      // [A]
-  double turn_arm_mm = 20.0;              // at this arm a turn is taken to surprise as a move does [A]
+  double allowance_mj = 0.008;          // that one contact may give more than it got
+  double tank_mj = 2.0;                 // most of the damping's work that is kept for later
+  double surprise_mm_per_s2 = 10000.0;  // a hand and its device are taken to accelerate less than this [A]
+  double calm_mm_per_s2 = 2000.0;  // and less than this, or `wary` times what they did lately, while that is less [A]
+  double wary = 2.0, lately_s = 0.2;  // [A]
+  double turn_arm_mm = 20.0;          // at this arm a turn is taken to surprise as a move does [A]
 };
 
 // Force at the handle's tip, and torque about it.
@@ -25,19 +26,20 @@ struct Wrench {
 
 // Energies at the handle, mJ: force shown to the hand times the way of the handle, and torque times its turn: N·mm·rad.
 struct EnergyReport {
-  double episode_mj = 0;     // given to the hand and to cutting in this contact, less what the hand put in; negative: dissipated
-  double stored_mj = 0;      // in the coupling's springs
-  double tank_mj = 0;        // of damping's work, at hand for material that comes back
-  double ended_mj = 0;       // of the contact that ended in this tick; zero in others
-  double generated_mj = 0;   // over all contacts that ended above zero, from the start
-  double worst_mj = 0;       // the most that one contact has generated
+  double episode_mj =
+      0;  // given to the hand and to cutting in this contact, less what the hand put in; negative: dissipated
+  double stored_mj = 0;        // in the coupling's springs
+  double tank_mj = 0;          // of damping's work, at hand for material that comes back
+  double ended_mj = 0;         // of the contact that ended in this tick; zero in others
+  double generated_mj = 0;     // over all contacts that ended above zero, from the start
+  double worst_mj = 0;         // the most that one contact has generated
   std::uint64_t episodes = 0;  // that have ended
   bool ended = false;
-  bool held_back = false;    // the monitor cut the force
+  bool held_back = false;  // the monitor cut the force
 };
 
-// One tick: observe(), paid_n_per_mm(), settle(), draw(), limited(), in this order; all [haptic]. Vectors in one frame of any
-// orientation, lengths of the handle's own motion.
+// One tick: observe(), paid_n_per_mm(), settle(), draw(), limited(), in this order; all [haptic]. Vectors in one frame
+// of any orientation, lengths of the handle's own motion.
 class EnergyLedger {
  public:
   explicit EnergyLedger(const EnergyParams& params = {})
@@ -47,21 +49,21 @@ class EnergyLedger {
 
   // Another tool, or the clutch: what was stored is gone.
   void reset() noexcept;
-  // The handle's tip moved and the handle turned by this (axis times angle) under what the last limited() gave. Where no
-  // torque is shown turning does no work.
+  // The handle's tip moved and the handle turned by this (axis times angle) under what the last limited() gave. Where
+  // no torque is shown turning does no work.
   void observe(const Vec3& handle_moved_mm, const Vec3& handle_turned_rad = Vec3::Zero()) noexcept;
-  // Cutting too must be paid for: the spring, at most this stiff and this long, as stiff as what the hand has put into it.
-  // It falls short of the real one in the first millisecond of a contact, before the hand has felt any of it.
+  // Cutting too must be paid for: the spring, at most this stiff and this long, as stiff as what the hand has put into
+  // it. It falls short of the real one in the first millisecond of a contact, before the hand has felt any of it.
   [[nodiscard]] double paid_n_per_mm(double stiffness_n_per_mm, double extension_mm) const noexcept;
   // How long a spring of that stiffness would be that the hand had paid for, when this much more has gone into cutting.
   [[nodiscard]] double paid_mm(double stiffness_n_per_mm, double cutting_mj) const noexcept;
-  // What the proxy did then: the law's force times the way cut, and the springs' energy as it is now. `turned_mj`: what of
-  // it is in the spring of the turn, which cuts nothing.
+  // What the proxy did then: the law's force times the way cut, and the springs' energy as it is now. `turned_mj`: what
+  // of it is in the spring of the turn, which cuts nothing.
   void settle(double cutting_mj, double stored_mj, double turned_mj = 0.0) noexcept;
   // Raises the stored energy by at most this, out of the tank; what it may be raised by.
   [[nodiscard]] double draw(double wanted_mj) noexcept;
-  // What to show in the next tick, force and torque held back by one share of `wanted`; `damping`: its part that is damping.
-  // The contact lasts as long as `touching`, also where safety asks for no force.
+  // What to show in the next tick, force and torque held back by one share of `wanted`; `damping`: its part that is
+  // damping. The contact lasts as long as `touching`, also where safety asks for no force.
   [[nodiscard]] Wrench limited(const Wrench& wanted, const Wrench& damping, bool touching) noexcept;
 
   [[nodiscard]] const EnergyReport& report() const noexcept { return report_; }
@@ -80,10 +82,10 @@ class EnergyLedger {
   EnergyReport report_;
   Wrench shown_, damping_;  // held since the last tick
   Going moves_, turns_;
-  double account_mj_ = 0;   // put in by the hand and still there: in the spring, or in the tank
-  double filled_mj_ = 0;    // by damping, in this tick
-  double turned_mj_ = 0;    // of what is stored, in the spring of the turn
-  bool open_ = false;       // a contact is under way
+  double account_mj_ = 0;  // put in by the hand and still there: in the spring, or in the tank
+  double filled_mj_ = 0;   // by damping, in this tick
+  double turned_mj_ = 0;   // of what is stored, in the spring of the turn
+  bool open_ = false;      // a contact is under way
 };
 
 }  // namespace osteon::haptic

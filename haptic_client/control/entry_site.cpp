@@ -8,7 +8,7 @@ namespace osteon::haptic {
 namespace {
 
 constexpr double kReach_mm = 60.0;
-constexpr double kLargestGap_mm = 3.0;   // diploe below the threshold is still one bone
+constexpr double kLargestGap_mm = 3.0;  // diploe below the threshold is still one bone
 constexpr double kNormalRadius_mm = 3.0;
 
 std::string shown(const Vec3& v) {
@@ -38,7 +38,8 @@ void refine(const Case& bone, EntrySite& site) {
   for (int ring = 1; ring <= 3; ++ring)
     for (int i = 0; i < 6 * ring; ++i) {
       const double angle = 2.0 * 3.14159265358979 * i / (6 * ring), radius = kNormalRadius_mm * ring / 3.0;
-      const Vec3 from = site.entry_mm + radius * (std::cos(angle) * site.across_u + std::sin(angle) * site.across_v) - kBack_mm * site.axis;
+      const Vec3 from = site.entry_mm + radius * (std::cos(angle) * site.across_u + std::sin(angle) * site.across_v) -
+                        kBack_mm * site.axis;
       const double distance = distance_to_bone_mm(bone, from, site.axis, 2.0 * kBack_mm);
       if (distance >= 0.0) hits.push_back(from + distance * site.axis);
     }
@@ -78,7 +79,8 @@ double distance_to_bone_mm(const Case& bone, const Vec3& from_mm, const Vec3& ax
 }
 
 Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward) {
-  if (!(toward.norm() > 1e-9)) return failure(ErrorCode::invalid_input, "entry.toward must not be zero; give a direction such as [0, 0, 1]");
+  if (!(toward.norm() > 1e-9))
+    return failure(ErrorCode::invalid_input, "entry.toward must not be zero; give a direction such as [0, 0, 1]");
   const Vec3 direction = -toward.normalized();
   const Box box = bone.bounds();
   const double far_mm = box.size_mm().norm();
@@ -88,7 +90,8 @@ Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward) {
   const Vec3 from = box.centre_mm() - far_mm * direction;
   const double distance = distance_to_bone_mm(bone, from, direction, 2.0 * far_mm);
   if (distance < 0.0)
-    return failure(ErrorCode::invalid_input, "no bone lies along entry.toward " + shown(toward) + "; choose another direction");
+    return failure(ErrorCode::invalid_input,
+                   "no bone lies along entry.toward " + shown(toward) + "; choose another direction");
   site.entry_mm = from + distance * direction;
   refine(bone, site);
   site.thickness_mm = thickness_mm(bone, site);
@@ -96,14 +99,16 @@ Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward) {
 }
 
 Result<EntrySite> find_site_at(const Case& bone, const Vec3& point_mm, const Vec3& axis) {
-  if (!(axis.norm() > 1e-9)) return failure(ErrorCode::invalid_input, "entry.axis must not be zero; give the direction into the bone");
+  if (!(axis.norm() > 1e-9))
+    return failure(ErrorCode::invalid_input, "entry.axis must not be zero; give the direction into the bone");
   EntrySite site;
   site.axis = axis.normalized();
   set_across(site);
   const Vec3 from = point_mm - 0.5 * kReach_mm * site.axis;
   const double distance = distance_to_bone_mm(bone, from, site.axis, kReach_mm);
   if (distance < 0.0)
-    return failure(ErrorCode::invalid_input, "no bone lies within 30 mm of entry.point_mm " + shown(point_mm) + " along entry.axis");
+    return failure(ErrorCode::invalid_input,
+                   "no bone lies within 30 mm of entry.point_mm " + shown(point_mm) + " along entry.axis");
   site.entry_mm = from + distance * site.axis;
   EntrySite flat = site;
   refine(bone, flat);
@@ -118,7 +123,8 @@ Result<EntrySite> find_site_beside(const Case& bone, const EntrySite& beside, do
   const Vec3 from = beside.entry_mm + u_mm * beside.across_u + v_mm * beside.across_v - kBack_mm * beside.axis;
   const double distance = distance_to_bone_mm(bone, from, beside.axis, 2.0 * kBack_mm);
   if (distance < 0.0)
-    return failure(ErrorCode::invalid_input, "no bone lies beside the last entry at entry.beside_last_mm; choose a smaller step");
+    return failure(ErrorCode::invalid_input,
+                   "no bone lies beside the last entry at entry.beside_last_mm; choose a smaller step");
   site.entry_mm = from + distance * beside.axis;
   refine(bone, site);
   site.thickness_mm = thickness_mm(bone, site);

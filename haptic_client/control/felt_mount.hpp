@@ -1,5 +1,5 @@
-// The bone on its mount as one hand feels it: what the room tells comes in, the loop's last force moves it, what is to be told
-// goes out. Of a room without a mount nothing comes, and the bone rests.
+// The bone on its mount as one hand feels it: what the room tells comes in, the loop's last force moves it, what is to
+// be told goes out. Of a room without a mount nothing comes, and the bone rests.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -9,8 +9,9 @@
 
 namespace osteon::haptic {
 
-// What the tool in hand did to the bone in that tick, about the mount's centre; axes of the bone's rest. It is the force that
-// the loop's ledger accounts for, unscaled: the coupling's. The motor's passes the account by, and so the mount.
+// What the tool in hand did to the bone in that tick, about the mount's centre; axes of the bone's rest. It is the
+// force that the loop's ledger accounts for, unscaled: the coupling's. The motor's passes the account by, and so the
+// mount.
 [[nodiscard]] Load load_on_bone(const HapticLoop& loop, const LoopReport& report, const Pose& pose_rest_bone,
                                 const Vec3& centre_now_mm) noexcept;
 
@@ -30,7 +31,9 @@ class FeltMount {
   [[nodiscard]] const MountFollower& shown() const noexcept { return shown_; }
   [[nodiscard]] const Load& load() const noexcept { return load_; }
   [[nodiscard]] const Pose& pose_rest_bone() const noexcept { return pose_; }
-  [[nodiscard]] double most_mm() const noexcept { return most_mm_; }    // that its middle was ever away from where it rests
+  [[nodiscard]] double most_mm() const noexcept {
+    return most_mm_;
+  }  // that its middle was ever away from where it rests
   [[nodiscard]] double most_rad() const noexcept { return most_rad_; }
 
  private:

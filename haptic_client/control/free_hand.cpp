@@ -79,9 +79,10 @@ Result<Vec3> read_point(std::string_view text, std::string_view option) {
 
 Result<void> check_held(const Tool& tool) {
   if (tool.cuts()) return {};
-  return failure(ErrorCode::invalid_input, "the tool \"" + tool.name +
-                                               "\" takes no bone; take one that does (drill, bur, saw, reamer, broach, pin, "
-                                               "screw) and set guides and trial implants in the viewer or with a plan");
+  return failure(ErrorCode::invalid_input,
+                 "the tool \"" + tool.name +
+                     "\" takes no bone; take one that does (drill, bur, saw, reamer, broach, pin, "
+                     "screw) and set guides and trial implants in the viewer or with a plan");
 }
 
 Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bone, const ToolFinder& find) {
@@ -89,7 +90,8 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   if (!tool) return tl::unexpected(tool.error());
   if (const Result<void> held = check_held(*tool); !held) return tl::unexpected(held.error());
   const Vec3 toward = options.toward.normalized();
-  const Result<EntrySite> site = options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
+  const Result<EntrySite> site =
+      options.at_mm ? find_site_at(bone, *options.at_mm, toward) : find_site_toward(bone, -toward);
   if (!site) return tl::unexpected(site.error());
   ReadyPlan ready;
   ReadyStep step;

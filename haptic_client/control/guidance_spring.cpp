@@ -76,7 +76,8 @@ Vec3 GuidanceSpring::step(const GuideMoment& moment) noexcept {
     const double least = pull ? whole : 0.0;
     k_n_per_mm_ = std::max(least, k_n_per_mm_ - params_.stiffness_n_per_mm * params_.dt_s / params_.fade_s);
   }
-  if (pull) move_far_end(moment);
+  if (pull)
+    move_far_end(moment);
   else if (!(k_n_per_mm_ > 0.0)) {
     static_cast<void>(ledger_.limited({}, {}, false));
     reset();
@@ -86,15 +87,15 @@ Vec3 GuidanceSpring::step(const GuideMoment& moment) noexcept {
   ledger_.settle(-std::max(0.0, after_mj - before_mj), after_mj);
 
   const double share = k_n_per_mm_ / params_.stiffness_n_per_mm;
-  const Vec3 damping_n =
-      clamped(-params_.damping_s * k_n_per_mm_ / params_.dt_s * moved_mm, share * params_.most_n);
+  const Vec3 damping_n = clamped(-params_.damping_s * k_n_per_mm_ / params_.dt_s * moved_mm, share * params_.most_n);
   const Vec3 spring_n = k_n_per_mm_ * (far_mm_ - moment.handle_mm);
   Vec3 wanted_n = clamped(spring_n + damping_n, std::min(share * params_.most_n, moment.room_n));
   const Vec3 grown_n = growth(wanted_n, force_n_);
   wanted_n += clamped(grown_n, moment.slew_n) - grown_n;
   wanted_n = held_to(moment.together_slew_n, wanted_n, moment.rest_n, moment.together_n);
   const double asked_n = (spring_n + damping_n).norm();
-  const Vec3 shown_damping_n = asked_n > 0.0 ? Vec3(std::min(1.0, wanted_n.norm() / asked_n) * damping_n) : Vec3(Vec3::Zero());
+  const Vec3 shown_damping_n =
+      asked_n > 0.0 ? Vec3(std::min(1.0, wanted_n.norm() / asked_n) * damping_n) : Vec3(Vec3::Zero());
   force_n_ = ledger_.limited({.force_n = wanted_n}, {.force_n = shown_damping_n}, true).force_n;
   guide_mm_ = moment.guide_mm;
   handle_mm_ = moment.handle_mm;

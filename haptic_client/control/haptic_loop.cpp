@@ -36,7 +36,8 @@ void HapticLoop::take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMa
   const Pose pose_bone_tool = from_rest(pose_rest_tool);
   tool_ = tool;
   mapping_ = mapping;
-  coupling_n_per_mm_ = std::min(params_.stiffness_n_per_mm, params_.device_n_per_mm / (params_.force_scale * mapping.scale()));
+  coupling_n_per_mm_ =
+      std::min(params_.stiffness_n_per_mm, params_.device_n_per_mm / (params_.force_scale * mapping.scale()));
   proxy_.place(pose_bone_tool);
   guiding_.release();
   recorder_.end();
@@ -75,15 +76,16 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (!may_work) report.events |= kForbidden;
   const bool works = follows && may_work;
 
-  // The spring hangs at handle + offset. Seen from the bone that place moves also where a bone that turns leaves the offset
-  // behind; were it to turn along, a hand with much slack would get, or lose, work that nobody reckons.
+  // The spring hangs at handle + offset. Seen from the bone that place moves also where a bone that turns leaves the
+  // offset behind; were it to turn along, a hand with much slack would get, or lose, work that nobody reckons.
   const Vec3 offset_before_mm = coupling_.offset_mm();
   if (bone_.rotation.coeffs() != bone_before_.rotation.coeffs())
     coupling_.turn(bone_.rotation.conjugate() * bone_before_.rotation);
   const Vec3 left_behind_mm = coupling_.offset_mm() - offset_before_mm;
 
   // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.
-  if (clutched_ && !input.clutch) mapping_.anchor(input.pose_device_tool.position_mm, bone_.point(proxy_.pose().position_mm));
+  if (clutched_ && !input.clutch)
+    mapping_.anchor(input.pose_device_tool.position_mm, bone_.point(proxy_.pose().position_mm));
   clutched_ = input.clutch;
   Pose pose_bone_device = from_rest(mapping_.pose_bone_tool(input.pose_device_tool));
   if (input.clutch) {
@@ -127,7 +129,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   const Pose proxy_before = proxy_.pose();
   double paid_n_per_mm = coupling_n_per_mm_;
   ProxyStep step;
-  if (!placed_ || patch.version == 0) step.covered = false;
+  if (!placed_ || patch.version == 0)
+    step.covered = false;
   else {
     const bool cuts_waiting = proxy_.sweeps_full() || pieces_.size() >= 60;
     if (cuts_waiting) report.events |= kCutsWaiting;
@@ -166,10 +169,10 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   report.torque_nmm = step.torque_nmm;
   report.across_n = step.across_n;
   report.out_of_range = step.out_of_range;
-  report.phase = step.cutting          ? CuttingPhase::cutting
-                 : step.contact        ? CuttingPhase::rubbing
-                 : spindle_.rpm > 1.0  ? CuttingPhase::free
-                                       : CuttingPhase::idle;
+  report.phase = step.cutting         ? CuttingPhase::cutting
+                 : step.contact       ? CuttingPhase::rubbing
+                 : spindle_.rpm > 1.0 ? CuttingPhase::free
+                                      : CuttingPhase::idle;
 
   // The coupling's spring, as far as the device could ever show it.
   CouplingMoment moment;
@@ -181,10 +184,11 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   moment.energy_scale = s / mapping_.scale();
   moment.fell_short = fell_short_;
   moment.touching = (step.contact || step.breakthrough || held_back) && step.covered && !input.clutch;
-  // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is larger than
-  // the bone, levers seem longer.
+  // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is
+  // larger than the bone, levers seem longer.
   moment.stiffness_nmm_per_rad = turn_arm_mm_ * turn_arm_mm_ * coupling_n_per_mm_;
-  moment.limit_nmm = (input.device_warm ? params_.continuous_nmm : params_.peak_nmm) / moment.energy_scale * (limit_n / device_n);
+  moment.limit_nmm =
+      (input.device_warm ? params_.continuous_nmm : params_.peak_nmm) / moment.energy_scale * (limit_n / device_n);
   if (step.contact) {
     moment.turn_before_rad = between(proxy_before, pose_bone_wanted).turn_rad;
     moment.turn_rad = step.turn_rad;
@@ -199,8 +203,8 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()));
   if (moment.touching) report.torque_physical_nmm = step.contact_torque_nmm;
 
-  // The spring of the turn is the coupling's. The moment of the cut is not: the bone turns back a spindle, and presses on
-  // faces beside the tip; whoever gives way to it gets the motor's work, not what the hand has put in.
+  // The spring of the turn is the coupling's. The moment of the cut is not: the bone turns back a spindle, and presses
+  // on faces beside the tip; whoever gives way to it gets the motor's work, not what the hand has put in.
   Vec3 cut_nmm = Vec3::Zero();
   if (step.cutting && moment.touching)
     cut_nmm = step.contact_torque_nmm + paid_n_per_mm * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm * step.turn_rad;
@@ -235,16 +239,17 @@ double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {
   return stuck ? torque_per_n_ * pressed_n : step.torque_nmm;
 }
 
-void HapticLoop::show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling, const CouplingMoment& moment,
-                      const Vec3& cut_nmm, LoopReport& report) noexcept {
-  const double s = params_.force_scale, limit_n = s * moment.limit_n, limit_nmm = moment.energy_scale * moment.limit_nmm;
+void HapticLoop::show(const LoopInput& input, const ToolModel& model, const CouplingForce& coupling,
+                      const CouplingMoment& moment, const Vec3& cut_nmm, LoopReport& report) noexcept {
+  const double s = params_.force_scale, limit_n = s * moment.limit_n,
+               limit_nmm = moment.energy_scale * moment.limit_nmm;
   const bool safe = input.device_ok && input.periods <= 3;
   const double ramp = params_.dt_s / params_.ramp_s;
   ramp_ = std::clamp(input.room == RoomLink::over ? ramp_ - ramp : ramp_ + ramp, 0.0, 1.0);
   if (ramp_ < 1.0) report.events |= kRamping;
 
-  // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly. Of a
-  // turn, as much at its arm.
+  // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly.
+  // Of a turn, as much at its arm.
   Motion hand = between(device_, report.pose_bone_device);
   // What moves the bone is not the hand: it counts from where the bone rests.
   if (moved_) hand = between(bone_before_ * device_, bone_ * report.pose_bone_device);
@@ -261,14 +266,16 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
     wanted.torque_nmm = slewed(ramp_ * clamped(turn_nmm, limit_nmm), shown_.torque_nmm,
                                turn_arm_mm_ * (by_hand_n / mapping_.scale() + slow), report);
   }
-  const auto share = [](const Vec3& shown, double whole) { return whole > 0.0 ? std::min(1.0, shown.norm() / whole) : 0.0; };
+  const auto share = [](const Vec3& shown, double whole) {
+    return whole > 0.0 ? std::min(1.0, shown.norm() / whole) : 0.0;
+  };
   const Wrench damping{
       share(wanted.force_n, s * (coupling.spring_n + coupling.damping_n).norm()) * s * coupling.damping_n,
       share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
   shown_ = ledger_.limited(wanted, damping, moment.touching);
   report.energy = ledger_.report();
-  // From a missed tick, the ramp or the monitor on until what is shown has come up again: not where the spring grows faster
-  // than force may, as on a point that skates; a hand that presses there would sink.
+  // From a missed tick, the ramp or the monitor on until what is shown has come up again: not where the spring grows
+  // faster than force may, as on a point that skates; a hand that presses there would sink.
   constexpr double kClearly = 0.9;  // the filter's lag is less
   fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.energy.held_back) &&
                 shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
@@ -298,8 +305,8 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   together_n_ = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
   report.force_device_n = together_n_ + report.motor_device_n;
 
-  // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no faster
-  // than force grows that the hand did not cause.
+  // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no
+  // faster than force grows that the hand did not cause.
   const double most_nmm = std::min(turn_arm_mm_ * shown_.force_n.norm() / mapping_.scale(),
                                    std::max(0.0, limit_nmm - shown_.torque_nmm.norm()));
   Vec3 motor_nmm = Vec3::Zero();
@@ -321,15 +328,16 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
     partner_n_.setZero();
     return left;
   }
-  // A hand whose tool is held by somebody has none that others could push: whoever holds it may do so from a console and have
-  // a hand of another number. And whoever leads this hand is where it is.
+  // A hand whose tool is held by somebody has none that others could push: whoever holds it may do so from a console
+  // and have a hand of another number. And whoever leads this hand is where it is.
   std::array<PartnerTool, PartnerContact::kMost> others;
   std::size_t count = 0;
   const HapticRestrictions& oversight = overseer_.now();
   for (const PartnerTool& partner : partners_)
-    if (count < others.size() && !oversight.taken_by && partner.author != oversight.guide.value) others[count++] = partner;
-  const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)], report.pose_bone_proxy,
-                                                  std::span(others).first(count), params_.dt_s);
+    if (count < others.size() && !oversight.taken_by && partner.author != oversight.guide.value)
+      others[count++] = partner;
+  const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)],
+                                                  report.pose_bone_proxy, std::span(others).first(count), params_.dt_s);
   if (felt.author != 0) report.events |= kPartnerTouched;
   Vec3 wanted_n = to_device(clamped(params_.force_scale * felt.force_n, left.room_n));
   const Vec3 grown_n = growth(wanted_n, partner_n_);

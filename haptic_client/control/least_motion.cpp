@@ -19,8 +19,10 @@ Vec6 row_of(const Condition& condition, const MotionLimits& limits) noexcept {
   Vec3 n = condition.n;
   if (limits.across) n -= n.dot(*limits.across) * *limits.across;
   row.head<3>() = n;
-  if (limits.may_turn) row.tail<3>() = condition.m / limits.arm_mm;
-  else row.tail<3>().setZero();
+  if (limits.may_turn)
+    row.tail<3>() = condition.m / limits.arm_mm;
+  else
+    row.tail<3>().setZero();
   return row;
 }
 
@@ -37,7 +39,8 @@ struct Problem {
   bool solve(Vec6& x, bool& pressed) const noexcept;
 };
 
-// The conditions that press, as an orthonormal base of their rows and what makes rows of it: row_j = sum_i base_i upper(i, j).
+// The conditions that press, as an orthonormal base of their rows and what makes rows of it: row_j = sum_i base_i
+// upper(i, j).
 class Pressing {
  public:
   [[nodiscard]] int count() const noexcept { return count_; }
@@ -94,8 +97,8 @@ class Pressing {
   int count_ = 0;
 };
 
-// Goldfarb and Idnani's dual method: the condition that is broken most is made to press, those that it relieves let go. Six
-// unknowns: at most six press at once. False: some contradict each other, or it takes too long; x breaks some then.
+// Goldfarb and Idnani's dual method: the condition that is broken most is made to press, those that it relieves let go.
+// Six unknowns: at most six press at once. False: some contradict each other, or it takes too long; x breaks some then.
 bool Problem::solve(Vec6& x, bool& pressed) const noexcept {
   constexpr int kMostSteps = 40;
   constexpr double kDependent2 = 1e-9;
@@ -124,7 +127,8 @@ bool Problem::solve(Vec6& x, bool& pressed) const noexcept {
     double until = kEndless;
     int lets_go = -1;
     for (int i = 0; i < pressing.count(); ++i)
-      if (falls[i] > 0.0 && pressing.pressure(i) < until * falls[i]) until = pressing.pressure(i) / falls[i], lets_go = i;
+      if (falls[i] > 0.0 && pressing.pressure(i) < until * falls[i])
+        until = pressing.pressure(i) / falls[i], lets_go = i;
     const double rises = way.squaredNorm();
     const bool free = pressing.count() < 6 && rises > kDependent2 * n.squaredNorm();
     const double whole = free ? (least[static_cast<std::size_t>(broken)] - n.dot(x)) / rises : kEndless;
@@ -152,7 +156,8 @@ Pose moved(const Pose& pose, const Motion& motion) noexcept {
   result.position_mm += motion.move_mm;
   const double angle = motion.turn_rad.norm();
   if (angle > 0.0)
-    result.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle, motion.turn_rad / angle)) * pose.rotation).normalized();
+    result.rotation =
+        (Eigen::Quaterniond(Eigen::AngleAxisd(angle, motion.turn_rad / angle)) * pose.rotation).normalized();
   return result;
 }
 
@@ -166,12 +171,15 @@ Motion between(const Pose& from, const Pose& to) noexcept {
   return motion;
 }
 
-Motion least_motion(const Motion& wanted, const Conditions& conditions, const MotionLimits& limits, bool& held) noexcept {
+Motion least_motion(const Motion& wanted, const Conditions& conditions, const MotionLimits& limits,
+                    bool& held) noexcept {
   Vec6 goal;
   goal.head<3>() = wanted.move_mm;
   if (limits.across) goal.head<3>() -= wanted.move_mm.dot(*limits.across) * *limits.across;
-  if (limits.may_turn) goal.tail<3>() = limits.arm_mm * wanted.turn_rad;
-  else goal.tail<3>().setZero();
+  if (limits.may_turn)
+    goal.tail<3>() = limits.arm_mm * wanted.turn_rad;
+  else
+    goal.tail<3>().setZero();
 
   Problem problem;
   for (int i = 0; i < conditions.count(); ++i) {
@@ -182,7 +190,8 @@ Motion least_motion(const Motion& wanted, const Conditions& conditions, const Mo
   bool pressed = false;
   if (!problem.solve(x, pressed) || x.norm() > goal.norm() + kMostPushedOut_mm) {
     // What asks to be let out on two sides at once stays where it is: then standing still breaks nothing.
-    for (double& least : std::span(problem.least).first(static_cast<std::size_t>(problem.count))) least = std::min(0.0, least);
+    for (double& least : std::span(problem.least).first(static_cast<std::size_t>(problem.count)))
+      least = std::min(0.0, least);
     x = goal;
     pressed = false;
     problem.solve(x, pressed);

@@ -1,4 +1,5 @@
-// The motion of a rigid tool nearest to a wanted one that keeps to all of some linear conditions: what a contact allows.
+// The motion of a rigid tool nearest to a wanted one that keeps to all of some linear conditions: what a contact
+// allows.
 #pragma once
 #include <array>
 
@@ -46,16 +47,16 @@ class Conditions {
 };
 
 struct MotionLimits {
-  double arm_mm = 20;          // a turn counts as much as a move that is this arm times as long
+  double arm_mm = 20;  // a turn counts as much as a move that is this arm times as long
   bool may_turn = true;
   const Vec3* across = nullptr;  // moves stay square to this unit vector
 };
 
-// Least squares of move and arm · turn against the wanted motion, over the conditions (the dual method of D. Goldfarb and
-// A. Idnani, Mathematical Programming 27, 1983). `held`: some condition kept the motion from being the wanted one. Where
-// conditions that ask for more than to stand still contradict each other, or would push out farther than what is wanted
-// goes, they only forbid to go deeper. Bounded work; a result that was not found in time may break some, the caller looks.
-// Pure, no allocation. [haptic]
+// Least squares of move and arm · turn against the wanted motion, over the conditions (the dual method of D. Goldfarb
+// and A. Idnani, Mathematical Programming 27, 1983). `held`: some condition kept the motion from being the wanted one.
+// Where conditions that ask for more than to stand still contradict each other, or would push out farther than what is
+// wanted goes, they only forbid to go deeper. Bounded work; a result that was not found in time may break some, the
+// caller looks. Pure, no allocation. [haptic]
 [[nodiscard]] Motion least_motion(const Motion& wanted, const Conditions& conditions, const MotionLimits& limits,
                                   bool& held) noexcept;
 

@@ -10,7 +10,8 @@ void MotorPort::reset() noexcept { open_ = usual_n_ = phase_ = 0.0; }
 
 Vec3 MotorPort::step(const MotorMoment& moment, double dt_s) noexcept {
   const bool turns = moment.spindle_rpm > 1.0;
-  open_ = moment.pedal && turns ? std::min(1.0, open_ + dt_s / params_.on_s) : std::max(0.0, open_ - dt_s / params_.off_s);
+  open_ =
+      moment.pedal && turns ? std::min(1.0, open_ + dt_s / params_.on_s) : std::max(0.0, open_ - dt_s / params_.off_s);
   const double normal_n = moment.normal_n.norm();
   usual_n_ += (normal_n - usual_n_) * (1.0 - std::exp(-dt_s / params_.kick_s));
   const bool saws = moment.stroke.squaredNorm() > 0.0;
@@ -23,7 +24,8 @@ Vec3 MotorPort::step(const MotorMoment& moment, double dt_s) noexcept {
   // What comes as often as teeth bite or the stroke turns round, without a mean.
   const double fade = std::clamp((params_.most_hz - bite_hz) / (0.2 * params_.most_hz), 0.0, 1.0);
   const double wave = fade * std::sin(2.0 * std::numbers::pi * phase_);
-  // The bone holds back the flank that slides over it; at the pole, and under a drill's point, nothing slides to one side.
+  // The bone holds back the flank that slides over it; at the pole, and under a drill's point, nothing slides to one
+  // side.
   const Vec3 across = saws ? Vec3(wave * moment.stroke) : moment.axis.cross(out);
   const double kick_n = moment.cutting ? params_.kick * params_.friction * std::max(0.0, normal_n - usual_n_) : 0.0;
   const double drag_n = moment.cutting ? std::min(moment.across_n, params_.drag * most_n) : params_.drag * most_n;

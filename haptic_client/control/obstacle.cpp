@@ -16,10 +16,12 @@ SolidLattice::SolidLattice(const Tool& item) {
   const auto samples = [&](int axis) { return static_cast<std::int32_t>(std::ceil(size[axis] / pitch_mm_)) + 1; };
   dims_ = {samples(0), samples(1), samples(2)};
   box_.max_mm = box_.min_mm + pitch_mm_ * Vec3(dims_.x - 1, dims_.y - 1, dims_.z - 1);
-  values_.reserve(static_cast<std::size_t>(dims_.x) * static_cast<std::size_t>(dims_.y) * static_cast<std::size_t>(dims_.z));
+  values_.reserve(static_cast<std::size_t>(dims_.x) * static_cast<std::size_t>(dims_.y) *
+                  static_cast<std::size_t>(dims_.z));
   for (Coord c; c.x < dims_.x; ++c.x)
     for (c.y = 0; c.y < dims_.y; ++c.y)
-      for (c.z = 0; c.z < dims_.z; ++c.z) values_.push_back(static_cast<float>(solid(box_.min_mm + position_mm(c, pitch_mm_))));
+      for (c.z = 0; c.z < dims_.z; ++c.z)
+        values_.push_back(static_cast<float>(solid(box_.min_mm + position_mm(c, pitch_mm_))));
 }
 
 bool SolidLattice::near(const Vec3& point_mm, double radius_mm) const noexcept {
@@ -37,7 +39,8 @@ bool SolidLattice::sample(const Vec3& point_mm, double& distance_mm, Vec3& gradi
   const float* v = &values_[static_cast<std::size_t>(c.x * step_x + c.y * step_y + c.z)];
   const auto at_corner = [&](std::ptrdiff_t i) { return static_cast<double>(v[i]); };
   const double d00 = at_corner(1) - at_corner(0), d01 = at_corner(step_y + 1) - at_corner(step_y);
-  const double d10 = at_corner(step_x + 1) - at_corner(step_x), d11 = at_corner(step_x + step_y + 1) - at_corner(step_x + step_y);
+  const double d10 = at_corner(step_x + 1) - at_corner(step_x),
+               d11 = at_corner(step_x + step_y + 1) - at_corner(step_x + step_y);
   const double c00 = at_corner(0) + t.z() * d00, c01 = at_corner(step_y) + t.z() * d01;
   const double c10 = at_corner(step_x) + t.z() * d10, c11 = at_corner(step_x + step_y) + t.z() * d11;
   const double e0 = c01 - c00, e1 = c11 - c10, b0 = c00 + t.y() * e0, b1 = c10 + t.y() * e1;

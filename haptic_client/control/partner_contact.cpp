@@ -45,8 +45,8 @@ Pose PartnerContact::felt(const PartnerTool& partner) const noexcept {
 }
 
 // Where and which way: the mean over all points inside, by their depth, so that neither jumps from point to point.
-PartnerContact::Touch PartnerContact::touch(const TouchPoints& own, const Pose& pose_bone_own, const SolidLattice& solid,
-                                            const Pose& pose_bone_partner) noexcept {
+PartnerContact::Touch PartnerContact::touch(const TouchPoints& own, const Pose& pose_bone_own,
+                                            const SolidLattice& solid, const Pose& pose_bone_partner) noexcept {
   Touch touch;
   const Pose pose_partner_own = pose_bone_partner.inverse() * pose_bone_own;
   if (!solid.near(pose_partner_own.point(own.centre_mm()), own.radius_mm())) return touch;
@@ -70,8 +70,8 @@ PartnerContact::Touch PartnerContact::touch(const TouchPoints& own, const Pose& 
   return touch;
 }
 
-PartnerForce PartnerContact::step(const TouchPoints& own, const Pose& pose_bone_own, std::span<const PartnerTool> partners,
-                                  double dt_s) noexcept {
+PartnerForce PartnerContact::step(const TouchPoints& own, const Pose& pose_bone_own,
+                                  std::span<const PartnerTool> partners, double dt_s) noexcept {
   const Pose before = placed_ ? pose_bone_own_ : pose_bone_own;
   // What the force of the last step has done meanwhile.
   const Eigen::Quaterniond turned = pose_bone_own.rotation * before.rotation.conjugate();

@@ -44,18 +44,18 @@ class BrickGrid {
 // Lower bound of the distance to bone, for every point of cells as wide as a brick at h: from the case, whose bone cuts
 // only take away. It reaches farther than the bricks do.
 struct Clearance {
-  Digest bone;            // of the case that it is of
+  Digest bone;  // of the case that it is of
   CoordBox cells;
   double cell_mm = 0;
   std::vector<float> mm;  // z fastest; zero: nothing is said
 };
 
 struct Patch {
-  BrickGrid fine;            // f, mm: negative in bone
-  BrickGrid coarse;          // f
-  BrickGrid density;         // g/cm³, at h, of the same bricks as `coarse`
-  BrickGrid metal;           // at h, where metal is near: 1 at its samples and in the air beside them, else 0
-  bool has_metal = false;    // any brick of these is there
+  BrickGrid fine;          // f, mm: negative in bone
+  BrickGrid coarse;        // f
+  BrickGrid density;       // g/cm³, at h, of the same bricks as `coarse`
+  BrickGrid metal;         // at h, where metal is near: 1 at its samples and in the air beside them, else 0
+  bool has_metal = false;  // any brick of these is there
   Clearance clearance;
   std::uint64_t own_cuts = 0;  // own cuts up to this number are in it
   RoomSeq room_seq;            // committed events that are in it

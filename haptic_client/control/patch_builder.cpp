@@ -30,8 +30,8 @@ Box tool_box(const ToolModel& model, const Pose& pose, double from_z_mm, double 
   const Box& solid = model.solid.bounds;
   Box box;
   for (int corner = 0; corner < 8; ++corner)
-    box.include(pose.point({corner & 4 ? solid.max_mm.x() : solid.min_mm.x(), corner & 2 ? solid.max_mm.y() : solid.min_mm.y(),
-                            corner & 1 ? from_z_mm : to_z_mm}));
+    box.include(pose.point({corner & 4 ? solid.max_mm.x() : solid.min_mm.x(),
+                            corner & 2 ? solid.max_mm.y() : solid.min_mm.y(), corner & 1 ? from_z_mm : to_z_mm}));
   return box;
 }
 
@@ -66,8 +66,8 @@ void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>&
   }
 }
 
-std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, std::span<const CutField* const> bodies, int level, Coord index,
-                                                 Quantity quantity) {
+std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, std::span<const CutField* const> bodies, int level,
+                                                 Coord index, Quantity quantity) {
   const Case& bone = bodies.front()->bone();
   auto& kept = store[index];
   if (kept) return kept;
@@ -89,7 +89,8 @@ std::shared_ptr<const Brick> PatchBuilder::brick(Store& store, std::span<const C
     Brick other;
     for (const CutField* body : bodies.subspan(1)) {
       body->gather_solid(level, samples, other.values);
-      for (std::size_t i = 0; i < made->values.size(); ++i) made->values[i] = std::min(made->values[i], other.values[i]);
+      for (std::size_t i = 0; i < made->values.size(); ++i)
+        made->values[i] = std::min(made->values[i], other.values[i]);
     }
   }
   ++bricks_made_;
@@ -115,7 +116,8 @@ std::shared_ptr<const Brick> PatchBuilder::metal_brick(const Case& bone, Coord i
   return kept = made;
 }
 
-void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose, Patch& patch) {
+void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose,
+                         Patch& patch) {
   const double h = bodies.front()->bone().pitch_mm();
   const Tool& tool = model.tool;
   if (fine_level_ != model.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
@@ -174,8 +176,9 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
     clearance.cells = cells;
     clearance.cell_mm = kBrickCells * h;
     clearance.mm.clear();
-    for_each(cells,
-             [&](Coord index) { clearance.mm.push_back(static_cast<float>(bone.clearance_mm(brick_centre_mm(index, h)))); });
+    for_each(cells, [&](Coord index) {
+      clearance.mm.push_back(static_cast<float>(bone.clearance_mm(brick_centre_mm(index, h))));
+    });
   }
   ++patch.version;
 }

@@ -13,10 +13,10 @@
 namespace osteon::haptic {
 
 struct PatchParams {
-  double fine_margin_mm = 1.5;    // of fine bricks round the cutting part
-  double coarse_margin_mm = 4.0;  // of coarse bricks round the whole tool
+  double fine_margin_mm = 1.5;        // of fine bricks round the cutting part
+  double coarse_margin_mm = 4.0;      // of coarse bricks round the whole tool
   double clearance_margin_mm = 12.0;  // of what is known to be free round the whole tool
-  int fine_samples = 160;         // along an axis, at most
+  int fine_samples = 160;             // along an axis, at most
 };
 
 class PatchBuilder {
@@ -46,7 +46,7 @@ class PatchBuilder {
   int fine_level_ = -1;
   Store fine_, coarse_, density_, metal_;
   std::vector<const CutField*> bodies_;  // of the last patch, to see when one comes or goes
-  std::shared_ptr<const Brick> air_;  // shared by every brick far from bone
+  std::shared_ptr<const Brick> air_;     // shared by every brick far from bone
   std::size_t bricks_made_ = 0;
 };
 

@@ -13,25 +13,25 @@ namespace {
 
 // Free travel along a direction of cutting in one tick: 2 m/s. A device that moves faster is followed a little later.
 constexpr double kMostTravel_mm = 2.0;
-constexpr int kMostSubSteps = 24;      // of what is cut
-constexpr int kMostTravelSteps = 10;   // of what is not
-constexpr int kMostTries = 12;         // places tried in a tick; a tool that is wedged gets there a little later
+constexpr int kMostSubSteps = 24;     // of what is cut
+constexpr int kMostTravelSteps = 10;  // of what is not
+constexpr int kMostTries = 12;        // places tried in a tick; a tool that is wedged gets there a little later
 constexpr double kNothing_mm = 1e-6;
 // A point may be so deep in bone without being inside: what a step's own linearity leaves, far below what a hand feels.
 constexpr double kSkin_mm = 1e-4;
-constexpr double kNoise_mm = 1e-5;    // of distances in floats
-constexpr double kFlatField = 0.3;     // a gradient shorter than this says nothing: samples are clipped there
-// A drill's point holds on a slope up to this much force aside for each newton along its axis [A]: 17 degrees. Beyond it
-// skates, until most of its point is in bone.
+constexpr double kNoise_mm = 1e-5;  // of distances in floats
+constexpr double kFlatField = 0.3;  // a gradient shorter than this says nothing: samples are clipped there
+// A drill's point holds on a slope up to this much force aside for each newton along its axis [A]: 17 degrees. Beyond
+// it skates, until most of its point is in bone.
 constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
 constexpr double kSkiveSpeed_mm_per_s = 30.0;
 constexpr double kMostSkive_mm = 3.0;
 constexpr double kHand_n_per_mm = 20.0;  // by which a hand, and the other beside it, hold the point against that [A]
-// Play of a tool in its own hole, in insets: points that stand round it some millimetres apart let it go a little farther
-// between them.
+// Play of a tool in its own hole, in insets: points that stand round it some millimetres apart let it go a little
+// farther between them.
 constexpr double kPlay = 1.5;
 constexpr std::int32_t kNoSweep = -1;
-constexpr double kDrawnOut_mm = 1.0;   // in a tick, of a tool that is locked in bone
+constexpr double kDrawnOut_mm = 1.0;  // in a tick, of a tool that is locked in bone
 
 const ContactPoint& point_at(const ToolModel& model, int i) noexcept {
   const int first = model.contact.first_passive();
@@ -43,9 +43,12 @@ bool is_real(const ToolModel& model, int i) noexcept {
 }
 // Along its axis a tool is followed by walls that are no wider than what cuts; those that are wider meet bone.
 bool walls_meet_bone(const ToolModel& model) noexcept {
-  return !model.axial || model.tool.shank_diameter_mm > model.tool.diameter_mm || model.tool.kind == ToolKind::outside_reamer;
+  return !model.axial || model.tool.shank_diameter_mm > model.tool.diameter_mm ||
+         model.tool.kind == ToolKind::outside_reamer;
 }
-bool skives(ToolKind kind) noexcept { return kind == ToolKind::drill || kind == ToolKind::pin || kind == ToolKind::end_drill; }
+bool skives(ToolKind kind) noexcept {
+  return kind == ToolKind::drill || kind == ToolKind::pin || kind == ToolKind::end_drill;
+}
 
 // Where a hole's axis goes when the tool in it has moved: two points of the axis, each with this much play across it.
 Pose with_play(const Pose& hole, const Pose& tool, double arm_mm, double play_mm) noexcept {
@@ -155,7 +158,8 @@ void Proxy::update_sweep(const ToolModel& model) noexcept {
   Sweep& sweep = sweeps_[static_cast<std::size_t>(sweep_count_ - 1)];
   const bool open_behind = sweep.shape->open_behind();
   cut_pose_ = open_behind ? with_play(cut_pose_, pose_, sweep.shape->behind_mm(), kPlay * model.inset) : pose_;
-  if (open_behind && (cut_pose_.position_mm - sweep.to.position_mm).dot(cut_pose_.direction(Vec3::UnitZ())) <= 0.0) return;
+  if (open_behind && (cut_pose_.position_mm - sweep.to.position_mm).dot(cut_pose_.direction(Vec3::UnitZ())) <= 0.0)
+    return;
   sweep.reach(cut_pose_);
 }
 
@@ -172,7 +176,9 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
   const ToolModel& model = tick.model;
   const ContactSet& set = model.contact;
   ContactValues& values = sight.values;
-  const int groups = set.groups(), first = against == Against::all ? 0 : against == Against::cutting ? set.active_groups : groups;
+  const int groups = set.groups(), first = against == Against::all       ? 0
+                                           : against == Against::cutting ? set.active_groups
+                                                                         : groups;
   std::fill_n(values.nearest_mm.begin(), first, kLeftOut_mm);
   if (tick.scene) {
     std::fill_n(values.distance_mm.begin(), first * kGroupPoints, kLeftOut_mm);
@@ -283,7 +289,8 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
   };
   const auto visit = [&](const auto& see) {
     for (int group = 0; group < groups; ++group) {
-      if (static_cast<double>(sight.values.nearest_mm[static_cast<std::size_t>(group)]) >= (broken_only ? 0.0 : reach_mm))
+      if (static_cast<double>(sight.values.nearest_mm[static_cast<std::size_t>(group)]) >=
+          (broken_only ? 0.0 : reach_mm))
         continue;
       for (int i = group * kGroupPoints; i < (group + 1) * kGroupPoints; ++i)
         if (is_real(model, i) && asked(i)) see(i);
@@ -321,8 +328,10 @@ double Proxy::safe_part(const Tick& tick, const Motion& motion, Against against)
   for (int group = against == Against::cutting && !tick.scene ? set.active_groups : 0; group < set.groups(); ++group) {
     const ContactSet::Ball& ball = set.balls[static_cast<std::size_t>(group)];
     const Vec3 centre = pose_.direction(Vec3(ball.x, ball.y, ball.z));
-    const double way_mm = (motion.move_mm + motion.turn_rad.cross(centre)).norm() + turn * static_cast<double>(ball.radius_mm);
-    const double may_mm = std::max(least_mm, 0.8 * static_cast<double>(here_.values.nearest_mm[static_cast<std::size_t>(group)]));
+    const double way_mm =
+        (motion.move_mm + motion.turn_rad.cross(centre)).norm() + turn * static_cast<double>(ball.radius_mm);
+    const double may_mm =
+        std::max(least_mm, 0.8 * static_cast<double>(here_.values.nearest_mm[static_cast<std::size_t>(group)]));
     if (way_mm * part > may_mm) part = may_mm / way_mm;
   }
   return part;
@@ -343,8 +352,8 @@ Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, co
     const Pose there = moved(pose_, motion);
     ++tries_;
     look(tick, there, against, there_);
-    // Not known there: the tool waits for its patch, at the edge of what is. A patch is about the tool, so a tool that did not
-    // go a part of the way would wait for ever.
+    // Not known there: the tool waits for its patch, at the edge of what is. A patch is about the tool, so a tool that
+    // did not go a part of the way would wait for ever.
     if (!there_.values.covered) {
       if (attempt == kMostHere) return {};
       motion = 0.5 * motion;
@@ -360,21 +369,25 @@ Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, co
       return motion;
     }
     held = true;
-    if (attempt < kMostSolved) motion = least_motion(piece, *conditions_, limits, held);
-    else motion = 0.5 * motion;
+    if (attempt < kMostSolved)
+      motion = least_motion(piece, *conditions_, limits, held);
+    else
+      motion = 0.5 * motion;
   }
   report.contact = true;
   return {};
 }
 
-void Proxy::travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too, ProxyStep& report) noexcept {
+void Proxy::travel(const Tick& tick, const Pose& wanted, const Vec3* across, bool move_too,
+                   ProxyStep& report) noexcept {
   const MotionLimits limits{.arm_mm = kTurnArm_mm, .may_turn = true, .across = across};
   for (int i = 0; i < kMostTravelSteps && tries_ < kMostTries; ++i) {
     Motion left = between(pose_, wanted);
     if (!move_too) left.move_mm.setZero();
     if (across) left.move_mm -= left.move_mm.dot(*across) * *across;
     if (norm_mm(left, limits.arm_mm) < kNothing_mm) return;
-    // First what is left of it once all that is near has had its say, so that what is pressed in does not slow what slides.
+    // First what is left of it once all that is near has had its say, so that what is pressed in does not slow what
+    // slides.
     bool held = false;
     conditions_->clear();
     add_conditions(tick, here_, pose_, Motion{}, 1.25 * tick.model.fine_pitch_mm, false);
@@ -397,8 +410,8 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
   query.direction_bone = direction;
   query.least_facing = model.least_facing;
   query.strength = &model.strength;
-  // From the inset point along the direction until a quarter pitch ahead of the face: never beyond the wall of the tool's
-  // own hole. Sides that cut though they hardly look ahead ask before their own face.
+  // From the inset point along the direction until a quarter pitch ahead of the face: never beyond the wall of the
+  // tool's own hole. Sides that cut though they hardly look ahead ask before their own face.
   const double ahead_mm = 0.25 * model.fine_pitch_mm;
   if (model.tool.kind == ToolKind::broach) {
     query.lift_mm = model.inset + ahead_mm;
@@ -443,9 +456,9 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
                      arm = static_cast<double>(set.arm_mm[p]);
         const double step = std::min(density, kMostDensity_g_cm3) * (kDensitySteps / kMostDensity_g_cm3);
         const auto below = static_cast<std::size_t>(step);
-        const double strength =
-            static_cast<double>(model.strength[below]) +
-            (step - static_cast<double>(below)) * static_cast<double>(model.strength[below + 1] - model.strength[below]);
+        const double strength = static_cast<double>(model.strength[below]) +
+                                (step - static_cast<double>(below)) *
+                                    static_cast<double>(model.strength[below + 1] - model.strength[below]);
         sums.engaged_mm2 -= area;
         sums.turned_area_mm2 -= point.area_mm2;
         sums.edge -= point.edge;
@@ -459,7 +472,8 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
     if (any) {
       sums.nearest_mm = static_cast<double>(kLeftOut_mm);
       for (int i = 0; i < set.active_groups * kGroupPoints; ++i)
-        sums.nearest_mm = std::min(sums.nearest_mm, static_cast<double>(values.distance_mm[static_cast<std::size_t>(i)]));
+        sums.nearest_mm =
+            std::min(sums.nearest_mm, static_cast<double>(values.distance_mm[static_cast<std::size_t>(i)]));
       sums.engaged_mm2 = std::max(0.0, sums.engaged_mm2);
       sums.milling = std::max(0.0, sums.milling);
     }
@@ -505,8 +519,8 @@ void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& dir
   report.torque_nmm = model.law->torque_nmm(model.law_tool, now.inputs, thrust_n);
   if (tick.around.effects) report.torque_nmm = tick.around.effects->torque_nmm(report.torque_nmm);
   if (model.law->across_n) report.across_n = model.law->across_n(model.law_tool, now.inputs, thrust_n);
-  // Each engaged face bears its share (7.12, 7.14): their moment about the tip, and the spindle's own, which the bone turns
-  // back.
+  // Each engaged face bears its share (7.12, 7.14): their moment about the tip, and the spindle's own, which the bone
+  // turns back.
   const double along = -pose_.direction(now.sums.force).dot(direction);
   cut_moment_nmm_ = -report.torque_nmm * pose_.direction(Vec3::UnitZ());
   if (along > 0.0) cut_moment_nmm_ += thrust_n / along * pose_.direction(now.sums.torque);
@@ -530,7 +544,8 @@ void Proxy::note_slope(const Tick& tick, const Vec3& direction, double thrust_n)
   const Vec3 aside = out + against * direction;
   const double slope = against > 0.0 ? aside.norm() / against : 0.0;
   if (slope > kBite)
-    skive_to_mm_ = std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * thrust_n / kHand_n_per_mm) * aside.normalized();
+    skive_to_mm_ =
+        std::min(kMostSkive_mm, (std::min(slope, kSteepest) - kBite) * thrust_n / kHand_n_per_mm) * aside.normalized();
 }
 
 bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm, ProxyStep& report) noexcept {
@@ -564,8 +579,10 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       report.engaged = now.inputs.engaged;
       report.engaged_area_mm2 = now.inputs.engaged_area_mm2;
       report.density_g_cm3 = now.inputs.density_g_cm3;
-      if (now.inputs.engaged >= kWholePoint) bitten_ = true;
-      else if (skives(model.tool.kind)) note_slope(tick, direction, tick.stiffness_n_per_mm * extension_mm);
+      if (now.inputs.engaged >= kWholePoint)
+        bitten_ = true;
+      else if (skives(model.tool.kind))
+        note_slope(tick, direction, tick.stiffness_n_per_mm * extension_mm);
       if (!tick.may_cut) break;
       // As on steel: the coupling's stretch is the force, and no law is asked.
       if (now.metal) {
@@ -586,8 +603,10 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
     bool blocked = false;
     if (walls || tick.scene) {
       // The walls are seen already from the way here.
-      if (!seen && tick.scene) look(tick, pose_, against, here_);
-      else if (!seen) std::fill_n(here_.values.nearest_mm.begin(), model.contact.active_groups, kLeftOut_mm);
+      if (!seen && tick.scene)
+        look(tick, pose_, against, here_);
+      else if (!seen)
+        std::fill_n(here_.values.nearest_mm.begin(), model.contact.active_groups, kLeftOut_mm);
       seen = true;
       Motion piece;
       piece.move_mm = step_mm * direction;
@@ -648,8 +667,9 @@ void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexc
     }
     return;
   }
-  // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it. Its path takes what its
-  // faces reach, so here the faces themselves block, not the points a little within: else it would creep on through bone.
+  // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it. Its path takes what
+  // its faces reach, so here the faces themselves block, not the points a little within: else it would creep on through
+  // bone.
   if (!(tick.lift_mm > 0.0)) {
     tick.lift_mm = model.inset;
     look(tick, pose_, Against::all, here_);
@@ -740,7 +760,8 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
   Tick tick{model, patch, around, stiffness_n_per_mm, spindle_rpm, false, dt_s};
   for (const PlacedGuide& item : around.items) tick.scene |= item.solid && !(item.id != 0 && item.id == around.guide);
 
-  // A tool that cuts wherever it is led is asked for by its faces. Where those are not deep, what is within them is neither.
+  // A tool that cuts wherever it is led is asked for by its faces. Where those are not deep, what is within them is
+  // neither.
   const bool turns = may_cut && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
   tick.lift_mm = turns && model.feed != Feeding::along && !returned_ ? model.inset : 0.0;
   look(tick, pose_, Against::all, here_);
@@ -764,7 +785,8 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
     skive_mm_.setZero();
     travel(tick, pose_bone_device, nullptr, true, report);
   }
-  if (tick.may_cut) update_sweep(model);  // else it would creep on through bone by what its points are inset, without turning
+  if (tick.may_cut)
+    update_sweep(model);  // else it would creep on through bone by what its points are inset, without turning
   cut_before_ = report.cutting && !report.breakthrough;
 
   note_pushed_back(report);

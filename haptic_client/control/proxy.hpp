@@ -1,13 +1,13 @@
-// The tool that the bone sees: a god-object of six degrees of freedom that follows the device but never enters bone except
-// by cutting it, nor what stands on the bone.
+// The tool that the bone sees: a god-object of six degrees of freedom that follows the device but never enters bone
+// except by cutting it, nor what stands on the bone.
 //
-// Each tick it takes the motion nearest to the device's that every contact point allows: a move of the tip and a turn about
-// it, where a turn counts as much as a move that is kTurnArm_mm times as long. So a tool that is pressed on one side leans,
-// one in a hole keeps to the hole, and what the device's orientation asks for beyond that is a torque. The motion goes in
-// parts of at most half a patch pitch, or as far as nothing is near: no wall that the patch shows is ever jumped over.
-// Points on the cutting part ask for bone a little ahead of the face they stand for: so it does not matter that patches are
-// some milliseconds old, nor that interpolation rounds edges by half a pitch. What was cut since the patch was built is
-// known from a ring of the proxy's own recent sweeps.
+// Each tick it takes the motion nearest to the device's that every contact point allows: a move of the tip and a turn
+// about it, where a turn counts as much as a move that is kTurnArm_mm times as long. So a tool that is pressed on one
+// side leans, one in a hole keeps to the hole, and what the device's orientation asks for beyond that is a torque. The
+// motion goes in parts of at most half a patch pitch, or as far as nothing is near: no wall that the patch shows is
+// ever jumped over. Points on the cutting part ask for bone a little ahead of the face they stand for: so it does not
+// matter that patches are some milliseconds old, nor that interpolation rounds edges by half a pitch. What was cut
+// since the patch was built is known from a ring of the proxy's own recent sweeps.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -24,34 +24,34 @@
 namespace osteon::haptic {
 
 struct ProxyStep {
-  bool covered = true;         // the patch reaches all of the tool that matters
-  bool contact = false;        // something holds the tool back
-  bool cutting = false;        // it advances into bone
-  bool may_cut = false;        // it would, where the force suffices: it turns, and nothing forbids it
-  bool near_bone = false;      // the cutting part touches or may remove bone
+  bool covered = true;     // the patch reaches all of the tool that matters
+  bool contact = false;    // something holds the tool back
+  bool cutting = false;    // it advances into bone
+  bool may_cut = false;    // it would, where the force suffices: it turns, and nothing forbids it
+  bool near_bone = false;  // the cutting part touches or may remove bone
   bool heel_contact = false;
-  bool on_metal = false;       // it turns, and metal is in its way: there it goes no further, and nothing is cut
-  bool returned = false;       // bone came back where the tool is: it cuts nothing until it has left that
-  bool locked = false;         // and so deep that it cannot be felt: no force, the spindle is to stand, until drawn out
-  double feed_mm_per_s = 0;    // into bone, along the direction of cutting
-  double density_g_cm3 = 0;    // engaged-area weighted
-  double engaged = 0;          // share of the leading projected area in bone
-  double engaged_area_mm2 = 0; // that area
-  double torque_nmm = 0;       // of the bone on the spindle, about the tool's axis
-  double across_n = 0;         // of the bone on the tool across the feed, as ForceLaw::across_n says
-  unsigned out_of_range = 0;   // bits: outside of which of its limits the law was used
+  bool on_metal = false;     // it turns, and metal is in its way: there it goes no further, and nothing is cut
+  bool returned = false;     // bone came back where the tool is: it cuts nothing until it has left that
+  bool locked = false;       // and so deep that it cannot be felt: no force, the spindle is to stand, until drawn out
+  double feed_mm_per_s = 0;  // into bone, along the direction of cutting
+  double density_g_cm3 = 0;  // engaged-area weighted
+  double engaged = 0;        // share of the leading projected area in bone
+  double engaged_area_mm2 = 0;          // that area
+  double torque_nmm = 0;                // of the bone on the spindle, about the tool's axis
+  double across_n = 0;                  // of the bone on the tool across the feed, as ForceLaw::across_n says
+  unsigned out_of_range = 0;            // bits: outside of which of its limits the law was used
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
   double cutting_work_mj = 0;  // of the law's force over the way cut in this tick, its parts added; never negative
-  // Turning cuts nothing: what turned the tool pushed it back by more than it then cut, and the force of that cut would have
-  // done this work on the tool. As a whole such a tick is rubbing, without force, though what was cut in it took its work,
-  // torque and feed. Zero in every other.
+  // Turning cuts nothing: what turned the tool pushed it back by more than it then cut, and the force of that cut would
+  // have done this work on the tool. As a whole such a tick is rubbing, without force, though what was cut in it took
+  // its work, torque and feed. Zero in every other.
   double pushed_back_mj = 0;
   // What was being cut ended in this tick or with the one before: the tool has stopped there, its coupling still
   // stretched; where it goes on is the loop's to say.
   bool breakthrough = false;
   Vec3 moved_mm = Vec3::Zero();
-  // Of bone and scene on the tool, about its tip, bone frame: what holds its turn back, and the moment of the cut. Never a
-  // force on a device of three axes.
+  // Of bone and scene on the tool, about its tip, bone frame: what holds its turn back, and the moment of the cut.
+  // Never a force on a device of three axes.
   Vec3 contact_torque_nmm = Vec3::Zero();
   Vec3 turn_rad = Vec3::Zero();  // from the proxy's orientation to the wanted one
 };
@@ -82,8 +82,9 @@ class Proxy {
   void end_sweep() noexcept;
   [[nodiscard]] bool sweeps_full() const noexcept { return sweep_count_ >= kMostSweeps - 1; }
   [[nodiscard]] const Pose& pose() const noexcept { return pose_; }
-  // [haptic] From where it takes bone away. A tool that goes along its axis plays in its hole by what its points are inset,
-  // and the hole follows only beyond that play: else a drill that is pressed sideways would widen it tick by tick.
+  // [haptic] From where it takes bone away. A tool that goes along its axis plays in its hole by what its points are
+  // inset, and the hole follows only beyond that play: else a drill that is pressed sideways would widen it tick by
+  // tick.
   [[nodiscard]] const Pose& cut_pose() const noexcept { return cut_pose_; }
 
  private:
@@ -114,7 +115,7 @@ class Proxy {
     // Of each point: by which part of which sweep its distance is what it is, or kNoSweep. The way out is asked of few.
     std::unique_ptr<std::int32_t[]> by;
     std::unique_ptr<SweepViews> sweeps;
-    float deepest_in_bone_mm = 0;          // least distance, over blocking points
+    float deepest_in_bone_mm = 0;  // least distance, over blocking points
   };
   struct Engagement {
     ContactSums sums;
@@ -128,7 +129,8 @@ class Proxy {
   void add_conditions(const Tick& tick, const Sight& sight, const Pose& pose, const Motion& at, double reach_mm,
                       bool broken_only) noexcept;
   // The part of a small motion that nothing forbids; both sights are of the poses before and after it, if it is any.
-  Motion allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits, ProxyStep& report) noexcept;
+  Motion allowed(const Tick& tick, const Motion& piece, Against against, const MotionLimits& limits,
+                 ProxyStep& report) noexcept;
   // How much of a motion may be made at once.
   [[nodiscard]] double safe_part(const Tick& tick, const Motion& motion, Against against) const noexcept;
   // Goes as far towards a pose as nothing blocks, cutting nothing.
@@ -142,12 +144,13 @@ class Proxy {
   void cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
   // Bone that came back, by undo or rejection, where the tool is. True: the tick is over.
   [[nodiscard]] bool bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& report) noexcept;
-  void note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n, ProxyStep& report) noexcept;
+  void note_forces(const Tick& tick, const Engagement& now, const Vec3& direction, double thrust_n,
+                   ProxyStep& report) noexcept;
   [[nodiscard]] bool near_bone(const Tick& tick) noexcept;
   void note_pushed_back(ProxyStep& report) noexcept;
   void update_sweep(const ToolModel& model) noexcept;
-  // The sweeps as they are seen from a pose, what they leave at a group of the tool's points, and the way out there: tool
-  // frame.
+  // The sweeps as they are seen from a pose, what they leave at a group of the tool's points, and the way out there:
+  // tool frame.
   void see_sweeps(const ToolModel& model, const Pose& pose, SweepViews& views) const noexcept;
   void swept(const SweepViews& views, const Lanes (&p)[3], Lanes& left, Parts& by) const noexcept;
   [[nodiscard]] static Vec3 way_out(const SweepViews& views, const Vec3& p, int by) noexcept;
@@ -159,7 +162,7 @@ class Proxy {
   bool sweeping_ = false;
   bool cut_before_ = false;  // the last step ended cutting
   bool returned_ = false, locked_ = false;
-  int tries_ = 0;  // in this tick
+  int tries_ = 0;                 // in this tick
   Vec3 skive_mm_ = Vec3::Zero();  // how far the point is pushed aside by the slope that it stands on
   Vec3 skive_to_mm_ = Vec3::Zero();
   bool skates_ = false;  // the last tick met a slope

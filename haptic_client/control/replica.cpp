@@ -6,7 +6,8 @@
 
 namespace osteon::haptic {
 
-Replica::Replica(const Case& bone, BodyId body, std::shared_ptr<const ToolBox> tools) : bone_(bone), tools_(std::move(tools)) {
+Replica::Replica(const Case& bone, BodyId body, std::shared_ptr<const ToolBox> tools)
+    : bone_(bone), tools_(std::move(tools)) {
   this->body(body);
 }
 
@@ -79,7 +80,8 @@ void Replica::lease(std::uint64_t epoch) {
   });
 }
 
-void Replica::renew(RoomSeq contained, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves, std::uint64_t decided) {
+void Replica::renew(RoomSeq contained, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves,
+                    std::uint64_t decided) {
   change(contained, bodies, {});
   room_seq_ = contained;
   std::map<BodyId, std::set<Place>> stored;

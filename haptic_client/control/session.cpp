@@ -11,7 +11,9 @@ LoopParams params_of(const DeviceLimits& limits, double force_scale, double dt_s
 }  // namespace
 
 SimulatedSession::SimulatedSession(ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, double dt_s)
-    : surgeon_(std::move(plan)), device_(device), loop_(params_of(device.limits, force_scale, dt_s), surgeon_.plan().tools) {}
+    : surgeon_(std::move(plan)),
+      device_(device),
+      loop_(params_of(device.limits, force_scale, dt_s), surgeon_.plan().tools) {}
 
 bool SimulatedSession::done() const noexcept {
   if (surgeon_.done() || !played_ || !played_->over()) return surgeon_.done();
@@ -59,13 +61,16 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
   input.room = room;
   input.periods = periods;
   const std::vector<PlacedGuide>& own = surgeon_.plan().guides;
-  const std::span<const PlacedGuide> guides = room_guides ? std::span(*room_guides) : std::span(own).first(surgeon_.guides_placed());
+  const std::span<const PlacedGuide> guides =
+      room_guides ? std::span(*room_guides) : std::span(own).first(surgeon_.guides_placed());
   result.reading = reading;
   result.commanded_rpm = input.spindle_rpm;
   result.report = last_ = loop_.tick(input, patch, guides);
   const DeviceOutput output{result.report.force_device_n, result.report.torque_device_nmm};
-  if (played_) played_->write(output);
-  else device_.write(output);
+  if (played_)
+    played_->write(output);
+  else
+    device_.write(output);
   return result;
 }
 

@@ -5,7 +5,7 @@
 namespace osteon::haptic {
 
 HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq place, std::uint64_t lease_epoch,
-                       std::span<const ToolModel> tools) {
+                                       std::span<const ToolModel> tools) {
   HapticRestrictions out;
   out.room_seq = place;
   out.lease_epoch = lease_epoch;
@@ -26,7 +26,8 @@ std::string in_words(const Restrictions& now) {
   const auto add = [&](const std::string& one) { words += (words.empty() ? "" : ", ") + one; };
   if (now.stopped) add("stopped");
   if (now.taken_by) add("tool taken by " + std::to_string(now.taken_by.value));
-  if (now.guide) add("led by " + std::to_string(now.guide.value) + " with a share of " + std::to_string(now.guide_share));
+  if (now.guide)
+    add("led by " + std::to_string(now.guide.value) + " with a share of " + std::to_string(now.guide_share));
   if (now.force_limit > 0) add("no more than " + std::to_string(now.force_limit) + " hundredths of a newton");
   if (now.zone) add("within a ball only");
   if (!now.tools.empty()) add("with " + std::to_string(now.tools.size()) + " tools only");
@@ -35,7 +36,8 @@ std::string in_words(const Restrictions& now) {
 
 std::string called(const Decider& by) {
   std::string name = by.name;
-  std::ranges::replace_if(name, [](unsigned char byte) { return byte < 0x20 || byte == 0x7f; }, '?');
+  std::ranges::replace_if(
+      name, [](unsigned char byte) { return byte < 0x20 || byte == 0x7f; }, '?');
   if (!name.empty()) return name;
   return by.author ? "#" + std::to_string(by.author.value) : std::string();
 }

@@ -1,6 +1,6 @@
-// What an instructor has decided about this hand, as the haptic loop keeps to it: where nothing may be cut the spindle runs
-// down and the tool rubs, as in a room that is held; no more is felt or cut with than was allowed. The room would refuse
-// what is kept from being predicted here.
+// What an instructor has decided about this hand, as the haptic loop keeps to it: where nothing may be cut the spindle
+// runs down and the tool rubs, as in a room that is held; no more is felt or cut with than was allowed. The room would
+// refuse what is kept from being predicted here.
 #pragma once
 #include <bitset>
 #include <cstddef>
@@ -18,35 +18,37 @@ namespace osteon::haptic {
 // A Restrictions of fixed size, so that it crosses to the haptic thread by TripleBuffer.
 struct HapticRestrictions {
   static constexpr std::size_t kMostTools = 256;
-  RoomSeq room_seq;                  // since when it holds
-  std::uint64_t lease_epoch = 0;     // of the hand's lease since then
+  RoomSeq room_seq;               // since when it holds
+  std::uint64_t lease_epoch = 0;  // of the hand's lease since then
   bool stopped = false;
-  AuthorId taken_by, guide;          // null: nobody
-  double guide_share = 0;            // 0 … 1
-  double force_limit_n = 0;          // physical; 0: none
+  AuthorId taken_by, guide;  // null: nobody
+  double guide_share = 0;    // 0 … 1
+  double force_limit_n = 0;  // physical; 0: none
   std::optional<ZoneLimit> zone;
-  bool some_tools = false;           // only those that are not forbidden
-  std::bitset<kMostTools> forbidden; // of the loop's tools
+  bool some_tools = false;            // only those that are not forbidden
+  std::bitset<kMostTools> forbidden;  // of the loop's tools
 
   [[nodiscard]] bool may_cut() const noexcept { return !stopped && !taken_by; }
 };
 // `tools`: the loop's.
-[[nodiscard]] HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq place, std::uint64_t lease_epoch,
-                                     std::span<const ToolModel> tools);
+[[nodiscard]] HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq place,
+                                                     std::uint64_t lease_epoch, std::span<const ToolModel> tools);
 
 // What holds, for a line of a log; empty: nothing does.
 [[nodiscard]] std::string in_words(const Restrictions& supervision);
 // "Dr. Weber", fit for a terminal; "#3" for somebody without a name; empty: nobody knows.
 [[nodiscard]] std::string called(const Decider& by);
 
-// What the newest datagram says of the hand. It may come before the row that it stands for, which may be lost or wait for
-// others; epochs say which of the two is newer.
+// What the newest datagram says of the hand. It may come before the row that it stands for, which may be lost or wait
+// for others; epochs say which of the two is newer.
 struct StopFlag {
   std::uint64_t lease_epoch = 0;
   bool frozen = false;
 };
 // In a word that is written and read without a lock.
-[[nodiscard]] constexpr std::uint64_t packed(const StopFlag& flag) { return flag.lease_epoch << 1 | (flag.frozen ? 1u : 0u); }
+[[nodiscard]] constexpr std::uint64_t packed(const StopFlag& flag) {
+  return flag.lease_epoch << 1 | (flag.frozen ? 1u : 0u);
+}
 [[nodiscard]] constexpr StopFlag unpacked(std::uint64_t word) { return {word >> 1, (word & 1) != 0}; }
 
 // Keeps to it, tick by tick. [haptic]

@@ -8,18 +8,19 @@
 namespace osteon::haptic {
 namespace {
 
-constexpr double kStandOff_mm = 12.0;        // where a tool is taken up, above the surface
-constexpr double kNear_mm = 1.5;             // from here the surface is sought slowly
+constexpr double kStandOff_mm = 12.0;  // where a tool is taken up, above the surface
+constexpr double kNear_mm = 1.5;       // from here the surface is sought slowly
 constexpr double kCarrySpeed_mm_per_s = 25.0;
 constexpr double kSeekSpeed_mm_per_s = 4.0;
-constexpr double kBeyondGone_mm = 1.0;       // sought so far past the far side where there is no bone any more
-constexpr double kCorticalDensity = 1.1;     // g/cm³; what is denser counts as cortex in the means
+constexpr double kBeyondGone_mm = 1.0;    // sought so far past the far side where there is no bone any more
+constexpr double kCorticalDensity = 1.1;  // g/cm³; what is denser counts as cortex in the means
 constexpr double kBurrTilt_rad = 30.0 * std::numbers::pi / 180.0;  // the pole of a burr does not cut
-constexpr double kPass_mm = 0.6;             // depth of a burr's pass
-constexpr double kFollows_s = 0.25;          // a hand is where it should be after some of its time constants, B/K of 0.04 to 0.07 s
-constexpr double kLastDwell_s = 1.0;         // and at the end it presses on until bone hardly gives way any more
-constexpr double kGrown_mm = 0.01;           // a tip that comes less deeper than this in such a time comes no deeper
-constexpr double kEnough = 0.9;              // part of the depth asked with which a window counts as done
+constexpr double kPass_mm = 0.6;                                   // depth of a burr's pass
+constexpr double kFollows_s =
+    0.25;  // a hand is where it should be after some of its time constants, B/K of 0.04 to 0.07 s
+constexpr double kLastDwell_s = 1.0;  // and at the end it presses on until bone hardly gives way any more
+constexpr double kGrown_mm = 0.01;    // a tip that comes less deeper than this in such a time comes no deeper
+constexpr double kEnough = 0.9;       // part of the depth asked with which a window counts as done
 
 double depth_mm(const ReadyStep& step, const Vec3& tip_mm) { return (tip_mm - step.site.entry_mm).dot(step.site.axis); }
 
@@ -29,10 +30,12 @@ Result<EntrySite> find_site(const Case& bone, const PlanEntry& entry, const Entr
   if (entry.toward) return find_site_toward(bone, *entry.toward);
   if (entry.point_mm && entry.axis) return find_site_at(bone, *entry.point_mm, *entry.axis);
   if (entry.beside_last_mm) {
-    if (!last) return failure(ErrorCode::invalid_input, "entry.beside_last_mm needs a step before it; give entry.toward");
+    if (!last)
+      return failure(ErrorCode::invalid_input, "entry.beside_last_mm needs a step before it; give entry.toward");
     return find_site_beside(bone, *last, (*entry.beside_last_mm)[0], (*entry.beside_last_mm)[1]);
   }
-  return failure(ErrorCode::invalid_input, "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
+  return failure(ErrorCode::invalid_input,
+                 "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
 }
 
 constexpr double kTremorArm_mm = 80.0;  // from the tip to where the hand holds the tool: a stray hand also tilts it
@@ -43,32 +46,37 @@ struct Stray {
 };
 Stray stray(double time_s, double phase) {
   const auto wave = [&](double shift) {
-    return 0.6 * std::sin(2.0 * std::numbers::pi * 0.7 * time_s + shift) + 0.4 * std::sin(2.0 * std::numbers::pi * 9.0 * time_s + 2.0 * shift);
+    return 0.6 * std::sin(2.0 * std::numbers::pi * 0.7 * time_s + shift) +
+           0.4 * std::sin(2.0 * std::numbers::pi * 9.0 * time_s + 2.0 * shift);
   };
   return {wave(phase + 0.8) / std::numbers::sqrt2, wave(phase + 2.5) / std::numbers::sqrt2};
 }
 
-// How far a rig goes: through the bone, or until the tool is as deep as it should be, however far the coupling stretches
-// on the way.
+// How far a rig goes: through the bone, or until the tool is as deep as it should be, however far the coupling
+// stretches on the way.
 double feed_end_mm(const ReadyStep& step) {
   constexpr double kMostStretch_mm = 15.0;
   return step.plan.to_mm > 0.0 ? step.plan.to_mm + kMostStretch_mm : step.site.thickness_mm + step.plan.beyond_mm;
 }
 
-// The time that a phase may take. What moves by its own clock gets twice that and a margin; the rest, what waits for bone
-// or spindle, as long as any bone could ask for.
+// The time that a phase may take. What moves by its own clock gets twice that and a margin; the rest, what waits for
+// bone or spindle, as long as any bone could ask for.
 double most_s(const ReadyStep& step, SurgeonPhase phase) {
   constexpr double kMargin_s = 10.0, kMostPush_s = 60.0;
   switch (phase) {
-    case SurgeonPhase::seek: return kMargin_s + 2.0 * step.site.thickness_mm / kSeekSpeed_mm_per_s;
-    case SurgeonPhase::push: return kMostPush_s;
-    case SurgeonPhase::feed: return kMargin_s + 2.0 * feed_end_mm(step) / step.plan.feed_mm_per_s;
+    case SurgeonPhase::seek:
+      return kMargin_s + 2.0 * step.site.thickness_mm / kSeekSpeed_mm_per_s;
+    case SurgeonPhase::push:
+      return kMostPush_s;
+    case SurgeonPhase::feed:
+      return kMargin_s + 2.0 * feed_end_mm(step) / step.plan.feed_mm_per_s;
     case SurgeonPhase::sweep: {
       constexpr double kMostDwell_s = 3.0;
       const double dwells = step.dwells ? static_cast<double>(step.sweep_mm.size() / step.line_places) : 1.0;
       return kMargin_s + 2.0 * step.sweep_length_mm / step.plan.sweep_mm_per_s + kMostDwell_s * dwells;
     }
-    default: return kMargin_s;
+    default:
+      return kMargin_s;
   }
 }
 
@@ -81,7 +89,8 @@ void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
   step.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(kBurrTilt_rad, site.across_v)) * upright).normalized();
   const Vec3 tip_from_centre = radius * (step.rotation * Vec3::UnitZ());
 
-  const double half_u = std::max(0.0, 0.5 * step.plan.window_u_mm - radius), half_v = std::max(0.0, 0.5 * step.plan.window_v_mm - radius);
+  const double half_u = std::max(0.0, 0.5 * step.plan.window_u_mm - radius),
+               half_v = std::max(0.0, 0.5 * step.plan.window_v_mm - radius);
   const int passes = std::max(1, static_cast<int>(std::ceil(step.plan.depth_mm / kPass_mm)));
   const int lines = 1 + static_cast<int>(std::ceil(2.0 * half_v / (0.4 * tool.diameter_mm)));
   const int places = 1 + static_cast<int>(std::ceil(2.0 * half_u));
@@ -101,7 +110,8 @@ void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
       for (int place = 0; place < places; ++place) {
         const double along = places > 1 ? half_u * (2.0 * place / (places - 1) - 1.0) : 0.0;
         const double u = forth ? along : -along;
-        const Vec3 centre = site.entry_mm + u * site.across_u + v * site.across_v + (surface_height(u, v) + depth - radius) * site.axis;
+        const Vec3 centre =
+            site.entry_mm + u * site.across_u + v * site.across_v + (surface_height(u, v) + depth - radius) * site.axis;
         const Vec3 tip = centre + tip_from_centre;
         if (!step.sweep_mm.empty()) step.sweep_length_mm += (tip - step.sweep_mm.back()).norm();
         step.sweep_mm.push_back(tip);
@@ -111,7 +121,9 @@ void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
   }
 }
 
-std::string sentence(const Tool& tool, std::string_view why) { return "tool \"" + tool.name + "\" " + std::string(why); }
+std::string sentence(const Tool& tool, std::string_view why) {
+  return "tool \"" + tool.name + "\" " + std::string(why);
+}
 
 bool is_guide(ToolKind kind) {
   return kind == ToolKind::drill_sleeve || kind == ToolKind::distal_block || kind == ToolKind::four_in_one_block;
@@ -120,15 +132,19 @@ bool is_guide(ToolKind kind) {
 // Whether the tool is one for this action.
 Result<void> suits(const Tool& tool, Action action) {
   if (action == Action::place && !is_guide(tool.kind))
-    return failure(ErrorCode::invalid_input, sentence(tool, "is not a guide; choose a drill sleeve or a cutting block"));
+    return failure(ErrorCode::invalid_input,
+                   sentence(tool, "is not a guide; choose a drill sleeve or a cutting block"));
   // Saws are plunged: they go along their axis too.
   const bool plunges = feeds_along_axis(tool.kind) || feeding(tool.kind) == Feeding::in_plane;
   if (action == Action::drill && (!plunges || tool.kind == ToolKind::screw))
-    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a drill, reamer, pin, broach or saw"));
+    return failure(ErrorCode::invalid_input,
+                   sentence(tool, "cannot do this action; choose a drill, reamer, pin, broach or saw"));
   if (action == Action::screw && tool.kind != ToolKind::screw)
     return failure(ErrorCode::invalid_input, sentence(tool, "is not a screw; choose one"));
-  const bool burr = tool.kind == ToolKind::round_burr || tool.kind == ToolKind::barrel_burr || tool.kind == ToolKind::contoured_burr;
-  if (action == Action::burr && !burr) return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a burr"));
+  const bool burr =
+      tool.kind == ToolKind::round_burr || tool.kind == ToolKind::barrel_burr || tool.kind == ToolKind::contoured_burr;
+  if (action == Action::burr && !burr)
+    return failure(ErrorCode::invalid_input, sentence(tool, "cannot do this action; choose a burr"));
   return {};
 }
 
@@ -148,17 +164,22 @@ const GuideBore* hole_for(const PlacedGuide& guide, const Tool& tool) {
 }
 
 // Where a tool that goes through the guide meets the bone.
-Result<EntrySite> find_site_through(const Case& bone, const std::vector<PlacedGuide>& guides, const Tool& tool, double& length_mm) {
+Result<EntrySite> find_site_through(const Case& bone, const std::vector<PlacedGuide>& guides, const Tool& tool,
+                                    double& length_mm) {
   if (guides.empty()) return failure(ErrorCode::invalid_input, "\"guide\" needs a step before it that places a guide");
   const GuideBore* hole = hole_for(guides.back(), tool);
-  if (!hole) return failure(ErrorCode::invalid_input, sentence(tool, "does not go through the guide placed last; choose one that fits its hole"));
+  if (!hole)
+    return failure(ErrorCode::invalid_input,
+                   sentence(tool, "does not go through the guide placed last; choose one that fits its hole"));
   length_mm = hole->length_mm;
   const Pose& pose = guides.back().pose_bone_guide;
-  return find_site_at(bone, pose.point(hole->entry_mm + hole->length_mm * hole->direction), pose.direction(hole->direction));
+  return find_site_at(bone, pose.point(hole->entry_mm + hole->length_mm * hole->direction),
+                      pose.direction(hole->direction));
 }
 
 // One step with its site found. `last`: the site of the step before, or null.
-Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolFinder& find, const EntrySite* last, ReadyPlan& ready) {
+Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolFinder& find, const EntrySite* last,
+                             ReadyPlan& ready) {
   ReadyStep step;
   step.plan = plan;
   if (plan.action == Action::wait) return step;
@@ -166,7 +187,8 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   if (!tool) return tl::unexpected(tool.error());
   if (const Result<void> suited = suits(*tool, plan.action); !suited) return tl::unexpected(suited.error());
   double guide_length_mm = 0.0;
-  const Result<EntrySite> site = plan.through_guide ? find_site_through(bone, ready.guides, *tool, guide_length_mm) : find_site(bone, plan.entry, last);
+  const Result<EntrySite> site = plan.through_guide ? find_site_through(bone, ready.guides, *tool, guide_length_mm)
+                                                    : find_site(bone, plan.entry, last);
   if (!site) return tl::unexpected(site.error());
   step.site = *site;
   step.stand_off_mm = kStandOff_mm + guide_length_mm;
@@ -197,10 +219,13 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   }
   if (step.plan.leave && tool->kind != ToolKind::pin && tool->kind != ToolKind::screw)
     return failure(ErrorCode::invalid_input, sentence(*tool, "cannot be left in the bone; choose a pin"));
-  const double deepest_mm = step.plan.to_mm > 0.0 ? step.plan.to_mm : plan.hand == HandKind::rig ? step.site.thickness_mm + plan.beyond_mm : 0.0;
+  const double deepest_mm = step.plan.to_mm > 0.0        ? step.plan.to_mm
+                            : plan.hand == HandKind::rig ? step.site.thickness_mm + plan.beyond_mm
+                                                         : 0.0;
   if (deepest_mm + guide_length_mm > tool->reach_mm())
-    return failure(ErrorCode::invalid_input, plan.to_mm > 0.0 ? "to_mm is deeper than the tool is long; choose a smaller one"
-                                                              : "the bone is thicker here than the drill is long; choose another entry");
+    return failure(ErrorCode::invalid_input,
+                   plan.to_mm > 0.0 ? "to_mm is deeper than the tool is long; choose a smaller one"
+                                    : "the bone is thicker here than the drill is long; choose another entry");
   return step;
 }
 
@@ -238,9 +263,9 @@ Digest plan_digest(const ReadyPlan& plan) {
                         : step.takes_tool()               ? plan.tools[static_cast<std::size_t>(step.tool)].tool.hash()
                                                           : Digest{};
     hasher.bytes(std::as_bytes(std::span(tool.bytes)));
-    for (const double value :
-         {step.spindle_rpm, p.push_n, p.hand_stiffness_n_per_mm, p.hand_damping_n_s_per_mm, p.feed_mm_per_s, p.beyond_mm, p.to_mm,
-          p.window_u_mm, p.window_v_mm, p.depth_mm, p.sweep_mm_per_s, p.wear, p.tremor_mm, p.seconds})
+    for (const double value : {step.spindle_rpm, p.push_n, p.hand_stiffness_n_per_mm, p.hand_damping_n_s_per_mm,
+                               p.feed_mm_per_s, p.beyond_mm, p.to_mm, p.window_u_mm, p.window_v_mm, p.depth_mm,
+                               p.sweep_mm_per_s, p.wear, p.tremor_mm, p.seconds})
       hasher.number(value);
     // Plans of before it was there keep their digest.
     if (p.hand_across_n_per_mm > 0.0) hasher.text("across"), hasher.number(p.hand_across_n_per_mm);
@@ -252,17 +277,26 @@ Digest plan_digest(const ReadyPlan& plan) {
 
 const char* given_up_words(SurgeonPhase phase) {
   switch (phase) {
-    case SurgeonPhase::take_up: return "the bone round the tool was not known in time; look at the server's log";
-    case SurgeonPhase::spin_up: return "the spindle did not come up to its speed";
-    case SurgeonPhase::seek: return "the tool did not meet the bone; look whether something is in its way";
-    case SurgeonPhase::push: return "the bone did not give way; press harder (\"push_n\"), or take another tool or a sharper one";
+    case SurgeonPhase::take_up:
+      return "the bone round the tool was not known in time; look at the server's log";
+    case SurgeonPhase::spin_up:
+      return "the spindle did not come up to its speed";
+    case SurgeonPhase::seek:
+      return "the tool did not meet the bone; look whether something is in its way";
+    case SurgeonPhase::push:
+      return "the bone did not give way; press harder (\"push_n\"), or take another tool or a sharper one";
     case SurgeonPhase::feed:
-      return "the tool did not come as deep as asked; feed it more slowly (\"feed_mm_per_s\"), or take a device that shows more force";
+      return "the tool did not come as deep as asked; feed it more slowly (\"feed_mm_per_s\"), or take a device that "
+             "shows more force";
     case SurgeonPhase::sweep:
-      return "the bur did not come as deep as asked; take a sharper one, or hold it more stiffly (\"hand_stiffness_n_per_mm\")";
-    case SurgeonPhase::retract: return "the tool did not come out of the bone";
-    case SurgeonPhase::lift: return "the spindle did not stop";
-    default: return "the hand did not get there in time";
+      return "the bur did not come as deep as asked; take a sharper one, or hold it more stiffly "
+             "(\"hand_stiffness_n_per_mm\")";
+    case SurgeonPhase::retract:
+      return "the tool did not come out of the bone";
+    case SurgeonPhase::lift:
+      return "the spindle did not stop";
+    default:
+      return "the hand did not get there in time";
   }
 }
 
@@ -279,8 +313,8 @@ const char* name(Action action) {
 }
 
 const char* name(SurgeonPhase phase) {
-  constexpr const char* kNames[] = {"take_up", "approach", "spin_up", "seek", "push", "feed",
-                                    "react",   "sweep",    "retract", "lift", "wait", "done", "free_hand"};
+  constexpr const char* kNames[] = {"take_up", "approach", "spin_up", "seek", "push", "feed",     "react",
+                                    "sweep",   "retract",  "lift",    "wait", "done", "free_hand"};
   return kNames[static_cast<int>(phase)];
 }
 
@@ -345,9 +379,9 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
   if (report.phase == CuttingPhase::cutting) {
     result.all.add(report.force_physical_n.norm(), report.feed_mm_per_s, report.density_g_cm3);
     if (step.feeds() && report.engaged > 0.97 && (phase_ == SurgeonPhase::push || phase_ == SurgeonPhase::feed)) {
-      LayerMeans& layer = report.density_g_cm3 < kCorticalDensity          ? result.medulla
-                          : depth < 0.5 * step.site.thickness_mm ? result.near_cortex
-                                                                 : result.far_cortex;
+      LayerMeans& layer = report.density_g_cm3 < kCorticalDensity ? result.medulla
+                          : depth < 0.5 * step.site.thickness_mm  ? result.near_cortex
+                                                                  : result.far_cortex;
       layer.add(force_n, report.feed_mm_per_s, report.density_g_cm3);
     }
   }
@@ -376,12 +410,13 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
         carry_to_depth(step, step.site.thickness_mm + kBeyondGone_mm, kSeekSpeed_mm_per_s, dt_s);
         if (force_n > 0.3) enter(SurgeonPhase::push);
         // Nothing was met all the way: the hole is there already.
-        else if (depth > (to_mm > 0.0 ? to_mm : step.site.thickness_mm)) enter(SurgeonPhase::retract);
+        else if (depth > (to_mm > 0.0 ? to_mm : step.site.thickness_mm))
+          enter(SurgeonPhase::retract);
       }
       break;
     case SurgeonPhase::feed:
-      // At its end the rig stays and presses on until the tool is there or the time is up: a device that cannot show all the
-      // force lets the tool fall behind by any way (slack).
+      // At its end the rig stays and presses on until the tool is there or the time is up: a device that cannot show
+      // all the force lets the tool fall behind by any way (slack).
       if (const bool at_end = carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s);
           to_mm > 0.0 ? depth >= to_mm : at_end)
         finish_feed(step, report);
@@ -405,7 +440,8 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
         enter(SurgeonPhase::retract);
       }
       break;
-    default: break;
+    default:
+      break;
   }
 }
 
@@ -417,7 +453,9 @@ void Surgeon::finish_feed(const ReadyStep& step, const LoopReport& report) noexc
   LeftItem item{step_, report.pose_bone_proxy, 0.0};
   if (step.item.thread_pitch_mm > 0.0) {
     item.turns = depth_mm(step, report.pose_bone_proxy.position_mm) / step.item.thread_pitch_mm;
-    item.pose_bone_item = item.pose_bone_item * Pose{Vec3::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(2.0 * std::numbers::pi * item.turns, Vec3::UnitZ()))};
+    item.pose_bone_item =
+        item.pose_bone_item *
+        Pose{Vec3::Zero(), Eigen::Quaterniond(Eigen::AngleAxisd(2.0 * std::numbers::pi * item.turns, Vec3::UnitZ()))};
   }
   left_.push_back(item);
   enter(SurgeonPhase::lift);
@@ -480,7 +518,8 @@ bool Surgeon::work(const ReadyStep& step, const LoopReport& report, double dt_s)
       if (report.spindle_rpm > 0.97 * step.spindle_rpm && in_phase_s_ > 0.3) enter(SurgeonPhase::seek);
       break;
     case SurgeonPhase::retract: {
-      const Vec3 lateral = hand_.target_mm - step.site.entry_mm - (hand_.target_mm - step.site.entry_mm).dot(step.site.axis) * step.site.axis;
+      const Vec3 lateral = hand_.target_mm - step.site.entry_mm -
+                           (hand_.target_mm - step.site.entry_mm).dot(step.site.axis) * step.site.axis;
       if (carry_to_depth(step, -step.stand_off_mm, kCarrySpeed_mm_per_s, dt_s)) enter(SurgeonPhase::lift);
       hand_.target_mm += lateral;
       break;
@@ -488,7 +527,9 @@ bool Surgeon::work(const ReadyStep& step, const LoopReport& report, double dt_s)
     case SurgeonPhase::lift:
       spindle_rpm_ = 0.0;
       return report.spindle_rpm < 1.0 && in_phase_s_ > 0.2;
-    default: drills ? drill(step, report, dt_s) : burr(step, report, dt_s); break;
+    default:
+      drills ? drill(step, report, dt_s) : burr(step, report, dt_s);
+      break;
   }
   return false;
 }
@@ -511,7 +552,9 @@ void Surgeon::tremble(const ReadyStep& step, SurgeonOrder& order) const noexcept
   order.hand.target_mm += step.plan.tremor_mm * (place.u * site.across_u + place.v * site.across_v);
   const Vec3 turn_rad = (step.plan.tremor_mm / kTremorArm_mm) * (tilt.u * site.across_u + tilt.v * site.across_v);
   const double angle_rad = turn_rad.norm();
-  if (angle_rad > 0.0) order.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad)) * step.rotation).normalized();
+  if (angle_rad > 0.0)
+    order.rotation =
+        (Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, turn_rad / angle_rad)) * step.rotation).normalized();
 }
 
 SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {

@@ -10,8 +10,8 @@
 
 #include "common/core/digest.hpp"
 #include "common/mechanics/simulated_hand.hpp"
-#include "haptic_client/control/haptic_loop.hpp"
 #include "haptic_client/control/entry_site.hpp"
+#include "haptic_client/control/haptic_loop.hpp"
 
 namespace osteon::haptic {
 
@@ -21,65 +21,80 @@ enum class HandKind : std::uint8_t { expert, novice, rig };
 
 struct PlanEntry {
   std::optional<Vec3> toward;
-  std::optional<Vec3> point_mm, axis;              // both or none
+  std::optional<Vec3> point_mm, axis;  // both or none
   std::optional<std::array<double, 2>> beside_last_mm;
 };
 
 struct PlanStep {
   Action action = Action::wait;
   std::string tool;
-  double spindle_rpm = 0;             // 0: the tool's own
+  double spindle_rpm = 0;  // 0: the tool's own
   HandKind hand = HandKind::expert;
-  double push_n = 29;                 // hand
+  double push_n = 29;                                               // hand
   double hand_stiffness_n_per_mm = 0, hand_damping_n_s_per_mm = 0;  // along the push; 0: of the hand's kind
-  double hand_across_n_per_mm = 0;    // stiffness across it, likewise: a hand that lets itself be led holds loosely
-  double feed_mm_per_s = 1;           // rig
-  double beyond_mm = 5;               // rig: past the far side
-  double to_mm = 0;                   // drill: as deep as this; 0: through the bone
+  double hand_across_n_per_mm = 0;  // stiffness across it, likewise: a hand that lets itself be led holds loosely
+  double feed_mm_per_s = 1;         // rig
+  double beyond_mm = 5;             // rig: past the far side
+  double to_mm = 0;                 // drill: as deep as this; 0: through the bone
   double window_u_mm = 12, window_v_mm = 8, depth_mm = 2, sweep_mm_per_s = 15;  // burr
   double wear = 1;
-  std::string law = {};               // force law by which the tool resists; empty: the tool's own
-  bool through_guide = false;         // drill: through the guide that was placed last, at its site unless an entry is given
-  bool leave = false;                 // drill: the pin stays where it is at the end; a screw always does
-  double tremor_mm = 0;               // of the hand: how far it strays at most, across the axis
+  std::string law = {};        // force law by which the tool resists; empty: the tool's own
+  bool through_guide = false;  // drill: through the guide that was placed last, at its site unless an entry is given
+  bool leave = false;          // drill: the pin stays where it is at the end; a screw always does
+  double tremor_mm = 0;        // of the hand: how far it strays at most, across the axis
   PlanEntry entry;
-  double seconds = 0;                 // wait, place
+  double seconds = 0;  // wait, place
 };
 
 // A step with its place on the bone found and its path worked out.
 struct ReadyStep {
   PlanStep plan;
   EntrySite site;
-  int tool = 0;                       // place in the loop's tools
+  int tool = 0;  // place in the loop's tools
   double spindle_rpm = 0;
-  double stand_off_mm = 0;            // where the tool is taken up, above the surface
-  int guide = -1;                     // place: which of the plan's guides
-  Tool item;                          // definition of what the step leaves on the bone
+  double stand_off_mm = 0;                                       // where the tool is taken up, above the surface
+  int guide = -1;                                                // place: which of the plan's guides
+  Tool item;                                                     // definition of what the step leaves on the bone
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
-  std::vector<Vec3> sweep_mm;         // places of the tip, burr
-  double sweep_length_mm = 0;         // from the first to the last of them
-  std::size_t line_places = 1;        // of them, in each of the lines to and fro
-  bool dwells = false;                // at the end of each line, which is too short for the hand to follow; else of the last only
+  std::vector<Vec3> sweep_mm;                                    // places of the tip, burr
+  double sweep_length_mm = 0;                                    // from the first to the last of them
+  std::size_t line_places = 1;                                   // of them, in each of the lines to and fro
+  bool dwells = false;  // at the end of each line, which is too short for the hand to follow; else of the last only
   [[nodiscard]] bool takes_tool() const { return plan.action != Action::wait && plan.action != Action::place; }
   [[nodiscard]] bool feeds() const { return plan.action == Action::drill || plan.action == Action::screw; }
-  // How deep the tip is to come below the entry, mm: through the bone, to_mm, or the lowest place of a sweep. What a device
-  // and a hand of limited stiffness reach falls short of it.
+  // How deep the tip is to come below the entry, mm: through the bone, to_mm, or the lowest place of a sweep. What a
+  // device and a hand of limited stiffness reach falls short of it.
   [[nodiscard]] double asked_mm() const;
 };
 
 struct ReadyPlan {
   std::vector<ReadyStep> steps;
   std::vector<ToolModel> tools;
-  std::vector<PlacedGuide> guides;    // in the order in which the steps place them
+  std::vector<PlacedGuide> guides;  // in the order in which the steps place them
 };
 using ToolFinder = std::function<Result<Tool>(std::string_view name)>;
 // Error invalid_input or not_found: names the step, the field and the remedy.
-[[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone, const ToolFinder& find = find_tool);
+[[nodiscard]] Result<ReadyPlan> make_ready(const std::vector<PlanStep>& plan, const Case& bone,
+                                           const ToolFinder& find = find_tool);
 // Of everything that a plan says and that was found for it, tools included: another plan has another.
 [[nodiscard]] Digest plan_digest(const ReadyPlan& plan);
 
 // free_hand: of no plan, a person's own.
-enum class SurgeonPhase : std::uint8_t { take_up, approach, spin_up, seek, push, feed, react, sweep, retract, lift, wait, done, free_hand };
+enum class SurgeonPhase : std::uint8_t {
+  take_up,
+  approach,
+  spin_up,
+  seek,
+  push,
+  feed,
+  react,
+  sweep,
+  retract,
+  lift,
+  wait,
+  done,
+  free_hand
+};
 [[nodiscard]] const char* name(SurgeonPhase phase);
 // What was waited for in vain where a phase's time ran out, and what may help: the end of a sentence.
 [[nodiscard]] const char* given_up_words(SurgeonPhase phase);
@@ -91,7 +106,7 @@ struct SurgeonOrder {
   HandCommand hand;
   double spindle_rpm = 0;
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the handle, as the hand holds it
-  bool take_up = false;      // the tool is taken up at hand.target_mm
+  bool take_up = false;                                          // the tool is taken up at hand.target_mm
 };
 
 // Means over the ticks in which the whole cutting part was in one kind of bone.
@@ -109,15 +124,15 @@ struct LeftItem {
 };
 
 struct StepResult {
-  bool completed = false;      // it came to its end by itself; false while it is under way
+  bool completed = false;               // it came to its end by itself; false while it is under way
   std::optional<SurgeonPhase> gave_up;  // the phase whose time ran out
   bool broke_through = false;
   double duration_s = 0;
   double peak_force_n = 0;
-  double deepest_mm = 0;       // of the tip below the entry
-  double plunge_mm = 0;        // of the tip beyond the far surface, as the reference table counts it
-  double after_exit_mm = 0;    // of the tip beyond where the cone was last in bone
-  double on_metal_s = 0;       // metal was in the way of the turning tool for so long
+  double deepest_mm = 0;     // of the tip below the entry
+  double plunge_mm = 0;      // of the tip beyond the far surface, as the reference table counts it
+  double after_exit_mm = 0;  // of the tip beyond where the cone was last in bone
+  double on_metal_s = 0;     // metal was in the way of the turning tool for so long
   LayerMeans near_cortex, medulla, far_cortex, all;
 };
 
@@ -132,14 +147,16 @@ class Surgeon {
   SurgeonOrder act(const LoopReport& report, double dt_s) noexcept;
   [[nodiscard]] bool done() const noexcept { return step_ >= plan_.steps.size(); }
   [[nodiscard]] const ReadyPlan& plan() const { return plan_; }
-  // What the steps have left so far, in order. Entries stay as they are: another thread may read those that it was told of.
+  // What the steps have left so far, in order. Entries stay as they are: another thread may read those that it was told
+  // of.
   [[nodiscard]] const std::vector<LeftItem>& left() const noexcept { return left_; }
   // How many of the plan's guides stand on the bone now.
   [[nodiscard]] std::size_t guides_placed() const noexcept { return guides_placed_; }
   [[nodiscard]] const std::vector<StepResult>& results() const { return results_; }
-  // The mapping that puts a step's site into the middle of the workspace, seen along the tool. A small workspace needs a
-  // scale above 1; a soft device gets one below, down to `stiff_enough`, as far as its workspace reaches.
-  [[nodiscard]] static WorkspaceMapping mapping_for(const ReadyStep& step, double workspace_radius_mm, double stiff_enough);
+  // The mapping that puts a step's site into the middle of the workspace, seen along the tool. A small workspace needs
+  // a scale above 1; a soft device gets one below, down to `stiff_enough`, as far as its workspace reaches.
+  [[nodiscard]] static WorkspaceMapping mapping_for(const ReadyStep& step, double workspace_radius_mm,
+                                                    double stiff_enough);
   // The hand of a step, physical values.
   [[nodiscard]] static HandParams hand_for(const PlanStep& plan);
 
@@ -170,11 +187,11 @@ class Surgeon {
   HandCommand hand_;
   double spindle_rpm_ = 0;
   double target_depth_mm_ = 0;
-  double last_engaged_mm_ = -1;   // depth of the tip when the cone was last in bone, beyond the far side
-  std::size_t knot_ = 0;          // next place of a sweep
+  double last_engaged_mm_ = -1;  // depth of the tip when the cone was last in bone, beyond the far side
+  std::size_t knot_ = 0;         // next place of a sweep
   bool dwelling_ = false;
-  double dwell_mm_ = 0;           // depth of the tip, dwelling, when it last got deeper
-  double still_s_ = 0;            // and how long ago that is
+  double dwell_mm_ = 0;  // depth of the tip, dwelling, when it last got deeper
+  double still_s_ = 0;   // and how long ago that is
 };
 
 }  // namespace osteon::haptic

@@ -1,6 +1,6 @@
-// What the cutting part of the tool in hand has taken away since a patch was built: from one place to another. Of what goes
-// along its axis the deepest place holds all others from where the sweep began on, and one sweep goes on for as long as it
-// keeps to its axis.
+// What the cutting part of the tool in hand has taken away since a patch was built: from one place to another. Of what
+// goes along its axis the deepest place holds all others from where the sweep began on, and one sweep goes on for as
+// long as it keeps to its axis.
 #pragma once
 #include <cstdint>
 
@@ -25,8 +25,8 @@ using Parts = std::array<std::int32_t, kGroupPoints>;
 class SweepView {
  public:
   SweepView() = default;
-  // Of a sweep that is shorter than `short_mm` only the end counts. `before`: the one seen before it, or null; where that
-  // ends, this one need not begin.
+  // Of a sweep that is shorter than `short_mm` only the end counts. `before`: the one seen before it, or null; where
+  // that ends, this one need not begin.
   SweepView(const Sweep& sweep, const Sweep* before, const Pose& pose_bone_tool, double short_mm) noexcept;
   // f that the sweep leaves at a group of the tool's points, at least: tool frame, single precision, which tells
   // hundred-thousandths of a millimetre near the tip. `by`: what of the sweep it is that leaves it.
@@ -38,10 +38,10 @@ class SweepView {
  private:
   static constexpr int kBehind = 3;  // as a part: the hole's beginning; before it places, by number
   const CutShape* shape_ = nullptr;
-  HullPlace places_[3];      // from the tool where it is to the tool where it was
+  HullPlace places_[3];  // from the tool where it is to the tool where it was
   int count_ = 0;
-  float began_mm_ = 0;       // along the axis, of a hole that goes on behind the tool
-  Vec3 ball_from_, ball_to_; // middles
+  float began_mm_ = 0;        // along the axis, of a hole that goes on behind the tool
+  Vec3 ball_from_, ball_to_;  // middles
 };
 
 }  // namespace osteon::haptic

@@ -31,9 +31,10 @@ Tool at_stroke_ends(const Tool& tool) {
   return swept;
 }
 
-// Z edges over a ring of radius r and width dr are Z dr long, on an area of 2 pi r dr: so the cutting edge of a turned tool is
-// shared among its points by their area over their distance from the axis, of what goes along its axis by the area as seen
-// along it. All of the faces that look into the usual feed, wholly in bone, have the edge that LawTool counts.
+// Z edges over a ring of radius r and width dr are Z dr long, on an area of 2 pi r dr: so the cutting edge of a turned
+// tool is shared among its points by their area over their distance from the axis, of what goes along its axis by the
+// area as seen along it. All of the faces that look into the usual feed, wholly in bone, have the edge that LawTool
+// counts.
 void share_edge(const ToolModel& model, std::vector<ContactPoint>& active) {
   const Vec3 feed = model.axial ? Vec3::UnitZ() : Vec3::UnitX();
   double whole = 0.0;
@@ -46,8 +47,9 @@ void share_edge(const ToolModel& model, std::vector<ContactPoint>& active) {
   for (ContactPoint& point : active) point.edge *= whole > 0.0 ? model.law_tool.edge_length_mm / whole : 0.0;
 }
 
-// A saw's teeth as a row of points along its toothed edge over the whole stroke, each with so many of them as are there on
-// average: the blade comes to the ends of its stroke for a part of the time only. They stand for no area, which is the faces'.
+// A saw's teeth as a row of points along its toothed edge over the whole stroke, each with so many of them as are there
+// on average: the blade comes to the ends of its stroke for a part of the time only. They stand for no area, which is
+// the faces'.
 void add_teeth(const ToolModel& model, std::vector<ContactPoint>& active) {
   constexpr double kApart_mm = 0.5;
   const Tool& tool = model.tool;
@@ -156,19 +158,21 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
     (cuts ? active : passive).push_back(point);
     if (cuts) active_area_mm2 += point.area_mm2;
   }
-  if (is_saw(tool.kind)) add_teeth(*this, active);
-  else if (tool.kind != ToolKind::broach && tool.kind != ToolKind::mesh) share_edge(*this, active);
+  if (is_saw(tool.kind))
+    add_teeth(*this, active);
+  else if (tool.kind != ToolKind::broach && tool.kind != ToolKind::mesh)
+    share_edge(*this, active);
   // The very point of what has one, which stands for no area: rings leave it out.
-  if (point_height_mm(tool) > 0.0)
-    active.push_back({Vec3::Zero(), {0, 0, -inset}, Vec3::UnitZ(), 0.0, 0.0});
+  if (point_height_mm(tool) > 0.0) active.push_back({Vec3::Zero(), {0, 0, -inset}, Vec3::UnitZ(), 0.0, 0.0});
   const MillingParams milling{.diameter_mm = tool.diameter_mm};
   contact = contact_set(active, passive, milling.pole_radius * 0.5 * tool.diameter_mm);
   OSTEON_CHECK(contact.groups() * kGroupPoints <= kMostContactPoints);
   // Far out, where the arm is not held up by the pole's; resistance goes with one over it.
   constexpr double kFar_mm = 1e3;
   for (std::size_t i = 0; i < strength.size(); ++i)
-    strength[i] = static_cast<float>(
-        kFar_mm * milling_resistance(milling, 1.0, kFar_mm, kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
+    strength[i] =
+        static_cast<float>(kFar_mm * milling_resistance(milling, 1.0, kFar_mm,
+                                                        kMostDensity_g_cm3 * static_cast<double>(i) / kDensitySteps));
   spindle = motor_of(tool);
   if (is_saw(tool.kind)) stroke = tool.kind == ToolKind::oscillating_saw ? Vec3::UnitX() : Vec3::UnitZ();
 }

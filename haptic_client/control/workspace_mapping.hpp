@@ -25,7 +25,8 @@ class WorkspaceMapping {
   }
   [[nodiscard]] Pose pose_device_tool(const Pose& pose_bone_tool) const noexcept {
     const Eigen::Quaterniond back = view_.conjugate();
-    return {device_mm_ + back * (pose_bone_tool.position_mm - bone_mm_) / scale_, (back * pose_bone_tool.rotation).normalized()};
+    return {device_mm_ + back * (pose_bone_tool.position_mm - bone_mm_) / scale_,
+            (back * pose_bone_tool.rotation).normalized()};
   }
   // Directions and forces; these are turned but not scaled.
   [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept { return view_.conjugate() * bone; }

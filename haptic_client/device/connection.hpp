@@ -30,8 +30,8 @@ class DeviceConnection {
   DeviceConnection(const DeviceConnection&) = delete;
   DeviceConnection& operator=(const DeviceConnection&) = delete;
 
-  // Opens the device on the calling thread, so that its limits are known after, and keeps it from then on. Error: that of
-  // the device; nothing is kept then.
+  // Opens the device on the calling thread, so that its limits are known after, and keeps it from then on. Error: that
+  // of the device; nothing is kept then.
   [[nodiscard]] Result<void> start();
   void stop() noexcept;
   [[nodiscard]] bool connected() const noexcept { return connected_; }

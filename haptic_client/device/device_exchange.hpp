@@ -14,7 +14,7 @@ class DeviceExchange {
   using Time = std::chrono::steady_clock::time_point;
   // Three ticks of the haptic thread: a frame of the device that comes after the third one missed shows no force.
   static constexpr std::chrono::milliseconds kForceHeld{3};
-  static constexpr int kReadsWithoutSample = 20;              // [A] then the device counts as silent
+  static constexpr int kReadsWithoutSample = 20;  // [A] then the device counts as silent
 
   DeviceExchange() { go_absent(); }
 
@@ -32,8 +32,9 @@ class DeviceExchange {
     publish(last_);
   }
   void go_absent() noexcept { go(DeviceStatus::absent); }
-  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. What counts is when
-  // it was written, so a force also ends on time that this thread, having been late itself, sees for the first time.
+  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. What counts is
+  // when it was written, so a force also ends on time that this thread, having been late itself, sees for the first
+  // time.
   [[nodiscard]] DeviceOutput demanded(Time now) noexcept {
     if (outputs_.refresh()) any_written_ = true;
     const Written& last = outputs_.value();
@@ -47,8 +48,10 @@ class DeviceExchange {
 
   // [haptic] The newest reading, with no buttons while it is not ok.
   [[nodiscard]] DeviceReading read() noexcept {
-    if (readings_.refresh()) reads_since_ = 0;
-    else if (reads_since_ < kReadsWithoutSample) ++reads_since_;
+    if (readings_.refresh())
+      reads_since_ = 0;
+    else if (reads_since_ < kReadsWithoutSample)
+      ++reads_since_;
     DeviceReading reading = readings_.value();
     if (reads_since_ >= kReadsWithoutSample && reading.status != DeviceStatus::absent) {
       reading.status = DeviceStatus::fault;
@@ -58,7 +61,9 @@ class DeviceExchange {
     return reading;
   }
   // [haptic] `now`: of the same clock as in demanded().
-  void write(const DeviceOutput& output, Time now = std::chrono::steady_clock::now()) noexcept { outputs_.store({output, now}); }
+  void write(const DeviceOutput& output, Time now = std::chrono::steady_clock::now()) noexcept {
+    outputs_.store({output, now});
+  }
 
  private:
   struct Written {
@@ -68,10 +73,10 @@ class DeviceExchange {
 
   TripleBuffer<DeviceReading> readings_;
   TripleBuffer<Written> outputs_;
-  DeviceReading last_;             // I/O
-  std::uint64_t samples_ = 0;      // I/O
-  bool any_written_ = false;       // I/O
-  int reads_since_ = 0;            // haptic
+  DeviceReading last_;         // I/O
+  std::uint64_t samples_ = 0;  // I/O
+  bool any_written_ = false;   // I/O
+  int reads_since_ = 0;        // haptic
 };
 
 }  // namespace osteon::haptic

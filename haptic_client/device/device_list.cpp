@@ -34,7 +34,8 @@ Made make_numbered_force_dimension(const std::string& argument, const DeviceOpti
 }
 
 Made make_recorded(const std::string& argument, const DeviceOptions&) {
-  if (argument.empty()) return failure(ErrorCode::invalid_input, "--device recorded: it needs a file; name it, recorded:FILE");
+  if (argument.empty())
+    return failure(ErrorCode::invalid_input, "--device recorded: it needs a file; name it, recorded:FILE");
   Result<std::unique_ptr<RecordedDevice>> device = make_recorded_device(argument);
   if (!device) return tl::unexpected(device.error());
   return Made(std::move(*device));
@@ -63,7 +64,8 @@ constexpr std::array<Kind, 7> kKinds{{
     {"spacemouse", "SpaceMouse: six degrees of freedom without force, or the rotation for another", "",
      [](const std::string&, const DeviceOptions&) -> Made { return make_space_mouse(); },
      [](const DeviceOptions&) { return look_for_space_mouse(); }},
-    {"pedal", "foot pedal, a switch for the spindle; pedal:left, :middle or :right for one of three", "left, middle or right",
+    {"pedal", "foot pedal, a switch for the spindle; pedal:left, :middle or :right for one of three",
+     "left, middle or right",
      [](const std::string& argument, const DeviceOptions&) { return make_pedal(read_pedal_switch(argument)); },
      [](const DeviceOptions&) { return look_for_foot_pedals(false); }},
     {"pedal-axis",
@@ -73,7 +75,9 @@ constexpr std::array<Kind, 7> kKinds{{
      [](const std::string& argument, const DeviceOptions&) { return make_pedal(read_pedal_axis(argument)); },
      [](const DeviceOptions&) { return look_for_foot_pedals(true); }},
     {"recorded", "a recording that --record wrote, played again: recorded:FILE", "FILE", make_recorded,
-     [](const DeviceOptions&) { return DeviceFinding{{"always there"}, ""}; }},
+     [](const DeviceOptions&) {
+       return DeviceFinding{{"always there"}, ""};
+     }},
 }};
 
 std::string all_names() {
@@ -129,8 +133,7 @@ std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
                    "a hand of our own making, as strong as the drilling of bone; needs a plan",
                    {{"always there"}, ""}});
   lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
-  for (const Kind& kind : kKinds)
-    lines.push_back({kind.name, kind.what, kind.look(options)});
+  for (const Kind& kind : kKinds) lines.push_back({kind.name, kind.what, kind.look(options)});
   return lines;
 }
 

@@ -11,14 +11,15 @@ namespace osteon::haptic {
 
 // What the user gives beside a device's name.
 struct DeviceOptions {
-  std::filesystem::path libhd, libdhd;      // vendors' libraries; empty: where the dynamic linker finds them
-  std::filesystem::path falcon_firmware;    // the vendor's image; none is shipped
+  std::filesystem::path libhd, libdhd;    // vendors' libraries; empty: where the dynamic linker finds them
+  std::filesystem::path falcon_firmware;  // the vendor's image; none is shipped
 };
 
 // `names`: one device for the hand, and what is to be added to it, joined by "+": "phantom", "falcon+spacemouse+pedal",
-// "phantom:NAME" (as in the vendor's setup), "force-dimension:1", "pedal-axis:z:inverted", "recorded:FILE". Nothing is opened.
-// Errors: not_found, invalid_input; each tells what may be named.
-[[nodiscard]] Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, const DeviceOptions& options);
+// "phantom:NAME" (as in the vendor's setup), "force-dimension:1", "pedal-axis:z:inverted", "recorded:FILE". Nothing is
+// opened. Errors: not_found, invalid_input; each tells what may be named.
+[[nodiscard]] Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names,
+                                                                   const DeviceOptions& options);
 
 struct DeviceLine {
   std::string_view name, what;

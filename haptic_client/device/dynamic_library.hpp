@@ -12,10 +12,10 @@ namespace osteon::haptic {
 
 // How a library is looked for, and what to tell the user who does not have it.
 struct LibraryWanted {
-  std::string what;                        // e.g. "OpenHaptics"
-  std::filesystem::path file;              // given by the user; empty: `names` are tried in order
-  std::span<const char* const> names;      // as the dynamic linker knows them
-  std::string remedy;                      // e.g. "install the vendor's OpenHaptics for Linux"
+  std::string what;                    // e.g. "OpenHaptics"
+  std::filesystem::path file;          // given by the user; empty: `names` are tried in order
+  std::span<const char* const> names;  // as the dynamic linker knows them
+  std::string remedy;                  // e.g. "install the vendor's OpenHaptics for Linux"
 };
 
 class DynamicLibrary {
@@ -49,7 +49,8 @@ struct VendorLibrary {
 // Loads it once for the process and keeps it. `bind(call, need)` asks for each function: need("its name", call.member).
 // Errors: those of DynamicLibrary::load; unsupported, it is another library: `is_not` says than which.
 template <class Api, class Bind>
-[[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryWanted& wanted, const std::string& is_not, Bind bind) {
+[[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryWanted& wanted, const std::string& is_not,
+                                                            Bind bind) {
   static std::mutex mutex;
   static std::map<std::filesystem::path, VendorLibrary<Api>> loaded;  // nodes stay where they are
   const std::lock_guard lock(mutex);

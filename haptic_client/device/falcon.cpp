@@ -56,8 +56,9 @@ class Falcon final : public HapticDevice {
       if (Result<void> loaded = usb->load(image); !loaded) return loaded;
       runs = usb->runs(kStartsPatience);
       if (runs && !*runs)
-        return failure(ErrorCode::unsupported, "the Falcon took " + options_.firmware.string() +
-                                                   " but nothing in it answers; name the image that belongs to the device");
+        return failure(ErrorCode::unsupported,
+                       "the Falcon took " + options_.firmware.string() +
+                           " but nothing in it answers; name the image that belongs to the device");
     }
     if (!runs) return tl::unexpected(runs.error());
     serial_ = usb->serial();
@@ -162,20 +163,22 @@ class Falcon final : public HapticDevice {
   static inline const Eigen::Vector3d kMiddle_m{0.0, 0.0, kFalconOriginZ_m};
 
   const FalconOptions options_;
-  std::string serial_;             // connection thread
-  std::optional<FalconUsb> usb_;   // connection thread until the I/O thread runs
+  std::string serial_;            // connection thread
+  std::optional<FalconUsb> usb_;  // connection thread until the I/O thread runs
   std::optional<EmergencyStop> emergency_;
   std::thread io_;
   Eigen::Vector3d place_m_ = kMiddle_m;  // I/O thread
   DeviceExchange exchange_;
   std::atomic<bool> stopping_{false}, homed_{false}, lost_{false};
-  std::mutex mutex_;               // never taken by the haptic thread
+  std::mutex mutex_;  // never taken by the haptic thread
   Error why_lost_;
 };
 
 }  // namespace
 
-std::unique_ptr<HapticDevice> make_falcon(FalconOptions options) { return std::make_unique<Falcon>(std::move(options)); }
+std::unique_ptr<HapticDevice> make_falcon(FalconOptions options) {
+  return std::make_unique<Falcon>(std::move(options));
+}
 
 DeviceFinding look_for_falcon(const FalconOptions& options) {
   DeviceFinding finding = FalconUsb::look();
@@ -197,9 +200,10 @@ Result<std::vector<std::uint8_t>> read_falcon_firmware(const std::filesystem::pa
     return failure(ErrorCode::invalid_input, named + " is not a file; name the image itself with --falcon-firmware");
   const std::uintmax_t size = std::filesystem::file_size(file, error);
   if (error || size == 0 || size > kLargestImage)
-    return failure(ErrorCode::invalid_input,
-                   named + " has " + (error ? std::string("an unknown number of") : std::to_string(size)) +
-                       " bytes, which no image of it has; name the image that belongs to the device with --falcon-firmware");
+    return failure(
+        ErrorCode::invalid_input,
+        named + " has " + (error ? std::string("an unknown number of") : std::to_string(size)) +
+            " bytes, which no image of it has; name the image that belongs to the device with --falcon-firmware");
   std::vector<std::uint8_t> image(static_cast<std::size_t>(size));
   std::ifstream in(file, std::ios::binary);
   if (!in.read(reinterpret_cast<char*>(image.data()), static_cast<std::streamsize>(image.size())))

@@ -38,9 +38,10 @@ std::optional<FalconCounts> counts_of(const FalconFrame& frame) {
   return counts;
 }
 
-// (request, value) of an FTDI chip: 0 reset and purge, 1 modem lines, 2 flow control, 3 baud rate, 4 framing, 9 latency.
-constexpr FalconSetting kGreetingSettings[] = {{0, 1}, {0, 2}, {9, 16}, {3, 0x4138}, {4, 8}, {2, 0},
-                                               {1, 0x200}, {1, 0x100}, {1, 0x101}};
+// (request, value) of an FTDI chip: 0 reset and purge, 1 modem lines, 2 flow control, 3 baud rate, 4 framing, 9
+// latency.
+constexpr FalconSetting kGreetingSettings[] = {{0, 1}, {0, 2},     {9, 16},    {3, 0x4138}, {4, 8},
+                                               {2, 0}, {1, 0x200}, {1, 0x100}, {1, 0x101}};
 constexpr FalconSetting kLoadingSettings[] = {{1, 0x100}, {3, 0x15}};
 constexpr FalconSetting kRunningSettings[] = {{9, 1}, {3, 2}, {0, 1}, {0, 2}};
 
@@ -65,7 +66,8 @@ std::optional<FalconState> decode_state(const FalconFrame& frame) noexcept {
   const std::optional<FalconCounts> encoders = counts_of(frame);
   const int control = frame[kControl] - kShift;
   if (!encoders || control < 0) return std::nullopt;
-  return FalconState{*encoders, static_cast<std::uint8_t>(control & 0xf), static_cast<std::uint8_t>((control >> 4) & 7)};
+  return FalconState{*encoders, static_cast<std::uint8_t>(control & 0xf),
+                     static_cast<std::uint8_t>((control >> 4) & 7)};
 }
 
 std::optional<FalconState> FalconFrameReader::take(std::span<const std::uint8_t> bytes) noexcept {
@@ -79,8 +81,10 @@ std::optional<FalconState> FalconFrameReader::take(std::span<const std::uint8_t>
     }
     frame_[have_++] = byte;
     if (have_ < kFalconFrame && byte != kEnd) continue;
-    if (const std::optional<FalconState> state = have_ == kFalconFrame ? decode_state(frame_) : std::nullopt) newest = state;
-    else ++broken_;
+    if (const std::optional<FalconState> state = have_ == kFalconFrame ? decode_state(frame_) : std::nullopt)
+      newest = state;
+    else
+      ++broken_;
     have_ = 0;
   }
   return newest;

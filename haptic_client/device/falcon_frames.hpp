@@ -19,7 +19,7 @@ inline constexpr std::uint8_t kFalconAllHomed = 7;
 
 struct FalconCommand {
   FalconCounts motors{};
-  bool homing = false;     // the device looks for the ends of its axes while the user moves the grip in and out
+  bool homing = false;  // the device looks for the ends of its axes while the user moves the grip in and out
   std::uint8_t lights = 0;
 };
 
@@ -68,8 +68,8 @@ struct FalconSetting {
 
 inline constexpr std::array<std::uint8_t, 3> kFalconGreeting{0x0a, 0x43, 0x0d};
 inline constexpr std::array<std::uint8_t, 4> kFalconGreetingAnswer{0x0a, 0x44, 0x2c, 0x0d};
-inline constexpr int kFalconGreetings = 100;       // tries, as the first ones may go astray
-inline constexpr std::uint8_t kFalconReady = 0x41; // sent, and sent back, before the image
-inline constexpr std::size_t kFalconPiece = 62;    // bytes of the image at a time; the boot loader echoes them
+inline constexpr int kFalconGreetings = 100;        // tries, as the first ones may go astray
+inline constexpr std::uint8_t kFalconReady = 0x41;  // sent, and sent back, before the image
+inline constexpr std::size_t kFalconPiece = 62;     // bytes of the image at a time; the boot loader echoes them
 
 }  // namespace osteon::haptic

@@ -16,14 +16,15 @@ constexpr double rad(double degrees) { return degrees * std::numbers::pi / 180.0
 
 // Lengths, m: arm a, parallelogram b, half its side on the grip c, its joints d = e, f and s along the leg's tangent,
 // distance r of the motors from the middle.
-constexpr double kA = 0.060, kB = 0.1025, kC = 0.01443, kD = 0.01125, kE = 0.01125, kF = -0.025, kR = 0.040, kS = -0.02309;
+constexpr double kA = 0.060, kB = 0.1025, kC = 0.01443, kD = 0.01125, kE = 0.01125, kF = -0.025, kR = 0.040,
+                 kS = -0.02309;
 constexpr std::array kLegs{rad(105.0), rad(-15.0), rad(-135.0)};
 
 constexpr double kAngleAtZero_rad = rad(35.0), kAngleOfCount_rad = rad(0.036435);
 constexpr double kMotorCountsPerNm = -1e4;
 
-// A leg in its own plane: its arm starts at (0, 0), the parallelogram's far end is at (across, up), and both are turned by
-// the arm's angle and `second`. `length` is the parallelogram as it is seen in the plane.
+// A leg in its own plane: its arm starts at (0, 0), the parallelogram's far end is at (across, up), and both are turned
+// by the arm's angle and `second`. `length` is the parallelogram as it is seen in the plane.
 struct Leg {
   double across, up, length;
   Vector3d d_across, d_length;  // by the grip's place; `up` is the grip's z

@@ -1,8 +1,7 @@
-// Novint Falcon: encoder counts to the grip's place and back, and the torques that show a force there. Three equal legs,
-// each an arm that the motor turns and a parallelogram that carries the grip, so that the grip moves without turning.
-// The geometry is that of Stamper 1997. Lengths and counts are those of public drivers of the device.
-// Metres and radians here,
-// in the device's own frame: z out of its face to the user, x right, y up.
+// Novint Falcon: encoder counts to the grip's place and back, and the torques that show a force there. Three equal
+// legs, each an arm that the motor turns and a parallelogram that carries the grip, so that the grip moves without
+// turning. The geometry is that of Stamper 1997. Lengths and counts are those of public drivers of the device. Metres
+// and radians here, in the device's own frame: z out of its face to the user, x right, y up.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -25,13 +24,13 @@ inline constexpr int kFalconMaxMotor = 4096;
 // [haptic] The arms' angles that hold the grip at a place; empty where a leg does not reach it.
 [[nodiscard]] std::optional<Eigen::Vector3d> falcon_angles(const Eigen::Vector3d& grip_m) noexcept;
 
-// [haptic] The place of the grip for the arms' angles, by Newton's method from `near_m`, any place in the workspace, such as
-// the last one. Empty for angles that no place has.
+// [haptic] The place of the grip for the arms' angles, by Newton's method from `near_m`, any place in the workspace,
+// such as the last one. Empty for angles that no place has.
 [[nodiscard]] std::optional<Eigen::Vector3d> falcon_place(const Eigen::Vector3d& angles_rad,
                                                           const Eigen::Vector3d& near_m) noexcept;
 
-// [haptic] J = dθ/dp, rad/m, by differentiating each leg's closure. Empty where a leg is stretched out and its arm no longer
-// follows the grip.
+// [haptic] J = dθ/dp, rad/m, by differentiating each leg's closure. Empty where a leg is stretched out and its arm no
+// longer follows the grip.
 [[nodiscard]] std::optional<Eigen::Matrix3d> falcon_jacobian(const Eigen::Vector3d& angles_rad,
                                                              const Eigen::Vector3d& grip_m) noexcept;
 
@@ -39,8 +38,8 @@ inline constexpr int kFalconMaxMotor = 4096;
 [[nodiscard]] Eigen::Vector3d falcon_torques(const Eigen::Vector3d& angles_rad, const Eigen::Vector3d& grip_m,
                                              const Eigen::Vector3d& force_n) noexcept;
 
-// [haptic] Motor commands −10⁴ τ. Where one would exceed the motors' range all three shrink alike, so that the force keeps
-// its direction.
+// [haptic] Motor commands −10⁴ τ. Where one would exceed the motors' range all three shrink alike, so that the force
+// keeps its direction.
 [[nodiscard]] FalconCounts falcon_motors(const Eigen::Vector3d& torques_nm) noexcept;
 
 }  // namespace osteon::haptic

@@ -22,7 +22,8 @@ constexpr std::uint16_t kVendor = 0x0403, kProduct = 0xcb48;
 constexpr std::uint8_t kOut = 0x02, kIn = 0x81, kSettingType = 0x40;
 constexpr int kInterface = 0;
 constexpr std::size_t kPacket = 64;
-constexpr milliseconds kSettingPatience = 500ms, kAnswerPatience = 50ms, kEchoPatience = 1000ms, kCancelPatience = 500ms;
+constexpr milliseconds kSettingPatience = 500ms, kAnswerPatience = 50ms, kEchoPatience = 1000ms,
+                       kCancelPatience = 500ms;
 constexpr milliseconds kStopPatience = 100ms;
 constexpr int kFailuresInARow = 3;  // of transfers, then the device counts as lost
 constexpr const char* kReplug = "unplug it, switch its power off and on, and plug it in again";
@@ -65,7 +66,8 @@ std::string serial_of(libusb_device* device, libusb_device_handle* handle) {
   if (libusb_get_device_descriptor(device, &descriptor) != 0 || descriptor.iSerialNumber == 0) return {};
   const int size =
       libusb_get_string_descriptor_ascii(handle, descriptor.iSerialNumber, text.data(), static_cast<int>(text.size()));
-  return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()), static_cast<std::size_t>(size)) : std::string();
+  return size > 0 ? std::string(reinterpret_cast<const char*>(text.data()), static_cast<std::size_t>(size))
+                  : std::string();
 }
 
 // A transfer that is submitted again and again.
@@ -74,7 +76,9 @@ struct Transfer {
   std::array<std::uint8_t, kPacket> bytes{};
   bool pending = false;
 
-  static void LIBUSB_CALL done(libusb_transfer* transfer) { static_cast<Transfer*>(transfer->user_data)->pending = false; }
+  static void LIBUSB_CALL done(libusb_transfer* transfer) {
+    static_cast<Transfer*>(transfer->user_data)->pending = false;
+  }
 
   int submit(libusb_device_handle* handle, std::uint8_t endpoint, std::size_t size) {
     libusb_fill_bulk_transfer(raw, handle, endpoint, bytes.data(), static_cast<int>(size), &done, this, 0);
@@ -86,12 +90,18 @@ struct Transfer {
 
 int code_of(libusb_transfer_status status) {
   switch (status) {
-    case LIBUSB_TRANSFER_COMPLETED: return 0;
-    case LIBUSB_TRANSFER_NO_DEVICE: return LIBUSB_ERROR_NO_DEVICE;
-    case LIBUSB_TRANSFER_STALL: return LIBUSB_ERROR_PIPE;
-    case LIBUSB_TRANSFER_OVERFLOW: return LIBUSB_ERROR_OVERFLOW;
-    case LIBUSB_TRANSFER_TIMED_OUT: return LIBUSB_ERROR_TIMEOUT;
-    default: return LIBUSB_ERROR_IO;
+    case LIBUSB_TRANSFER_COMPLETED:
+      return 0;
+    case LIBUSB_TRANSFER_NO_DEVICE:
+      return LIBUSB_ERROR_NO_DEVICE;
+    case LIBUSB_TRANSFER_STALL:
+      return LIBUSB_ERROR_PIPE;
+    case LIBUSB_TRANSFER_OVERFLOW:
+      return LIBUSB_ERROR_OVERFLOW;
+    case LIBUSB_TRANSFER_TIMED_OUT:
+      return LIBUSB_ERROR_TIMEOUT;
+    default:
+      return LIBUSB_ERROR_IO;
   }
 }
 
@@ -100,9 +110,9 @@ int code_of(libusb_transfer_status status) {
 struct FalconUsb::Wire {
   libusb_context* context = nullptr;
   libusb_device_handle* handle = nullptr;
-  int node = -1;                      // the device's file, libusb's own; -1: not known
+  int node = -1;  // the device's file, libusb's own; -1: not known
   FalconFrame without_force = encode(FalconCommand{});
-  std::atomic<bool> stopped{false};   // no frame goes out any more
+  std::atomic<bool> stopped{false};  // no frame goes out any more
   Transfer out, in;
   FalconFrameReader reader;
   std::string serial;
@@ -160,7 +170,8 @@ struct FalconUsb::Wire {
     std::array<std::uint8_t, kPacket> copy{};
     std::copy(bytes.begin(), bytes.end(), copy.begin());
     int sent = 0;
-    const int code = libusb_bulk_transfer(handle, kOut, copy.data(), static_cast<int>(bytes.size()), &sent, in_ms(kEchoPatience));
+    const int code =
+        libusb_bulk_transfer(handle, kOut, copy.data(), static_cast<int>(bytes.size()), &sent, in_ms(kEchoPatience));
     if (code < 0) return went_wrong("writing to", code);
     if (sent != static_cast<int>(bytes.size()))
       return unavailable(std::string("the Falcon took only a part of what was sent; ") + kReplug);
@@ -176,7 +187,8 @@ struct FalconUsb::Wire {
       if (left <= 0ms) break;
       std::array<std::uint8_t, kPacket> packet{};
       int size = 0;
-      const int code = libusb_bulk_transfer(handle, kIn, packet.data(), static_cast<int>(packet.size()), &size, in_ms(left));
+      const int code =
+          libusb_bulk_transfer(handle, kIn, packet.data(), static_cast<int>(packet.size()), &size, in_ms(left));
       if (code < 0 && code != LIBUSB_ERROR_TIMEOUT) return went_wrong("reading from", code);
       const auto data = without_modem_status(std::span(packet).first(static_cast<std::size_t>(size)));
       const std::size_t taken = std::min(data.size(), into.size() - have);
@@ -206,9 +218,9 @@ FalconUsb::~FalconUsb() = default;
 const std::string& FalconUsb::serial() const noexcept { return wire_->serial; }
 std::uint64_t FalconUsb::broken_frames() const noexcept { return wire_->reader.broken(); }
 
-// Past libusb, whose locks the thread that has crashed may hold: the kernel's own synchronous transfer is one system call,
-// which a handler may make, and queues behind what is under way. A frame that the I/O thread is just submitting may come
-// between the flag and the first transfer; the second is behind that too.
+// Past libusb, whose locks the thread that has crashed may hold: the kernel's own synchronous transfer is one system
+// call, which a handler may make, and queues behind what is under way. A frame that the I/O thread is just submitting
+// may come between the flag and the first transfer; the second is behind that too.
 void FalconUsb::stop_motors() noexcept {
   Wire& wire = *wire_;
   wire.stopped = true;
@@ -250,7 +262,8 @@ Result<FalconUsb> FalconUsb::open() {
     libusb_close(wire->handle);
     wire->handle = nullptr;
   }
-  if (where.empty()) return failure(ErrorCode::not_found, "no Novint Falcon is there; plug it in and switch its power on");
+  if (where.empty())
+    return failure(ErrorCode::not_found, "no Novint Falcon is there; plug it in and switch its power on");
   if (why == LIBUSB_ERROR_ACCESS)
     return unavailable("no permission to use the Falcon at " + where +
                        "; install deploy/udev/70-osteon-devices.rules and plug it in again");
@@ -262,7 +275,8 @@ DeviceFinding FalconUsb::look() {
   DeviceFinding finding;
   libusb_context* context = nullptr;
   if (const int code = libusb_init(&context); code != 0) {
-    finding.missing = std::string("libusb does not start (") + libusb_error_name(code) + "); is this machine's USB in order?";
+    finding.missing =
+        std::string("libusb does not start (") + libusb_error_name(code) + "); is this machine's USB in order?";
     return finding;
   }
   {
@@ -348,13 +362,16 @@ Result<std::optional<FalconState>> FalconUsb::exchange(const FalconCommand& comm
     if (reading || wire.out.pending) wire.handle_events(left);
     if (writing && !wire.out.pending) {
       writing = false;
-      if (Result<void> ok = wire.check("writing to", code_of(wire.out.raw->status)); !ok) return tl::unexpected(ok.error());
+      if (Result<void> ok = wire.check("writing to", code_of(wire.out.raw->status)); !ok)
+        return tl::unexpected(ok.error());
     }
     if (reading && !wire.in.pending) {
-      if (Result<void> ok = wire.check("reading from", code_of(wire.in.raw->status)); !ok) return tl::unexpected(ok.error());
+      if (Result<void> ok = wire.check("reading from", code_of(wire.in.raw->status)); !ok)
+        return tl::unexpected(ok.error());
       const auto size = static_cast<std::size_t>(std::max(0, wire.in.raw->actual_length));
       if (wire.in.raw->status == LIBUSB_TRANSFER_COMPLETED)
-        if (const auto state = wire.reader.take(without_modem_status(std::span(wire.in.bytes).first(size)))) newest = state;
+        if (const auto state = wire.reader.take(without_modem_status(std::span(wire.in.bytes).first(size))))
+          newest = state;
     }
     if (newest) wire.failures = 0;
     if (newest && !wire.out.pending) return newest;

@@ -1,5 +1,5 @@
-// Novint Falcon: its wire, by libusb. Everything here blocks, within its stated patience, and belongs to one thread at a
-// time: the connection's until the device runs, then the device's I/O thread.
+// Novint Falcon: its wire, by libusb. Everything here blocks, within its stated patience, and belongs to one thread at
+// a time: the connection's until the device runs, then the device's I/O thread.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -32,13 +32,14 @@ class FalconUsb {
   // unsupported (the device did not take the image as it is).
   [[nodiscard]] Result<void> load(std::span<const std::uint8_t> image);
 
-  // One frame out and the newest one back; empty when there was none within `patience`. Error: unavailable (it went away
-  // or fails again and again).
-  [[nodiscard]] Result<std::optional<FalconState>> exchange(const FalconCommand& command, std::chrono::milliseconds patience);
+  // One frame out and the newest one back; empty when there was none within `patience`. Error: unavailable (it went
+  // away or fails again and again).
+  [[nodiscard]] Result<std::optional<FalconState>> exchange(const FalconCommand& command,
+                                                            std::chrono::milliseconds patience);
   [[nodiscard]] std::uint64_t broken_frames() const noexcept;
 
-  // The last of all, for a process that ends: sends a frame without force, and after it none goes out. Any thread, also in a
-  // signal's handler, whatever the other calls are doing.
+  // The last of all, for a process that ends: sends a frame without force, and after it none goes out. Any thread, also
+  // in a signal's handler, whatever the other calls are doing.
   void stop_motors() noexcept;
 
  private:

@@ -67,15 +67,18 @@ class FootPedal final : public HapticDevice {
     const std::vector<HidFound> all = list_hid_devices();
     const auto found = std::find_if(all.begin(), all.end(), options_.proportional ? is_joystick : is_switch);
     if (found == all.end())
-      return failure(ErrorCode::not_found, options_.proportional ? "no joystick whose axis could be a pedal is there; plug it in"
-                                                                 : "no foot pedal is there; plug it in");
+      return failure(ErrorCode::not_found, options_.proportional
+                                               ? "no joystick whose axis could be a pedal is there; plug it in"
+                                               : "no foot pedal is there; plug it in");
     Result<HidPort> port = HidPort::open(*found, "the foot pedal");
     if (!port) return tl::unexpected(port.error());
     if (options_.proportional) {
       const std::vector<HidField> fields = hid_input_fields(port->descriptor());
       std::vector<HidUsage> wanted;
-      if (options_.axis_usage) wanted.push_back(*options_.axis_usage);
-      else std::ranges::transform(kAxes, std::back_inserter(wanted), &Axis::usage);
+      if (options_.axis_usage)
+        wanted.push_back(*options_.axis_usage);
+      else
+        std::ranges::transform(kAxes, std::back_inserter(wanted), &Axis::usage);
       const auto field = find_field(fields, wanted);
       if (!field)
         return failure(ErrorCode::unsupported,
@@ -103,8 +106,10 @@ class FootPedal final : public HapticDevice {
   [[nodiscard]] std::string advice() const override {
     if (armed_) return "";
     if (!elsewhere_) return "let the foot pedal go once; until then it turns nothing";
-    return std::string("the foot pedal was down when it was first heard of and turns nothing; if nobody pressed it, it rests at "
-                       "the other end of its axis: ") +
+    return std::string(
+               "the foot pedal was down when it was first heard of and turns nothing; if nobody pressed it, it rests "
+               "at "
+               "the other end of its axis: ") +
            (options_.axis.inverted ? "leave out \"inverted\"" : "name it pedal-axis:inverted") +
            "; else let it go and plug it in again";
   }
@@ -130,8 +135,8 @@ class FootPedal final : public HapticDevice {
 
   const FootPedalOptions options_;
   HidField field_;
-  PedalAxis axis_;           // reading thread, while it runs
-  std::uint8_t down_ = 0;    // reading thread
+  PedalAxis axis_;         // reading thread, while it runs
+  std::uint8_t down_ = 0;  // reading thread
   std::atomic<bool> armed_{true}, elsewhere_{false};
   DeviceInfo info_{.model = "foot pedal",
                    .serial = {},
@@ -141,7 +146,7 @@ class FootPedal final : public HapticDevice {
                    .pedals = true,
                    .force_axes = 0};
   DeviceExchange exchange_;
-  HidReader reader_;         // last: its thread ends before what it uses
+  HidReader reader_;  // last: its thread ends before what it uses
 };
 
 }  // namespace
@@ -165,9 +170,10 @@ Result<FootPedalOptions> read_pedal_switch(std::string_view argument) {
   if (argument.empty()) return options;
   const auto side = std::ranges::find(kSides, argument);
   if (side == kSides.end())
-    return failure(ErrorCode::invalid_input, "--device pedal:" + std::string(argument) +
-                                                 ": the pedal must be left, middle or right; without a colon all three turn the "
-                                                 "spindle");
+    return failure(ErrorCode::invalid_input,
+                   "--device pedal:" + std::string(argument) +
+                       ": the pedal must be left, middle or right; without a colon all three turn the "
+                       "spindle");
   options.switches = static_cast<std::uint8_t>(1 << (side - kSides.begin()));
   return options;
 }
@@ -199,7 +205,9 @@ Result<FootPedalOptions> read_pedal_axis(std::string_view argument) {
   return options;
 }
 
-std::unique_ptr<HapticDevice> make_foot_pedal(const FootPedalOptions& options) { return std::make_unique<FootPedal>(options); }
+std::unique_ptr<HapticDevice> make_foot_pedal(const FootPedalOptions& options) {
+  return std::make_unique<FootPedal>(options);
+}
 
 DeviceFinding look_for_foot_pedals(bool proportional) {
   DeviceFinding finding;

@@ -20,10 +20,10 @@ struct PedalAxisParams {
   double near = 0.25;     // [A] of the way from its rest within which a pedal that nobody presses is first heard of
 };
 
-// A pedal's way from its rest to down. It gives nothing until it was seen at rest, so that a foot never starts a spindle just
-// by being there when the device is plugged in. One that is first heard of far from its rest gives nothing at all: a stick
-// that rests in the middle, or a pedal that rests at the other end, would be at rest when it is pressed and turn the spindle
-// when it is let go.
+// A pedal's way from its rest to down. It gives nothing until it was seen at rest, so that a foot never starts a
+// spindle just by being there when the device is plugged in. One that is first heard of far from its rest gives nothing
+// at all: a stick that rests in the middle, or a pedal that rests at the other end, would be at rest when it is pressed
+// and turn the spindle when it is let go.
 class PedalAxis {
  public:
   explicit PedalAxis(const PedalAxisParams& params = {}) : params_(params) {}
@@ -31,7 +31,9 @@ class PedalAxis {
   void forget() noexcept { rest_ = Rest::unknown, armed_ = false, value_ = 0.0; }
   [[nodiscard]] double value() const noexcept { return value_; }  // 0 … 1
   [[nodiscard]] bool armed() const noexcept { return armed_; }
-  [[nodiscard]] bool elsewhere() const noexcept { return rest_ == Rest::elsewhere; }  // first heard of far from its rest
+  [[nodiscard]] bool elsewhere() const noexcept {
+    return rest_ == Rest::elsewhere;
+  }  // first heard of far from its rest
 
  private:
   enum class Rest : std::uint8_t { unknown, here, elsewhere };
@@ -49,9 +51,9 @@ struct FootPedalOptions {
   std::optional<HidUsage> axis_usage = {};  // empty: the first of those that a pedal has
 };
 
-// What follows "pedal:" on the command line: left, middle or right; and "pedal-axis:", joined by colons: inverted, and an axis
-// by its name (accelerator, brake, throttle, slider, x, y, z, rx, ry, rz) or usage of the generic desktop page, e.g. 0x32.
-// Error invalid_input: what may be said.
+// What follows "pedal:" on the command line: left, middle or right; and "pedal-axis:", joined by colons: inverted, and
+// an axis by its name (accelerator, brake, throttle, slider, x, y, z, rx, ry, rz) or usage of the generic desktop page,
+// e.g. 0x32. Error invalid_input: what may be said.
 [[nodiscard]] Result<FootPedalOptions> read_pedal_switch(std::string_view argument);
 [[nodiscard]] Result<FootPedalOptions> read_pedal_axis(std::string_view argument);
 

@@ -46,7 +46,8 @@ Result<const Library*> load(const std::filesystem::path& file) {
     need("dhdErrorGetLast", c.last_error);
     need("dhdErrorGetStr", c.error_text);
   };
-  return load_vendor<dhd::Api>({"Force Dimension's libdhd", file, kNames, kRemedy}, "a Force Dimension library of version 3", bind);
+  return load_vendor<dhd::Api>({"Force Dimension's libdhd", file, kNames, kRemedy},
+                               "a Force Dimension library of version 3", bind);
 }
 
 // The library does not tell a device's limits; these are the vendor's figures for its kinds, as published programs use
@@ -177,7 +178,8 @@ class ForceDimension final : public HapticDevice {
     // Motors are on once the device knows where it is.
     if (calibrated && !force_on_) {
       if (call_->enable_force(1, id_) < 0)
-        return failure(ErrorCode::unavailable, "the Force Dimension device does not switch its motors on: " + last_error().message);
+        return failure(ErrorCode::unavailable,
+                       "the Force Dimension device does not switch its motors on: " + last_error().message);
       force_on_ = true;
     }
     return {};

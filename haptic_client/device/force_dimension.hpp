@@ -10,9 +10,9 @@
 namespace osteon::haptic {
 
 struct ForceDimensionOptions {
-  std::filesystem::path library;          // empty: libdhd.so where the dynamic linker finds it
-  int number = 0;                         // of the devices that are connected
-  std::chrono::microseconds period{1000}; // of its thread; 0: as fast as the device answers
+  std::filesystem::path library;           // empty: libdhd.so where the dynamic linker finds it
+  int number = 0;                          // of the devices that are connected
+  std::chrono::microseconds period{1000};  // of its thread; 0: as fast as the device answers
 };
 
 [[nodiscard]] std::unique_ptr<HapticDevice> make_force_dimension(const ForceDimensionOptions& options);

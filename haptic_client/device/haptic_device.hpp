@@ -1,6 +1,6 @@
 // What the loop needs of any device that a hand holds: where the hand is, what it presses, and force to show it.
-// Device frame: x right, y up, z to the user; millimetres, newtons, newton-millimetres. A handle's own frame is a tool's:
-// its tip at the origin, +z out of the tip.
+// Device frame: x right, y up, z to the user; millimetres, newtons, newton-millimetres. A handle's own frame is a
+// tool's: its tip at the origin, +z out of the tip.
 //
 // Two threads use a device. The connection thread (connection.hpp) opens, tends, closes and opens again; the haptic
 // thread reads and writes at any time, also while the other opens or closes: a device that is not there reads as absent
@@ -20,41 +20,41 @@ namespace osteon::haptic {
 
 // Read from the device itself where it tells them.
 struct DeviceLimits {
-  double peak_n = 0;                // 0: shows no force
+  double peak_n = 0;  // 0: shows no force
   double continuous_n = 0;
   double stiffness_n_per_mm = 0;
   double workspace_radius_mm = 0;
-  double damping_n_s_per_mm = 0;    // most that may be rendered; 0: the device does not say
-  double peak_nmm = 0;              // torque; 0: shows none
+  double damping_n_s_per_mm = 0;  // most that may be rendered; 0: the device does not say
+  double peak_nmm = 0;            // torque; 0: shows none
   double continuous_nmm = 0;
   Vec3 workspace_middle_mm = Vec3::Zero();
 };
 
 enum class DeviceStatus : std::uint8_t {
   ok,
-  warm,      // motors are warm: only the continuous force may be asked for
-  fault,     // broken or silent: no force, and what was read is old
-  absent,    // not opened, or unplugged: no force, and what was read is old
+  warm,    // motors are warm: only the continuous force may be asked for
+  fault,   // broken or silent: no force, and what was read is old
+  absent,  // not opened, or unplugged: no force, and what was read is old
 };
 
 // No force is shown before `done`. A device that needs none is always done.
 enum class Calibration : std::uint8_t {
   done,
-  pending,   // the device or its driver is at it, or waits for the hand: HapticDevice::advice() says what is to be done
+  pending,  // the device or its driver is at it, or waits for the hand: HapticDevice::advice() says what is to be done
 };
 
 enum DeviceButton : std::uint32_t {
-  kClutchButton = 1,   // held: the tool stays and the handle moves freely
-  kSpindlePedal = 2,   // held: the spindle turns at full speed
+  kClutchButton = 1,  // held: the tool stays and the handle moves freely
+  kSpindlePedal = 2,  // held: the spindle turns at full speed
 };
 
 struct DeviceReading {
-  Pose pose_device_tool;    // the handle
+  Pose pose_device_tool;  // the handle
   std::uint32_t buttons = 0;
   DeviceStatus status = DeviceStatus::ok;
   Calibration calibration = Calibration::done;
-  double pedal = 0;         // of a proportional pedal, 0 … 1 of the tool's speed
-  std::uint64_t sample = 0; // counts the device's own samples
+  double pedal = 0;          // of a proportional pedal, 0 … 1 of the tool's speed
+  std::uint64_t sample = 0;  // counts the device's own samples
 
   // Of the spindle's full speed, by pedal or button.
   [[nodiscard]] double spindle() const noexcept { return buttons & kSpindlePedal ? 1.0 : pedal; }
@@ -73,10 +73,10 @@ struct DeviceOutput {
 
 // Known once open() has succeeded; what kind of device it is (places, turns, pedals, axes) as far as possible before.
 struct DeviceInfo {
-  std::string model, serial, driver;   // as the device and its library name themselves; empty: it does not
-  bool places = true, turns = true;    // what it reads: position, rotation
-  bool pedals = false;                 // it is there for the spindle: another device's spindle button becomes a second clutch
-  int force_axes = 3, torque_axes = 0; // what it shows: 0 or 3 of each
+  std::string model, serial, driver;  // as the device and its library name themselves; empty: it does not
+  bool places = true, turns = true;   // what it reads: position, rotation
+  bool pedals = false;  // it is there for the spindle: another device's spindle button becomes a second clutch
+  int force_axes = 3, torque_axes = 0;  // what it shows: 0 or 3 of each
 };
 
 // The rotation of a handle that has none of its own: a tool that points away from the user.
@@ -84,11 +84,11 @@ struct DeviceInfo {
 
 class HapticDevice {
  public:
-  virtual ~HapticDevice() = default;   // closes
+  virtual ~HapticDevice() = default;                        // closes
   [[nodiscard]] virtual std::string_view name() const = 0;  // as --device names it
 
-  // [connection] May take seconds. Errors: not_found (no such device or library), unavailable (in use, no permission, no
-  // answer), unsupported (a library of the wrong kind), internal. Each a sentence that ends in the remedy.
+  // [connection] May take seconds. Errors: not_found (no such device or library), unavailable (in use, no permission,
+  // no answer), unsupported (a library of the wrong kind), internal. Each a sentence that ends in the remedy.
   [[nodiscard]] virtual Result<void> open() { return {}; }
   // [connection] Force ends at once. May be called at any time, also twice or after an open() that failed.
   virtual void close() noexcept {}
@@ -104,8 +104,8 @@ class HapticDevice {
 
   // [haptic]
   [[nodiscard]] virtual DeviceReading read() noexcept = 0;
-  // [haptic] Of a recording: where the bone stood on its mount at the last reading, seen from where it rests, and so it stands
-  // for whoever plays it. Null: nobody says, and the bone is where the room has it.
+  // [haptic] Of a recording: where the bone stood on its mount at the last reading, seen from where it rests, and so it
+  // stands for whoever plays it. Null: nobody says, and the bone is where the room has it.
   [[nodiscard]] virtual const Pose* pose_rest_bone() const noexcept { return nullptr; }
   // [haptic] It has given its last reading for good, as a recording does at its end.
   [[nodiscard]] virtual bool over() const noexcept { return false; }

@@ -23,11 +23,13 @@ class Reader {
       return wrong(ErrorCode::not_found, "there is no file " + path_.string() + "; give one that --record wrote");
     if (H5Fis_hdf5(path_.c_str()) <= 0)
       return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
-    // One that is being written, or whose writer was killed, opens only so; one of another program perhaps only otherwise.
+    // One that is being written, or whose writer was killed, opens only so; one of another program perhaps only
+    // otherwise.
     file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, H5P_DEFAULT), H5Fclose);
     if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
     if (!file_.ok())
-      return wrong(ErrorCode::invalid_input, name_ + " cannot be opened: it is damaged, or another program has it open");
+      return wrong(ErrorCode::invalid_input,
+                   name_ + " cannot be opened: it is damaged, or another program has it open");
     return true;
   }
 
@@ -52,7 +54,8 @@ class Reader {
   double number(const char* group, const char* name) {
     const Hdf5Handle attribute = find(group, name);
     double value = 0.0;
-    if (attribute.ok() && (H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0 || !std::isfinite(value))) damaged(name);
+    if (attribute.ok() && (H5Aread(attribute.id(), H5T_NATIVE_DOUBLE, &value) < 0 || !std::isfinite(value)))
+      damaged(name);
     return value;
   }
 
@@ -60,7 +63,9 @@ class Reader {
     return H5Aexists_by_name(file_.id(), group, name, H5P_DEFAULT) > 0;
   }
 
-  [[nodiscard]] bool has_dataset(const char* path) const { return H5Oexists_by_name(file_.id(), path, H5P_DEFAULT) > 0; }
+  [[nodiscard]] bool has_dataset(const char* path) const {
+    return H5Oexists_by_name(file_.id(), path, H5P_DEFAULT) > 0;
+  }
 
   // A list of texts of one length.
   std::vector<std::string> texts(const char* path) {
@@ -70,8 +75,8 @@ class Reader {
     const hssize_t count = H5Sget_simple_extent_npoints(space.id());
     const std::size_t size = H5Tget_size(type.id());
     constexpr hssize_t kMostTexts = 10'000;
-    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 || count < 0 || count > kMostTexts ||
-        size == 0 || size > 4096) {
+    if (H5Tget_class(type.id()) != H5T_STRING || H5Tis_variable_str(type.id()) != 0 || count < 0 ||
+        count > kMostTexts || size == 0 || size > 4096) {
       wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" is not a list of texts");
       return {};
     }
@@ -120,7 +125,8 @@ class Reader {
       return {};
     }
     if (size[0] < rows) {
-      wrong(ErrorCode::invalid_input, name_ + ": the dataset \"" + path + "\" has fewer rows than \"" + recording::kTime + "\"");
+      wrong(ErrorCode::invalid_input,
+            name_ + ": the dataset \"" + path + "\" has fewer rows than \"" + recording::kTime + "\"");
       return {};
     }
     const hsize_t from[] = {0, 0}, count[] = {rows, width};
@@ -199,11 +205,13 @@ void read_rows(Reader& reader, RecordedSession& session) {
   const auto calibration = reader.values<std::uint8_t>(recording::kCalibration, H5T_NATIVE_UINT8, rows, 1);
   const auto ticks = reader.values<std::uint64_t>(recording::kTick, H5T_NATIVE_UINT64, rows, 1);
   std::vector<double> bone;
-  if (reader.has_dataset(recording::kBonePose)) bone = reader.values<double>(recording::kBonePose, H5T_NATIVE_DOUBLE, rows, 7);
+  if (reader.has_dataset(recording::kBonePose))
+    bone = reader.values<double>(recording::kBonePose, H5T_NATIVE_DOUBLE, rows, 7);
   if (!reader.ok()) return;
   bool moves = false;
   std::vector<Pose>& places = session.pose_rest_bone;
-  if (rows == 0) reader.wrong(ErrorCode::invalid_input, reader.name() + " holds no complete row; its session ended too soon");
+  if (rows == 0)
+    reader.wrong(ErrorCode::invalid_input, reader.name() + " holds no complete row; its session ended too soon");
   constexpr std::uint64_t kMostLost = 60'000;
   for (std::size_t i = 0; i < rows && reader.ok(); ++i) {
     DeviceReading reading;
@@ -281,12 +289,14 @@ Result<void> check_played(const RecordedSession& recorded, std::string_view name
     return text.empty() ? std::string("no tool") : text;
   };
   if (recorded.tools != tools)
-    return failure(ErrorCode::invalid_input, is_of + "a session with " + list(recorded.tools) + ", not with " + list(tools) +
-                                                 "; give the --plan or --tool that it was made with");
+    return failure(ErrorCode::invalid_input, is_of + "a session with " + list(recorded.tools) + ", not with " +
+                                                 list(tools) + "; give the --plan or --tool that it was made with");
   if (!recorded.plan_digest.empty() && recorded.plan_digest != plan_digest)
-    return failure(ErrorCode::invalid_input,
-                   is_of + "another plan or another start of the tool; give the --plan, or --tool, --view, --at, --rpm, --law "
-                           "and --wear, that it was made with");
+    return failure(
+        ErrorCode::invalid_input,
+        is_of +
+            "another plan or another start of the tool; give the --plan, or --tool, --view, --at, --rpm, --law "
+            "and --wear, that it was made with");
   return {};
 }
 
@@ -310,8 +320,8 @@ Result<void> check_played_on(const RecordedDevice& recorded, std::string_view fi
   const std::string& began_on = recorded.session().start_hash;
   if (began_on.empty() || began_on == field_hash) return {};
   return failure(ErrorCode::invalid_input,
-                 "--device " + std::string(recorded.name()) + " began on bone in another state (field " + began_on.substr(0, 12) +
-                     ") than the room's (field " + std::string(field_hash.substr(0, 12)) +
+                 "--device " + std::string(recorded.name()) + " began on bone in another state (field " +
+                     began_on.substr(0, 12) + ") than the room's (field " + std::string(field_hash.substr(0, 12)) +
                      "); start osteon-server anew on the case, or with the --resume that it then had");
 }
 

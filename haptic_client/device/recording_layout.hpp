@@ -16,7 +16,7 @@ inline constexpr const char* kVersionName = "version";
 inline constexpr int kVersion = 1;
 
 // One row for each millisecond.
-inline constexpr const char* kTime = "data/time";                    // written last: what it lacks is not complete
+inline constexpr const char* kTime = "data/time";  // written last: what it lacks is not complete
 inline constexpr const char* kTick = "data/state_seq";
 inline constexpr const char* kHandlePose = "high_frequency_poses/handle_pose/pose";
 // Of a bone on its mount; recordings of before it was written have none.

@@ -5,7 +5,9 @@ namespace osteon::haptic {
 Result<SimulatedDeviceParams> find_simulated_device(std::string_view name) {
   // Force, stiffness and workspace of a PHANToM Omni, as its vendor gives them; its motors are taken never to be warm.
   static const SimulatedDeviceParams kDevices[] = {
-      {}, {"simulated-3.3N", {.peak_n = 3.3, .continuous_n = 3.3, .stiffness_n_per_mm = 0.7, .workspace_radius_mm = 100.0}}};
+      {},
+      {"simulated-3.3N",
+       {.peak_n = 3.3, .continuous_n = 3.3, .stiffness_n_per_mm = 0.7, .workspace_radius_mm = 100.0}}};
   std::string names;
   for (const SimulatedDeviceParams& device : kDevices) {
     if (device.name == name) return device;
@@ -14,7 +16,8 @@ Result<SimulatedDeviceParams> find_simulated_device(std::string_view name) {
   return failure(ErrorCode::not_found, "there is no device \"" + std::string(name) + "\"; choose " + names);
 }
 
-SimulatedDevice::SimulatedDevice(const SimulatedDeviceParams& params) : params_(params), hand_(HandParams{}, Vec3::Zero()) {}
+SimulatedDevice::SimulatedDevice(const SimulatedDeviceParams& params)
+    : params_(params), hand_(HandParams{}, Vec3::Zero()) {}
 
 DeviceReading SimulatedDevice::read() noexcept {
   return {.pose_device_tool = {hand_.position_mm(), rotation_}, .buttons = buttons_};

@@ -26,7 +26,8 @@ class SimulatedDevice final : public HapticDevice {
   void write(const DeviceOutput& output) noexcept override;
 
   // [haptic] What the hand means to do from now on; device frame.
-  void command(const HandCommand& command, const Eigen::Quaterniond& rotation_device_tool, std::uint32_t buttons) noexcept;
+  void command(const HandCommand& command, const Eigen::Quaterniond& rotation_device_tool,
+               std::uint32_t buttons) noexcept;
   // [haptic] Another hand takes the handle at a place.
   void take(const HandParams& hand, const Vec3& at_mm) noexcept;
   // [haptic] Time passes.

@@ -27,8 +27,9 @@ class SpaceMouse final : public HapticDevice {
   Result<void> open() override {
     close();
     stepped_ = Clock::now();
-    const Result<HidFound> found = cap_.open(options_.light, {.moved = [this](const SpaceMouseState& state) { move(state); },
-                                                              .lost = [this] { exchange_.go(DeviceStatus::fault); }});
+    const Result<HidFound> found =
+        cap_.open(options_.light, {.moved = [this](const SpaceMouseState& state) { move(state); },
+                                   .lost = [this] { exchange_.go(DeviceStatus::fault); }});
     if (!found) return tl::unexpected(found.error());
     info_.model = found->product.empty() ? "SpaceMouse" : found->product;
     info_.serial = found->serial;
@@ -42,7 +43,8 @@ class SpaceMouse final : public HapticDevice {
   [[nodiscard]] std::string advice() const override {
     constexpr int kLow = 15;
     const int percent = cap_.battery_percent();
-    return percent >= 0 && percent < kLow ? "charge the SpaceMouse: its battery has " + std::to_string(percent) + " %" : "";
+    return percent >= 0 && percent < kLow ? "charge the SpaceMouse: its battery has " + std::to_string(percent) + " %"
+                                          : "";
   }
 
   DeviceReading read() noexcept override { return exchange_.read(); }
@@ -61,16 +63,18 @@ class SpaceMouse final : public HapticDevice {
   }
 
   const SpaceMouseOptions options_;
-  RateControl rate_;           // reading thread, while it runs; keeps its place when the device comes back
+  RateControl rate_;  // reading thread, while it runs; keeps its place when the device comes back
   Clock::time_point stepped_;
   DeviceInfo info_{.model = "SpaceMouse", .serial = {}, .driver = "hidapi", .force_axes = 0};
   DeviceExchange exchange_;
-  SpaceMousePort cap_;         // last: its thread ends before what it uses
+  SpaceMousePort cap_;  // last: its thread ends before what it uses
 };
 
 }  // namespace
 
-std::unique_ptr<HapticDevice> make_space_mouse(const SpaceMouseOptions& options) { return std::make_unique<SpaceMouse>(options); }
+std::unique_ptr<HapticDevice> make_space_mouse(const SpaceMouseOptions& options) {
+  return std::make_unique<SpaceMouse>(options);
+}
 
 DeviceFinding look_for_space_mouse() {
   DeviceFinding finding;

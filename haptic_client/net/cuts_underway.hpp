@@ -1,5 +1,5 @@
-// What a haptic client has to say to its room: cuts until they are decided, and the newest state. Whatever line carries them
-// may break; what was not decided goes again over the next one.
+// What a haptic client has to say to its room: cuts until they are decided, and the newest state. Whatever line carries
+// them may break; what was not decided goes again over the next one.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -38,8 +38,8 @@ class CutsUnderway {
 
  private:
   const std::size_t most_;
-  std::deque<Cut> cuts_;   // not known to be decided
-  std::size_t next_ = 0;   // of these, the first that did not go over the present line
+  std::deque<Cut> cuts_;  // not known to be decided
+  std::size_t next_ = 0;  // of these, the first that did not go over the present line
   std::optional<CuttingState> state_;
   bool may_go_ = false;
 };

@@ -29,12 +29,16 @@ Result<std::unique_ptr<FastPath>> FastPath::open(const std::string& host, std::u
   const bool v4 = server->high == 0 && server->low >> 32 == 0xffff;
   Result<std::unique_ptr<UdpPort>> socket = UdpPort::open({.address = v4 ? "0.0.0.0" : "::"});
   if (!socket) return tl::unexpected(socket.error());
-  return std::unique_ptr<FastPath>(new FastPath(std::move(*socket), *server, keys, first_author_seq, std::move(events)));
+  return std::unique_ptr<FastPath>(
+      new FastPath(std::move(*socket), *server, keys, first_author_seq, std::move(events)));
 }
 
-FastPath::FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys, std::uint64_t first_author_seq,
-                   FastPathEvents events)
-    : port_(std::move(port)), server_(server), events_(std::move(events)), link_(keys, first_author_seq),
+FastPath::FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys,
+                   std::uint64_t first_author_seq, FastPathEvents events)
+    : port_(std::move(port)),
+      server_(server),
+      events_(std::move(events)),
+      link_(keys, first_author_seq),
       pushed_(first_author_seq - 1) {
   thread_ = std::thread([this] { run(); });
 }
@@ -100,9 +104,13 @@ FastPathHealth FastPath::health() const {
   const std::lock_guard lock(mutex_);
   const Time now = now_of_links();
   const wire::LinkCounts& counts = link_.half().counts();
-  FastPathHealth health{.offered = true, .alive = link_.alive(now), .loss = link_.loss(),
-                        .packets_sent = counts.packets_sent, .bytes_sent = counts.bytes_sent,
-                        .packets_received = counts.packets_received, .bytes_received = counts.bytes_received};
+  FastPathHealth health{.offered = true,
+                        .alive = link_.alive(now),
+                        .loss = link_.loss(),
+                        .packets_sent = counts.packets_sent,
+                        .bytes_sent = counts.bytes_sent,
+                        .packets_received = counts.packets_received,
+                        .bytes_received = counts.bytes_received};
   if (const std::optional<ClockReading> clock = link_.clock(now))
     health.round_trip_ms = 1e-6 * static_cast<double>(clock->round_trip.count());
   return health;

@@ -1,4 +1,5 @@
-// The client's end of the fast path on a real socket: a thread that sends and receives sealed datagrams beside the stream.
+// The client's end of the fast path on a real socket: a thread that sends and receives sealed datagrams beside the
+// stream.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -24,7 +25,7 @@ struct FastPathEvents {
   // Datagrams do not get through any more, so that what went only in them has to go over the stream.
   std::function<void()> dead;
   std::function<void(const CuttingState&)> partner{};  // a newer state of another's tool
-  std::function<void(const MountPose&)> bone{};         // a newer place of the bone on its mount
+  std::function<void(const MountPose&)> bone{};        // a newer place of the bone on its mount
   // Whether the newest datagram says that the hand may not cut, where that has changed or the lease's epoch has.
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
 };
@@ -33,8 +34,9 @@ struct FastPathEvents {
 class FastPath {
  public:
   // Error: not_found (the server's name), unavailable (no socket).
-  [[nodiscard]] static Result<std::unique_ptr<FastPath>> open(const std::string& host, std::uint16_t port, const SessionKeys& keys,
-                                                              std::uint64_t first_author_seq, FastPathEvents events);
+  [[nodiscard]] static Result<std::unique_ptr<FastPath>> open(const std::string& host, std::uint16_t port,
+                                                              const SessionKeys& keys, std::uint64_t first_author_seq,
+                                                              FastPathEvents events);
   ~FastPath();  // stops
   // Nothing is called any more once it returns; not from within what is called.
   void stop();
@@ -52,8 +54,8 @@ class FastPath {
   [[nodiscard]] FastPathHealth health() const;
 
  private:
-  FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys, std::uint64_t first_author_seq,
-           FastPathEvents events);
+  FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys,
+           std::uint64_t first_author_seq, FastPathEvents events);
   void run();
   // What of others' tools is newer than what was told of them.
   void take_partners(wire::ClientLink::Time now, std::vector<CuttingState>& newer);
@@ -63,7 +65,7 @@ class FastPath {
   const FastPathEvents events_;
   mutable std::mutex mutex_;
   wire::ClientLink link_;
-  std::uint64_t pushed_;  // newest cut that the link was given
+  std::uint64_t pushed_;                        // newest cut that the link was given
   std::map<AuthorId, std::uint64_t> partners_;  // state_seq of what was told of each; of its thread
   bool end_ = false;
   std::thread thread_;

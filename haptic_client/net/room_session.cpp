@@ -33,12 +33,13 @@ namespace fs = std::filesystem;
 
 constexpr auto kCloseTime = 1s;
 constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a wait that a server asks for
-constexpr auto kPushesApart = 33ms;  // over the stream
-constexpr auto kTellHeard = 250ms;  // between two words on how far this client has come
-constexpr auto kCaseSilence = 60s;  // a whole case takes no longer on one machine
+constexpr auto kPushesApart = 33ms;                        // over the stream
+constexpr auto kTellHeard = 250ms;                         // between two words on how far this client has come
+constexpr auto kCaseSilence = 60s;                         // a whole case takes no longer on one machine
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
-  return {ErrorCode::internal, "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
+  return {ErrorCode::internal,
+          "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
 }
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {
@@ -77,7 +78,8 @@ Result<void> receive_case(const wire::JoinedRoom& room, const fs::path& folder, 
   if (failed) context.TryCancel();
   const grpc::Status status = reader->Finish();
   if (failed) return tl::unexpected(*failed);
-  if (!status.ok()) return failure(ErrorCode::unavailable, "the server stopped sending the case: " + status.error_message());
+  if (!status.ok())
+    return failure(ErrorCode::unavailable, "the server stopped sending the case: " + status.error_message());
   return {};
 }
 
@@ -106,7 +108,8 @@ Result<Case> fetch_case(const wire::JoinedRoom& room, const fs::path& cache, con
   fs::remove_all(part.path(), error);
   fs::create_directories(part.path(), error);
   if (error) return tl::unexpected(cannot_cache(part.path(), error.message()));
-  if (const Result<void> received = receive_case(room, part.path(), stop); !received) return tl::unexpected(received.error());
+  if (const Result<void> received = receive_case(room, part.path(), stop); !received)
+    return tl::unexpected(received.error());
   Result<Case> fetched = Case::load(part.path());
   if (!fetched) return fetched;
   if (fetched->hash() != room.case_hash)
@@ -201,25 +204,25 @@ struct RoomSession::Impl {
   std::unique_ptr<v1::CuttingService::Stub> stub;
   std::thread thread;
   // Of that thread.
-  wire::JoinedRoom joined;                    // newest
-  std::optional<v1::LinkOffer> offer;         // of the present stream, as the next two
-  std::string redial_why;                     // of a server that stops in good order
+  wire::JoinedRoom joined;             // newest
+  std::optional<v1::LinkOffer> offer;  // of the present stream, as the next two
+  std::string redial_why;              // of a server that stops in good order
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools;
 
   // Order: read_mutex, then mutex, then fast_mutex.
-  std::mutex read_mutex;                      // what comes is passed on by one thread at a time
+  std::mutex read_mutex;  // what comes is passed on by one thread at a time
   std::optional<SessionReader> reader;
   mutable std::mutex fast_mutex;
-  std::shared_ptr<FastPath> fast;             // of the present stream; held by those who use it just now
+  std::shared_ptr<FastPath> fast;  // of the present stream; held by those who use it just now
 
-  std::atomic<std::uint64_t> heard{0};        // place of the newest event that was passed on, over the present stream
-  std::atomic<bool> heard_leaves{false};      // no datagram says that these have come
+  std::atomic<std::uint64_t> heard{0};    // place of the newest event that was passed on, over the present stream
+  std::atomic<bool> heard_leaves{false};  // no datagram says that these have come
 
   mutable std::mutex mutex;
   std::condition_variable wake;
-  Line* line = nullptr;                       // the open one
+  Line* line = nullptr;  // the open one
   CutsUnderway underway{kMaxWaitingCuts};
-  std::optional<MountLoad> push;               // for the stream
+  std::optional<MountLoad> push;  // for the stream
   std::chrono::steady_clock::time_point next_push{};
   std::optional<std::chrono::milliseconds> redial;  // the server stops in good order: when to come again
   bool closing = false, over = false;
@@ -240,8 +243,11 @@ void RoomSession::Impl::write(Line& open) {
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait_until(lock, tell_at, [&] { return underway.something_to_send() || push || closing || over || line != &open || redial; });
-      // A server that is about to stop decides what it has been sent and no more: the rest goes when the session goes on.
+      wake.wait_until(lock, tell_at, [&] {
+        return underway.something_to_send() || push || closing || over || line != &open || redial;
+      });
+      // A server that is about to stop decides what it has been sent and no more: the rest goes when the session goes
+      // on.
       if (over || line != &open || redial) break;
       cut = underway.take_cut();
       state = cut ? std::nullopt : underway.take_state();
@@ -278,7 +284,8 @@ void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (response.has_redial()) {
     redial_why = response.redial().why();
     const std::lock_guard lock(mutex);
-    redial = std::min<std::chrono::milliseconds>(std::chrono::milliseconds(response.redial().after_ms()), kLongestRedial);
+    redial =
+        std::min<std::chrono::milliseconds>(std::chrono::milliseconds(response.redial().after_ms()), kLongestRedial);
     wake.notify_all();
   }
   if (response.has_tool() && response.tool().tool_number() != 0)
@@ -299,29 +306,30 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
   const std::string& at = options.fast_path.empty() ? options.address : options.fast_path;
   std::string host = at.substr(0, at.rfind(':'));
   if (host.size() > 2 && host.front() == '[') host = host.substr(1, host.size() - 2);
-  const std::uint32_t port = options.fast_path.empty() ? offer->udp_port()
-                                                       : static_cast<std::uint32_t>(std::strtoul(at.c_str() + at.rfind(':') + 1, nullptr, 10));
-  Result<std::unique_ptr<FastPath>> opened = FastPath::open(
-      host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
-      {.row =
-           [this](wire::IndexedRow row) {
-             const std::lock_guard lock(read_mutex);
-             (void)reader->take(std::move(row));
-             heard = reader->place().value;
-           },
-       .dead =
-           [this] {
-             const std::lock_guard lock(mutex);
-             underway.again();
-             wake.notify_all();
-           },
-       .partner =
-           [this](const CuttingState& partner) {
-             const std::lock_guard lock(read_mutex);
-             reader->take(partner);
-           },
-       .bone = events.bone,
-       .stop_flag = events.stop_flag});
+  const std::uint32_t port =
+      options.fast_path.empty() ? offer->udp_port()
+                                : static_cast<std::uint32_t>(std::strtoul(at.c_str() + at.rfind(':') + 1, nullptr, 10));
+  Result<std::unique_ptr<FastPath>> opened =
+      FastPath::open(host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
+                     {.row =
+                          [this](wire::IndexedRow row) {
+                            const std::lock_guard lock(read_mutex);
+                            (void)reader->take(std::move(row));
+                            heard = reader->place().value;
+                          },
+                      .dead =
+                          [this] {
+                            const std::lock_guard lock(mutex);
+                            underway.again();
+                            wake.notify_all();
+                          },
+                      .partner =
+                          [this](const CuttingState& partner) {
+                            const std::lock_guard lock(read_mutex);
+                            reader->take(partner);
+                          },
+                      .bone = events.bone,
+                      .stop_flag = events.stop_flag});
   if (!opened) return;
   for (const auto& [number, tool] : numbered_tools) (*opened)->know_tool(number, tool);
   const std::lock_guard lock(fast_mutex);
@@ -364,8 +372,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       if (over) break;
     }
     const Result<void> delivered = [&] {
-      // As one, so that no row of a datagram comes between: it may name a tool that only its path knows yet, or follow leaves
-      // that are not all there.
+      // As one, so that no row of a datagram comes between: it may name a tool that only its path knows yet, or follow
+      // leaves that are not all there.
       const std::lock_guard lock(read_mutex);
       follow(response);
       const bool complete = response.has_complete();
@@ -375,7 +383,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       return taken;
     }();
     if (!delivered) {
-      broken = Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
+      broken =
+          Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
       open.context.TryCancel();
     }
   }
@@ -401,16 +410,19 @@ bool may_come_again(const grpc::Status& status) {
     case grpc::StatusCode::INTERNAL:
     case grpc::StatusCode::UNKNOWN:
     case grpc::StatusCode::DEADLINE_EXCEEDED:
-    case grpc::StatusCode::RESOURCE_EXHAUSTED: return true;
-    default: return false;
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return true;
+    default:
+      return false;
   }
 }
 
 }  // namespace
 
 Result<void> RoomSession::Impl::join_again() {
-  Backoff backoff(room.author.value ^ static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count()),
-                  {.least = 20ms, .most = 2s});
+  Backoff backoff(
+      room.author.value ^ static_cast<std::uint64_t>(std::chrono::steady_clock::now().time_since_epoch().count()),
+      {.least = 20ms, .most = 2s});
   while (true) {
     {
       std::unique_lock lock(mutex);
@@ -470,8 +482,8 @@ RoomSession& RoomSession::operator=(RoomSession&& other) noexcept {
 RoomSession::~RoomSession() { close(); }
 
 Result<RoomSession> RoomSession::join(const RoomSessionOptions& options, const std::function<bool()>& stop) {
-  Result<wire::JoinedRoom> room =
-      wire::join_room(options.address, wire::ClientKind::haptic, options.name, options.patience, stop, options.room, options.credentials);
+  Result<wire::JoinedRoom> room = wire::join_room(options.address, wire::ClientKind::haptic, options.name,
+                                                  options.patience, stop, options.room, options.credentials);
   if (!room) return tl::unexpected(room.error());
   Result<Case> bone = fetch_case(*room, options.cache, stop);
   if (!bone) return tl::unexpected(bone.error());

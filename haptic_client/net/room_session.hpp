@@ -25,10 +25,10 @@ namespace osteon {
 [[nodiscard]] std::filesystem::path default_case_cache();
 
 struct RoomSessionOptions {
-  std::string address;                  // HOST:PORT
-  std::string room{};                   // which of the server's; empty: the only one that is open
+  std::string address;  // HOST:PORT
+  std::string room{};   // which of the server's; empty: the only one that is open
   wire::ClientCredentials credentials{};
-  std::string name{};                   // shown to others, and over plain text who one is; empty: somebody else each time
+  std::string name{};  // shown to others, and over plain text who one is; empty: somebody else each time
   std::chrono::milliseconds patience{5000};
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash
   // Sealed datagrams beside the stream: to the port that the server says, to this HOST:PORT instead, or "off".
@@ -47,14 +47,15 @@ class RoomSession {
   // Cuts that may wait for the network before send() refuses more.
   static constexpr std::size_t kMaxWaitingCuts = 1024;
 
-  // Joins, fetches the case unless the cache has it, and the tools that the room knows and this program does not. Errors:
-  // those of wire::join_room; what Case::load says of a fetched case; internal (the cache cannot be written).
+  // Joins, fetches the case unless the cache has it, and the tools that the room knows and this program does not.
+  // Errors: those of wire::join_room; what Case::load says of a fetched case; internal (the cache cannot be written).
   [[nodiscard]] static Result<RoomSession> join(const RoomSessionOptions& options, const std::function<bool()>& stop);
   ~RoomSession();  // closes
   RoomSession(RoomSession&&) noexcept;
   RoomSession& operator=(RoomSession&&) noexcept;
 
-  [[nodiscard]] const wire::JoinedRoom& room() const;  // as first joined: the author of all cuts and states, epochs, bounds
+  [[nodiscard]] const wire::JoinedRoom& room()
+      const;  // as first joined: the author of all cuts and states, epochs, bounds
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // that the room knows; grows with its events
   // Sets an item of the room's scene, id 0 for a new one, and returns its id. Waits for the answer. Errors:
@@ -64,7 +65,8 @@ class RoomSession {
   // Opens the stream; once. From now on `events` are called.
   void open(RoomCallbacks events);
   // Any thread but the haptic and audio ones: these lock and allocate.
-  // In order of the calls. False when kMaxWaitingCuts are not decided yet or the session is lost; the cut is then not taken.
+  // In order of the calls. False when kMaxWaitingCuts are not decided yet or the session is lost; the cut is then not
+  // taken.
   [[nodiscard]] bool send(const Cut& cut);
   // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
   void send(const CuttingState& state);

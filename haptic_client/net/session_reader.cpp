@@ -21,7 +21,11 @@ std::vector<BodyId> bodies_of(const google::protobuf::RepeatedField<std::uint32_
 
 SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
                              std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete)
-    : own_(own), tools_(std::move(tools)), events_(std::move(events)), decided_(std::move(decided)), complete_(std::move(complete)) {}
+    : own_(own),
+      tools_(std::move(tools)),
+      events_(std::move(events)),
+      decided_(std::move(decided)),
+      complete_(std::move(complete)) {}
 
 void SessionReader::begin() {
   rows_ = ReceiveWindow<Row>();
@@ -32,8 +36,10 @@ void SessionReader::begin() {
 
 Result<void> SessionReader::take(v1::SessionResponse response) {
   // An answer outside the order: what it tells of is in the leaves, or came before.
-  if (response.index() == 0 && response.has_committed()) return decided_(response.committed().cut().author_seq()), Result<void>{};
-  if (response.index() == 0 && response.has_rejected()) return decided_(response.rejected().author_seq()), Result<void>{};
+  if (response.index() == 0 && response.has_committed())
+    return decided_(response.committed().cut().author_seq()), Result<void>{};
+  if (response.index() == 0 && response.has_rejected())
+    return decided_(response.rejected().author_seq()), Result<void>{};
   if (response.index() == 0) return deliver(response);
   const std::uint64_t index = response.index();
   rows_.offer(index, std::move(response));
@@ -50,7 +56,8 @@ Result<void> SessionReader::take(wire::IndexedRow row) {
 
 Result<void> SessionReader::pass_on() {
   while (const std::optional<Row> row = rows_.take())
-    if (Result<void> delivered = std::visit([&](const auto& one) { return deliver(one); }, *row); !delivered) return delivered;
+    if (Result<void> delivered = std::visit([&](const auto& one) { return deliver(one); }, *row); !delivered)
+      return delivered;
   return {};
 }
 
@@ -79,7 +86,8 @@ void SessionReader::committed(RoomSeq place, const Cut& cut) {
   if (events_.committed) events_.committed(place, cut);
 }
 
-void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason) {
+void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch,
+                             const std::string& reason) {
   place_ = std::max(place_, place);
   decided_(author_seq);
   if (events_.rejected) events_.rejected(place, author_seq, lease_epoch, reason);
@@ -141,7 +149,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       for (const v1::SceneItem& wire_item : response.scene().items()) {
         const Result<SceneItem> item = wire::from_wire(wire_item);
         if (!item) return tl::unexpected(item.error());
-        if (!tools_->find(item->tool)) return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
+        if (!tools_->find(item->tool))
+          return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
         items.push_back(*item);
       }
       // Without a number it goes before the leaves, which have not come.
@@ -177,7 +186,10 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const v1::Supervised& row = response.supervised();
       const Result<Restrictions> supervision = wire::from_wire(row.supervision());
       if (!supervision) return tl::unexpected(supervision.error());
-      supervised({RoomSeq{row.room_seq()}, *supervision, row.lease_epoch(), {AuthorId{row.decided_by()}, row.decided_by_name()}});
+      supervised({RoomSeq{row.room_seq()},
+                  *supervision,
+                  row.lease_epoch(),
+                  {AuthorId{row.decided_by()}, row.decided_by_name()}});
       return {};
     }
     case v1::SessionResponse::kSaid: {
@@ -199,8 +211,10 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     }
     case v1::SessionResponse::kLink:
-    case v1::SessionResponse::kRedial: return {};  // the session's own
-    default: return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
+    case v1::SessionResponse::kRedial:
+      return {};  // the session's own
+    default:
+      return failure(ErrorCode::unsupported, "SessionResponse.message is not known to this client");
   }
 }
 

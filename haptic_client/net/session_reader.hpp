@@ -16,17 +16,17 @@
 
 namespace osteon {
 
-// Every row after the leaves comes over the stream; rejections, supervision and cuts of anyone may come sooner over the fast path. Whichever
-// is first counts. Not synchronised.
+// Every row after the leaves comes over the stream; rejections, supervision and cuts of anyone may come sooner over the
+// fast path. Whichever is first counts. Not synchronised.
 class SessionReader {
  public:
-  // `decided`: own cuts up to a number are decided; `complete`: the same, and from here on cuts may be sent. Both are called
-  // before the event itself.
-  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events, std::function<void(std::uint64_t)> decided,
-                std::function<void(std::uint64_t)> complete);
+  // `decided`: own cuts up to a number are decided; `complete`: the same, and from here on cuts may be sent. Both are
+  // called before the event itself.
+  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
+                std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete);
 
-  // A stream begins: its leaves and rows count anew, and so does place(), as the server may have lost the end of what an
-  // earlier one told. What was said to be kept stays: it is what shows such a loss.
+  // A stream begins: its leaves and rows count anew, and so does place(), as the server may have lost the end of what
+  // an earlier one told. What was said to be kept stays: it is what shows such a loss.
   void begin();
   // Error: the server sent what no correct server sends; nothing more of the stream is to be taken.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
@@ -58,7 +58,7 @@ class SessionReader {
   ReceiveWindow<Row> rows_;
   std::optional<wire::DurableSeq> kept_;
   RoomSeq place_;
-  bool supervised_ = false;  // of the present stream, before its leaves are complete
+  bool supervised_ = false;                     // of the present stream, before its leaves are complete
   std::map<AuthorId, std::uint64_t> partners_;  // newest state_seq of each
 };
 

@@ -11,8 +11,8 @@
 
 namespace osteon {
 
-CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what, std::function<Result<void>()>& chosen,
-                             std::function<Result<void>(RoomAdminClient&)> run) {
+CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what,
+                             std::function<Result<void>()>& chosen, std::function<Result<void>(RoomAdminClient&)> run) {
   struct Arguments {
     std::string server;
     wire::CredentialArguments credentials;

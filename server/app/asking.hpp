@@ -11,9 +11,10 @@ class App;
 
 namespace osteon {
 
-// Adds to `parent` the command `name` with --server and the credentials's options. Where it is on the command line, `chosen` becomes
-// what reaches the server and then runs `run`; its errors are those of both. Returned for more options.
-CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what, std::function<Result<void>()>& chosen,
-                             std::function<Result<void>(RoomAdminClient&)> run);
+// Adds to `parent` the command `name` with --server and the credentials's options. Where it is on the command line,
+// `chosen` becomes what reaches the server and then runs `run`; its errors are those of both. Returned for more
+// options.
+CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what,
+                             std::function<Result<void>()>& chosen, std::function<Result<void>(RoomAdminClient&)> run);
 
 }  // namespace osteon

@@ -21,8 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 void print(const RoomAdminClient::CaseLine& one) {
-  std::printf("%s  %8.1f MB  [%s]%s\n", to_hex(one.hash).c_str(), static_cast<double>(one.bytes) / 1e6, one.title.c_str(),
-              one.known ? "  was here before" : "");
+  std::printf("%s  %8.1f MB  [%s]%s\n", to_hex(one.hash).c_str(), static_cast<double>(one.bytes) / 1e6,
+              one.title.c_str(), one.known ? "  was here before" : "");
 }
 
 Result<void> list(RoomAdminClient& client) {
@@ -45,7 +45,8 @@ Result<void> upload(RoomAdminClient& client, const fs::path& from) {
   } packed;
   if (fs::is_directory(from, error)) {
     std::string place = (fs::temp_directory_path() / "osteon-upload-XXXXXX").string();
-    if (::mkdtemp(place.data()) == nullptr) return failure(ErrorCode::internal, "cannot make a folder for the archive in " + place);
+    if (::mkdtemp(place.data()) == nullptr)
+      return failure(ErrorCode::internal, "cannot make a folder for the archive in " + place);
     packed.folder = place;
     archive = packed.folder / "case.zip";
     if (Result<void> done = pack_case(from, archive); !done) return done;

@@ -1,8 +1,8 @@
 #include "server/app/journal_commands.hpp"
 
-#include <CLI/CLI.hpp>
 #include <fcntl.h>
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <cerrno>
 #include <chrono>
@@ -25,8 +25,8 @@
 #include "server/app/audit_commands.hpp"
 #include "server/app/key_command.hpp"
 #include "server/journal/journal_file.hpp"
-#include "server/journal/signing.hpp"
 #include "server/journal/maintenance.hpp"
+#include "server/journal/signing.hpp"
 #include "server/net/forgetting.hpp"
 #include "server/net/journal_rows.hpp"
 #include "server/net/room_files.hpp"
@@ -49,11 +49,11 @@ struct Arguments {
 void say(const std::string& what, const std::string& value) {
   std::printf("%-12s %s\n", (what + ":").c_str(), bounded_text(value).c_str());
 }
-void say_unsigned() {
-  say("note", "not signed: there is no signing.key beside the journal; give --signing-key FILE");
-}
+void say_unsigned() { say("note", "not signed: there is no signing.key beside the journal; give --signing-key FILE"); }
 
-std::string text_of(const JournalHead& head) { return std::to_string(head.place.value) + ", chain " + to_hex(head.chain).substr(0, 16); }
+std::string text_of(const JournalHead& head) {
+  return std::to_string(head.place.value) + ", chain " + to_hex(head.chain).substr(0, 16);
+}
 
 // Reads a journal and writes nothing, neither to it nor beside it.
 template <class Do>
@@ -101,7 +101,8 @@ Result<RoomSeq> last_of(const Journal& journal, const Arguments& given) {
 // What a file of another name is never to become: a part of the journal, as the next opening would take it.
 Result<void> check_apart(const fs::path& journal, const fs::path& to) {
   std::error_code ignored;
-  if (!fs::equivalent(folder_of(journal), folder_of(to), ignored) || !belongs_to(journal, to.filename().string())) return {};
+  if (!fs::equivalent(folder_of(journal), folder_of(to), ignored) || !belongs_to(journal, to.filename().string()))
+    return {};
   return failure(ErrorCode::exists,
                  to.string() + " would belong to the journal " + journal.string() + " itself; give another name");
 }
@@ -111,8 +112,8 @@ Error cannot_write(const fs::path& file, int reason) {
                                    std::string(remedy_of(reason))};
 }
 
-// A file whose name nothing has yet. It grows beside its place and gets its name when it is whole; dropped before, it leaves
-// nothing.
+// A file whose name nothing has yet. It grows beside its place and gets its name when it is whole; dropped before, it
+// leaves nothing.
 class NewFile {
  public:
   static Result<NewFile> begin(const fs::path& file) {
@@ -120,8 +121,10 @@ class NewFile {
     if (made.is_taken()) return made.taken();
     const int fd = ::open(made.partial_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
     if (fd < 0 && errno == EEXIST)
-      return failure(ErrorCode::exists, "there is " + made.partial_.string() + ", which an export that was cut short may have "
-                                            "left; remove it, or give another name than " + file.string());
+      return failure(ErrorCode::exists, "there is " + made.partial_.string() +
+                                            ", which an export that was cut short may have "
+                                            "left; remove it, or give another name than " +
+                                            file.string());
     if (fd < 0 && errno == ENOENT)
       return failure(ErrorCode::not_found, "there is no folder " + folder_of(file).string() + "; make it first");
     if (fd < 0) return tl::unexpected(cannot_write(file, errno));
@@ -146,7 +149,8 @@ class NewFile {
     if (std::fflush(out_) != 0 || ::fsync(::fileno(out_)) != 0) return tl::unexpected(failed());
     bool named = ::renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, file_.c_str(), RENAME_NOREPLACE) == 0;
     // Some file systems know only the older way to replace nothing.
-    if (!named && errno == EINVAL) named = ::link(partial_.c_str(), file_.c_str()) == 0 && ::unlink(partial_.c_str()) == 0;
+    if (!named && errno == EINVAL)
+      named = ::link(partial_.c_str(), file_.c_str()) == 0 && ::unlink(partial_.c_str()) == 0;
     if (!named && errno == EEXIST) return taken();
     if (!named) return tl::unexpected(failed());
     std::fclose(std::exchange(out_, nullptr));
@@ -228,8 +232,8 @@ Result<void> verify(const Arguments& given) {
   for (const std::string& note : report->notes) say("note", note);
   for (const std::string& fault : report->faults) say("fault", fault);
   if (!report->sound())
-    return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server recover " + given.file.string() +
-                                                 " NEW copies what can be confirmed");
+    return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server recover " +
+                                                 given.file.string() + " NEW copies what can be confirmed");
   if (!given.case_folder.empty()) {
     const Result<Room> room = replayed(given);
     if (!room) return tl::unexpected(room.error());
@@ -272,7 +276,8 @@ Result<void> check_fields_file(const Arguments& given) {
   if (::access(folder.c_str(), W_OK) != 0) return tl::unexpected(cannot_write(file, errno));
   if (const Result<void> apart = check_apart(given.file, file); !apart) return apart;
   if (!fs::exists(fs::symlink_status(file, ignored)) || load_fields(file)) return {};
-  return failure(ErrorCode::exists, "there is " + file.string() + ", which is no file of fields, to be replaced by newer ones; "
+  return failure(ErrorCode::exists, "there is " + file.string() +
+                                        ", which is no file of fields, to be replaced by newer ones; "
                                         "give --fields another name");
 }
 
@@ -293,7 +298,8 @@ Result<void> replay(const Arguments& given) {
   saved.room_seq = room->room_seq();
   saved.pitch_mm = room->bone().pitch_mm();
   saved.bodies = room->bodies();
-  for (const BodyId body : saved.bodies) std::ranges::move(room->find_field(body)->leaves(), std::back_inserter(saved.leaves));
+  for (const BodyId body : saved.bodies)
+    std::ranges::move(room->find_field(body)->leaves(), std::back_inserter(saved.leaves));
   saved.items = room->items();
   const std::shared_ptr<ToolBox> built_in = builtin_tool_box();
   for (const ToolBox::Entry* entry : room->tools()->entries())
@@ -317,8 +323,9 @@ Result<void> remove(const Arguments& given) {
   if (!branches && branches.error().code != ErrorCode::not_found) return tl::unexpected(branches.error());
   if (branches && !branches->empty() && !given.branches && !given.alone) {
     for (const RoomFile& branch : *branches) say("branch", branch.file.string());
-    return failure(ErrorCode::invalid_input, given.file.string() + " has branches, which hold what was cut in it; "
-                                                                   "say --branches or --alone");
+    return failure(ErrorCode::invalid_input, given.file.string() +
+                                                 " has branches, which hold what was cut in it; "
+                                                 "say --branches or --alone");
   }
   const Result<std::vector<fs::path>> gone = delete_room(given.file, given.branches);
   if (!gone) return tl::unexpected(gone.error());
@@ -352,12 +359,16 @@ Result<void> write_out(const Arguments& given) {
       if (row.place > *last) return false;
       if (of_person) {
         const Result<std::optional<std::string>> line = of_person->of(row);
-        if (!line) outcome = tl::unexpected(line.error());
-        else if (*line) put(**line);
+        if (!line)
+          outcome = tl::unexpected(line.error());
+        else if (*line)
+          put(**line);
       } else {
         const Result<std::string> line = row_as_json(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
-        if (!line) outcome = tl::unexpected(line.error());
-        else put(*line);
+        if (!line)
+          outcome = tl::unexpected(line.error());
+        else
+          put(*line);
       }
       return outcome.has_value();
     });
@@ -400,7 +411,8 @@ Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::
 
 Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == !given.days)
-    return failure(ErrorCode::invalid_input, "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
+    return failure(ErrorCode::invalid_input,
+                   "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
   std::vector<std::string> names;
   const Result<void> done = change_journal(given, [&](Journal& journal) -> Result<void> {
@@ -478,9 +490,8 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   CLI::App* check =
       command("verify", "Holds every event against the chain of hashes, and checkpoints and footer against it", verify);
   check->add_option("--case", given->case_folder, "Folder of the case: makes the room again, too, and says its hashes");
-  check->add_option(
-      "--key", given->key,
-      "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
+  check->add_option("--key", given->key,
+                    "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
   CLI::App* recovered = copies("recover", "Copies what can be confirmed of a damaged journal into a new one", recover);
   recovered->add_option("--to", given->at, "room_seq of the last event; all by default");
   signs(recovered);
@@ -494,8 +505,9 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   signs(again);
   again->add_option("--case", given->case_folder, "Folder of the case")->required();
   again->add_option("--to", given->at, "room_seq of the last event; all by default");
-  again->add_option("--fields", given->fields,
-                    "Writes the bone as it was then (.vdb), for --resume and osteon-import surface; replaces only earlier fields");
+  again->add_option(
+      "--fields", given->fields,
+      "Writes the bone as it was then (.vdb), for --resume and osteon-import surface; replaces only earlier fields");
   CLI::App* lines = copies("export", "Writes each event as a line of JSON", write_out);
   signs(lines);
   lines->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");

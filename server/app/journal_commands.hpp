@@ -1,5 +1,5 @@
-// osteon-server verify, recover, backup, migrate, branch, replay, export, people, forget and delete: what is done to journals
-// that no server has open.
+// osteon-server verify, recover, backup, migrate, branch, replay, export, people, forget and delete: what is done to
+// journals that no server has open.
 #pragma once
 #include <functional>
 

@@ -19,8 +19,7 @@ struct Arguments {
 void print(const SigningKeys& keys) {
   std::printf("%s\n", to_hex(keys.key().public_key()).c_str());
   // Standard output has the key alone, for programs.
-  for (const Succession& one : keys.successions())
-    std::fprintf(stderr, "earlier: %s\n", to_hex(one.before).c_str());
+  for (const Succession& one : keys.successions()) std::fprintf(stderr, "earlier: %s\n", to_hex(one.before).c_str());
 }
 
 Result<void> show(const Arguments& given) {
@@ -43,7 +42,8 @@ Result<PublicKey> public_key_of(const std::string& given) {
   if (Result<PublicKey> key = parse_public_key(given)) return key;
   std::error_code ignored;
   if (!std::filesystem::exists(given, ignored))
-    return failure(ErrorCode::not_found, "--key " + given + " is neither 64 hexadecimal digits nor a file; give what "
+    return failure(ErrorCode::not_found, "--key " + given +
+                                             " is neither 64 hexadecimal digits nor a file; give what "
                                              "osteon-server key show prints");
   if (const auto keys = load_signing_keys(given)) return (*keys)->key().public_key();
   const Result<std::string> content = read_file(given);

@@ -58,7 +58,8 @@ void log_health(const std::string& room, const RuntimeHealth& health) {
 }
 
 void log_health(RoomServer& server) {
-  for (const std::shared_ptr<OpenRoom>& room : server.rooms().open_rooms()) log_health(room->name, room->host().health());
+  for (const std::shared_ptr<OpenRoom>& room : server.rooms().open_rooms())
+    log_health(room->name, room->host().health());
   const LinkServerHealth links = server.link_health();
   log::info("fast path", {{"links", links.links},
                           {"links_alive", links.alive},
@@ -104,7 +105,9 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error))
     if (entry.path().extension() == ".yaml") files.push_back(entry.path());
-  if (error) return failure(ErrorCode::not_found, "the tools' folder " + folder.string() + " cannot be read: " + error.message());
+  if (error)
+    return failure(ErrorCode::not_found,
+                   "the tools' folder " + folder.string() + " cannot be read: " + error.message());
   std::sort(files.begin(), files.end());
   for (const std::filesystem::path& file : files) {
     const Result<Tool> tool = load_tool_file(file);
@@ -113,7 +116,8 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
     if (const Result<const ForceLaw*> law = choose_law(*tool); !law)
       return failure(law.error().code, file.string() + ": \"law\": " + law.error().message);
     const auto entries = box.entries();
-    const auto same = std::find_if(entries.begin(), entries.end(), [&](const auto* e) { return e->tool.name == tool->name; });
+    const auto same =
+        std::find_if(entries.begin(), entries.end(), [&](const auto* e) { return e->tool.name == tool->name; });
     if (same != entries.end() && (*same)->hash != tool->hash())
       return failure(ErrorCode::exists, file.string() + ": there is another tool of the name " + tool->name +
                                             "; give this one a name of its own");
@@ -123,7 +127,8 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   return {};
 }
 
-// The box that every new room begins with. Tools are loaded once, so that a folder that changes meanwhile changes no room.
+// The box that every new room begins with. Tools are loaded once, so that a folder that changes meanwhile changes no
+// room.
 Result<std::function<std::shared_ptr<ToolBox>()>> tool_boxes(const ServerConfig& options) {
   const std::shared_ptr<ToolBox> loaded = builtin_tool_box();  // shared with the function below
   if (!options.tools_folder.empty())
@@ -141,20 +146,26 @@ Result<Room> make_room(const ServerConfig& options, const Case& bone, std::share
   if (!saved) return tl::unexpected(saved.error());
   Result<Room> room = Room::resume(bone, *saved, options.limits, std::move(tools));
   if (!room) return failure(room.error().code, options.resume_file.string() + ": " + room.error().message);
-  log::info("resumed", {{"file", options.resume_file.string()},
-                        {"room_seq", saved->room_seq.value},
-                        {"bodies", saved->bodies.size()}});
+  log::info(
+      "resumed",
+      {{"file", options.resume_file.string()}, {"room_seq", saved->room_seq.value}, {"bodies", saved->bodies.size()}});
   return room;
 }
 
 // The room that the journal keeps, or a new one in a new journal.
 Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools,
                           std::shared_ptr<const SigningKeys> keys, std::unique_ptr<RoomStore>& store) {
-  RoomStore::Options keeping{.name = options.journal_file.stem().string(), .limits = options.limits, .tools = std::move(tools), .journal = {}, .today = {}, .random = {}};
+  RoomStore::Options keeping{.name = options.journal_file.stem().string(),
+                             .limits = options.limits,
+                             .tools = std::move(tools),
+                             .journal = {},
+                             .today = {},
+                             .random = {}};
   keeping.journal.keys = std::move(keys);
   keeping.retention_days = options.retention_days;
   Progress progress("journal");
-  Result<PersistedRoom> kept = RoomStore::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
+  Result<PersistedRoom> kept =
+      RoomStore::open(options.journal_file, bone, keeping, [&](double fraction) { progress.update(fraction); });
   if (!kept) return tl::unexpected(kept.error());
   log::info("journal", {{"file", options.journal_file.string()},
                         {"made", kept->made},
@@ -165,8 +176,8 @@ Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::sh
   return std::move(kept->room);
 }
 
-// Cases that were uploaded earlier are served as those of the command line are, and read when a room is of them. One that cannot
-// be described is none.
+// Cases that were uploaded earlier are served as those of the command line are, and read when a room is of them. One
+// that cannot be described is none.
 Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder, RoomsOptions& rooms) {
   Result<std::unique_ptr<CaseRepository>> store = CaseRepository::open(folder, "/proc/self/exe");
   if (!store) return tl::unexpected(store.error());
@@ -251,7 +262,8 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
     case_bytes += bone->memory_bytes();
     if (case_bytes > rooms_options.case_memory_bytes)
       return failure(ErrorCode::exhausted,
-                     "the cases up to " + folder.string() + " take more than the " + std::to_string(options.case_memory_mib) +
+                     "the cases up to " + folder.string() + " take more than the " +
+                         std::to_string(options.case_memory_mib) +
                          " MiB of memory that they may; give fewer with --case, or a larger --case-memory-mib");
     rooms_options.cases.push_back({std::move(*bone), folder});
   }
@@ -282,7 +294,9 @@ Result<std::unique_ptr<DiskLock>> take_rooms_folder(const std::filesystem::path&
   if (folder.empty()) return nullptr;
   std::error_code error;
   std::filesystem::create_directories(folder, error);
-  if (error) return failure(ErrorCode::internal, "the folder --rooms " + folder.string() + " cannot be made: " + error.message());
+  if (error)
+    return failure(ErrorCode::internal,
+                   "the folder --rooms " + folder.string() + " cannot be made: " + error.message());
   Result<std::unique_ptr<DiskLock>> taken = lock_rooms(folder);
   // Of another's folder nothing is touched; why one cannot be written, this says in the words of the option.
   if (taken || taken.error().code != ErrorCode::exists)
@@ -309,10 +323,10 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
     std::filesystem::remove(options.address_file, ignored);
   }
   const ConnectionOptions connections{.certificates = options.certificates,
-                          .most_connections = static_cast<std::size_t>(options.most_connections),
-                          .proxy_socket = options.proxy_socket,
-                          .udp_listen = options.udp_listen,
-                          .most_ticket_life = std::chrono::hours(options.most_ticket_hours)};
+                                      .most_connections = static_cast<std::size_t>(options.most_connections),
+                                      .proxy_socket = options.proxy_socket,
+                                      .udp_listen = options.udp_listen,
+                                      .most_ticket_life = std::chrono::hours(options.most_ticket_hours)};
   if (Result<void> usable = RoomServer::check_listen(options.listen, connections); !usable) return usable;
   if (Result<void> usable = check_writable(options.save_file, "the fields", "--save"); !usable) return usable;
   Result<std::unique_ptr<Rooms>> rooms = open_rooms(options);
@@ -326,8 +340,9 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
                           {"surface_bytes", first.surface_bytes}});
   Result<std::unique_ptr<Metrics>> metrics;
   if (!options.metrics.empty()) {
-    metrics = Metrics::start(options.metrics, **server,
-                             options.certificates.empty() ? std::filesystem::path() : options.certificates / "server.pem");
+    metrics =
+        Metrics::start(options.metrics, **server,
+                       options.certificates.empty() ? std::filesystem::path() : options.certificates / "server.pem");
     if (!metrics) return tl::unexpected(metrics.error());
     log::info("metrics", {{"address", (*metrics)->address()}});
   }
@@ -336,7 +351,8 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
       return tl::unexpected(written.error());
 
   while (!stop.wait_for(kHealthEvery)) log_health(**server);
-  (*server)->drain(std::chrono::seconds(options.drain_seconds), [&](std::chrono::milliseconds time) { return stop.wait_for_second(time); });
+  (*server)->drain(std::chrono::seconds(options.drain_seconds),
+                   [&](std::chrono::milliseconds time) { return stop.wait_for_second(time); });
 
   log::info("stopping");
   if (metrics) metrics->reset();
@@ -363,10 +379,12 @@ int check(const std::filesystem::path& file, std::vector<std::string> faults, co
 int main(int argc, char** argv) {
   if (const auto checked = case_check_command(argc, argv)) return *checked;
   ServerConfig options;
-  CLI::App app("Owns the bone of a case: applies the cuts of haptic clients in one order and streams the surface and the "
-               "tools' states to viewers and audio clients.",
-               kProgram);
-  app.add_option("--case", options.case_folders, "Folder of the case, as osteon-import writes it; with --rooms several, each for rooms of its own")
+  CLI::App app(
+      "Owns the bone of a case: applies the cuts of haptic clients in one order and streams the surface and the "
+      "tools' states to viewers and audio clients.",
+      kProgram);
+  app.add_option("--case", options.case_folders,
+                 "Folder of the case, as osteon-import writes it; with --rooms several, each for rooms of its own")
       ->allow_extra_args(false);
   std::function<Result<void>()> command;
   add_journal_commands(app, command);
@@ -376,22 +394,27 @@ int main(int argc, char** argv) {
   add_key_command(app, command);
   add_audit_commands(app, command);
   app.require_subcommand(0, 1);
-  app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")->capture_default_str();
+  app.add_option("--listen", options.listen, "HOST:PORT on this machine; port 0 lets the system choose")
+      ->capture_default_str();
   app.add_option(
       "--udp-listen", options.udp_listen,
       "HOST:PORT for the datagrams of the fast path, HOST numeric; without it where --listen is, at a free port");
   app.add_option("--certificates", options.certificates,
-                 "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come with a certificate and a ticket");
+                 "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come "
+                 "with a certificate and a ticket");
   app.add_option("--proxy-socket", options.proxy_socket,
                  "Unix socket at which a proxy on this machine brings calls; deploy/front-proxy.md");
-  app.add_flag("--plain", options.plain, "Plain text, without certificates and tickets, for clients on this machine alone");
-  app.add_option("--most-connections", options.most_connections, "Of everybody together; further ones are closed at once")
+  app.add_flag("--plain", options.plain,
+               "Plain text, without certificates and tickets, for clients on this machine alone");
+  app.add_option("--most-connections", options.most_connections,
+                 "Of everybody together; further ones are closed at once")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   app.add_option("--most-ticket-hours", options.most_ticket_hours,
                  "Refuses tickets that are good for more hours, counted from the call; without it none")
       ->check(CLI::Range(1, 87600));
-  app.add_option("--most-rooms", options.most_rooms, "Open and closed ones together; none is made, branched or shown again beyond")
+  app.add_option("--most-rooms", options.most_rooms,
+                 "Open and closed ones together; none is made, branched or shown again beyond")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   app.add_option("--most-rooms-per-person", options.most_rooms_per_person,
@@ -403,18 +426,23 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
-  app.add_option("--tools", options.tools_folder,
-                 "Folder of tool files (*.yaml, with the STL files they name) that the room knows beside the built-in tools");
+  app.add_option(
+      "--tools", options.tools_folder,
+      "Folder of tool files (*.yaml, with the STL files they name) that the room knows beside the built-in tools");
   app.add_option("--save", options.save_file,
-                 "The cut bone in all its bodies, the scene and added tools (.vdb), written at a clean stop and when a client asks");
-  CLI::Option* resume = app.add_option("--resume", options.resume_file,
-                                       "What --save wrote: the room goes on from there; what came before cannot be undone");
-  app.add_option("--journal", options.journal_file,
-                 "Every event of the room, on the disk before any hand is told or answered; where the file is there, the room "
-                 "goes on, with all that can be undone")
+                 "The cut bone in all its bodies, the scene and added tools (.vdb), written at a clean stop and when a "
+                 "client asks");
+  CLI::Option* resume =
+      app.add_option("--resume", options.resume_file,
+                     "What --save wrote: the room goes on from there; what came before cannot be undone");
+  app.add_option(
+         "--journal", options.journal_file,
+         "Every event of the room, on the disk before any hand is told or answered; where the file is there, the room "
+         "goes on, with all that can be undone")
       ->excludes(resume);
   app.add_option("--rooms", options.rooms_folder,
-                 "Folder of many rooms, each kept in a journal: those that were open are opened, and \"osteon-server rooms\" makes, "
+                 "Folder of many rooms, each kept in a journal: those that were open are opened, and \"osteon-server "
+                 "rooms\" makes, "
                  "closes, branches and deletes them")
       ->excludes(resume)
       ->excludes("--journal")
@@ -432,33 +460,43 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 36500))
       ->capture_default_str();
   app.add_option("--uploads", options.uploads_folder,
-                 "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; without it none are taken");
+                 "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; "
+                 "without it none are taken");
   app.add_option("--case-memory-mib", options.case_memory_mib,
-                 "Of all cases in memory: those of --case, and uploaded ones as long as a room is of them; a room that needs more "
+                 "Of all cases in memory: those of --case, and uploaded ones as long as a room is of them; a room that "
+                 "needs more "
                  "is refused")
       ->check(CLI::Range(1, kMostCaseMemoryMib))
       ->capture_default_str();
   app.add_option("--retention-days", options.retention_days,
-                 "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what they did stays")
+                 "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what "
+                 "they did stays")
       ->check(CLI::Range(1, 36500));
-  const std::map<std::string, Detail> details{{"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
+  const std::map<std::string, Detail> details{
+      {"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
   app.add_flag("--compliant-mount", options.mount,
                "The bone stands on a compliant mount, so that whoever pushes it is felt by all who have a tool at it");
-  app.add_option("--detail", options.detail,
-                 "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
-                 "work, coarser elsewhere; auto: near for a bone of more than " + std::to_string(kMostFullBlocks) + " blocks")
+  app.add_option(
+         "--detail", options.detail,
+         "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
+         "work, coarser elsewhere; auto: near for a bone of more than " +
+             std::to_string(kMostFullBlocks) + " blocks")
       ->transform(CLI::CheckedTransformer(details, CLI::ignore_case).description("auto|full|near"))
       ->default_str("auto");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
-  app.add_option("--metrics", options.metrics, "PORT or HOST:PORT of this machine where Prometheus finds figures of every room");
-  app.add_option("--drain-seconds", options.drain_seconds,
-                 "After SIGTERM or Ctrl-C, how long those in the rooms have to leave in good order; a second signal ends that")
+  app.add_option("--metrics", options.metrics,
+                 "PORT or HOST:PORT of this machine where Prometheus finds figures of every room");
+  app.add_option(
+         "--drain-seconds", options.drain_seconds,
+         "After SIGTERM or Ctrl-C, how long those in the rooms have to leave in good order; a second signal ends that")
       ->check(CLI::Range(0, 600))
       ->capture_default_str();
   std::filesystem::path config_file;
   bool only_check = false;
-  CLI::Option* from_file = app.add_option("--config", config_file, "YAML file with all of these, and limits; the command line wins over it");
-  app.add_flag("--check", only_check, "Says whether the --config file is sound, and what to change in it, and ends")->needs(from_file);
+  CLI::Option* from_file =
+      app.add_option("--config", config_file, "YAML file with all of these, and limits; the command line wins over it");
+  app.add_flag("--check", only_check, "Says whether the --config file is sound, and what to change in it, and ends")
+      ->needs(from_file);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (!config_file.empty() && !command) {
     const Result<ConfigRead> read = read_server_config(config_file);

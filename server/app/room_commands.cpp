@@ -20,10 +20,11 @@ struct Arguments {
 };
 
 void print(const RoomLine& room) {
-  std::string about = room.open ? "open, at event " + std::to_string(room.room_seq.value) + ", " + std::to_string(room.sessions) +
-                                      " sessions, " + std::to_string(room.watchers) + " watchers"
-                      : room.room_seq ? "stopped, at event " + std::to_string(room.room_seq.value) + ": takes no more cuts"
-                                      : "closed";
+  std::string about =
+      room.open ? "open, at event " + std::to_string(room.room_seq.value) + ", " + std::to_string(room.sessions) +
+                      " sessions, " + std::to_string(room.watchers) + " watchers"
+      : room.room_seq ? "stopped, at event " + std::to_string(room.room_seq.value) + ": takes no more cuts"
+                      : "closed";
   if (!room.kept && !room.replay) about += ", not kept";
   if (!room.parent.empty())
     about += (room.replay ? ", shows " : ", branch of ") + room.parent + (room.replay ? " up to " : " at ") +
@@ -53,8 +54,9 @@ Result<void> verify(RoomAdminClient& rooms, const Arguments& given) {
               to_hex(checked->field_hash).c_str(), checked->checkpoints);
   for (const std::string& fault : checked->faults) std::printf("fault:       %s\n", fault.c_str());
   if (!checked->faults.empty())
-    return failure(ErrorCode::invalid_input, "what is kept of room " + given.name +
-                                                 " is not sound; close the room and see osteon-server verify and recover");
+    return failure(ErrorCode::invalid_input,
+                   "what is kept of room " + given.name +
+                       " is not sound; close the room and see osteon-server verify and recover");
   std::printf("verdict:     sound\n");
   return {};
 }
@@ -77,11 +79,14 @@ Result<void> remove(RoomAdminClient& rooms, const Arguments& given) {
 
 void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
-  CLI::App* rooms = app.add_subcommand("rooms", "Makes, lists, closes, branches, shows again, checks, copies and deletes the rooms of a server that runs");
+  CLI::App* rooms = app.add_subcommand(
+      "rooms",
+      "Makes, lists, closes, branches, shows again, checks, copies and deletes the rooms of a server that runs");
   rooms->require_subcommand(1);
   using Run = Result<void> (*)(RoomAdminClient&, const Arguments&);
   const auto command = [&](const char* name, const char* what, Run run) {
-    return add_asking_command(*rooms, name, what, chosen, [given, run](RoomAdminClient& client) { return run(client, *given); });
+    return add_asking_command(*rooms, name, what, chosen,
+                              [given, run](RoomAdminClient& client) { return run(client, *given); });
   };
   const auto of_room = [&](const char* name, const char* what, Run run) {
     CLI::App* sub = command(name, what, run);
@@ -89,21 +94,28 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
     return sub;
   };
   command("list", "Lists them all", list);
-  of_room("create", "Makes a room and opens it", [](RoomAdminClient& c, const Arguments& a) { return print(c.create(a.name, a.case_hash)); })
-      ->add_option("--case-hash", given->case_hash, "Which of the server's cases, where it has several; as its log says it");
-  of_room("close", "Ends a room for those in it; what it keeps stays", [](RoomAdminClient& c, const Arguments& a) { return print(c.close(a.name)); });
-  of_room("resume", "Opens a closed room where it was left", [](RoomAdminClient& c, const Arguments& a) { return print(c.resume(a.name)); });
-  CLI::App* branch = of_room("branch", "Makes a room of its own from what another was at an event",
-                             [](RoomAdminClient& c, const Arguments& a) { return print(c.branch(a.name, a.new_name, RoomSeq{a.to})); });
+  of_room("create", "Makes a room and opens it",
+          [](RoomAdminClient& c, const Arguments& a) { return print(c.create(a.name, a.case_hash)); })
+      ->add_option("--case-hash", given->case_hash,
+                   "Which of the server's cases, where it has several; as its log says it");
+  of_room("close", "Ends a room for those in it; what it keeps stays",
+          [](RoomAdminClient& c, const Arguments& a) { return print(c.close(a.name)); });
+  of_room("resume", "Opens a closed room where it was left",
+          [](RoomAdminClient& c, const Arguments& a) { return print(c.resume(a.name)); });
+  CLI::App* branch = of_room(
+      "branch", "Makes a room of its own from what another was at an event",
+      [](RoomAdminClient& c, const Arguments& a) { return print(c.branch(a.name, a.new_name, RoomSeq{a.to})); });
   branch->add_option("new", given->new_name, "Name of the branch")->required();
   branch->add_option("--at", given->to, "room_seq of the last event that it takes over; all by default");
-  CLI::App* replay = of_room("replay", "Opens a room in which what happened in another happens again, for viewers", [](RoomAdminClient& c, const Arguments& a) {
-    return print(c.replay(a.name, a.new_name, RoomSeq{a.from}, RoomSeq{a.to}, a.speed));
-  });
+  CLI::App* replay = of_room("replay", "Opens a room in which what happened in another happens again, for viewers",
+                             [](RoomAdminClient& c, const Arguments& a) {
+                               return print(c.replay(a.name, a.new_name, RoomSeq{a.from}, RoomSeq{a.to}, a.speed));
+                             });
   replay->add_option("new", given->new_name, "Name of the room that shows it")->required();
   replay->add_option("--from", given->from, "room_seq of the event that it begins after");
   replay->add_option("--to", given->to, "room_seq of the last event; all by default");
-  replay->add_option("--speed", given->speed, "Times as fast as it happened; 0: stands still at --from")->capture_default_str();
+  replay->add_option("--speed", given->speed, "Times as fast as it happened; 0: stands still at --from")
+      ->capture_default_str();
   of_room("verify", "Checks a room's journal, and the bone that it makes, while the room is cut", verify);
   of_room("backup", "Copies a room's journal while the room is cut", back_up)
       ->add_option("file", given->file_name, "Plain name in the server's folder of rooms, ending in .backup")

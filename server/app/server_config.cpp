@@ -31,7 +31,8 @@ struct Value {
 };
 
 std::string scalar(const Value& value, const char* remedy) {
-  if (!value.node.IsScalar() || value.node.Scalar().empty()) throw Wrong{std::string("is not a single value; ") + remedy};
+  if (!value.node.IsScalar() || value.node.Scalar().empty())
+    throw Wrong{std::string("is not a single value; ") + remedy};
   return value.node.Scalar();
 }
 
@@ -44,7 +45,8 @@ double number(const Value& value, double least, double most) {
   const std::string text = scalar(value, remedy.c_str());
   double read = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), read);
-  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(read)) throw Wrong{"is " + text + "; " + remedy};
+  if (error != std::errc{} || end != text.data() + text.size() || !std::isfinite(read))
+    throw Wrong{"is " + text + "; " + remedy};
   if (read < least || read > most) throw Wrong{"is " + text + "; " + remedy};
   return read;
 }
@@ -119,7 +121,8 @@ const std::vector<Field>& fields() {
       {"detail", [](const Value& v, Config& c) { c.detail = detail(v); }},
       {"drain_seconds", [](const Value& v, Config& c) { c.drain_seconds = whole(v, 0, 600); }},
       {"journal", [](const Value& v, Config& c) { c.journal_file = path(v); }},
-      {"listen", [](const Value& v, Config& c) { c.listen = host_port(v, "write HOST:PORT, such as 127.0.0.1:50000"); }},
+      {"listen",
+       [](const Value& v, Config& c) { c.listen = host_port(v, "write HOST:PORT, such as 127.0.0.1:50000"); }},
       {"metrics", [](const Value& v, Config& c) { c.metrics = metrics_place(v); }},
       {"most_backups_per_person", [](const Value& v, Config& c) { c.most_backups_per_person = whole(v, 1, 65536); }},
       {"most_connections", [](const Value& v, Config& c) { c.most_connections = whole(v, 1, 65535); }},
@@ -150,10 +153,12 @@ const std::vector<Field>& limit_fields() {
       {"blow_j", [](const Value& v, Config& c) { c.limits.blow_j = number(v, 0, 1000); }},
       {"path_knots", [](const Value& v, Config& c) { c.limits.path_knots = whole(v, 2, 64); }},
       {"power_w", [](const Value& v, Config& c) { c.limits.power_w = number(v, 1, 100000); }},
-      {"spindle_rpm", [](const Value& v, Config& c) { c.limits.spindle_rpm = static_cast<std::uint32_t>(whole(v, 1, 1000000)); }},
+      {"spindle_rpm",
+       [](const Value& v, Config& c) { c.limits.spindle_rpm = static_cast<std::uint32_t>(whole(v, 1, 1000000)); }},
       {"swept_mm", [](const Value& v, Config& c) { c.limits.swept_mm = number(v, 1, 1000); }},
       {"swept_voxels_per_s", [](const Value& v, Config& c) { c.limits.swept_voxels_per_s = number(v, 1e6, 1e12); }},
-      {"time_slack_ms", [](const Value& v, Config& c) { c.limits.time_slack = std::chrono::milliseconds(whole(v, 1, 60000)); }},
+      {"time_slack_ms",
+       [](const Value& v, Config& c) { c.limits.time_slack = std::chrono::milliseconds(whole(v, 1, 60000)); }},
   };
   return all;
 }
@@ -207,7 +212,8 @@ class Reader {
         if (entry.second.IsMap())
           read_map(entry.second, limit_fields(), "limits.");
         else
-          fault(entry.second, "\"limits\" is not a map of limits; write lines such as power_w: 500 below it, further in");
+          fault(entry.second,
+                "\"limits\" is not a map of limits; write lines such as power_w: 500 below it, further in");
       } else if (field == known.end()) {
         std::vector<std::string> names;
         for (const Field& one : known) names.emplace_back(one.name);
@@ -249,7 +255,8 @@ Result<ConfigRead> read_server_config(const fs::path& file, ServerConfig config)
 
 Result<void> check_server_config(const ServerConfig& config) {
   const auto wrong = [](const std::string& what) -> Result<void> { return failure(ErrorCode::invalid_input, what); };
-  if (config.case_folders.empty()) return wrong("--case is required, or cases in the --config file; see osteon-server --help");
+  if (config.case_folders.empty())
+    return wrong("--case is required, or cases in the --config file; see osteon-server --help");
   if (config.case_folders.size() > 1 && config.rooms_folder.empty())
     return wrong("--case was given more than once, but there is one room; give --rooms FOLDER for many");
   const std::pair<const char*, bool> ways[]{{"--rooms", !config.rooms_folder.empty()},
@@ -261,7 +268,8 @@ Result<void> check_server_config(const ServerConfig& config) {
         return wrong(std::string(ways[i].first) + " excludes " + ways[j].first +
                      ", on the command line as in a --config file; leave one");
   if (!config.uploads_folder.empty() && config.rooms_folder.empty())
-    return wrong("--uploads needs --rooms, since a case that is uploaded is for rooms of its own; give --rooms FOLDER too");
+    return wrong(
+        "--uploads needs --rooms, since a case that is uploaded is for rooms of its own; give --rooms FOLDER too");
   if (!config.signing_key.empty() && !ways[0].second && !ways[1].second)
     return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
   if (!config.audit_syslog.empty() && config.audit_file.empty() && !ways[0].second && !ways[1].second)
@@ -276,7 +284,8 @@ Result<void> check_server_config(const ServerConfig& config) {
     return wrong("--proxy-socket needs --certificates DIR: a proxy brings calls of people");
   if (config.plain == !config.certificates.empty())
     return wrong(config.plain ? "--plain excludes --certificates, on the command line as in a --config file; leave one"
-                              : "say how clients come in: --certificates DIR, which deploy/certs makes, or --plain for plain text on this machine alone");
+                              : "say how clients come in: --certificates DIR, which deploy/certs makes, or --plain for "
+                                "plain text on this machine alone");
   return {};
 }
 
@@ -292,7 +301,8 @@ Result<void> check_server_places(const ServerConfig& config) {
   if (!config.resume_file.empty() && !is_there(config.resume_file, false))
     return missing("resume (--resume)", config.resume_file, "is not there; give a file that --save wrote");
   if (!config.certificates.empty() && !is_there(config.certificates / "server.pem", false))
-    return missing("certificates (--certificates)", config.certificates, "has no server.pem; give a folder that deploy/certs server made");
+    return missing("certificates (--certificates)", config.certificates,
+                   "has no server.pem; give a folder that deploy/certs server made");
   const std::tuple<const char*, const fs::path&> written[]{{"address_file (--address-file)", config.address_file},
                                                            {"audit (--audit)", config.audit_file},
                                                            {"journal (--journal)", config.journal_file},

@@ -28,15 +28,18 @@ Result<void> run(const Arguments& given) {
   const Result<TicketKey> key = parse_ticket_key(*text);
   if (!key) return failure(key.error().code, given.key.string() + ": " + key.error().message);
   const auto role = parse_role(given.role);
-  if (!role) return failure(ErrorCode::invalid_input, "--role " + given.role + " is none of observer, trainee, collaborator, instructor, operator");
+  if (!role)
+    return failure(ErrorCode::invalid_input,
+                   "--role " + given.role + " is none of observer, trainee, collaborator, instructor, operator");
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  const auto good_for = std::chrono::ceil<std::chrono::seconds>(std::chrono::duration<double, std::ratio<3600>>(given.hours));
+  const auto good_for =
+      std::chrono::ceil<std::chrono::seconds>(std::chrono::duration<double, std::ratio<3600>>(given.hours));
   const Result<Ticket> ticket = make_ticket(given.room, given.user, *role, now + good_for);
   if (!ticket) return tl::unexpected(ticket.error());
   std::printf("%s\n", sign_ticket(*ticket, *key).c_str());
   // Beside what is kept as the file: by this it can be revoked.
-  std::fprintf(stderr, "ticket %s: %s, %s in %s, for %g hours\n", to_hex(ticket->id).c_str(), ticket->user.c_str(), given.role.c_str(),
-               given.room == kAnyRoom ? "every room" : given.room.c_str(), given.hours);
+  std::fprintf(stderr, "ticket %s: %s, %s in %s, for %g hours\n", to_hex(ticket->id).c_str(), ticket->user.c_str(),
+               given.role.c_str(), given.room == kAnyRoom ? "every room" : given.room.c_str(), given.hours);
   if (good_for > kLongTicket)
     std::fprintf(
         stderr,
@@ -50,8 +53,11 @@ Result<void> run(const Arguments& given) {
 
 void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
-  CLI::App* ticket = app.add_subcommand("ticket", "Signs a ticket, with which a person with a certificate may come into a room");
-  ticket->add_option("--key", given->key, "Secret key of the authority: tickets.key, as deploy/certs authority makes it")->required();
+  CLI::App* ticket =
+      app.add_subcommand("ticket", "Signs a ticket, with which a person with a certificate may come into a room");
+  ticket
+      ->add_option("--key", given->key, "Secret key of the authority: tickets.key, as deploy/certs authority makes it")
+      ->required();
   ticket->add_option("--room", given->room, "Name of the room, * for every room")->required();
   ticket->add_option("--user", given->user, "Whose: the name in the person's certificate")->required();
   ticket->add_option("--role", given->role, "observer, trainee, collaborator, instructor or operator")->required();

@@ -73,7 +73,7 @@ class AuditTrail {
   void run();
   void write(std::unique_lock<std::mutex>& lock);            // what waits; lets go of the lock meanwhile
   void tell(const std::vector<AuditLog::Written>& written);  // [writer] the batch is on the disk
-  void maintain();                                            // [writer] retention
+  void maintain();                                           // [writer] retention
 
   const AuditOptions options_;
   AuditLog log_;  // of the writer, as the next three

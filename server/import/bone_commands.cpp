@@ -77,7 +77,8 @@ Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
 
 // One way to ask whether the tool meets bone: its answer, the median of its times, what it keeps.
 template <class Ask>
-std::string contact_line(const char* way, const std::vector<SamplePoint>& points, const Pose& pose, std::size_t memory_bytes, Ask ask) {
+std::string contact_line(const char* way, const std::vector<SamplePoint>& points, const Pose& pose,
+                         std::size_t memory_bytes, Ask ask) {
   using Clock = std::chrono::steady_clock;
   std::array<double, 21> times_us;
   std::optional<std::size_t> found;
@@ -95,7 +96,8 @@ std::string contact_line(const char* way, const std::vector<SamplePoint>& points
     where = text;
   }
   char line[240];
-  std::snprintf(line, sizeof line, "%-18s %-52s %9.1f us %9.3f MB\n", way, where.c_str(), times_us[times_us.size() / 2], static_cast<double>(memory_bytes) * 1e-6);
+  std::snprintf(line, sizeof line, "%-18s %-52s %9.1f us %9.3f MB\n", way, where.c_str(), times_us[times_us.size() / 2],
+                static_cast<double>(memory_bytes) * 1e-6);
   return line;
 }
 
@@ -104,7 +106,8 @@ Result<std::string> run_contact(const Arguments& a) {
   const auto tool = tool_named(a.tool, fs::current_path());
   if (!tool) return tl::unexpected(tool.error());
   const Vec3 axis(a.axis[0], a.axis[1], a.axis[2]);
-  if (!axis.allFinite() || !(axis.stableNorm() > 1e-6)) return failure(ErrorCode::invalid_input, "--axis has no length or no finite one");
+  if (!axis.allFinite() || !(axis.stableNorm() > 1e-6))
+    return failure(ErrorCode::invalid_input, "--axis has no length or no finite one");
   const Vec3 at(a.at[0], a.at[1], a.at[2]);
   if (!at.allFinite()) return failure(ErrorCode::invalid_input, "--at is not finite; give X,Y,Z in mm");
   const Pose pose = pose_along(at, axis.stableNormalized());
@@ -124,14 +127,18 @@ Result<std::string> run_contact(const Arguments& a) {
   box = {box.min_mm.cwiseMax(bone.min_mm), box.max_mm.cwiseMin(bone.max_mm)};
   if (!(box.min_mm.array() < box.max_mm.array()).all()) return tool->name + " is beyond the bone\n";
   if ((box.max_mm - box.min_mm).prod() / (pitch * pitch * pitch) > kMostSamples)
-    return failure(ErrorCode::invalid_input, "the box round " + tool->name + " has more than 100 million samples; choose a lower --level");
+    return failure(ErrorCode::invalid_input,
+                   "the box round " + tool->name + " has more than 100 million samples; choose a lower --level");
   const CoordBox samples = covering_samples(box, pitch);
   const BoneCells cells(*field, a.level, samples);
   const BoneDistance distance(*field, a.level, samples);
-  const auto of_cells = [&](MixedCell rule) { return [&cells, &points, &pose, rule] { return first_contact(cells, rule, points, pose); }; };
+  const auto of_cells = [&](MixedCell rule) {
+    return [&cells, &points, &pose, rule] { return first_contact(cells, rule, points, pose); };
+  };
   return contact_line("cells, nearest", points, pose, cells.memory_bytes(), of_cells(MixedCell::nearest)) +
          contact_line("cells, trilinear", points, pose, cells.memory_bytes(), of_cells(MixedCell::trilinear)) +
-         contact_line("distance", points, pose, distance.memory_bytes(), [&] { return first_contact(distance, points, pose); });
+         contact_line("distance", points, pose, distance.memory_bytes(),
+                      [&] { return first_contact(distance, points, pose); });
 }
 
 // Peak memory of this process, MB; zero where the system does not say.
@@ -158,9 +165,12 @@ std::string nothing_removed(std::size_t number, const CarveStep& step, const Ste
   }
   const Box box = bone.bounds();
   char why[120], text[320];
-  if (report.metal_refused > 0) std::snprintf(why, sizeof why, "it meets metal, which no tool cuts");
-  else if (in_bone) std::snprintf(why, sizeof why, "what its tip meets was removed before");
-  else std::snprintf(why, sizeof why, "its tip stays at least %.1f mm from bone", free_mm);
+  if (report.metal_refused > 0)
+    std::snprintf(why, sizeof why, "it meets metal, which no tool cuts");
+  else if (in_bone)
+    std::snprintf(why, sizeof why, "what its tip meets was removed before");
+  else
+    std::snprintf(why, sizeof why, "its tip stays at least %.1f mm from bone", free_mm);
   std::snprintf(text, sizeof text,
                 "       step %zu removed nothing: %s; bone lies within x %.0f..%.0f, y %.0f..%.0f, z %.0f..%.0f mm\n",
                 number, why, box.min_mm.x(), box.max_mm.x(), box.min_mm.y(), box.max_mm.y(), box.min_mm.z(),
@@ -186,7 +196,8 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
     Bar bar(stop, "carving");
     for (std::size_t i = 0; i < steps->size(); ++i) {
       const double count = static_cast<double>(steps->size());
-      const auto report = carving.run((*steps)[i], bar.stage(static_cast<double>(i) / count, static_cast<double>(i + 1) / count));
+      const auto report =
+          carving.run((*steps)[i], bar.stage(static_cast<double>(i) / count, static_cast<double>(i + 1) / count));
       if (!report) return tl::unexpected(report.error());
       reports.push_back(*report);
       text += line(i + 1, *report);
@@ -201,8 +212,9 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
   double removed = 0;
   for (const StepReport& report : reports) removed += report.removed_mm3;
   char totals[320];
-  std::snprintf(totals, sizeof totals, "removed    %.2f mm3\nbodies     %zu\nmemory     %.0f MB at most\nhash       %s\n", removed, carving.bodies(), peak_memory_mb(),
-                to_hex(field_hash(fields.leaves, fields.pitch_mm)).c_str());
+  std::snprintf(totals, sizeof totals,
+                "removed    %.2f mm3\nbodies     %zu\nmemory     %.0f MB at most\nhash       %s\n", removed,
+                carving.bodies(), peak_memory_mb(), to_hex(field_hash(fields.leaves, fields.pitch_mm)).c_str());
   text += totals;
   if (!a.surface.empty()) {
     Bar bar(stop, "meshing");
@@ -219,19 +231,29 @@ std::string dimensions(const Tool& tool) {
   for (const EditableField& field : editable_fields(tool.kind)) {
     if (!field.name.ends_with("_mm") && !field.name.ends_with("_rpm")) continue;
     double value = 0;
-    if (field.name == "diameter_mm") value = tool.diameter_mm;
-    else if (field.name == "cutting_length_mm") value = tool.cutting_length_mm;
-    else if (field.name == "width_mm") value = tool.width_mm;
-    else if (field.name == "thickness_mm") value = tool.thickness_mm;
-    else if (field.name == "set_mm") value = tool.set_mm;
-    else if (field.name == "bore_mm") value = tool.bore_mm;
-    else if (field.name == "stroke_mm") value = tool.stroke_mm;
-    else if (field.name == "spindle_rpm") value = tool.spindle_rpm;
-    else continue;
+    if (field.name == "diameter_mm")
+      value = tool.diameter_mm;
+    else if (field.name == "cutting_length_mm")
+      value = tool.cutting_length_mm;
+    else if (field.name == "width_mm")
+      value = tool.width_mm;
+    else if (field.name == "thickness_mm")
+      value = tool.thickness_mm;
+    else if (field.name == "set_mm")
+      value = tool.set_mm;
+    else if (field.name == "bore_mm")
+      value = tool.bore_mm;
+    else if (field.name == "stroke_mm")
+      value = tool.stroke_mm;
+    else if (field.name == "spindle_rpm")
+      value = tool.spindle_rpm;
+    else
+      continue;
     if (value == 0) continue;
     char part[64];
     const std::string unit = field.name.substr(field.name.rfind('_') + 1);
-    std::snprintf(part, sizeof part, "%s%s %.6g %s", text.empty() ? "" : ", ", field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
+    std::snprintf(part, sizeof part, "%s%s %.6g %s", text.empty() ? "" : ", ",
+                  field.name.substr(0, field.name.rfind('_')).c_str(), value, unit == "rpm" ? "/min" : "mm");
     text += part;
   }
   std::ranges::replace(text, '_', ' ');
@@ -257,11 +279,12 @@ Result<std::string> change(Tool& tool, const std::vector<std::string>& settings)
   return changes;
 }
 
-// The tool with what --set, --name and --title say, as a tool file. A room tells tools by their names, so that a changed
-// one gets another: that of its file unless --name gives one.
+// The tool with what --set, --name and --title say, as a tool file. A room tells tools by their names, so that a
+// changed one gets another: that of its file unless --name gives one.
 Result<void> write_changed(Tool& tool, const Arguments& a) {
   const fs::path file(a.out);
-  if (file.extension() != ".yaml" && file.extension() != ".yml") return failure(ErrorCode::invalid_input, a.out + " does not end in .yaml");
+  if (file.extension() != ".yaml" && file.extension() != ".yml")
+    return failure(ErrorCode::invalid_input, a.out + " does not end in .yaml");
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   const auto changes = change(tool, a.set);
   if (!changes) return tl::unexpected(changes.error());
@@ -278,7 +301,8 @@ std::string limits(ToolKind kind) {
   std::string text;
   for (const EditableField& field : editable_fields(kind)) {
     char line[120];
-    std::snprintf(line, sizeof line, "  %-20s %g to %g%s\n", field.name.c_str(), field.lowest, field.highest, field.whole ? ", whole" : "");
+    std::snprintf(line, sizeof line, "  %-20s %g to %g%s\n", field.name.c_str(), field.lowest, field.highest,
+                  field.whole ? ", whole" : "");
     text += line;
   }
   return text;
@@ -289,7 +313,8 @@ Result<std::string> run_tools(const Arguments& a) {
   if (!a.file.empty()) {
     auto own = load_tool_file(a.file);  // with the STL that it may name
     if (!own) return tl::unexpected(own.error());
-    if (const auto law = choose_law(*own); !law) return failure(law.error().code, a.file + ": \"law\": " + law.error().message);
+    if (const auto law = choose_law(*own); !law)
+      return failure(law.error().code, a.file + ": \"law\": " + law.error().message);
     tools = {std::move(*own)};
   }
   if (!a.tool.empty()) {
@@ -297,9 +322,11 @@ Result<std::string> run_tools(const Arguments& a) {
     if (!known) return tl::unexpected(known.error());
     tools = {std::move(*known)};
   }
-  if (a.out.empty() != a.set.empty()) return failure(ErrorCode::invalid_input, "a changed tool needs --set FIELD=NUMBER and --out FILE.yaml, both");
+  if (a.out.empty() != a.set.empty())
+    return failure(ErrorCode::invalid_input, "a changed tool needs --set FIELD=NUMBER and --out FILE.yaml, both");
   if (!a.set.empty()) {
-    if (tools.size() != 1) return failure(ErrorCode::invalid_input, "--set changes one tool: name it, or give its --file");
+    if (tools.size() != 1)
+      return failure(ErrorCode::invalid_input, "--set changes one tool: name it, or give its --file");
     if (auto written = write_changed(tools.front(), a); !written) return tl::unexpected(written.error());
   }
   if (!a.stl.empty()) {
@@ -307,18 +334,22 @@ Result<std::string> run_tools(const Arguments& a) {
     fs::create_directories(a.stl, error);
     if (error) return failure(ErrorCode::internal, "cannot make the folder " + a.stl + ": " + error.message());
     for (const Tool& tool : tools)
-      if (auto is_free = check_free((fs::path(a.stl) / (tool.name + ".stl")).string()); !is_free) return tl::unexpected(is_free.error());
+      if (auto is_free = check_free((fs::path(a.stl) / (tool.name + ".stl")).string()); !is_free)
+        return tl::unexpected(is_free.error());
   }
   std::string text;
   for (const Tool& tool : tools) {
     char line[400];
-    std::snprintf(line, sizeof line, "%-20s %-18s %-7s %.16s  %s\n", tool.name.c_str(), std::string(kind_name(tool.kind)).c_str(),
-                  tool.cuts() ? ("level " + std::to_string(tool.cut_level)).c_str() : "-", to_hex(tool.hash()).c_str(), dimensions(tool).c_str());
+    std::snprintf(line, sizeof line, "%-20s %-18s %-7s %.16s  %s\n", tool.name.c_str(),
+                  std::string(kind_name(tool.kind)).c_str(),
+                  tool.cuts() ? ("level " + std::to_string(tool.cut_level)).c_str() : "-", to_hex(tool.hash()).c_str(),
+                  dimensions(tool).c_str());
     text += line;
     if (!a.tool.empty() && a.set.empty()) text += limits(tool.kind);
     if (a.stl.empty()) continue;
     const TriangleMesh mesh = tool_surface(tool, 0.5);
-    if (auto written = write_stl(mesh, fs::path(a.stl) / (tool.name + ".stl")); !written) return tl::unexpected(written.error());
+    if (auto written = write_stl(mesh, fs::path(a.stl) / (tool.name + ".stl")); !written)
+      return tl::unexpected(written.error());
   }
   return text;
 }
@@ -340,33 +371,48 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   surface->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
   surface->add_option("--out", a.out, "File to write: .stl, .ply or .obj")->required();
   surface->add_option("--fields", a.fields, "What was cut from it: a file of carve, or of osteon-server --save");
-  surface->add_option("--body", a.body, "Which body of the fields: 0 is the bone, others are pieces sawn off")->capture_default_str();
+  surface->add_option("--body", a.body, "Which body of the fields: 0 is the bone, others are pieces sawn off")
+      ->capture_default_str();
   commands.push_back({surface, [shared](const StopSignal& stop) { return run_surface(*shared, stop); }});
 
-  CLI::App* contact = app.add_subcommand("contact", "Ask whether a tool meets bone: by the segmentation's cells, two ways, and by the distance field");
+  CLI::App* contact = app.add_subcommand(
+      "contact", "Ask whether a tool meets bone: by the segmentation's cells, two ways, and by the distance field");
   contact->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
   contact->add_option("TOOL", a.tool, "A tool of the box, or a tool file")->required();
   contact->add_option("--at", a.at, "Its tip, X,Y,Z, mm")->delimiter(',')->expected(3)->required();
   contact->add_option("--axis", a.axis, "The way out of its tip, X,Y,Z")->delimiter(',')->expected(3)->required();
   contact->add_option("--fields", a.fields, "What was cut from the bone: a file of carve, or of osteon-server --save");
   contact->add_option("--body", a.body, "Which body of the fields")->capture_default_str();
-  contact->add_option("--level", a.level, "Ask at pitch h / 2^level")->check(CLI::Range(0, kLevels - 1))->capture_default_str();
-  contact->add_option("--points", a.points, "So many points of the tool's surface, about")->check(CLI::Range(100, 100000))->capture_default_str();
+  contact->add_option("--level", a.level, "Ask at pitch h / 2^level")
+      ->check(CLI::Range(0, kLevels - 1))
+      ->capture_default_str();
+  contact->add_option("--points", a.points, "So many points of the tool's surface, about")
+      ->check(CLI::Range(100, 100000))
+      ->capture_default_str();
   commands.push_back({contact, [shared](const StopSignal&) { return run_contact(*shared); }});
 
   CLI::App* carve = app.add_subcommand("carve", "Cut a bone as a script says, and say what every step did and cost");
   carve->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
-  carve->add_option("SCRIPT", a.script, "YAML: steps: [{tool: burr-round-5, from: [x, y, z], to: [x, y, z], axis: [x, y, z]}]")->required();
+  carve
+      ->add_option("SCRIPT", a.script,
+                   "YAML: steps: [{tool: burr-round-5, from: [x, y, z], to: [x, y, z], axis: [x, y, z]}]")
+      ->required();
   carve->add_option("--out", a.out, "File of the cut fields, .vdb")->required();
   carve->add_option("--surface", a.surface, "Also write what is left of the bone: .stl, .ply or .obj");
   carve->add_option("--report", a.report, "Also write the steps' numbers as JSON");
-  carve->add_option("--cut", a.cut_mm, "Longest way of one cut, mm")->check(CLI::Range(0.01, 25.0))->capture_default_str();
+  carve->add_option("--cut", a.cut_mm, "Longest way of one cut, mm")
+      ->check(CLI::Range(0.01, 25.0))
+      ->capture_default_str();
   commands.push_back({carve, [shared](const StopSignal& stop) { return run_carve(*shared, stop); }});
 
-  CLI::App* tools = app.add_subcommand("tools", "List the tool box: name, kind, level of its cuts, hash, dimensions; or change a tool");
-  CLI::Option* named = tools->add_option("NAME", a.tool, "Of this tool alone, with what --set may change of it and the limits");
+  CLI::App* tools = app.add_subcommand(
+      "tools", "List the tool box: name, kind, level of its cuts, hash, dimensions; or change a tool");
+  CLI::Option* named =
+      tools->add_option("NAME", a.tool, "Of this tool alone, with what --set may change of it and the limits");
   tools->add_option("--file", a.file, "Of a tool file instead")->excludes(named);
-  tools->add_option("--set", a.set, "Change a field, such as diameter_mm=3 or teeth=4; may be given again")->expected(1)->take_all();
+  tools->add_option("--set", a.set, "Change a field, such as diameter_mm=3 or teeth=4; may be given again")
+      ->expected(1)
+      ->take_all();
   tools->add_option("--out", a.out, "Write the changed tool to this file, .yaml");
   tools->add_option("--name", a.name, "Its name; default: its file's, without .yaml");
   tools->add_option("--title", a.title, "Its title; default: the old one and what was changed");

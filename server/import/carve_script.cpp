@@ -34,7 +34,8 @@ Vec3 vector_of(const YAML::Node& node, const char* field) {
 
 Vec3 place_of(const YAML::Node& node, const char* field) {
   const Vec3 at = vector_of(node, field);
-  if (at.cwiseAbs().maxCoeff() > kFarthest_mm) throw Wrong{std::string(field) + " is more than a metre from the origin"};
+  if (at.cwiseAbs().maxCoeff() > kFarthest_mm)
+    throw Wrong{std::string(field) + " is more than a metre from the origin"};
   return at;
 }
 
@@ -70,7 +71,8 @@ CarveStep step_of(const YAML::Node& node, const fs::path& folder) {
   if (node["level"]) {
     step.level = node["level"].as<int>();
     if (*step.level < 0 || *step.level >= kLevels) throw Wrong{"level must be 0, 1 or 2"};
-    if (*step.level > step.tool.cut_level) throw Wrong{step.tool.name + " cuts no finer than level " + std::to_string(step.tool.cut_level)};
+    if (*step.level > step.tool.cut_level)
+      throw Wrong{step.tool.name + " cuts no finer than level " + std::to_string(step.tool.cut_level)};
   }
   const int ways = (node["path"] ? 1 : 0) + (node["from"] || node["to"] ? 1 : 0) + (node["at"] ? 1 : 0);
   if (ways != 1) throw Wrong{"it needs from and to, or at, or path"};
@@ -98,7 +100,9 @@ Result<Tool> tool_named(const std::string& name, const fs::path& folder) {
   const fs::path given(name);
   if (given.extension() != ".yaml" && given.extension() != ".yml") {
     Result<Tool> known = find_tool(name);
-    if (!known) return failure(known.error().code, known.error().message + "; or name a tool file of yours, such as my-tool.yaml");
+    if (!known)
+      return failure(known.error().code,
+                     known.error().message + "; or name a tool file of yours, such as my-tool.yaml");
     return known;
   }
   return load_tool_file(given.is_absolute() ? given : folder / given);  // with the STL that it may name
@@ -112,7 +116,9 @@ Result<std::vector<CarveStep>> read_carve_script(const fs::path& file) {
     const YAML::Node root = YAML::LoadFile(file.string());
     if (!root.IsMap() || !root["steps"] || !root["steps"].IsSequence() || root["steps"].size() == 0)
       return failure(ErrorCode::invalid_input, file.string() + " is not a carve script: it needs a list `steps`");
-    if (root["steps"].size() > kMostSteps) return failure(ErrorCode::invalid_input, file.string() + " has more than " + std::to_string(kMostSteps) + " steps");
+    if (root["steps"].size() > kMostSteps)
+      return failure(ErrorCode::invalid_input,
+                     file.string() + " has more than " + std::to_string(kMostSteps) + " steps");
     std::vector<CarveStep> steps;
     for (const YAML::Node& node : root["steps"]) {
       ++number;

@@ -23,8 +23,8 @@ namespace osteon::import {
 
 struct CarveStep {
   Tool tool;
-  std::vector<Pose> path;   // pose_bone_tool, at least one
-  std::optional<int> level; // as wished; a case and a tool bound it
+  std::vector<Pose> path;    // pose_bone_tool, at least one
+  std::optional<int> level;  // as wished; a case and a tool bound it
 };
 
 // Errors: not_found, invalid_input; each names the file and the step.

@@ -21,7 +21,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kTurn_rad = 5.0 * std::numbers::pi / 180.0;  // of one cut
 
-double milliseconds_since(Clock::time_point begin) { return std::chrono::duration<double, std::milli>(Clock::now() - begin).count(); }
+double milliseconds_since(Clock::time_point begin) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+}
 
 double quantile(std::vector<double> values, double part) {
   if (values.empty()) return 0.0;
@@ -49,7 +51,8 @@ std::vector<Cut> cuts_of(const CarveStep& step, const Digest& tool, int level, d
     const int parts = std::max(1, static_cast<int>(std::ceil(std::max(way / cut_mm, turn / kTurn_rad) - 1e-9)));
     for (int part = 1; part <= parts; ++part) {
       const double t = static_cast<double>(part) / parts;
-      const QuantisedPose next = quantise({from.position_mm + t * (to.position_mm - from.position_mm), from.rotation.slerp(t, to.rotation)});
+      const QuantisedPose next =
+          quantise({from.position_mm + t * (to.position_mm - from.position_mm), from.rotation.slerp(t, to.rotation)});
       cut.path = {last, next};
       cuts.push_back(cut);
       last = next;
@@ -88,7 +91,8 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
   std::vector<const CutField*> fields;
   for (const CutField& body : bodies_) fields.push_back(&body);
   for (std::size_t i = 0; i < cuts.size(); ++i) {
-    if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size()))) return failure(ErrorCode::cancelled, "stopped while carving");
+    if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size())))
+      return failure(ErrorCode::cancelled, "stopped while carving");
     const auto begin = Clock::now();
     const bool metal = meets_metal(cuts[i], tool.body, fields);
     report.metal_refused += metal;
@@ -233,14 +237,17 @@ SavedFields Carving::fields() {
 }
 
 std::string heading() {
-  return " step  tool                 level   cuts  removed mm3       visited      computed      modified   cut ms median/p99/max     frame ms  pieces  fields MB\n";
+  return " step  tool                 level   cuts  removed mm3       visited      computed      modified   cut ms "
+         "median/p99/max     frame ms  pieces  fields MB\n";
 }
 
 std::string line(std::size_t number, const StepReport& r) {
   char text[320];
-  std::snprintf(text, sizeof text, "%5zu  %-20s %5d %6d %12.2f %13lld %13lld %13lld %8.3f/%6.3f/%6.3f %6.2f/%6.2f  %3d+%-3d %9.1f\n", number, r.tool.c_str(), r.level, r.cuts,
-                r.removed_mm3, static_cast<long long>(r.visited), static_cast<long long>(r.computed), static_cast<long long>(r.modified), r.cut_ms_median,
-                r.cut_ms_p99, r.cut_ms_most, r.frame_ms_median, r.frame_ms_most, r.pieces, r.debris, r.field_mb);
+  std::snprintf(text, sizeof text,
+                "%5zu  %-20s %5d %6d %12.2f %13lld %13lld %13lld %8.3f/%6.3f/%6.3f %6.2f/%6.2f  %3d+%-3d %9.1f\n",
+                number, r.tool.c_str(), r.level, r.cuts, r.removed_mm3, static_cast<long long>(r.visited),
+                static_cast<long long>(r.computed), static_cast<long long>(r.modified), r.cut_ms_median, r.cut_ms_p99,
+                r.cut_ms_most, r.frame_ms_median, r.frame_ms_most, r.pieces, r.debris, r.field_mb);
   if (r.metal_refused == 0) return text;
   return text + ("       metal refused " + std::to_string(r.metal_refused) + " more cuts\n");
 }
@@ -248,14 +255,25 @@ std::string line(std::size_t number, const StepReport& r) {
 std::string to_json(const std::vector<StepReport>& steps, const SavedFields& fields) {
   nlohmann::json list = nlohmann::json::array();
   for (const StepReport& r : steps)
-    list.push_back({{"tool", r.tool}, {"level", r.level}, {"cuts", r.cuts}, {"removed_mm3", r.removed_mm3},
-                    {"visited", r.visited}, {"computed", r.computed}, {"modified", r.modified},
+    list.push_back({{"tool", r.tool},
+                    {"level", r.level},
+                    {"cuts", r.cuts},
+                    {"removed_mm3", r.removed_mm3},
+                    {"visited", r.visited},
+                    {"computed", r.computed},
+                    {"modified", r.modified},
                     {"cut_ms", {{"median", r.cut_ms_median}, {"p99", r.cut_ms_p99}, {"max", r.cut_ms_most}}},
                     {"frame_ms", {{"median", r.frame_ms_median}, {"max", r.frame_ms_most}}},
-                    {"fragment_ms", r.fragment_ms}, {"pieces", r.pieces}, {"pieces_mm3", r.pieces_mm3}, {"debris", r.debris},
-                    {"field_mb", r.field_mb}, {"metal_refused", r.metal_refused}});
-  const nlohmann::json report{{"case", to_hex(fields.case_hash)}, {"field_hash", to_hex(field_hash(fields.leaves, fields.pitch_mm))},
-                              {"bodies", fields.bodies.size()}, {"steps", list}};
+                    {"fragment_ms", r.fragment_ms},
+                    {"pieces", r.pieces},
+                    {"pieces_mm3", r.pieces_mm3},
+                    {"debris", r.debris},
+                    {"field_mb", r.field_mb},
+                    {"metal_refused", r.metal_refused}});
+  const nlohmann::json report{{"case", to_hex(fields.case_hash)},
+                              {"field_hash", to_hex(field_hash(fields.leaves, fields.pitch_mm))},
+                              {"bodies", fields.bodies.size()},
+                              {"steps", list}};
   return report.dump(2) + "\n";
 }
 

@@ -18,17 +18,17 @@ namespace osteon::import {
 struct StepReport {
   std::string tool;
   int level = 0;
-  int cuts = 0;                           // that were made
-  int metal_refused = 0;                  // others, which would have taken metal away
-  double removed_mm3 = 0;                 // by cutting, from all bodies; pieces that came apart are not counted
+  int cuts = 0;            // that were made
+  int metal_refused = 0;   // others, which would have taken metal away
+  double removed_mm3 = 0;  // by cutting, from all bodies; pieces that came apart are not counted
   std::int64_t visited = 0, computed = 0, modified = 0;  // samples of all bodies together (Niu 2008, §5.4)
   double cut_ms_median = 0, cut_ms_p99 = 0, cut_ms_most = 0;
   double frame_ms_median = 0, frame_ms_most = 0;  // of meshing body 0's blocks that kCutsPerFrame cuts changed
-  double fragment_ms = 0;                 // of keeping the components and looking for pieces
-  int pieces = 0;                         // that came apart in this step, debris not counted
+  double fragment_ms = 0;                         // of keeping the components and looking for pieces
+  int pieces = 0;                                 // that came apart in this step, debris not counted
   double pieces_mm3 = 0;
   int debris = 0;
-  double field_mb = 0;                    // samples of all bodies' cut fields
+  double field_mb = 0;  // samples of all bodies' cut fields
 };
 
 // A frame of 30 Hz takes what a tool cuts at 1 kHz.
@@ -57,12 +57,12 @@ class Carving {
   [[nodiscard]] double field_mb() const;
 
   double cut_mm_;
-  std::shared_ptr<ToolBox> tools_;   // shared with the bodies' fields
-  std::vector<CutField> bodies_;     // 0: the bone; others: pieces that came apart
+  std::shared_ptr<ToolBox> tools_;       // shared with the bodies' fields
+  std::vector<CutField> bodies_;         // 0: the bone; others: pieces that came apart
   std::vector<FragmentFinder> finders_;  // one for each body; none after settle()
-  CutHistory history_;               // of body 0
-  std::uint64_t events_ = 0;         // in it
-  std::vector<RoomSeq> taken_;       // of these: what pieces and debris took along
+  CutHistory history_;                   // of body 0
+  std::uint64_t events_ = 0;             // in it
+  std::vector<RoomSeq> taken_;           // of these: what pieces and debris took along
   bool settled_ = true;
   SurfaceBlocks surface_;
   std::vector<BlockKey> stale_;

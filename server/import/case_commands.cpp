@@ -145,7 +145,8 @@ Result<std::string> run_phantom(const Arguments& a, const StopSignal& stop) {
   if (!a.dicom.empty()) {
     const auto scan = scan_phantom(phantom, pitch_mm, bar.stage(0.4, 0.6));
     if (!scan) return tl::unexpected(scan.error());
-    if (auto written = write_dicom_series(*scan, a.dicom, bar.stage(0.6, 0.95)); !written) return tl::unexpected(written.error());
+    if (auto written = write_dicom_series(*scan, a.dicom, bar.stage(0.6, 0.95)); !written)
+      return tl::unexpected(written.error());
   }
   if (auto saved = save(*bone, a.out, stop); !saved) {
     std::error_code error;
@@ -162,7 +163,9 @@ Result<Vec3> parse_spacing(const std::string& text) {
   const int parts = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &z, &rest);
   const Vec3 spacing = parts == 1 && text.find(',') == std::string::npos ? Vec3::Constant(x) : Vec3(x, y, z);
   if ((parts != 3 && parts != 1) || !(spacing.minCoeff() >= 0.01) || !(spacing.maxCoeff() <= 10.0))
-    return failure(ErrorCode::invalid_input, "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
+    return failure(
+        ErrorCode::invalid_input,
+        "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
   return spacing;
 }
 
@@ -198,13 +201,15 @@ Result<std::string> run_labels(const Arguments& a, const StopSignal& stop) {
   std::string text = report_text(made->bone);
   char line[200];
   const double labelled = made->labelled_mm3, kept = made->bone.volume_mm3();
-  std::snprintf(line, sizeof line, "labelled   %.2f cm3; the smoothed bone has %+.2f %% of that more\n", labelled * 1e-3, 100.0 * (kept - labelled) / labelled);
+  std::snprintf(line, sizeof line, "labelled   %.2f cm3; the smoothed bone has %+.2f %% of that more\n",
+                labelled * 1e-3, 100.0 * (kept - labelled) / labelled);
   text += line;
   for (std::size_t i = 0; i < colours.size(); ++i) {
     const ColourCount& c = colours[i];
     if (c.label == 0 && i >= 12) continue;  // noise
     const std::string name = c.label == 0 ? "other" : legend.bones[static_cast<std::size_t>(c.label) - 1].name;
-    std::snprintf(line, sizeof line, "colour     %3d,%3d,%3d  %12lld voxels  %s\n", c.rgba[0], c.rgba[1], c.rgba[2], static_cast<long long>(c.voxels), name.c_str());
+    std::snprintf(line, sizeof line, "colour     %3d,%3d,%3d  %12lld voxels  %s\n", c.rgba[0], c.rgba[1], c.rgba[2],
+                  static_cast<long long>(c.voxels), name.c_str());
     text += line;
   }
   return text;
@@ -224,7 +229,9 @@ CLI::Validator within(double low, double high) {
   return {check, text, "within"};
 }
 
-double millimetres_of(const std::string& unit) { return unit == "m" ? 1000.0 : unit == "inch" ? 25.4 : unit == "cm" ? 10.0 : 1.0; }
+double millimetres_of(const std::string& unit) {
+  return unit == "m" ? 1000.0 : unit == "inch" ? 25.4 : unit == "cm" ? 10.0 : 1.0;
+}
 
 Result<std::string> run_stl(const Arguments& a, const StopSignal& stop) {
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
@@ -245,8 +252,9 @@ Result<std::string> run_stl(const Arguments& a, const StopSignal& stop) {
   if (auto saved = save(*bone, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
   char line[160];
-  std::snprintf(line, sizeof line, "mesh       %.2f cm3 within its triangles; the sampled bone has %+.2f %% of that more\n", enclosed * 1e-3,
-                100.0 * (bone->volume_mm3() - enclosed) / enclosed);
+  std::snprintf(line, sizeof line,
+                "mesh       %.2f cm3 within its triangles; the sampled bone has %+.2f %% of that more\n",
+                enclosed * 1e-3, 100.0 * (bone->volume_mm3() - enclosed) / enclosed);
   return report_text(*bone) + line;
 }
 
@@ -260,7 +268,8 @@ Result<std::string> run_info(const Arguments& a) {
 
 Result<void> check_free(const std::string& path) {
   std::error_code error;
-  if (fs::exists(path, error)) return failure(ErrorCode::exists, path + " is already there; choose another name or remove it first");
+  if (fs::exists(path, error))
+    return failure(ErrorCode::exists, path + " is already there; choose another name or remove it first");
   return {};
 }
 
@@ -295,24 +304,30 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   commands.push_back({series, [shared](const StopSignal& stop) { return run_series(*shared, stop); }});
 
   CLI::App* phantom = app.add_subcommand("phantom", "Make a case whose true shape and density are known");
-  phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")->required()->check(CLI::IsMember({"block", "tube"}));
+  phantom->add_option("KIND", a.kind, "block (layers from the top down) or tube (layers from the outside in)")
+      ->required()
+      ->check(CLI::IsMember({"block", "tube"}));
   phantom->add_option("--layers", a.layers, "THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9")->required();
   phantom->add_option("--width", a.width_mm, "Edge of the block, or length of the tube, mm")
       ->check(within(1.0, 1000.0))
       ->capture_default_str();
   phantom->add_option("--pitch", a.pitch_mm, "Voxel edge, mm (default: 0.4)")->check(within(0.02, 10.0));
   phantom->add_option("--out", a.out, "Folder of the case, made by this command")->required();
-  phantom->add_option("--dicom", a.dicom, "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
+  phantom->add_option("--dicom", a.dicom,
+                      "Also write what a CT scanner would see of it, as a DICOM series, to this folder");
   phantom->add_option("--title", a.title, "Name shown to people");
   commands.push_back({phantom, [shared](const StopSignal& stop) { return run_phantom(*shared, stop); }});
 
-  CLI::App* labels = app.add_subcommand("labels", "Make a case from a segmented volume: PNG slices whose colours name structures");
+  CLI::App* labels =
+      app.add_subcommand("labels", "Make a case from a segmented volume: PNG slices whose colours name structures");
   labels->add_option("DIR", a.input, "Folder with the slices, numbered at the end of their names")->required();
   labels->add_option("--out", a.out, "Folder of the case, made by this command")->required();
   labels->add_option("--spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->required();
   labels->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the smallest spacing)")
       ->check(within(0.02, 10.0));
-  labels->add_option("--bone", a.bone_colours, "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
+  labels->add_option(
+      "--bone", a.bone_colours,
+      "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
   labels->add_option("--legend", a.legend, "The same from a YAML file");
   labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({labels, [shared](const StopSignal& stop) { return run_labels(*shared, stop); }});
@@ -324,7 +339,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   stl->add_option("--density", a.density_g_cm3, "Of all its bone, g/cm3")
       ->check(within(0.05, 3.0))
       ->capture_default_str();
-  stl->add_option("--unit", a.unit, "Of the file's numbers: mm, cm, m or inch")->check(CLI::IsMember({"mm", "cm", "m", "inch"}))->capture_default_str();
+  stl->add_option("--unit", a.unit, "Of the file's numbers: mm, cm, m or inch")
+      ->check(CLI::IsMember({"mm", "cm", "m", "inch"}))
+      ->capture_default_str();
   stl->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({stl, [shared](const StopSignal& stop) { return run_stl(*shared, stop); }});
 

@@ -21,8 +21,8 @@ struct Command {
   std::function<Result<std::string>(const StopSignal& stop)> run;
 };
 
-void add_case_commands(CLI::App& app, std::vector<Command>& commands);   // make cases, and say what one is
-void add_bone_commands(CLI::App& app, std::vector<Command>& commands);   // work on a case's bone, and list the tools
+void add_case_commands(CLI::App& app, std::vector<Command>& commands);  // make cases, and say what one is
+void add_bone_commands(CLI::App& app, std::vector<Command>& commands);  // work on a case's bone, and list the tools
 
 // One bar over all stages, shown when the first work is done: a refused input leaves only its sentence.
 class Bar {

@@ -26,11 +26,11 @@ struct CtOptions {
 
 // What the segmentation found.
 struct CtSegmentation {
-  std::vector<imaging::Island> islands;      // largest first; number N is islands[N - 1]
-  std::vector<int> kept;                     // numbers; empty where the islands were only listed
-  bool merged = false;                       // the kept ones are one bone
-  double left_out_cm3 = 0.0;                 // of the islands that were not kept
-  double marrow_cm3 = 0.0;                   // below the threshold, within what was kept
+  std::vector<imaging::Island> islands;  // largest first; number N is islands[N - 1]
+  std::vector<int> kept;                 // numbers; empty where the islands were only listed
+  bool merged = false;                   // the kept ones are one bone
+  double left_out_cm3 = 0.0;             // of the islands that were not kept
+  double marrow_cm3 = 0.0;               // below the threshold, within what was kept
   std::vector<double> joined_cm3;        // large pieces of dense and cancellous bone that only marrow joins, if several
   double case_cm3 = 0.0;                 // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within what was kept

@@ -26,7 +26,8 @@ struct Uids {
 bool write_slice(const imaging::HuVolume& volume, int slice, const Uids& uids, const fs::path& file) {
   const std::size_t pixels = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   std::vector<std::int16_t> stored(pixels);
-  for (std::size_t i = 0; i < pixels; ++i) stored[i] = static_cast<std::int16_t>(volume.values[static_cast<std::size_t>(slice) * pixels + i] - kIntercept_hu);
+  for (std::size_t i = 0; i < pixels; ++i)
+    stored[i] = static_cast<std::int16_t>(volume.values[static_cast<std::size_t>(slice) * pixels + i] - kIntercept_hu);
 
   gdcm::ImageWriter writer;
   gdcm::Image& image = writer.GetImage();
@@ -44,12 +45,15 @@ bool write_slice(const imaging::HuVolume& volume, int slice, const Uids& uids, c
   image.SetIntercept(kIntercept_hu);
   image.SetSlope(1.0);
   gdcm::DataElement data(gdcm::Tag(0x7fe0, 0x0010));
-  data.SetByteValue(reinterpret_cast<const char*>(stored.data()), static_cast<std::uint32_t>(stored.size() * sizeof stored[0]));
+  data.SetByteValue(reinterpret_cast<const char*>(stored.data()),
+                    static_cast<std::uint32_t>(stored.size() * sizeof stored[0]));
   image.SetDataElement(data);
 
   gdcm::Anonymizer tags;  // sets attributes by tag; there is nobody to anonymise
   tags.SetFile(writer.GetFile());
-  const auto set = [&](std::uint16_t group, std::uint16_t element, const std::string& value) { tags.Replace(gdcm::Tag(group, element), value.c_str()); };
+  const auto set = [&](std::uint16_t group, std::uint16_t element, const std::string& value) {
+    tags.Replace(gdcm::Tag(group, element), value.c_str());
+  };
   set(0x0008, 0x0008, "DERIVED\\SECONDARY\\AXIAL");
   set(0x0008, 0x0016, "1.2.840.10008.5.1.4.1.1.2");
   set(0x0008, 0x0060, "CT");
@@ -73,7 +77,8 @@ Result<void> write_slices(const imaging::HuVolume& volume, const fs::path& folde
   uids.series = generator.Generate();
   uids.frame = generator.Generate();
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return failure(ErrorCode::cancelled, "stopped while writing " + folder.string());
+    if (!keep_going(static_cast<double>(slice) / volume.dims[2]))
+      return failure(ErrorCode::cancelled, "stopped while writing " + folder.string());
     char name[32];
     std::snprintf(name, sizeof name, "slice-%04d.dcm", slice + 1);
     if (!write_slice(volume, slice, uids, folder / name))
@@ -92,7 +97,8 @@ Result<void> write_dicom_series(const imaging::HuVolume& volume, const fs::path&
   gdcm::Trace::ErrorOff();
   std::error_code error;
   fs::path target = folder.has_filename() ? folder : folder.parent_path();
-  if (fs::exists(target, error)) return failure(ErrorCode::exists, target.string() + " is already there; choose another name or remove it first");
+  if (fs::exists(target, error))
+    return failure(ErrorCode::exists, target.string() + " is already there; choose another name or remove it first");
   fs::path partial = target;
   partial += ".partial-" + std::to_string(::getpid());
   fs::create_directories(partial, error);
@@ -101,7 +107,9 @@ Result<void> write_dicom_series(const imaging::HuVolume& volume, const fs::path&
   Result<void> written = write_slices(volume, partial, keep_going);
   if (written) {
     fs::rename(partial, target, error);
-    if (error) written = failure(ErrorCode::internal, "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
+    if (error)
+      written = failure(ErrorCode::internal,
+                        "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
   }
   if (!written) fs::remove_all(partial, error);
   return written;

@@ -35,8 +35,8 @@ Error no_project(const fs::path& file) {
 
 Error damaged(const fs::path& file, archive* a) {
   const char* reason = archive_error_string(a);
-  return {ErrorCode::invalid_input, file.string() + " is truncated or damaged (" + (reason != nullptr ? reason : "unknown reason") +
-                                        "); copy or export it again"};
+  return {ErrorCode::invalid_input, file.string() + " is truncated or damaged (" +
+                                        (reason != nullptr ? reason : "unknown reason") + "); copy or export it again"};
 }
 
 // Walks to the entry whose name without folders is `name`. Null when the archive has no such entry.
@@ -80,17 +80,21 @@ pugi::xml_node value_of(const pugi::xml_node& dict, const char* key) {
 Result<Project> parse_project(const std::string& text, const std::string& where) {
   pugi::xml_document document;
   const auto parsed = document.load_buffer(text.data(), text.size());
-  if (!parsed) return failure(ErrorCode::invalid_input, where + " is not a property list (" + parsed.description() + ")");
+  if (!parsed)
+    return failure(ErrorCode::invalid_input, where + " is not a property list (" + parsed.description() + ")");
   const pugi::xml_node top = document.child("plist").child("dict");
-  const auto wrong = [&](const std::string& what) { return failure(ErrorCode::invalid_input, where + ": " + what + "; export the scan as DICOM instead"); };
+  const auto wrong = [&](const std::string& what) {
+    return failure(ErrorCode::invalid_input, where + ": " + what + "; export the scan as DICOM instead");
+  };
 
   const std::string modality = value_of(top, "modality").text().as_string("CT");
   if (modality != "CT")
     return failure(ErrorCode::unsupported, where + ": modality is " + modality + ", but only CT can be imported");
   const int orientation = value_of(top, "orientation").text().as_int(1);
   if (orientation != 1)
-    return failure(ErrorCode::unsupported, where + ": orientation is " + std::to_string(orientation) +
-                                               ", but only axial slices (1) can be imported; export the scan as DICOM instead");
+    return failure(ErrorCode::unsupported,
+                   where + ": orientation is " + std::to_string(orientation) +
+                       ", but only axial slices (1) can be imported; export the scan as DICOM instead");
 
   const pugi::xml_node matrix = value_of(top, "matrix");
   if (!matrix) return wrong("it has no matrix");
@@ -103,7 +107,8 @@ Result<Project> parse_project(const std::string& text, const std::string& where)
   int axis = 2;  // the shape counts slices, rows, columns
   for (const pugi::xml_node n : value_of(matrix, "shape").children()) {
     const int count = n.text().as_int();
-    if (axis < 0 || count < 2 || count > kLargestAxis) return wrong("matrix shape must be three numbers from 2 to " + std::to_string(kLargestAxis));
+    if (axis < 0 || count < 2 || count > kLargestAxis)
+      return wrong("matrix shape must be three numbers from 2 to " + std::to_string(kLargestAxis));
     project.dims[static_cast<std::size_t>(axis--)] = count;
   }
   if (axis != -1) return wrong("matrix shape must be three numbers from 2 to " + std::to_string(kLargestAxis));
@@ -136,7 +141,8 @@ Result<Project> read_project(const fs::path& file) {
     if (n == 0) break;
     text.append(chunk, 0, static_cast<std::size_t>(n));
     if (text.size() > kLargestPlist)
-      return failure(ErrorCode::invalid_input, file.string() + ": main.plist is far larger than a project's; export the scan as DICOM instead");
+      return failure(ErrorCode::invalid_input,
+                     file.string() + ": main.plist is far larger than a project's; export the scan as DICOM instead");
   }
   return parse_project(text, file.string() + ": main.plist");
 }
@@ -145,7 +151,9 @@ Result<Project> read_project(const fs::path& file) {
 
 Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try {
   std::error_code error;
-  if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string() + "; give an InVesalius project or a DICOM folder");
+  if (!fs::exists(file, error))
+    return failure(ErrorCode::not_found,
+                   "there is no file " + file.string() + "; give an InVesalius project or a DICOM folder");
   // Two passes, since the matrix may come before the list that says its shape.
   const auto project = read_project(file);
   if (!project) return tl::unexpected(project.error());
@@ -155,7 +163,8 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
   const auto entry = find_entry(a->get(), file, project->matrix_name);
   if (!entry) return tl::unexpected(entry.error());
   if (*entry == nullptr)
-    return failure(ErrorCode::invalid_input, file.string() + " has no " + project->matrix_name + ", which its main.plist names; export it again");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " has no " + project->matrix_name + ", which its main.plist names; export it again");
 
   CtScan scan;
   imaging::HuVolume& volume = scan.volume;
@@ -166,8 +175,9 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
 
   const std::size_t expected = volume.count() * sizeof(std::int16_t);
   if (archive_entry_size(*entry) != static_cast<std::int64_t>(expected))
-    return failure(ErrorCode::invalid_input, file.string() + ": " + project->matrix_name + " has " + std::to_string(archive_entry_size(*entry)) +
-                                                 " bytes where the shape in main.plist needs " + std::to_string(expected) + "; export it again");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + ": " + project->matrix_name + " has " + std::to_string(archive_entry_size(*entry)) +
+                       " bytes where the shape in main.plist needs " + std::to_string(expected) + "; export it again");
   // Memory grows with the bytes that come, not with what the file claims.
   std::size_t got = 0;
   while (got < expected) {

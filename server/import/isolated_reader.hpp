@@ -25,9 +25,9 @@ class ChildChannel {
 };
 
 struct IsolatedWork {
-  std::function<Result<void>(ChildChannel&)> run;           // in the child
+  std::function<Result<void>(ChildChannel&)> run;            // in the child
   std::function<bool(std::string_view message)> on_message;  // in the parent; false: the message makes no sense
-  std::size_t memory_bytes = std::size_t{1} << 30;     // that the child may take beside what it begins with
+  std::size_t memory_bytes = std::size_t{1} << 30;           // that the child may take beside what it begins with
 };
 
 struct IsolatedEnd {

@@ -18,7 +18,8 @@ constexpr double kSurfaceEnd = 0.85;
 DenseVolume<std::uint8_t> cropped(const DenseVolume<std::uint8_t>& from, const CoordBox& box) {
   DenseVolume<std::uint8_t> out;
   out.box = box;
-  out.values.reserve(static_cast<std::size_t>(box.dims().x) * static_cast<std::size_t>(box.dims().y) * static_cast<std::size_t>(box.dims().z));
+  out.values.reserve(static_cast<std::size_t>(box.dims().x) * static_cast<std::size_t>(box.dims().y) *
+                     static_cast<std::size_t>(box.dims().z));
   for (int x = box.min.x; x <= box.max.x; ++x)
     for (int y = box.min.y; y <= box.max.y; ++y) {
       const auto line = from.values.begin() + static_cast<std::ptrdiff_t>(from.index({x, y, box.min.z}));
@@ -34,10 +35,12 @@ void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVol
   const auto beyond = [&](int first, int last, int axis) {
     std::vector<float> out;
     const double spacing = volume.spacing_mm[axis], half = 0.5 * volume.dims[static_cast<std::size_t>(axis)] * spacing;
-    for (int i = first; i <= last; ++i) out.push_back(static_cast<float>(std::abs(i * pitch_mm + 0.5 * spacing - half) - half));
+    for (int i = first; i <= last; ++i)
+      out.push_back(static_cast<float>(std::abs(i * pitch_mm + 0.5 * spacing - half) - half));
     return out;
   };
-  const auto xs = beyond(box.min.x, box.max.x, 0), ys = beyond(box.min.y, box.max.y, 1), zs = beyond(box.min.z, box.max.z, 2);
+  const auto xs = beyond(box.min.x, box.max.x, 0), ys = beyond(box.min.y, box.max.y, 1),
+             zs = beyond(box.min.z, box.max.z, 2);
   const auto band = static_cast<float>(4.0 * pitch_mm);
   float* value = surface_mm.values.data();
   for (const float x : xs)
@@ -48,8 +51,8 @@ void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVol
       }
 }
 
-// Smoothing draws convex bone in by some hundredths of a voxel. Moves the whole surface back by one distance, so that the
-// volume is that of the labels again: dV = A δ, with A from the samples within half a pitch of the surface.
+// Smoothing draws convex bone in by some hundredths of a voxel. Moves the whole surface back by one distance, so that
+// the volume is that of the labels again: dV = A δ, with A from the samples within half a pitch of the surface.
 void restore_volume(double labelled_mm3, double pitch_mm, DenseVolume<float>& surface_mm) {
   constexpr double kMost = 0.15;  // voxels: more would be another bone
   double inside = 0, near = 0;
@@ -68,7 +71,8 @@ void restore_volume(double labelled_mm3, double pitch_mm, DenseVolume<float>& su
 
 }  // namespace
 
-Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, const LabelOptions& options, const KeepGoing& keep_going) {
+Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, const LabelOptions& options,
+                                  const KeepGoing& keep_going) {
   imaging::LabelVolume& volume = stack.volume;
   const Vec3 spacing = volume.spacing_mm;
   const double pitch_mm = options.pitch_mm.value_or(spacing.minCoeff());
@@ -79,10 +83,13 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   // Only the bone's box, and what the filter and the band reach beyond it.
   const CoordBox all = volume.labels.box;
   CoordBox voxels = imaging::bone_voxels(volume).grown(kMargin);
-  voxels.min = {std::max(voxels.min.x, all.min.x), std::max(voxels.min.y, all.min.y), std::max(voxels.min.z, all.min.z)};
-  voxels.max = {std::min(voxels.max.x, all.max.x), std::min(voxels.max.y, all.max.y), std::min(voxels.max.z, all.max.z)};
+  voxels.min = {std::max(voxels.min.x, all.min.x), std::max(voxels.min.y, all.min.y),
+                std::max(voxels.min.z, all.min.z)};
+  voxels.max = {std::min(voxels.max.x, all.max.x), std::min(voxels.max.y, all.max.y),
+                std::min(voxels.max.z, all.max.z)};
   if (voxels != all) volume.labels = cropped(volume.labels, voxels);
-  const Box bone{position_mm(voxels.min, 1.0).cwiseProduct(spacing), position_mm(voxels.max, 1.0).cwiseProduct(spacing)};
+  const Box bone{position_mm(voxels.min, 1.0).cwiseProduct(spacing),
+                 position_mm(voxels.max, 1.0).cwiseProduct(spacing)};
   const CoordBox box = covering_samples(bone.grown(kMargin * pitch_mm), pitch_mm);
   if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
 
@@ -106,8 +113,8 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   if (!keep_going(0.9)) return failure(ErrorCode::cancelled, "stopped before building the case");
 
   char source[160];
-  std::snprintf(source, sizeof source, "label volume, %dx%dx%d, %.4gx%.4gx%.4g mm", volume.dims[0], volume.dims[1], volume.dims[2], spacing.x(),
-                spacing.y(), spacing.z());
+  std::snprintf(source, sizeof source, "label volume, %dx%dx%d, %.4gx%.4gx%.4g mm", volume.dims[0], volume.dims[1],
+                volume.dims[2], spacing.x(), spacing.y(), spacing.z());
   CaseInfo info;
   info.title = options.title;
   info.source = source;

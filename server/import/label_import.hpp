@@ -9,18 +9,18 @@
 namespace osteon::import {
 
 struct LabelOptions {
-  std::optional<double> pitch_mm;   // default: the smallest spacing
+  std::optional<double> pitch_mm;  // default: the smallest spacing
   std::string title = "Label volume";
   imaging::SmoothingParams smoothing;
 };
 
 struct LabelImport {
   Case bone;
-  double labelled_mm3 = 0;          // volume of the bone's voxels; that of `bone` is what smoothing made of it
+  double labelled_mm3 = 0;  // volume of the bone's voxels; that of `bone` is what smoothing made of it
 };
 
 // Errors: invalid_input (a lattice too large), cancelled.
-[[nodiscard]] Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, const LabelOptions& options,
-                                                const KeepGoing& keep_going);
+[[nodiscard]] Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend,
+                                                const LabelOptions& options, const KeepGoing& keep_going);
 
 }  // namespace osteon::import

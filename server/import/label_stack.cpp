@@ -22,7 +22,7 @@ constexpr int kBatch = 32;
 constexpr std::size_t kMostKinds = 250;
 constexpr double kLargestVolume = 1.0e9;  // voxels
 constexpr double kLargestSlice = 6.4e7;  // pixels: a small file can claim far more, and all of them are decoded at once
-constexpr double kDensest_g_cm3 = 3.0;    // enamel
+constexpr double kDensest_g_cm3 = 3.0;   // enamel
 
 struct Slice {
   std::int64_t number = 0;
@@ -40,12 +40,14 @@ std::string text_of(const Rgba& c) {
 Result<std::vector<Slice>> find_slices(const fs::path& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
-    return failure(ErrorCode::not_found, "there is no folder " + folder.string() + "; give one with a label volume as PNG slices");
+    return failure(ErrorCode::not_found,
+                   "there is no folder " + folder.string() + "; give one with a label volume as PNG slices");
   std::vector<Slice> slices;
   std::string stem;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     std::string extension = entry.path().extension().string();
-    std::ranges::transform(extension, extension.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+    std::ranges::transform(extension, extension.begin(),
+                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
     if (extension != ".png") continue;
     const std::string name = entry.path().stem().string();
     std::size_t digits = name.size();
@@ -53,21 +55,28 @@ Result<std::vector<Slice>> find_slices(const fs::path& folder) {
     Slice slice{0, entry.path()};
     const auto parsed = std::from_chars(name.data() + digits, name.data() + name.size(), slice.number);
     if (digits == name.size() || parsed.ec != std::errc{})
-      return failure(ErrorCode::invalid_input, entry.path().string() + " has no slice number at the end of its name; number the slices or move it away");
+      return failure(
+          ErrorCode::invalid_input,
+          entry.path().string() + " has no slice number at the end of its name; number the slices or move it away");
     if (!slices.empty() && name.substr(0, digits) != stem)
-      return failure(ErrorCode::invalid_input, folder.string() + " holds more than one stack (" + stem + "... and " + name.substr(0, digits) + "...); give a folder with one");
+      return failure(ErrorCode::invalid_input, folder.string() + " holds more than one stack (" + stem + "... and " +
+                                                   name.substr(0, digits) + "...); give a folder with one");
     stem = name.substr(0, digits);
     slices.push_back(std::move(slice));
   }
   if (error) return failure(ErrorCode::not_found, "cannot read the folder " + folder.string() + ": " + error.message());
-  if (slices.empty()) return failure(ErrorCode::invalid_input, folder.string() + " has no PNG files; give a folder with a label volume as PNG slices");
+  if (slices.empty())
+    return failure(ErrorCode::invalid_input,
+                   folder.string() + " has no PNG files; give a folder with a label volume as PNG slices");
   std::ranges::sort(slices, {}, &Slice::number);
   for (std::size_t i = 1; i < slices.size(); ++i) {
     if (slices[i].number == slices[i - 1].number)
-      return failure(ErrorCode::invalid_input, slices[i].file.string() + " has the same slice number as " + slices[i - 1].file.filename().string() + "; keep one of them");
+      return failure(ErrorCode::invalid_input, slices[i].file.string() + " has the same slice number as " +
+                                                   slices[i - 1].file.filename().string() + "; keep one of them");
     if (slices[i].number != slices[i - 1].number + 1)
-      return failure(ErrorCode::invalid_input, folder.string() + ": slice " + std::to_string(slices[i - 1].number + 1) + " is missing, after " +
-                                                   slices[i - 1].file.filename().string() + "; copy the whole stack");
+      return failure(ErrorCode::invalid_input, folder.string() + ": slice " + std::to_string(slices[i - 1].number + 1) +
+                                                   " is missing, after " + slices[i - 1].file.filename().string() +
+                                                   "; copy the whole stack");
   }
   return slices;
 }
@@ -77,7 +86,8 @@ Result<std::vector<Rgba>> read_png(const fs::path& file, int& width, int& height
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_file(&image, file.c_str()) == 0)
-    return failure(ErrorCode::invalid_input, file.string() + " cannot be read as a PNG picture (" + image.message + "); export it again");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " cannot be read as a PNG picture (" + image.message + "); export it again");
   image.format = PNG_FORMAT_RGBA;
   std::vector<Rgba> pixels;
   const double count = static_cast<double>(image.width) * image.height;
@@ -91,7 +101,8 @@ Result<std::vector<Rgba>> read_png(const fs::path& file, int& width, int& height
   width = static_cast<int>(image.width);
   height = static_cast<int>(image.height);
   if (png_image_finish_read(&image, nullptr, pixels.data(), 0, nullptr) == 0)
-    return failure(ErrorCode::invalid_input, file.string() + " is damaged (" + image.message + "); copy or export it again");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is damaged (" + image.message + "); copy or export it again");
   return pixels;
 }
 
@@ -99,7 +110,8 @@ int label_of(const Rgba& c, const LabelLegend& legend) {
   if (c[3] == 0) return 0;
   for (std::size_t i = 0; i < legend.bones.size(); ++i) {
     const auto& rgb = legend.bones[i].rgb;
-    if (std::abs(c[0] - rgb[0]) <= legend.tolerance && std::abs(c[1] - rgb[1]) <= legend.tolerance && std::abs(c[2] - rgb[2]) <= legend.tolerance)
+    if (std::abs(c[0] - rgb[0]) <= legend.tolerance && std::abs(c[1] - rgb[1]) <= legend.tolerance &&
+        std::abs(c[2] - rgb[2]) <= legend.tolerance)
       return static_cast<int>(i) + 1;
   }
   return 0;
@@ -111,7 +123,8 @@ class Palette {
   explicit Palette(const LabelLegend& legend) : legend_(legend) {}
   std::uint8_t count(const Rgba& colour) {
     if (!last_ || last_->rgba != colour) {
-      const std::uint32_t key = static_cast<std::uint32_t>(colour[0]) << 24 | static_cast<std::uint32_t>(colour[1]) << 16 |
+      const std::uint32_t key = static_cast<std::uint32_t>(colour[0]) << 24 |
+                                static_cast<std::uint32_t>(colour[1]) << 16 |
                                 static_cast<std::uint32_t>(colour[2]) << 8 | colour[3];
       const auto [at, fresh] = colours_.try_emplace(key);
       if (fresh) at->second = {colour, 0, label_of(colour, legend_)};
@@ -143,7 +156,9 @@ Result<void> check_bone(const BoneColour& bone, const std::string& where) {
 
 Result<BoneColour> parse_bone_colour(std::string_view text) {
   const auto wrong = [&] {
-    return failure(ErrorCode::invalid_input, "--bone " + std::string(text) + " is not a colour; write R,G,B or R,G,B:DENSITY_G_CM3 such as 255,249,219:1.9");
+    return failure(
+        ErrorCode::invalid_input,
+        "--bone " + std::string(text) + " is not a colour; write R,G,B or R,G,B:DENSITY_G_CM3 such as 255,249,219:1.9");
   };
   BoneColour bone;
   bone.name = text.substr(0, text.find(':'));
@@ -168,7 +183,9 @@ Result<BoneColour> parse_bone_colour(std::string_view text) {
 
 Result<LabelLegend> read_legend(const fs::path& file) {
   const auto wrong = [&](const std::string& why) {
-    return failure(ErrorCode::invalid_input, file.string() + " is not a legend: " + why + "; write bones: [{name: cortical, colour: [255, 249, 219], density_g_cm3: 1.9}]");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " is not a legend: " + why +
+                       "; write bones: [{name: cortical, colour: [255, 249, 219], density_g_cm3: 1.9}]");
   };
   std::error_code error;
   if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no legend " + file.string());
@@ -176,7 +193,8 @@ Result<LabelLegend> read_legend(const fs::path& file) {
     const YAML::Node root = YAML::LoadFile(file.string());
     if (!root.IsMap()) return wrong("it is no map");
     for (const auto& entry : root)
-      if (const auto key = entry.first.as<std::string>(); key != "bones" && key != "tolerance") return wrong("unknown key " + key);
+      if (const auto key = entry.first.as<std::string>(); key != "bones" && key != "tolerance")
+        return wrong("unknown key " + key);
     LabelLegend legend;
     legend.bones.clear();
     if (const YAML::Node tolerance = root["tolerance"]) legend.tolerance = tolerance.as<int>();
@@ -185,7 +203,8 @@ Result<LabelLegend> read_legend(const fs::path& file) {
     for (const YAML::Node& node : root["bones"]) {
       BoneColour bone;
       const auto rgb = node["colour"].as<std::vector<int>>();
-      if (rgb.size() != 3 || !std::ranges::all_of(rgb, [](int v) { return v >= 0 && v <= 255; })) return wrong("a colour is three numbers from 0 to 255");
+      if (rgb.size() != 3 || !std::ranges::all_of(rgb, [](int v) { return v >= 0 && v <= 255; }))
+        return wrong("a colour is three numbers from 0 to 255");
       for (std::size_t i = 0; i < 3; ++i) bone.rgb[i] = static_cast<std::uint8_t>(rgb[i]);
       bone.name = node["name"].as<std::string>("bone");
       bone.density_g_cm3 = node["density_g_cm3"].as<double>(bone.density_g_cm3);
@@ -199,7 +218,8 @@ Result<LabelLegend> read_legend(const fs::path& file) {
   }
 }
 
-Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& legend, const Vec3& spacing_mm, const KeepGoing& keep_going) {
+Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& legend, const Vec3& spacing_mm,
+                                    const KeepGoing& keep_going) {
   OSTEON_CHECK(!legend.bones.empty() && legend.bones.size() <= kMostKinds && spacing_mm.minCoeff() > 0.0);
   const auto slices = find_slices(folder);
   if (!slices) return tl::unexpected(slices.error());
@@ -214,7 +234,8 @@ Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& l
     const int depth = std::min(kBatch, count - first);
     batch.assign(static_cast<std::size_t>(depth), {});
     for (int i = 0; i < depth; ++i) {
-      if (!keep_going(static_cast<double>(first + i) / count)) return failure(ErrorCode::cancelled, "stopped while reading the slices");
+      if (!keep_going(static_cast<double>(first + i) / count))
+        return failure(ErrorCode::cancelled, "stopped while reading the slices");
       const fs::path& file = (*slices)[static_cast<std::size_t>(first + i)].file;
       int width = 0, height = 0;
       const auto pixels = read_png(file, width, height);
@@ -222,11 +243,14 @@ Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& l
       if (volume.dims[0] == 0) {
         volume.dims = {width, height, count};
         if (static_cast<double>(width) * height * count > kLargestVolume)
-          return failure(ErrorCode::invalid_input, folder.string() + " has more than 1000 million voxels; cut it into parts");
+          return failure(ErrorCode::invalid_input,
+                         folder.string() + " has more than 1000 million voxels; cut it into parts");
         volume.labels = DenseVolume<std::uint8_t>({{0, 0, 0}, {width - 1, height - 1, count - 1}}, 0);
       } else if (width != volume.dims[0] || height != volume.dims[1]) {
-        return failure(ErrorCode::invalid_input, file.string() + " is " + std::to_string(width) + "x" + std::to_string(height) + " where the slices before are " +
-                                                     std::to_string(volume.dims[0]) + "x" + std::to_string(volume.dims[1]) + "; export the stack again");
+        return failure(ErrorCode::invalid_input, file.string() + " is " + std::to_string(width) + "x" +
+                                                     std::to_string(height) + " where the slices before are " +
+                                                     std::to_string(volume.dims[0]) + "x" +
+                                                     std::to_string(volume.dims[1]) + "; export the stack again");
       }
       std::vector<std::uint8_t>& labels = batch[static_cast<std::size_t>(i)];
       labels.resize(pixels->size());
@@ -237,14 +261,17 @@ Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& l
       for (int y = 0; y < rows; ++y) {
         std::uint8_t* line = &volume.labels.at({x, y, first});
         for (int i = 0; i < depth; ++i)
-          line[i] = batch[static_cast<std::size_t>(i)][static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(x)];
+          line[i] = batch[static_cast<std::size_t>(i)][static_cast<std::size_t>(y) * static_cast<std::size_t>(columns) +
+                                                       static_cast<std::size_t>(x)];
       }
   }
   stack.colours = palette.sorted();
   if (std::ranges::none_of(stack.colours, [](const ColourCount& c) { return c.label != 0; })) {
     std::string most;
-    for (std::size_t i = 0; i < std::min<std::size_t>(3, stack.colours.size()); ++i) most += (i > 0 ? "; " : "") + text_of(stack.colours[i].rgba);
-    return failure(ErrorCode::invalid_input, folder.string() + " has no voxel in a bone colour (most have " + most + "); name the bone's with --bone R,G,B");
+    for (std::size_t i = 0; i < std::min<std::size_t>(3, stack.colours.size()); ++i)
+      most += (i > 0 ? "; " : "") + text_of(stack.colours[i].rgba);
+    return failure(ErrorCode::invalid_input, folder.string() + " has no voxel in a bone colour (most have " + most +
+                                                 "); name the bone's with --bone R,G,B");
   }
   return stack;
 }

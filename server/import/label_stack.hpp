@@ -12,7 +12,7 @@
 namespace osteon::import {
 
 struct BoneColour {
-  std::string name;                        // shown to people
+  std::string name;  // shown to people
   std::array<std::uint8_t, 3> rgb{};
   double density_g_cm3 = 1.9;
 };
@@ -20,7 +20,7 @@ struct BoneColour {
 // Which colours are bone; every other one, known or noise, is not.
 struct LabelLegend {
   std::vector<BoneColour> bones{{"bone", {255, 249, 219}, 1.9}};
-  int tolerance = 8;                       // by which each of red, green and blue may differ
+  int tolerance = 8;  // by which each of red, green and blue may differ
 };
 
 // "R,G,B" or "R,G,B:DENSITY_G_CM3".
@@ -31,17 +31,17 @@ struct LabelLegend {
 struct ColourCount {
   std::array<std::uint8_t, 4> rgba{};
   std::int64_t voxels = 0;
-  int label = 0;                           // as in LabelVolume: 0 is not bone
+  int label = 0;  // as in LabelVolume: 0 is not bone
 };
 
 struct LabelStack {
-  imaging::LabelVolume volume;             // labels in the order of the legend, from 1
-  std::vector<ColourCount> colours;        // most frequent first
+  imaging::LabelVolume volume;       // labels in the order of the legend, from 1
+  std::vector<ColourCount> colours;  // most frequent first
 };
 
 // Slices by the number at the end of their names. Columns go along x, rows along y, slices along z.
-// Errors: not_found (no such folder), invalid_input (no PNG files, a slice that is missing, of another size or not a PNG,
-// no bone colour at all), cancelled.
+// Errors: not_found (no such folder), invalid_input (no PNG files, a slice that is missing, of another size or not a
+// PNG, no bone colour at all), cancelled.
 [[nodiscard]] Result<LabelStack> read_label_stack(const std::filesystem::path& folder, const LabelLegend& legend,
                                                   const Vec3& spacing_mm, const KeepGoing& keep_going);
 

@@ -10,7 +10,8 @@
 int main(int argc, char** argv) {
   using namespace osteon;
   static constexpr const char* kProgram = "osteon-import";
-  CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan, a label volume, a mesh or a phantom.", kProgram);
+  CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan, a label volume, a mesh or a phantom.",
+               kProgram);
   app.require_subcommand(1);
   app.set_help_all_flag("--help-all", "Help for all commands");
   std::vector<import::Command> commands;
@@ -19,9 +20,11 @@ int main(int argc, char** argv) {
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
 
   const StopSignal stop;
-  const auto chosen = std::ranges::find_if(commands, [](const import::Command& command) { return command.app->parsed(); });
+  const auto chosen =
+      std::ranges::find_if(commands, [](const import::Command& command) { return command.app->parsed(); });
   const auto text = chosen->run(stop);
-  if (!text) return log::exit_with(kProgram, text.error().code == ErrorCode::cancelled ? import::stopped() : text.error());
+  if (!text)
+    return log::exit_with(kProgram, text.error().code == ErrorCode::cancelled ? import::stopped() : text.error());
   std::fputs(text->c_str(), stdout);
   return 0;
 }

@@ -13,9 +13,9 @@
 namespace osteon::import {
 namespace {
 
-constexpr double kDensest_g_cm3 = 3.0;   // enamel
+constexpr double kDensest_g_cm3 = 3.0;  // enamel
 constexpr double kThickest_mm = 500.0;
-constexpr int kSubsamples = 16;          // along a voxel's edge, where the tube's circles cross it
+constexpr int kSubsamples = 16;  // along a voxel's edge, where the tube's circles cross it
 
 // Integral over depth from zero of a value given layer by layer; the outer layers go on beyond the ends.
 template <class Value>
@@ -31,7 +31,9 @@ double integral(const std::vector<Layer>& layers, double depth_mm, Value value) 
   return sum;
 }
 
-double hu_above_air(const Layer& layer) { return imaging::hounsfield(imaging::kRho1995, layer.density_g_cm3) - imaging::kAir_hu; }
+double hu_above_air(const Layer& layer) {
+  return imaging::hounsfield(imaging::kRho1995, layer.density_g_cm3) - imaging::kAir_hu;
+}
 
 // The length that two intervals share.
 double overlap(double a_low, double a_high, double b_low, double b_high) {
@@ -56,11 +58,14 @@ std::string describe(const Phantom& phantom) {
 Result<void> check_pitch(const Phantom& phantom, double pitch_mm) {
   const double thinnest = std::ranges::min(phantom.layers, {}, &Layer::thickness_mm).thickness_mm;
   if (pitch_mm > thinnest || pitch_mm > phantom.width_mm)
-    return failure(ErrorCode::invalid_input, "a pitch of " + number(pitch_mm) + " mm is coarser than the phantom's thinnest layer or its width (" +
-                                                 number(std::min(thinnest, phantom.width_mm)) + " mm); give a smaller --pitch");
+    return failure(ErrorCode::invalid_input, "a pitch of " + number(pitch_mm) +
+                                                 " mm is coarser than the phantom's thinnest layer or its width (" +
+                                                 number(std::min(thinnest, phantom.width_mm)) +
+                                                 " mm); give a smaller --pitch");
   const Vec3 samples = phantom.bounds().size_mm() / pitch_mm;
   if (samples.prod() > kLargestLattice)
-    return failure(ErrorCode::invalid_input, "a pitch of " + number(pitch_mm) + " mm needs " + std::to_string(std::llround(samples.prod() * 1e-6)) +
+    return failure(ErrorCode::invalid_input, "a pitch of " + number(pitch_mm) + " mm needs " +
+                                                 std::to_string(std::llround(samples.prod() * 1e-6)) +
                                                  " million samples; give a larger --pitch");
   return {};
 }
@@ -69,7 +74,8 @@ Result<void> check_pitch(const Phantom& phantom, double pitch_mm) {
 
 Result<std::vector<Layer>> parse_layers(std::string_view text) {
   const auto wrong = [&](const std::string& what) {
-    return failure(ErrorCode::invalid_input, "--layers " + std::string(text) + ": " + what + "; write THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
+    return failure(ErrorCode::invalid_input, "--layers " + std::string(text) + ": " + what +
+                                                 "; write THICKNESS_MM:DENSITY_G_CM3,... such as 5:1.9,20:0.3,5:1.9");
   };
   const auto parse = [](std::string_view part, double& value) {
     const std::string digits(part);
@@ -83,10 +89,13 @@ Result<std::vector<Layer>> parse_layers(std::string_view text) {
     const std::string_view part = text.substr(begin, end - begin);
     const std::size_t colon = part.find(':');
     Layer layer;
-    if (colon == std::string_view::npos || !parse(part.substr(0, colon), layer.thickness_mm) || !parse(part.substr(colon + 1), layer.density_g_cm3))
+    if (colon == std::string_view::npos || !parse(part.substr(0, colon), layer.thickness_mm) ||
+        !parse(part.substr(colon + 1), layer.density_g_cm3))
       return wrong("\"" + std::string(part) + "\" is not a layer");
-    if (layer.thickness_mm <= 0.0 || layer.thickness_mm > kThickest_mm) return wrong("a thickness must be above 0 and at most " + number(kThickest_mm) + " mm");
-    if (layer.density_g_cm3 <= 0.0 || layer.density_g_cm3 > kDensest_g_cm3) return wrong("a density must be above 0 and at most " + number(kDensest_g_cm3) + " g/cm3");
+    if (layer.thickness_mm <= 0.0 || layer.thickness_mm > kThickest_mm)
+      return wrong("a thickness must be above 0 and at most " + number(kThickest_mm) + " mm");
+    if (layer.density_g_cm3 <= 0.0 || layer.density_g_cm3 > kDensest_g_cm3)
+      return wrong("a density must be above 0 and at most " + number(kDensest_g_cm3) + " g/cm3");
     layers.push_back(layer);
     begin = end + 1;
   }
@@ -139,17 +148,20 @@ double Phantom::depth_mm(const Vec3& point_mm) const {
 double Phantom::density_g_cm3(const Vec3& point_mm, double blur_mm) const {
   const double depth = depth_mm(point_mm);
   const auto density = [](const Layer& layer) { return layer.density_g_cm3; };
-  return (integral(layers, depth + 0.5 * blur_mm, density) - integral(layers, depth - 0.5 * blur_mm, density)) / blur_mm;
+  return (integral(layers, depth + 0.5 * blur_mm, density) - integral(layers, depth - 0.5 * blur_mm, density)) /
+         blur_mm;
 }
 
-Result<Case> build_phantom_case(const Phantom& phantom, double pitch_mm, const std::string& title, const KeepGoing& keep_going) {
+Result<Case> build_phantom_case(const Phantom& phantom, double pitch_mm, const std::string& title,
+                                const KeepGoing& keep_going) {
   if (auto checked = check_pitch(phantom, pitch_mm); !checked) return tl::unexpected(checked.error());
   const CoordBox box = covering_samples(phantom.bounds().grown(5.0 * pitch_mm), pitch_mm);
   DenseVolume<float> surface(box, 0.0f);
   DenseVolume<float> density(box, 0.0f);
   std::size_t n = 0;
   for (int x = box.min.x; x <= box.max.x; ++x) {
-    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x)) return failure(ErrorCode::cancelled, "stopped while building the phantom");
+    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x))
+      return failure(ErrorCode::cancelled, "stopped while building the phantom");
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z, ++n) {
         const Vec3 at = position_mm({x, y, z}, pitch_mm);
@@ -171,7 +183,8 @@ Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm
   imaging::HuVolume scan;
   const Box field = phantom.bounds().grown(6.0 * spacing_mm);
   const Vec3 size = field.size_mm() / spacing_mm;
-  scan.dims = {static_cast<int>(std::ceil(size.x() - 1e-9)), static_cast<int>(std::ceil(size.y() - 1e-9)), static_cast<int>(std::ceil(size.z() - 1e-9))};
+  scan.dims = {static_cast<int>(std::ceil(size.x() - 1e-9)), static_cast<int>(std::ceil(size.y() - 1e-9)),
+               static_cast<int>(std::ceil(size.z() - 1e-9))};
   scan.spacing_mm = Vec3::Constant(spacing_mm);
   scan.origin_mm = field.min_mm.array() + 0.5 * spacing_mm;
   scan.values.resize(scan.count());
@@ -180,7 +193,9 @@ Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm
   const double deep = phantom.thickness_mm();
   const double half_width = 0.5 * phantom.width_mm;
   const double voxel_mm3 = spacing_mm * spacing_mm * spacing_mm;
-  const auto inside_integral = [&](double depth) { return integral(phantom.layers, std::clamp(depth, 0.0, deep), hu_above_air); };
+  const auto inside_integral = [&](double depth) {
+    return integral(phantom.layers, std::clamp(depth, 0.0, deep), hu_above_air);
+  };
 
   // The tube looks the same in every slice: mean HU above air over each pixel's square.
   std::vector<double> section;
@@ -199,7 +214,8 @@ Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm
         double sum = 0.0;
         for (int v = 0; v < kSubsamples; ++v)
           for (int u = 0; u < kSubsamples; ++u) {
-            const Vec3 offset(((u + 0.5) / kSubsamples - 0.5) * spacing_mm, ((v + 0.5) / kSubsamples - 0.5) * spacing_mm, 0.0);
+            const Vec3 offset(((u + 0.5) / kSubsamples - 0.5) * spacing_mm,
+                              ((v + 0.5) / kSubsamples - 0.5) * spacing_mm, 0.0);
             sum += at_depth(phantom.depth_mm(centre + offset));
           }
         section.push_back(sum / (kSubsamples * kSubsamples));
@@ -209,17 +225,21 @@ Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm
 
   std::size_t n = 0;
   for (int slice = 0; slice < scan.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / scan.dims[2])) return failure(ErrorCode::cancelled, "stopped while scanning the phantom");
+    if (!keep_going(static_cast<double>(slice) / scan.dims[2]))
+      return failure(ErrorCode::cancelled, "stopped while scanning the phantom");
     for (int row = 0; row < scan.dims[1]; ++row)
       for (int column = 0; column < scan.dims[0]; ++column) {
         const Vec3 c = scan.position_mm(Vec3(column, row, slice));
         double above_air = 0.0;
         if (phantom.kind == PhantomKind::block) {
-          const double area = overlap(c.x() - half, c.x() + half, -half_width, half_width) * overlap(c.y() - half, c.y() + half, -half_width, half_width);
+          const double area = overlap(c.x() - half, c.x() + half, -half_width, half_width) *
+                              overlap(c.y() - half, c.y() + half, -half_width, half_width);
           above_air = area * (inside_integral(-c.z() + half) - inside_integral(-c.z() - half)) / voxel_mm3;
         } else {
           const double length = overlap(c.z() - half, c.z() + half, -half_width, half_width);
-          above_air = section[static_cast<std::size_t>(row) * static_cast<std::size_t>(scan.dims[0]) + static_cast<std::size_t>(column)] * length / spacing_mm;
+          above_air = section[static_cast<std::size_t>(row) * static_cast<std::size_t>(scan.dims[0]) +
+                              static_cast<std::size_t>(column)] *
+                      length / spacing_mm;
         }
         scan.values[n++] = static_cast<std::int16_t>(std::lround(imaging::kAir_hu + above_air));
       }

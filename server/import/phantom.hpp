@@ -45,7 +45,8 @@ struct Phantom {
                                               const KeepGoing& keep_going);
 
 // What a CT scanner without noise and with box-shaped voxels sees of it, in air: the mean HU of each voxel.
-[[nodiscard]] Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm, const KeepGoing& keep_going);
+[[nodiscard]] Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm,
+                                                     const KeepGoing& keep_going);
 
 // The threshold that is least wrong for all layers that reach the surface: half way between air and bone puts the
 // edge of a blurred step where it was, so this is the middle between the halves of the lightest and the densest.

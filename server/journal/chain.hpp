@@ -15,20 +15,23 @@ struct JournalRow {
   std::string bytes;       // the room's own encoding
 };
 
-// How far a journal goes, and what it says: equal heads, equal histories. Whoever was told of a row keeps it as a witness.
+// How far a journal goes, and what it says: equal heads, equal histories. Whoever was told of a row keeps it as a
+// witness.
 struct JournalHead {
   RoomSeq place;
   Digest chain;
   friend bool operator==(const JournalHead&, const JournalHead&) = default;
 };
 
-// The same with a seal by which the room's store knows its own word again, for those who are not to be believed without.
+// The same with a seal by which the room's store knows its own word again, for those who are not to be believed
+// without.
 struct Witness {
   JournalHead head;
   Digest seal;
 };
 
-// chain_0 = SHA-256(text "osteon journal", text genesis); a text is its length as 8 bytes, little endian, and its bytes.
+// chain_0 = SHA-256(text "osteon journal", text genesis); a text is its length as 8 bytes, little endian, and its
+// bytes.
 [[nodiscard]] JournalHead first_head(std::string_view genesis);
 // chain_n = SHA-256(chain_n-1, place, at_ns, text bytes), integers as 8 bytes, little endian.
 [[nodiscard]] JournalHead next_head(const JournalHead& before, const JournalRow& row);

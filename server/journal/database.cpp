@@ -20,16 +20,22 @@ Error error_of(sqlite3* connection, const std::string& file) {
   if (reason != 0) message += " (" + std::generic_category().message(reason) + ")";
   switch (code) {
     case SQLITE_BUSY:
-    case SQLITE_LOCKED: return {ErrorCode::exists, message + "; close it in the program that has it open"};
+    case SQLITE_LOCKED:
+      return {ErrorCode::exists, message + "; close it in the program that has it open"};
     case SQLITE_CORRUPT:
-    case SQLITE_FORMAT: return {ErrorCode::invalid_input, message + "; recover it into a new journal, or go on from a backup"};
+    case SQLITE_FORMAT:
+      return {ErrorCode::invalid_input, message + "; recover it into a new journal, or go on from a backup"};
     // Files that never were a journal are told apart before SQLite sees them.
-    case SQLITE_NOTADB: return {ErrorCode::invalid_input, file + ": its first page is damaged; go on from a backup"};
-    case SQLITE_READONLY: return {ErrorCode::internal, message + "; see to its permissions"};
-    case SQLITE_FULL: return {ErrorCode::internal, message + std::string(remedy_of(ENOSPC))};
+    case SQLITE_NOTADB:
+      return {ErrorCode::invalid_input, file + ": its first page is damaged; go on from a backup"};
+    case SQLITE_READONLY:
+      return {ErrorCode::internal, message + "; see to its permissions"};
+    case SQLITE_FULL:
+      return {ErrorCode::internal, message + std::string(remedy_of(ENOSPC))};
     case SQLITE_CANTOPEN:
       return {reason == ENOENT ? ErrorCode::not_found : ErrorCode::internal, message + std::string(remedy_of(reason))};
-    default: return {ErrorCode::internal, message + std::string(remedy_of(reason))};
+    default:
+      return {ErrorCode::internal, message + std::string(remedy_of(reason))};
   }
 }
 
@@ -59,14 +65,14 @@ Statement& Statement::integer(int at, std::int64_t value) {
 }
 
 Statement& Statement::text(int at, std::string_view value) {
-  OSTEON_CHECK(sqlite3_bind_text64(statement_.get(), at + 1, value.empty() ? "" : value.data(), value.size(), SQLITE_STATIC,
-                                   SQLITE_UTF8) == SQLITE_OK);
+  OSTEON_CHECK(sqlite3_bind_text64(statement_.get(), at + 1, value.empty() ? "" : value.data(), value.size(),
+                                   SQLITE_STATIC, SQLITE_UTF8) == SQLITE_OK);
   return *this;
 }
 
 Statement& Statement::blob(int at, std::string_view value) {
-  OSTEON_CHECK(sqlite3_bind_blob64(statement_.get(), at + 1, value.empty() ? "" : value.data(), value.size(), SQLITE_STATIC) ==
-               SQLITE_OK);
+  OSTEON_CHECK(sqlite3_bind_blob64(statement_.get(), at + 1, value.empty() ? "" : value.data(), value.size(),
+                                   SQLITE_STATIC) == SQLITE_OK);
   return *this;
 }
 
@@ -114,8 +120,8 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
   connection.file = (options.shown_as.empty() ? file : options.shown_as).string();
   const std::string vfs = disk.vfs();
   const std::string uri = uri_of(file) + (options.peek ? "?immutable=1" : "");
-  const int flags = (options.peek ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE) | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX |
-                    SQLITE_OPEN_EXRESCODE | (options.create ? SQLITE_OPEN_CREATE : 0);
+  const int flags = (options.peek ? SQLITE_OPEN_READONLY : SQLITE_OPEN_READWRITE) | SQLITE_OPEN_URI |
+                    SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE | (options.create ? SQLITE_OPEN_CREATE : 0);
   const int code = sqlite3_open_v2(uri.c_str(), &connection.handle, flags, vfs.empty() ? nullptr : vfs.c_str());
   if (code != SQLITE_OK) return tl::unexpected(error_of(connection.handle, connection.file));
   // SQLite then opens it to be read, and fails later for a reason of its own.
@@ -124,12 +130,14 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
                    connection.file + " cannot be written to; see to its permissions, or copy it to another place");
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  // EXCLUSIVE keeps the index of the log in memory: no file of it that another process could have damaged, and nobody beside us.
+  // EXCLUSIVE keeps the index of the log in memory: no file of it that another process could have damaged, and nobody
+  // beside us.
   std::string settings =
       "PRAGMA locking_mode=EXCLUSIVE; PRAGMA temp_store=MEMORY; PRAGMA mmap_size=0; PRAGMA secure_delete=ON;"
       "PRAGMA cell_size_check=ON; PRAGMA cache_spill=OFF; PRAGMA trusted_schema=OFF; PRAGMA fullfsync=ON; PRAGMA "
       "checkpoint_fullfsync=ON;";
-  if (options.create) settings += "PRAGMA page_size=" + std::to_string(options.page_bytes) + "; PRAGMA journal_mode=WAL;";
+  if (options.create)
+    settings += "PRAGMA page_size=" + std::to_string(options.page_bytes) + "; PRAGMA journal_mode=WAL;";
   settings += options.durable ? "PRAGMA synchronous=FULL;" : "PRAGMA synchronous=OFF;";
   if (Result<void> set = made.run(settings); !set) return tl::unexpected(set.error());
   return made;
@@ -137,8 +145,8 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
 
 Result<Statement> Database::prepare(std::string_view sql) {
   sqlite3_stmt* statement = nullptr;
-  const int code = sqlite3_prepare_v3(connection_->handle, sql.data(), static_cast<int>(sql.size()), SQLITE_PREPARE_PERSISTENT,
-                                      &statement, nullptr);
+  const int code = sqlite3_prepare_v3(connection_->handle, sql.data(), static_cast<int>(sql.size()),
+                                      SQLITE_PREPARE_PERSISTENT, &statement, nullptr);
   if (code != SQLITE_OK) return tl::unexpected(error_of(connection_->handle, connection_->file));
   Statement made;
   made.statement_.reset(statement);

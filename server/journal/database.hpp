@@ -44,20 +44,22 @@ struct DatabaseOptions {
   bool create = false;
   bool durable = true;  // false: SQLite waits for no write; for tests that must see rows lost
   int page_bytes = 4096;
-  bool peek = false;    // reads the file as it lies there, without its log and beside whoever has it open
+  bool peek = false;  // reads the file as it lies there, without its log and beside whoever has it open
   std::filesystem::path shown_as = {};  // what errors name, where the file is a copy; empty: the file
 };
 
 // Not synchronised; one thread at a time.
 class Database {
  public:
-  [[nodiscard]] static Result<Database> open(const std::filesystem::path& file, const Disk& disk, const DatabaseOptions& options);
-  // Closing carries nothing from the log into the file: that is for carry_log(), while it still can be told to have failed.
+  [[nodiscard]] static Result<Database> open(const std::filesystem::path& file, const Disk& disk,
+                                             const DatabaseOptions& options);
+  // Closing carries nothing from the log into the file: that is for carry_log(), while it still can be told to have
+  // failed.
   Database(Database&&) noexcept = default;
   Database& operator=(Database&&) noexcept = default;
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
-  [[nodiscard]] Result<void> run(const std::string& sql);  // statements without rows that matter
+  [[nodiscard]] Result<void> run(const std::string& sql);            // statements without rows that matter
   [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first row; 0 without one
   [[nodiscard]] Result<std::string> text(std::string_view sql);
   // What is changed between the two is in memory until the second, which returns when SQLite's log has it durably.

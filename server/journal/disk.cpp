@@ -22,11 +22,11 @@ namespace fs = std::filesystem;
 constexpr std::size_t kPiece = std::size_t{1} << 20;
 
 tl::unexpected<Error> cannot(const char* what, const fs::path& file, int reason) {
-  const ErrorCode code = reason == ENOENT                         ? ErrorCode::not_found
+  const ErrorCode code = reason == ENOENT                        ? ErrorCode::not_found
                          : reason == EISDIR || reason == ENOTDIR ? ErrorCode::invalid_input
                                                                  : ErrorCode::internal;
-  return failure(code, "cannot " + std::string(what) + " " + file.string() + ": " + std::generic_category().message(reason) +
-                           std::string(remedy_of(reason)));
+  return failure(code, "cannot " + std::string(what) + " " + file.string() + ": " +
+                           std::generic_category().message(reason) + std::string(remedy_of(reason)));
 }
 
 // A file that was to be made is missing only because its folder is.
@@ -222,7 +222,8 @@ class SystemDisk final : public Disk {
         return failure(ErrorCode::exists, file.string() + " is held by another process");
       }
       // Its holder may have removed or renamed it before it let go: then the name stands for another file.
-      struct stat mine {}, named {};
+      struct stat mine {
+      }, named{};
       if (::fstat(fd, &mine) != 0) return cannot("look at", file, errno);
       if (::stat(file.c_str(), &named) != 0 || mine.st_dev != named.st_dev || mine.st_ino != named.st_ino) continue;
       if (kind == LockKind::shared) return held;
@@ -279,13 +280,19 @@ Disk& system_disk() {
 std::string_view remedy_of(int reason) {
   switch (reason) {
     case EACCES:
-    case EPERM: return "; see to the permissions, or choose another place";
-    case EROFS: return "; choose a place that can be written to";
+    case EPERM:
+      return "; see to the permissions, or choose another place";
+    case EROFS:
+      return "; choose a place that can be written to";
     case ENOSPC:
-    case EDQUOT: return "; make room on the disk";
-    case EISDIR: return "; name a file, not a folder";
-    case ENOTDIR: return "; name a file in a folder";
-    default: return {};
+    case EDQUOT:
+      return "; make room on the disk";
+    case EISDIR:
+      return "; name a file, not a folder";
+    case ENOTDIR:
+      return "; name a file in a folder";
+    default:
+      return {};
   }
 }
 
@@ -324,7 +331,8 @@ Result<WrittenFile> DurableFile::finish() {
   return WrittenFile{size_, hasher_.finish()};
 }
 
-Result<WrittenFile> read_in_pieces(Disk& disk, const fs::path& file, const std::function<Result<void>(std::string_view)>& take) {
+Result<WrittenFile> read_in_pieces(Disk& disk, const fs::path& file,
+                                   const std::function<Result<void>(std::string_view)>& take) {
   WrittenFile read;
   Hasher hasher;
   for (;;) {

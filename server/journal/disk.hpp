@@ -52,8 +52,8 @@ struct FileIdentity {
 };
 
 // What is written stays after a power failure only once the file was synced; what is made, renamed or removed, once its
-// folder was. Any thread. Errors name the file and the system's reason: not_found, exists (a lock), invalid_input (a folder where
-// a file should be, or a file where a folder), internal.
+// folder was. Any thread. Errors name the file and the system's reason: not_found, exists (a lock), invalid_input (a
+// folder where a file should be, or a file where a folder), internal.
 class Disk {
  public:
   virtual ~Disk() = default;
@@ -61,7 +61,8 @@ class Disk {
   [[nodiscard]] virtual Result<std::unique_ptr<DiskFile>> create(const std::filesystem::path& file) = 0;
   // A file as it is, or an empty one where there is none.
   [[nodiscard]] virtual Result<std::unique_ptr<DiskFile>> open(const std::filesystem::path& file) = 0;
-  [[nodiscard]] virtual Result<std::string> read(const std::filesystem::path& file, std::uint64_t from, std::size_t most) = 0;
+  [[nodiscard]] virtual Result<std::string> read(const std::filesystem::path& file, std::uint64_t from,
+                                                 std::size_t most) = 0;
   // Nothing: no such file.
   [[nodiscard]] virtual Result<std::optional<FileIdentity>> identity(const std::filesystem::path& file) = 0;
   [[nodiscard]] Result<std::optional<std::uint64_t>> size(const std::filesystem::path& file);
@@ -111,7 +112,8 @@ class DurableFile {
   std::uint64_t size_ = 0;
 };
 
-// What a user can do about a reason of the system's (an errno value), as the end of a sentence; empty: nothing is known.
+// What a user can do about a reason of the system's (an errno value), as the end of a sentence; empty: nothing is
+// known.
 [[nodiscard]] std::string_view remedy_of(int reason);
 
 // The end of the name of a file that is still being written.

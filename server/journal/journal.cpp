@@ -128,8 +128,7 @@ Result<Journal> Journal::open_to_read(const fs::path& file, Disk* given) {
   if (!lock) return tl::unexpected(lock.error());
   auto opened = JournalFile::open_to_read(file, disk);
   if (!opened) return tl::unexpected(opened.error());
-  Journal journal(std::unique_ptr<State>(
-      new State{file, options, &disk, std::move(*lock), std::move(*opened), {}}));
+  Journal journal(std::unique_ptr<State>(new State{file, options, &disk, std::move(*lock), std::move(*opened), {}}));
   State& state = *journal.state_;
   state.only_read = true;
   Inspection found = state.file.inspect(false);
@@ -139,19 +138,21 @@ Result<Journal> Journal::open_to_read(const fs::path& file, Disk* given) {
   return journal;
 }
 
-Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions& options, std::unique_ptr<DiskLock> lock) {
+Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions& options,
+                                     std::unique_ptr<DiskLock> lock) {
   Disk& disk = disk_of(options);
   if (Result<void> renewed = renew_wal(disk, wal_of(file)); !renewed) return tl::unexpected(renewed.error());
   auto opened = JournalFile::open(file, disk, {.durable = options.durable});
   if (!opened) return tl::unexpected(opened.error());
   if (opened->version() < kVersionWithTimes)
-    return failure(ErrorCode::unsupported, file.string() + " is a journal of version " + std::to_string(opened->version()) +
-                                               "; migrate it into a copy of version " + std::to_string(kJournalVersion));
+    return failure(ErrorCode::unsupported,
+                   file.string() + " is a journal of version " + std::to_string(opened->version()) +
+                       "; migrate it into a copy of version " + std::to_string(kJournalVersion));
   const auto identity = disk.identity(file);
   if (!identity) return tl::unexpected(identity.error());
   if (!*identity) return failure(ErrorCode::not_found, file.string() + " was removed while it was opened");
-  Journal journal(std::unique_ptr<State>(
-      new State{file, options, &disk, std::move(lock), std::move(*opened), **identity}));
+  Journal journal(
+      std::unique_ptr<State>(new State{file, options, &disk, std::move(lock), std::move(*opened), **identity}));
   State& state = *journal.state_;
   Inspection found = state.file.inspect(false);
   state.head = found.head;
@@ -195,8 +196,8 @@ Result<void> Journal::note_keys() {
   if (!state.options.keys) return {};
   const auto stored = state.file.find_register(kKeysRegister);
   if (!stored) return tl::unexpected(stored.error());
-  std::vector<Succession> all = *stored ? decode_successions(**stored).value_or(std::vector<Succession>{})
-                                        : std::vector<Succession>{};
+  std::vector<Succession> all =
+      *stored ? decode_successions(**stored).value_or(std::vector<Succession>{}) : std::vector<Succession>{};
   const std::size_t known = all.size();
   for (const Succession& one : state.options.keys->successions())
     if (std::ranges::find(all, one) == all.end()) all.push_back(one);
@@ -299,8 +300,9 @@ const JournalHead& Journal::head() const { return state_->head; }
 const std::string& Journal::genesis() const { return state_->file.genesis(); }
 std::optional<RoomSeq> Journal::recovered_to() const { return state_->recovered_to; }
 
-// Every change goes through here: the first that fails is the last. Whether it reached the disk is then unknown, and what the
-// system shows of the file is not to be trusted, so a note beside the file keeps the next process from going on as well.
+// Every change goes through here: the first that fails is the last. Whether it reached the disk is then unknown, and
+// what the system shows of the file is not to be trusted, so a note beside the file keeps the next process from going
+// on as well.
 Result<void> Journal::write(const std::function<Result<void>()>& work) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
@@ -319,8 +321,8 @@ Result<void> Journal::check_named() {
   const auto now = state.disk->identity(state.path);
   if (!now) return tl::unexpected(now.error());
   if (*now && (*now)->same_file(state.identity) && (*now)->size >= state.identity.size) return {};
-  return failure(ErrorCode::internal, std::string("the file was ") + (*now ? "replaced or cut" : "removed") +
-                                          " while its room was open");
+  return failure(ErrorCode::internal,
+                 std::string("the file was ") + (*now ? "replaced or cut" : "removed") + " while its room was open");
 }
 
 Result<void> Journal::write_through(const std::function<Result<void>()>& work) {
@@ -341,9 +343,10 @@ Result<void> Journal::append(std::span<const JournalRow> rows) {
   if (state.closed) return tl::unexpected(*state.closed);
   for (const JournalRow& row : rows)
     if (row.bytes.size() > state.options.most_row_bytes)
-      return failure(ErrorCode::invalid_input, state.path.string() + ": row " + std::to_string(row.place.value) + " has " +
-                                                   std::to_string(row.bytes.size()) + " bytes, more than the " +
-                                                   std::to_string(state.options.most_row_bytes) + " that a row may have");
+      return failure(ErrorCode::invalid_input,
+                     state.path.string() + ": row " + std::to_string(row.place.value) + " has " +
+                         std::to_string(row.bytes.size()) + " bytes, more than the " +
+                         std::to_string(state.options.most_row_bytes) + " that a row may have");
   if (rows.empty()) return {};
   JournalHead head = state.head;
   // Into the transaction, which is in memory, and into the log, which makes them safe.
@@ -388,11 +391,12 @@ Result<JournalHead> Journal::head_at(RoomSeq place) {
 JournalSlice Journal::read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows) {
   JournalSlice slice;
   std::size_t bytes = 0;
-  Walk walked = state_->file.walk(after, std::min(last, state_->head.place), [&](const JournalRow& row, const JournalHead&) {
-    slice.rows.push_back(row);
-    bytes += row.bytes.size();
-    return slice.rows.size() < most_rows && bytes < kSliceBytes;
-  });
+  Walk walked =
+      state_->file.walk(after, std::min(last, state_->head.place), [&](const JournalRow& row, const JournalHead&) {
+        slice.rows.push_back(row);
+        bytes += row.bytes.size();
+        return slice.rows.size() < most_rows && bytes < kSliceBytes;
+      });
   slice.head = walked.head;
   slice.stopped = std::move(walked.stopped);
   return slice;
@@ -408,8 +412,9 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
   if (witness.place > state.head.place) {
     // Also for the next process: whoever knows more may not come again to say so.
     close_for_good({ErrorCode::unavailable,
-                    file + " goes to place " + std::to_string(state.head.place.value) + ", but a client was told that place " +
-                        place + " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
+                    file + " goes to place " + std::to_string(state.head.place.value) +
+                        ", but a client was told that place " + place +
+                        " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
     return tl::unexpected(*state.closed);
   }
   const auto chain = state.file.chain_at(witness.place);
@@ -421,19 +426,20 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
                  file + " and a client know different histories up to place " + place + "; it has to join anew");
 }
 
-Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta,
-                                                 std::string_view seal) {
+Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta, std::string_view seal) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
   const auto chain = state.file.chain_at(at.place);
   if (!chain) return tl::unexpected(chain.error());
   if (at.place > state.head.place || *chain != at.chain)
-    return failure(ErrorCode::invalid_input, state.path.string() + ": a checkpoint at place " + std::to_string(at.place.value) +
+    return failure(ErrorCode::invalid_input, state.path.string() + ": a checkpoint at place " +
+                                                 std::to_string(at.place.value) +
                                                  " is of another history than the journal's");
   const auto all = checkpoints();
   if (!all) return tl::unexpected(all.error());
   if (std::any_of(all->begin(), all->end(), [&](const Checkpoint& c) { return c.at == at; }))
-    return failure(ErrorCode::exists, state.path.string() + " has a checkpoint at place " + std::to_string(at.place.value));
+    return failure(ErrorCode::exists,
+                   state.path.string() + " has a checkpoint at place " + std::to_string(at.place.value));
   auto file = DurableFile::begin(*state.disk, checkpoint_file(state.path, at));
   if (!file) return tl::unexpected(file.error());
   return CheckpointFile({at, std::string(meta), 0, {}, std::string(seal)}, std::move(*file));
@@ -458,7 +464,8 @@ Result<void> Journal::add_checkpoint(CheckpointFile file) {
   });
   if (!noted) return noted;
   // A file that cannot be removed now is removed when the journal is opened next.
-  for (const Checkpoint& checkpoint : old) static_cast<void>(state.disk->remove(checkpoint_file(state.path, checkpoint.at)));
+  for (const Checkpoint& checkpoint : old)
+    static_cast<void>(state.disk->remove(checkpoint_file(state.path, checkpoint.at)));
   return {};
 }
 
@@ -495,7 +502,9 @@ Result<void> Journal::set_beside(const Registers& registers, const std::vector<P
   });
 }
 
-Result<std::optional<std::string>> Journal::find_register(std::string_view name) { return state_->file.find_register(name); }
+Result<std::optional<std::string>> Journal::find_register(std::string_view name) {
+  return state_->file.find_register(name);
+}
 
 Result<std::uint64_t> Journal::next_server_epoch() {
   const auto known = find_register(kEpochRegister);
@@ -557,7 +566,9 @@ Result<void> Journal::close() {
     Database& database = state.file.database();
     done = write([&] {
       return keep_signature()
-          .and_then([&] { return state.file.set_register(kFooterRegister, encode_footer({state.head, true})); })
+          .and_then([&] {
+            return state.file.set_register(kFooterRegister, encode_footer({state.head, true}));
+          })
           .and_then([&] { return database.commit(); })
           .and_then([&] { return database.carry_log(); });
     });

@@ -49,9 +49,10 @@ class Journal {
   // Error exists: a journal, or what belonged to one, is there.
   [[nodiscard]] static Result<Journal> create(const std::filesystem::path& file, std::string_view genesis,
                                               JournalOptions options = {});
-  // Takes over where the last process left off, however it ended, and confirms every row. Errors: not_found; exists (in use
-  // by another process); unsupported (an older version: migrate_journal; a newer one); invalid_input (damaged so that no row
-  // can be read). Where rows are damaged, or the journal is behind a witness, it opens and is closed to rows.
+  // Takes over where the last process left off, however it ended, and confirms every row. Errors: not_found; exists (in
+  // use by another process); unsupported (an older version: migrate_journal; a newer one); invalid_input (damaged so
+  // that no row can be read). Where rows are damaged, or the journal is behind a witness, it opens and is closed to
+  // rows.
   [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, JournalOptions options = {});
   // Only to be read: nothing is written to it or beside it, and others may read it too. What takes rows fails. Errors:
   // those of open(); where rows are damaged, closed_because() says so.
@@ -65,23 +66,26 @@ class Journal {
   // Closes it to rows, for a reason of the owner's.
   void close_to_rows(Error reason);
 
-  // All of them or, after an error, none that was ever reported: safe on the disk when it returns. Places must go on from
-  // head(). Error invalid_input: a row above most_row_bytes, and nothing happens; any other closes the journal to rows.
+  // All of them or, after an error, none that was ever reported: safe on the disk when it returns. Places must go on
+  // from head(). Error invalid_input: a row above most_row_bytes, and nothing happens; any other closes the journal to
+  // rows.
   [[nodiscard]] Result<void> append(std::span<const JournalRow> rows);
   [[nodiscard]] const JournalHead& head() const;
   [[nodiscard]] const std::string& genesis() const;
-  // Rows from this place on up to the head, held against the chain again, until `take` returns false. Error: the sentence of
-  // the first that does not fit.
+  // Rows from this place on up to the head, held against the chain again, until `take` returns false. Error: the
+  // sentence of the first that does not fit.
   [[nodiscard]] Result<void> read(RoomSeq from, const std::function<bool(const JournalRow&)>& take);
 
   // What the journal says up to a place, not beyond head(): as stored. Error invalid_input: the row is missing.
   [[nodiscard]] Result<JournalHead> head_at(RoomSeq place);
-  // The next rows after `after` up to `last`, each held against the chain: so many at most, and of little more than 1 MiB.
+  // The next rows after `after` up to `last`, each held against the chain: so many at most, and of little more than 1
+  // MiB.
   [[nodiscard]] JournalSlice read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows);
 
-  // What somebody was told was safe, a client's last acknowledged row, say. Error unavailable: the journal is behind it, and
-  // from now on closed to rows for good, unless it was recovered with losses (see recovered_to); or it is closed to rows, and its file
-  // does not show what the witness knows. Error invalid_input: the witness knows another history.
+  // What somebody was told was safe, a client's last acknowledged row, say. Error unavailable: the journal is behind
+  // it, and from now on closed to rows for good, unless it was recovered with losses (see recovered_to); or it is
+  // closed to rows, and its file does not show what the witness knows. Error invalid_input: the witness knows another
+  // history.
   [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
   // Where it was cut off when it was recovered from a damaged one: what a witness knows beyond is lost for good.
   [[nodiscard]] std::optional<RoomSeq> recovered_to() const;
@@ -126,7 +130,7 @@ class Journal {
   [[nodiscard]] const std::vector<std::string>& notes() const;
   // Whether one of JournalOptions::keys signed a register that is there; without keys, whatever is there.
   [[nodiscard]] Result<bool> is_vouched_for(std::string_view name);
-  [[nodiscard]] bool is_signed() const;  // whether what is written from now on is
+  [[nodiscard]] bool is_signed() const;                                   // whether what is written from now on is
   [[nodiscard]] bool is_vouched_for(const Checkpoint& checkpoint) const;  // one of checkpoints()
   // Vouches for the head in a footer, with which the log is needed no more and goes; of a journal that is closed to
   // rows, nothing. The journal must not be used afterwards.
@@ -149,7 +153,7 @@ class Journal {
   [[nodiscard]] Result<void> begin_signing();
   [[nodiscard]] Result<void> note_keys();
   [[nodiscard]] Result<void> keep_signature();  // of the newest rows, in the database
-  void close_for_good(Error reason);  // with a note beside the file for the next process
+  void close_for_good(Error reason);            // with a note beside the file for the next process
   [[nodiscard]] Result<std::size_t> keep_people(const std::function<bool(const Person&)>& kept);
   std::unique_ptr<State> state_;
 };

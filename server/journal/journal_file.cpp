@@ -26,11 +26,12 @@ struct Version {
   const char* rows;
 };
 
-#define OSTEON_OTHER_TABLES                                                                                             \
-  "CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"      \
-  "CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT NULL," \
-  " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT;"                                                                 \
-  "CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"                  \
+#define OSTEON_OTHER_TABLES                                                                                        \
+  "CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"  \
+  "CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT " \
+  "NULL,"                                                                                                          \
+  " digest BLOB NOT NULL, seal BLOB NOT NULL) STRICT;"                                                             \
+  "CREATE TABLE people(pseudonym TEXT PRIMARY KEY, label TEXT NOT NULL, joined_day INTEGER NOT NULL,"              \
   " seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"
 
 constexpr const char* kTimedTables =
@@ -45,7 +46,8 @@ constexpr const char* kTimedRows =
 
 const std::array kVersions{
     Version{1,
-            "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES,
+            "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
+            "STRICT;" OSTEON_OTHER_TABLES,
             "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
     Version{2, kTimedTables, kTimedRows}, Version{3, kTimedTables, kTimedRows},
     Version{kJournalVersion, std::string(kTimedTables) + kSignatureTable, kTimedRows}};
@@ -131,11 +133,12 @@ bool is_partial_of(const fs::path& journal, std::string_view name) {
          parse_checkpoint_file(journal, name);
 }
 
-// SQLite takes an empty file for a new database, and throws away the log beside it. When the power failed while the log was
-// being carried into the file, the first page may be lost, and the log still has it: then SQLite has to judge.
+// SQLite takes an empty file for a new database, and throws away the log beside it. When the power failed while the log
+// was being carried into the file, the first page may be lost, and the log still has it: then SQLite has to judge.
 Result<void> check_is_journal(const fs::path& file, Disk& disk) {
   constexpr std::size_t kSmallestPage = 512, kLooked = std::size_t{64} << 10, kApplicationAt = 68;
-  constexpr std::string_view kMagic("SQLite format 3\0", 16), kOwn("OstJ"), kRows("CREATE TABLE rows(place INTEGER PRIMARY KEY");
+  constexpr std::string_view kMagic("SQLite format 3\0", 16), kOwn("OstJ"),
+      kRows("CREATE TABLE rows(place INTEGER PRIMARY KEY");
   const auto size = disk.size(file);
   if (!size) return tl::unexpected(size.error());
   if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
@@ -153,7 +156,8 @@ Result<void> check_is_journal(const fs::path& file, Disk& disk) {
   const auto wal = disk.size(wal_of(file));
   if (!wal) return tl::unexpected(wal.error());
   if (*wal && **wal > 0 && page.size() >= kSmallestPage) return {};
-  return is_not(" is no journal; name a file that osteon-server keeps a room in, or, where it was one, go on from a backup");
+  return is_not(
+      " is no journal; name a file that osteon-server keeps a room in, or, where it was one, go on from a backup");
 }
 
 bool belongs_to(const fs::path& journal, std::string_view name) {
@@ -177,7 +181,8 @@ std::optional<std::uint64_t> decode_number(std::string_view bytes) {
 }
 
 std::string encode_footer(const Footer& footer) {
-  return encode_number(footer.head.place.value) + std::string(as_text(footer.head.chain)) + (footer.clean ? '\1' : '\0');
+  return encode_number(footer.head.place.value) + std::string(as_text(footer.head.chain)) +
+         (footer.clean ? '\1' : '\0');
 }
 
 std::optional<Footer> decode_footer(std::string_view bytes) {
@@ -185,18 +190,19 @@ std::optional<Footer> decode_footer(std::string_view bytes) {
   return Footer{{RoomSeq{*decode_number(bytes.substr(0, 8))}, *digest_of(bytes.substr(8, 32))}, bytes[40] != '\0'};
 }
 
-Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, Disk& disk, const DatabaseOptions& options) {
+Result<void> JournalFile::make(const fs::path& file, std::string_view genesis, Disk& disk,
+                               const DatabaseOptions& options) {
   auto database = Database::open(file, disk, options);
   if (!database) return tl::unexpected(database.error());
   const Result<std::string> mode = database->text("PRAGMA journal_mode");
   if (!mode) return tl::unexpected(mode.error());
-  if (*mode != "wal") return failure(ErrorCode::internal, file.string() + ": SQLite cannot keep a write-ahead log here");
+  if (*mode != "wal")
+    return failure(ErrorCode::internal, file.string() + ": SQLite cannot keep a write-ahead log here");
   JournalFile made(file, disk, std::move(*database));
   Database& own = made.database_;
   return own.begin()
       .and_then([&] {
-        return own.run(version_of(kJournalVersion).tables +
-                       "PRAGMA application_id=" + std::to_string(kApplication) +
+        return own.run(version_of(kJournalVersion).tables + "PRAGMA application_id=" + std::to_string(kApplication) +
                        "; PRAGMA user_version=" + std::to_string(kJournalVersion) + ";");
       })
       .and_then([&] { return made.set_register(kGenesisRegister, genesis); })
@@ -249,7 +255,8 @@ Result<JournalFile> JournalFile::of_database(const fs::path& file, Disk& disk, D
   const auto genesis = opened.find_register(kGenesisRegister);
   if (!genesis) return tl::unexpected(genesis.error());
   if (!*genesis)
-    return failure(ErrorCode::invalid_input, file.string() + " has lost its register genesis, so no row of it can be confirmed");
+    return failure(ErrorCode::invalid_input,
+                   file.string() + " has lost its register genesis, so no row of it can be confirmed");
   opened.genesis_ = **genesis;
   const auto generation = opened.find_register(kGenerationRegister), footer = opened.find_register(kFooterRegister);
   const auto id = opened.find_register(kIdRegister);
@@ -353,10 +360,12 @@ Result<void> JournalFile::check_tables(bool peek) {
   const Result<std::string> mode = peek ? Result<std::string>("wal") : database_.text("PRAGMA journal_mode");
   if (!mode) return tl::unexpected(mode.error());
   if (*application != kApplication || *mode != "wal")
-    return failure(ErrorCode::invalid_input, file_.string() + " is no journal, or its first page is damaged; go on from a backup");
+    return failure(ErrorCode::invalid_input,
+                   file_.string() + " is no journal, or its first page is damaged; go on from a backup");
   if (Result<void> known = read_version(); !known) return known;
   if (!peek && database_.read_only())  // of no permission to write, or of a first page that claims a file of the future
-    return failure(ErrorCode::invalid_input, file_.string() + " cannot be written to; see to its permissions, or recover it");
+    return failure(ErrorCode::invalid_input,
+                   file_.string() + " cannot be written to; see to its permissions, or recover it");
 
   // A damaged definition could make SQLite read the right bytes wrongly.
   const Result<std::string> tables =
@@ -374,7 +383,8 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
     walked.stopped = statement.error();
     return walked;
   }
-  statement->integer(0, static_cast<std::int64_t>(before.place.value)).integer(1, static_cast<std::int64_t>(last.value));
+  statement->integer(0, static_cast<std::int64_t>(before.place.value))
+      .integer(1, static_cast<std::int64_t>(last.value));
   JournalRow row;
   while (walked.head.place < last) {
     const Result<bool> more = statement->step();
@@ -389,8 +399,9 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
     row.bytes = statement->bytes(2);
     const JournalHead next = next_in_chain(walked.head, row);
     if (row.place.value != walked.head.place.value + 1 || statement->bytes(3) != as_text(next.chain)) {
-      walked.stopped = Error{ErrorCode::invalid_input, file_.string() + ": row " + std::to_string(walked.head.place.value + 1) +
-                                                           " does not fit the chain of hashes" + std::string(kRemedy)};
+      walked.stopped =
+          Error{ErrorCode::invalid_input, file_.string() + ": row " + std::to_string(walked.head.place.value + 1) +
+                                              " does not fit the chain of hashes" + std::string(kRemedy)};
       return walked;
     }
     walked.head = next;
@@ -411,7 +422,8 @@ Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
 
 Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
   std::vector<Checkpoint> all;
-  auto statement = database_.prepare("SELECT place, chain, meta, size, digest, seal FROM checkpoints ORDER BY place DESC");
+  auto statement =
+      database_.prepare("SELECT place, chain, meta, size, digest, seal FROM checkpoints ORDER BY place DESC");
   if (!statement) return tl::unexpected(statement.error());
   for (;;) {
     const Result<bool> more = statement->step();
@@ -450,7 +462,8 @@ Result<std::vector<Person>> JournalFile::people(std::vector<std::optional<Public
 
 Result<std::vector<std::string>> JournalFile::registers() {
   std::vector<std::string> names;
-  auto statement = database_.prepare("SELECT name FROM registers WHERE name NOT IN ('genesis', 'footer') ORDER BY name");
+  auto statement =
+      database_.prepare("SELECT name FROM registers WHERE name NOT IN ('genesis', 'footer') ORDER BY name");
   if (!statement) return tl::unexpected(statement.error());
   for (;;) {
     const Result<bool> more = statement->step();
@@ -515,8 +528,8 @@ Result<std::vector<SignedRows>> JournalFile::signed_rows() {
 }
 
 Result<void> JournalFile::add_signed_rows(const SignedRows& rows) {
-  auto statement = database_.prepare(
-      "INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
+  auto statement =
+      database_.prepare("INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
   const auto text_of = [](const auto& bytes) {
     return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
@@ -575,7 +588,8 @@ Inspection JournalFile::inspect(bool files) {
   else if (*pages != "ok")
     found.faults.push_back(file_.string() + " is damaged (" + *pages + ")" + std::string(kRemedy));
 
-  const Walk walked = walk(first_head(genesis_), RoomSeq{INT64_MAX}, [](const JournalRow&, const JournalHead&) { return true; });
+  const Walk walked =
+      walk(first_head(genesis_), RoomSeq{INT64_MAX}, [](const JournalRow&, const JournalHead&) { return true; });
   found.head = walked.head;
   if (walked.stopped) {
     found.first_bad = RoomSeq{walked.head.place.value + 1};
@@ -656,7 +670,8 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
     note(size.error());
   } else if (*size) {
     const auto why = disk_->read(failed_of(file_), 0, 4096);
-    found.faults.push_back(why && !why->empty() ? *why : file_.string() + " failed to be written" + std::string(kRemedy));
+    found.faults.push_back(why && !why->empty() ? *why
+                                                : file_.string() + " failed to be written" + std::string(kRemedy));
   }
   if (const auto all = people(); !all) note(all.error());
   if (const auto names = registers(); !names) {
@@ -705,7 +720,9 @@ Result<void> JournalFile::keep_log() {
         return signature ? add_signed_rows(*signature) : Result<void>{};
       })
       // Until the next generation begins it needs no log.
-      .and_then([&] { return set_register(kFooterRegister, encode_footer({head, true})); })
+      .and_then([&] {
+        return set_register(kFooterRegister, encode_footer({head, true}));
+      })
       .and_then([&] { return make_id(); })
       .and_then([&] { return database_.commit(); })
       .and_then([&] { return database_.carry_log(); })
@@ -720,8 +737,8 @@ Result<void> JournalFile::upgrade() {
 }
 
 Result<void> JournalFile::set_register(std::string_view name, std::string_view value) {
-  return add_register({std::string(name), std::string(value),
-                       make_seal(seal_of(name, value), first_head(genesis_).chain, key_)});
+  return add_register(
+      {std::string(name), std::string(value), make_seal(seal_of(name, value), first_head(genesis_).chain, key_)});
 }
 
 Result<void> JournalFile::add_register(const SealedRegister& copied) {
@@ -731,15 +748,17 @@ Result<void> JournalFile::add_register(const SealedRegister& copied) {
 }
 
 Result<void> JournalFile::note_generation(const LogStart& start) {
-  return set_register(kGenerationRegister, encode_number(start.generation))
-      .and_then([&] { return set_register(kFooterRegister, encode_footer({start.base, false})); });
+  return set_register(kGenerationRegister, encode_number(start.generation)).and_then([&] {
+    return set_register(kFooterRegister, encode_footer({start.base, false}));
+  });
 }
 
 Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {
-  auto statement = database_.prepare("INSERT INTO checkpoints(place, chain, meta, size, digest, seal) VALUES(?, ?, ?, ?, ?, ?)");
+  auto statement =
+      database_.prepare("INSERT INTO checkpoints(place, chain, meta, size, digest, seal) VALUES(?, ?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
-  const std::string seal = checkpoint.seal.empty() ? make_seal(seal_of(checkpoint), first_head(genesis_).chain, key_)
-                                                   : checkpoint.seal;
+  const std::string seal =
+      checkpoint.seal.empty() ? make_seal(seal_of(checkpoint), first_head(genesis_).chain, key_) : checkpoint.seal;
   return statement->integer(0, static_cast<std::int64_t>(checkpoint.at.place.value))
       .blob(1, as_text(checkpoint.at.chain))
       .blob(2, checkpoint.meta)
@@ -750,7 +769,8 @@ Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {
 }
 
 Result<void> JournalFile::add_person(const Person& person) {
-  auto statement = database_.prepare("INSERT OR REPLACE INTO people(pseudonym, label, joined_day, seal) VALUES(?, ?, ?, ?)");
+  auto statement =
+      database_.prepare("INSERT OR REPLACE INTO people(pseudonym, label, joined_day, seal) VALUES(?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
   const std::string seal = make_seal(seal_of(person), first_head(genesis_).chain, key_);
   return statement->text(0, person.pseudonym).text(1, person.label).integer(2, person.joined_day).blob(3, seal).run();

@@ -1,5 +1,5 @@
-// A journal's tables, as this and every older version of them is read: for the journal itself and for what checks, copies
-// and recovers one. Reading writes nothing.
+// A journal's tables, as this and every older version of them is read: for the journal itself and for what checks,
+// copies and recovers one. Reading writes nothing.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -24,20 +24,22 @@
 namespace osteon {
 
 // Files beside the journal's own, besides log_of() and mirror_of().
-[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);     // SQLite's write-ahead log
+[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);         // SQLite's write-ahead log
 [[nodiscard]] std::filesystem::path owner_file_of(const std::filesystem::path& journal);  // names who made it
 [[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more rows
 // Its name is a witness: of the place and the chain there.
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& journal, const JournalHead& at);
-[[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal, std::string_view name);
-// Whether a name in the journal's folder is of something that is still being written: the journal, its log, a checkpoint.
+[[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal,
+                                                               std::string_view name);
+// Whether a name in the journal's folder is of something that is still being written: the journal, its log, a
+// checkpoint.
 [[nodiscard]] bool is_partial_of(const std::filesystem::path& journal, std::string_view name);
 // Whether it is the journal itself or anything that was made beside it, also by earlier versions.
 [[nodiscard]] bool belongs_to(const std::filesystem::path& journal, std::string_view name);
 
-// Tells a file that cannot be a journal before anything is made beside it: one of another program, a folder, one that is cut
-// short. What SQLite has to judge, a first page that the log may still have, is well. Errors: not_found; invalid_input; those
-// of reading it.
+// Tells a file that cannot be a journal before anything is made beside it: one of another program, a folder, one that
+// is cut short. What SQLite has to judge, a first page that the log may still have, is well. Errors: not_found;
+// invalid_input; those of reading it.
 [[nodiscard]] Result<void> check_is_journal(const std::filesystem::path& file, Disk& disk);
 
 // What a file says of itself.
@@ -46,8 +48,8 @@ struct Inspection {
   std::vector<std::string> faults;   // one sentence each; none: sound
   std::optional<RoomSeq> first_bad;  // row
   bool closed_cleanly = false;
-  RoomSeq witnessed;                 // the furthest place that its log, a footer or a checkpoint vouches for
-  std::vector<std::string> notes;    // of its log: what one file lacks and the other has, a write that is not whole
+  RoomSeq witnessed;               // the furthest place that its log, a footer or a checkpoint vouches for
+  std::vector<std::string> notes;  // of its log: what one file lacks and the other has, a write that is not whole
 };
 
 // A register as it is stored.
@@ -76,13 +78,15 @@ class JournalFile {
                                          const DatabaseOptions& options);
   // Any version that this program reads. The rows of its log are taken into a transaction, which stays open. Error
   // invalid_input: no journal, or damaged beyond reading.
-  [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk, const DatabaseOptions& options);
+  [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk,
+                                                const DatabaseOptions& options);
   // Only to be read. Nothing is written beside it: what is not in its file yet is put together in a copy elsewhere.
   // Nobody may have it open for writing. Errors as of open().
   [[nodiscard]] static Result<JournalFile> open_to_read(const std::filesystem::path& file, Disk& disk);
 
-  // One that may be in use, as far as its log has been carried into the file: only to look for single things in it, since it
-  // may be written to at the same time. What it began as is always there, and held against its seal. Errors as of open().
+  // One that may be in use, as far as its log has been carried into the file: only to look for single things in it,
+  // since it may be written to at the same time. What it began as is always there, and held against its seal. Errors as
+  // of open().
   [[nodiscard]] static Result<JournalFile> peek(const std::filesystem::path& file, Disk& disk);
 
   [[nodiscard]] int version() const { return version_; }
@@ -107,7 +111,7 @@ class JournalFile {
   [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
   [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
   [[nodiscard]] Result<std::vector<Person>> people(std::vector<std::optional<PublicKey>>* signers = nullptr);
-  [[nodiscard]] Result<std::vector<std::string>> registers();           // their names, the journal's own not
+  [[nodiscard]] Result<std::vector<std::string>> registers();  // their names, the journal's own not
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
   [[nodiscard]] Result<std::optional<SealedRegister>> find_sealed(std::string_view name);
   // Who signed an entry that was read from here. None: nobody.

@@ -12,12 +12,12 @@
 namespace osteon {
 
 struct JournalOptions {
-  Disk* disk = nullptr;                                 // null: the computer's; must outlive the journal
+  Disk* disk = nullptr;  // null: the computer's; must outlive the journal
   std::size_t most_row_bytes = std::size_t{64} << 20;
-  std::uint64_t log_bytes = std::uint64_t{1} << 20;  // of each log file; what is beyond it goes into the database
-  int page_bytes = 4096;                                // of a new journal; not below the disk's sectors
-  bool durable = true;                                  // false, for tests only: no row is waited for
-  std::shared_ptr<const SigningKeys> keys = nullptr;    // that vouch for what is written; null: nobody does
+  std::uint64_t log_bytes = std::uint64_t{1} << 20;   // of each log file; what is beyond it goes into the database
+  int page_bytes = 4096;                              // of a new journal; not below the disk's sectors
+  bool durable = true;                                // false, for tests only: no row is waited for
+  std::shared_ptr<const SigningKeys> keys = nullptr;  // that vouch for what is written; null: nobody does
 };
 
 // The room as it was at one place, in a file of its own: opaque to the journal.
@@ -25,11 +25,12 @@ struct Checkpoint {
   JournalHead at;
   std::string meta;  // a few words of the owner's
   std::uint64_t size = 0;
-  Digest digest;     // SHA-256 of the file's bytes
+  Digest digest;          // SHA-256 of the file's bytes
   std::string seal = {};  // of the four above; empty: it is made when the checkpoint is added
 };
 
-// Who a pseudonym of the rows is. Apart from the chain, so that a person can be forgotten and the rows still be confirmed.
+// Who a pseudonym of the rows is. Apart from the chain, so that a person can be forgotten and the rows still be
+// confirmed.
 struct Person {
   std::string pseudonym;
   std::string label;

@@ -18,13 +18,13 @@ struct Journal::State {
   Disk* disk;
   std::unique_ptr<DiskLock> lock;  // let go last
   JournalFile file;
-  FileIdentity identity;           // of the file
+  FileIdentity identity;  // of the file
   JournalHead head = {};
   std::optional<MirroredLog> log = {};  // nothing: closed to rows since it was opened
-  std::uint64_t generation = 0;    // of the log
+  std::uint64_t generation = 0;         // of the log
   std::optional<RoomSeq> recovered_to = {};
   std::optional<Error> closed = {};
-  std::vector<std::string> notes = {};  // of when it was opened
+  std::vector<std::string> notes = {};            // of when it was opened
   std::optional<RoomSeq> signed_since = {};       // none: nothing is signed
   std::optional<SignedRows> last_signature = {};  // of the newest rows, until the database has it
   bool only_read = false;

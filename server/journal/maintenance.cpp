@@ -99,18 +99,24 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
       if (range.from <= from && to <= range.to && (by == nullptr || own.contains(range.key))) by = &range;
     if (by == nullptr) {
       auto& none = vouched.by_nobody;
-      if (!none.empty() && none.back().second.value + 1 == from.value) none.back().second = to;
-      else none.emplace_back(from, to);
+      if (!none.empty() && none.back().second.value + 1 == from.value)
+        none.back().second = to;
+      else
+        none.emplace_back(from, to);
     } else {
       auto& some = own.contains(by->key) ? vouched.rows : vouched.by_others;
-      if (!some.empty() && some.back().key == by->key && some.back().to.value + 1 == from.value) some.back().to = to;
-      else some.push_back({from, to, by->key});
+      if (!some.empty() && some.back().key == by->key && some.back().to.value + 1 == from.value)
+        some.back().to = to;
+      else
+        some.push_back({from, to, by->key});
     }
     from.value = end + 1;
   }
   for (const auto& [what, signer] : report.entries) {
-    if (signer && own.contains(*signer)) ++vouched.entries;
-    else vouched.other_entries.push_back(what);
+    if (signer && own.contains(*signer))
+      ++vouched.entries;
+    else
+      vouched.other_entries.push_back(what);
   }
   return vouched;
 }
@@ -137,9 +143,9 @@ struct JournalCopy::State {
   fs::path from, to, growing;
   Disk* disk;
   JournalFile* source;
-  std::string genesis;     // of the copy
-  JournalHead copied;      // as the source has it
-  JournalHead head;        // as the copy has it
+  std::string genesis;  // of the copy
+  JournalHead copied;   // as the source has it
+  JournalHead head;     // as the copy has it
   RoomSeq last;
   std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and nobody
   bool damaged = false;                               // what cannot be read is left out
@@ -158,11 +164,12 @@ struct JournalCopy::State {
 };
 
 struct JournalCopying {
-  static Result<JournalCopy> begin(const fs::path& from, JournalFile& source, RoomSeq last, const fs::path& to, Disk& disk) {
+  static Result<JournalCopy> begin(const fs::path& from, JournalFile& source, RoomSeq last, const fs::path& to,
+                                   Disk& disk) {
     if (Result<void> clear = check_nothing_left(disk, to); !clear) return tl::unexpected(clear.error());
     const std::string& genesis = source.genesis();
-    return JournalCopy(std::make_unique<JournalCopy::State>(
-        JournalCopy::State{from, to, growing_copy(to), &disk, &source, genesis, first_head(genesis), first_head(genesis), last}));
+    return JournalCopy(std::make_unique<JournalCopy::State>(JournalCopy::State{
+        from, to, growing_copy(to), &disk, &source, genesis, first_head(genesis), first_head(genesis), last}));
   }
 
   static JournalCopy::State& state(JournalCopy& copy) { return *copy.state_; }
@@ -233,8 +240,10 @@ struct JournalCopying {
             state.signed_rows.push_back(one);
       }
       auto people = state.source->people();
-      if (people) state.people = std::move(*people);
-      else if (Result<void> on = left_out(state, people.error()); !on) return on;
+      if (people)
+        state.people = std::move(*people);
+      else if (Result<void> on = left_out(state, people.error()); !on)
+        return on;
     }
     auto checkpoints = state.source->checkpoints();
     if (!checkpoints) return left_out(state, checkpoints.error());
@@ -273,8 +282,10 @@ struct JournalCopying {
     if (!std::exchange(state.put_beside, true))
       if (Result<void> put = put_beside(state); !put) return tl::unexpected(put.error());
     if (!state.checkpoints.empty()) {
-      if (Result<void> copied = copy_checkpoint(state, state.checkpoints.back()); copied) state.checkpoints.pop_back();
-      else state.no_checkpoint = copied.error();
+      if (Result<void> copied = copy_checkpoint(state, state.checkpoints.back()); copied)
+        state.checkpoints.pop_back();
+      else
+        state.no_checkpoint = copied.error();
       return false;
     }
     return finish(state).map([] { return true; });
@@ -325,7 +336,8 @@ struct JournalCopying {
     state.target.reset();
     for (const Checkpoint& checkpoint : *checkpoints) {
       if (!done) break;
-      done = state.disk->rename(checkpoint_file(state.growing, checkpoint.at), checkpoint_file(state.to, checkpoint.at));
+      done =
+          state.disk->rename(checkpoint_file(state.growing, checkpoint.at), checkpoint_file(state.to, checkpoint.at));
     }
     if (done) done = state.disk->rename(state.growing, state.to);  // last: what vouches for it is there
     if (done) done = state.disk->sync_folder(folder_of(state.to));
@@ -426,7 +438,8 @@ Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk)
   const RoomSeq before{head.place.value - 1};
   const auto chain = peeked->chain_at(before);
   if (!chain || !*chain) return tl::unexpected(source.error());
-  const Walk walked = peeked->walk({before, **chain}, head.place, [](const JournalRow&, const JournalHead&) { return true; });
+  const Walk walked =
+      peeked->walk({before, **chain}, head.place, [](const JournalRow&, const JournalHead&) { return true; });
   if (walked.stopped || walked.head.place != head.place) return tl::unexpected(source.error());
   return walked.head == head;
 }
@@ -457,8 +470,8 @@ Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
     all.push_back(std::move(doomed));
   }
   for (Doomed& doomed : all) {
-    // The file itself first, and for good: without its log it would be a shorter journal, which nothing contradicts once the
-    // checkpoints are gone, while a log without its file is nothing.
+    // The file itself first, and for good: without its log it would be a shorter journal, which nothing contradicts
+    // once the checkpoints are gone, while a log without its file is nothing.
     const fs::path folder = folder_of(doomed.file);
     Result<void> done = disk.remove(doomed.file).and_then([&] { return disk.sync_folder(folder); });
     for (const fs::path& other : doomed.others)

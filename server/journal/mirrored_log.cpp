@@ -107,13 +107,13 @@ std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes
 // What one of the two files holds.
 struct FoundFile {
   fs::path path;
-  std::string unreadable;         // why nothing of it counts; empty: its start is sound
+  std::string unreadable;  // why nothing of it counts; empty: its start is sound
   LogStart start;
   std::vector<Entry> entries;
   bool is_there = false;
-  bool damaged = false;           // something that cannot be read lies between entries
-  bool is_cut = false;            // shorter than it was made
-  bool ends_in_part = false;      // of an entry
+  bool damaged = false;       // something that cannot be read lies between entries
+  bool is_cut = false;        // shorter than it was made
+  bool ends_in_part = false;  // of an entry
   [[nodiscard]] RoomSeq last() const { return entries.empty() ? start.base.place : entries.back().head.place; }
 };
 
@@ -230,8 +230,7 @@ void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents
   if (log.is_cut) return note(log, mirror, "was cut");
   if (mirror.is_cut) return note(mirror, log, "was cut");
   for (const FoundFile* file : {&log, &mirror})
-    if (file->ends_in_part)
-      found.notes.push_back(file->path.string() + " ends in a write that is not whole");
+    if (file->ends_in_part) found.notes.push_back(file->path.string() + " ends in a write that is not whole");
   if (mirror.start.generation > log.start.generation) return;
   if (log.damaged || log.last() < mirror.last() || lacks_rows(log, mirror)) note(log, mirror, "is damaged");
   const bool one_behind = !log.entries.empty() && mirror.last().value + 1 == log.entries.back().first;
@@ -292,9 +291,9 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
   if (is_lost(log) != is_lost(mirror))
     found.doubtful = cut_short(is_lost(log) ? mirror : log);
   else
-    found.doubtful = log.unreadable.empty() && log.start.generation == mirror.start.generation &&
-                     ((log.ends_in_part && mirror.last() < log.last()) ||
-                      (mirror.ends_in_part && log.last() <= mirror.last()));
+    found.doubtful =
+        log.unreadable.empty() && log.start.generation == mirror.start.generation &&
+        ((log.ends_in_part && mirror.last() < log.last()) || (mirror.ends_in_part && log.last() <= mirror.last()));
   return found;
 }
 
@@ -352,9 +351,9 @@ Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
   member.end = kFirstSector;
   member.is_signed = start.signer.has_value();
   const std::string first = encode_start(start, member.salt, capacity_);
-  return check_named(member)
-      .and_then([&] { return member.file->write_at(0, first); })
-      .and_then([&] { return sync(member); });
+  return check_named(member).and_then([&] { return member.file->write_at(0, first); }).and_then([&] {
+    return sync(member);
+  });
 }
 
 Result<void> MirroredLog::begin_mirror(const LogStart& start) { return begin(mirror_, start); }
@@ -368,8 +367,8 @@ Result<void> MirroredLog::append(std::span<const JournalRow> rows, const Journal
     OSTEON_CHECK(signature.has_value() == member->is_signed);
     const std::string entry = encode_entry(rows, head, signature, member->salt);
     if (Result<void> named = check_named(*member); !named) return named;
-    const Result<void> put = durable_ ? member->file->write_durably(member->end, entry)
-                                      : member->file->write_at(member->end, entry);
+    const Result<void> put =
+        durable_ ? member->file->write_durably(member->end, entry) : member->file->write_at(member->end, entry);
     if (!put) return put;
     member->end += entry.size();
     member->written = std::max(member->written, member->end);

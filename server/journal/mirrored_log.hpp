@@ -35,12 +35,12 @@ struct LogStart {
 
 // What both files together hold.
 struct LogContents {
-  std::uint64_t generation = 0;      // the newest that either file is of; 0: neither can be read
-  std::vector<JournalRow> rows;      // after the head that was asked for
-  JournalHead head;                  // of the last of them
+  std::uint64_t generation = 0;         // the newest that either file is of; 0: neither can be read
+  std::vector<JournalRow> rows;         // after the head that was asked for
+  JournalHead head;                     // of the last of them
   std::optional<SignedRows> signature;  // of the entry that leads to head; may be anything
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // what each file goes on from
-  RoomSeq witnessed;                 // the furthest place that either file knows
+  RoomSeq witnessed;                                                 // the furthest place that either file knows
   std::vector<std::string>
       notes;  // what one file lacks and the other has, a write that is not whole; one sentence each
   std::vector<std::string> foreign;  // files of another journal; one sentence each

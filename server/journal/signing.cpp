@@ -140,8 +140,10 @@ class Draft {
     while (!content.empty() && reason == 0) {
       const ssize_t put = ::write(fd, content.data(), content.size());
       if (put < 0 && errno == EINTR) continue;
-      if (put < 0) reason = errno;
-      else content.remove_prefix(static_cast<std::size_t>(put));
+      if (put < 0)
+        reason = errno;
+      else
+        content.remove_prefix(static_cast<std::size_t>(put));
     }
     if (reason == 0 && ::fsync(fd) != 0) reason = errno;
     ::close(fd);

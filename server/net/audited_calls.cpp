@@ -251,7 +251,8 @@ std::string_view call_name(std::string_view method) {
 
 bool is_audited(std::string_view method) { return find_row(method) != nullptr; }
 
-std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(AuditTrail& trail, Authorizer* authorizer) {
+std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(AuditTrail& trail,
+                                                                                     Authorizer* authorizer) {
   return std::make_unique<AuditedCalls>(trail, authorizer);
 }
 

@@ -19,9 +19,9 @@ class Authorizer;
 // and what takes data out of the server or brings it in. Cutting and drawing are in the room's journal, and not here.
 [[nodiscard]] bool is_audited(std::string_view method);
 
-// Records those, and of all other calls those that a handler refuses; the authorizer records what it refuses itself. `authorizer`
-// says whose a call is; null: plain text. Both outlive the server.
-[[nodiscard]] std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(AuditTrail& trail,
-                                                                                                   Authorizer* authorizer);
+// Records those, and of all other calls those that a handler refuses; the authorizer records what it refuses itself.
+// `authorizer` says whose a call is; null: plain text. Both outlive the server.
+[[nodiscard]] std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(
+    AuditTrail& trail, Authorizer* authorizer);
 
 }  // namespace osteon

@@ -50,7 +50,9 @@ std::string article(Role role) {
   return (std::string_view("aeiou").find(name.front()) == std::string_view::npos ? "a " : "an ") + name;
 }
 
-std::string changed_role(Role role) { return "your role has changed to " + std::string(to_string(role)) + "; join anew"; }
+std::string changed_role(Role role) {
+  return "your role has changed to " + std::string(to_string(role)) + "; join anew";
+}
 
 template <class Map>
 void make_space(Map& map) {
@@ -83,7 +85,13 @@ class HandshakeCheck final : public grpc::experimental::ExternalCertificateVerif
 class Authorizer::Watched final : public OpenStream {
  public:
   Watched(Authorizer& authorizer, Caller who, std::string in, AuthorId as, std::string_view what, End when)
-      : caller(std::move(who)), room(std::move(in)), author(as), method(what), authorizer_(authorizer), end_(std::move(when)), role_(caller.role) {}
+      : caller(std::move(who)),
+        room(std::move(in)),
+        author(as),
+        method(what),
+        authorizer_(authorizer),
+        end_(std::move(when)),
+        role_(caller.role) {}
   ~Watched() override {
     const std::lock_guard lock(authorizer_.mutex_);
     authorizer_.streams_.remove_if([](const std::weak_ptr<Watched>& stream) { return stream.expired(); });
@@ -125,14 +133,15 @@ Authorizer::~Authorizer() {
   thread_.join();
 }
 
-Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path& folder, RefusalCounts& counts, Now now) {
+Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path& folder, RefusalCounts& counts,
+                                                     Now now) {
   const Result<std::string> authority = read_all(folder / "ca.pem"), certificate = read_all(folder / "server.pem"),
                             secret = read_all(folder / "server.key");
   for (const auto* file : {&authority, &certificate, &secret})
     if (!*file) return tl::unexpected(file->error());
   if (const Result<void> pair = check_key_pair(*certificate, *secret); !pair)
-    return failure(ErrorCode::invalid_input, (folder / "server.pem").string() + " and server.key: " + pair.error().message +
-                                                 "; make both anew with deploy/certs server");
+    return failure(ErrorCode::invalid_input, (folder / "server.pem").string() + " and server.key: " +
+                                                 pair.error().message + "; make both anew with deploy/certs server");
   warn_of_readable_secrets(folder);
   std::unique_ptr<Authorizer> authorizer(new Authorizer(folder, counts, std::move(now)));
   if (const Result<bool> read = authorizer->read_ticket_keys(); !read) return tl::unexpected(read.error());
@@ -147,7 +156,8 @@ Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path
 std::shared_ptr<grpc::ServerCredentials> Authorizer::credentials() {
   // Read again while the server runs; a renewed certificate disturbs nobody who is in.
   const auto files = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(  // shared with gRPC
-      (folder_ / "server.key").string(), (folder_ / "server.pem").string(), (folder_ / "ca.pem").string(), kCertificatesEverySeconds);
+      (folder_ / "server.key").string(), (folder_ / "server.pem").string(), (folder_ / "ca.pem").string(),
+      kCertificatesEverySeconds);
   grpc::experimental::TlsServerCredentialsOptions options(files);
   options.watch_root_certs();
   options.watch_identity_key_cert_pairs();
@@ -256,7 +266,8 @@ Result<Authorizer::CheckedTicket> Authorizer::ticket_of(std::string_view text) {
 
 std::optional<Refusal> Authorizer::judge_again(Caller& caller, const std::string& room, std::string_view method) const {
   const UnixTime now = now_();
-  if (now >= caller.certificate_ends) return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
+  if (now >= caller.certificate_ends)
+    return Refusal{"certificate", false, "the certificate has expired; ask for a new one"};
   if (const auto why = revoked(caller.serial, caller.user, caller.ticket_id)) return Refusal{"revoked", false, *why};
   if (std::ranges::find(ticket_keys_, caller.ticket_key) == ticket_keys_.end())
     return Refusal{"ticket", false,
@@ -268,12 +279,13 @@ std::optional<Refusal> Authorizer::judge_again(Caller& caller, const std::string
   caller.role = access_list_.role(caller.user, room, caller.ticket_role);
   if (method.empty() || may_call(caller.role, method)) return {};
   if (!find_call(method)) return Refusal{"call", true, "this server has no such call"};
-  return Refusal{"role", true, article(caller.role) + " may not call " + std::string(call_name(method)) +
-                                   "; ask whoever runs the server for a ticket of another role"};
+  return Refusal{"role", true,
+                 article(caller.role) + " may not call " + std::string(call_name(method)) +
+                     "; ask whoever runs the server for a ticket of another role"};
 }
 
 std::optional<std::string> Authorizer::revoked(const std::string& serial, const std::string& user,
-                                         const std::string& ticket_id) const {
+                                               const std::string& ticket_id) const {
   if (listed_serials_.contains(serial)) return "the certificate was revoked; ask for a new one";
   return access_list_.refuses(serial, user, ticket_id);
 }
@@ -299,9 +311,12 @@ tl::expected<Caller, Refusal> Authorizer::judge(const CallClaims& call) {
   if (const Result<void> short_enough = check_life(*ticket, now_(), most_ticket_life_); !short_enough)
     return refused("ticket", false, short_enough.error().message);
   if (ticket->user != certificate->user)
-    return refused("person", true, "the ticket is for " + ticket->user + " and the certificate for " + certificate->user + "; come with your own");
+    return refused(
+        "person", true,
+        "the ticket is for " + ticket->user + " and the certificate for " + certificate->user + "; come with your own");
   if (!call.room.empty())
-    if (const Result<void> here = check_room(*ticket, call.room); !here) return refused("room", true, here.error().message);
+    if (const Result<void> here = check_room(*ticket, call.room); !here)
+      return refused("room", true, here.error().message);
   Caller caller{.user = certificate->user,
                 .serial = certificate->serial,
                 .ticket_id = to_hex(ticket->id),
@@ -315,7 +330,8 @@ tl::expected<Caller, Refusal> Authorizer::judge(const CallClaims& call) {
   // A role may hold in one room alone: that room has to be known here, however the call names it.
   std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
   if (room == kAnyRoom && only_room_) room = only_room_();
-  if (std::optional<Refusal> refusal = judge_again(caller, room, call.method)) return tl::unexpected(std::move(*refusal));
+  if (std::optional<Refusal> refusal = judge_again(caller, room, call.method))
+    return tl::unexpected(std::move(*refusal));
   caller.room = std::move(room);
   return caller;
 }
@@ -374,18 +390,22 @@ Result<void> Authorizer::check_resume(const Caller& caller, const std::string& r
   return check_resume_locked(caller, room, kind, author);
 }
 
-Result<void> Authorizer::check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
+Result<void> Authorizer::check_resume_locked(const Caller& caller, const std::string& room, int kind,
+                                             AuthorId author) const {
   const Seat seat{room, caller.user, kind};
   if (const auto known = authors_.find({room, author}); known != authors_.end()) {
-    if (known->second.seat != seat) return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is another person's; join anew");
+    if (known->second.seat != seat)
+      return failure(ErrorCode::denied, "author " + std::to_string(author.value) + " is another person's; join anew");
     if (known->second.role != caller.role) return failure(ErrorCode::denied, changed_role(caller.role));
   }
   if (const auto taken = seats_.find(seat); taken != seats_.end() && taken->second != author)
-    return failure(ErrorCode::denied, "a newer session of " + caller.user + " took the place of this one; join anew to take it back");
+    return failure(ErrorCode::denied,
+                   "a newer session of " + caller.user + " took the place of this one; join anew to take it back");
   return {};
 }
 
-Result<void> Authorizer::joined(const Caller& caller, const std::string& room, int kind, AuthorId author, Coming coming) {
+Result<void> Authorizer::joined(const Caller& caller, const std::string& room, int kind, AuthorId author,
+                                Coming coming) {
   std::vector<std::shared_ptr<Watched>> held, displaced;  // let go of without the lock, which their end takes
   {
     const std::lock_guard lock(mutex_);
@@ -422,7 +442,8 @@ std::optional<Refusal> Authorizer::judge_author(const Caller& caller, const std:
 
 Result<void> Authorizer::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
   const std::lock_guard lock(mutex_);
-  if (const std::optional<Refusal> why = judge_author(caller, room, author)) return failure(ErrorCode::denied, why->sentence);
+  if (const std::optional<Refusal> why = judge_author(caller, room, author))
+    return failure(ErrorCode::denied, why->sentence);
   return {};
 }
 
@@ -432,11 +453,14 @@ void Authorizer::forget_room(const std::string& room) {
   std::erase_if(authors_, [&](const auto& author) { return author.first.first == room; });
 }
 
-Authorizer::Entered Authorizer::enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end) {
-  auto stream = std::make_shared<Watched>(*this, caller, room, author, method, std::move(end));  // shared with look() while it ends it
+Authorizer::Entered Authorizer::enter(const Caller& caller, const std::string& room, AuthorId author,
+                                      std::string_view method, End end) {
+  auto stream = std::make_shared<Watched>(*this, caller, room, author, method,
+                                          std::move(end));  // shared with look() while it ends it
   const std::lock_guard lock(mutex_);
   std::optional<Refusal> refusal = judge_again(stream->caller, room, method);
-  if (!refusal && stream->caller.role != caller.role) refusal = Refusal{"role", true, changed_role(stream->caller.role)};
+  if (!refusal && stream->caller.role != caller.role)
+    refusal = Refusal{"role", true, changed_role(stream->caller.role)};
   if (!refusal && author) refusal = judge_author(caller, room, author);
   if (refusal) return tl::unexpected(std::move(*refusal));
   streams_.push_back(stream);

@@ -13,10 +13,10 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <thread>
-#include <set>
 #include <tuple>
 #include <unordered_map>
 #include <vector>
@@ -44,22 +44,22 @@ class AuditTrail;
 struct Caller {
   std::string user;  // of the certificate
   std::string serial, ticket_id;
-  std::string ticket_room;           // of the ticket; kAnyRoom: of every room
-  Role ticket_role = Role::none;     // of the ticket
-  Role role = Role::none;            // what holds now
-  UnixTime ends{};                   // of the ticket
-  TicketCheckKey ticket_key{};       // that checks the ticket
+  std::string ticket_room;        // of the ticket; kAnyRoom: of every room
+  Role ticket_role = Role::none;  // of the ticket
+  Role role = Role::none;         // what holds now
+  UnixTime ends{};                // of the ticket
+  TicketCheckKey ticket_key{};    // that checks the ticket
   UnixTime certificate_ends{};
-  std::string room{};                // that the call named or meant, where the role holds
-  std::string address{};             // from where the call came, as address_of() has it
+  std::string room{};     // that the call named or meant, where the role holds
+  std::string address{};  // from where the call came, as address_of() has it
 };
 
 // Why somebody was not.
 struct Refusal {
-  std::string_view reason;    // a fixed word, for counting
-  bool is_known = false;      // it is clear who it is, but that person may not do this
-  std::string sentence;       // for the caller
-  bool is_for_now = false;    // the same call may be made later
+  std::string_view reason;  // a fixed word, for counting
+  bool is_known = false;    // it is clear who it is, but that person may not do this
+  std::string sentence;     // for the caller
+  bool is_for_now = false;  // the same call may be made later
 };
 
 // What is looked at of a call.
@@ -79,7 +79,7 @@ class OpenStream {
 
 struct AuthorizerCounts {
   std::uint64_t admitted = 0, refused = 0, ended = 0, displaced = 0;  // calls, calls, streams, sessions
-  std::size_t streams = 0;                                           // open now
+  std::size_t streams = 0;                                            // open now
 };
 
 // Any thread.
@@ -91,18 +91,21 @@ class Authorizer {
   // `folder`: ca.pem, server.pem, server.key, tickets.pub; access.txt and crl.pem where somebody was revoked. All are
   // read again when they change. `counts` outlives it. Errors: not_found, invalid_input; the sentence
   // names the file.
-  [[nodiscard]] static Result<std::unique_ptr<Authorizer>> open(const std::filesystem::path& folder, RefusalCounts& counts, Now now = {});
+  [[nodiscard]] static Result<std::unique_ptr<Authorizer>> open(const std::filesystem::path& folder,
+                                                                RefusalCounts& counts, Now now = {});
   ~Authorizer();
   Authorizer(const Authorizer&) = delete;
   Authorizer& operator=(const Authorizer&) = delete;
 
-  // Which room a call is to that names none, with a ticket for every room; empty: there is no such. Before the first call.
+  // Which room a call is to that names none, with a ticket for every room; empty: there is no such. Before the first
+  // call.
   void set_only_room(std::function<std::string()> name) { only_room_ = std::move(name); }
 
   // Tickets that are good for longer, counted from now, are refused; zero: none is. Before the first call.
   void set_most_ticket_life(std::chrono::hours most) { most_ticket_life_ = most; }
 
-  // Through which connections are closed whose certificate is revoked; they outlive the authorizer. Before the first call.
+  // Through which connections are closed whose certificate is revoked; they outlive the authorizer. Before the first
+  // call.
   void set_connections(Connections& connections) { connections_ = &connections; }
 
   // Takes down every refusal; it outlives the authorizer. Before the first call.
@@ -129,24 +132,27 @@ class Authorizer {
   static constexpr std::chrono::seconds kPause{60};
   void note_flood(const PeerClaims& peer);
 
-  // Who may be who in a room. `kind`: of client. Errors denied: the identity is another person's or of another role, or a newer
-  // one of the same person took its place.
-  [[nodiscard]] Result<void> check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
-  // From now on this identity is the caller's. An earlier one of the same person, room and kind is nobody's, and its streams end.
-  // Who comes `again` is checked as above in one step with it, and changes nothing where that fails: a newer one may have come
-  // since it was asked.
+  // Who may be who in a room. `kind`: of client. Errors denied: the identity is another person's or of another role, or
+  // a newer one of the same person took its place.
+  [[nodiscard]] Result<void> check_resume(const Caller& caller, const std::string& room, int kind,
+                                          AuthorId author) const;
+  // From now on this identity is the caller's. An earlier one of the same person, room and kind is nobody's, and its
+  // streams end. Who comes `again` is checked as above in one step with it, and changes nothing where that fails: a
+  // newer one may have come since it was asked.
   enum class Coming { anew, again };
-  Result<void> joined(const Caller& caller, const std::string& room, int kind, AuthorId author, Coming coming = Coming::anew);
+  Result<void> joined(const Caller& caller, const std::string& room, int kind, AuthorId author,
+                      Coming coming = Coming::anew);
   [[nodiscard]] Result<void> check_author(const Caller& caller, const std::string& room, AuthorId author) const;
   // A room that is closed: its identities mean nothing any more.
   void forget_room(const std::string& room);
 
-  // Looks again who it is, and as whom (`author` null: as nobody), in one step with the beginning: whose right ends meanwhile
-  // is refused here or hears of it. `end` is called once, on a thread of the authorizer's own, when the caller may have the stream no
-  // more; not after the result has been destroyed, except while that happens.
+  // Looks again who it is, and as whom (`author` null: as nobody), in one step with the beginning: whose right ends
+  // meanwhile is refused here or hears of it. `end` is called once, on a thread of the authorizer's own, when the
+  // caller may have the stream no more; not after the result has been destroyed, except while that happens.
   using End = std::function<void(const Refusal& why)>;
   using Entered = tl::expected<std::shared_ptr<OpenStream>, Refusal>;
-  [[nodiscard]] Entered enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method, End end);
+  [[nodiscard]] Entered enter(const Caller& caller, const std::string& room, AuthorId author, std::string_view method,
+                              End end);
   // What a caller would be in another room than that of the call, if the ticket were for it.
   [[nodiscard]] Role role_in(const Caller& caller, const std::string& room) const;
   [[nodiscard]] AuthorizerCounts counts() const;
@@ -165,9 +171,12 @@ class Authorizer {
                                                    const std::string& ticket_id) const;  // under mutex_
   [[nodiscard]] bool is_paused(const std::string& user) const;                           // under mutex_
   // Under mutex_. What changes while somebody is in: revocations, ends and roles. Sets the role that holds.
-  [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room, std::string_view method) const;
-  [[nodiscard]] std::optional<Refusal> judge_author(const Caller& caller, const std::string& room, AuthorId author) const;
-  [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind, AuthorId author) const;
+  [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room,
+                                                   std::string_view method) const;
+  [[nodiscard]] std::optional<Refusal> judge_author(const Caller& caller, const std::string& room,
+                                                    AuthorId author) const;
+  [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind,
+                                                 AuthorId author) const;
   [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next three
   [[nodiscard]] Result<void> check_shown(const PeerClaims& peer);
   struct CheckedTicket {
@@ -184,12 +193,12 @@ class Authorizer {
   const Now now_;
   std::function<std::string()> only_room_;
   std::chrono::hours most_ticket_life_{0};
-  Connections* connections_ = nullptr;  // null: of a authorizer without a server
-  AuditTrail* trail_ = nullptr;         // null: nothing is taken down
-  std::mutex reading_;         // taken before mutex_, never within it
-  AccessFile access_;          // under reading_, as the next
+  Connections* connections_ = nullptr;                         // null: of a authorizer without a server
+  AuditTrail* trail_ = nullptr;                                // null: nothing is taken down
+  std::mutex reading_;                                         // taken before mutex_, never within it
+  AccessFile access_;                                          // under reading_, as the next
   std::string access_fault_, authorities_fault_, keys_fault_;  // that was logged last
-  std::atomic<bool> revoked_anew_ = false;  // at the last look
+  std::atomic<bool> revoked_anew_ = false;                     // at the last look
   mutable std::mutex mutex_;
   AccessList access_list_;
   std::vector<TicketCheckKey> ticket_keys_;
@@ -197,10 +206,10 @@ class Authorizer {
   std::set<std::string> listed_serials_;            // on the revocation lists
   std::set<std::string> checked_;  // certificates in PEM that a proxy showed and these authorities signed
   std::map<std::string, std::chrono::steady_clock::time_point> paused_;  // until when, by user
-  std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
+  std::unordered_map<std::string, PersonCertificate> certificates_;      // by PEM, of those seen lately
   CallRates rates_;
-  std::unordered_map<std::string, CheckedTicket> tickets_;     // by text, of those seen lately
-  using Seat = std::tuple<std::string, std::string, int>;      // room, user, kind
+  std::unordered_map<std::string, CheckedTicket> tickets_;  // by text, of those seen lately
+  using Seat = std::tuple<std::string, std::string, int>;   // room, user, kind
   std::map<Seat, AuthorId> seats_;
   struct Member {
     Seat seat;

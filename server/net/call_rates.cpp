@@ -6,7 +6,8 @@
 namespace osteon {
 namespace {
 
-// Programs come again by themselves, over a bad line a few times a second. Each joining stays in the room's memory and journal.
+// Programs come again by themselves, over a bad line a few times a second. Each joining stays in the room's memory and
+// journal.
 constexpr CallRate kComing{4.0, 60.0};
 // Each is a row of the journal, which everybody in the room is told.
 constexpr CallRate kSaying{5.0, 40.0};
@@ -20,26 +21,16 @@ struct Row {
   CallRate rate;
 };
 constexpr std::array kRates{
-    Row{"/osteon.v1.RoomService/Join", kComing},
-    Row{"/osteon.v1.CuttingService/Session", kComing},
-    Row{"/osteon.v1.WatchService/WatchMesh", kComing},
-    Row{"/osteon.v1.WatchService/WatchCutting", kComing},
-    Row{"/osteon.v1.PeopleService/WatchPeople", kComing},
-    Row{"/osteon.v1.RoomService/Mark", kSaying},
-    Row{"/osteon.v1.PeopleService/Say", kSaying},
-    Row{"/osteon.v1.PeopleService/Annotate", kChanging},
-    Row{"/osteon.v1.PeopleService/Supervise", kChanging},
-    Row{"/osteon.v1.PeopleService/Demonstrate", kSaying},
-    Row{"/osteon.v1.RoomService/AddTool", kChanging},
-    Row{"/osteon.v1.RoomService/Undo", kChanging},
-    Row{"/osteon.v1.RoomService/Redo", kChanging},
-    Row{"/osteon.v1.RoomService/RemoveBody", kChanging},
-    Row{"/osteon.v1.RoomService/SetSceneItem", kChanging},
-    Row{"/osteon.v1.RoomService/RemoveSceneItem", kChanging},
-    Row{"/osteon.v1.RoomService/SaveFields", kSaying},
-    Row{"/osteon.v1.RoomService/GetStatus", kLookingUp},
-    Row{"/osteon.v1.RoomService/GetCase", kComing},
-    Row{"/osteon.v1.RoomsService/BranchRoom", kSaying},
+    Row{"/osteon.v1.RoomService/Join", kComing},           Row{"/osteon.v1.CuttingService/Session", kComing},
+    Row{"/osteon.v1.WatchService/WatchMesh", kComing},     Row{"/osteon.v1.WatchService/WatchCutting", kComing},
+    Row{"/osteon.v1.PeopleService/WatchPeople", kComing},  Row{"/osteon.v1.RoomService/Mark", kSaying},
+    Row{"/osteon.v1.PeopleService/Say", kSaying},          Row{"/osteon.v1.PeopleService/Annotate", kChanging},
+    Row{"/osteon.v1.PeopleService/Supervise", kChanging},  Row{"/osteon.v1.PeopleService/Demonstrate", kSaying},
+    Row{"/osteon.v1.RoomService/AddTool", kChanging},      Row{"/osteon.v1.RoomService/Undo", kChanging},
+    Row{"/osteon.v1.RoomService/Redo", kChanging},         Row{"/osteon.v1.RoomService/RemoveBody", kChanging},
+    Row{"/osteon.v1.RoomService/SetSceneItem", kChanging}, Row{"/osteon.v1.RoomService/RemoveSceneItem", kChanging},
+    Row{"/osteon.v1.RoomService/SaveFields", kSaying},     Row{"/osteon.v1.RoomService/GetStatus", kLookingUp},
+    Row{"/osteon.v1.RoomService/GetCase", kComing},        Row{"/osteon.v1.RoomsService/BranchRoom", kSaying},
     Row{"/osteon.v1.RoomsService/ReplayRoom", kSaying},
 };
 

@@ -1,5 +1,5 @@
-// How often one person may make a call: more often than anybody does by hand, and less than what would fill a journal or the
-// queues of a room.
+// How often one person may make a call: more often than anybody does by hand, and less than what would fill a journal
+// or the queues of a room.
 #pragma once
 #include <chrono>
 #include <cstddef>

@@ -38,8 +38,8 @@ inline bool is_known_header(std::string_view name, bool by_proxy) {
   return std::ranges::find(kKnown, name) != kKnown.end();
 }
 
-inline tl::expected<Caller, Refusal> judged(Authorizer& authorizer, const grpc::CallbackServerContext& context, const std::string& room,
-                                            std::string_view method) {
+inline tl::expected<Caller, Refusal> judged(Authorizer& authorizer, const grpc::CallbackServerContext& context,
+                                            const std::string& room, std::string_view method) {
   const PeerClaims peer = peer_claims(context);
   const std::string ticket = metadata_of(context, "osteon-ticket").value_or("");
   return authorizer.judge({.peer = peer, .ticket = ticket, .room = room, .method = method});
@@ -58,9 +58,7 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
                         .room = room ? std::string_view(*room) : std::string_view(),
                         .method = method};
   // Tells programs the reason, and refused_call_notes() that it was noted.
-  const auto tell = [&](std::string_view reason) {
-    context.AddTrailingMetadata(kRefusalTrailer, std::string(reason));
-  };
+  const auto tell = [&](std::string_view reason) { context.AddTrailingMetadata(kRefusalTrailer, std::string(reason)); };
   const auto wrong = [&](std::string sentence) {
     tell("request");
     rooms.authorizer->note_refused("request", sentence, call);
@@ -68,7 +66,8 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
   };
   for (const auto& [key, value] : context.client_metadata())
     if (!is_known_header({key.data(), key.size()}, peer.by_proxy))
-      return wrong("the call has a header that this server does not know; leave out " + std::string(key.data(), key.size()));
+      return wrong("the call has a header that this server does not know; leave out " +
+                   std::string(key.data(), key.size()));
   if (!room || !ticket) return wrong("the call says twice which ticket or room is meant");
   const auto caller = rooms.authorizer->admit(call);
   if (caller) return {};
@@ -104,8 +103,8 @@ bool admitted(const Rooms& rooms, grpc::CallbackServerContext& context, grpc::Se
   return !refusal;
 }
 
-// Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the caller's
-// right has ended since the call was let in.
+// Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the
+// caller's right has ended since the call was let in.
 inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerContext& context) {
   if (!rooms.authorizer) return Caller{};
   auto caller = judged(*rooms.authorizer, context, metadata_of(context, "osteon-room-bin").value_or(""), {});
@@ -113,8 +112,9 @@ inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerCo
   return std::move(*caller);
 }
 
-// The same, as whoever they are in `room`, which has a name: of a call whose message names rooms. They need not be the metadata's,
-// by which it was let in. Error denied: the ticket is not for that room, or the role there may not make the call `method`.
+// The same, as whoever they are in `room`, which has a name: of a call whose message names rooms. They need not be the
+// metadata's, by which it was let in. Error denied: the ticket is not for that room, or the role there may not make the
+// call `method`.
 inline Result<Caller> caller_in(const Rooms& rooms, const grpc::CallbackServerContext& context, const std::string& room,
                                 std::string_view method) {
   if (!rooms.authorizer) return Caller{};
@@ -133,12 +133,14 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
 }
 
 // The same, of a call that is made as `author`. Error denied: that is not who calls.
-inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context, AuthorId author) {
+inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context,
+                                                     AuthorId author) {
   Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context);
   if (!room || !rooms.authorizer) return room;
   const Result<Caller> caller = caller_of(rooms, context);
   if (!caller) return tl::unexpected(caller.error());
-  if (const Result<void> own = rooms.authorizer->check_author(*caller, (*room)->name, author); !own) return tl::unexpected(own.error());
+  if (const Result<void> own = rooms.authorizer->check_author(*caller, (*room)->name, author); !own)
+    return tl::unexpected(own.error());
   return room;
 }
 
@@ -147,14 +149,21 @@ inline Status status_of(const Error& error) {
   if (without_paths(error.message) != error.message) log::warn("a call failed", {{"reason", error.message}});
   std::string said = short_words(error.message);
   switch (error.code) {
-    case ErrorCode::invalid_input: return invalid(std::move(said));
-    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, std::move(said)};
-    case ErrorCode::denied: return {StatusCode::PERMISSION_DENIED, std::move(said)};
-    case ErrorCode::exhausted: return {StatusCode::RESOURCE_EXHAUSTED, std::move(said)};
-    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, std::move(said)};
+    case ErrorCode::invalid_input:
+      return invalid(std::move(said));
+    case ErrorCode::not_found:
+      return {StatusCode::NOT_FOUND, std::move(said)};
+    case ErrorCode::denied:
+      return {StatusCode::PERMISSION_DENIED, std::move(said)};
+    case ErrorCode::exhausted:
+      return {StatusCode::RESOURCE_EXHAUSTED, std::move(said)};
+    case ErrorCode::exists:
+      return {StatusCode::ALREADY_EXISTS, std::move(said)};
     case ErrorCode::unavailable:
-    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, std::move(said)};
-    default: return {StatusCode::INTERNAL, std::move(said)};
+    case ErrorCode::unsupported:
+      return {StatusCode::FAILED_PRECONDITION, std::move(said)};
+    default:
+      return {StatusCode::INTERNAL, std::move(said)};
   }
 }
 

@@ -8,7 +8,8 @@ namespace osteon {
 void CaseCache::keep(ServedCase served) {
   const auto bone = std::make_shared<const Case>(std::move(served.bone));  // shared with its rooms
   const std::lock_guard lock(mutex_);
-  entries_[bone->hash()] = {{bone->hash(), bone->info().title, std::move(served.folder), bone->memory_bytes()}, bone, bone};
+  entries_[bone->hash()] = {
+      {bone->hash(), bone->info().title, std::move(served.folder), bone->memory_bytes()}, bone, bone};
 }
 
 void CaseCache::add(KnownCase known) {
@@ -46,10 +47,11 @@ Result<void> CaseCache::check_space(const KnownCase& known, std::uint64_t bytes)
   const std::uint64_t loaded = loaded_locked();
   if (bytes <= most_bytes_ && loaded <= most_bytes_ - bytes) return {};
   const auto mib = [](std::uint64_t n) { return std::to_string((n + (1 << 20) - 1) >> 20); };
-  return failure(ErrorCode::exhausted,
-                 "the case " + to_hex(known.hash) + " needs " + mib(bytes) + " MiB of memory, and " + mib(loaded) + " of the " +
-                     std::to_string(most_bytes_ >> 20) + " MiB that cases may take are in use; close rooms of other cases, or " +
-                     "start the server with a larger --case-memory-mib");
+  return failure(ErrorCode::exhausted, "the case " + to_hex(known.hash) + " needs " + mib(bytes) +
+                                           " MiB of memory, and " + mib(loaded) + " of the " +
+                                           std::to_string(most_bytes_ >> 20) +
+                                           " MiB that cases may take are in use; close rooms of other cases, or " +
+                                           "start the server with a larger --case-memory-mib");
 }
 
 Result<LoadedCase> CaseCache::load(const Digest& hash) {
@@ -61,7 +63,8 @@ Result<LoadedCase> CaseCache::load(const Digest& hash) {
     if (found == entries_.end()) return failure(ErrorCode::not_found, "the server has no case " + to_hex(hash));
     known = found->second.known;
     if (auto bone = found->second.loaded.lock()) return LoadedCase{std::move(bone), known.folder};
-    // Refused before it is read, by what it takes or, where that is not known yet, by the bytes of its file, which are fewer.
+    // Refused before it is read, by what it takes or, where that is not known yet, by the bytes of its file, which are
+    // fewer.
     std::error_code none;
     const std::uint64_t file = std::filesystem::file_size(known.folder / "bone.vdb", none);
     const std::uint64_t least = known.memory_bytes != 0 ? known.memory_bytes : none ? 0 : file;

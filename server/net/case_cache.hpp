@@ -1,5 +1,5 @@
-// The cases that rooms can be of. Those that were uploaded are in memory only as long as a room has them, and all together
-// within a limit: what strangers' cases take is decided by whoever runs the server.
+// The cases that rooms can be of. Those that were uploaded are in memory only as long as a room has them, and all
+// together within a limit: what strangers' cases take is decided by whoever runs the server.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -47,8 +47,8 @@ class CaseCache {
   void add(KnownCase known);     // one of a hash that is known stays as it is
   [[nodiscard]] std::optional<KnownCase> find(const Digest& hash) const;
   [[nodiscard]] std::vector<KnownCase> all() const;  // in the order of their hashes
-  // Reads it from its folder where nobody has it, one at a time. Errors: not_found, exhausted (with it, the cases in memory would
-  // take more than they may), and those of Case::load().
+  // Reads it from its folder where nobody has it, one at a time. Errors: not_found, exhausted (with it, the cases in
+  // memory would take more than they may), and those of Case::load().
   [[nodiscard]] Result<LoadedCase> load(const Digest& hash);
   [[nodiscard]] std::uint64_t loaded_bytes() const;
 
@@ -58,11 +58,11 @@ class CaseCache {
     std::shared_ptr<const Case> kept;  // shared with its rooms; null: only they have it
     std::weak_ptr<const Case> loaded;
   };
-  [[nodiscard]] std::uint64_t loaded_locked() const;  // under mutex_
+  [[nodiscard]] std::uint64_t loaded_locked() const;                                          // under mutex_
   [[nodiscard]] Result<void> check_space(const KnownCase& known, std::uint64_t bytes) const;  // likewise
 
   const std::uint64_t most_bytes_;
-  std::mutex loading_;         // taken before mutex_, never within it
+  std::mutex loading_;  // taken before mutex_, never within it
   mutable std::mutex mutex_;
   std::map<Digest, Entry> entries_;
 };

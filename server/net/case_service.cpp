@@ -38,16 +38,18 @@ std::uint64_t bytes_of(const std::filesystem::path& folder) {
   return bytes;
 }
 
-// One upload. What has come goes to the disk at once, so that none of it waits in memory. It ends with its sender's right, and
-// with their patience: each holds one of the few places for uploads.
+// One upload. What has come goes to the disk at once, so that none of it waits in memory. It ends with its sender's
+// right, and with their patience: each holds one of the few places for uploads.
 class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest> {
  public:
   static constexpr std::size_t kMostPiece = 1 << 20;
   static constexpr std::string_view kMethod = "/osteon.v1.CaseService/UploadCase";
 
-  UploadStream(Rooms& rooms, v1::UploadCaseResponse* response) : rooms_(rooms), store_(rooms.store()), response_(response) {}
+  UploadStream(Rooms& rooms, v1::UploadCaseResponse* response)
+      : rooms_(rooms), store_(rooms.store()), response_(response) {}
 
-  // gRPC holds the stream until OnDone; the thread that looks cases through, the authorizer and the alarm may hold it longer.
+  // gRPC holds the stream until OnDone; the thread that looks cases through, the authorizer and the alarm may hold it
+  // longer.
   static UploadStream* launch(const std::shared_ptr<UploadStream>& stream, const Result<Caller>& caller) {
     stream->self_ = stream;
     stream->start(caller);
@@ -73,7 +75,8 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     newest_ = Clock::now();
     Result<void> added = request_.data().size() <= kMostPiece
                              ? upload_->add(request_.data())
-                             : failure(ErrorCode::invalid_input, "a piece of the upload has more than " + std::to_string(kMostPiece) + " bytes");
+                             : failure(ErrorCode::invalid_input,
+                                       "a piece of the upload has more than " + std::to_string(kMostPiece) + " bytes");
     if (!added) return finish(status_of(added.error()));
     StartRead(&request_);
   }
@@ -95,11 +98,13 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   void start(const Result<Caller>& caller) {
     const std::lock_guard lock(mutex_);
     if (!caller) return finish(status_of(caller.error()));
-    if (!store_) return finish({StatusCode::FAILED_PRECONDITION, "this server takes no cases; start it with --uploads FOLDER"});
+    if (!store_)
+      return finish({StatusCode::FAILED_PRECONDITION, "this server takes no cases; start it with --uploads FOLDER"});
     if (rooms_.authorizer) {
-      auto entered = rooms_.authorizer->enter(*caller, caller->room, {}, kMethod, [weak = std::weak_ptr(self_)](const Refusal& why) {
-        if (const auto self = weak.lock()) self->end(status_of(why));
-      });
+      auto entered = rooms_.authorizer->enter(*caller, caller->room, {}, kMethod,
+                                              [weak = std::weak_ptr(self_)](const Refusal& why) {
+                                                if (const auto self = weak.lock()) self->end(status_of(why));
+                                              });
       if (!entered) return finish(status_of(entered.error()));
       watched_ = std::move(*entered);
     }
@@ -153,7 +158,8 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   void keep_case() {
     // A sender who is gone, or a server that stops: nobody waits for it.
     const auto stop = [this] { return cancelled_ || rooms_.ending(); };
-    Result<StoredCase> stored = stop() ? failure(ErrorCode::cancelled, "the upload was given up") : Result<StoredCase>{};
+    Result<StoredCase> stored =
+        stop() ? failure(ErrorCode::cancelled, "the upload was given up") : Result<StoredCase>{};
     if (stored) stored = store_->keep(std::move(upload_), stop);
     upload_.reset();
     if (stored) {
@@ -161,7 +167,8 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
       log::info("case uploaded", {{"hash", to_hex(stored->hash)}, {"title", stored->title}, {"bytes", stored->bytes}});
     }
     const std::lock_guard lock(mutex_);
-    if (!stored) return finish(stop() ? Status{StatusCode::CANCELLED, "the upload was given up"} : status_of(stored.error()));
+    if (!stored)
+      return finish(stop() ? Status{StatusCode::CANCELLED, "the upload was given up"} : status_of(stored.error()));
     if (!finished_) {
       *response_->mutable_stored() = to_wire(stored->hash, stored->title, stored->bytes);
       response_->set_known(stored->known);
@@ -171,13 +178,13 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
 
   Rooms& rooms_;
   const std::shared_ptr<CaseRepository> store_;  // shared with the rooms; outlives what was uploaded here
-  v1::UploadCaseResponse* const response_;  // until it has finished
+  v1::UploadCaseResponse* const response_;       // until it has finished
   v1::UploadCaseRequest request_;
   std::atomic<bool> cancelled_{false};
-  std::shared_ptr<OpenStream> watched_;     // shared with the authorizer while it ends the stream
+  std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream
   std::mutex mutex_;
   std::shared_ptr<UploadStream> self_;
-  std::unique_ptr<Upload> upload_;          // once all has come, of the thread that keeps it
+  std::unique_ptr<Upload> upload_;  // once all has come, of the thread that keeps it
   std::unique_ptr<grpc::Alarm> alarm_;
   Clock::time_point began_, newest_;
   bool whole_ = false, finished_ = false;
@@ -199,7 +206,8 @@ class CaseServiceImpl final : public v1::CaseService::CallbackService {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::ListCasesRequest>(rooms_, *context, reactor)) return reactor;
     rooms_.files.run([this, reactor, response] {
-      for (const KnownCase& one : rooms_.cases()) *response->add_cases() = to_wire(one.hash, one.title, bytes_of(one.folder));
+      for (const KnownCase& one : rooms_.cases())
+        *response->add_cases() = to_wire(one.hash, one.title, bytes_of(one.folder));
       reactor->Finish(Status::OK);
     });
     return reactor;

@@ -8,8 +8,8 @@
 
 namespace osteon {
 
-// Days from now to the notAfter of the first certificate of a PEM file; negative once it is over. Errors: not_found (no file),
-// invalid_input (no certificate in it).
+// Days from now to the notAfter of the first certificate of a PEM file; negative once it is over. Errors: not_found (no
+// file), invalid_input (no certificate in it).
 [[nodiscard]] Result<double> certificate_days_left(const std::filesystem::path& pem);
 
 // Writes into the log by which names clients may come and until when, and a warning where they cannot come at `now`:

@@ -1,5 +1,5 @@
-// Makes what a room has decided durable before anyone is told of it: one transaction for all rows of a tick, on a thread of
-// its own, while the room goes on.
+// Makes what a room has decided durable before anyone is told of it: one transaction for all rows of a tick, on a
+// thread of its own, while the room goes on.
 #pragma once
 #include <condition_variable>
 #include <cstddef>

@@ -42,7 +42,8 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   Demonstration(RoomRuntime& runtime, AuthorId author, std::vector<Recorded> cuts, double speed)
       : runtime_(runtime), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
 
-  // Before start(). `by` may be whoever they were when they asked; a newer session of theirs leaves what they started alone.
+  // Before start(). `by` may be whoever they were when they asked; a newer session of theirs leaves what they started
+  // alone.
   [[nodiscard]] Result<void> stand_under(Authorizer& authorizer, const Caller& by, const std::string& room) {
     const auto end = [weak = weak_from_this()](const Refusal& why) {
       if (const auto self = weak.lock()) self->refuse({ErrorCode::denied, why.sentence});
@@ -130,8 +131,8 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     enum class What { cut, rest, end } what;
     Recorded cut{};
   };
-  // Waits for the next cut that is due, for the end, or for the tool to come to rest: at once where it is stopped, else at
-  // `seen_at_work`, until when it is seen at work; null: it rests.
+  // Waits for the next cut that is due, for the end, or for the tool to come to rest: at once where it is stopped, else
+  // at `seen_at_work`, until when it is seen at work; null: it rests.
   Step next(const std::optional<Clock::time_point>& seen_at_work) {
     std::unique_lock lock(mutex_);
     while (!over_) {
@@ -218,7 +219,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   Clock::time_point due_{};
   bool stopped_ = false, over_ = false;
   std::string why_;
-  std::shared_ptr<OpenStream> watched_;        // shared with the authorizer while it ends this
+  std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends this
   std::thread thread_;
 };
 
@@ -275,7 +276,7 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
 Result<void> add_tool(RoomRuntime& runtime, AuthorId by, const Tool& tool) {
   std::promise<Result<RoomEvent>> answer;
   runtime.queue_event([by, tool](Room& room) { return room.add_tool(by, tool); },
-                   [&](const Result<RoomEvent>& added) { answer.set_value(added); });
+                      [&](const Result<RoomEvent>& added) { answer.set_value(added); });
   const Result<RoomEvent> added = answer.get_future().get();
   if (!added) return tl::unexpected(added.error());
   return {};
@@ -286,9 +287,11 @@ Result<void> add_tool(RoomRuntime& runtime, AuthorId by, const Tool& tool) {
 Demonstrations::Demonstrations() = default;
 Demonstrations::~Demonstrations() { end_all(); }
 
-Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what) {
+Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller,
+                                    const WhatToShow& what) {
   if (!(what.speed >= kLeastSpeed && what.speed <= kMostSpeed))
-    return failure(ErrorCode::invalid_input, "the speed is not from 0.001 to " + std::to_string(static_cast<int>(kMostSpeed)));
+    return failure(ErrorCode::invalid_input,
+                   "the speed is not from 0.001 to " + std::to_string(static_cast<int>(kMostSpeed)));
   if (const std::optional<std::string> why = rooms.draining()) return failure(ErrorCode::unavailable, *why);
   Result<Recording> recording = read_recording(rooms, in, what, over_);
   if (!recording) return tl::unexpected(recording.error());
@@ -314,7 +317,8 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   const Shown shown{*author, recording->cuts.size()};
   const auto one = std::make_shared<Demonstration>(runtime, *author, std::move(recording->cuts), what.speed);
   if (rooms.authorizer)
-    if (const Result<void> may = one->stand_under(*rooms.authorizer, caller, in.name); !may) return tl::unexpected(may.error());
+    if (const Result<void> may = one->stand_under(*rooms.authorizer, caller, in.name); !may)
+      return tl::unexpected(may.error());
   if (const Result<void> started = one->start(); !started) return tl::unexpected(started.error());
   going_on_.push_back(one);
   return shown;

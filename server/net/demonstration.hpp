@@ -41,15 +41,17 @@ class Demonstrations {
   Demonstrations(const Demonstrations&) = delete;
   Demonstrations& operator=(const Demonstrations&) = delete;
 
-  // Reads the journal first, which takes a while; given up where all are to end. Cuts that were taken back by `to` are not
-  // shown. While the demonstrator is stopped or without its tool, the tool is seen at rest. Errors: invalid_input (the speed;
-  // another case; more than kMostCuts), not_found (no such room, no cut there), unavailable (that room is not kept, kMost go
-  // on, the room is closed, the server is to stop), denied (`caller` may not any more), and those of reading. It ends once the
-  // caller may not start one any more: who is revoked leaves nothing going on.
-  [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what);
+  // Reads the journal first, which takes a while; given up where all are to end. Cuts that were taken back by `to` are
+  // not shown. While the demonstrator is stopped or without its tool, the tool is seen at rest. Errors: invalid_input
+  // (the speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable (that room is
+  // not kept, kMost go on, the room is closed, the server is to stop), denied (`caller` may not any more), and those of
+  // reading. It ends once the caller may not start one any more: who is revoked leaves nothing going on.
+  [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller,
+                                    const WhatToShow& what);
   // Error not_found: no demonstration of that author goes on; of one that was ended, why.
   [[nodiscard]] Result<void> end(AuthorId demonstrator);
-  // For good, also of those that are about to begin: the room is closed, or the server is to stop. They are over when it returns.
+  // For good, also of those that are about to begin: the room is closed, or the server is to stop. They are over when
+  // it returns.
   void end_all();
 
  private:

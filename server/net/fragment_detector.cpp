@@ -61,7 +61,8 @@ std::vector<Separation> FragmentDetector::look() {
   return found;
 }
 
-Separation FragmentDetector::separation(BodyId body, const Watched& watched, std::vector<Fragment> fragments, std::uint32_t& next_body) const {
+Separation FragmentDetector::separation(BodyId body, const Watched& watched, std::vector<Fragment> fragments,
+                                        std::uint32_t& next_body) const {
   Separation result{body, std::move(fragments)};
   std::vector<FieldLeaf> leaves;
   for (const Fragment& fragment : result.fragments) {

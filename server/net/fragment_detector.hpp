@@ -15,7 +15,8 @@ class FragmentDetector {
  public:
   // Fills the values of leaves, a batch at a time under the room's lock; leaves out those of bodies that are gone.
   using ReadLeaves = std::function<void(std::vector<FieldLeaf>& leaves)>;
-  FragmentDetector(Room& room, std::shared_mutex& room_mutex, ReadLeaves read) : room_(room), mutex_(room_mutex), read_(std::move(read)) {}
+  FragmentDetector(Room& room, std::shared_mutex& room_mutex, ReadLeaves read)
+      : room_(room), mutex_(room_mutex), read_(std::move(read)) {}
 
   // Follows the bodies to where they are now, and says what has come apart. The room decides about all of it before the
   // next call.
@@ -29,7 +30,8 @@ class FragmentDetector {
     FragmentFinder finder;
   };
   void begin(BodyId body);
-  [[nodiscard]] Separation separation(BodyId body, const Watched& watched, std::vector<Fragment> fragments, std::uint32_t& next_body) const;
+  [[nodiscard]] Separation separation(BodyId body, const Watched& watched, std::vector<Fragment> fragments,
+                                      std::uint32_t& next_body) const;
 
   Room& room_;
   std::shared_mutex& mutex_;

@@ -43,7 +43,8 @@ void HealthWatch::look() {
   for (const auto& [name, serving] : told_) now[name] = false;
   now[""] = open;
   if (of_ == Of::server_and_rooms)
-    for (const std::shared_ptr<OpenRoom>& room : rooms_.open_rooms()) now[room->name] = open && !room->runtime().stopped();
+    for (const std::shared_ptr<OpenRoom>& room : rooms_.open_rooms())
+      now[room->name] = open && !room->runtime().stopped();
   for (const auto& [name, serving] : now)
     if (const auto before = told_.find(name); before == told_.end() || before->second != serving)
       service_.SetServingStatus(name, serving);

@@ -1,4 +1,5 @@
-// Tells grpc.health.v1 how the server and each of its rooms fare: "" is the server, the others are named as their rooms.
+// Tells grpc.health.v1 how the server and each of its rooms fare: "" is the server, the others are named as their
+// rooms.
 #pragma once
 #include <condition_variable>
 #include <map>
@@ -14,8 +15,8 @@ namespace osteon {
 
 class Rooms;
 
-// SERVING while a room takes cuts, and the server lets people in; NOT_SERVING once a room was closed, its journal failed, or
-// all is being drained. Looks several times a second, and at once when asked.
+// SERVING while a room takes cuts, and the server lets people in; NOT_SERVING once a room was closed, its journal
+// failed, or all is being drained. Looks several times a second, and at once when asked.
 class HealthWatch {
  public:
   // Whoever has a certificate may ask grpc.health.v1, without a ticket. So a server with certificates names no room

@@ -141,7 +141,8 @@ Result<What> read(const v1::JournalJoin& row) {
   const Result<Digest> secret = wire::digest_from_wire(row.secret());
   if (!secret) return bad("join.secret: " + secret.error().message);
   if (row.role() >= static_cast<std::uint32_t>(kRoles)) return bad("join.role is not known");
-  return JoinRow{AuthorId{row.author()}, static_cast<MemberKind>(row.kind()), row.person(), *secret, static_cast<Role>(row.role())};
+  return JoinRow{AuthorId{row.author()}, static_cast<MemberKind>(row.kind()), row.person(), *secret,
+                 static_cast<Role>(row.role())};
 }
 
 Result<What> read(const v1::Cut& row) {
@@ -205,20 +206,34 @@ Result<What> read(const v1::JournalAnnotation& row) {
 
 Result<What> read(const v1::JournalRow& row) {
   switch (row.what_case()) {
-    case v1::JournalRow::kJoin: return read(row.join());
-    case v1::JournalRow::kCut: return read(row.cut());
-    case v1::JournalRow::kRejection: return read(row.rejection());
-    case v1::JournalRow::kSplit: return read(row.split());
-    case v1::JournalRow::kUndo: return UndoRow{places_of(row.undo().places())};
-    case v1::JournalRow::kRedo: return RedoRow{places_of(row.redo().undos()), places_of(row.redo().places())};
-    case v1::JournalRow::kRemoval: return RemoveBodyRow{BodyId{row.removal().body()}};
-    case v1::JournalRow::kItem: return read(row.item());
-    case v1::JournalRow::kTool: return read(row.tool());
-    case v1::JournalRow::kMark: return MarkRow{row.mark().label()};
-    case v1::JournalRow::kSupervision: return read(row.supervision());
-    case v1::JournalRow::kAnnotation: return read(row.annotation());
-    case v1::JournalRow::kWords: return WordsRow{AuthorId{row.words().to()}, row.words().words()};
-    case v1::JournalRow::WHAT_NOT_SET: break;
+    case v1::JournalRow::kJoin:
+      return read(row.join());
+    case v1::JournalRow::kCut:
+      return read(row.cut());
+    case v1::JournalRow::kRejection:
+      return read(row.rejection());
+    case v1::JournalRow::kSplit:
+      return read(row.split());
+    case v1::JournalRow::kUndo:
+      return UndoRow{places_of(row.undo().places())};
+    case v1::JournalRow::kRedo:
+      return RedoRow{places_of(row.redo().undos()), places_of(row.redo().places())};
+    case v1::JournalRow::kRemoval:
+      return RemoveBodyRow{BodyId{row.removal().body()}};
+    case v1::JournalRow::kItem:
+      return read(row.item());
+    case v1::JournalRow::kTool:
+      return read(row.tool());
+    case v1::JournalRow::kMark:
+      return MarkRow{row.mark().label()};
+    case v1::JournalRow::kSupervision:
+      return read(row.supervision());
+    case v1::JournalRow::kAnnotation:
+      return read(row.annotation());
+    case v1::JournalRow::kWords:
+      return WordsRow{AuthorId{row.words().to()}, row.words().words()};
+    case v1::JournalRow::WHAT_NOT_SET:
+      break;
   }
   return failure(ErrorCode::unsupported, "its event is of a kind that this release does not know");
 }
@@ -251,10 +266,11 @@ std::string to_bytes(const RoomGenesis& genesis) {
 
 Result<RoomGenesis> genesis_from_bytes(std::string_view bytes) {
   v1::JournalGenesis in;
-  if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return bad("the journal does not say what its room began as");
+  if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
+    return bad("the journal does not say what its room began as");
   if (in.version() != kGenesisVersion)
-    return failure(ErrorCode::unsupported, "the journal is of version " + std::to_string(in.version()) + " and this release knows " +
-                                               std::to_string(kGenesisVersion));
+    return failure(ErrorCode::unsupported, "the journal is of version " + std::to_string(in.version()) +
+                                               " and this release knows " + std::to_string(kGenesisVersion));
   RoomGenesis genesis;
   const Result<Digest> hash = wire::digest_from_wire(in.case_hash()), began = wire::digest_from_wire(in.room_genesis());
   if (!hash || !began) return bad("the journal does not name its case");
@@ -278,8 +294,9 @@ Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutL
     return failure(ErrorCode::unsupported, "the journal is of the case " + to_hex(genesis.case_hash) + " and not of " +
                                                to_hex(bone.hash()) + "; start the server with that case");
   if (genesis.kernel_version != kKernelVersion)
-    return failure(ErrorCode::unsupported, "the journal is of cut kernel version " + std::to_string(genesis.kernel_version) +
-                                               " and this server's is " + std::to_string(kKernelVersion) +
+    return failure(ErrorCode::unsupported, "the journal is of cut kernel version " +
+                                               std::to_string(genesis.kernel_version) + " and this server's is " +
+                                               std::to_string(kKernelVersion) +
                                                "; go on with the release that made it");
   // Not the server's own box: another release's may hold other tools.
   auto tools = std::make_shared<ToolBox>();
@@ -316,8 +333,8 @@ Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std:
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
       !google::protobuf::util::MessageToJsonString(in, &event, names).ok())
     return bad("row " + std::to_string(place.value) + ": it is no row of a room");
-  return "{\"place\":" + std::to_string(place.value) + ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) +
-         ",\"event\":" + event + "}";
+  return "{\"place\":" + std::to_string(place.value) +
+         ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) + ",\"event\":" + event + "}";
 }
 
 PersonExport::PersonExport(std::uint32_t person, const std::vector<Person>& people) : person_(person) {

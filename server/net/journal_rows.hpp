@@ -26,8 +26,8 @@ struct RoomGenesis {
   Digest case_hash;
   std::uint32_t kernel_version = 0;
   std::vector<Tool> tools;
-  Digest room_genesis;        // Room::genesis()
-  std::string room;           // its name
+  Digest room_genesis;  // Room::genesis()
+  std::string room;     // its name
   // A branch: where it comes from.
   std::string parent;
   RoomSeq parent_room_seq;
@@ -54,7 +54,8 @@ class PersonExport {
   PersonExport(std::uint32_t person, const std::vector<Person>& people);
   // {"person": 3, "label": "...", "joined_day": 20778}; nothing: it was forgotten, or there is no such.
   [[nodiscard]] const std::optional<std::string>& who() const { return who_; }
-  // As row_as_json(), of the next row where it is this person's: its coming, and what it asked for as whoever it then was.
+  // As row_as_json(), of the next row where it is this person's: its coming, and what it asked for as whoever it then
+  // was.
   [[nodiscard]] Result<std::optional<std::string>> of(const JournalRow& row);
   [[nodiscard]] tl::unexpected<Error> nobody() const;  // error not_found
 

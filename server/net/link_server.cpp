@@ -125,7 +125,8 @@ std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t firs
     while (session == 0 || links_.contains(session)) {
       std::array<std::uint8_t, 4> bytes{};
       random_(bytes);
-      session = std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 | std::uint32_t{bytes[3]} << 24;
+      session = std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
+                std::uint32_t{bytes[3]} << 24;
     }
     link = std::make_shared<SessionLink>(make_session_keys(session, random_), author, first_author_seq, sink);
     link->server_ = this;
@@ -173,8 +174,10 @@ void LinkServer::receive_some(Time now) {
     {
       const std::lock_guard lock(mutex_);
       const auto found = session ? links_.find(*session) : links_.end();
-      if (found == links_.end()) ++strangers_;
-      else link = found->second;
+      if (found == links_.end())
+        ++strangers_;
+      else
+        link = found->second;
     }
     if (!link) continue;
     const std::lock_guard told(link->told_mutex_);
@@ -193,7 +196,8 @@ Time LinkServer::send_due(Time now) {
   Time next = now + kLongestWait;
   for (const auto& link : links()) {
     const std::lock_guard lock(link->mutex_);
-    while (const std::optional<wire::ServerLink::Out> out = link->link_.send(now, buffer)) port_->send(out->to, out->bytes);
+    while (const std::optional<wire::ServerLink::Out> out = link->link_.send(now, buffer))
+      port_->send(out->to, out->bytes);
     next = std::min(next, link->link_.next(now));
   }
   return next;

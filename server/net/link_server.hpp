@@ -1,5 +1,5 @@
-// The room's end of all fast paths: one UDP socket and one thread for every session. What gets through here is heard sooner;
-// the session's stream says all of it as well.
+// The room's end of all fast paths: one UDP socket and one thread for every session. What gets through here is heard
+// sooner; the session's stream says all of it as well.
 #pragma once
 #include <condition_variable>
 #include <cstdint>
@@ -19,8 +19,8 @@
 
 namespace osteon {
 
-// One session's link as its owner sees it: any thread, except from within the sink. What the sink is told comes on the link
-// server's thread.
+// One session's link as its owner sees it: any thread, except from within the sink. What the sink is told comes on the
+// link server's thread.
 class SessionLink {
  public:
   class Sink {
@@ -39,8 +39,8 @@ class SessionLink {
 
   // A cut that came over the stream; the sink hears of it in its turn, within this call or later.
   void offer(const Cut& cut);
-  // Every row of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False: this one
-  // goes over the stream alone.
+  // Every row of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False:
+  // this one goes over the stream alone.
   bool tell(std::uint64_t index, const wire::SessionRow& row);
   void know_tool(std::uint32_t number, const Digest& tool);
   // Newest states of others' tools. False: nothing gets through now, so they are for the stream to tell.
@@ -89,7 +89,8 @@ class LinkServer {
 
   [[nodiscard]] std::uint16_t port() const { return port_->local().port; }
   // A link with keys of its own, heard of until it is removed.
-  [[nodiscard]] std::shared_ptr<SessionLink> add(AuthorId author, std::uint64_t first_author_seq, SessionLink::Sink& sink);
+  [[nodiscard]] std::shared_ptr<SessionLink> add(AuthorId author, std::uint64_t first_author_seq,
+                                                 SessionLink::Sink& sink);
   void remove(const std::shared_ptr<SessionLink>& link);
   void wake() { port_->wake(); }
   [[nodiscard]] LinkServerHealth health() const;

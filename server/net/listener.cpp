@@ -18,8 +18,8 @@
 namespace osteon {
 namespace {
 
-constexpr int kWaiting = 128;       // that the system keeps until they are accepted
-constexpr int kPauseMs = 100;       // when there is no descriptor for a connection
+constexpr int kWaiting = 128;  // that the system keeps until they are accepted
+constexpr int kPauseMs = 100;  // when there is no descriptor for a connection
 constexpr int kAcceptedAtOnce = 64;
 
 tl::unexpected<Error> refused_by_system(int reason) {
@@ -31,14 +31,17 @@ tl::unexpected<Error> refused_by_system(int reason) {
 int listen_at(const addrinfo& address, int port) {
   sockaddr_storage at{};
   std::copy_n(reinterpret_cast<const char*>(address.ai_addr), address.ai_addrlen, reinterpret_cast<char*>(&at));
-  (address.ai_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port : reinterpret_cast<sockaddr_in&>(at).sin_port) =
+  (address.ai_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port
+                                 : reinterpret_cast<sockaddr_in&>(at).sin_port) =
       htons(static_cast<std::uint16_t>(port));
   const int socket = ::socket(address.ai_family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   if (socket < 0) return -errno;
   const int yes = 1;
   ::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
   if (address.ai_family == AF_INET6) ::setsockopt(socket, IPPROTO_IPV6, IPV6_V6ONLY, &yes, sizeof yes);
-  if (::bind(socket, reinterpret_cast<const sockaddr*>(&at), address.ai_addrlen) == 0 && ::listen(socket, kWaiting) == 0) return socket;
+  if (::bind(socket, reinterpret_cast<const sockaddr*>(&at), address.ai_addrlen) == 0 &&
+      ::listen(socket, kWaiting) == 0)
+    return socket;
   const int reason = errno;
   ::close(socket);
   return -reason;
@@ -48,7 +51,8 @@ int port_of(int socket) {
   sockaddr_storage at{};
   socklen_t size = sizeof at;
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&at), &size) != 0) return 0;
-  return ntohs(at.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port : reinterpret_cast<sockaddr_in&>(at).sin_port);
+  return ntohs(at.ss_family == AF_INET6 ? reinterpret_cast<sockaddr_in6&>(at).sin6_port
+                                        : reinterpret_cast<sockaddr_in&>(at).sin_port);
 }
 
 std::string numeric(const addrinfo& address) {
@@ -98,7 +102,8 @@ Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int po
     if (socket >= 0) {
       listener->sockets_.push_back(socket);
       listener->port_ = port_of(socket);
-      if (listener->address_.empty() || (address->ai_family == AF_INET && !has_ipv4)) listener->address_ = numeric(*address);
+      if (listener->address_.empty() || (address->ai_family == AF_INET && !has_ipv4))
+        listener->address_ = numeric(*address);
       has_ipv4 = has_ipv4 || address->ai_family == AF_INET;
     } else if (socket == -EADDRNOTAVAIL || socket == -EAFNOSUPPORT) {
       lacking = -socket;  // localhost has an address of each family, and a machine may lack one of them

@@ -13,7 +13,8 @@ constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every b
 
 }  // namespace
 
-MeshPublisher::MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm)
+MeshPublisher::MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail,
+                             ToolTips tool_tips_mm)
     : room_(room),
       room_mutex_(room_mutex),
       rates_(rates),
@@ -72,8 +73,8 @@ void MeshPublisher::run() {
       else if (!owed_)
         wake_.wait(lock, called);
       if (!due_ && end_) return;
-      // A first cut is shown at once, a row of cuts at the mesh rate: with the tick that comes about then, so that what it
-      // has committed goes at once.
+      // A first cut is shown at once, a row of cuts at the mesh rate: with the tick that comes about then, so that what
+      // it has committed goes at once.
       if (Clock::now() < next) {
         wake_.wait_until(lock, next - about, [&] { return end_; });
         fresh_ = false;
@@ -210,7 +211,8 @@ void MeshPublisher::watch(MeshSubscriber& sink, const std::optional<ViewFrustum>
 
 void MeshPublisher::leave(MeshSubscriber& sink) {
   const std::lock_guard lock(surface_mutex_);
-  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; }) > 0) view_interest_.close(sink.author());
+  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; }) > 0)
+    view_interest_.close(sink.author());
 }
 
 void MeshPublisher::look(AuthorId viewer, const ViewFrustum& from) {
@@ -230,7 +232,8 @@ MeshHealth MeshPublisher::health() const {
     health.streams = streams_.size();
     health.blocks = surface_.blocks.size();
     for (const auto& [key, message] : surface_.blocks) health.surface_bytes += message->size();
-    for (const Stream& stream : streams_) health.furthest_behind = std::max(health.furthest_behind, stream.sink->waiting());
+    for (const Stream& stream : streams_)
+      health.furthest_behind = std::max(health.furthest_behind, stream.sink->waiting());
   }
   const std::lock_guard lock(stats_mutex_);
   health.update = update_;

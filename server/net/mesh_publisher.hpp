@@ -1,5 +1,5 @@
-// The surface of a room's bone as viewers hold it: one thread makes the blocks that events have changed and offers them to
-// every open stream. Viewers take turns, so that no message waits behind those to all the others.
+// The surface of a room's bone as viewers hold it: one thread makes the blocks that events have changed and offers them
+// to every open stream. Viewers take turns, so that no message waits behind those to all the others.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -14,9 +14,9 @@
 #include "common/core/digest.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/view_frustum.hpp"
-#include "server/net/view_interest.hpp"
 #include "server/net/send_queue.hpp"
 #include "server/net/subscriber.hpp"
+#include "server/net/view_interest.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
@@ -40,7 +40,7 @@ struct MeshRates {
 };
 
 struct MeshHealth {
-  DurationHistogram update;         // from a cut's arrival until its blocks' payloads were ready
+  DurationHistogram update;  // from a cut's arrival until its blocks' payloads were ready
   std::size_t streams = 0;
   std::size_t blocks = 0;
   std::size_t surface_bytes = 0;    // of the newest blocks: what a viewer that joins is sent
@@ -52,8 +52,8 @@ class MeshPublisher {
  public:
   using Clock = std::chrono::steady_clock;
   using ToolTips = std::function<std::vector<Vec3>()>;  // where tools are, mm
-  // The surface is brought up to date at the mesh rate for so many viewers; for more of them in up to Pace::kTurns turns
-  // between two messages to one.
+  // The surface is brought up to date at the mesh rate for so many viewers; for more of them in up to Pace::kTurns
+  // turns between two messages to one.
   static constexpr std::size_t kTurnViewers = 16;
 
   MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm);
@@ -65,8 +65,8 @@ class MeshPublisher {
   void make_whole_surface(const std::function<void(double)>& progress);
   void start();
   void stop();  // makes what is due, then joins the thread
-  // [mesh thread; any other before start() and after stop()] Makes the stale blocks and offers them; where none is stale
-  // and `due`, the room's place alone. Then sends to those whose turn it is.
+  // [mesh thread; any other before start() and after stop()] Makes the stale blocks and offers them; where none is
+  // stale and `due`, the room's place alone. Then sends to those whose turn it is.
   void update(bool due);
 
   void changed(Clock::time_point arrived);  // a cut or event that arrived then has made blocks stale

@@ -61,9 +61,9 @@ class Page {
     metric.histogram.sample_count = durations.count();
     metric.histogram.sample_sum = seconds(durations.sum_us());
     for (const double bound : kBounds_s)
-      metric.histogram.bucket.push_back(
-          {durations.count_up_to(std::chrono::duration_cast<std::chrono::nanoseconds>(std::chrono::duration<double>(bound))),
-           bound});
+      metric.histogram.bucket.push_back({durations.count_up_to(std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                             std::chrono::duration<double>(bound))),
+                                         bound});
     family(name, help, MetricType::Histogram).metric.push_back(std::move(metric));
   }
   [[nodiscard]] std::vector<MetricFamily> take() { return std::move(families_); }
@@ -96,7 +96,8 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
     return labels;
   };
   page.gauge("osteon_room_serving", "1 while the room takes cuts.", with(), health.serving && !draining ? 1 : 0);
-  page.gauge("osteon_room_event", "Newest place in the room's order.", with(), static_cast<double>(health.room_seq.value));
+  page.gauge("osteon_room_event", "Newest place in the room's order.", with(),
+             static_cast<double>(health.room_seq.value));
 
   const char* stage = "What a committed cut waits for: the tick, its decision, the disk, the streams.";
   page.histogram("osteon_cut_stage_seconds", stage, with("stage", "wait"), health.stages.wait);
@@ -105,9 +106,11 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
   page.histogram("osteon_cut_stage_seconds", stage, with("stage", "tell"), health.stages.tell);
   page.histogram("osteon_tick_late_seconds", "How late ticks began.", with(), health.tick.lateness);
   page.histogram("osteon_tick_work_seconds", "How long ticks took.", with(), health.tick.work);
-  page.counter("osteon_ticks_missed_total", "Periods that no tick ran in.", with(), static_cast<double>(health.tick.missed));
+  page.counter("osteon_ticks_missed_total", "Periods that no tick ran in.", with(),
+               static_cast<double>(health.tick.missed));
   page.histogram("osteon_journal_commit_seconds", "Transactions of the journal.", with(), health.commit);
-  if (room.store()) page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
+  if (room.store())
+    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
 
   const char* queue =
       "What waits: cuts for a tick, rows for the disk, blocks for the surface, the slowest reader's rows or blocks.";
@@ -141,7 +144,8 @@ std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certifi
   auto refusals = server.rooms().refusals.counts();
   for (const char* known : {"version", "request", "room", "draining", "tls"}) refusals.try_emplace(known, 0u);
   for (const auto& [reason, count] : refusals)
-    page.counter("osteon_refusals_total", "Callers turned away at the credentials, and calls refused behind it.", {{"reason", reason}}, static_cast<double>(count));
+    page.counter("osteon_refusals_total", "Callers turned away at the credentials, and calls refused behind it.",
+                 {{"reason", reason}}, static_cast<double>(count));
   if (!certificate.empty())
     if (const Result<double> days = certificate_days_left(certificate))
       page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
@@ -175,8 +179,8 @@ struct Metrics::Impl {
     if (daemon) MHD_stop_daemon(daemon);
   }
   // [the HTTP library's thread]
-  static MHD_Result answer(void* self, MHD_Connection* connection, const char* url, const char* method, const char*, const char*,
-                           std::size_t*, void**) {
+  static MHD_Result answer(void* self, MHD_Connection* connection, const char* url, const char* method, const char*,
+                           const char*, std::size_t*, void**) {
     const Impl& own = *static_cast<Impl*>(self);
     std::string text = "the figures are at /metrics\n";
     const bool found = std::string_view(url) == "/metrics" && std::string_view(method) == "GET";
@@ -194,14 +198,16 @@ Metrics::Metrics(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Metrics::~Metrics() = default;
 const std::string& Metrics::address() const { return impl_->address; }
 
-Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomServer& server, const fs::path& certificate) {
+Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomServer& server,
+                                                const fs::path& certificate) {
   const Result<HostPort> at =
       parse_host_port(listen.find(':') == std::string::npos ? "127.0.0.1:" + listen : listen, "--metrics");
   if (!at) return tl::unexpected(at.error());
   if (!is_loopback(at->host))
-    return failure(ErrorCode::invalid_input, "--metrics " + listen +
-                                                 " is reachable from other machines, and whoever reaches it may read it; use a "
-                                                 "port, or one with 127.0.0.1, [::1] or localhost");
+    return failure(ErrorCode::invalid_input,
+                   "--metrics " + listen +
+                       " is reachable from other machines, and whoever reaches it may read it; use a "
+                       "port, or one with 127.0.0.1, [::1] or localhost");
   sockaddr_in v4{};
   sockaddr_in6 v6{};
   v4.sin_family = AF_INET;
@@ -215,12 +221,13 @@ Result<std::unique_ptr<Metrics>> Metrics::start(const std::string& listen, RoomS
 
   auto impl = std::unique_ptr<Impl>(new Impl{server, certificate, {}});
   errno = 0;
-  impl->daemon = MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | (is_v6 ? MHD_USE_IPv6 : MHD_NO_FLAG), 0, nullptr, nullptr,
-                                  &Impl::answer, impl.get(), MHD_OPTION_SOCK_ADDR, place, MHD_OPTION_CONNECTION_LIMIT,
-                                  kMostConnections, MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s, MHD_OPTION_END);
+  impl->daemon =
+      MHD_start_daemon(MHD_USE_INTERNAL_POLLING_THREAD | (is_v6 ? MHD_USE_IPv6 : MHD_NO_FLAG), 0, nullptr, nullptr,
+                       &Impl::answer, impl.get(), MHD_OPTION_SOCK_ADDR, place, MHD_OPTION_CONNECTION_LIMIT,
+                       kMostConnections, MHD_OPTION_CONNECTION_TIMEOUT, kPatience_s, MHD_OPTION_END);
   if (!impl->daemon)
-    return failure(ErrorCode::unavailable, "--metrics " + listen + " cannot be listened on: " +
-                                               std::generic_category().message(errno) +
+    return failure(ErrorCode::unavailable, "--metrics " + listen +
+                                               " cannot be listened on: " + std::generic_category().message(errno) +
                                                "; choose another port, or 0 for a free one");
   const MHD_DaemonInfo* bound = MHD_get_daemon_info(impl->daemon, MHD_DAEMON_INFO_BIND_PORT);
   impl->address = host + ":" + std::to_string(bound ? bound->port : at->port);

@@ -13,8 +13,9 @@ class RoomServer;
 // What is asked for is gathered when it is asked for: between two questions it costs nothing.
 class Metrics {
  public:
-  // `listen`: PORT or HOST:PORT, 0 lets the system choose. `certificate`: the server's, empty where it has none. `server`
-  // outlives it. Errors: invalid_input (not HOST:PORT, or not of this machine alone), unavailable (the system refuses).
+  // `listen`: PORT or HOST:PORT, 0 lets the system choose. `certificate`: the server's, empty where it has none.
+  // `server` outlives it. Errors: invalid_input (not HOST:PORT, or not of this machine alone), unavailable (the system
+  // refuses).
   [[nodiscard]] static Result<std::unique_ptr<Metrics>> start(const std::string& listen, RoomServer& server,
                                                               const std::filesystem::path& certificate);
   ~Metrics();

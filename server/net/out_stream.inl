@@ -41,11 +41,10 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
   return message;
 }
 
-// What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it, with three bytes for each of
-// some letters, and after more it reads no answer on that line. Where files lie here is nobody's business there.
-inline std::string short_words(std::string_view why) {
-  return bounded_text(without_paths(why), 1000);
-}
+// What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it, with three bytes for
+// each of some letters, and after more it reads no answer on that line. Where files lie here is nobody's business
+// there.
+inline std::string short_words(std::string_view why) { return bounded_text(without_paths(why), 1000); }
 
 inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, short_words(std::move(why))}; }
 
@@ -55,19 +54,20 @@ inline Status status_of(const Refusal& why) {
 }
 
 inline Status not_joined(const char* message, std::uint64_t author) {
-  return invalid(std::string(message) + ".author " + std::to_string(author) + " has not joined this room; call Join first");
+  return invalid(std::string(message) + ".author " + std::to_string(author) +
+                 " has not joined this room; call Join first");
 }
 
-// A stream that owns at most the message in flight; what waits behind it is the derived class's bounded set. Exactly one
-// path calls Finish, decided under the mutex.
+// A stream that owns at most the message in flight; what waits behind it is the derived class's bounded set. Exactly
+// one path calls Finish, decided under the mutex.
 template <class Reactor>
 class OutStream : public Reactor {
  public:
   // A reader who was told that it is over, and does not read that either.
   static constexpr std::chrono::milliseconds kLetGoAfter{1000};
 
-  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer. `context`: of its call, which is
-  // cut off where the reader does not read; null: it is not.
+  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer. `context`: of its
+  // call, which is cut off where the reader does not read; null: it is not.
   template <class Stream>
   static Stream* launch(std::shared_ptr<Stream> stream, grpc::CallbackServerContext* context = nullptr) {
     Stream* raw = stream.get();
@@ -77,14 +77,16 @@ class OutStream : public Reactor {
     return raw;
   }
 
-  // From now on `authorizer` ends it when its caller may have it no more, or has come anew; null, over plain text: nothing does.
-  // Before the stream is given to gRPC, or in its reactions to reads. False: the caller, or `author` where it is not null, may
-  // not have it now, and it ends with the reason.
-  [[nodiscard]] bool stand_under(Authorizer* authorizer, const Caller& caller, const std::string& room, AuthorId author, std::string_view method) {
+  // From now on `authorizer` ends it when its caller may have it no more, or has come anew; null, over plain text:
+  // nothing does. Before the stream is given to gRPC, or in its reactions to reads. False: the caller, or `author`
+  // where it is not null, may not have it now, and it ends with the reason.
+  [[nodiscard]] bool stand_under(Authorizer* authorizer, const Caller& caller, const std::string& room, AuthorId author,
+                                 std::string_view method) {
     if (authorizer == nullptr) return true;
-    auto entered = authorizer->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
-      if (const std::shared_ptr<void> keep = weak.lock()) close(status_of(why));
-    });
+    auto entered =
+        authorizer->enter(caller, room, author, method, [this, weak = std::weak_ptr<void>(self_)](const Refusal& why) {
+          if (const std::shared_ptr<void> keep = weak.lock()) close(status_of(why));
+        });
     if (entered)
       watched_ = std::move(*entered);
     else
@@ -149,12 +151,16 @@ class OutStream : public Reactor {
     }
   }
   // Whether its caller may send that now.
-  [[nodiscard]] bool may_carry(DatagramContent kind) const { return !watched_ || osteon::may_carry(watched_->role(), kind); }
+  [[nodiscard]] bool may_carry(DatagramContent kind) const {
+    return !watched_ || osteon::may_carry(watched_->role(), kind);
+  }
   // Whether its caller may be told that now.
-  [[nodiscard]] bool may_receive(StreamContent content) const { return !watched_ || osteon::may_receive(watched_->role(), content); }
+  [[nodiscard]] bool may_receive(StreamContent content) const {
+    return !watched_ || osteon::may_receive(watched_->role(), content);
+  }
   [[nodiscard]] bool closing() const { return closing_.has_value(); }
   [[nodiscard]] bool failing() const { return closing_ && !closing_->ok(); }  // nothing more is sent
-  [[nodiscard]] bool done() const { return done_; }  // gRPC has let go of the stream
+  [[nodiscard]] bool done() const { return done_; }                           // gRPC has let go of the stream
   [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
 
   mutable std::mutex mutex_;
@@ -175,7 +181,7 @@ class OutStream : public Reactor {
 
   std::mutex context_mutex_;  // never held with another
   grpc::CallbackServerContext* context_ = nullptr;
-  bool can_let_go_ = false;   // set before anybody else has the stream
+  bool can_let_go_ = false;  // set before anybody else has the stream
   std::unique_ptr<grpc::Alarm> alarm_;
   std::shared_ptr<void> self_;
   std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream

@@ -78,7 +78,8 @@ class PeopleServiceImpl final : public PeopleBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     PeopleStream* stream = PeopleStream::launch(std::make_shared<PeopleStream>(*room, author), context);
-    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople")) stream->begin();
+    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, author, "/osteon.v1.PeopleService/WatchPeople"))
+      stream->begin();
     return stream;
   }
 
@@ -97,9 +98,8 @@ class PeopleServiceImpl final : public PeopleBase {
       std::erase(subjects, by);
       if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
     }
-    // One event each, in one tick; answered with the last. Of all together, none for whom it changes nothing: most of those who
-    // ever had a hand here are away for good.
-    // A room that closes meanwhile answers the rest on this thread.
+    // One event each, in one tick; answered with the last. Of all together, none for whom it changes nothing: most of
+    // those who ever had a hand here are away for good. A room that closes meanwhile answers the rest on this thread.
     struct Answer {
       std::mutex mutex;
       std::size_t left = 0;
@@ -110,26 +110,27 @@ class PeopleServiceImpl final : public PeopleBase {
     answer->left = subjects.size();
     const bool all = request->subject() == 0;
     for (const AuthorId subject : subjects)
-      room->runtime().queue_event([by, subject, word = *word, all, answer](Room& r) -> Result<RoomEvent> {
-                                 const People::Supervised& now = r.people().supervised(subject);
-                                 const bool holds = all && now.supervision == word && r.people().oversees(by);
-                                 if (!holds) return r.supervise(by, subject, word);
-                                 const std::lock_guard lock(answer->mutex);
-                                 answer->place = std::max(answer->place, now.place);
-                                 return RoomEvent{};
-                               },
-                               [answer, room, reactor, response](const Result<RoomEvent>& decided) {
-                                 std::unique_lock lock(answer->mutex);
-                                 if (decided)
-                                   answer->place = std::max(answer->place, decided->room_seq);
-                                 else if (!answer->failed)
-                                   answer->failed = decided.error();
-                                 if (--answer->left > 0) return;
-                                 // Of those for whom nothing was ever decided it holds from the beginning.
-                                 response->set_room_seq(answer->place ? answer->place.value : room->runtime().room_seq().value);
-                                 lock.unlock();
-                                 reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
-                               });
+      room->runtime().queue_event(
+          [by, subject, word = *word, all, answer](Room& r) -> Result<RoomEvent> {
+            const People::Supervised& now = r.people().supervised(subject);
+            const bool holds = all && now.supervision == word && r.people().oversees(by);
+            if (!holds) return r.supervise(by, subject, word);
+            const std::lock_guard lock(answer->mutex);
+            answer->place = std::max(answer->place, now.place);
+            return RoomEvent{};
+          },
+          [answer, room, reactor, response](const Result<RoomEvent>& decided) {
+            std::unique_lock lock(answer->mutex);
+            if (decided)
+              answer->place = std::max(answer->place, decided->room_seq);
+            else if (!answer->failed)
+              answer->failed = decided.error();
+            if (--answer->left > 0) return;
+            // Of those for whom nothing was ever decided it holds from the beginning.
+            response->set_room_seq(answer->place ? answer->place.value : room->runtime().room_seq().value);
+            lock.unlock();
+            reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
+          });
     return reactor;
   }
 
@@ -182,7 +183,9 @@ class PeopleServiceImpl final : public PeopleBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refuse(reactor, status_of(caller.error()));
     if (!request->room().empty())
-      if (const Result<Caller> there = caller_in(rooms_, *context, request->room(), "/osteon.v1.PeopleService/Demonstrate"); !there)
+      if (const Result<Caller> there =
+              caller_in(rooms_, *context, request->room(), "/osteon.v1.PeopleService/Demonstrate");
+          !there)
         return refuse(reactor, status_of(there.error()));
     // A journal is read, which takes a while: others do not wait for it.
     rooms_.recordings.run([this, room, reactor, request, response, caller = *caller] {

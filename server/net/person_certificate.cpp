@@ -174,14 +174,16 @@ Result<PersonCertificate> read_person_certificate(std::string_view pem) {
     if (name->type != GEN_URI) continue;
     const ASN1_IA5STRING* uri = name->d.uniformResourceIdentifier;
     // By its length: a zero byte within ends no name.
-    const std::string_view text(reinterpret_cast<const char*>(ASN1_STRING_get0_data(uri)), static_cast<std::size_t>(ASN1_STRING_length(uri)));
+    const std::string_view text(reinterpret_cast<const char*>(ASN1_STRING_get0_data(uri)),
+                                static_cast<std::size_t>(ASN1_STRING_length(uri)));
     if (!text.starts_with(kPerson)) continue;
     ++people;
     certificate.user = text.substr(kPerson.size());
   }
   if (people != 1 || !is_user_name(certificate.user))
-    return failure(ErrorCode::invalid_input,
-                   "the certificate does not name one person (osteon://person/NAME); make one with deploy/certs person NAME");
+    return failure(
+        ErrorCode::invalid_input,
+        "the certificate does not name one person (osteon://person/NAME); make one with deploy/certs person NAME");
 
   certificate.serial = hex_of(X509_get0_serialNumber(x509.get()));
   std::tm ends{};
@@ -195,9 +197,12 @@ Result<void> check_key_pair(std::string_view certificate_pem, std::string_view k
   const X509Ptr x509 = first_of(certificate_pem);
   if (!x509) return failure(ErrorCode::invalid_input, "the certificate cannot be read");
   const Bio bio = reader_of(key_pem);
-  const Key key(bio ? PEM_read_bio_PrivateKey(bio.get(), nullptr, [](char*, int, int, void*) { return 0; }, nullptr) : nullptr);
+  const Key key(bio ? PEM_read_bio_PrivateKey(
+                          bio.get(), nullptr, [](char*, int, int, void*) { return 0; }, nullptr)
+                    : nullptr);
   if (!key) return failure(ErrorCode::invalid_input, "the key cannot be read (it may have no pass phrase)");
-  if (X509_check_private_key(x509.get(), key.get()) != 1) return failure(ErrorCode::invalid_input, "the key is not that of the certificate");
+  if (X509_check_private_key(x509.get(), key.get()) != 1)
+    return failure(ErrorCode::invalid_input, "the key is not that of the certificate");
   return {};
 }
 

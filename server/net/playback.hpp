@@ -36,8 +36,8 @@ class Player {
     upcoming_.reset();
   }
 
-  // A recorded cut says where its tool was: nothing of a tool that nobody knows. Its number rises with every state, also with
-  // those at rest, as readers take only newer ones.
+  // A recorded cut says where its tool was: nothing of a tool that nobody knows. Its number rises with every state,
+  // also with those at rest, as readers take only newer ones.
   [[nodiscard]] std::optional<CuttingState> see(const Cut& cut, const ToolBox& tools, Time now);
   // Idle, once: tools that have not cut for a while. What they did between two cuts is not recorded.
   [[nodiscard]] std::vector<CuttingState> at_rest(Time now);

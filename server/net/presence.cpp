@@ -9,8 +9,7 @@
 
 namespace osteon {
 
-Presence::Presence(const Room& room, const std::map<std::uint32_t, std::string>& names)
-    : room_seq_(room.room_seq()) {
+Presence::Presence(const Room& room, const std::map<std::uint32_t, std::string>& names) : room_seq_(room.room_seq()) {
   revision_ = room.authors() + 1;  // whoever is here from now on was here later than any of them
   for (std::uint64_t author = 1; author <= room.authors(); ++author) {
     const AuthorId id{author};
@@ -171,7 +170,8 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
   };
   v1::WatchPeopleResponse out;
   for (const auto& [author, entry] : people_) {
-    if (!rights.people || entry.revision <= cursor.revision || (entry.streams == 0 && entry.last_here < least)) continue;
+    if (!rights.people || entry.revision <= cursor.revision || (entry.streams == 0 && entry.last_here < least))
+      continue;
     v1::Person& person = *out.add_people();
     person.set_author(author.value);
     person.set_name(entry.name);

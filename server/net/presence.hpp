@@ -34,7 +34,8 @@ struct PresenceCursor {
 
 // What a reader may be told. Own is what concerns anyone of the reader's name: who has come by it is one person.
 struct PeopleRights {
-  bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true, others_words = true;
+  bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true,
+       others_words = true;
 };
 
 // Any thread. Lock order: that of the streams, then a stream's own, then that of the people.

@@ -1,4 +1,5 @@
-// Which refusals were logged: once for each peer and reason, so that a caller who tries for ever fills no disk. See refusals.hpp.
+// Which refusals were logged: once for each peer and reason, so that a caller who tries for ever fills no disk. See
+// refusals.hpp.
 #pragma once
 #include <cstddef>
 #include <deque>

@@ -1,5 +1,5 @@
-// What is refused beside the authorizer: handshakes that fail, which gRPC alone hears of, and calls whose messages make no
-// sense.
+// What is refused beside the authorizer: handshakes that fail, which gRPC alone hears of, and calls whose messages make
+// no sense.
 #pragma once
 #include <memory>
 #include <string>
@@ -40,7 +40,8 @@ class HandshakeWatch {
 inline constexpr const char* kRefusalTrailer = "osteon-refusal";
 
 // Notes every call that ends since its message was malformed or nonsense ("request"), asked for too much ("quota"), or
-// was not its caller's to make ("denied"), by the caller's address. Join and the authorizer note their own. `refusals` outlives the server.
+// was not its caller's to make ("denied"), by the caller's address. Join and the authorizer note their own. `refusals`
+// outlives the server.
 [[nodiscard]] std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(
     RefusalCounts& refusals);
 

@@ -16,15 +16,23 @@ namespace {
 
 Error error_of(const grpc::Status& status) {
   switch (status.error_code()) {
-    case grpc::StatusCode::INVALID_ARGUMENT: return {ErrorCode::invalid_input, status.error_message()};
-    case grpc::StatusCode::NOT_FOUND: return {ErrorCode::not_found, status.error_message()};
-    case grpc::StatusCode::ALREADY_EXISTS: return {ErrorCode::exists, status.error_message()};
-    case grpc::StatusCode::FAILED_PRECONDITION: return {ErrorCode::unavailable, status.error_message()};
-    case grpc::StatusCode::RESOURCE_EXHAUSTED: return {ErrorCode::exhausted, status.error_message()};
+    case grpc::StatusCode::INVALID_ARGUMENT:
+      return {ErrorCode::invalid_input, status.error_message()};
+    case grpc::StatusCode::NOT_FOUND:
+      return {ErrorCode::not_found, status.error_message()};
+    case grpc::StatusCode::ALREADY_EXISTS:
+      return {ErrorCode::exists, status.error_message()};
+    case grpc::StatusCode::FAILED_PRECONDITION:
+      return {ErrorCode::unavailable, status.error_message()};
+    case grpc::StatusCode::RESOURCE_EXHAUSTED:
+      return {ErrorCode::exhausted, status.error_message()};
     case grpc::StatusCode::UNAUTHENTICATED:
-    case grpc::StatusCode::PERMISSION_DENIED: return {ErrorCode::denied, "the server does not do that for you: " + status.error_message()};
-    case grpc::StatusCode::INTERNAL: return {ErrorCode::internal, status.error_message()};
-    default: return {ErrorCode::unavailable, "the server does not answer: " + status.error_message()};
+    case grpc::StatusCode::PERMISSION_DENIED:
+      return {ErrorCode::denied, "the server does not do that for you: " + status.error_message()};
+    case grpc::StatusCode::INTERNAL:
+      return {ErrorCode::internal, status.error_message()};
+    default:
+      return {ErrorCode::unavailable, "the server does not answer: " + status.error_message()};
   }
 }
 
@@ -78,9 +86,11 @@ Result<RoomLine> line_of(const Result<Response>& response) {
 }  // namespace
 
 Result<RoomAdminClient> RoomAdminClient::reach(const std::string& address, std::chrono::milliseconds patience,
-                                       const std::function<bool()>& stop, const wire::ClientCredentials& credentials) {
+                                               const std::function<bool()>& stop,
+                                               const wire::ClientCredentials& credentials) {
   // A long answer is waited for as long as by a hand.
-  Result<std::shared_ptr<grpc::Channel>> channel = wire::reach_server(address, wire::ClientKind::haptic, patience, stop, credentials);
+  Result<std::shared_ptr<grpc::Channel>> channel =
+      wire::reach_server(address, wire::ClientKind::haptic, patience, stop, credentials);
   if (!channel) return tl::unexpected(channel.error());
   return RoomAdminClient(std::move(*channel));
 }
@@ -98,7 +108,8 @@ Result<RoomLine> RoomAdminClient::create(const std::string& name, const std::str
   request.set_name(name);
   if (!case_hash_hex.empty()) {
     const Result<Digest> hash = digest_from_hex(case_hash_hex);
-    if (!hash) return failure(ErrorCode::invalid_input, "--case-hash " + case_hash_hex + " is not 64 hexadecimal digits");
+    if (!hash)
+      return failure(ErrorCode::invalid_input, "--case-hash " + case_hash_hex + " is not 64 hexadecimal digits");
     request.set_case_hash(wire::to_wire(*hash));
   }
   return line_of(ask(channel_, &v1::RoomsService::Stub::CreateRoom, request));
@@ -124,7 +135,8 @@ Result<RoomLine> RoomAdminClient::branch(const std::string& name, const std::str
   return line_of(ask(channel_, &v1::RoomsService::Stub::BranchRoom, request));
 }
 
-Result<RoomLine> RoomAdminClient::replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to, double speed) {
+Result<RoomLine> RoomAdminClient::replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
+                                         double speed) {
   v1::ReplayRoomRequest request;
   request.set_name(name);
   request.set_new_name(new_name);
@@ -154,7 +166,10 @@ Result<RoomAdminClient::Checked> RoomAdminClient::verify(const std::string& name
   const Result<Digest> chain = wire::digest_from_wire(response->chain());
   const Result<Digest> fields = wire::digest_from_wire(response->field_hash());
   if (!chain || !fields) return failure(ErrorCode::unsupported, "the server does not answer as an Osteon server does");
-  return Checked{RoomSeq{response->room_seq()}, *chain, *fields, response->checkpoints(),
+  return Checked{RoomSeq{response->room_seq()},
+                 *chain,
+                 *fields,
+                 response->checkpoints(),
                  {response->faults().begin(), response->faults().end()}};
 }
 
@@ -181,7 +196,8 @@ Result<std::vector<RoomAdminClient::CaseLine>> RoomAdminClient::cases() {
   return lines;
 }
 
-Result<RoomAdminClient::CaseLine> RoomAdminClient::upload_case(const std::filesystem::path& archive, const std::function<void(double)>& progress) {
+Result<RoomAdminClient::CaseLine> RoomAdminClient::upload_case(const std::filesystem::path& archive,
+                                                               const std::function<void(double)>& progress) {
   constexpr std::size_t kPiece = 256 * 1024;
   std::error_code error;
   const std::uint64_t size = std::filesystem::file_size(archive, error);

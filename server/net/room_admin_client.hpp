@@ -22,7 +22,7 @@ namespace osteon {
 // As proto/osteon/v1/rooms.proto has it.
 struct RoomLine {
   std::string name;
-  bool open = false;   // one that is not, and is at an event, has stopped: it takes no more cuts
+  bool open = false;  // one that is not, and is at an event, has stopped: it takes no more cuts
   bool kept = false, replay = false;
   std::string case_title;
   RoomSeq room_seq;
@@ -31,19 +31,21 @@ struct RoomLine {
   RoomSeq parent_room_seq;
 };
 
-// Every call waits for the server's answer, which may take long. Errors: what the server says, in its words; unavailable (it
-// does not answer).
+// Every call waits for the server's answer, which may take long. Errors: what the server says, in its words;
+// unavailable (it does not answer).
 class RoomAdminClient {
  public:
   [[nodiscard]] static Result<RoomAdminClient> reach(const std::string& address, std::chrono::milliseconds patience,
-                                                 const std::function<bool()>& stop, const wire::ClientCredentials& credentials = {});
+                                                     const std::function<bool()>& stop,
+                                                     const wire::ClientCredentials& credentials = {});
 
   [[nodiscard]] Result<std::vector<RoomLine>> list();
   [[nodiscard]] Result<RoomLine> create(const std::string& name, const std::string& case_hash_hex);
   [[nodiscard]] Result<RoomLine> close(const std::string& name);
   [[nodiscard]] Result<RoomLine> resume(const std::string& name);
   [[nodiscard]] Result<RoomLine> branch(const std::string& name, const std::string& new_name, RoomSeq to);
-  [[nodiscard]] Result<RoomLine> replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to, double speed);
+  [[nodiscard]] Result<RoomLine> replay(const std::string& name, const std::string& new_name, RoomSeq from, RoomSeq to,
+                                        double speed);
   [[nodiscard]] Result<std::vector<std::string>> remove(const std::string& name, bool with_branches);
   struct Checked {
     RoomSeq room_seq;
@@ -65,7 +67,8 @@ class RoomAdminClient {
   };
   [[nodiscard]] Result<std::vector<CaseLine>> cases();
   // `archive`: a zip of a case. `progress` hears the fraction that is sent. Errors: also not_found (no such file).
-  [[nodiscard]] Result<CaseLine> upload_case(const std::filesystem::path& archive, const std::function<void(double)>& progress);
+  [[nodiscard]] Result<CaseLine> upload_case(const std::filesystem::path& archive,
+                                             const std::function<void(double)>& progress);
 
  private:
   explicit RoomAdminClient(std::shared_ptr<grpc::Channel> channel) : channel_(std::move(channel)) {}

@@ -20,15 +20,18 @@ Disk& or_system(Disk* disk) { return disk != nullptr ? *disk : system_disk(); }
 
 }  // namespace
 
-tl::unexpected<Error> given_up(const std::string& what) { return failure(ErrorCode::cancelled, what + " was given up"); }
+tl::unexpected<Error> given_up(const std::string& what) {
+  return failure(ErrorCode::cancelled, what + " was given up");
+}
 
 Result<std::unique_ptr<DiskLock>> lock_rooms(const fs::path& folder, Disk* disk) {
   const fs::path file = folder / "open-rooms.lock";
   if (const auto made = or_system(disk).open(file); !made) return tl::unexpected(made.error());
   return or_system(disk).lock(file, LockKind::exclusive).map_error([&](Error error) {
     if (error.code == ErrorCode::exists)
-      error.message = "the folder --rooms " + folder.string() +
-                      " is another osteon-server's, which runs; end that one first, or give this one a folder of its own";
+      error.message =
+          "the folder --rooms " + folder.string() +
+          " is another osteon-server's, which runs; end that one first, or give this one a folder of its own";
     return error;
   });
 }
@@ -59,7 +62,8 @@ Result<void> check_room_name(Journal& journal, const fs::path& file, const std::
         ErrorCode::invalid_input,
         file.string() + " was given the name " + name +
             " without this server's signing key; start the server again if its key was changed, or give the name with "
-            "the key: osteon-server rename-room " + file.string() + " " + name + " --signing-key KEY");
+            "the key: osteon-server rename-room " +
+            file.string() + " " + name + " --signing-key KEY");
   }
   return failure(ErrorCode::invalid_input,
                  file.string() + " holds the room " + *own + ", not " + name +
@@ -109,7 +113,8 @@ Result<JournalHead> branch_journal(const fs::path& from, const fs::path& to, Roo
   return copy->head();
 }
 
-Result<std::vector<RoomFile>> branches_of(const fs::path& folder, const fs::path& file, const HasHead& has, Disk* given) {
+Result<std::vector<RoomFile>> branches_of(const fs::path& folder, const fs::path& file, const HasHead& has,
+                                          Disk* given) {
   Disk& disk = or_system(given);
   Result<RoomGenesis> first = peek_genesis(file, given);
   if (!first) return tl::unexpected(first.error());

@@ -17,8 +17,8 @@ constexpr std::size_t kSliceRows = 256;  // read and hashed in a millisecond or 
 
 Result<void> RoomStore::each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take) {
   while (at.place < last) {
-    Result<JournalSlice> slice =
-        with_journal([&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceRows); });
+    Result<JournalSlice> slice = with_journal(
+        [&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceRows); });
     if (!slice) return tl::unexpected(slice.error());
     at = slice->head;
     for (const JournalRow& row : slice->rows)
@@ -67,14 +67,15 @@ Result<JournalHead> RoomStore::backup(const std::filesystem::path& to, const Mai
 }
 
 Result<JournalHead> RoomStore::branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
-                                       const MaintenanceCalls& calls) {
+                                      const MaintenanceCalls& calls) {
   Result<JournalCopy> copy = with_journal([&](Journal& journal) { return begin_branch(journal, to, place, name); });
   if (!copy) return tl::unexpected(copy.error());
   if (const Result<void> done = run(*copy, calls); !done) return tl::unexpected(done.error());
   return copy->head();
 }
 
-Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneAt>& live, const MaintenanceCalls& calls) {
+Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneAt>& live,
+                                     const MaintenanceCalls& calls) {
   std::optional<Room> room;
   if (live) {
     Result<Room> begun = begin_room(bone, genesis_, {});
@@ -93,8 +94,8 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   if (!checkpoints) return tl::unexpected(checkpoints.error());
   const RoomSeq replayed_to = live ? live->place : RoomSeq{};
   if (replayed_to > last)
-    return failure(ErrorCode::unavailable, "event " + std::to_string(replayed_to.value) + " of the room " + genesis_.room +
-                                               " is not kept yet; try again");
+    return failure(ErrorCode::unavailable, "event " + std::to_string(replayed_to.value) + " of the room " +
+                                               genesis_.room + " is not kept yet; try again");
 
   // Rows, and what they make.
   bool stopped = false;
@@ -146,17 +147,21 @@ Result<void> RoomStore::check_bytes(const Checkpoint& one, RoomReport& report) {
     return Result<void>{};
   });
   Result<void> good;
-  if (!read) good = tl::unexpected(read.error());
+  if (!read)
+    good = tl::unexpected(read.error());
   else if (read->size != one.size || read->digest != one.digest)
-    good = failure(ErrorCode::invalid_input, file.string() + " is not what was written; the checkpoint before it has to serve");
-  else if (const auto fields = fields_of(one, bytes); !fields) good = tl::unexpected(fields.error());
+    good = failure(ErrorCode::invalid_input,
+                   file.string() + " is not what was written; the checkpoint before it has to serve");
+  else if (const auto fields = fields_of(one, bytes); !fields)
+    good = tl::unexpected(fields.error());
   if (good) {
     ++report.checkpoints;
     return {};
   }
   const auto known = with_journal([](Journal& journal) { return journal.checkpoints(); });
   if (!known && known.error().code == ErrorCode::unavailable) return tl::unexpected(known.error());
-  const bool replaced = known && std::ranges::none_of(*known, [&](const Checkpoint& kept) { return kept.at == one.at; });
+  const bool replaced =
+      known && std::ranges::none_of(*known, [&](const Checkpoint& kept) { return kept.at == one.at; });
   if (!replaced) report.faults.push_back(good.error().message);
   return {};
 }

@@ -11,11 +11,16 @@ constexpr std::size_t kChangeBytes = 128 * 1024;
 
 v1::BoneChangeKind wire_kind(EventKind kind) {
   switch (kind) {
-    case EventKind::split: return v1::BONE_CHANGE_KIND_SPLIT;
-    case EventKind::undo: return v1::BONE_CHANGE_KIND_UNDO;
-    case EventKind::redo: return v1::BONE_CHANGE_KIND_REDO;
-    case EventKind::remove_body: return v1::BONE_CHANGE_KIND_REMOVE_BODY;
-    default: return v1::BONE_CHANGE_KIND_UNSPECIFIED;
+    case EventKind::split:
+      return v1::BONE_CHANGE_KIND_SPLIT;
+    case EventKind::undo:
+      return v1::BONE_CHANGE_KIND_UNDO;
+    case EventKind::redo:
+      return v1::BONE_CHANGE_KIND_REDO;
+    case EventKind::remove_body:
+      return v1::BONE_CHANGE_KIND_REMOVE_BODY;
+    default:
+      return v1::BONE_CHANGE_KIND_UNSPECIFIED;
   }
 }
 

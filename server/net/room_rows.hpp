@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/link/sealed.hpp"
-#include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/compliant_mount.hpp"
+#include "common/mechanics/cutting_state.hpp"
 #include "server/journal/chain.hpp"
 #include "server/net/send_queue.hpp"
 #include "server/room/room.hpp"
@@ -26,7 +26,8 @@ namespace osteon {
 [[nodiscard]] Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items);
 // What an instructor has decided; `place` null: what held before. `by`: who, as far as it is known.
-[[nodiscard]] Bytes supervised_row(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by);
+[[nodiscard]] Bytes supervised_row(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch,
+                                   const Decider& by);
 [[nodiscard]] Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words);
 [[nodiscard]] Bytes partner_row(const CuttingState& state);
 [[nodiscard]] Bytes bone_row(const MountPose& seen);

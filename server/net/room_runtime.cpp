@@ -31,8 +31,8 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
   for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
   const bool decided = player ? play(now) : !batch.empty();
   batch.clear();
-  // A commit that fails says so itself. What else closes a journal: damage that was found when it was opened, a witness, a
-  // name or a checkpoint that could not be written.
+  // A commit that fails says so itself. What else closes a journal: damage that was found when it was opened, a
+  // witness, a name or a checkpoint that could not be written.
   if (store && store->closed_to_rows() && !closing_told) {
     closing_told = true;
     later([this](const Result<void>&) {
@@ -124,7 +124,7 @@ std::optional<Error> RoomRuntime::Impl::closed() const {
 void RoomRuntime::Impl::show_scene() { board.show(room.items(), room.bodies()); }
 
 RoomRuntime::RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress, Detail detail,
-                   RoomStore* store, std::optional<Playback> playback)
+                         RoomStore* store, std::optional<Playback> playback)
     : impl_(std::make_unique<Impl>(std::move(room), rates, detail, store, std::move(playback))) {
   if (!impl_->driven()) impl_->mesh.make_whole_surface(progress);
   impl_->room_seq = impl_->room.room_seq().value;
@@ -161,7 +161,9 @@ bool RoomRuntime::knows(AuthorId author) const {
 RuntimeHealth RoomRuntime::health() const {
   RuntimeHealth health;
   health.room_seq = room_seq();
-  const auto look = [&](const Subscriber& sink) { health.furthest_behind = std::max(health.furthest_behind, sink.waiting()); };
+  const auto look = [&](const Subscriber& sink) {
+    health.furthest_behind = std::max(health.furthest_behind, sink.waiting());
+  };
   {
     const std::lock_guard lock(impl_->sessions_mutex);
     health.sessions = impl_->sessions.size();
@@ -216,11 +218,12 @@ void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> sink, Cut cut, Cl
 }
 
 void RoomRuntime::queue_event(std::function<Result<RoomEvent>(Room&)> change,
-                           std::function<void(const Result<RoomEvent>&)> answer) {
+                              std::function<void(const Result<RoomEvent>&)> answer) {
   {
     const std::lock_guard lock(impl_->queue_mutex);
     if (!impl_->queue_closed) {
-      impl_->queue.emplace_back(std::in_place_type<QueuedEvent>, QueuedEvent{std::move(change), std::move(answer), Clock::now()});
+      impl_->queue.emplace_back(std::in_place_type<QueuedEvent>,
+                                QueuedEvent{std::move(change), std::move(answer), Clock::now()});
       return;
     }
   }

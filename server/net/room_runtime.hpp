@@ -9,18 +9,18 @@
 #include <string>
 
 #include "common/core/result.hpp"
-#include "common/mechanics/cutting_state.hpp"
 #include "common/mechanics/compliant_mount.hpp"
+#include "common/mechanics/cutting_state.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "common/wire/cut_run.hpp"
-#include "server/net/mesh_publisher.hpp"
 #include "server/net/committer.hpp"
 #include "server/net/cut_figures.hpp"
+#include "server/net/mesh_publisher.hpp"
+#include "server/net/playback.hpp"
+#include "server/net/presence.hpp"
 #include "server/net/room_store.hpp"
 #include "server/net/send_queue.hpp"
-#include "server/net/presence.hpp"
-#include "server/net/playback.hpp"
 #include "server/net/state_publisher.hpp"
 #include "server/net/subscriber.hpp"
 #include "server/room/room.hpp"
@@ -30,8 +30,8 @@ namespace osteon {
 class SessionSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
-  // Of the leaves; rows come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the one
-  // that ends them.
+  // Of the leaves; rows come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the
+  // one that ends them.
   virtual void begin(RoomSeq contained, MessageParts before, Bytes complete) = 0;
   // Once, after begin() and perhaps after rows. Those apply to these leaves: what one of them contains already is no
   // change when its row is applied again.
@@ -41,7 +41,8 @@ class SessionSubscriber : public Subscriber {
   virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
   // [thread of the tools' states] All tools' newest states. True: some of it is owed, and wants to be told again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
-  // Whether it pushes the bone on its mount and is pushed by it: whoever is not takes nothing of what others put into it.
+  // Whether it pushes the bone on its mount and is pushed by it: whoever is not takes nothing of what others put into
+  // it.
   [[nodiscard]] virtual bool feels_bone() const { return true; }
   // [tick] Where the bone stands on its mount, to this one.
   virtual void show_bone(const MountPose& /*seen*/) {}
@@ -49,20 +50,25 @@ class SessionSubscriber : public Subscriber {
   virtual void hold(const wire::SessionRow& /*supervised*/) {}
   // A tool's number in few bytes: after begin() for those of the room, and before the row that adds another.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
-  virtual void answer(const Bytes& row) = 0;                // the same, outside the room's order
-  virtual void refuse(const Error& why) = 0;                // a breach of the protocol: the stream ends
-  // Another stream of its author was opened. That may be one that was given up and came late, so the author may come again.
+  virtual void answer(const Bytes& row) = 0;  // the same, outside the room's order
+  virtual void refuse(const Error& why) = 0;  // a breach of the protocol: the stream ends
+  // Another stream of its author was opened. That may be one that was given up and came late, so the author may come
+  // again.
   virtual void replaced(const std::string& why) { end(why); }
-  virtual void decided() = 0;                               // one queued cut has left the queue
+  virtual void decided() = 0;  // one queued cut has left the queue
 };
 
 struct RuntimeRates {
-  // Zero: driven. The runtime has no thread and no surface; its owner calls tick(), and slow requests are answered at once.
+  // Zero: driven. The runtime has no thread and no surface; its owner calls tick(), and slow requests are answered at
+  // once.
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
-  std::chrono::nanoseconds looks{250'000'000};   // at most so often the surface follows the looks of viewers and the tools
-  std::chrono::nanoseconds pieces{1'000'000'000 / 8};  // at most so often is looked for what has come apart; zero: never
-  bool mount = false;  // the bone stands on one, about its middle, and whoever has a session pushes it; not in a playback
+  std::chrono::nanoseconds looks{
+      250'000'000};  // at most so often the surface follows the looks of viewers and the tools
+  std::chrono::nanoseconds pieces{1'000'000'000 /
+                                  8};  // at most so often is looked for what has come apart; zero: never
+  bool mount =
+      false;  // the bone stands on one, about its middle, and whoever has a session pushes it; not in a playback
 };
 
 struct RuntimeHealth {
@@ -71,21 +77,21 @@ struct RuntimeHealth {
   DurationHistogram mesh_update;  // from a cut's arrival until its blocks' payloads were ready
   RoomSeq room_seq;
   RoomCounts counts;
-  RejectionCounts rejections{};   // of counts.rejected
-  bool serving = false;           // takes cuts
+  RejectionCounts rejections{};  // of counts.rejected
+  bool serving = false;          // takes cuts
   std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
   std::size_t queued_cuts = 0, stale_blocks = 0;
   std::size_t waiting_rows = 0;     // decided and not yet kept
   DurationHistogram commit;         // of the journal's transactions
   std::size_t furthest_behind = 0;  // rows or blocks that wait for the slowest reader
   std::size_t blocks = 0;
-  std::size_t surface_bytes = 0;    // of the newest blocks: what a viewer that joins is sent
+  std::size_t surface_bytes = 0;  // of the newest blocks: what a viewer that joins is sent
 };
 
 // The bone at one place of the room's order.
 struct BoneStatus {
   RoomSeq room_seq;
-  Digest field_hash;   // of all bodies
+  Digest field_hash;  // of all bodies
   std::vector<BodyId> bodies;
   double removed_mm3 = 0;
   RoomCounts counts;
@@ -98,8 +104,8 @@ class RoomRuntime {
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
   // `store` makes rows durable before any hand hears of them, and outlives the runtime; without it nothing is kept.
   // `playback`: rows after those of `room` happen at their times; whoever joins may watch and nothing else.
-  RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress, Detail detail = Detail::automatic,
-           RoomStore* store = nullptr, std::optional<Playback> playback = {});
+  RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress,
+              Detail detail = Detail::automatic, RoomStore* store = nullptr, std::optional<Playback> playback = {});
   ~RoomRuntime();
   RoomRuntime(const RoomRuntime&) = delete;
   RoomRuntime& operator=(const RoomRuntime&) = delete;
@@ -114,14 +120,15 @@ class RoomRuntime {
   [[nodiscard]] RuntimeHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
-  // [owner of a driven runtime] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls. `keep`
-  // false: that is left to a later tick, as by a slow disk.
+  // [owner of a driven runtime] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls.
+  // `keep` false: that is left to a later tick, as by a slow disk.
   void tick(std::chrono::nanoseconds now, bool keep = true);
 
-  // Runs `job` on the thread for slow requests, in order; it may call the functions below. Of a stopped runtime: at once.
+  // Runs `job` on the thread for slow requests, in order; it may call the functions below. Of a stopped runtime: at
+  // once.
   void run_slowly(std::function<void()> job);
-  // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps nothing
-  // any more.
+  // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps
+  // nothing any more.
   void join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
             std::function<void(const Result<AuthorId>&)> answer);
   // The same; waits, so not on the tick or the committing thread, nor of a driven runtime.
@@ -142,7 +149,7 @@ class RoomRuntime {
     std::vector<FieldLeaf> leaves;
   };
   [[nodiscard]] Leaves leaves_now();
-  void find_pieces();                        // waits until what was cut so far is looked through, and its pieces are bodies
+  void find_pieces();  // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
   // The sink hears every row after those of its leaves. With the digest of the author's secret it takes the place of an
   // earlier session of his. Error: invalid_input (the author may not cut, or has an open session).
@@ -162,20 +169,21 @@ class RoomRuntime {
 
   // Queued until the next tick. The sink, kept alive until then, hears the outcome.
   void queue_cut(std::shared_ptr<SessionSubscriber> sink, Cut cut, Clock::time_point arrived);
-  void offer_state(CuttingState state);  // newest of its author wins
+  void offer_state(CuttingState state);                    // newest of its author wins
   void push_bone(AuthorId author, const MountLoad& push);  // likewise; of no effect where there is no mount
   // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;
   // by then every session has been told. Error unavailable: the room has stopped.
-  void queue_event(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer);
+  void queue_event(std::function<Result<RoomEvent>(Room&)> change,
+                   std::function<void(const Result<RoomEvent>&)> answer);
 
-  [[nodiscard]] bool stopped() const;        // takes no more, also where its store's journal does not
-  // The process is about to stop: sessions, also those that are opened from now on, are told to come again after that time,
-  // and go on until they have.
+  [[nodiscard]] bool stopped() const;  // takes no more, also where its store's journal does not
+  // The process is about to stop: sessions, also those that are opened from now on, are told to come again after that
+  // time, and go on until they have.
   void ask_to_redial(std::chrono::milliseconds after, const std::string& why);
   // As end_streams(), but so that sessions come again by themselves.
   void send_away(const std::string& why);
-  void end_streams(const std::string& why);  // those open now and those that come later
-  void stop();                               // joins the threads; what is queued is decided before
+  void end_streams(const std::string& why);                 // those open now and those that come later
+  void stop();                                              // joins the threads; what is queued is decided before
   [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;  // Room::all_leaves(), of one that has stopped
 
  private:

@@ -11,10 +11,10 @@
 #include "common/core/check.hpp"
 #include "common/runtime/log.hpp"
 #include "server/net/audited_calls.hpp"
+#include "server/net/authorizer.hpp"
 #include "server/net/call_flood.hpp"
 #include "server/net/certificate.hpp"
 #include "server/net/cipher_order.hpp"
-#include "server/net/authorizer.hpp"
 #include "server/net/health_watch.hpp"
 #include "server/net/host_port.hpp"
 #include "server/net/link_server.hpp"
@@ -33,16 +33,17 @@ Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const Con
   const Result<HostPort> at = parse_host_port(listen, "--listen");
   if (!at) return tl::unexpected(at.error());
   if (connections.certificates.empty() && !is_loopback(at->host))
-    return failure(ErrorCode::invalid_input, "--listen " + listen +
-                                                 " is reachable from other machines, but this server speaks plain text; "
-                                                 "use 127.0.0.1, [::1] or localhost, or give --certificates DIR");
+    return failure(ErrorCode::invalid_input,
+                   "--listen " + listen +
+                       " is reachable from other machines, but this server speaks plain text; "
+                       "use 127.0.0.1, [::1] or localhost, or give --certificates DIR");
   Result<std::unique_ptr<Listener>> listener = Listener::open(at->host, at->port, connections.most_connections);
   if (!listener) return tl::unexpected(cannot_listen(listen, listener.error().message, listener.error().code));
   return listener;
 }
 
-// Where `connections.udp_listen` says, or at a free port of where connections come in: then a failure is no error, since the
-// streams carry everything.
+// Where `connections.udp_listen` says, or at a free port of where connections come in: then a failure is no error,
+// since the streams carry everything.
 Result<std::unique_ptr<LinkServer>> hear_datagrams(const ConnectionOptions& connections, const std::string& address) {
   if (connections.udp_listen.empty()) {
     Result<std::unique_ptr<LinkServer>> links = LinkServer::open(address);
@@ -71,7 +72,7 @@ constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is b
 // Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000
 // of them.
 constexpr int kMostReadBytes = 16 * 1024;
-constexpr int kHandshakeMs = 5'000;                // for those who have not shown who they are
+constexpr int kHandshakeMs = 5'000;                                  // for those who have not shown who they are
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
 constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
 constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{5};
@@ -83,9 +84,9 @@ struct RoomServer::Impl {
   std::unique_ptr<HandshakeWatch> handshakes;
   std::unique_ptr<Listener> listener;  // hands connections to the acceptor; its table of them outlives the authorizer
   std::unique_ptr<Listener> proxy_listener;  // null: there is no proxy
-  std::unique_ptr<CallFlood> flood;    // null: plain text
-  std::unique_ptr<Authorizer> authorizer;          // null: plain text; outlives the streams
-  std::unique_ptr<LinkServer> links;   // outlives the streams
+  std::unique_ptr<CallFlood> flood;          // null: plain text
+  std::unique_ptr<Authorizer> authorizer;    // null: plain text; outlives the streams
+  std::unique_ptr<LinkServer> links;         // outlives the streams
   std::vector<std::unique_ptr<grpc::Service>> services;
   std::unique_ptr<grpc::CallbackGenericService> unknown_calls;
   std::unique_ptr<grpc::experimental::ExternalConnectionAcceptor> acceptor, proxy_acceptor;
@@ -187,7 +188,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   builder.AddChannelArgument(GRPC_ARG_MAX_METADATA_SIZE, kMostMetadataBytes);
   builder.AddChannelArgument(GRPC_ARG_SERVER_HANDSHAKE_TIMEOUT_MS, kHandshakeMs);
   builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_MS, static_cast<int>(connections.connection_age.count()));
-  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS, static_cast<int>(connections.longest_session.count()));
+  builder.AddChannelArgument(GRPC_ARG_MAX_CONNECTION_AGE_GRACE_MS,
+                             static_cast<int>(connections.longest_session.count()));
   grpc::ResourceQuota quota("osteon");
   quota.Resize(kMostTransportBytes);
   builder.SetResourceQuota(quota);
@@ -196,8 +198,8 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   auto interceptors = refused_call_notes(impl->rooms->refusals);
   if (impl->authorizer) {
     impl->flood = std::make_unique<CallFlood>(connections.flood);
-    interceptors.push_back(
-        flood_watch(*impl->flood, [authorizer = impl->authorizer.get()](const PeerClaims& peer) { authorizer->note_flood(peer); }));
+    interceptors.push_back(flood_watch(
+        *impl->flood, [authorizer = impl->authorizer.get()](const PeerClaims& peer) { authorizer->note_flood(peer); }));
   }
   if (impl->rooms->trail()) {
     impl->handshakes->set_trail(*impl->rooms->trail());

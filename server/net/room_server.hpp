@@ -8,8 +8,8 @@
 #include <string>
 
 #include "common/core/result.hpp"
-#include "server/net/call_flood.hpp"
 #include "server/net/authorizer.hpp"
+#include "server/net/call_flood.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/room_runtime.hpp"
@@ -28,12 +28,13 @@ struct ConnectionOptions {
   // system chooses.
   std::string udp_listen{};
   std::chrono::hours most_ticket_life{0};  // tickets that are good for longer are refused; zero: none is
-  FloodLimit flood{};  // of calls over one connection
+  FloodLimit flood{};                      // of calls over one connection
   // After so long without a word a client is asked whether it lives; one that does not answer for as long again is
   // gone.
   std::chrono::milliseconds keepalive = std::chrono::seconds(10);
-  // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then. Streams go
-  // on over the old one for `longest_session` more; then it is closed, and sessions come again by themselves.
+  // After which calls go over a new connection, with a new handshake and the authority's certificates as they are then.
+  // Streams go on over the old one for `longest_session` more; then it is closed, and sessions come again by
+  // themselves.
   std::chrono::milliseconds connection_age = std::chrono::hours(1), longest_session = std::chrono::hours(12);
 };
 
@@ -43,9 +44,9 @@ struct ConnectionHealth {
 };
 
 struct RoomServerOptions {
-  std::string listen = "127.0.0.1:0";   // HOST:PORT on this machine; port 0 lets the system choose
-  std::filesystem::path case_folder;    // what clients are sent; holds the room's case
-  std::filesystem::path save{};         // where the cut fields are written on request; empty: nowhere
+  std::string listen = "127.0.0.1:0";  // HOST:PORT on this machine; port 0 lets the system choose
+  std::filesystem::path case_folder;   // what clients are sent; holds the room's case
+  std::filesystem::path save{};        // where the cut fields are written on request; empty: nowhere
   RuntimeRates rates{};
   Detail detail = Detail::automatic;
 };
@@ -56,7 +57,8 @@ class RoomServer {
   [[nodiscard]] static Result<void> check_listen(const std::string& listen, const ConnectionOptions& connections = {});
   // Errors: invalid_input (`listen` is not HOST:PORT, or not of this machine alone), exists (the port is in use),
   // unavailable (the system refuses for another reason, which the message gives).
-  [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(std::unique_ptr<Rooms> rooms, const std::string& listen,
+  [[nodiscard]] static Result<std::unique_ptr<RoomServer>> start(std::unique_ptr<Rooms> rooms,
+                                                                 const std::string& listen,
                                                                  const ConnectionOptions& connections = {});
   // Of one room, "room" or what `store` calls it. `progress` hears how far the first surface is. `store`: of this room;
   // without one it is lost when the process ends.
@@ -69,12 +71,13 @@ class RoomServer {
 
   [[nodiscard]] const std::string& address() const;  // HOST:PORT with the real port
   [[nodiscard]] Rooms& rooms();
-  [[nodiscard]] RuntimeHealth health() const;           // of the only room
-  [[nodiscard]] std::uint16_t link_port() const;     // UDP; 0: there is no fast path
+  [[nodiscard]] RuntimeHealth health() const;     // of the only room
+  [[nodiscard]] std::uint16_t link_port() const;  // UDP; 0: there is no fast path
   [[nodiscard]] LinkServerHealth link_health() const;
   [[nodiscard]] ConnectionHealth connection_health() const;
-  // Lets nobody in any more, tells grpc.health.v1 so, asks every session to come again later, and returns when all have gone
-  // with what they were told being kept, when `most` is over, or when `give_up`, which waits that long, returns true.
+  // Lets nobody in any more, tells grpc.health.v1 so, asks every session to come again later, and returns when all have
+  // gone with what they were told being kept, when `most` is over, or when `give_up`, which waits that long, returns
+  // true.
   void drain(std::chrono::milliseconds most, const std::function<bool(std::chrono::milliseconds)>& give_up);
   // Ends every stream with a status and joins all threads; the journals are closed cleanly, with a checkpoint. Once.
   std::map<std::string, RoomSummary> stop_all();

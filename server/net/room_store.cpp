@@ -79,7 +79,11 @@ void InTurn::unlock() {
 }
 
 RoomStore::RoomStore(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk)
-    : journal_(std::move(journal)), file_(std::move(file)), genesis_(std::move(genesis)), pitch_mm_(pitch_mm), disk_(disk) {}
+    : journal_(std::move(journal)),
+      file_(std::move(file)),
+      genesis_(std::move(genesis)),
+      pitch_mm_(pitch_mm),
+      disk_(disk) {}
 
 tl::unexpected<Error> RoomStore::is_closed() const {
   return failure(ErrorCode::unavailable, "the room " + genesis_.room + " is closed; open it again");
@@ -93,7 +97,7 @@ void RoomStore::note_closing() {
 }
 
 Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const Case& bone, const Options& options,
-                                  const std::function<void(double)>& progress) {
+                                      const std::function<void(double)>& progress) {
   Result<Journal> journal = Journal::open(file, options.journal);
   bool made = false;
   if (!journal && journal.error().code == ErrorCode::not_found) {
@@ -110,8 +114,9 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
     return tl::unexpected(named.error());
   }
   genesis->room = options.name;  // which it may have been given since
-  std::unique_ptr<RoomStore> store(new RoomStore(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
-                                                    options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
+  std::unique_ptr<RoomStore> store(
+      new RoomStore(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
+                    options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
   for (const std::string& note : store->journal_->notes())
     log::warn("journal", {{"file", file.string()}, {"note", note}});
   if (const Error* closed = store->journal_->closed_because())
@@ -124,7 +129,8 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
   store->retention_days_ = options.retention_days;
   store->today_ = options.today ? options.today : computers_day;
   if (const auto forgotten = store->forget_old(); !forgotten)
-    log::warn("people who should be forgotten are not", {{"file", file.string()}, {"reason", forgotten.error().message}});
+    log::warn("people who should be forgotten are not",
+              {{"file", file.string()}, {"reason", forgotten.error().message}});
   const Fields fields = store->newest_fields();
   Result<Room> room = store->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
@@ -154,7 +160,7 @@ Result<std::vector<FieldLeaf>> RoomStore::fields_of(const Checkpoint& one, std::
 }
 
 Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const Fields& fields,
-                                const std::function<void(double)>& progress) {
+                               const std::function<void(double)>& progress) {
   Result<Room> room = begin_room(bone, genesis_, limits);
   if (!room) return room;
   const std::uint64_t rows = journal_->head().place.value;
@@ -165,7 +171,8 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
                    : Result<void>(tl::unexpected(row.error()));
     if (replayed && one.place == fields.place) replayed = room->set_fields(fields.leaves);
     if (replayed && one.place > fields.place && changes_bone(*row)) changes_.push_back(one.place);
-    if (progress && one.place.value % 64 == 0) progress(static_cast<double>(one.place.value) / static_cast<double>(rows));
+    if (progress && one.place.value % 64 == 0)
+      progress(static_cast<double>(one.place.value) / static_cast<double>(rows));
     return replayed.has_value();
   };
   if (Result<void> read = journal_->read(RoomSeq{1}, take); !read) return tl::unexpected(read.error());
@@ -298,10 +305,12 @@ Result<void> RoomStore::checkpoint(RoomSeq place, std::span<const FieldLeaf> lea
   if (!needed) return tl::unexpected(needed.error());
   if (!*needed) return {};
   const std::string meta = to_hex(field_hash({leaves.begin(), leaves.end()}, pitch_mm_));
-  Result<CheckpointFile> file = with_journal([&](Journal& journal) { return journal.begin_checkpoint(**needed, meta); });
+  Result<CheckpointFile> file =
+      with_journal([&](Journal& journal) { return journal.begin_checkpoint(**needed, meta); });
   if (!file) return tl::unexpected(file.error());
   for (std::size_t next = 0, unsynced = 0; next < leaves.size();) {
-    if (closing_ || (calls.stop && calls.stop())) return given_up("the checkpoint at place " + std::to_string(place.value));
+    if (closing_ || (calls.stop && calls.stop()))
+      return given_up("the checkpoint at place " + std::to_string(place.value));
     v1::JournalFields fields;
     for (std::size_t size = 0; next < leaves.size() && size < kPieceBytes; ++next) {
       *fields.add_leaves() = wire::to_wire(leaves[next]);

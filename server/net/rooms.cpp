@@ -60,12 +60,14 @@ Error not_open(const std::string& name) {
   return {ErrorCode::unavailable, "the room " + name + " is closed; osteon-server rooms resume " + name + " opens it"};
 }
 Error kept_elsewhere(const OpenRoom& room) {
-  return {ErrorCode::unavailable, "the room " + room.name + " is kept in " + room.keeper_file().string() +
-                                      ", not in a folder of rooms; stop the server and see osteon-server --help for what is done to "
-                                      "its journal, or start it with --rooms FOLDER"};
+  return {ErrorCode::unavailable,
+          "the room " + room.name + " is kept in " + room.keeper_file().string() +
+              ", not in a folder of rooms; stop the server and see osteon-server --help for what is done to "
+              "its journal, or start it with --rooms FOLDER"};
 }
 Error not_kept(const std::string& name) {
-  return {ErrorCode::unavailable, "the room " + name + " is not kept in a journal; start osteon-server with --rooms FOLDER"};
+  return {ErrorCode::unavailable,
+          "the room " + name + " is not kept in a journal; start osteon-server with --rooms FOLDER"};
 }
 
 std::uint64_t new_server_epoch() {
@@ -114,7 +116,8 @@ class RowsAgain {
 }  // namespace
 
 OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptions& options,
-                   const std::function<void(double)>& progress, std::unique_ptr<RoomStore> store, std::optional<Playback> playback)
+                   const std::function<void(double)>& progress, std::unique_ptr<RoomStore> store,
+                   std::optional<Playback> playback)
     : name(std::move(n)),
       of(std::move(loaded)),
       server_epoch(store ? store->server_epoch() : new_server_epoch()),
@@ -124,7 +127,8 @@ OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptio
   if (store_ && store_->evaluated() > kLongReplay)
     if (const Result<void> kept = store_->checkpoint(room.room_seq(), room.all_leaves()); !kept)
       log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
-  runtime_ = std::make_unique<RoomRuntime>(std::move(room), options.rates, progress, options.detail, store_.get(), std::move(playback));
+  runtime_ = std::make_unique<RoomRuntime>(std::move(room), options.rates, progress, options.detail, store_.get(),
+                                           std::move(playback));
 }
 
 void OpenRoom::note_version(AuthorId author, std::uint32_t version) {
@@ -161,7 +165,11 @@ RoomSummary OpenRoom::close() {
     if (const Result<void> closed = store_->close(); !closed)
       log::warn("the journal was not closed cleanly", {{"room", name}, {"reason", closed.error().message}});
   }
-  return {runtime_->bone().hash(), runtime_->bone_status(), runtime_->health(), save, save.empty() ? SavedFields{} : runtime_->saved_fields(),
+  return {runtime_->bone().hash(),
+          runtime_->bone_status(),
+          runtime_->health(),
+          save,
+          save.empty() ? SavedFields{} : runtime_->saved_fields(),
           runtime_->surface_hash()};
 }
 
@@ -255,7 +263,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::find(const std::string& name) const {
   if (const auto found = open_.find(name); found != open_.end()) return found->second;
   if (!name.empty()) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
   if (open_.size() == 1) return open_.begin()->second;
-  if (open_.empty()) return failure(ErrorCode::unavailable, "no room is open here; osteon-server rooms create NAME makes one");
+  if (open_.empty())
+    return failure(ErrorCode::unavailable, "no room is open here; osteon-server rooms create NAME makes one");
   std::string names;
   for (const auto& [one, room] : open_) names += (names.empty() ? "" : ", ") + one;
   return failure(ErrorCode::unavailable, "several rooms are open here: " + names + "; name one with --room");
@@ -282,7 +291,8 @@ std::size_t Rooms::count() const {
   std::error_code ignored;
   if (!options_.folder.empty())
     for (const auto& entry : fs::directory_iterator(options_.folder, ignored))
-      if (entry.path().extension() == kEnding && is_name(entry.path().stem().string())) names.insert(entry.path().stem().string());
+      if (entry.path().extension() == kEnding && is_name(entry.path().stem().string()))
+        names.insert(entry.path().stem().string());
   return names.size();
 }
 
@@ -349,17 +359,20 @@ Result<void> Rooms::check_share(const Requester& by) const {
 
 Result<void> Rooms::check_new(const std::string& name, const Requester& by) const {
   if (!is_name(name))
-    return failure(ErrorCode::invalid_input, "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
+    return failure(ErrorCode::invalid_input,
+                   "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
   if (Result<void> free = check_free(name); !free) return free;
   // Each open one holds a bone and threads, each closed one a journal.
   if (count() < static_cast<std::size_t>(options_.most_rooms)) return check_share(by);
   return failure(ErrorCode::exhausted, "there are " + std::to_string(options_.most_rooms) +
-                                           " rooms, open and closed, as many as there may be; delete some, or start the server with a larger --most-rooms");
+                                           " rooms, open and closed, as many as there may be; delete some, or start "
+                                           "the server with a larger --most-rooms");
 }
 
 Result<void> Rooms::check_free(const std::string& name) const {
   const std::lock_guard lock(mutex_);
-  if (open_.contains(name) || kept_file(name)) return failure(ErrorCode::exists, "there is a room " + name + "; choose another name");
+  if (open_.contains(name) || kept_file(name))
+    return failure(ErrorCode::exists, "there is a room " + name + "; choose another name");
   return {};
 }
 
@@ -401,8 +414,8 @@ void Rooms::note_open() const {
     log::warn("which rooms are open was not noted", {{"reason", written.error().message}});
 }
 
-Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomStore> store, fs::path save,
-                                             const std::function<void(double)>& progress) {
+Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomStore> store,
+                                             fs::path save, const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
   if (Result<void> may = check_free(name); !may) return tl::unexpected(may.error());
   const Result<LoadedCase> of = cases_.load(room.bone().hash());
@@ -421,7 +434,9 @@ void Rooms::resume_all(const std::function<void(double)>& progress) {
     to_open_ = {names.begin(), names.end()};
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const auto part = [&](double fraction) { progress((static_cast<double>(i) + fraction) / static_cast<double>(names.size())); };
+    const auto part = [&](double fraction) {
+      progress((static_cast<double>(i) + fraction) / static_cast<double>(names.size()));
+    };
     const Result<std::shared_ptr<OpenRoom>> room = resume(names[i], part);
     if (!room) log::error("a room cannot be opened", {{"room", names[i]}, {"reason", room.error().message}});
   }
@@ -464,7 +479,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
 // [with changing_]
 Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const LoadedCase& of, bool is_new,
                                               const std::function<void(double)>& progress) {
-  RoomStore::Options keeping{.name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}, .random = {}};
+  RoomStore::Options keeping{
+      .name = name, .limits = options_.limits, .tools = {}, .journal = {}, .today = {}, .random = {}};
   keeping.journal.keys = options_.keys;
   keeping.retention_days = options_.retention_days;
   if (is_new) keeping.tools = options_.tools();
@@ -476,7 +492,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Loa
   };
   Result<PersistedRoom> kept = RoomStore::open(journal_of(name), *of.bone, keeping, half(0));
   if (!kept) return tl::unexpected(kept.error());
-  return take_in(std::make_shared<OpenRoom>(name, of, std::move(kept->room), options_, half(0.5), std::move(kept->store)));
+  return take_in(
+      std::make_shared<OpenRoom>(name, of, std::move(kept->room), options_, half(0.5), std::move(kept->store)));
 }
 
 Result<RoomSummary> Rooms::close(const std::string& name) {
@@ -526,8 +543,9 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   const RoomSeq head = store->head().place;
   const RoomSeq last = to ? to : head;
   if (last > head || from > last)
-    return failure(ErrorCode::invalid_input, "events " + std::to_string(from.value) + " to " + std::to_string(last.value) +
-                                                 " are not among the " + std::to_string(head.value) + " of room " + name);
+    return failure(ErrorCode::invalid_input, "events " + std::to_string(from.value) + " to " +
+                                                 std::to_string(last.value) + " are not among the " +
+                                                 std::to_string(head.value) + " of room " + name);
   const LoadedCase& of = (*source)->of;
   Result<Room> room = begin_room(*of.bone, store->genesis(), options_.limits);
   if (!room) return tl::unexpected(room.error());
@@ -540,8 +558,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   if (!read) return tl::unexpected(read.error());
   (void)room->take_changes();
   Playback playback{RowsAgain(*source, RoomSeq{from.value + 1}, last), speed};
-  auto shown = std::make_shared<OpenRoom>(new_name, of, std::move(*room), options_, std::function<void(double)>{}, nullptr,
-                                          std::move(playback));
+  auto shown = std::make_shared<OpenRoom>(new_name, of, std::move(*room), options_, std::function<void(double)>{},
+                                          nullptr, std::move(playback));
   shown->shows = {name, last};
   shown->owner = by.user;
   return take_in(std::move(shown));
@@ -552,7 +570,8 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
     RoomStore* store = (*room)->store();
     if (!store) return tl::unexpected(not_kept(name));
     const RoomSeq head = store->head().place;
-    if (const Result<void> read = store->read(RoomSeq{1}, to ? std::min(to, head) : head, take); !read) return tl::unexpected(read.error());
+    if (const Result<void> read = store->read(RoomSeq{1}, to ? std::min(to, head) : head, take); !read)
+      return tl::unexpected(read.error());
     return store->genesis();
   }
   // Nobody opens it meanwhile.
@@ -639,8 +658,11 @@ Result<RoomReport> Rooms::verify(const std::string& name) {
   while ((*room)->store()->head().place < status.room_seq && !(*room)->runtime().stopped() && !ending_)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   if ((*room)->store()->head().place < status.room_seq)
-    return failure(ErrorCode::unavailable, "the room " + name + " has stopped; check its journal with osteon-server verify once the server has ended");
-  return (*room)->store()->verify((*room)->runtime().bone(), BoneAt{status.room_seq, status.field_hash}, until_the_end());
+    return failure(
+        ErrorCode::unavailable,
+        "the room " + name + " has stopped; check its journal with osteon-server verify once the server has ended");
+  return (*room)->store()->verify((*room)->runtime().bone(), BoneAt{status.room_seq, status.field_hash},
+                                  until_the_end());
 }
 
 Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& file_name, fs::path& file,

@@ -19,7 +19,6 @@
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
 #include "server/audit/audit_trail.hpp"
-#include "server/upload_validation/case_repository.hpp"
 #include "server/net/case_cache.hpp"
 #include "server/net/demonstration.hpp"
 #include "server/net/job_thread.hpp"
@@ -27,6 +26,7 @@
 #include "server/net/room_files.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
+#include "server/upload_validation/case_repository.hpp"
 
 namespace osteon {
 
@@ -40,7 +40,7 @@ struct RoomSummary {
   RuntimeHealth health;
   std::filesystem::path save;  // where its owner is to write `fields`; empty: nowhere, and they are
   SavedFields fields;
-  Digest surface_hash;         // equal to every viewer's that has shown room_seq
+  Digest surface_hash;  // equal to every viewer's that has shown room_seq
 };
 
 // Unless somebody says otherwise.
@@ -54,18 +54,19 @@ struct Requester {
 };
 
 struct RoomsOptions {
-  std::vector<ServedCase> cases;      // at least one; in memory as long as the rooms are
-  std::filesystem::path folder{};     // of the journals NAME.journal; empty: rooms made here end with the process
+  std::vector<ServedCase> cases;   // at least one; in memory as long as the rooms are
+  std::filesystem::path folder{};  // of the journals NAME.journal; empty: rooms made here end with the process
   CutLimits limits{};
   std::function<std::shared_ptr<ToolBox>()> tools = builtin_tool_box;  // that a new room begins with: a box of its own
   RuntimeRates rates{};
   Detail detail = Detail::automatic;
   std::shared_ptr<const SigningKeys> keys = nullptr;  // sign the journals; null: nobody does
-  int retention_days = 0;             // after which it is forgotten who somebody was; 0: never
-  std::shared_ptr<AuditTrail> trail = nullptr;  // shared with the server's calls; null: nothing is taken down
-  std::shared_ptr<CaseRepository> store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
+  int retention_days = 0;                             // after which it is forgotten who somebody was; 0: never
+  std::shared_ptr<AuditTrail> trail = nullptr;        // shared with the server's calls; null: nothing is taken down
+  std::shared_ptr<CaseRepository>
+      store{};  // where uploaded cases are kept, shared with uploads under way; null: none are taken
   std::uint64_t case_memory_bytes = kMostCaseMemory;  // of all cases that rooms have
-  int most_rooms = kMostRooms;        // open and closed ones together; none is made beyond
+  int most_rooms = kMostRooms;                        // open and closed ones together; none is made beyond
   // Of those that one person made: rooms, branches and playbacks together, and backups in the folder.
   int most_rooms_per_person = kMostRoomsPerPerson, most_backups_per_person = kMostBackupsPerPerson;
 };
@@ -74,13 +75,14 @@ struct RoomsOptions {
 class OpenRoom {
  public:
   OpenRoom(std::string name, LoadedCase of, Room room, const RoomsOptions& options,
-           const std::function<void(double)>& progress, std::unique_ptr<RoomStore> store, std::optional<Playback> playback = {});
+           const std::function<void(double)>& progress, std::unique_ptr<RoomStore> store,
+           std::optional<Playback> playback = {});
 
   const std::string name;
-  const LoadedCase of;                // in memory for as long as this is
-  std::filesystem::path save;         // where the cut fields are written on request; empty: nowhere
-  std::string owner;                  // who made one that is not kept; of one that is kept see Rooms::owner()
-  const std::uint64_t server_epoch;   // rises with every opening
+  const LoadedCase of;               // in memory for as long as this is
+  std::filesystem::path save;        // where the cut fields are written on request; empty: nowhere
+  std::string owner;                 // who made one that is not kept; of one that is kept see Rooms::owner()
+  const std::uint64_t server_epoch;  // rises with every opening
   std::optional<std::pair<std::string, RoomSeq>> shows;  // of a playback: which room, up to where
 
   [[nodiscard]] RoomRuntime& runtime() { return *runtime_; }
@@ -96,35 +98,35 @@ class OpenRoom {
   void send_away(const std::string& why);
   // Afterwards nothing changes any more; the journal is closed cleanly, with a checkpoint.
   RoomSummary close();
-  // [maintenance] Writes a checkpoint where the next opening would take long without, forgets whom it is time to forget, and cuts the
-  // journal's log where the room is idle. `stop` returns true: what takes long is given up.
+  // [maintenance] Writes a checkpoint where the next opening would take long without, forgets whom it is time to
+  // forget, and cuts the journal's log where the room is idle. `stop` returns true: what takes long is given up.
   void maintain(const std::function<bool()>& stop);
 
  private:
   using Clock = std::chrono::steady_clock;
-  mutable std::mutex versions_mutex_;                     // never held with another
-  std::map<AuthorId, std::uint32_t> older_versions_;      // of those that are not this server's own
-  std::unique_ptr<RoomStore> store_;  // outlives the runtime, which writes to it
+  mutable std::mutex versions_mutex_;                 // never held with another
+  std::map<AuthorId, std::uint32_t> older_versions_;  // of those that are not this server's own
+  std::unique_ptr<RoomStore> store_;                  // outlives the runtime, which writes to it
   std::unique_ptr<RoomRuntime> runtime_;
-  Demonstrations demonstrations_;       // in the runtime
+  Demonstrations demonstrations_;                                                  // in the runtime
   Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // of maintenance
 };
 
 struct RoomListing {
   std::string name;
-  bool open = false;          // one can join it: not where it has stopped, whose journal takes no more
+  bool open = false;  // one can join it: not where it has stopped, whose journal takes no more
   bool kept = false, replay = false;
   Digest case_hash;
-  std::string case_title;     // empty: the server has no such case
-  RoomSeq room_seq;           // of an open or stopped one, as the next two
+  std::string case_title;  // empty: the server has no such case
+  RoomSeq room_seq;        // of an open or stopped one, as the next two
   std::size_t sessions = 0, watchers = 0;
-  std::string parent;         // of a branch or a playback
+  std::string parent;  // of a branch or a playback
   RoomSeq parent_room_seq;
 };
 
-// Any thread. What makes, opens, closes, copies or deletes takes long and runs one at a time. Errors: not_found (no such
-// room), exists (there is one of that name), exhausted (there are as many as there may be), invalid_input (not a name; a place that
-// the room has not reached), unavailable (closed, or not kept), and those of RoomStore.
+// Any thread. What makes, opens, closes, copies or deletes takes long and runs one at a time. Errors: not_found (no
+// such room), exists (there is one of that name), exhausted (there are as many as there may be), invalid_input (not a
+// name; a place that the room has not reached), unavailable (closed, or not kept), and those of RoomStore.
 class Rooms {
  public:
   explicit Rooms(RoomsOptions options);
@@ -143,7 +145,8 @@ class Rooms {
   [[nodiscard]] const std::shared_ptr<CaseRepository>& store() const { return options_.store; }
   [[nodiscard]] std::vector<RoomListing> list() const;
 
-  // A room that was made elsewhere, with its store. `save`: see OpenRoom. `progress` hears how far its first surface is.
+  // A room that was made elsewhere, with its store. `save`: see OpenRoom. `progress` hears how far its first surface
+  // is.
   Result<std::shared_ptr<OpenRoom>> add(const std::string& name, Room room, std::unique_ptr<RoomStore> store,
                                         std::filesystem::path save, const std::function<void(double)>& progress);
   // All that were open when the folder was last left, however that was. Those that cannot be opened are logged.
@@ -155,12 +158,12 @@ class Rooms {
   // All that `name` was up to that event, null for all.
   Result<std::shared_ptr<OpenRoom>> branch(const std::string& name, const std::string& new_name, RoomSeq to,
                                            const Requester& by = {});
-  // Shows `name`, which is open, from one event, null for its beginning, to another, null for its last. It ends early where
-  // that room is closed meanwhile.
+  // Shows `name`, which is open, from one event, null for its beginning, to another, null for its last. It ends early
+  // where that room is closed meanwhile.
   Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from,
                                            RoomSeq to, double speed, const Requester& by = {});
-  // The rows of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what it
-  // began as.
+  // The rows of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what
+  // it began as.
   Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
   // Who made a room or, where the name has its ending, a backup; empty: nobody knows.
   [[nodiscard]] std::string owner(const std::string& name) const;
@@ -174,22 +177,25 @@ class Rooms {
   Result<JournalHead> back_up(const std::string& name, const std::string& file_name, std::filesystem::path& file,
                               const Requester& by = {});
 
-  // From now on nobody is let in, and demonstrations are over. `again`: when those who are asked to leave may come again.
+  // From now on nobody is let in, and demonstrations are over. `again`: when those who are asked to leave may come
+  // again.
   void begin_drain(std::chrono::milliseconds again, const std::string& why);
   [[nodiscard]] std::optional<std::string> draining() const;  // why nobody is let in
   void begin_end();  // gives up what takes long, and does no maintenance any more
   [[nodiscard]] bool ending() const { return ending_; }
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();  // those that are open stay so in the folder's list
 
-  // For calls that take long: a thread for each kind, so that a slow one holds up none but its own. What concerns one room
-  // alone runs on that room's thread for slow requests.
-  JobThread jobs;        // whatever changes the rooms: one at a time, and opening one may take minutes
-  JobThread files;       // what everybody asks for who comes: the lists of rooms and of cases, a case's files piece by piece
-  JobThread recordings;  // journals that are read for demonstrations; that of a closed room waits until no room is being changed
-  JobThread checks;      // uploaded cases, each looked through by a process, for as long as UploadQuota lets it
-  void end_calls();      // after those that wait; later ones run where they are made
+  // For calls that take long: a thread for each kind, so that a slow one holds up none but its own. What concerns one
+  // room alone runs on that room's thread for slow requests.
+  JobThread jobs;   // whatever changes the rooms: one at a time, and opening one may take minutes
+  JobThread files;  // what everybody asks for who comes: the lists of rooms and of cases, a case's files piece by piece
+  JobThread recordings;    // journals that are read for demonstrations; that of a closed room waits until no room is
+                           // being changed
+  JobThread checks;        // uploaded cases, each looked through by a process, for as long as UploadQuota lets it
+  void end_calls();        // after those that wait; later ones run where they are made
   RefusalCounts refusals;  // of all doors
-  Authorizer* authorizer = nullptr;    // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
+  Authorizer* authorizer =
+      nullptr;  // before every call; null: plain text, and everybody may do anything. It outlives the rooms' calls
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
@@ -214,7 +220,7 @@ class Rooms {
   mutable std::mutex mutex_;
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;
   std::optional<std::string> draining_;  // under mutex_
-  std::set<std::string> to_open_;  // that were open when the folder was last left, and are not yet again
+  std::set<std::string> to_open_;        // that were open when the folder was last left, and are not yet again
   std::condition_variable upkeep_wake_;
   std::atomic<bool> ending_{false};
   std::thread upkeep_;

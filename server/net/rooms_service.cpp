@@ -7,8 +7,8 @@
 
 #include "common/wire/convert.hpp"
 #include "osteon/v1/rooms.grpc.pb.h"
-#include "server/net/called_room.inl"
 #include "server/net/authorizer.hpp"
+#include "server/net/called_room.inl"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -52,7 +52,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
     return reactor;
   }
-  Reactor* CreateRoom(Context* context, const v1::CreateRoomRequest* request, v1::CreateRoomResponse* response) override {
+  Reactor* CreateRoom(Context* context, const v1::CreateRoomRequest* request,
+                      v1::CreateRoomResponse* response) override {
     return slowly(context, "CreateRoom", request->name(), [this, context, request, response] {
       std::optional<Digest> hash;
       if (!request->case_hash().empty()) {
@@ -76,10 +77,13 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       return Status(Status::OK);
     });
   }
-  Reactor* ResumeRoom(Context* context, const v1::ResumeRoomRequest* request, v1::ResumeRoomResponse* response) override {
-    return slowly(context, "ResumeRoom", request->name(), [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
+  Reactor* ResumeRoom(Context* context, const v1::ResumeRoomRequest* request,
+                      v1::ResumeRoomResponse* response) override {
+    return slowly(context, "ResumeRoom", request->name(),
+                  [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
   }
-  Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request, v1::BranchRoomResponse* response) override {
+  Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request,
+                      v1::BranchRoomResponse* response) override {
     return slowly(context, "BranchRoom", request->name(), [this, context, request, response] {
       const Result<Requester> by = requester(*context, "BranchRoom", request->name());
       if (!by) return status_of(by.error());
@@ -87,7 +91,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
                   response->mutable_room());
     });
   }
-  Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request, v1::DeleteRoomResponse* response) override {
+  Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request,
+                      v1::DeleteRoomResponse* response) override {
     const auto work = [this, context, request, response] {
       // Of every branch too it is asked whether the caller may.
       const auto may = [&](const std::string& room) { return may_delete(*context, room); };
@@ -102,7 +107,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, "DeleteRoom", request->name(), work,
                   [this, context, request] { return may_delete(*context, request->name()); });
   }
-  Reactor* VerifyRoom(Context* context, const v1::VerifyRoomRequest* request, v1::VerifyRoomResponse* response) override {
+  Reactor* VerifyRoom(Context* context, const v1::VerifyRoomRequest* request,
+                      v1::VerifyRoomResponse* response) override {
     return slowly(context, "VerifyRoom", request->name(), [this, request, response] {
       const auto report = rooms_.verify(request->name());
       if (!report) return status_of(report.error());
@@ -117,7 +123,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       return Status(Status::OK);
     });
   }
-  Reactor* BackUpRoom(Context* context, const v1::BackUpRoomRequest* request, v1::BackUpRoomResponse* response) override {
+  Reactor* BackUpRoom(Context* context, const v1::BackUpRoomRequest* request,
+                      v1::BackUpRoomResponse* response) override {
     return slowly(context, "BackUpRoom", request->name(), [this, context, request, response] {
       const Result<Requester> by = requester(*context, "BackUpRoom", request->name());
       if (!by) return status_of(by.error());
@@ -130,7 +137,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       return Status(Status::OK);
     });
   }
-  Reactor* ReplayRoom(Context* context, const v1::ReplayRoomRequest* request, v1::ReplayRoomResponse* response) override {
+  Reactor* ReplayRoom(Context* context, const v1::ReplayRoomRequest* request,
+                      v1::ReplayRoomResponse* response) override {
     return slowly(context, "ReplayRoom", request->name(), [this, context, request, response] {
       const Result<Requester> by = requester(*context, "ReplayRoom", request->name());
       if (!by) return status_of(by.error());

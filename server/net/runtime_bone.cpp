@@ -18,8 +18,8 @@ constexpr std::size_t kLeafBatch = 64;
 
 Digest RoomRuntime::surface_hash() const { return impl_->mesh.surface_hash(); }
 
-// In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied. Those of a
-// body that goes meanwhile stay without values.
+// In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied. Those of
+// a body that goes meanwhile stay without values.
 void RoomRuntime::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   for (std::size_t i = 0; i < leaves.size();) {
     const std::shared_lock lock(room_mutex);
@@ -33,7 +33,8 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
   const auto bodies = [&] { return which == Bodies::all ? room.all_bodies() : room.bodies(); };
   const auto places = [&] {
     std::vector<FieldLeaf> leaves;
-    for (const BodyId body : bodies()) std::ranges::move(room.any_field(body)->leaf_places(), std::back_inserter(leaves));
+    for (const BodyId body : bodies())
+      std::ranges::move(room.any_field(body)->leaf_places(), std::back_inserter(leaves));
     return leaves;
   };
   for (int attempt = 0;; ++attempt) {

@@ -14,13 +14,13 @@
 #include <vector>
 
 #include "server/net/bone_mount.hpp"
-#include "server/net/runtime_parts.hpp"
+#include "server/net/fragment_detector.hpp"
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/presence.hpp"
-#include "server/net/fragment_detector.hpp"
-#include "server/net/room_runtime.hpp"
 #include "server/net/room_rows.hpp"
+#include "server/net/room_runtime.hpp"
+#include "server/net/runtime_parts.hpp"
 #include "server/net/state_publisher.hpp"
 
 namespace osteon {
@@ -30,20 +30,22 @@ namespace osteon {
 // Who watches a playback is no row of it, so their numbers must not be those of the room that is shown.
 inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
-// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's own, then
-// that of the people or the jobs.
-// queue_mutex, pieces_mutex, stats_mutex and that of the figures are never held with another.
+// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's
+// own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of the figures are never
+// held with another.
 struct RoomRuntime::Impl {
   using Clock = RoomRuntime::Clock;
 
   Impl(Room r, RuntimeRates rates, Detail detail, RoomStore* k, std::optional<Playback> p)
-      : store(k), room(std::move(r)),
+      : store(k),
+        room(std::move(r)),
         rates_(rates),
         room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(k ? reopened_time(room) : room.time())),
         people(room, names_of(k)),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
-        committer(k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
-                  [this](const Error& why) { close_room(why); }, !driven()) {
+        committer(
+            k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
+            [this](const Error& why) { close_room(why); }, !driven()) {
     authors = room.authors();
     if (rates_.mount && !p) mount.emplace(MountServerParams{.mount = mount_about(room.bone().bounds().centre_mm())});
     if (p) player.emplace(std::move(*p), room.time());
@@ -106,14 +108,14 @@ struct RoomRuntime::Impl {
   BoneCopy copy_bone(Bodies which = Bodies::that_exist);
   void ask_for_split(Separation found);
 
-  RoomStore* const store;  // null: nothing is kept
-  std::optional<Player> player;           // of a playback, from the beginning; used by the tick thread alone
+  RoomStore* const store;        // null: nothing is kept
+  std::optional<Player> player;  // of a playback, from the beginning; used by the tick thread alone
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const RuntimeRates rates_;
-  const Clock::time_point room_began;     // the room's time 0, as if it had hardly been closed
+  const Clock::time_point room_began;  // the room's time 0, as if it had hardly been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
 
@@ -138,7 +140,8 @@ struct RoomRuntime::Impl {
   bool pieces_due = true, pieces_end = false;
   std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
   bool look_wanted = false;                       // someone waits for the next one
-  FragmentDetector pieces{room, room_mutex, [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
+  FragmentDetector pieces{room, room_mutex,
+                          [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
 
   JobThread jobs;
 
@@ -153,11 +156,11 @@ struct RoomRuntime::Impl {
   std::mutex copy_mutex;                  // held while the bone is copied: of a stopped runtime by whoever asks
   std::optional<BoneStatus> last_status;  // under copy_mutex
   std::map<std::string, std::uint32_t> persons;  // of the tick thread: by name, where no journal numbers them
-  std::vector<Queued> batch;              // of the tick thread
-  std::vector<Committer::Tell> tells;     // of the tick thread
-  bool closing_told = false;              // of the tick thread: sessions are told that the journal is closed to rows
-  std::chrono::nanoseconds next_kept{};   // of the tick thread: when it is next said how much is kept
-  Committer committer;                    // the last member with a thread: it tells the others
+  std::vector<Queued> batch;                     // of the tick thread
+  std::vector<Committer::Tell> tells;            // of the tick thread
+  bool closing_told = false;             // of the tick thread: sessions are told that the journal is closed to rows
+  std::chrono::nanoseconds next_kept{};  // of the tick thread: when it is next said how much is kept
+  Committer committer;                   // the last member with a thread: it tells the others
 
   std::thread tick_thread, piece_thread;
 };

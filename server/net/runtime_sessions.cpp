@@ -19,7 +19,8 @@ constexpr std::size_t kMostToldAgain = 1024;
 }  // namespace
 
 Error only_to_be_watched() {
-  return {ErrorCode::unavailable, "this room shows what happened in another: it can be watched, with osteon-viewer, and not changed"};
+  return {ErrorCode::unavailable,
+          "this room shows what happened in another: it can be watched, with osteon-viewer, and not changed"};
 }
 
 // A name that cannot be read now is shown as nobody's.
@@ -104,7 +105,8 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
     if (event->scene || event->bone) show_scene();
     if (event->bone) note_changed(queued.arrived);
   }
-  later([this, said = std::move(said), event = std::move(event), answer = std::move(queued.answer)](const Result<void>& durable) {
+  later([this, said = std::move(said), event = std::move(event),
+         answer = std::move(queued.answer)](const Result<void>& durable) {
     if (!durable) return answer(tl::unexpected(durable.error()));
     if (event) {
       people.take(*event);
@@ -160,9 +162,13 @@ MessageParts RoomRuntime::Impl::rows_of(const RoomEvent& event) {
 RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_row(const RoomEvent& event) {
   if (const auto* decided = std::get_if<SuperviseRow>(&event.people)) {
     const Decider by{event.author, people.name_of(event.author)};
-    return {decided->subject, supervised_row(event.room_seq, decided->supervision, event.lease_epoch, by),
-            {.room_seq = event.room_seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = event.lease_epoch,
-             .supervision = decided->supervision, .by = by}};
+    return {decided->subject,
+            supervised_row(event.room_seq, decided->supervision, event.lease_epoch, by),
+            {.room_seq = event.room_seq,
+             .kind = wire::SessionRowKind::supervised,
+             .lease_epoch = event.lease_epoch,
+             .supervision = decided->supervision,
+             .by = by}};
   }
   if (const auto* said = std::get_if<WordsRow>(&event.people))
     return {said->to, said_row(event.room_seq, event.author, *said), {.room_seq = event.room_seq}};
@@ -192,26 +198,27 @@ Result<void> RoomRuntime::check_kept(const Witness& kept) {
                      " events that you were told are kept; start again to join it as it is now");
 }
 
-Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept, std::optional<Role> role) {
+Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept,
+                                 std::optional<Role> role) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   if (kept)
     if (Result<void> has = check_kept(*kept); !has) return has;
   const std::shared_lock lock(impl_->room_mutex);
   if (!impl_->room.proves(author, secret))
-    return failure(ErrorCode::invalid_input,
-                   "the room does not know author " + std::to_string(author.value) + " of an earlier connection: " +
-                       (impl_->store ? "its journal begins anew, or ends before that join"
-                                      : "without a journal it ends with its server") +
-                       "; start again to join it as it is now");
+    return failure(ErrorCode::invalid_input, "the room does not know author " + std::to_string(author.value) +
+                                                 " of an earlier connection: " +
+                                                 (impl_->store ? "its journal begins anew, or ends before that join"
+                                                               : "without a journal it ends with its server") +
+                                                 "; start again to join it as it is now");
   // What an author may take back goes by the role of the join.
   if (role && impl_->room.people().role(author) != *role)
-    return failure(ErrorCode::denied, "your role here is another than when author " + std::to_string(author.value) +
-                                          " joined; join anew");
+    return failure(ErrorCode::denied,
+                   "your role here is another than when author " + std::to_string(author.value) + " joined; join anew");
   return {};
 }
 
 void RoomRuntime::join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
-                    std::function<void(const Result<AuthorId>&)> answer) {
+                       std::function<void(const Result<AuthorId>&)> answer) {
   if (impl_->player) {
     if (kind == MemberKind::watcher) return answer(AuthorId{impl_->next_watcher++});
     return answer(tl::unexpected(only_to_be_watched()));
@@ -255,7 +262,8 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     for (const BodyId body : impl_->room.bodies())
       std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
     const std::vector<const ToolBox::Entry*> tools = impl_->room.tools()->entries();
-    for (const ToolBox::Entry* entry : tools) before.push_back(tool_row(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
+    for (const ToolBox::Entry* entry : tools)
+      before.push_back(tool_row(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
     before.push_back(scene_row(impl_->room.room_seq(), impl_->room.items()));
     // Whatever holds for the hand, it knows before it could cut; also that nothing does any more.
     const People::Supervised& held = impl_->room.people().supervised(sink->author());
@@ -272,8 +280,8 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     const std::lock_guard lock(impl_->sessions_mutex);
     SessionSubscriber*& open = impl_->open_authors[sink->author()];
     if (open && !impl_->room.proves(sink->author(), secret))
-      return failure(ErrorCode::invalid_input,
-                     "open.author " + std::to_string(sink->author().value) + " has an open session; join again for another");
+      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
+                                                   " has an open session; join again for another");
     if (open) {
       open->replaced("another connection of the same client has taken its place");
       impl_->sessions.remove(*open);
@@ -286,7 +294,11 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
-      sink->hold({.room_seq = {}, .kind = wire::SessionRowKind::supervised, .lease_epoch = lease_epoch, .supervision = held.supervision, .by = by});
+      sink->hold({.room_seq = {},
+                  .kind = wire::SessionRowKind::supervised,
+                  .lease_epoch = lease_epoch,
+                  .supervision = held.supervision,
+                  .by = by});
     if (impl_->redial) sink->answer(impl_->redial);
     if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
   }
@@ -295,9 +307,9 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     sink->set_leaves(std::move(leaves));
     return {};
   }
-  // All that the session begins with tells of what may not be kept yet, and `complete` says that it is decided: the sink sends
-  // none of it before it has the leaves, and it has these once it is kept. By datagram nothing is told sooner either, whose
-  // keys are with the rest.
+  // All that the session begins with tells of what may not be kept yet, and `complete` says that it is decided: the
+  // sink sends none of it before it has the leaves, and it has these once it is kept. By datagram nothing is told
+  // sooner either, whose keys are with the rest.
   queue_event([](Room&) { return RoomEvent{}; },
               [sink, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
                 if (kept) sink->set_leaves(std::move(leaves));

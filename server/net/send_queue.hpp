@@ -50,19 +50,19 @@ class MeshSendQueue {
 
  private:
   std::map<BlockKey, Bytes> waiting_;
-  BlockKey cursor_;             // the last block taken
-  bool started_ = false;        // cursor_ is set
+  BlockKey cursor_;       // the last block taken
+  bool started_ = false;  // cursor_ is set
   std::size_t snapshot_blocks_;
   bool snapshot_sent_ = false;
-  RoomSeq snapshot_seq_;        // what the first whole surface contains
-  RoomSeq newest_;              // contained once nothing waits
-  RoomSeq said_;                // contained in what was sent so far
-  bool news_ = true;            // newest_ was not said yet
+  RoomSeq snapshot_seq_;  // what the first whole surface contains
+  RoomSeq newest_;        // contained once nothing waits
+  RoomSeq said_;          // contained in what was sent so far
+  bool news_ = true;      // newest_ was not said yet
 };
 
-// What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Nothing of it before
-// the leaves are given, which is when all that it tells of is kept. Rows cannot be skipped, so a reader that falls too far
-// behind is given up instead.
+// What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Nothing of it
+// before the leaves are given, which is when all that it tells of is kept. Rows cannot be skipped, so a reader that
+// falls too far behind is given up instead.
 class SessionSendQueue {
  public:
   static constexpr std::size_t kMaxRows = 8192;
@@ -70,8 +70,8 @@ class SessionSendQueue {
   // `before`: sent before the leaves, once they are given; `complete` after them.
   void begin(RoomSeq contained, MessageParts before, Bytes complete);
   // Copied while rows may have come already: every leaf contains at least the order up to `contained`. What it contains
-  // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts and all other
-  // rows set leaves as they are at their place.
+  // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts and all
+  // other rows set leaves as they are at their place.
   void set_leaves(std::vector<FieldLeaf> leaves);
   // A row of the room's order; one up to `contained` is skipped. False when kMaxRows wait already; the row is then
   // not taken. Rows that are taken count from 1 on, and carry their number.
@@ -79,8 +79,8 @@ class SessionSendQueue {
   [[nodiscard]] bool takes(RoomSeq place) const { return place > contained_; }
   // Of the newest row that was taken.
   [[nodiscard]] std::uint64_t index() const { return index_; }
-  // The reader has rows up to this number by another way: those that still wait need not be sent. Gives the place of the
-  // newest row that it is known to have; null: nobody knows.
+  // The reader has rows up to this number by another way: those that still wait need not be sent. Gives the place of
+  // the newest row that it is known to have; null: nobody knows.
   RoomSeq arrived(std::uint64_t index);
   // All that goes before the rows has been taken.
   [[nodiscard]] bool begun() const { return leaves_known_ && !complete_; }
@@ -109,7 +109,7 @@ class SessionSendQueue {
 class PartnerSendQueue {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::size_t kMost = 16;                    // as many as a link tells of
+  static constexpr std::size_t kMost = 16;  // as many as a link tells of
   static constexpr std::chrono::nanoseconds kApart{1'000'000'000 / 30};
 
   // All there are; those that are gone need not be told. `by_stream` false: they go another way, so that nothing waits.

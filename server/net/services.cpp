@@ -22,7 +22,6 @@
 namespace osteon {
 namespace {
 
-
 // The case's files, read piece by piece on the thread for files.
 class CaseStream final : public OutStream<WriteReactor> {
  public:
@@ -43,7 +42,8 @@ class CaseStream final : public OutStream<WriteReactor> {
       std::error_code failed;
       file_size_ = std::filesystem::file_size(path, failed);
       file_.open(path, std::ios::binary);
-      if (failed || !file_) return close({StatusCode::INTERNAL, "the server cannot read its case's " + path.filename().string()});
+      if (failed || !file_)
+        return close({StatusCode::INTERNAL, "the server cannot read its case's " + path.filename().string()});
       sent_ = 0;
     }
     v1::GetCaseResponse response;
@@ -85,12 +85,14 @@ constexpr std::uint64_t kLongestUndoMs = 1'000'000'000'000;  // longer than any 
 
 // Why a program of these versions cannot join; OK when it can.
 Status judge(const v1::JoinRequest& request) {
-  if (const Result<void> known = wire::check_protocol_version(request.protocol_version()); !known) return status_of(known.error());
+  if (const Result<void> known = wire::check_protocol_version(request.protocol_version()); !known)
+    return status_of(known.error());
   const bool needs_kernel = request.kind() == v1::CLIENT_KIND_HAPTIC;
   if (request.kernel_version() != kKernelVersion && (needs_kernel || request.kernel_version() != 0))
-    return {StatusCode::FAILED_PRECONDITION, "the client speaks cut kernel version " + std::to_string(request.kernel_version()) +
-                                                 " and the server cut kernel version " + std::to_string(kKernelVersion) +
-                                                 "; install the same Osteon release on both"};
+    return {StatusCode::FAILED_PRECONDITION,
+            "the client speaks cut kernel version " + std::to_string(request.kernel_version()) +
+                " and the server cut kernel version " + std::to_string(kKernelVersion) +
+                "; install the same Osteon release on both"};
   if (!v1::ClientKind_IsValid(request.kind()) || request.kind() == v1::CLIENT_KIND_UNSPECIFIED)
     return invalid("kind is not a kind of client that this server knows");
   if (request.name().size() > 256) return invalid("name is longer than 256 bytes");
@@ -101,12 +103,13 @@ template <class Base>
 using WithTools = v1::RoomService::WithCallbackMethod_ListTools<
     v1::RoomService::WithCallbackMethod_GetTool<v1::RoomService::WithCallbackMethod_AddTool<Base>>>;
 template <class Base>
-using WithEvents = v1::RoomService::WithCallbackMethod_Undo<
-    v1::RoomService::WithCallbackMethod_Redo<v1::RoomService::WithCallbackMethod_Mark<v1::RoomService::WithCallbackMethod_RemoveBody<
+using WithEvents = v1::RoomService::WithCallbackMethod_Undo<v1::RoomService::WithCallbackMethod_Redo<
+    v1::RoomService::WithCallbackMethod_Mark<v1::RoomService::WithCallbackMethod_RemoveBody<
         v1::RoomService::WithCallbackMethod_SetSceneItem<v1::RoomService::WithCallbackMethod_RemoveSceneItem<
             v1::RoomService::WithCallbackMethod_SaveFields<Base>>>>>>>;
-using RoomBase = WithTools<WithEvents<v1::RoomService::WithCallbackMethod_Join<v1::RoomService::WithCallbackMethod_GetStatus<
-    v1::RoomService::WithRawCallbackMethod_GetCase<v1::RoomService::Service>>>>>;
+using RoomBase =
+    WithTools<WithEvents<v1::RoomService::WithCallbackMethod_Join<v1::RoomService::WithCallbackMethod_GetStatus<
+        v1::RoomService::WithRawCallbackMethod_GetCase<v1::RoomService::Service>>>>>;
 
 class RoomServiceImpl final : public RoomBase {
  public:
@@ -117,8 +120,8 @@ class RoomServiceImpl final : public RoomBase {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::JoinRequest>(rooms_, *context, reactor)) return reactor;
     if (Status status = judge(*request); !status.ok()) {
-      rooms_.refusals.note(status.error_code() == StatusCode::FAILED_PRECONDITION ? "version" : "request", address_of(context->peer()),
-                           status.error_message());
+      rooms_.refusals.note(status.error_code() == StatusCode::FAILED_PRECONDITION ? "version" : "request",
+                           address_of(context->peer()), status.error_message());
       return refuse(reactor, std::move(status));
     }
     if (const std::optional<std::string> why = rooms_.draining()) {
@@ -128,7 +131,8 @@ class RoomServiceImpl final : public RoomBase {
     const std::shared_ptr<OpenRoom> room = room_of(rooms_, *context, reactor);
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!room || !caller) {
-      rooms_.refusals.note("room", address_of(context->peer()), caller ? "there is no such room" : caller.error().message);
+      rooms_.refusals.note("room", address_of(context->peer()),
+                           caller ? "there is no such room" : caller.error().message);
       return room ? refuse(reactor, status_of(caller.error())) : reactor;
     }
     if (Result<void> may = may_join(*caller, *request); !may) {
@@ -158,7 +162,8 @@ class RoomServiceImpl final : public RoomBase {
         return reactor->Finish(status_of(author.error()));
       }
       if (rooms_.authorizer)
-        if (const Result<void> seated = rooms_.authorizer->joined(caller, room->name, request->kind(), *author, coming); !seated)
+        if (const Result<void> seated = rooms_.authorizer->joined(caller, room->name, request->kind(), *author, coming);
+            !seated)
           return reactor->Finish(status_of(seated.error()));
       room->note_version(*author, request->protocol_version());
       log::info("joined", {{"room", room->name},
@@ -233,7 +238,8 @@ class RoomServiceImpl final : public RoomBase {
       const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
       if (!room) return refused(status_of(room.error()));
       if ((*room)->runtime().bone().hash() != *hash)
-        return refused({StatusCode::PERMISSION_DENIED, "case " + to_hex(*hash) + " is not that of room " + (*room)->name});
+        return refused(
+            {StatusCode::PERMISSION_DENIED, "case " + to_hex(*hash) + " is not that of room " + (*room)->name});
       of_room = (*room)->name;
     }
     CaseStream* stream = CaseStream::launch(std::make_shared<CaseStream>(rooms_.files, served->folder), context);
@@ -280,7 +286,8 @@ class RoomServiceImpl final : public RoomBase {
     Result<Tool> tool = wire::from_wire(request->tool());
     if (!tool) return refuse(reactor, invalid(tool.error().message));
     return change(
-        *context, reactor, request->author(), [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
+        *context, reactor, request->author(),
+        [by = AuthorId{request->author()}, tool = *tool](Room& room) { return room.add_tool(by, tool); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
           response->set_tool_hash(wire::to_wire(event.tool->hash));
@@ -295,7 +302,9 @@ class RoomServiceImpl final : public RoomBase {
     for (const std::uint64_t place : request->room_seqs()) places.push_back(RoomSeq{place});
     const bool by_count = request->count() != 0 || request->of_author() != 0;
     const std::chrono::milliseconds newest(std::min<std::uint64_t>(request->newest_ms(), kLongestUndoMs));
-    if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} + int{newest.count() > 0} + int{request->all()} > 1)
+    if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} + int{newest.count() > 0} +
+            int{request->all()} >
+        1)
       return refuse(reactor, invalid("an UndoRequest has one of count, room_seqs, to_mark, newest_ms and all"));
     return change(
         *context, reactor, request->author(),
@@ -343,7 +352,9 @@ class RoomServiceImpl final : public RoomBase {
     if (!admitted<v1::RemoveBodyRequest>(rooms_, *context, reactor)) return reactor;
     return change(
         *context, reactor, request->author(),
-        [by = AuthorId{request->author()}, body = BodyId{request->body()}](Room& room) { return room.remove_body(by, body); },
+        [by = AuthorId{request->author()}, body = BodyId{request->body()}](Room& room) {
+          return room.remove_body(by, body);
+        },
         [response](const RoomEvent& event) { response->set_room_seq(event.room_seq.value); });
   }
 
@@ -357,7 +368,9 @@ class RoomServiceImpl final : public RoomBase {
     if (!placing) return refuse(reactor, invalid(placing.error().message));
     return change(
         *context, reactor, request->author(),
-        [by = AuthorId{request->author()}, item = *item, placing = *placing](Room& room) { return room.set_item(by, item, placing); },
+        [by = AuthorId{request->author()}, item = *item, placing = *placing](Room& room) {
+          return room.set_item(by, item, placing);
+        },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
           response->set_item(event.item);
@@ -366,7 +379,8 @@ class RoomServiceImpl final : public RoomBase {
         });
   }
 
-  grpc::ServerUnaryReactor* RemoveSceneItem(grpc::CallbackServerContext* context, const v1::RemoveSceneItemRequest* request,
+  grpc::ServerUnaryReactor* RemoveSceneItem(grpc::CallbackServerContext* context,
+                                            const v1::RemoveSceneItemRequest* request,
                                             v1::RemoveSceneItemResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::RemoveSceneItemRequest>(rooms_, *context, reactor)) return reactor;
@@ -383,7 +397,8 @@ class RoomServiceImpl final : public RoomBase {
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
     if (room->save.empty())
-      return refuse(reactor, {StatusCode::FAILED_PRECONDITION, "this server saves nothing; start it with --save FILE.vdb"});
+      return refuse(reactor,
+                    {StatusCode::FAILED_PRECONDITION, "this server saves nothing; start it with --save FILE.vdb"});
     // A client names no folder: it may not write elsewhere on the server's disk.
     const std::filesystem::path name = request->file_name();
     if (!name.empty() && (name != name.filename() || name.extension() != ".vdb" || request->file_name().front() == '.'))
@@ -404,13 +419,15 @@ class RoomServiceImpl final : public RoomBase {
 
  private:
   // A new identity, and the secret that proves it.
-  static Result<AuthorId> come(RoomRuntime& runtime, const v1::JoinRequest& request, v1::JoinResponse& response, const Caller& caller) {
+  static Result<AuthorId> come(RoomRuntime& runtime, const v1::JoinRequest& request, v1::JoinResponse& response,
+                               const Caller& caller) {
     const MemberKind kind = request.kind() == v1::CLIENT_KIND_HAPTIC ? MemberKind::surgeon : MemberKind::watcher;
     std::array<std::uint8_t, 32> secret{};
     system_random()(secret);
     response.set_secret(secret.data(), secret.size());
     // Others see who it is by the certificate, where there is one.
-    return runtime.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()), caller.role);
+    return runtime.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()),
+                        caller.role);
   }
   static Result<void> check_kept(RoomRuntime& runtime, const v1::JoinRequest& request) {
     if (request.kept_room_seq() == 0) return {};
@@ -440,8 +457,8 @@ class RoomServiceImpl final : public RoomBase {
     return {};
   }
   template <class Fill>
-  grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor, std::uint64_t author,
-                                   std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+  grpc::ServerUnaryReactor* change(const grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor,
+                                   std::uint64_t author, std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
     const std::shared_ptr<OpenRoom> room = room_of(rooms_, context, reactor, AuthorId{author});
     return room ? change_room(*room, reactor, std::move(event), fill) : reactor;
   }

@@ -9,7 +9,7 @@
 namespace grpc {
 class CallbackGenericService;
 class Service;
-}
+}  // namespace grpc
 
 namespace osteon {
 

@@ -14,8 +14,8 @@
 #include "common/wire/convert.hpp"
 #include "common/wire/version.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
-#include "server/net/link_server.hpp"
 #include "server/net/called_room.inl"
+#include "server/net/link_server.hpp"
 #include "server/net/room_rows.hpp"
 #include "server/net/services.hpp"
 
@@ -23,8 +23,8 @@ namespace osteon {
 namespace {
 
 // One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
-// faster than the room cuts is slowed down by the network instead of filling memory. Datagrams nobody slows down: who sends
-// more of them than a haptic client does before it has heard of the first is ended.
+// faster than the room cuts is slowed down by the network instead of filling memory. Datagrams nobody slows down: who
+// sends more of them than a haptic client does before it has heard of the first is ended.
 class SessionStream final : public OutStream<BidiReactor>, public SessionSubscriber, private SessionLink::Sink {
  public:
   static constexpr int kMaxQueuedCuts = 256;
@@ -32,7 +32,11 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
   SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Authorizer* authorizer, Caller caller)
-      : room_(std::move(room)), runtime_(room_->runtime()), links_(links), authorizer_(authorizer), caller_(std::move(caller)) {}
+      : room_(std::move(room)),
+        runtime_(room_->runtime()),
+        links_(links),
+        authorizer_(authorizer),
+        caller_(std::move(caller)) {}
   void start() {
     if (stand_under(authorizer_, caller_, room_->name, {}, kMethod)) StartRead(&request_);
   }
@@ -82,7 +86,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     }
     // Beside the stream, which carries all.
     const bool goes = row == any && may_carry(content_of(fast));
-    if (link_) link_->tell(index, goes ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
+    if (link_)
+      link_->tell(index, goes ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
   }
   void hold(const wire::SessionRow& supervised) override {
     if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
@@ -90,7 +95,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   bool show_partners(const std::vector<CuttingState>& states) override {
     if (is_closing()) return false;  // nor are they told by datagram
     std::vector<CuttingState> others;
-    std::ranges::copy_if(states, std::back_inserter(others), [&](const CuttingState& state) { return state.author != author_; });
+    std::ranges::copy_if(states, std::back_inserter(others),
+                         [&](const CuttingState& state) { return state.author != author_; });
     const bool by_link = link_ && may_carry(DatagramContent::partners) && link_->set_partners(others);
     const std::lock_guard lock(mutex_);
     if (closing() || !may_receive(StreamContent::tool_states)) return false;
@@ -149,11 +155,16 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (request->message_case() == v1::SessionRequest::kOpen) return open(request->open());
     if (!opened_) return close(invalid("the first SessionRequest must be open"));
     switch (request->message_case()) {
-      case v1::SessionRequest::kHeard: return hear(RoomSeq{request->heard().room_seq()});
-      case v1::SessionRequest::kCut: return queue(request->cut());
-      case v1::SessionRequest::kState: return show(request->state());
-      case v1::SessionRequest::kPush: return push(request->push());
-      default: return close(invalid("SessionRequest.message is not set"));
+      case v1::SessionRequest::kHeard:
+        return hear(RoomSeq{request->heard().room_seq()});
+      case v1::SessionRequest::kCut:
+        return queue(request->cut());
+      case v1::SessionRequest::kState:
+        return show(request->state());
+      case v1::SessionRequest::kPush:
+        return push(request->push());
+      default:
+        return close(invalid("SessionRequest.message is not set"));
     }
   }
 
@@ -163,8 +174,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (!stand_under(authorizer_, caller_, room_->name, AuthorId{request.author()}, kMethod)) return;
     if (request.server_epoch() != room_->server_epoch)
       // It joined a server that was killed meanwhile: this one knows it, if it joins again.
-      return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) + " and the server's " +
-                           std::to_string(room_->server_epoch) + "; join again"});
+      return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) +
+                                                 " and the server's " + std::to_string(room_->server_epoch) +
+                                                 "; join again"});
     opened_ = true;
     author_ = AuthorId{request.author()};
     version_ = room_->version_of(author_);
@@ -172,7 +184,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
     runtime_.run_slowly([this, keep = self(), secret] {
       const std::shared_ptr<SessionSubscriber> sink(keep, this);
-      if (const Result<void> opened = runtime_.open_session(sink, secret); !opened) return close(invalid(opened.error().message));
+      if (const Result<void> opened = runtime_.open_session(sink, secret); !opened)
+        return close(invalid(opened.error().message));
       // A reader that went away meanwhile has left the runtime's list before it was on it.
       if (!read_on()) leave();
     });
@@ -182,8 +195,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     Result<Cut> cut = wire::from_wire(message);
     if (!cut) return close(invalid(cut.error().message));
     if (cut->author != author_) return close(invalid("cut.author is not the author who opened the session"));
-    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come in
-    // datagrams.
+    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come
+    // in datagrams.
     const bool again = [&] {
       const std::lock_guard lock(mutex_);
       return cut->author_seq <= taken_;
@@ -221,8 +234,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     }();
     if (newest) runtime_.people().heard(author_, newest);
   }
-  // Whoever was told of more than there is, by a server whose journal has lost its end, has heard all that is left: what was
-  // lost is for the witness that it comes back with to show, and no reason to turn it away here.
+  // Whoever was told of more than there is, by a server whose journal has lost its end, has heard all that is left:
+  // what was lost is for the witness that it comes back with to show, and no reason to turn it away here.
   void hear(RoomSeq newest) {
     runtime_.people().heard(author_, std::min(newest, runtime_.room_seq()));
     read_on();
@@ -257,16 +270,22 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     switch (row.message_case()) {
       case v1::SessionResponse::kLeaf:
       case v1::SessionResponse::kCommitted:
-      case v1::SessionResponse::kChange: return StreamContent::field;
-      case v1::SessionResponse::kScene: return StreamContent::scene;
-      case v1::SessionResponse::kSupervised: return StreamContent::own_supervision;
-      case v1::SessionResponse::kSaid: return StreamContent::own_words;
-      default: return {};
+      case v1::SessionResponse::kChange:
+        return StreamContent::field;
+      case v1::SessionResponse::kScene:
+        return StreamContent::scene;
+      case v1::SessionResponse::kSupervised:
+        return StreamContent::own_supervision;
+      case v1::SessionResponse::kSaid:
+        return StreamContent::own_words;
+      default:
+        return {};
     }
   }
   // A row as the reader may be told it: without what is not for them it says only that there was something.
   [[nodiscard]] Bytes row_for_role(RoomSeq place, const Bytes& row) const {
-    constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision, StreamContent::own_words};
+    constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision,
+                              StreamContent::own_words};
     if (std::ranges::all_of(kAll, [&](StreamContent content) { return may_receive(content); })) return row;
     v1::SessionResponse said;
     (void)said.ParseFromString(*row);
@@ -290,7 +309,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
                                                 " cuts of this session wait to be decided; send no more than " +
                                                 std::to_string(kMostUnheard) + " before you have heard of the first"};
   }
-  [[nodiscard]] static Status not_allowed() { return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"}; }
+  [[nodiscard]] static Status not_allowed() {
+    return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"};
+  }
 
   // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
   bool read_on() {
@@ -305,7 +326,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (taken)
       pump();
     else
-      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " + std::to_string(SessionSendQueue::kMaxRows) +
+      close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " +
+                                                        std::to_string(SessionSendQueue::kMaxRows) +
                                                         " events behind the room; join again"});
   }
   [[nodiscard]] bool is_closing() const {
@@ -344,21 +366,21 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
-  RoomRuntime& runtime_;                        // of room_
+  RoomRuntime& runtime_;                  // of room_
   LinkServer* const links_;
   Authorizer* const authorizer_;  // null: plain text
   const Caller caller_;
   std::shared_ptr<SessionLink> link_;  // with the link server; set before the runtime tells of rows
   ByteBuffer request_;
-  AuthorId author_;           // set before the runtime knows the stream, as the next
+  AuthorId author_;  // set before the runtime knows the stream, as the next
   std::uint32_t version_ = wire::kProtocolVersion;
-  bool opened_ = false;       // only reactions to reads use it, and these come one by one
+  bool opened_ = false;  // only reactions to reads use it, and these come one by one
   SessionSendQueue send_queue_;
   PartnerSendQueue partners_;
-  std::optional<MountPose> bone_;                // newest place of the bone that the stream is to tell
+  std::optional<MountPose> bone_;  // newest place of the bone that the stream is to tell
   PartnerSendQueue::Clock::time_point next_bone_{};
-  int queued_ = 0;            // cuts between reading and deciding
-  std::uint64_t taken_ = 0;   // newest author_seq that was queued, here or in an earlier session
+  int queued_ = 0;           // cuts between reading and deciding
+  std::uint64_t taken_ = 0;  // newest author_seq that was queued, here or in an earlier session
   bool paused_ = false, reading_ended_ = false;
 };
 
@@ -372,8 +394,8 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
     if (!room) return refused<BidiReactor>(status_of(room.error()));
     Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused<BidiReactor>(status_of(caller.error()));
-    SessionStream* stream =
-        SessionStream::launch(std::make_shared<SessionStream>(std::move(*room), links_, rooms_.authorizer, std::move(*caller)), context);
+    SessionStream* stream = SessionStream::launch(
+        std::make_shared<SessionStream>(std::move(*room), links_, rooms_.authorizer, std::move(*caller)), context);
     stream->start();
     return stream;
   }

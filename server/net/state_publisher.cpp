@@ -84,7 +84,8 @@ void StatePublisher::show(const std::vector<SceneItem>& items, const std::vector
 void StatePublisher::publish(RoomSeq room_seq) {
   const std::lock_guard lock(states_mutex_);
   for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
-  if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0) changed_ = true;
+  if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
+    changed_ = true;
   if (std::exchange(changed_, false)) {
     v1::WatchCuttingResponse response;
     response.set_room_seq(room_seq.value);

@@ -13,8 +13,8 @@ namespace osteon {
 class Subscriber {
  public:
   virtual ~Subscriber() = default;
-  virtual void end(const std::string& why) = 0;             // the server stops
-  [[nodiscard]] virtual std::size_t waiting() const = 0;    // rows or blocks that the reader is behind
+  virtual void end(const std::string& why) = 0;           // the server stops
+  [[nodiscard]] virtual std::size_t waiting() const = 0;  // rows or blocks that the reader is behind
 };
 
 // When something may be done that is done so far apart on average, the first time and after a pause at once.
@@ -23,8 +23,8 @@ class Pace {
   using Time = std::chrono::steady_clock::time_point;
   static constexpr int kTurns = 4;
   explicit Pace(std::chrono::nanoseconds apart) : apart_(apart) {}
-  // The `number`th of many that begin together and are asked kTurns times in `apart`: they take turns. Its steps lie in the
-  // middle between two times of asking, so that none of these has to be exact.
+  // The `number`th of many that begin together and are asked kTurns times in `apart`: they take turns. Its steps lie in
+  // the middle between two times of asking, so that none of these has to be exact.
   Pace(std::chrono::nanoseconds apart, std::size_t number) : apart_(apart) {
     constexpr std::array<int, kTurns> kOrder{0, 2, 1, 3};
     early_ = apart * (2 * kOrder[number % kTurns] + 1) / (2 * kTurns);

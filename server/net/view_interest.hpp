@@ -1,4 +1,5 @@
-// Who watches the surface from where, and what it is drawn for: one surface for all, in full where any of them wants it so.
+// Who watches the surface from where, and what it is drawn for: one surface for all, in full where any of them wants it
+// so.
 #pragma once
 #include <map>
 #include <mutex>
@@ -19,8 +20,8 @@ class ViewInterest {
   void close(AuthorId viewer);
   // The newest of each viewer counts, until its last stream closes. Of one without a stream: nothing; false.
   bool look(AuthorId viewer, const ViewFrustum& from);
-  // [mesh thread] What the surface is to be drawn for from now on; nothing where that is as good as before. Whoever comes
-  // when everyone has gone finds what the last one looked at.
+  // [mesh thread] What the surface is to be drawn for from now on; nothing where that is as good as before. Whoever
+  // comes when everyone has gone finds what the last one looked at.
   [[nodiscard]] std::optional<std::vector<Focus>> focuses(double pitch_mm, std::span<const Vec3> tool_tips_mm);
 
  private:

@@ -94,8 +94,9 @@ class CuttingStream final : public OutStream<WriteReactor>, public StateSubscrib
   std::optional<ShownNow> waiting_;
 };
 
-using WatchBase = v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchService::WithRawCallbackMethod_WatchCutting<
-    v1::WatchService::WithCallbackMethod_LookFrom<v1::WatchService::Service>>>;
+using WatchBase =
+    v1::WatchService::WithRawCallbackMethod_WatchMesh<v1::WatchService::WithRawCallbackMethod_WatchCutting<
+        v1::WatchService::WithCallbackMethod_LookFrom<v1::WatchService::Service>>>;
 
 class WatchServiceImpl final : public WatchBase {
  public:
@@ -107,7 +108,8 @@ class WatchServiceImpl final : public WatchBase {
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
-    if (!(*room)->runtime().knows(AuthorId{request->author()})) return refused(not_joined("WatchMeshRequest", request->author()));
+    if (!(*room)->runtime().knows(AuthorId{request->author()}))
+      return refused(not_joined("WatchMeshRequest", request->author()));
     std::optional<ViewFrustum> look;
     if (request->has_look()) {
       const Result<ViewFrustum> stated = wire::from_wire(request->look());
@@ -117,7 +119,8 @@ class WatchServiceImpl final : public WatchBase {
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
     MeshStream* stream = MeshStream::launch(std::make_shared<MeshStream>(*room, AuthorId{request->author()}), context);
-    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchMesh"))
+    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()},
+                            "/osteon.v1.WatchService/WatchMesh"))
       (*room)->runtime().watch_mesh(*stream, look);
     return stream;
   }
@@ -147,12 +150,15 @@ class WatchServiceImpl final : public WatchBase {
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
     if (!room) return refused(status_of(room.error()));
-    if (!(*room)->runtime().knows(AuthorId{request->author()})) return refused(not_joined("WatchCuttingRequest", request->author()));
+    if (!(*room)->runtime().knows(AuthorId{request->author()}))
+      return refused(not_joined("WatchCuttingRequest", request->author()));
     const std::chrono::nanoseconds apart{request->most_hz() == 0 ? 0 : 1'000'000'000 / request->most_hz()};
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refused(status_of(caller.error()));
-    CuttingStream* stream = CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart), context);
-    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()}, "/osteon.v1.WatchService/WatchCutting"))
+    CuttingStream* stream =
+        CuttingStream::launch(std::make_shared<CuttingStream>(*room, AuthorId{request->author()}, apart), context);
+    if (stream->stand_under(rooms_.authorizer, *caller, (*room)->name, AuthorId{request->author()},
+                            "/osteon.v1.WatchService/WatchCutting"))
       (*room)->runtime().watch_cutting(*stream);
     return stream;
   }

@@ -4,9 +4,7 @@
 
 namespace osteon {
 
-BlockPayload make_block(const BlockSamples& samples) {
-  return encode_block(samples);
-}
+BlockPayload make_block(const BlockSamples& samples) { return encode_block(samples); }
 
 const StoredBlock* BlockStore::put(const BlockKey& key, BlockPayload payload) {
   const auto known = blocks_.find(key);

@@ -10,7 +10,7 @@ namespace osteon {
 namespace {
 
 constexpr int kSamples = 64, kMostTried = 20'000;
-constexpr std::size_t kPoses = 3; // of the path, besides its last
+constexpr std::size_t kPoses = 3;  // of the path, besides its last
 constexpr double kJ_per_N_mm = 1e-3;
 
 }  // namespace
@@ -24,8 +24,8 @@ const CutEnergy::Samples& CutEnergy::samples(const ToolBox::Entry& tool) {
     low[axis] = tool.body.lowest[static_cast<std::size_t>(axis)] * kQuantum_mm;
     high[axis] = tool.body.highest[static_cast<std::size_t>(axis)] * kQuantum_mm;
   }
-  // Halton's points: no two lie in one plane, so that a tool that goes forward meets them one by one. As many as it takes: a
-  // blade is a small part of its box.
+  // Halton's points: no two lie in one plane, so that a tool that goes forward meets them one by one. As many as it
+  // takes: a blade is a small part of its box.
   const auto halton = [](int index, int base) {
     double value = 0, part = 1;
     for (; index > 0; index /= base) value += (part /= base) * (index % base);
@@ -57,7 +57,8 @@ double CutEnergy::least_j(const Cut& cut, const ToolBox::Entry& tool, std::span<
     for (const Vec3& at : body.at_mm) {
       const Vec3 p = pose.point(at);
       const bool bone = std::ranges::any_of(fields, [&](const CutField* field) { return field->solid_mm(p) < 0.0; });
-      if (bone) energy_j += kJ_per_N_mm * ultimate_stress_mpa(fields.front()->bone().density_g_cm3(p)) * body.volume_mm3;
+      if (bone)
+        energy_j += kJ_per_N_mm * ultimate_stress_mpa(fields.front()->bone().density_g_cm3(p)) * body.volume_mm3;
     }
     most_j = std::max(most_j, energy_j);
   }

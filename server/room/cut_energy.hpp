@@ -13,8 +13,8 @@ namespace osteon {
 // Not synchronised.
 class CutEnergy {
  public:
-  // Bone that is inside the cutting body at one pose of the path is gone after the cut, so that the energy to take it, of the
-  // pose where that is most, is a lower bound. ∫ u(ρ) dV with u the ultimate stress [A], by samples in the body,
+  // Bone that is inside the cutting body at one pose of the path is gone after the cut, so that the energy to take it,
+  // of the pose where that is most, is a lower bound. ∫ u(ρ) dV with u the ultimate stress [A], by samples in the body,
   // so exact only over many cuts: see resolution_j(). `fields`: of all bodies that the room has. J.
   [[nodiscard]] double least_j(const Cut& cut, const ToolBox::Entry& tool, std::span<const CutField* const> fields);
   // What one sample stands for in cortical bone, J.

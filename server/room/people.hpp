@@ -25,33 +25,37 @@ class People {
   };
 
   void join(AuthorId author, Role role, std::uint32_t person, bool hand) { members_[author] = {role, person, hand}; }
-  void supervise(RoomSeq place, AuthorId by, const SuperviseRow& row) { supervised_[row.subject] = {row.supervision, place, by}; }
+  void supervise(RoomSeq place, AuthorId by, const SuperviseRow& row) {
+    supervised_[row.subject] = {row.supervision, place, by};
+  }
   void draw(const AnnotationRow& row);
 
   [[nodiscard]] Role role(AuthorId author) const;
   [[nodiscard]] std::uint32_t person(AuthorId author) const;  // a pseudonym, 0: unnamed
-  // An author without a role may do whatever one with any role may: his room is from before there were roles, or his server
-  // knows nobody by name.
+  // An author without a role may do whatever one with any role may: his room is from before there were roles, or his
+  // server knows nobody by name.
   [[nodiscard]] bool oversees(AuthorId author) const;
   [[nodiscard]] bool only_own(AuthorId author) const { return role(author) == Role::trainee; }
   // Whether they may take back all that others did.
   [[nodiscard]] bool may_undo_all(AuthorId author) const;
   // Whether both are one person, as far as it is known who they are.
-  [[nodiscard]] bool same_person(AuthorId a, AuthorId b) const { return a == b || (person(a) != 0 && person(a) == person(b)); }
+  [[nodiscard]] bool same_person(AuthorId a, AuthorId b) const {
+    return a == b || (person(a) != 0 && person(a) == person(b));
+  }
   // The hand of a person that came last, here or not; null: there is none, or nobody knows who it is (0).
   [[nodiscard]] AuthorId newest_hand(std::uint32_t person) const;
   // What holds for a hand; nothing but the default where nobody has decided anything.
   [[nodiscard]] const Supervised& supervised(AuthorId author) const;
-  // What an author keeps to: what holds for it as a hand, then what holds for the newest hand of its person, unless it may
-  // oversee others.
+  // What an author keeps to: what holds for it as a hand, then what holds for the newest hand of its person, unless it
+  // may oversee others.
   [[nodiscard]] std::array<const Restrictions*, 2> binding(AuthorId author) const;
   [[nodiscard]] const std::map<std::uint32_t, Annotation>& annotations() const { return annotations_; }
   [[nodiscard]] std::uint32_t last_annotation() const { return last_annotation_; }
   // The one that a new drawing of this kind takes the place of; 0: none.
   [[nodiscard]] std::uint32_t replaced_by(const Annotation& drawn) const;
 
-  // Adds nothing where nobody has a role, was overseen or has drawn anything: as the hash of a room was before there were
-  // people.
+  // Adds nothing where nobody has a role, was overseen or has drawn anything: as the hash of a room was before there
+  // were people.
   void add_to(Hasher& hasher) const;
 
  private:

@@ -21,7 +21,8 @@ double norm(const QuantisedPose& knot) {
 // Rounding to steps of 1/32767 moves the norm by less than 1e-4.
 constexpr double kUnitTolerance = 0.01;
 
-// The bound on swept voxels may be overdrawn by what it gives in so long: cuts come in bursts after a bad moment of the net.
+// The bound on swept voxels may be overdrawn by what it gives in so long: cuts come in bursts after a bad moment of the
+// net.
 constexpr double kBurst_s = 3.0;
 
 constexpr double kEvenOut = 8.0;
@@ -63,7 +64,8 @@ Digest cut_digest(const Cut& cut) {
 
 Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools)
     : bone_(std::move(bone)), limits_(limits), tools_(std::move(tools)), genesis_(begun(bone_, *tools_)) {
-  bodies_.emplace(BodyId{0}, Body{CutField(bone_, BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), bone_.bounds_samples()});
+  bodies_.emplace(BodyId{0},
+                  Body{CutField(bone_, BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), bone_.bounds_samples()});
 }
 
 RoomRow Room::next_row(AuthorId by, decltype(RoomRow::what) what) {
@@ -128,7 +130,8 @@ Result<Outcome> Room::submit(const Cut& cut) {
   const std::vector<Decided>& rows = surgeon->second.decided;
   const std::uint64_t next = rows.size() + 1;
   if (cut.author_seq == 0 || cut.author_seq > next)
-    return refuse("cut.author_seq is " + std::to_string(cut.author_seq) + " where " + std::to_string(next) + " comes next");
+    return refuse("cut.author_seq is " + std::to_string(cut.author_seq) + " where " + std::to_string(next) +
+                  " comes next");
 
   // What was decided stays decided, so a cut may be sent again after a lost answer.
   if (cut.author_seq < next) {
@@ -154,7 +157,8 @@ Rejection Room::judge(const Cut& cut) {
   if (!exists(cut.body)) return Rejection::body;
   const Surgeon& surgeon = surgeons_.at(cut.author);
   if (cut.lease_epoch != surgeon.epoch) return Rejection::lease;
-  if (const Rejection word = breach(people_.supervised(cut.author).supervision, cut); word != Rejection::none) return word;
+  if (const Rejection word = breach(people_.supervised(cut.author).supervision, cut); word != Rejection::none)
+    return word;
   if (const Rejection form = judge_form(cut); form != Rejection::none) return form;
   if (limits_.time_slack.count() > 0 &&
       surgeon.claimed + std::chrono::microseconds(cut.path_us) > now_ - surgeon.granted + limits_.time_slack)
@@ -186,7 +190,8 @@ bool Room::beyond_power(const Cut& cut, std::span<const CutField* const> fields)
 Rejection Room::judge_form(const Cut& cut) const {
   const ToolBox::Entry* entry = tools_->find(cut.tool);
   if (!entry || !entry->body.cuts()) return Rejection::tool;
-  if (cut.level < 0 || cut.level > std::min(entry->tool.cut_level, finest_level(bone().pitch_mm()))) return Rejection::level;
+  if (cut.level < 0 || cut.level > std::min(entry->tool.cut_level, finest_level(bone().pitch_mm())))
+    return Rejection::level;
   if (cut.path.empty() || cut.path.size() > static_cast<std::size_t>(limits_.path_knots)) return Rejection::path;
   if (cut.spindle_rpm > limits_.spindle_rpm) return Rejection::spindle;
 
@@ -212,8 +217,8 @@ double Room::swept_mm(const Cut& cut, const ToolBox::Entry& tool) const {
   return swept_mm;
 }
 
-// Samples of its level in the box of the cutting part, drawn out by the way that it goes and grown by the band: at least
-// what the kernel looks at.
+// Samples of its level in the box of the cutting part, drawn out by the way that it goes and grown by the band: at
+// least what the kernel looks at.
 double Room::swept_voxels(const Cut& cut) const {
   const ToolBox::Entry& tool = *tools_->find(cut.tool);
   const double pitch_mm = level_pitch_mm(bone().pitch_mm(), cut.level);

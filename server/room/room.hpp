@@ -1,6 +1,6 @@
 // The room: owns the bone and the scene, puts cuts and all other events in one order, judges them, applies them. A
-// function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time. What it decides
-// are rows (room_row.hpp): applied to a room as it began, in order, they make the same room again.
+// function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time. What it
+// decides are rows (room_row.hpp): applied to a room as it began, in order, they make the same room again.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -34,13 +34,13 @@ namespace osteon {
 // Bounds on a cut, checked before any of it is evaluated.
 struct CutLimits {
   int path_knots = 64;
-  double beyond_bone_mm = 60.0;     // how far outside the bone's box a tool's tip may be
-  double swept_mm = 25.0;           // way of the cutting part in one cut, its turning included
+  double beyond_bone_mm = 60.0;  // how far outside the bone's box a tool's tip may be
+  double swept_mm = 25.0;        // way of the cutting part in one cut, its turning included
   std::uint32_t spindle_rpm = 120000;
   // Bounds over time, of one author; none where zero. Time is what set_time() says.
-  std::chrono::nanoseconds time_slack{};   // tool time that may be claimed beyond what passed since joining
-  double swept_voxels_per_s = 0;           // of the cut's level: what the kernel is asked to look at
-  double power_w = 0;                      // that a motor gives: bounds the energy of a cut beside that of a blow
+  std::chrono::nanoseconds time_slack{};  // tool time that may be claimed beyond what passed since joining
+  double swept_voxels_per_s = 0;          // of the cut's level: what the kernel is asked to look at
+  double power_w = 0;                     // that a motor gives: bounds the energy of a cut beside that of a blow
   double blow_j = 20.0;
 };
 
@@ -58,11 +58,13 @@ struct RoomCounts {
   std::uint64_t refused = 0;  // breaches that got no place in the order
 };
 
-inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64, kMostLabelBytes = 256, kMostMarks = 4096;
+inline constexpr std::size_t kMostItems = 256, kMostTools = 1024, kMostBodies = 64, kMostLabelBytes = 256,
+                             kMostMarks = 4096;
 
-// Every body holds every cut, those that were taken away too: all bodies share the case's lattice and frame, a piece has
-// all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a split need
-// no notion of which body a tool meets. Not synchronised: one thread calls the changing functions, or several the const ones.
+// Every body holds every cut, those that were taken away too: all bodies share the case's lattice and frame, a piece
+// has all but itself taken away, and a cut is applied to each of them, so the server, every replica and the undo of a
+// split need no notion of which body a tool meets. Not synchronised: one thread calls the changing functions, or
+// several the const ones.
 class Room {
  public:
   explicit Room(Case bone, CutLimits limits = {}, std::shared_ptr<ToolBox> tools = builtin_tool_box());
@@ -75,15 +77,15 @@ class Room {
   void set_time(std::chrono::nanoseconds now) { now_ = std::max(now_, now); }
   [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
 
-  // A new identity, never given twice: the event's author. What holds for the person's newest hand holds for the new one, by a
-  // row of its own (RoomEvent::further), unless the server itself joins, which has no secret.
+  // A new identity, never given twice: the event's author. What holds for the person's newest hand holds for the new
+  // one, by a row of its own (RoomEvent::further), unless the server itself joins, which has no secret.
   RoomEvent admit(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   [[nodiscard]] bool knows(AuthorId author) const;
   [[nodiscard]] std::uint64_t authors() const { return authors_; }  // so many have joined
   [[nodiscard]] bool may_cut(AuthorId author) const { return surgeons_.contains(author); }
-  // Rises when bone comes back (undo, redo), for everyone, and with a rejection for its author: what was cut on the sight
-  // of what is not there is void. Cuts are taken under the present one only. 0: no such surgeon.
+  // Rises when bone comes back (undo, redo), for everyone, and with a rejection for its author: what was cut on the
+  // sight of what is not there is void. Cuts are taken under the present one only. 0: no such surgeon.
   [[nodiscard]] std::uint64_t lease_epoch(AuthorId holder) const;
   // The secret that the author was given is the one of which this is the digest.
   [[nodiscard]] bool proves(AuthorId author, const Digest& secret) const;
@@ -101,15 +103,16 @@ class Room {
   // The other events. Errors, without a place in the order: invalid_input (an author who has not joined, an unknown
   // body, item, tool or place), unavailable (nothing to undo or redo, or the bone has changed meanwhile).
   Result<RoomEvent> add_tool(AuthorId by, const Tool& tool);  // place 0 when it is known already
-  // Takes back these events, or the newest `count` of one author or (null) of all, of a trainee their own. With a cut falls every
-  // later split of a body that it had reached, and what was done to the piece as such; cuts made since stay in the bone.
+  // Takes back these events, or the newest `count` of one author or (null) of all, of a trainee their own. With a cut
+  // falls every later split of a body that it had reached, and what was done to the piece as such; cuts made since stay
+  // in the bone.
   Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);         // all that came after it
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still stand
   // All that was done since then, by the room's time; all of it, where nothing is older.
   Result<RoomEvent> undo_since(AuthorId by, std::chrono::nanoseconds since);
-  Result<RoomEvent> mark(AuthorId by, std::string label);       // of 1 to kMostLabelBytes bytes
+  Result<RoomEvent> mark(AuthorId by, std::string label);  // of 1 to kMostLabelBytes bytes
   Result<RoomEvent> remove_body(AuthorId by, BodyId body);
   // By the rules of common/tools/scene.hpp, which also say whether it is seated. id 0: a new one.
   Result<RoomEvent> set_item(AuthorId by, SceneItem item, const Placing& placing = {});
@@ -119,10 +122,11 @@ class Room {
     return split({parent, std::move(fragments), seen});
   }
   Result<RoomEvent> split(Separation found);
-  // What people decide about each other, draw and say: room_people.cpp. A trainee takes back and does again what is their
-  // own; errors as above, and denied where the author's role, or what was decided about their hand, does not allow it.
+  // What people decide about each other, draw and say: room_people.cpp. A trainee takes back and does again what is
+  // their own; errors as above, and denied where the author's role, or what was decided about their hand, does not
+  // allow it.
   Result<RoomEvent> supervise(AuthorId by, AuthorId subject, Restrictions supervision);
-  Result<RoomEvent> annotate(AuthorId by, Annotation drawn);        // id 0: a new one; an author has one pointer
+  Result<RoomEvent> annotate(AuthorId by, Annotation drawn);          // id 0: a new one; an author has one pointer
   Result<RoomEvent> wipe_off(AuthorId by, std::uint32_t annotation);  // an own one, or anyone's for an instructor
   Result<RoomEvent> say(AuthorId by, AuthorId to, std::string words);
   [[nodiscard]] const People& people() const { return people_; }
@@ -130,9 +134,9 @@ class Room {
 
   // What was decided since the last call, in order: for the journal, before anyone is told.
   [[nodiscard]] std::vector<RoomRow> take_rows() { return std::exchange(rows_, {}); }
-  // The next row of a room that began as this one did. Judges nothing; take_rows() does not give it again. `fields` leave:
-  // cuts are noted but not evaluated, until set_fields() brings what they have made. Error invalid_input: not the next
-  // row, or one that cannot follow what is here.
+  // The next row of a room that began as this one did. Judges nothing; take_rows() does not give it again. `fields`
+  // leave: cuts are noted but not evaluated, until set_fields() brings what they have made. Error invalid_input: not
+  // the next row, or one that cannot follow what is here.
   enum class Fields : bool { evaluate, leave };
   Result<void> replay(const RoomRow& row, Fields fields = Fields::evaluate);
   // The leaves of all bodies, those that were taken away too, as they were at room_seq(): what all_leaves() gave.
@@ -149,12 +153,12 @@ class Room {
   // Never changes, so that any thread may ask beside the one that changes the room.
   [[nodiscard]] const Case& bone() const { return bone_; }
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const { return tools_; }
-  [[nodiscard]] std::vector<BodyId> bodies() const;  // that exist, in order
-  [[nodiscard]] const CutField* find_field(BodyId body) const;  // null: no such body
-  [[nodiscard]] std::vector<BodyId> all_bodies() const;         // those that were taken away too
-  [[nodiscard]] const CutField* any_field(BodyId body) const;   // of one of these
+  [[nodiscard]] std::vector<BodyId> bodies() const;                                    // that exist, in order
+  [[nodiscard]] const CutField* find_field(BodyId body) const;                         // null: no such body
+  [[nodiscard]] std::vector<BodyId> all_bodies() const;                                // those that were taken away too
+  [[nodiscard]] const CutField* any_field(BodyId body) const;                          // of one of these
   [[nodiscard]] const CutField& field() const { return bodies_.at(BodyId{0}).field; }  // of the case's bone
-  [[nodiscard]] Digest field_hash() const;           // of all bodies
+  [[nodiscard]] Digest field_hash() const;                                             // of all bodies
   [[nodiscard]] std::vector<SceneItem> items() const;
   // Events so far that changed the bone otherwise than by cutting.
   [[nodiscard]] std::uint64_t bone_changes() const { return bone_changes_; }
@@ -180,11 +184,11 @@ class Room {
     Rejection rejection = Rejection::none;
   };
   struct Surgeon {
-    std::uint64_t epoch = 1;                 // of the lease
+    std::uint64_t epoch = 1;                        // of the lease
     std::chrono::nanoseconds granted{}, claimed{};  // when, and tool time of its cuts since
-    double swept_voxels = 0;                 // spent of the bound, at `spent`
+    double swept_voxels = 0;                        // spent of the bound, at `spent`
     std::chrono::nanoseconds spent{};
-    std::vector<Decided> decided;            // row author_seq − 1
+    std::vector<Decided> decided;  // row author_seq − 1
   };
   struct Body {
     CutField field;
@@ -197,14 +201,14 @@ class Room {
     EventKind kind = EventKind::cut;
     AuthorId author{};
     bool undone = false;
-    BodyId body{};                      // split: its parent; remove_body
-    Mask taken = {};                    // split
+    BodyId body{};    // split: its parent; remove_body
+    Mask taken = {};  // split
     std::vector<SplitPiece> pieces = {};
-    std::uint32_t item = 0;             // scene
-    std::vector<RoomSeq> places = {};   // undo
+    std::uint32_t item = 0;                  // scene
+    std::vector<RoomSeq> places = {};        // undo
     std::shared_ptr<const Cut> missed = {};  // cut: one that is in no body's history; never changed
-    bool all_of_others = false;         // undo: nothing was left of what anybody but its author had done
-    std::string label = {};             // mark
+    bool all_of_others = false;              // undo: nothing was left of what anybody but its author had done
+    std::string label = {};                  // mark
     std::chrono::nanoseconds at{};
   };
   // What an item was set to; nothing: taken out.
@@ -275,7 +279,7 @@ class Room {
   std::map<BodyId, Body> bodies_;
   std::uint32_t last_body_ = 0, last_item_ = 0;
   std::map<std::uint32_t, std::vector<ItemState>> items_;  // rows in order
-  std::map<RoomSeq, Event> events_;                      // committed ones, tombstones included
+  std::map<RoomSeq, Event> events_;                        // committed ones, tombstones included
   std::vector<Focus> focuses_;
   std::set<BlockKey> stale_;
   std::vector<BodyLeaves> changes_;
@@ -287,7 +291,7 @@ class Room {
   People people_;
   RoomCounts counts_;
   Digest genesis_;
-  std::vector<RoomRow> rows_;   // decided since take_rows()
+  std::vector<RoomRow> rows_;  // decided since take_rows()
   Fields fields_ = Fields::evaluate;
   CutEnergy energy_;
   std::map<AuthorId, double> owed_j_;

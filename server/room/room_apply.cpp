@@ -41,7 +41,8 @@ bool is_mask(const Mask& mask, const CoordBox& about) {
     const FieldLeaf& leaf = (*mask)[i];
     const auto off_lattice = [](std::int32_t at) { return at % kLeafSize != 0; };
     if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() || off_lattice(leaf.origin.x) ||
-        off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z) || !about.contains(shift_down(leaf.origin, leaf.level)))
+        off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z) ||
+        !about.contains(shift_down(leaf.origin, leaf.level)))
       return false;
     if (i > 0 && !(place_of((*mask)[i - 1]) < place_of(leaf))) return false;
   }
@@ -61,8 +62,8 @@ Result<void> Room::replay(const RoomRow& row, Fields fields) {
   return {};
 }
 
-// Not whether it would be decided so again, but whether it can have been: what a damaged or forged journal names may not
-// exist.
+// Not whether it would be decided so again, but whether it can have been: what a damaged or forged journal names may
+// not exist.
 Result<void> Room::can_follow(const RoomRow& row) const {
   const auto possible = [&](bool holds, const char* why) -> Result<void> {
     return holds ? Result<void>{} : Result<void>(impossible(row, why));
@@ -86,7 +87,8 @@ Result<void> Room::can_follow(const RoomRow& row) const {
     }
     Result<void> operator()(const CutRow& cut) const {
       if (Result<void> next = next_of(cut.cut.author, cut.cut.author_seq); !next) return next;
-      return require(room.exists(cut.cut.body) && room.judge_form(cut.cut) == Rejection::none, "no room would take this cut");
+      return require(room.exists(cut.cut.body) && room.judge_form(cut.cut) == Rejection::none,
+                     "no room would take this cut");
     }
     Result<void> operator()(const RejectionRow& one) const {
       if (Result<void> next = next_of(one.author, one.author_seq); !next) return next;
@@ -131,7 +133,8 @@ Result<void> Room::can_follow(const RoomRow& row) const {
     }
     Result<void> operator()(const ToolRow& tool) const {
       if (room.tools_->find(tool.tool.hash())) return require(false, "the tool was known before");
-      if (Result<void> room_for_it = room.know(tool.tool); !room_for_it) return impossible(row, room_for_it.error().message);
+      if (Result<void> room_for_it = room.know(tool.tool); !room_for_it)
+        return impossible(row, room_for_it.error().message);
       return {};
     }
     Result<void> operator()(const MarkRow& mark) const {
@@ -140,7 +143,8 @@ Result<void> Room::can_follow(const RoomRow& row) const {
     Result<void> operator()(const SuperviseRow& one) const {
       const Restrictions& set = one.supervision;
       bool all = room.surgeons_.contains(one.subject) && check(set).has_value();
-      for (const AuthorId named : {set.taken_by, set.guide}) all = all && (!named || (room.knows(named) && named != one.subject));
+      for (const AuthorId named : {set.taken_by, set.guide})
+        all = all && (!named || (room.knows(named) && named != one.subject));
       for (const Digest& tool : set.tools) all = all && room.tools_->find(tool);
       return require(all, "it oversees what is not there");
     }
@@ -149,8 +153,9 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       if (!one.drawn) return require(drawn.contains(one.id), "there is no such annotation");
       const bool room_for_it =
           drawn.contains(one.id) || (one.id == room.people_.last_annotation() + 1 && drawn.size() < kMostAnnotations);
-      return require(room_for_it && one.drawn->id == one.id && room.knows(one.drawn->author) && check(*one.drawn).has_value(),
-                     "the annotation cannot be there");
+      return require(
+          room_for_it && one.drawn->id == one.id && room.knows(one.drawn->author) && check(*one.drawn).has_value(),
+          "the annotation cannot be there");
     }
     Result<void> operator()(const WordsRow& said) const {
       return require(!said.words.empty() && said.words.size() <= kMostWordsBytes && (!said.to || room.knows(said.to)),
@@ -170,9 +175,7 @@ RoomEvent Room::apply(const RoomRow& row) {
   return event;
 }
 
-void Room::finish_event(RoomEvent& event) const {
-  event.bodies = bodies();
-}
+void Room::finish_event(RoomEvent& event) const { event.bodies = bodies(); }
 
 Room::Event& Room::add_event(const RoomRow& row, EventKind kind) {
   Event& event = events_[row.place];
@@ -205,7 +208,8 @@ void Room::apply(const RoomRow& row, const CutRow& what, RoomEvent& event) {
   event.cut.level = cut.level;
   for (auto& [id, body] : bodies_) {
     if (fields_ == Fields::leave) {
-      if (const std::vector<Coord> reach = body.field.reach(cut); !reach.empty()) body.history.add(row.place, cut, reach);
+      if (const std::vector<Coord> reach = body.field.reach(cut); !reach.empty())
+        body.history.add(row.place, cut, reach);
       continue;
     }
     CutReport part = body.field.apply(cut);
@@ -214,15 +218,16 @@ void Room::apply(const RoomRow& row, const CutRow& what, RoomEvent& event) {
     event.cut.visited += part.visited;
     event.cut.computed += part.computed;
     event.cut.modified += part.modified;
-    event.cut.changed_leaves.insert(event.cut.changed_leaves.end(), part.changed_leaves.begin(), part.changed_leaves.end());
+    event.cut.changed_leaves.insert(event.cut.changed_leaves.end(), part.changed_leaves.begin(),
+                                    part.changed_leaves.end());
     if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
   }
   if (std::ranges::none_of(bodies_, [&](const auto& body) { return body.second.history.contains(row.place); }))
     events_.at(row.place).missed = std::make_shared<const Cut>(cut);
 }
 
-// What its author has predicted on top of a cut that fell, falls too; but a stale cut says that he does not know yet, and
-// to raise the epoch for it would make the next ones stale as well.
+// What its author has predicted on top of a cut that fell, falls too; but a stale cut says that he does not know yet,
+// and to raise the epoch for it would make the next ones stale as well.
 void Room::apply(const RoomRow& row, const RejectionRow& rejection, RoomEvent& event) {
   event.kind = EventKind::cut;
   ++counts_.rejected;
@@ -256,7 +261,8 @@ void Room::apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event) {
   for (auto place = undo.places.rbegin(); place != undo.places.rend(); ++place) {
     Event& fallen = events_.at(*place);
     fallen.undone = true;
-    event.scene |= fallen.kind == EventKind::scene || fallen.kind == EventKind::split || fallen.kind == EventKind::remove_body;
+    event.scene |=
+        fallen.kind == EventKind::scene || fallen.kind == EventKind::split || fallen.kind == EventKind::remove_body;
     event.bone |= fallen.kind != EventKind::scene;
     for (const SplitPiece& piece : fallen.pieces) {
       bodies_.erase(piece.body);
@@ -301,7 +307,8 @@ void Room::apply(const RoomRow& row, const RedoRow& redo, RoomEvent& event) {
     if ((again.kind == EventKind::split || again.kind == EventKind::remove_body) && !exists(again.body)) continue;
     again.undone = false;
     event.places.push_back(place);
-    event.scene |= again.kind == EventKind::scene || again.kind == EventKind::split || again.kind == EventKind::remove_body;
+    event.scene |=
+        again.kind == EventKind::scene || again.kind == EventKind::split || again.kind == EventKind::remove_body;
     event.bone |= again.kind != EventKind::scene;
     if (again.kind == EventKind::split) cut_apart(place, again, event);
     if (again.kind == EventKind::remove_body) bodies_.at(again.body).present = false;
@@ -421,7 +428,9 @@ void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
     const SplitPiece& piece = row.pieces[i];
     const bool use = ready && ready_[i].body() == piece.body;
     if (use) catch_up(parent, ready_[i]);
-    CutField field = use ? std::move(ready_[i]) : evaluated ? made_piece(parent, piece) : CutField(bone(), piece.body, tools_);
+    CutField field = use         ? std::move(ready_[i])
+                     : evaluated ? made_piece(parent, piece)
+                                 : CutField(bone(), piece.body, tools_);
     CutHistory history = parent.history.fork();
     history.add_mask(left_key, piece.left);
     add_body(piece.body, std::move(field), std::move(history), piece.reach);
@@ -454,12 +463,14 @@ std::vector<FieldLeaf> Room::all_leaves() const {
 Result<void> Room::set_fields(std::span<const FieldLeaf> leaves) {
   const CoordBox near = about(bone());
   for (const FieldLeaf& leaf : leaves)
-    if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() || !near.contains(shift_down(leaf.origin, leaf.level)))
+    if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() ||
+        !near.contains(shift_down(leaf.origin, leaf.level)))
       return failure(ErrorCode::invalid_input, "the fields hold a leaf that is none of this bone's");
   for (const FieldLeaf& leaf : leaves)
     if (!bodies_.contains(leaf.body))
       return failure(ErrorCode::invalid_input, "the fields hold leaves of body " + std::to_string(leaf.body.value) +
-                                                   ", which the room does not have at place " + std::to_string(room_seq_.value));
+                                                   ", which the room does not have at place " +
+                                                   std::to_string(room_seq_.value));
   for (const FieldLeaf& leaf : leaves) bodies_.at(leaf.body).field.restore(leaf);
   RoomEvent nobody_hears;
   for (auto& [id, body] : bodies_)

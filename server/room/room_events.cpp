@@ -37,10 +37,13 @@ std::vector<FieldLeaf> united(std::vector<FieldLeaf> masks) {
   return out;
 }
 
-Mask shared(std::vector<FieldLeaf> mask) { return std::make_shared<const std::vector<FieldLeaf>>(united(std::move(mask))); }
+Mask shared(std::vector<FieldLeaf> mask) {
+  return std::make_shared<const std::vector<FieldLeaf>>(united(std::move(mask)));
+}
 
 bool is_guide(const Tool& tool) {
-  return tool.kind == ToolKind::drill_sleeve || tool.kind == ToolKind::distal_block || tool.kind == ToolKind::four_in_one_block;
+  return tool.kind == ToolKind::drill_sleeve || tool.kind == ToolKind::distal_block ||
+         tool.kind == ToolKind::four_in_one_block;
 }
 
 // A room that goes on from what was saved began with that.
@@ -59,11 +62,13 @@ Digest begun_with(const Digest& genesis, const SavedFields& saved) {
 
 Result<Room> Room::resume(Case bone, const SavedFields& saved, CutLimits limits, std::shared_ptr<ToolBox> tools) {
   if (saved.case_hash != bone.hash())
-    return failure(ErrorCode::unsupported, "the saved fields are of the case " + to_hex(saved.case_hash) + " and not of " +
-                                               to_hex(bone.hash()) + "; start the server with that case");
+    return failure(ErrorCode::unsupported, "the saved fields are of the case " + to_hex(saved.case_hash) +
+                                               " and not of " + to_hex(bone.hash()) +
+                                               "; start the server with that case");
   if (saved.kernel_version != kKernelVersion)
-    return failure(ErrorCode::unsupported, "the saved fields are of cut kernel version " + std::to_string(saved.kernel_version) +
-                                               " and this server's is " + std::to_string(kKernelVersion) +
+    return failure(ErrorCode::unsupported, "the saved fields are of cut kernel version " +
+                                               std::to_string(saved.kernel_version) + " and this server's is " +
+                                               std::to_string(kKernelVersion) +
                                                "; resume them with the release that saved them");
   Room room(bone, limits, std::move(tools));
   room.room_seq_ = saved.room_seq;
@@ -84,8 +89,10 @@ Result<Room> Room::resume(Case bone, const SavedFields& saved, CutLimits limits,
     room.show_whole(id, nobody_hears);
   }
   for (const Tool& tool : saved.tools)
-    if (Result<void> added = room.know(tool); !added) return tl::unexpected(added.error());
-    else if (!room.tools_->find(tool.hash())) room.tools_->add(tool);
+    if (Result<void> added = room.know(tool); !added)
+      return tl::unexpected(added.error());
+    else if (!room.tools_->find(tool.hash()))
+      room.tools_->add(tool);
   // Set by nobody and not to be undone.
   room.events_[RoomSeq{}] = {.kind = EventKind::tool};
   for (const SceneItem& item : saved.items) {
@@ -141,7 +148,8 @@ std::vector<SceneItem> Room::items() const {
   // Whether a guide is fixed follows from the pins that stand with it.
   const std::vector<Standing> scene = with_tools(standing);
   for (std::size_t i = 0; i < scene.size(); ++i)
-    if (is_guide(scene[i].tool)) standing[i].seated = pins_in(scene[i].tool, scene[i].item.pose_bone_item, scene) >= kPinsThatFix;
+    if (is_guide(scene[i].tool))
+      standing[i].seated = pins_in(scene[i].tool, scene[i].item.pose_bone_item, scene) >= kPinsThatFix;
   return standing;
 }
 
@@ -173,17 +181,19 @@ Result<RoomEvent> Room::add_tool(AuthorId by, const Tool& tool) {
 Result<void> Room::know(const Tool& tool) const {
   if (tools_->find(tool.hash())) return {};
   const auto entries = tools_->entries();
-  if (entries.size() >= kMostTools) return refuse("the room knows " + std::to_string(kMostTools) + " tools and takes no more");
+  if (entries.size() >= kMostTools)
+    return refuse("the room knows " + std::to_string(kMostTools) + " tools and takes no more");
   // States and lists name tools by their names, so that two must not have one.
   for (const ToolBox::Entry* entry : entries)
     if (entry->tool.name == tool.name)
-      return failure(ErrorCode::exists, "the room has another tool of the name " + tool.name + "; give this one a name of its own");
+      return failure(ErrorCode::exists,
+                     "the room has another tool of the name " + tool.name + "; give this one a name of its own");
   return {};
 }
 
 // What was done to a piece as such falls with the split that made it; with a cut falls every later split of a body that
-// the cut had reached, since the bone that comes back may hold the piece; and so with an earlier split of that body, whose
-// bone would come back in the later piece too.
+// the cut had reached, since the bone that comes back may hold the piece; and so with an earlier split of that body,
+// whose bone would come back in the later piece too.
 std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
   std::set<BodyId> pieces_gone;
   bool more = true;
@@ -217,7 +227,8 @@ bool Room::can_be_undone(RoomSeq place) const {
   const auto found = events_.find(place);
   if (found == events_.end()) return false;
   const EventKind kind = found->second.kind;
-  return kind == EventKind::cut || kind == EventKind::split || kind == EventKind::remove_body || kind == EventKind::scene;
+  return kind == EventKind::cut || kind == EventKind::split || kind == EventKind::remove_body ||
+         kind == EventKind::scene;
 }
 
 RoomEvent Room::take_back(AuthorId by, std::set<RoomSeq> places) {
@@ -252,7 +263,8 @@ Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
 }
 
 Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) {
-  const auto later = std::ranges::find_if(events_, [&](const auto& event) { return event.second.at >= since && event.first; });
+  const auto later =
+      std::ranges::find_if(events_, [&](const auto& event) { return event.second.at >= since && event.first; });
   return undo_to(by, later == events_.end() ? room_seq_ : RoomSeq{later->first.value - 1});
 }
 
@@ -263,7 +275,8 @@ Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
     if (can_be_undone(event->first) && !event->second.undone) places.insert(event->first);
   // A split is nobody's own: it falls with the cut that parted the piece.
-  if (people_.only_own(by)) std::erase_if(places, [&](RoomSeq place) { return events_.at(place).kind == EventKind::split; });
+  if (people_.only_own(by))
+    std::erase_if(places, [&](RoomSeq place) { return events_.at(place).kind == EventKind::split; });
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
   if (Result<void> may = may_take_back(by, places); !may) return tl::unexpected(may.error());
   return take_back(by, std::move(places));
@@ -276,7 +289,8 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
   for (auto event = events_.rbegin(); event != events_.rend() && row.undos.size() < count; ++event)
     if (event->second.kind == EventKind::undo && !event->second.undone) row.undos.push_back(event->first);
   if (row.undos.empty()) return failure(ErrorCode::unavailable, "there is nothing to redo");
-  if (Result<void> may = may_do_again(by, {row.undos.begin(), row.undos.end()}); !may) return tl::unexpected(may.error());
+  if (Result<void> may = may_do_again(by, {row.undos.begin(), row.undos.end()}); !may)
+    return tl::unexpected(may.error());
 
   std::set<RoomSeq> again;
   for (const RoomSeq undo : row.undos) {
@@ -298,7 +312,8 @@ Result<RoomEvent> Room::mark(AuthorId by, std::string label) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (label.empty() || label.size() > kMostLabelBytes)
     return refuse("a mark needs a label of 1 to " + std::to_string(kMostLabelBytes) + " bytes");
-  if (marks().size() >= kMostMarks) return refuse("the room has " + std::to_string(kMostMarks) + " marks and takes no more");
+  if (marks().size() >= kMostMarks)
+    return refuse("the room has " + std::to_string(kMostMarks) + " marks and takes no more");
   return decide(by, MarkRow{std::move(label)});
 }
 
@@ -343,7 +358,8 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& pla
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
   if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
-  if (item.id != 0 && !items_.contains(item.id)) return refuse("item.item: the room has no item " + std::to_string(item.id));
+  if (item.id != 0 && !items_.contains(item.id))
+    return refuse("item.item: the room has no item " + std::to_string(item.id));
   if (item.id == 0 && items_.size() >= kMostItems)
     return refuse("the scene has had " + std::to_string(kMostItems) + " items and takes no more");
   const std::vector<SceneItem> standing = items();

@@ -17,15 +17,18 @@ std::string author_name(AuthorId author) { return "author " + std::to_string(aut
 Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions supervision) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (!people_.oversees(by)) return deny(author_name(by) + " is no instructor here");
-  if (!surgeons_.contains(subject)) return failure(ErrorCode::not_found, author_name(subject) + " has no hand in this room");
+  if (!surgeons_.contains(subject))
+    return failure(ErrorCode::not_found, author_name(subject) + " has no hand in this room");
   if (Result<void> sound = check(supervision); !sound) return tl::unexpected(sound.error());
   for (const AuthorId named : {supervision.taken_by, supervision.guide}) {
     if (!named) continue;
-    if (named == subject) return refuse("supervision names the hand itself as who holds or guides it; name another author");
+    if (named == subject)
+      return refuse("supervision names the hand itself as who holds or guides it; name another author");
     if (!knows(named)) return refuse("supervision names " + author_name(named) + ", who has not joined this room");
   }
   for (const Digest& tool : supervision.tools)
-    if (!tools_->find(tool)) return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
+    if (!tools_->find(tool))
+      return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
   // Who decided it may not know yet that the person has come again: what held for both alike goes on doing so.
   const Restrictions before = people_.supervised(subject).supervision;
   const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
@@ -44,12 +47,15 @@ Result<RoomEvent> Room::annotate(AuthorId by, Annotation drawn) {
   if (drawn.id == 0) drawn.id = people_.replaced_by(drawn);
   if (drawn.id == 0) {
     if (all.size() >= kMostAnnotations)
-      return refuse("the room has " + std::to_string(kMostAnnotations) + " annotations and takes no more; wipe some off");
+      return refuse("the room has " + std::to_string(kMostAnnotations) +
+                    " annotations and takes no more; wipe some off");
     drawn.id = people_.last_annotation() + 1;
   } else {
     const auto known = all.find(drawn.id);
-    if (known == all.end()) return failure(ErrorCode::not_found, "the room has no annotation " + std::to_string(drawn.id));
-    if (known->second.author != by) return deny("annotation " + std::to_string(drawn.id) + " is another's; draw a new one");
+    if (known == all.end())
+      return failure(ErrorCode::not_found, "the room has no annotation " + std::to_string(drawn.id));
+    if (known->second.author != by)
+      return deny("annotation " + std::to_string(drawn.id) + " is another's; draw a new one");
   }
   const std::uint32_t id = drawn.id;
   return decide(by, AnnotationRow{id, std::move(drawn)});
@@ -69,7 +75,8 @@ Result<RoomEvent> Room::say(AuthorId by, AuthorId to, std::string words) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (to && !knows(to)) return failure(ErrorCode::not_found, author_name(to) + " has not joined this room");
   if (words.empty() || words.size() > kMostWordsBytes)
-    return refuse("words need 1 to " + std::to_string(kMostWordsBytes) + " bytes, these have " + std::to_string(words.size()));
+    return refuse("words need 1 to " + std::to_string(kMostWordsBytes) + " bytes, these have " +
+                  std::to_string(words.size()));
   return decide(by, WordsRow{to, std::move(words)});
 }
 
@@ -77,8 +84,9 @@ Result<void> Room::may_change(AuthorId by) const {
   if (Result<void> member = check_member(by); !member) return member;
   for (const Restrictions* held : people_.binding(by))
     if (!held->may_cut())
-      return deny(std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
-                  "; until an instructor lets you go on, you take nothing back, do nothing again, place and take away nothing");
+      return deny(
+          std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
+          "; until an instructor lets you go on, you take nothing back, do nothing again, place and take away nothing");
   return {};
 }
 
@@ -87,13 +95,14 @@ Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& places) c
     const Event& event = events_.at(place);
     if (event.kind != EventKind::cut) continue;
     const Cut* cut = event.missed.get();
-    for (auto body = bodies_.begin(); body != bodies_.end() && cut == nullptr; ++body) cut = body->second.history.find_cut(place);
+    for (auto body = bodies_.begin(); body != bodies_.end() && cut == nullptr; ++body)
+      cut = body->second.history.find_cut(place);
     if (cut == nullptr) continue;
     const auto forbidden = [&](AuthorId whose) -> Result<void> {
       for (const Restrictions* held : people_.binding(whose))
         if (const Rejection why = breach(*held, *cut); why != Rejection::none)
-          return deny("event " + std::to_string(place.value) + " is a cut that " + author_name(whose) + " may not make now: " +
-                      std::string(sentence(why)));
+          return deny("event " + std::to_string(place.value) + " is a cut that " + author_name(whose) +
+                      " may not make now: " + std::string(sentence(why)));
       return {};
     };
     if (Result<void> may = forbidden(by); !may) return may;
@@ -107,7 +116,9 @@ Result<void> Room::may_take_back(AuthorId by, const std::set<RoomSeq>& places) c
   if (people_.may_undo_all(by)) return {};
   if (people_.only_own(by)) return are_own(by, places);
   if (!takes_all_of_others(by, places)) return {};
-  return deny("this takes back all that others have done here, which only an instructor does; take back less, or only your own");
+  return deny(
+      "this takes back all that others have done here, which only an instructor does; take back less, or only your "
+      "own");
 }
 
 Result<void> Room::may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const {
@@ -115,22 +126,27 @@ Result<void> Room::may_do_again(AuthorId by, const std::set<RoomSeq>& undos) con
   if (people_.only_own(by)) return are_own(by, undos);
   for (const RoomSeq place : undos)
     if (const Event& undo = events_.at(place); undo.all_of_others && !people_.same_person(by, undo.author))
-      return deny("event " + std::to_string(place.value) + " took back all that others had done, which only an instructor does again");
+      return deny("event " + std::to_string(place.value) +
+                  " took back all that others had done, which only an instructor does again");
   return {};
 }
 
 Result<void> Room::are_own(AuthorId by, const std::set<RoomSeq>& places) const {
   for (const RoomSeq place : places)
     if (!people_.same_person(by, events_.at(place).author))
-      return deny("event " + std::to_string(place.value) + " is not " + author_name(by) + "'s own, and a trainee takes back no other");
+      return deny("event " + std::to_string(place.value) + " is not " + author_name(by) +
+                  "'s own, and a trainee takes back no other");
   return {};
 }
 
 bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) const {
-  const auto is_others = [&](const Event& event) { return event.kind != EventKind::split && !people_.same_person(by, event.author); };
+  const auto is_others = [&](const Event& event) {
+    return event.kind != EventKind::split && !people_.same_person(by, event.author);
+  };
   if (std::ranges::none_of(places, [&](RoomSeq place) { return is_others(events_.at(place)); })) return false;
   const auto stays = [&](const auto& event) {
-    return can_be_undone(event.first) && !event.second.undone && is_others(event.second) && !places.contains(event.first);
+    return can_be_undone(event.first) && !event.second.undone && is_others(event.second) &&
+           !places.contains(event.first);
   };
   return std::ranges::none_of(events_, stays);
 }
@@ -141,7 +157,8 @@ void Room::apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& e
   event.people = supervise;
   Surgeon& surgeon = surgeons_.at(supervise.subject);
   const Restrictions& before = people_.supervised(supervise.subject).supervision;
-  if (before.stopped != supervise.supervision.stopped || before.taken_by != supervise.supervision.taken_by) grant(surgeon);
+  if (before.stopped != supervise.supervision.stopped || before.taken_by != supervise.supervision.taken_by)
+    grant(surgeon);
   people_.supervise(row.place, row.author, supervise);
   event.lease_epoch = surgeon.epoch;
 }

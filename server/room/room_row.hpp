@@ -1,5 +1,5 @@
-// Rows: what a room has decided, in one order. They are all that a journal keeps and all that a replay needs: applied to a
-// room as it began, they make the same room again, without judging anything a second time.
+// Rows: what a room has decided, in one order. They are all that a journal keeps and all that a replay needs: applied
+// to a room as it began, they make the same room again, without judging anything a second time.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -24,11 +24,11 @@ namespace osteon {
 enum class MemberKind : std::uint8_t { surgeon, watcher };
 
 struct JoinRow {
-  AuthorId author;         // given here, never again
+  AuthorId author;  // given here, never again
   MemberKind kind = MemberKind::watcher;
   std::uint32_t person = 0;  // a pseudonym: who it is, is written elsewhere and can be forgotten; 0: unnamed
-  Digest secret{};         // SHA-256 of what proves that a later connection is the same author's
-  Role role = Role::none;  // none: in a room from before there were roles, or of the server itself
+  Digest secret{};           // SHA-256 of what proves that a later connection is the same author's
+  Role role = Role::none;    // none: in a room from before there were roles, or of the server itself
 };
 struct CutRow {
   Cut cut;
@@ -37,18 +37,18 @@ struct CutRow {
 struct RejectionRow {
   AuthorId author;
   std::uint64_t author_seq = 0;
-  Digest bytes{};          // of the cut: cut_digest()
+  Digest bytes{};  // of the cut: cut_digest()
   Rejection reason = Rejection::none;
 };
 // One piece of a split, or debris.
 struct SplitPiece {
-  BodyId body;             // of debris null
-  CoordBox reach;          // samples of level 0 that its bone is in
-  Mask left;               // min(R, left) leaves the piece of its parent
+  BodyId body;     // of debris null
+  CoordBox reach;  // samples of level 0 that its bone is in
+  Mask left;       // min(R, left) leaves the piece of its parent
 };
 struct SplitRow {
   BodyId parent;
-  Mask taken;              // min(R, taken) takes the pieces from their parent
+  Mask taken;  // min(R, taken) takes the pieces from their parent
   std::vector<SplitPiece> pieces;
 };
 struct UndoRow {
@@ -84,7 +84,7 @@ struct AnnotationRow {
   std::optional<Annotation> drawn;  // nothing: wiped off
 };
 struct WordsRow {
-  AuthorId to;             // null: to all
+  AuthorId to;  // null: to all
   std::string words;
 };
 
@@ -93,7 +93,8 @@ struct RoomRow {
   std::chrono::nanoseconds at{};  // since the room was made, by the clock of the server that decided
   AuthorId author;                // who asked for it; null: the room itself
   std::variant<JoinRow, CutRow, RejectionRow, SplitRow, UndoRow, RedoRow, RemoveBodyRow, ItemRow, ToolRow, MarkRow,
-               SuperviseRow, AnnotationRow, WordsRow> what;
+               SuperviseRow, AnnotationRow, WordsRow>
+      what;
 };
 
 // Names a cut's bytes: every field, in the order of the protocol.

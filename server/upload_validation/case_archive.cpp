@@ -53,18 +53,24 @@ class Unpacker {
       if (status == ARCHIVE_EOF) break;
       if (status != ARCHIVE_OK && status != ARCHIVE_WARN) return damaged();
       if (++entries > quota_.entries)
-        return failure(ErrorCode::exhausted, name_ + " has more than " + std::to_string(quota_.entries) + " entries; a case has " +
-                                                 std::to_string(std::size(kCaseFiles)) + " files");
+        return failure(ErrorCode::exhausted, name_ + " has more than " + std::to_string(quota_.entries) +
+                                                 " entries; a case has " + std::to_string(std::size(kCaseFiles)) +
+                                                 " files");
       if (Result<void> taken = take(entry); !taken) return tl::unexpected(taken.error());
     }
     for (const std::string_view file : kCaseFiles)
-      if (!files_.contains(std::string(file))) return bad("has no " + std::string(file) + "; pack the whole folder of a case");
+      if (!files_.contains(std::string(file)))
+        return bad("has no " + std::string(file) + "; pack the whole folder of a case");
     return files_;
   }
 
  private:
-  tl::unexpected<Error> bad(const std::string& what) const { return failure(ErrorCode::invalid_input, name_ + " " + what); }
-  tl::unexpected<Error> damaged() const { return bad("is no sound zip archive (" + reason_of(archive_) + "); pack the case again"); }
+  tl::unexpected<Error> bad(const std::string& what) const {
+    return failure(ErrorCode::invalid_input, name_ + " " + what);
+  }
+  tl::unexpected<Error> damaged() const {
+    return bad("is no sound zip archive (" + reason_of(archive_) + "); pack the case again");
+  }
 
   // The file of a case that an entry is, if it may be one at all.
   Result<std::string> file_of(archive_entry* entry) {
@@ -102,11 +108,13 @@ class Unpacker {
       size += static_cast<std::uint64_t>(n);
       unpacked_bytes_ += static_cast<std::uint64_t>(n);
       if (unpacked_bytes_ > quota_.unpacked_bytes)
-        return failure(ErrorCode::exhausted, name_ + " holds more than the " + std::to_string(quota_.unpacked_bytes) +
-                                                 " bytes that a case may have here; ask the operator for a larger quota");
+        return failure(ErrorCode::exhausted,
+                       name_ + " holds more than the " + std::to_string(quota_.unpacked_bytes) +
+                           " bytes that a case may have here; ask the operator for a larger quota");
       if (unpacked_bytes_ > quota_.ratio_free_bytes &&
           static_cast<double>(unpacked_bytes_) > quota_.ratio * static_cast<double>(packed_bytes_))
-        return failure(ErrorCode::exhausted, name_ + " unpacks to more than " + std::to_string(static_cast<int>(quota_.ratio)) +
+        return failure(ErrorCode::exhausted, name_ + " unpacks to more than " +
+                                                 std::to_string(static_cast<int>(quota_.ratio)) +
                                                  " times its size, as no case does");
       if (Result<void> put = put_(*file, std::span(piece).first(static_cast<std::size_t>(n))); !put) return put;
     }
@@ -124,16 +132,19 @@ class Unpacker {
 
 }  // namespace
 
-Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, const UploadQuota& quota, const PutPiece& put) {
+Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, const UploadQuota& quota,
+                                                         const PutPiece& put) {
   std::error_code error;
   const std::uint64_t bytes = fs::file_size(file, error);
   if (error) return failure(ErrorCode::not_found, file.string() + " cannot be read: " + error.message());
   const std::string name = file.filename().string();
   if (bytes > quota.archive_bytes)
-    return failure(ErrorCode::exhausted, name + " is larger than the " + std::to_string(quota.archive_bytes) + " bytes that are taken here");
+    return failure(ErrorCode::exhausted,
+                   name + " is larger than the " + std::to_string(quota.archive_bytes) + " bytes that are taken here");
   const Reader a = zip_reader();
   if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK)
-    return failure(ErrorCode::invalid_input, name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
+    return failure(ErrorCode::invalid_input,
+                   name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
   return Unpacker(a.get(), name, bytes, quota, put).run();
 }
 
@@ -141,13 +152,16 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::by
                                                          const UploadQuota& quota, const PutPiece& put) {
   const Reader a = zip_reader();
   if (archive_read_open_memory(a.get(), bytes.data(), bytes.size()) != ARCHIVE_OK)
-    return failure(ErrorCode::invalid_input, name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
+    return failure(ErrorCode::invalid_input,
+                   name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
   return Unpacker(a.get(), name, bytes.size(), quota, put).run();
 }
 
 Result<void> pack_case(const fs::path& folder, const fs::path& file) {
   const Writer a(archive_write_new());
-  const auto disk = [&] { return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + reason_of(a.get())); };
+  const auto disk = [&] {
+    return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + reason_of(a.get()));
+  };
   archive_write_set_format_zip(a.get());
   if (archive_write_open_filename(a.get(), file.c_str()) != ARCHIVE_OK) return disk();
   for (const std::string_view name : kCaseFiles) {
@@ -155,7 +169,8 @@ Result<void> pack_case(const fs::path& folder, const fs::path& file) {
     std::error_code error;
     const std::uint64_t size = fs::file_size(from, error);
     std::ifstream in(from, std::ios::binary);
-    if (error || !in) return failure(ErrorCode::not_found, folder.string() + " is no case: it has no " + std::string(name));
+    if (error || !in)
+      return failure(ErrorCode::not_found, folder.string() + " is no case: it has no " + std::string(name));
     const std::unique_ptr<archive_entry, FreeEntry> entry(archive_entry_new());
     archive_entry_set_pathname(entry.get(), std::string(name).c_str());
     archive_entry_set_size(entry.get(), static_cast<la_int64_t>(size));
@@ -164,7 +179,8 @@ Result<void> pack_case(const fs::path& folder, const fs::path& file) {
     if (archive_write_header(a.get(), entry.get()) != ARCHIVE_OK) return disk();
     std::vector<char> piece(kChunk);
     while (in.read(piece.data(), static_cast<std::streamsize>(piece.size())), in.gcount() > 0)
-      if (archive_write_data(a.get(), piece.data(), static_cast<std::size_t>(in.gcount())) != in.gcount()) return disk();
+      if (archive_write_data(a.get(), piece.data(), static_cast<std::size_t>(in.gcount())) != in.gcount())
+        return disk();
   }
   return archive_write_close(a.get()) == ARCHIVE_OK ? Result<void>{} : disk();
 }

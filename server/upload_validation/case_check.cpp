@@ -40,7 +40,8 @@ constexpr std::size_t kMostSaid = 64 * 1024;
 constexpr std::uint64_t kAddressesToMemory = 4;  // allocators and threads reserve addresses that they do not use
 
 tl::unexpected<Error> cannot_start(int reason) {
-  return failure(ErrorCode::internal, std::string("the process that looks cases through cannot be started: ") + std::strerror(reason));
+  return failure(ErrorCode::internal,
+                 std::string("the process that looks cases through cannot be started: ") + std::strerror(reason));
 }
 
 class Descriptor {
@@ -119,8 +120,12 @@ void limit_self(__rlimit_resource resource, std::uint64_t most) {
 
 // What the process may unpack, in one of its arguments.
 std::string text_of(const UploadQuota& quota) {
-  return nlohmann::json{{"archive_bytes", quota.archive_bytes}, {"unpacked_bytes", quota.unpacked_bytes}, {"entries", quota.entries},
-                        {"ratio", quota.ratio}, {"ratio_free_bytes", quota.ratio_free_bytes}}.dump();
+  return nlohmann::json{{"archive_bytes", quota.archive_bytes},
+                        {"unpacked_bytes", quota.unpacked_bytes},
+                        {"entries", quota.entries},
+                        {"ratio", quota.ratio},
+                        {"ratio_free_bytes", quota.ratio_free_bytes}}
+      .dump();
 }
 UploadQuota quota_of(const std::string& text) {
   const nlohmann::json said = nlohmann::json::parse(text);
@@ -139,7 +144,8 @@ const char* word_of(ErrorCode code) {
   return code == ErrorCode::internal ? "internal" : "invalid";
 }
 ErrorCode code_of(const nlohmann::json& answer) {
-  const std::string word = answer.contains("code") && answer["code"].is_string() ? answer["code"].get<std::string>() : "";
+  const std::string word =
+      answer.contains("code") && answer["code"].is_string() ? answer["code"].get<std::string>() : "";
   if (word == "exhausted") return ErrorCode::exhausted;
   return word == "internal" ? ErrorCode::internal : ErrorCode::invalid_input;
 }
@@ -150,7 +156,8 @@ void say_what_holds(const nlohmann::json& answer) {
   if (holds("files_held") && holds("calls_held")) return;
   static std::atomic<bool> said{false};
   if (!said.exchange(true))
-    log::warn("cases are looked through with less held back than could be", {{"files_held", holds("files_held")}, {"calls_held", holds("calls_held")}});
+    log::warn("cases are looked through with less held back than could be",
+              {{"files_held", holds("files_held")}, {"calls_held", holds("calls_held")}});
 }
 
 bool has_plain_files(const fs::path& folder) {
@@ -207,8 +214,8 @@ Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, cons
 
 }  // namespace
 
-Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive, const fs::path& folder, const UploadQuota& quota,
-                               const std::function<bool()>& stop) {
+Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive, const fs::path& folder,
+                               const UploadQuota& quota, const std::function<bool()>& stop) {
   int ends[2];
   if (::pipe2(ends, O_CLOEXEC) != 0) return cannot_start(errno);
   Descriptor in(ends[0]), out(ends[1]);
@@ -218,7 +225,8 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   ::posix_spawn_file_actions_adddup2(&actions, out.number(), STDOUT_FILENO);
   ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   std::array<std::string, 5> words{program.string(), "check-case", archive.string(), folder.string(), text_of(quota)};
-  std::array<char*, 6> arguments{words[0].data(), words[1].data(), words[2].data(), words[3].data(), words[4].data(), nullptr};
+  std::array<char*, 6> arguments{words[0].data(), words[1].data(), words[2].data(),
+                                 words[3].data(), words[4].data(), nullptr};
   pid_t id = 0;
   const int failed = ::posix_spawn(&id, words[0].c_str(), &actions, nullptr, arguments.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
@@ -234,8 +242,10 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   const std::optional<std::string> said = listen(in.number(), Clock::now() + quota.time, stop);
   if (!said) {
     (void)child.end();
-    if (stop && stop()) return failure(ErrorCode::cancelled, "the case is not looked through, since it is not wanted any more");
-    return failure(ErrorCode::exhausted, "the case takes longer to read than the " + std::to_string(quota.time.count()) + " s that it may");
+    if (stop && stop())
+      return failure(ErrorCode::cancelled, "the case is not looked through, since it is not wanted any more");
+    return failure(ErrorCode::exhausted,
+                   "the case takes longer to read than the " + std::to_string(quota.time.count()) + " s that it may");
   }
   const int status = child.join(Clock::now() + std::chrono::seconds(5));
   const nlohmann::json answer = nlohmann::json::parse(*said, nullptr, false);
@@ -247,11 +257,13 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
                      answer.contains("memory_bytes") && answer["memory_bytes"].is_number_unsigned();
   if (!whole && WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGXFSZ))
     return failure(ErrorCode::exhausted, "the case takes more to read than it may");
-  if (!whole) return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
+  if (!whole)
+    return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
   const Result<Digest> hash = digest_from_hex(answer["hash"].get<std::string>());
   if (!hash) return tl::unexpected(hash.error());
   // One that was taken over by what it read may have left anything.
-  if (!has_plain_files(folder / kSoundCase)) return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
+  if (!has_plain_files(folder / kSoundCase))
+    return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
   return CheckedCase{*hash, answer["title"].get<std::string>(), answer["memory_bytes"].get<std::uint64_t>()};
 }
 

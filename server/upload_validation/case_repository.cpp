@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kIncoming = "incoming-", kArchive = "upload.zip";
 constexpr std::uintmax_t kMostDescription = 1 << 20;  // bytes
-constexpr std::string_view kNote = "memory.json";  // in a case's folder: what it takes once it is loaded
+constexpr std::string_view kNote = "memory.json";     // in a case's folder: what it takes once it is loaded
 
 tl::unexpected<Error> disk(const fs::path& where, const std::string& why) {
   return failure(ErrorCode::internal, "cannot write " + where.string() + ": " + why);
@@ -62,7 +62,9 @@ Result<std::unique_ptr<CaseRepository>> CaseRepository::open(fs::path folder, fs
   std::error_code error;
   fs::create_directories(folder, error);
   if (!error && ::access(folder.c_str(), W_OK) != 0) error = std::error_code(errno, std::generic_category());
-  if (error) return failure(ErrorCode::internal, "the folder --cases " + folder.string() + " cannot be written: " + error.message());
+  if (error)
+    return failure(ErrorCode::internal,
+                   "the folder --cases " + folder.string() + " cannot be written: " + error.message());
   std::vector<fs::path> left;
   for (const auto& entry : fs::directory_iterator(folder, error))
     if (entry.path().filename().string().starts_with(kIncoming)) left.push_back(entry.path());
@@ -107,7 +109,8 @@ Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const st
   std::ofstream(sound / kNote) << nlohmann::json{{"memory_bytes", checked->memory_bytes}} << "\n";
 
   const std::lock_guard lock(keeping_);
-  StoredCase stored{checked->hash, checked->title, folder_ / to_hex(checked->hash), bytes_in(sound), false, checked->memory_bytes};
+  StoredCase stored{checked->hash,   checked->title, folder_ / to_hex(checked->hash),
+                    bytes_in(sound), false,          checked->memory_bytes};
   if (fs::exists(stored.folder, error)) {
     stored.known = true;
     return stored;
@@ -135,17 +138,21 @@ Result<StoredCase> CaseRepository::peek(const fs::path& folder) {
   if (!hash) return failure(ErrorCode::invalid_input, folder.string() + " is not called by the hash of a case");
   std::error_code none;
   if (fs::file_size(folder / "case.json", none) > kMostDescription || none)
-    return failure(ErrorCode::invalid_input,
-                   (folder / "case.json").string() + " is missing or too long; delete the folder and upload the case again");
+    return failure(
+        ErrorCode::invalid_input,
+        (folder / "case.json").string() + " is missing or too long; delete the folder and upload the case again");
   std::ifstream described(folder / "case.json"), noted(folder / kNote);
-  const nlohmann::json about = nlohmann::json::parse(described, nullptr, false), note = nlohmann::json::parse(noted, nullptr, false);
+  const nlohmann::json about = nlohmann::json::parse(described, nullptr, false),
+                       note = nlohmann::json::parse(noted, nullptr, false);
   if (!about.is_object() || !about.contains("title") || !about["title"].is_string())
-    return failure(ErrorCode::invalid_input,
-                   (folder / "case.json").string() + " does not describe a case; delete the folder and upload the case again");
+    return failure(
+        ErrorCode::invalid_input,
+        (folder / "case.json").string() + " does not describe a case; delete the folder and upload the case again");
   // Without the note, as of an earlier version, it shows when the case is loaded.
   const bool known = note.is_object() && note.contains("memory_bytes") && note["memory_bytes"].is_number_unsigned();
-  return StoredCase{*hash, about["title"].get<std::string>(), folder, bytes_in(folder), true,
-                    known ? note["memory_bytes"].get<std::uint64_t>() : 0};
+  return StoredCase{*hash,  about["title"].get<std::string>(),
+                    folder, bytes_in(folder),
+                    true,   known ? note["memory_bytes"].get<std::uint64_t>() : 0};
 }
 
 }  // namespace osteon

@@ -52,13 +52,14 @@ class CaseRepository {
 
   // `program`: what check_case() starts. What was left half done by an earlier process goes. Error internal: the folder
   // cannot be made or written.
-  [[nodiscard]] static Result<std::unique_ptr<CaseRepository>> open(std::filesystem::path folder, std::filesystem::path program,
-                                                               UploadQuota quota = {});
+  [[nodiscard]] static Result<std::unique_ptr<CaseRepository>> open(std::filesystem::path folder,
+                                                                    std::filesystem::path program,
+                                                                    UploadQuota quota = {});
 
   // Error exhausted: so many are under way already, or the store is full.
   [[nodiscard]] Result<std::unique_ptr<Upload>> begin();
-  // Takes it apart, looks it through and keeps it; takes long. Errors: those of check_case(), exhausted (the store is full),
-  // internal (disk), cancelled (`stop` returned true).
+  // Takes it apart, looks it through and keeps it; takes long. Errors: those of check_case(), exhausted (the store is
+  // full), internal (disk), cancelled (`stop` returned true).
   [[nodiscard]] Result<StoredCase> keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop = {});
   // Folders of the cases that are kept, in the order of their hashes.
   [[nodiscard]] std::vector<std::filesystem::path> folders() const;

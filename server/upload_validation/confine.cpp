@@ -26,17 +26,19 @@ struct __attribute__((packed)) Beneath {
   std::int32_t folder;
 };
 constexpr std::uint32_t kVersion = 1, kPathBeneath = 1;
-// Bit by bit: execute, write, read, list; remove folders, files; make devices of characters, folders, files, sockets, pipes, devices
-// of blocks, symbolic links; move between folders, shorten, control devices.
+// Bit by bit: execute, write, read, list; remove folders, files; make devices of characters, folders, files, sockets,
+// pipes, devices of blocks, symbolic links; move between folders, shorten, control devices.
 constexpr std::uint64_t kAll1 = (1u << 13) - 1, kMove = 1u << 13, kShorten = 1u << 14, kControl = 1u << 15;
 constexpr std::uint64_t kOwn = 0b1'1011'1110 | kMove | kShorten;  // of those, what the folder is for
-static_assert((kOwn & (1u << 0 | 1u << 6 | 1u << 9 | 1u << 10 | 1u << 11 | 1u << 12)) == 0, "no programs, devices, sockets, pipes and links");
+static_assert((kOwn & (1u << 0 | 1u << 6 | 1u << 9 | 1u << 10 | 1u << 11 | 1u << 12)) == 0,
+              "no programs, devices, sockets, pipes and links");
 constexpr std::uint64_t kSignals = 1u << 1;
 
 bool confine_files(const std::filesystem::path& folder) {
   const long version = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, kVersion);
   if (version < 1) return false;
-  const std::uint64_t handled = kAll1 | (version >= 2 ? kMove : 0) | (version >= 3 ? kShorten : 0) | (version >= 5 ? kControl : 0);
+  const std::uint64_t handled =
+      kAll1 | (version >= 2 ? kMove : 0) | (version >= 3 ? kShorten : 0) | (version >= 5 ? kControl : 0);
   const Ruleset wanted{handled, 0, version >= 6 ? kSignals : 0};
   const int rules = static_cast<int>(::syscall(SYS_landlock_create_ruleset, &wanted, sizeof wanted, 0));
   const int place = ::open(folder.c_str(), O_PATH | O_DIRECTORY | O_CLOEXEC);
@@ -57,15 +59,36 @@ constexpr std::uint32_t kMachine = 0;
 #endif
 
 // Denied with EPERM. Reading and writing, memory, threads and clocks are left.
-constexpr long kDenied[] = {SYS_socket,  SYS_execve,           SYS_execveat,          SYS_ptrace,        SYS_process_vm_readv, SYS_process_vm_writev,
-                            SYS_kill,    SYS_tkill,            SYS_rt_sigqueueinfo,   SYS_rt_tgsigqueueinfo, SYS_pidfd_open,   SYS_pidfd_getfd,
-                            SYS_pidfd_send_signal, SYS_io_uring_setup, SYS_bpf,       SYS_perf_event_open, SYS_userfaultfd,     SYS_keyctl,
-                            SYS_add_key, SYS_request_key,      SYS_unshare,           SYS_setns,         SYS_mount};
+constexpr long kDenied[] = {SYS_socket,
+                            SYS_execve,
+                            SYS_execveat,
+                            SYS_ptrace,
+                            SYS_process_vm_readv,
+                            SYS_process_vm_writev,
+                            SYS_kill,
+                            SYS_tkill,
+                            SYS_rt_sigqueueinfo,
+                            SYS_rt_tgsigqueueinfo,
+                            SYS_pidfd_open,
+                            SYS_pidfd_getfd,
+                            SYS_pidfd_send_signal,
+                            SYS_io_uring_setup,
+                            SYS_bpf,
+                            SYS_perf_event_open,
+                            SYS_userfaultfd,
+                            SYS_keyctl,
+                            SYS_add_key,
+                            SYS_request_key,
+                            SYS_unshare,
+                            SYS_setns,
+                            SYS_mount};
 
 bool confine_calls() {
   if (kMachine == 0) return false;
   std::vector<sock_filter> filter;
-  const auto add = [&](std::uint16_t code, std::uint32_t k, std::uint8_t yes = 0, std::uint8_t no = 0) { filter.push_back({code, yes, no, k}); };
+  const auto add = [&](std::uint16_t code, std::uint32_t k, std::uint8_t yes = 0, std::uint8_t no = 0) {
+    filter.push_back({code, yes, no, k});
+  };
   const auto load = [&](std::size_t at) { add(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(at)); };
   const auto deny = [&] { add(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM); };
   // Numbers mean these calls on this machine alone; those of x32 begin at bit 30.
@@ -80,7 +103,8 @@ bool confine_calls() {
     deny();
   }
   // A process may end itself, and look at its own limits; nobody else's.
-  for (const auto& [call, self] : {std::pair{SYS_tgkill, static_cast<std::uint32_t>(::getpid())}, std::pair{SYS_prlimit64, 0u}}) {
+  for (const auto& [call, self] :
+       {std::pair{SYS_tgkill, static_cast<std::uint32_t>(::getpid())}, std::pair{SYS_prlimit64, 0u}}) {
     load(offsetof(seccomp_data, nr));
     add(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, 3);
     load(offsetof(seccomp_data, args));

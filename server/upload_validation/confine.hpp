@@ -9,8 +9,8 @@ struct Confinement {
   bool calls = false;  // it opens no socket, starts no program, and reaches no other process
 };
 
-// The calling thread and those that it starts, for good. What the kernel cannot do is left out: the result says what holds.
-// Descriptors that are open stay usable. Before any other thread is started.
+// The calling thread and those that it starts, for good. What the kernel cannot do is left out: the result says what
+// holds. Descriptors that are open stay usable. Before any other thread is started.
 [[nodiscard]] Confinement confine_to(const std::filesystem::path& folder);
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// Requests of every call that a server takes, as inputs: the first byte says which call, the others are the request. For the
-// sources of targets alone: generated types stay out of headers.
+// Requests of every call that a server takes, as inputs: the first byte says which call, the others are the request.
+// For the sources of targets alone: generated types stay out of headers.
 #pragma once
 #include <cstdint>
 #include <random>

@@ -32,15 +32,16 @@ namespace {
 using google::protobuf::MethodDescriptor;
 
 constexpr std::size_t kMostRooms = 3;
-constexpr std::size_t kUnderWay = 192;     // calls at once
-constexpr std::size_t kLines = 4;          // a connection takes 64 streams
-constexpr int kMostAnswerBytes = 64 * 1024;  // of a status with what it says: more than there may be, so that all is read
+constexpr std::size_t kUnderWay = 192;  // calls at once
+constexpr std::size_t kLines = 4;       // a connection takes 64 streams
+constexpr int kMostAnswerBytes =
+    64 * 1024;  // of a status with what it says: more than there may be, so that all is read
 constexpr std::size_t kMostSaidBytes = 1100;
-constexpr std::size_t kHands = 8;          // whose sessions are opened before the input comes
+constexpr std::size_t kHands = 8;              // whose sessions are opened before the input comes
 constexpr std::uint64_t kRenewEvery = 10'000;  // what a room keeps of everything that happened in it is not for ever
 constexpr std::uint64_t kLookEvery = 16;
-constexpr long kSessionRounds = 10;        // opening a session costs as much as fifty other calls
-constexpr int kTries = 100;                    // a room that nobody else makes or takes
+constexpr long kSessionRounds = 10;  // opening a session costs as much as fifty other calls
+constexpr int kTries = 100;          // a room that nobody else makes or takes
 constexpr const char* kSecret = "of a hand";
 
 grpc::ByteBuffer buffer_of(const std::string& bytes) {
@@ -91,7 +92,8 @@ class Server {
  public:
   Server() : bone_(served_bone()) {
     OSTEON_CHECK(bone_.save(dir_ / "case").has_value());
-    // No cases are taken: each upload would be looked through by a process of its own. The target upload gives any bytes to that.
+    // No cases are taken: each upload would be looked through by a process of its own. The target upload gives any
+    // bytes to that.
     RoomsOptions options{.cases = {{bone_, dir_ / "case"}}};
     options.rates.tick = std::chrono::milliseconds(2);  // who waits for one waits less
     auto started = RoomServer::start(std::make_unique<Rooms>(std::move(options)), "127.0.0.1:0");
@@ -117,8 +119,8 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // Whatever it is, it is answered: an open stream by its first message or its end, and the server goes on. Returns while
-  // it is under way.
+  // Whatever it is, it is answered: an open stream by its first message or its end, and the server goes on. Returns
+  // while it is under way.
   void call(std::span<const std::uint8_t> data) {
     if (data.empty()) return;
     if (calls_++ % kRenewEvery == kRenewEvery - 1) {
@@ -151,7 +153,8 @@ class Server {
     const auto least = std::ranges::min_element(counts_, {}, &std::pair<const std::string, std::uint64_t>::second);
     std::string text = std::to_string(calls_) + " calls of " + std::to_string(counts_.size()) + " kinds of request";
     if (least != counts_.end()) text += ", the fewest " + std::to_string(least->second) + " of " + least->first;
-    for (const auto& [status, count] : statuses_) text += "; status " + std::to_string(status) + ": " + std::to_string(count);
+    for (const auto& [status, count] : statuses_)
+      text += "; status " + std::to_string(status) + ": " + std::to_string(count);
     return text;
   }
 
@@ -216,7 +219,8 @@ class Server {
         if (ok && call.hand) return call.line->Read(&call.answer, &call);
         if (ok && call.method->server_streaming()) call.context->TryCancel();
         return end(call);
-      default: return done(call);
+      default:
+        return done(call);
     }
   }
   static void end(Call& call) {
@@ -245,15 +249,16 @@ class Server {
     using grpc::StatusCode;
     const StatusCode code = call.status.error_code();
     // Nothing that is sent is an accident of the server's, and none of it is waited for without end.
-    const bool sound = code != StatusCode::INTERNAL && code != StatusCode::UNKNOWN && code != StatusCode::DEADLINE_EXCEEDED;
+    const bool sound =
+        code != StatusCode::INTERNAL && code != StatusCode::UNKNOWN && code != StatusCode::DEADLINE_EXCEEDED;
     // Bytes that are no message at all are refused by gRPC itself, which says no more than that.
     // Where they are refused by the server it says a sentence, which no client's limit of 8 kB cuts off.
     const std::string said = call.status.error_message();
     const bool told = (call.status.ok() || call.answered || !said.empty() || code == StatusCode::UNIMPLEMENTED) &&
                       said.size() <= kMostSaidBytes;
     if (!sound || !told) {
-      std::fprintf(stderr, "%s was answered with status %d, %s: OSTEON_FUZZ_INPUT=%s\n", call.method->full_name().c_str(), code,
-                   said.c_str(), hex_of(call.input).c_str());
+      std::fprintf(stderr, "%s was answered with status %d, %s: OSTEON_FUZZ_INPUT=%s\n",
+                   call.method->full_name().c_str(), code, said.c_str(), hex_of(call.input).c_str());
       OSTEON_CHECK(sound && told);
     }
     call.line.reset();
@@ -316,12 +321,12 @@ class Server {
   std::unique_ptr<RoomServer> server_;
   std::vector<std::unique_ptr<grpc::GenericStub>> stubs_;
   grpc::CompletionQueue queue_;
-  std::uint64_t calls_ = 0, epoch_ = 0;           // of the caller, as the next
+  std::uint64_t calls_ = 0, epoch_ = 0;          // of the caller, as the next
   std::map<std::string, std::uint64_t> counts_;  // by request
   std::mutex mutex_;
   std::condition_variable freed_;
-  std::vector<Call*> free_;                      // under mutex_, as the next two
-  std::vector<AuthorId> hands_;                  // that have no session
+  std::vector<Call*> free_;      // under mutex_, as the next two
+  std::vector<AuthorId> hands_;  // that have no session
   std::map<int, std::uint64_t> statuses_;
   std::thread reader_;
 };

@@ -32,7 +32,7 @@ void expect_bounded(const Error& error) {
 }
 
 void change_number(Bytes& input, std::mt19937& random) {
-  constexpr std::array<std::string_view, 12> kHard{"0",    "-0",  "-1",         "1e308",       "-1e39",       "1e-320",
+  constexpr std::array<std::string_view, 12> kHard{"0",    "-0",   "-1",         "1e308",       "-1e39",      "1e-320",
                                                    ".nan", ".inf", "2147483648", "-2147483649", "4294967296", "1e17"};
   const auto is_digit = [](std::uint8_t c) { return std::isdigit(c) != 0; };
   if (input.empty()) return;

@@ -22,7 +22,8 @@ const std::vector<JournalRow>& all_rows() {
   static const std::vector<JournalRow> made = [] {
     std::vector<JournalRow> rows;
     for (std::uint64_t i = 1; i <= kRows; ++i)
-      rows.push_back({RoomSeq{i}, static_cast<std::int64_t>(i) * 8'000'000, std::string(7 * i, static_cast<char>('a' + i))});
+      rows.push_back(
+          {RoomSeq{i}, static_cast<std::int64_t>(i) * 8'000'000, std::string(7 * i, static_cast<char>('a' + i))});
     return rows;
   }();
   return made;
@@ -39,7 +40,8 @@ MemoryDisk::Image a_journal(bool closed) {
       std::move(Journal::create(kFile, kGenesis, {.disk = &disk, .log_bytes = 2000, .page_bytes = 512}).value());
   append(journal, 0, 6);
   auto file = journal.begin_checkpoint(journal.head(), "meta");
-  OSTEON_CHECK(file && file->write("the room at place 6") && file->finish() && journal.add_checkpoint(std::move(*file)));
+  OSTEON_CHECK(file && file->write("the room at place 6") && file->finish() &&
+               journal.add_checkpoint(std::move(*file)));
   OSTEON_CHECK(journal.close().has_value());
   journal = std::move(Journal::open(kFile, {.disk = &disk, .log_bytes = 2000}).value());
   append(journal, 6, 8);
@@ -53,8 +55,8 @@ const MemoryDisk::Image& sound(bool closed) {
   return made[closed];
 }
 
-// An input's first byte chooses the journal; then each five are a damage: which file and what, where (two bytes), how much,
-// and with what. Places wrap round the file's end, so that every damage meets it.
+// An input's first byte chooses the journal; then each five are a damage: which file and what, where (two bytes), how
+// much, and with what. Places wrap round the file's end, so that every damage meets it.
 void damage(MemoryDisk::Image& image, std::span<const std::uint8_t> what) {
   const auto file = std::next(image.begin(), what[0] % static_cast<std::ptrdiff_t>(image.size()));
   std::string& bytes = file->second;
@@ -62,12 +64,24 @@ void damage(MemoryDisk::Image& image, std::span<const std::uint8_t> what) {
   const std::size_t at = (what[1] | std::size_t{what[2]} << 8) % bytes.size();
   const std::size_t count = std::min<std::size_t>(what[3], bytes.size() - at);
   switch (what[0] / 16 % 6) {
-    case 0: bytes[at] = static_cast<char>(bytes[at] ^ (1 << what[4] % 8)); break;
-    case 1: bytes[at] = static_cast<char>(what[4]); break;
-    case 2: bytes.resize(at); break;
-    case 3: std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), count, static_cast<char>(what[4])); break;
-    case 4: bytes.replace(at, count, bytes.substr(what[4] * std::size_t{64} % bytes.size(), count)); break;
-    default: image.erase(file); break;
+    case 0:
+      bytes[at] = static_cast<char>(bytes[at] ^ (1 << what[4] % 8));
+      break;
+    case 1:
+      bytes[at] = static_cast<char>(what[4]);
+      break;
+    case 2:
+      bytes.resize(at);
+      break;
+    case 3:
+      std::fill_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), count, static_cast<char>(what[4]));
+      break;
+    case 4:
+      bytes.replace(at, count, bytes.substr(what[4] * std::size_t{64} % bytes.size(), count));
+      break;
+    default:
+      image.erase(file);
+      break;
   }
 }
 

@@ -1,5 +1,5 @@
-// osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]: one target under libFuzzer, which looks for
-// inputs that reach what no input has reached. --seeds writes the target's own seeds into that folder first.
+// osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]: one target under libFuzzer, which
+// looks for inputs that reach what no input has reached. --seeds writes the target's own seeds into that folder first.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -1,6 +1,6 @@
-// Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in all of a
-// target's seeds together, OSTEON_FUZZ_TARGET for one target alone, OSTEON_FUZZ_SEED for other mutations (1 if it is not set),
-// and OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but that input.
+// Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in
+// all of a target's seeds together, OSTEON_FUZZ_TARGET for one target alone, OSTEON_FUZZ_SEED for other mutations (1 if
+// it is not set), and OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but that input.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -21,11 +21,22 @@ Bytes mutated(Bytes bytes, std::mt19937& random) {
   for (std::size_t i = 0, count = 1 + below(4); i < count; ++i) {
     if (bytes.empty()) bytes.push_back(0);
     switch (below(5)) {
-      case 0: bytes[below(bytes.size())] ^= static_cast<std::uint8_t>(1u << below(8)); break;
-      case 1: bytes[below(bytes.size())] = static_cast<std::uint8_t>(below(256)); break;
-      case 2: bytes.resize(below(bytes.size() + 1)); break;
-      case 3: bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(below(bytes.size() + 1)), static_cast<std::uint8_t>(below(256))); break;
-      default: bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(below(bytes.size()))); break;
+      case 0:
+        bytes[below(bytes.size())] ^= static_cast<std::uint8_t>(1u << below(8));
+        break;
+      case 1:
+        bytes[below(bytes.size())] = static_cast<std::uint8_t>(below(256));
+        break;
+      case 2:
+        bytes.resize(below(bytes.size() + 1));
+        break;
+      case 3:
+        bytes.insert(bytes.begin() + static_cast<std::ptrdiff_t>(below(bytes.size() + 1)),
+                     static_cast<std::uint8_t>(below(256)));
+        break;
+      default:
+        bytes.erase(bytes.begin() + static_cast<std::ptrdiff_t>(below(bytes.size())));
+        break;
     }
   }
   return bytes;
@@ -96,8 +107,8 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
     const double memory_mb = resident_mb();  // what a start takes is there by then
     done += run_asked(target, count - done, random);
     settle();
-    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n", target.name.c_str(), done,
-                memory_mb, resident_mb());
+    std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n",
+                target.name.c_str(), done, memory_mb, resident_mb());
     if (target.figures) std::printf("fuzzed: %s\n", target.figures().c_str());
   }
   EXPECT_TRUE(any) << "there is no such target";

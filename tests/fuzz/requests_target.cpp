@@ -29,7 +29,7 @@ using google::protobuf::Message;
 struct Count {
   std::uint64_t runs = 0, messages = 0;  // of the runs, what could be read at all
 };
-std::map<std::string, Count> counts;  // by request
+std::map<std::string, Count> counts;   // by request
 std::uint64_t taken = 0, refused = 0;  // values that the checks took, and did not
 
 template <class Kind>
@@ -56,12 +56,14 @@ void note(const Result<Value>& value) {
 
 void look_through(const Message& message) {
   if (converts<v1::Cut>(message) || converts<v1::CuttingState>(message) || converts<v1::SceneItem>(message) ||
-      converts<v1::ToolDefinition>(message) || converts<v1::Restrictions>(message) || converts<v1::Annotation>(message) ||
-      converts<v1::ViewFrustum>(message))
+      converts<v1::ToolDefinition>(message) || converts<v1::Restrictions>(message) ||
+      converts<v1::Annotation>(message) || converts<v1::ViewFrustum>(message))
     return;
   if (is<v1::MountLoad>(message)) note(wire::from_wire(static_cast<const v1::MountLoad&>(message)));
-  if (is<v1::SetSceneItemRequest>(message)) note(wire::placing_from_wire(static_cast<const v1::SetSceneItemRequest&>(message)));
-  if (is<v1::JoinRequest>(message)) note(wire::check_protocol_version(static_cast<const v1::JoinRequest&>(message).protocol_version()));
+  if (is<v1::SetSceneItemRequest>(message))
+    note(wire::placing_from_wire(static_cast<const v1::SetSceneItemRequest&>(message)));
+  if (is<v1::JoinRequest>(message))
+    note(wire::check_protocol_version(static_cast<const v1::JoinRequest&>(message).protocol_version()));
   const auto& reflect = *message.GetReflection();
   std::vector<const FieldDescriptor*> fields;
   reflect.ListFields(message, &fields);
@@ -69,7 +71,8 @@ void look_through(const Message& message) {
     if (field->type() == FieldDescriptor::TYPE_BYTES && !field->is_repeated()) {
       note(wire::digest_from_wire(reflect.GetString(message, field)));
     } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE && field->is_repeated()) {
-      for (int i = 0; i < reflect.FieldSize(message, field); ++i) look_through(reflect.GetRepeatedMessage(message, field, i));
+      for (int i = 0; i < reflect.FieldSize(message, field); ++i)
+        look_through(reflect.GetRepeatedMessage(message, field, i));
     } else if (field->cpp_type() == FieldDescriptor::CPPTYPE_MESSAGE) {
       look_through(reflect.GetMessage(message, field));
     }
@@ -93,8 +96,9 @@ std::string figures() {
   const auto least = std::ranges::min_element(counts, {}, [](const auto& one) { return one.second.runs; });
   std::uint64_t messages = 0;
   for (const auto& [name, count] : counts) messages += count.messages;
-  return std::to_string(counts.size()) + " kinds of request, the fewest " + std::to_string(least->second.runs) + " of " + least->first +
-         "; messages " + std::to_string(messages) + "; values taken " + std::to_string(taken) + ", refused " + std::to_string(refused);
+  return std::to_string(counts.size()) + " kinds of request, the fewest " + std::to_string(least->second.runs) +
+         " of " + least->first + "; messages " + std::to_string(messages) + "; values taken " + std::to_string(taken) +
+         ", refused " + std::to_string(refused);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
-// Requests of every call as a fuzz target, as far as they go before a room is asked: read, and taken apart by the checks of the
-// wire. No server, so that millions of inputs take minutes; the target calls gives fewer to a server itself.
+// Requests of every call as a fuzz target, as far as they go before a room is asked: read, and taken apart by the
+// checks of the wire. No server, so that millions of inputs take minutes; the target calls gives fewer to a server
+// itself.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 

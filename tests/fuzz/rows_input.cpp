@@ -27,10 +27,18 @@ class Changes {
       value = below(2) ? kOdd[below(kOdd.size())] : value + T(0.1) * (static_cast<T>(below(200)) - T(100));
     } else {
       switch (below(6)) {
-        case 0: value = std::numeric_limits<T>::max(); break;
-        case 1: value = std::numeric_limits<T>::min(); break;
-        case 2: value = static_cast<T>(T{1} << below(8 * sizeof(T) - 1)); break;
-        case 3: value = static_cast<T>(below(20)); break;
+        case 0:
+          value = std::numeric_limits<T>::max();
+          break;
+        case 1:
+          value = std::numeric_limits<T>::min();
+          break;
+        case 2:
+          value = static_cast<T>(T{1} << below(8 * sizeof(T) - 1));
+          break;
+        case 3:
+          value = static_cast<T>(below(20));
+          break;
         default: {
           const std::uint64_t step = 1 + below(9), before = static_cast<std::uint64_t>(value);
           value = static_cast<T>(below(2) ? before + step : before - step);
@@ -54,12 +62,16 @@ class Changes {
   void change(RoomSeq& place) { number(place.value); }
   void change(Digest& digest) { number(digest.bytes[below(digest.bytes.size())]); }
   void change(QuantisedPose& knot) {
-    if (below(3) == 0) number(knot.rotation[below(4)]);
-    else number(knot.position[below(3)]);
+    if (below(3) == 0)
+      number(knot.rotation[below(4)]);
+    else
+      number(knot.position[below(3)]);
   }
   void change(FieldLeaf& leaf) {
     switch (below(3)) {
-      case 0: leaf.level = static_cast<int>(below(4)); break;
+      case 0:
+        leaf.level = static_cast<int>(below(4));
+        break;
       case 1: {
         change(leaf.origin);
         if (below(4)) leaf.origin = floor_to(leaf.origin, kLeafSize);
@@ -74,46 +86,78 @@ class Changes {
     std::vector<FieldLeaf> leaves = *mask;
     if (leaves.empty()) leaves.push_back({BodyId{0}, 0, {}, {0}});
     one_of(leaves);
-    if (below(4)) std::ranges::sort(leaves, {}, [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); });
+    if (below(4))
+      std::ranges::sort(leaves, {}, [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); });
     mask = std::make_shared<const std::vector<FieldLeaf>>(std::move(leaves));
   }
   void change(SplitPiece& piece) {
     if (!piece.left) piece.left = std::make_shared<const std::vector<FieldLeaf>>();
     switch (below(4)) {
-      case 0: number(piece.body.value); break;
-      case 1: change(piece.reach.min); break;
-      case 2: change(piece.reach.max); break;
-      default: change(piece.left);
+      case 0:
+        number(piece.body.value);
+        break;
+      case 1:
+        change(piece.reach.min);
+        break;
+      case 2:
+        change(piece.reach.max);
+        break;
+      default:
+        change(piece.left);
     }
   }
 
   void change(JoinRow& join) {
-    if (below(2)) number(join.author.value);
-    else if (below(2)) join.role = static_cast<Role>(below(static_cast<std::size_t>(kRoles) + 1));
-    else join.kind = static_cast<MemberKind>(below(3));
+    if (below(2))
+      number(join.author.value);
+    else if (below(2))
+      join.role = static_cast<Role>(below(static_cast<std::size_t>(kRoles) + 1));
+    else
+      join.kind = static_cast<MemberKind>(below(3));
   }
   void change(CutRow& row) {
     Cut& cut = row.cut;
     switch (below(9)) {
-      case 0: number(cut.author.value); break;
-      case 1: number(cut.author_seq); break;
-      case 2: number(cut.body.value); break;
-      case 3: cut.level = static_cast<int>(below(4)); break;
-      case 4: change(cut.tool); break;
-      case 5: number(cut.spindle_rpm); break;
-      case 6: number(cut.path_us); break;
-      default: one_of(cut.path);
+      case 0:
+        number(cut.author.value);
+        break;
+      case 1:
+        number(cut.author_seq);
+        break;
+      case 2:
+        number(cut.body.value);
+        break;
+      case 3:
+        cut.level = static_cast<int>(below(4));
+        break;
+      case 4:
+        change(cut.tool);
+        break;
+      case 5:
+        number(cut.spindle_rpm);
+        break;
+      case 6:
+        number(cut.path_us);
+        break;
+      default:
+        one_of(cut.path);
     }
   }
   void change(RejectionRow& row) {
-    if (below(3) == 0) number(row.author.value);
-    else if (below(2)) number(row.author_seq);
-    else row.reason = static_cast<Rejection>(below(static_cast<std::size_t>(kRejections) + 1));
+    if (below(3) == 0)
+      number(row.author.value);
+    else if (below(2))
+      number(row.author_seq);
+    else
+      row.reason = static_cast<Rejection>(below(static_cast<std::size_t>(kRejections) + 1));
   }
   void change(SplitRow& row) {
-    if (below(4) == 0) number(row.parent.value);
-    else if (below(2)) change(row.taken);
-    else one_of(row.pieces);
+    if (below(4) == 0)
+      number(row.parent.value);
+    else if (below(2))
+      change(row.taken);
+    else
+      one_of(row.pieces);
     for (SplitPiece& piece : row.pieces)
       if (!piece.left) piece.left = std::make_shared<const std::vector<FieldLeaf>>();
   }
@@ -124,63 +168,110 @@ class Changes {
     if (!row.set || below(4) == 0) return number(row.item);
     SceneItem& item = *row.set;
     switch (below(7)) {
-      case 0: number(item.id); break;
-      case 1: number(item.body.value); break;
-      case 2: change(item.tool); break;
-      case 3: number(item.turns); break;
-      case 4: number(item.set_at); break;
-      case 5: number(item.pose_bone_item.rotation.coeffs()[static_cast<int>(below(4))]); break;
-      default: number(item.pose_bone_item.position_mm[static_cast<int>(below(3))]);
+      case 0:
+        number(item.id);
+        break;
+      case 1:
+        number(item.body.value);
+        break;
+      case 2:
+        change(item.tool);
+        break;
+      case 3:
+        number(item.turns);
+        break;
+      case 4:
+        number(item.set_at);
+        break;
+      case 5:
+        number(item.pose_bone_item.rotation.coeffs()[static_cast<int>(below(4))]);
+        break;
+      default:
+        number(item.pose_bone_item.position_mm[static_cast<int>(below(3))]);
     }
   }
   void change(ToolRow& row) {
     Tool& tool = row.tool;
     if (below(3) == 0) tool.name.push_back(static_cast<char>('a' + below(26)));
-    const std::array<double*, 4> sizes{&tool.diameter_mm, &tool.cutting_length_mm, &tool.shank_length_mm, &tool.spindle_rpm};
+    const std::array<double*, 4> sizes{&tool.diameter_mm, &tool.cutting_length_mm, &tool.shank_length_mm,
+                                       &tool.spindle_rpm};
     number(*sizes[below(sizes.size())]);
   }
   void change(MarkRow& row) {
-    if (below(2)) row.label.resize(below(300), static_cast<char>('a' + below(26)));
-    else row.label.clear();
+    if (below(2))
+      row.label.resize(below(300), static_cast<char>('a' + below(26)));
+    else
+      row.label.clear();
   }
   void change(std::string& words) {
-    if (below(2)) words.resize(below(1200), static_cast<char>('a' + below(26)));
-    else words.clear();
+    if (below(2))
+      words.resize(below(1200), static_cast<char>('a' + below(26)));
+    else
+      words.clear();
   }
   void change(SuperviseRow& row) {
     Restrictions& set = row.supervision;
     switch (below(9)) {
-      case 0: number(row.subject.value); break;
-      case 1: set.stopped = !set.stopped; break;
-      case 2: number(set.taken_by.value); break;
-      case 3: number(set.guide.value); break;
-      case 4: number(set.guide_share); break;
-      case 5: number(set.force_limit); break;
+      case 0:
+        number(row.subject.value);
+        break;
+      case 1:
+        set.stopped = !set.stopped;
+        break;
+      case 2:
+        number(set.taken_by.value);
+        break;
+      case 3:
+        number(set.guide.value);
+        break;
+      case 4:
+        number(set.guide_share);
+        break;
+      case 5:
+        number(set.force_limit);
+        break;
       case 6:
         if (!set.zone) set.zone.emplace();
         number(below(2) ? set.zone->radius : set.zone->centre[below(3)]);
         break;
-      case 7: one_of(set.tools); break;
-      default: change(set.words);
+      case 7:
+        one_of(set.tools);
+        break;
+      default:
+        change(set.words);
     }
   }
   void change(AnnotationRow& row) {
     if (!row.drawn || below(4) == 0) return number(row.id);
     Annotation& drawn = *row.drawn;
     switch (below(6)) {
-      case 0: number(drawn.id); break;
-      case 1: number(drawn.author.value); break;
-      case 2: drawn.kind = static_cast<AnnotationKind>(below(5)); break;
-      case 3: number(drawn.colour); break;
-      case 4: change(drawn.words); break;
+      case 0:
+        number(drawn.id);
+        break;
+      case 1:
+        number(drawn.author.value);
+        break;
+      case 2:
+        drawn.kind = static_cast<AnnotationKind>(below(5));
+        break;
+      case 3:
+        number(drawn.colour);
+        break;
+      case 4:
+        change(drawn.words);
+        break;
       default:
-        if (drawn.points.empty() || below(4) == 0) drawn.points.push_back({1, 2, 3});
-        else number(drawn.points[below(drawn.points.size())][below(3)]);
+        if (drawn.points.empty() || below(4) == 0)
+          drawn.points.push_back({1, 2, 3});
+        else
+          number(drawn.points[below(drawn.points.size())][below(3)]);
     }
   }
   void change(WordsRow& row) {
-    if (below(2)) number(row.to.value);
-    else change(row.words);
+    if (below(2))
+      number(row.to.value);
+    else
+      change(row.words);
   }
 
  private:
@@ -207,7 +298,8 @@ RowsInput rows_input(std::span<const std::uint8_t> data) {
   while (data.size() >= kHead) {
     const std::size_t asked = data[2] | std::size_t{data[3]} << 8;
     const auto bytes = data.subspan(kHead, std::min(asked, data.size() - kHead));
-    input.records.push_back({static_cast<std::int8_t>(data[0]), static_cast<std::int8_t>(data[1]), {bytes.begin(), bytes.end()}});
+    input.records.push_back(
+        {static_cast<std::int8_t>(data[0]), static_cast<std::int8_t>(data[1]), {bytes.begin(), bytes.end()}});
     data = data.subspan(kHead + bytes.size());
   }
   return input;
@@ -240,17 +332,28 @@ void change_rows(Bytes& data, std::mt19937& random) {
     return records.begin() + static_cast<std::ptrdiff_t>(changes.below(records.size() + extra));
   };
   switch (changes.below(12)) {
-    case 0: records.erase(place()); break;
+    case 0:
+      records.erase(place());
+      break;
     case 1: {
       Record again = *place();
       records.insert(place(1), std::move(again));
       break;
     }
-    case 2: std::iter_swap(place(), place()); break;
-    case 3: changes.number(place()->off); break;
-    case 4: changes.number(place()->later); break;
-    case 5: changes.number(changes.below(2) ? input.how : input.checkpoint); break;
-    default: change_field(place()->bytes, changes);
+    case 2:
+      std::iter_swap(place(), place());
+      break;
+    case 3:
+      changes.number(place()->off);
+      break;
+    case 4:
+      changes.number(place()->later);
+      break;
+    case 5:
+      changes.number(changes.below(2) ? input.how : input.checkpoint);
+      break;
+    default:
+      change_field(place()->bytes, changes);
   }
   data = to_bytes(input);
 }

@@ -21,8 +21,8 @@ constexpr double kPitch_mm = 1.0, kFirst_mm = 37.0, kLast_mm = 42.0, kMiddle_mm 
 constexpr std::int32_t kFirstLeaf = 32, kSecondLeaf = 40;  // along each axis
 constexpr CutLimits kLimits{.time_slack = 1s, .swept_voxels_per_s = 5e8, .power_w = 500.0};
 
-// A cube of 2 x 2 x 2 leaves, all in one branch of the volumes' trees, and a box of two tools: so that a room is made and
-// compared in microseconds.
+// A cube of 2 x 2 x 2 leaves, all in one branch of the volumes' trees, and a box of two tools: so that a room is made
+// and compared in microseconds.
 const Case& bone() {
   static const Case made = [] {
     const Box extent{Vec3::Constant(kFirst_mm), Vec3::Constant(kLast_mm)};
@@ -186,9 +186,17 @@ std::vector<Bytes> rooms() {
     OSTEON_CHECK(room.split(BodyId{0}, {half(true)}, room.bone_epoch()) && room.remove_body(hand, BodyId{1}));
     OSTEON_CHECK(room.undo_last(hand, 2, {}) && room.redo_last(hand, 1));
     const AuthorId teacher = room.join(MemberKind::surgeon, 3, {}, Role::instructor);
-    OSTEON_CHECK(room.supervise(teacher, hand, {.stopped = true, .taken_by = teacher, .guide = teacher, .guide_share = 500, .force_limit = 300,
-                                                .zone = ZoneLimit{{1, 2, 3}, 1000}, .tools = {drill().hash()}, .words = "wait"}));
-    OSTEON_CHECK(room.annotate(teacher, {.kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here"}));
+    OSTEON_CHECK(room.supervise(teacher, hand,
+                                {.stopped = true,
+                                 .taken_by = teacher,
+                                 .guide = teacher,
+                                 .guide_share = 500,
+                                 .force_limit = 300,
+                                 .zone = ZoneLimit{{1, 2, 3}, 1000},
+                                 .tools = {drill().hash()},
+                                 .words = "wait"}));
+    OSTEON_CHECK(
+        room.annotate(teacher, {.kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here"}));
     OSTEON_CHECK(room.wipe_off(teacher, 1) && room.say(hand, teacher, "why?"));
     std::array<bool, std::variant_size_v<decltype(RoomRow::what)>> seen{};
     const RowsInput input = as_input(room, kGoOn, 0);

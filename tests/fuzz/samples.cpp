@@ -6,8 +6,14 @@ namespace osteon::fuzz {
 
 Cut a_cut() {
   const Tool drill = builtin_tools()[0];
-  return {.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = drill.hash(), .level = 2,
-          .path = {quantise(pose_along({0, 0, 1}, {0, 0, -1})), quantise(pose_along({0, 0, -1}, {0, 0.1, -1}))}, .spindle_rpm = 1000};
+  return {.author = {1},
+          .author_seq = 1,
+          .lease_epoch = 1,
+          .body = {},
+          .tool = drill.hash(),
+          .level = 2,
+          .path = {quantise(pose_along({0, 0, 1}, {0, 0, -1})), quantise(pose_along({0, 0, -1}, {0, 0.1, -1}))},
+          .spindle_rpm = 1000};
 }
 
 SceneItem an_item() {
@@ -18,12 +24,23 @@ SceneItem an_item() {
 }
 
 Restrictions a_supervision() {
-  return {.stopped = true, .taken_by = {2}, .guide = {3}, .guide_share = 500, .force_limit = 300, .zone = ZoneLimit{{1, 2, 3}, 1000},
-          .tools = {builtin_tools()[0].hash()}, .words = "wait"};
+  return {.stopped = true,
+          .taken_by = {2},
+          .guide = {3},
+          .guide_share = 500,
+          .force_limit = 300,
+          .zone = ZoneLimit{{1, 2, 3}, 1000},
+          .tools = {builtin_tools()[0].hash()},
+          .words = "wait"};
 }
 
 Annotation an_annotation() {
-  return {.id = 1, .author = {2}, .kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here", .colour = 0x00ff00};
+  return {.id = 1,
+          .author = {2},
+          .kind = AnnotationKind::line,
+          .points = {{1, 2, 3}, {4, 5, 6}},
+          .words = "here",
+          .colour = 0x00ff00};
 }
 
 CuttingState a_state() {

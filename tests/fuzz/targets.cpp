@@ -96,7 +96,8 @@ wire::ServerLink server_end() {
   return {link_keys(), {1}, [](std::span<std::uint8_t> bytes) { std::ranges::fill(bytes, std::uint8_t{0x7e}); }};
 }
 
-// Of the packets that were given to an end, with the key: what it could read, and what a correct peer would not have said.
+// Of the packets that were given to an end, with the key: what it could read, and what a correct peer would not have
+// said.
 struct PacketCounts {
   std::uint64_t taken = 0, refused = 0;
   void add(const wire::LinkCounts& counts) { ++(counts.malformed == 0 ? taken : refused); }
@@ -113,7 +114,8 @@ void as_up_packet(std::span<const std::uint8_t> plain) {
   const Endpoint client{0, 1, 1};
   for (auto now = 1000ms; now < 1020ms; now += 5ms) {
     link.receive(client, sealer.seal(plain, now, buffer), now);
-    while (const auto out = link.send(now, buffer)) OSTEON_CHECK(out->to == client && out->bytes.size() <= kMostDatagramBytes);
+    while (const auto out = link.send(now, buffer))
+      OSTEON_CHECK(out->to == client && out->bytes.size() <= kMostDatagramBytes);
     while (const auto taken = link.take_cut()) OSTEON_CHECK(wire::fits_a_packet(*taken));
     (void)link.take_state();
   }
@@ -158,7 +160,8 @@ Bytes a_down_packet() {
   wire::RowSender sender(window, tools);
   OSTEON_CHECK(sender.push({.room_seq = {1}, .kind = wire::SessionRowKind::committed, .cut = a_cut()}));
   OSTEON_CHECK(sender.push({.room_seq = {2}, .kind = wire::SessionRowKind::rejected, .author_seq = 2, .reason = 1}));
-  OSTEON_CHECK(sender.push({.room_seq = {3}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 4, .supervision = a_supervision()}));
+  OSTEON_CHECK(sender.push(
+      {.room_seq = {3}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 4, .supervision = a_supervision()}));
   v1::DownPacket packet;
   OSTEON_CHECK(packet.ParseFromString(window.item(2).bytes + window.item(3).bytes));  // parts merge
   packet.mutable_times()->set_sent_us(1'000'000);
@@ -199,40 +202,45 @@ Target packet_target(std::string name, PlainTarget end, Bytes packet, const Pack
 std::vector<Target> targets() {
   google::protobuf::SetLogHandler(nullptr);  // it writes a line for every text that is none
   FieldLeaf leaf{{}, 1, {8, -16, 0}, std::vector<std::int16_t>(kLeafVoxels, 7)};
-  return {{"cut", parse_and_convert<v1::Cut>, {bytes_of(wire::to_wire(a_cut()).SerializeAsString())}},
-          {"cutting_state", parse_and_convert<v1::CuttingState>, {bytes_of(wire::to_wire(CuttingState{}).SerializeAsString())}},
-          {"field_leaf", parse_and_convert<v1::FieldLeaf>, {bytes_of(wire::to_wire(leaf).SerializeAsString())}},
-          {"scene_item", parse_and_convert<v1::SceneItem>, {bytes_of(wire::to_wire(an_item()).SerializeAsString())}},
-          {"tool_definition", parse_and_convert<v1::ToolDefinition>, {bytes_of(wire::to_wire(builtin_tools()[0]).SerializeAsString())}},
-          {"look",
-           parse_and_convert<v1::ViewFrustum>,
-           {bytes_of(wire::to_wire(a_look()).SerializeAsString())}},
-          packet_target<v1::UpPacket>("up_packet", as_up_packet, an_up_packet(), up_packets),
-          packet_target<v1::DownPacket>("down_packet", as_down_packet, a_down_packet(), down_packets),
-          {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
-          ticket_target(),
-          ticket_contents_target(),
-          access_list_target(),
-          rows_target(),
-          evaluated_rows_target(),
-          genesis_target(),
-          journal_file_target(),
-          {"supervision", parse_and_convert<v1::Restrictions>, {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
-          {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
-          requests_target(),
-          calls_target(),
-          upload_target(),
-          mesh_target(),
-          tool_file_target(),
-          carve_script_target(),
-          legend_target(),
-          case_info_target(),
-          bone_volume_target(),
-          cut_fields_target(),
-          dicom_target(),
-          inv3_target(),
-          scan_archive_target(),
-          label_slice_target()};
+  return {
+      {"cut", parse_and_convert<v1::Cut>, {bytes_of(wire::to_wire(a_cut()).SerializeAsString())}},
+      {"cutting_state",
+       parse_and_convert<v1::CuttingState>,
+       {bytes_of(wire::to_wire(CuttingState{}).SerializeAsString())}},
+      {"field_leaf", parse_and_convert<v1::FieldLeaf>, {bytes_of(wire::to_wire(leaf).SerializeAsString())}},
+      {"scene_item", parse_and_convert<v1::SceneItem>, {bytes_of(wire::to_wire(an_item()).SerializeAsString())}},
+      {"tool_definition",
+       parse_and_convert<v1::ToolDefinition>,
+       {bytes_of(wire::to_wire(builtin_tools()[0]).SerializeAsString())}},
+      {"look", parse_and_convert<v1::ViewFrustum>, {bytes_of(wire::to_wire(a_look()).SerializeAsString())}},
+      packet_target<v1::UpPacket>("up_packet", as_up_packet, an_up_packet(), up_packets),
+      packet_target<v1::DownPacket>("down_packet", as_down_packet, a_down_packet(), down_packets),
+      {"mesh_block", decode_any_block, {a_block().bytes, a_seamed_block().bytes}},
+      ticket_target(),
+      ticket_contents_target(),
+      access_list_target(),
+      rows_target(),
+      evaluated_rows_target(),
+      genesis_target(),
+      journal_file_target(),
+      {"supervision",
+       parse_and_convert<v1::Restrictions>,
+       {bytes_of(wire::to_wire(a_supervision()).SerializeAsString())}},
+      {"annotation", parse_and_convert<v1::Annotation>, {bytes_of(wire::to_wire(an_annotation()).SerializeAsString())}},
+      requests_target(),
+      calls_target(),
+      upload_target(),
+      mesh_target(),
+      tool_file_target(),
+      carve_script_target(),
+      legend_target(),
+      case_info_target(),
+      bone_volume_target(),
+      cut_fields_target(),
+      dicom_target(),
+      inv3_target(),
+      scan_archive_target(),
+      label_slice_target()};
 }
 
 }  // namespace osteon::fuzz

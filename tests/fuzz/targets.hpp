@@ -1,5 +1,5 @@
-// What untrusted bytes can reach. Each target takes any bytes and must neither crash nor break a promise; sanitizers see
-// the rest. Run by libFuzzer (osteon-fuzz, of the preset fuzz) and, in every test run, on seeded mutations.
+// What untrusted bytes can reach. Each target takes any bytes and must neither crash nor break a promise; sanitizers
+// see the rest. Run by libFuzzer (osteon-fuzz, of the preset fuzz) and, in every test run, on seeded mutations.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -21,8 +21,8 @@ struct Target {
   std::function<void(Bytes&, std::mt19937&)> change = nullptr;
   // Waits for what run() has only begun; none: it has done all when it returns.
   std::function<void()> settle = nullptr;
-  // Of how many rounds through the seeds one has this seed, where millions of inputs are asked for: more than 1 where it costs
-  // as much as many others, or tells less. None: every round has all.
+  // Of how many rounds through the seeds one has this seed, where millions of inputs are asked for: more than 1 where
+  // it costs as much as many others, or tells less. None: every round has all.
   std::function<long(const Bytes& seed)> rounds = nullptr;
   // A line for whoever looks on: what was run how often.
   std::function<std::string()> figures = nullptr;

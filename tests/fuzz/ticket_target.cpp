@@ -57,7 +57,8 @@ void open_signed(std::span<const std::uint8_t> contents) {
 }
 
 void read_list(std::span<const std::uint8_t> data) {
-  const Result<AccessList> list = AccessList::parse({reinterpret_cast<const char*>(data.data()), data.size()}, "access.txt");
+  const Result<AccessList> list =
+      AccessList::parse({reinterpret_cast<const char*>(data.data()), data.size()}, "access.txt");
   if (!list) {
     OSTEON_CHECK(list.error().message.starts_with("access.txt:"));
     return;
@@ -86,9 +87,13 @@ Bytes contents(const std::string& room, const std::string& user) {
 }  // namespace
 
 Target ticket_target() {
-  return {.name = "ticket",
-          .run = [](std::span<const std::uint8_t> data) { open_text({reinterpret_cast<const char*>(data.data()), data.size()}); },
-          .seeds = {bytes_of(a_ticket("ward", "anna")), bytes_of(a_ticket(std::string(255, 'r'), std::string(64, 'u')))}};
+  return {
+      .name = "ticket",
+      .run =
+          [](std::span<const std::uint8_t> data) {
+            open_text({reinterpret_cast<const char*>(data.data()), data.size()});
+          },
+      .seeds = {bytes_of(a_ticket("ward", "anna")), bytes_of(a_ticket(std::string(255, 'r'), std::string(64, 'u')))}};
 }
 
 Target ticket_contents_target() {
@@ -98,7 +103,8 @@ Target ticket_contents_target() {
 Target access_list_target() {
   return {.name = "access_list",
           .run = read_list,
-          .seeds = {bytes_of("# left\nrevoke user anna\nrevoke certificate 0A:1f\nrevoke ticket 00ff\nrole ben observer my room\nrole eve instructor\n")}};
+          .seeds = {bytes_of("# left\nrevoke user anna\nrevoke certificate 0A:1f\nrevoke ticket 00ff\nrole ben "
+                             "observer my room\nrole eve instructor\n")}};
 }
 
 }  // namespace osteon::fuzz

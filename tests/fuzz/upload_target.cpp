@@ -17,13 +17,14 @@ constexpr UploadQuota kQuota{.unpacked_bytes = 1 << 16, .entries = 4, .ratio = 5
 void unpack(std::span<const std::uint8_t> data) {
   std::map<std::string, std::uint64_t, std::less<>> put;
   std::uint64_t all = 0;
-  const auto out = unpack_case(std::as_bytes(data), "upload", kQuota, [&](std::string_view file, std::span<const std::byte> piece) {
-    OSTEON_CHECK(std::ranges::find(kCaseFiles, file) != std::end(kCaseFiles));
-    put[std::string(file)] += piece.size();
-    all += piece.size();
-    OSTEON_CHECK(all <= kQuota.unpacked_bytes);
-    return Result<void>{};
-  });
+  const auto out =
+      unpack_case(std::as_bytes(data), "upload", kQuota, [&](std::string_view file, std::span<const std::byte> piece) {
+        OSTEON_CHECK(std::ranges::find(kCaseFiles, file) != std::end(kCaseFiles));
+        put[std::string(file)] += piece.size();
+        all += piece.size();
+        OSTEON_CHECK(all <= kQuota.unpacked_bytes);
+        return Result<void>{};
+      });
   if (!out) {
     OSTEON_CHECK(out.error().code == ErrorCode::invalid_input || out.error().code == ErrorCode::exhausted);
     return;
@@ -36,7 +37,8 @@ void unpack(std::span<const std::uint8_t> data) {
 
 Target upload_target() {
   const std::string text(300, 'a');
-  Target target{"upload", unpack,
+  Target target{"upload",
+                unpack,
                 {an_archive({{"case.json", "{}"}, {"bone.vdb", text}}, {}),
                  an_archive({{"case.json", "{}"}, {"bone.vdb", text}}, {.zip_compression = "store"}),
                  an_archive({{"skull/case.json", "{}"}, {"skull/bone.vdb", std::string(40000, '\0')}}, {})}};

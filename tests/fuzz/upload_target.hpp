@@ -1,4 +1,5 @@
-// Uploaded archives as a fuzz target: whatever they are, they come out as files of a case within the quota, or not at all.
+// Uploaded archives as a fuzz target: whatever they are, they come out as files of a case within the quota, or not at
+// all.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 

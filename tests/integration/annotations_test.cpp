@@ -1,4 +1,5 @@
-// Windows of one room as processes: what somebody draws and says in one is seen in the others, and one goes where another looks.
+// Windows of one room as processes: what somebody draws and says in one is seen in the others, and one goes where
+// another looks.
 #include <gtest/gtest.h>
 #include <png.h>
 
@@ -16,7 +17,8 @@ struct Photo {
   int width = 0, height = 0;
   std::vector<std::uint8_t> rgb;
   [[nodiscard]] std::array<int, 3> at(int x, int y) const {
-    const std::size_t i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+    const std::size_t i =
+        3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
     return i + 2 < rgb.size() ? std::array<int, 3>{rgb[i], rgb[i + 1], rgb[i + 2]} : std::array<int, 3>{};
   }
 };
@@ -42,7 +44,8 @@ int difference(const std::array<int, 3>& a, const std::array<int, 3>& b) {
 int changed_in_middle(const Photo& a, const Photo& b, int half) {
   int changed = 0;
   for (int y = a.height / 2 - half; y < a.height / 2 + half; ++y)
-    for (int x = a.width / 2 - half; x < a.width / 2 + half; ++x) changed += difference(a.at(x, y), b.at(x, y)) > 60 ? 1 : 0;
+    for (int x = a.width / 2 - half; x < a.width / 2 + half; ++x)
+      changed += difference(a.at(x, y), b.at(x, y)) > 60 ? 1 : 0;
   return changed;
 }
 
@@ -78,7 +81,8 @@ class Annotations : public testing::Test {
 };
 
 TEST_F(Annotations, WhatOneDrawsTheOtherSeesUntilItIsWiped) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}), ada(stage_.address(), *screen_, {"--name", "Ada"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}),
+      ada(stage_.address(), *screen_, {"--name", "Ada"});
   for (ScriptedViewer* viewer : {&berg, &ada}) ASSERT_TRUE(viewer->tell("wait surface"));
   ASSERT_TRUE(ada.tell(kFromAbove));
   const Photo bare = photo(ada, "bare.png");
@@ -117,12 +121,15 @@ TEST_F(Annotations, WhoComesLaterSeesWhatIsThere) {
 }
 
 TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}), ada(stage_.address(), *screen_, {"--name", "Ada"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}),
+      ada(stage_.address(), *screen_, {"--name", "Ada"});
   for (ScriptedViewer* viewer : {&berg, &ada}) ASSERT_TRUE(viewer->tell("wait surface"));
   const auto looks_from = [](double x, double y, double z) {
     return [=](const json& status) {
       const json eye = status["camera"]["eye_mm"];
-      return std::abs(eye[0].get<double>() - x) + std::abs(eye[1].get<double>() - y) + std::abs(eye[2].get<double>() - z) < 1e-6;
+      return std::abs(eye[0].get<double>() - x) + std::abs(eye[1].get<double>() - y) +
+                 std::abs(eye[2].get<double>() - z) <
+             1e-6;
     };
   };
   ASSERT_TRUE(ada.tell(kFromAbove));
@@ -147,7 +154,8 @@ TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
 }
 
 TEST_F(Annotations, WordsReachWhomTheyAreFor) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}), ada(stage_.address(), *screen_, {"--name", "Ada"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}),
+      ada(stage_.address(), *screen_, {"--name", "Ada"});
   for (ScriptedViewer* viewer : {&berg, &ada}) ASSERT_TRUE(viewer->tell("wait surface"));
   const auto says = [](const std::string& text) {
     return [text](const json& status) { return status["said"].dump().find(text) != std::string::npos; };

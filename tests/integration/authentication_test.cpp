@@ -1,5 +1,5 @@
-// A server with certificates and tickets, a surgeon at work in it, and all who may not come in, or not any more. What they try
-// must not be felt by the surgeon.
+// A server with certificates and tickets, a surgeon at work in it, and all who may not come in, or not any more. What
+// they try must not be felt by the surgeon.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -30,7 +30,8 @@ class DoorsOfPrograms : public ::testing::Test {
  protected:
   // A ticket as whoever runs the server makes it.
   std::filesystem::path ticket(const std::string& user, const std::string& role, const std::string& room = "room") {
-    const RunResult made = run(program("osteon-server"), {"ticket", "--key", people_.ticket_key(), "--room", room, "--user", user, "--role", role, "--hours", "1"});
+    const RunResult made = run(program("osteon-server"), {"ticket", "--key", people_.ticket_key(), "--room", room,
+                                                          "--user", user, "--role", role, "--hours", "1"});
     EXPECT_EQ(made.exit_code, 0) << made.err;
     EXPECT_THAT(made.err, HasSubstr("ticket ")) << "its id, by which it is revoked";
     return people_.ticket_file(made.out.substr(0, made.out.find('\n')));
@@ -40,16 +41,20 @@ class DoorsOfPrograms : public ::testing::Test {
   }
   // An audio client that is turned away: one sentence that says why, and an exit code.
   std::string turned_away(const std::vector<std::string>& by, ProcessOptions options = {}) {
-    const RunResult result = run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--timeout", "1"}, by), 30s, std::move(options));
+    const RunResult result =
+        run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--timeout", "1"}, by),
+            30s, std::move(options));
     EXPECT_NE(result.exit_code, 0) << result.out << result.err;
     EXPECT_FALSE(result.timed_out);
     const std::size_t last = result.err.rfind("osteon-audio: ");
     return last == std::string::npos ? result.err : result.err.substr(last);
   }
-  Process haptic(const std::string& name, const std::string& user, const std::string& role, const nlohmann::json& plan) {
+  Process haptic(const std::string& name, const std::string& user, const std::string& role,
+                 const nlohmann::json& plan) {
     const auto file = stage_ / (name + "-plan.json");
     std::ofstream(file) << plan.dump();
-    return stage_.start("osteon-haptic", plus({"--server", stage_.address(), "--plan", file, "--summary", stage_ / (name + ".json"), "--cache", stage_ / "cache"},
+    return stage_.start("osteon-haptic", plus({"--server", stage_.address(), "--plan", file, "--summary",
+                                               stage_ / (name + ".json"), "--cache", stage_ / "cache"},
                                               credentials(user, ticket(user, role))));
   }
   // Connects and says what is neither TLS nor HTTP.
@@ -58,7 +63,8 @@ class DoorsOfPrograms : public ::testing::Test {
     sockaddr_in at{};
     at.sin_family = AF_INET;
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    at.sin_port = htons(static_cast<std::uint16_t>(std::stoi(stage_.address().substr(stage_.address().rfind(':') + 1))));
+    at.sin_port =
+        htons(static_cast<std::uint16_t>(std::stoi(stage_.address().substr(stage_.address().rfind(':') + 1))));
     ASSERT_EQ(::connect(socket, reinterpret_cast<const sockaddr*>(&at), sizeof at), 0);
     std::string noise(64 * 1024, '\0');
     unsigned state = 1;
@@ -74,10 +80,12 @@ class DoorsOfPrograms : public ::testing::Test {
 TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   Process sue = haptic("sue", "sue", "trainee", {{"steps", {drill_at(0, 0, "rig")}}});
   Process dora = haptic("dora", "dora", "collaborator", {{"steps", {drill_at(9, 9, "rig")}}});
-  Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"}, credentials("ben", ticket("ben", "observer"))));
+  Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"},
+                                                  credentials("ben", ticket("ben", "observer"))));
 
   // With nothing, with plain text, with what another authority has made.
-  EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}), HasSubstr("--certificates DIR with --ticket FILE"));
+  EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}),
+              HasSubstr("--certificates DIR with --ticket FILE"));
   EXPECT_THAT(turned_away({"--plain"}), HasSubstr("asks for a certificate"));
   People strangers;
   EXPECT_THAT(turned_away({"--certificates", strangers.person("sue"), "--ticket", ticket("sue", "trainee")}),
@@ -85,12 +93,17 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   say_nonsense();
 
   // With a certificate, and a ticket that does not fit.
-  EXPECT_THAT(turned_away(credentials("eve", people_.ticket("eve", "room", Role::observer, -5s))), HasSubstr("the ticket expired"));
-  EXPECT_THAT(turned_away(credentials("eve", ticket("sue", "trainee"))), HasSubstr("the ticket is for sue and the certificate for eve"));
-  EXPECT_THAT(turned_away(plus(credentials("eve", ticket("eve", "observer", "theatre")), {"--room", "room"})), HasSubstr("the ticket is for room theatre"));
+  EXPECT_THAT(turned_away(credentials("eve", people_.ticket("eve", "room", Role::observer, -5s))),
+              HasSubstr("the ticket expired"));
+  EXPECT_THAT(turned_away(credentials("eve", ticket("sue", "trainee"))),
+              HasSubstr("the ticket is for sue and the certificate for eve"));
+  EXPECT_THAT(turned_away(plus(credentials("eve", ticket("eve", "observer", "theatre")), {"--room", "room"})),
+              HasSubstr("the ticket is for room theatre"));
   EXPECT_THAT(turned_away(credentials("eve", people_.ticket_file("osteon1.AAAA.AAAA"))), HasSubstr("malformed"));
-  EXPECT_THAT(turned_away(credentials("eve", strangers.ticket("eve", "room", Role::instructor))), HasSubstr("signature"));
-  const RunResult closing = run(program("osteon-server"), plus({"rooms", "close", "room", "--server", stage_.address()}, credentials("eve", ticket("eve", "instructor"))));
+  EXPECT_THAT(turned_away(credentials("eve", strangers.ticket("eve", "room", Role::instructor))),
+              HasSubstr("signature"));
+  const RunResult closing = run(program("osteon-server"), plus({"rooms", "close", "room", "--server", stage_.address()},
+                                                               credentials("eve", ticket("eve", "instructor"))));
   EXPECT_NE(closing.exit_code, 0);
   EXPECT_THAT(closing.err, HasSubstr("an instructor may not call CloseRoom"));
 
@@ -130,7 +143,9 @@ TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
   const auto ida = credentials("ida", ticket("ida", "instructor"));
   ScriptedViewer window(stage_.address(), *screen, ida);
   ASSERT_TRUE(window.tell("wait surface")) << window.process().err();
-  const auto start = [&] { return stage_.start("osteon-viewer", plus({"--console", "--server", stage_.address()}, ida)); };
+  const auto start = [&] {
+    return stage_.start("osteon-viewer", plus({"--console", "--server", stage_.address()}, ida));
+  };
   const auto ask = [](Process& console, const std::string& command) {
     console.write(command + "\n");
     return console.read_line(60s).value_or("");

@@ -18,14 +18,16 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-// What a hand has of the bone under its tool, made by a thread of its own as in a client; here the tool is where the other has
-// cut last.
+// What a hand has of the bone under its tool, made by a thread of its own as in a client; here the tool is where the
+// other has cut last.
 class Felt {
  public:
   // `in_patch`: called on that thread for every cut that the patch has.
   Felt(const Case& bone, std::function<void(const Cut&)> in_patch)
-      : in_patch_(std::move(in_patch)), replica_(bone, BodyId{}),
-        model_(*haptic::ToolModel::make(*find_tool("burr-round-5"), bone.pitch_mm(), 1.0, "")), thread_([this] { run(); }) {}
+      : in_patch_(std::move(in_patch)),
+        replica_(bone, BodyId{}),
+        model_(*haptic::ToolModel::make(*find_tool("burr-round-5"), bone.pitch_mm(), 1.0, "")),
+        thread_([this] { run(); }) {}
   ~Felt() {
     {
       const std::lock_guard lock(mutex_);
@@ -78,8 +80,12 @@ std::string udp_port_of(Process& server) {
   std::string log;
   std::size_t at = std::string::npos;
   // What a process has written reaches us a moment later.
-  (void)wait_until([&] { return log = server.err(), (at = log.find("udp_port=")) != std::string::npos && log.find('\n', at) != std::string::npos; },
-                   10s);
+  (void)wait_until(
+      [&] {
+        return log = server.err(),
+               (at = log.find("udp_port=")) != std::string::npos && log.find('\n', at) != std::string::npos;
+      },
+      10s);
   return at == std::string::npos ? "" : std::to_string(std::strtoul(log.c_str() + at + 9, nullptr, 10));
 }
 
@@ -90,8 +96,8 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
   std::optional<ImpairProcess> relay;
   std::string address = stage.address(), fast_path = network.fast_path;
   if (!network.impairment.empty()) {
-    std::vector<std::string> arguments{"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server()),
-                                       "--seed", std::to_string(seed)};
+    std::vector<std::string> arguments{
+        "--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server()), "--seed", std::to_string(seed)};
     relay.emplace(arguments);
     if (relay->tcp().empty()) return run.fault = "osteon-impair did not start: " + relay->process().err(), run;
     address = relay->tcp();
@@ -102,8 +108,11 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
   std::mutex felt_mutex;
   for (std::uint64_t i = 0; i < 2; ++i)
     hands.push_back(std::make_unique<Hand>(address, folder / "cache", seed * 2 + i, 8ms, fast_path));
-  const auto both = [&](auto holds) { return std::ranges::all_of(hands, [&](const auto& hand) { return holds(*hand); }); };
-  if (!wait_until([&] { return both([](Hand& hand) { return hand.surgeon().stands(); }); }, 30s)) run.fault = "a hand did not join";
+  const auto both = [&](auto holds) {
+    return std::ranges::all_of(hands, [&](const auto& hand) { return holds(*hand); });
+  };
+  if (!wait_until([&] { return both([](Hand& hand) { return hand.surgeon().stands(); }); }, 30s))
+    run.fault = "a hand did not join";
   if (relay) {
     for (const std::string& command : network.impairment) (void)relay->command(command);
     std::this_thread::sleep_for(1500ms);  // in some hundred packets both ends learn what is lost

@@ -1,5 +1,5 @@
-// Real processes and real sockets, with osteon-impair between a server and two hands: do all of them end with one bone, and how
-// soon does one feel what the other cuts?
+// Real processes and real sockets, with osteon-impair between a server and two hands: do all of them end with one bone,
+// and how soon does one feel what the other cuts?
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -11,15 +11,15 @@
 namespace osteon::test {
 
 struct BadNetworkRun {
-  std::uint64_t sent = 0, kept = 0;      // cuts of both hands; kept: decided by the server
-  double converged_s = 0;                // from quiet (hands rest, the network is good) until all hold one bone
-  std::vector<double> felt_ms;           // from one hand's sending of each cut until it is in the other's patch
-  bool fast_path_alive = false;          // of both, before quiet
-  std::string fault;                     // empty: none
+  std::uint64_t sent = 0, kept = 0;  // cuts of both hands; kept: decided by the server
+  double converged_s = 0;            // from quiet (hands rest, the network is good) until all hold one bone
+  std::vector<double> felt_ms;       // from one hand's sending of each cut until it is in the other's patch
+  bool fast_path_alive = false;      // of both, before quiet
+  std::string fault;                 // empty: none
 };
 
 struct BadNetwork {
-  std::vector<std::string> impairment{};   // arguments of osteon-impair; none: no relay at all
+  std::vector<std::string> impairment{};  // arguments of osteon-impair; none: no relay at all
   std::chrono::milliseconds work{1500};
   std::vector<std::string> meanwhile{};  // commands for osteon-impair, in equal times during the work
   std::string fast_path{};               // "off": over the streams alone

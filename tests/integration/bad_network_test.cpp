@@ -14,7 +14,9 @@ void expect_converged(const BadNetworkRun& run) {
   EXPECT_EQ(run.kept, run.sent) << "every cut is decided";
   std::vector<double> felt_ms = run.felt_ms;
   std::ranges::sort(felt_ms);
-  const auto percentile = [&](std::size_t percent) { return felt_ms.empty() ? 0.0 : felt_ms[percent * (felt_ms.size() - 1) / 100]; };
+  const auto percentile = [&](std::size_t percent) {
+    return felt_ms.empty() ? 0.0 : felt_ms[percent * (felt_ms.size() - 1) / 100];
+  };
   std::printf("%llu cuts, one bone after %.2f s, felt by the other after %.0f ms (99 of 100: %.0f ms)\n",
               static_cast<unsigned long long>(run.sent), run.converged_s, percentile(50), percentile(99));
 }

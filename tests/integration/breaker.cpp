@@ -143,8 +143,7 @@ struct Breaker::Parts {
             {"rename-room", file, "other"},
             {"delete", file, "--alone"},
             {"delete", file, "--branches"},
-            {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key(), "--audit",
-             stage.audit()}};
+            {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key(), "--audit", stage.audit()}};
   }
 
   // A command of osteon-server that nobody tries here; empty: there is none.
@@ -435,9 +434,10 @@ bool Breaker::read_only(std::uint64_t seed) {
     if (verdict.fault.empty() && copied.exit_code != 0) verdict.fault = "backup: " + said(copied);
     if (verdict.fault.empty())
       verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.rows);
-    const RunResult served = parts_->stage.command(
-        {"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key", parts_->stage.key(),
-         "--audit", parts_->stage.audit()}, 10s);
+    const RunResult served =
+        parts_->stage.command({"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key",
+                               parts_->stage.key(), "--audit", parts_->stage.audit()},
+                              10s);
     if (verdict.fault.empty() && (served.exit_code == 0 || served.timed_out))
       verdict.fault = "a server: " + said(served);
     if (verdict.fault.empty()) verdict.fault = BreakerJudge::refusal("a server", served, trial.file());

@@ -129,8 +129,7 @@ Server BreakerStage::start(const fs::path& folder, const std::string& name, Proc
   server.process = std::make_unique<Process>(
       first(),
       with_prefix({"--case", bone_, "--journal", (folder / (name + ".journal")).string(), "--signing-key", key(),
-                   "--audit", audit(),
-                   "--address-file", address.string(), "--drain-seconds", "0"}),
+                   "--audit", audit(), "--address-file", address.string(), "--drain-seconds", "0"}),
       std::move(options));
   std::optional<std::string> line;
   (void)wait_until([&] { return (line = wait_for_address(address, 1ms)) || !server.process->running(); }, kPatience);

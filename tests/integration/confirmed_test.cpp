@@ -36,9 +36,11 @@ class Confirmed : public ::testing::Test {
   }
   Process drill(const std::string& name, const std::string& address, std::vector<std::string> more = {}) {
     std::ofstream(stage_ / (name + "-plan.json")) << json{{"steps", json::array({drill_at(0, 0, "rig")})}};
-    std::vector<std::string> arguments{"--server", address, "--plan", stage_ / (name + "-plan.json"), "--cut-log",
-                                       stage_ / (name + "-cuts.csv"), "--summary", stage_ / (name + ".json"), "--cache",
-                                       stage_ / "cache"};
+    std::vector<std::string> arguments{"--server",  address,
+                                       "--plan",    stage_ / (name + "-plan.json"),
+                                       "--cut-log", stage_ / (name + "-cuts.csv"),
+                                       "--summary", stage_ / (name + ".json"),
+                                       "--cache",   stage_ / "cache"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return stage_.start("osteon-haptic", arguments);
   }

@@ -334,7 +334,8 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   for (const auto& some : {without_a_server(), of_the_server(), of_the_client(), of_files(), of_tickets()})
     mistakes.insert(mistakes.end(), some.begin(), some.end());
   std::map<std::string, std::string> said = say_all(mistakes);
-  said["slow"] = wire::connection_fault(stage_.address(), people_.credentials("anna", Role::observer, "room")).error.message;
+  said["slow"] =
+      wire::connection_fault(stage_.address(), people_.credentials("anna", Role::observer, "room")).error.message;
   mistakes.push_back({"slow", stage_.address(), {}});
   const fs::path marked = people_.ticket_file(
       "\xef\xbb\xbf"
@@ -342,8 +343,9 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "which would end the client";
   const std::map<std::string, fs::path> tickets{{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}};
   for (const auto& [what, file] : tickets) {
-    said[what] =
-        wire::client_credentials({.plain = false, .certificates = people_.person("anna"), .ticket = file}).error().message;
+    said[what] = wire::client_credentials({.plain = false, .certificates = people_.person("anna"), .ticket = file})
+                     .error()
+                     .message;
     mistakes.push_back({what, stage_.address(), {}});
   }
 

@@ -159,8 +159,8 @@ TEST_F(PhantomInRoom, WaitsForItsUserWhereItMustBeCalibrated) {
 // Only the room knows which tools it has.
 TEST_F(PhantomInRoom, AToolThatTheRoomHasNotIsNamed) {
   const Stage stage(16.0);
-  Process haptic = stage.start("osteon-haptic", {"--server", stage.address(), "--device", "phantom", "--libhd", OSTEON_STAND_IN_HD,
-                                                 "--tool", "drill-99", "--cache", stage / "cache"});
+  Process haptic = stage.start("osteon-haptic", {"--server", stage.address(), "--device", "phantom", "--libhd",
+                                                 OSTEON_STAND_IN_HD, "--tool", "drill-99", "--cache", stage / "cache"});
   ASSERT_EQ(haptic.wait(kPatience), 1) << haptic.err();
   EXPECT_THAT(haptic.err(), testing::HasSubstr("the room has no tool \"drill-99\"; choose one of"));
   EXPECT_EQ(arm_->is_open, 0);
@@ -177,9 +177,9 @@ TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
   EXPECT_EQ(read_json(stage / "hand.json")["force_scale"], 0.07);
 
   const std::string recording = "recorded:" + (stage / "hand.h5").string();
-  Process again = stage.start("osteon-haptic", {"--server", stage.address(), "--device", recording, "--tool", "drill-3.2",
-                                                "--view", "top", "--at", "2,-3,0", "--summary", stage / "again.json",
-                                                "--cache", stage / "cache"});
+  Process again = stage.start(
+      "osteon-haptic", {"--server", stage.address(), "--device", recording, "--tool", "drill-3.2", "--view", "top",
+                        "--at", "2,-3,0", "--summary", stage / "again.json", "--cache", stage / "cache"});
   ASSERT_EQ(again.wait(kPatience), 0) << again.err();
   const auto summary = read_json(stage / "again.json");
   EXPECT_EQ(summary["device"], recording);

@@ -53,8 +53,9 @@ class DrillingRoom : public testing::Test {
     ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
     Stage stage;
     ScriptedViewer viewer(stage.address(), *screen, {"--summary", stage / "viewer.json"});
-    Process audio = stage.start("osteon-audio", {"--server", stage.address(), "--output", "none", "--wav", stage / "sound.wav",
-                                                 "--state-log", stage / "states.csv", "--summary", stage / "audio.json"});
+    Process audio =
+        stage.start("osteon-audio", {"--server", stage.address(), "--output", "none", "--wav", stage / "sound.wav",
+                                     "--state-log", stage / "states.csv", "--summary", stage / "audio.json"});
     ASSERT_TRUE(viewer.tell("wait surface"));
     ASSERT_TRUE(viewer.tell("tool off"));
     const std::string look = "look at 0 0 -10 from 30 -40 60 up 0 0 1";
@@ -86,8 +87,8 @@ class DrillingRoom : public testing::Test {
     ASSERT_TRUE(viewer.tell("wait seq " + seq));
     ASSERT_TRUE(viewer.tell("screenshot " + (stage / "after.png").string()));
     ScriptedViewer late(stage.address(), *screen, {"--summary", stage / "late.json"});
-    r.late_viewer_came = late.tell("wait surface") && late.tell("wait seq " + seq) && late.tell("tool off") && late.tell(look) &&
-                         late.tell("screenshot " + (stage / "late.png").string());
+    r.late_viewer_came = late.tell("wait surface") && late.tell("wait seq " + seq) && late.tell("tool off") &&
+                         late.tell(look) && late.tell("screenshot " + (stage / "late.png").string());
     r.pictures_equal = bytes_of(stage / "after.png") == bytes_of(stage / "late.png");
     r.pictures_differ_from_start = bytes_of(stage / "after.png") != bytes_of(stage / "before.png");
 
@@ -186,7 +187,8 @@ TEST_F(DrillingRoom, TheDrillSoundsDifferentInAirCortexAndMedulla) {
     std::vector<double> times;
     for (std::size_t i = 0; i < rig.log.rows(); ++i) {
       const double depth = rig.log["depth_mm"][i];
-      if (depth >= from_mm && depth <= to_mm && rig.log["rpm"][i] > 500.0 && times.size() < 100'000) times.push_back(1e-9 * rig.log["mono_ns"][i]);
+      if (depth >= from_mm && depth <= to_mm && rig.log["rpm"][i] > 500.0 && times.size() < 100'000)
+        times.push_back(1e-9 * rig.log["mono_ns"][i]);
       if (depth > to_mm) break;
     }
     EXPECT_FALSE(times.empty()) << "between " << from_mm << " and " << to_mm << " mm";

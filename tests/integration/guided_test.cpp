@@ -39,12 +39,14 @@ TEST(Guided, ATremblingHandDrillsWhereTheGuideSays) {
   Stage stage(30.0, {"--save", kept / "bone.vdb"});
   ScriptedViewer viewer(stage.address(), *screen, {"--summary", stage / "viewer.json"});
   ASSERT_TRUE(viewer.tell("wait surface"));
-  const json drill{{"action", "drill"}, {"tool", "drill-3.2"}, {"guide", true}, {"tremor_mm", 1.2}, {"hand", "expert"}, {"spindle_rpm", 1000},
-             {"feed_mm_per_s", 2.0}, {"beyond_mm", 3.0}};
-  const json pin{{"action", "drill"}, {"tool", "pin-1"}, {"to_mm", 10.0}, {"leave", true}, {"spindle_rpm", 800}, {"entry", entry_at(9, 6)}};
+  const json drill{{"action", "drill"}, {"tool", "drill-3.2"}, {"guide", true},        {"tremor_mm", 1.2},
+                   {"hand", "expert"},  {"spindle_rpm", 1000}, {"feed_mm_per_s", 2.0}, {"beyond_mm", 3.0}};
+  const json pin{{"action", "drill"}, {"tool", "pin-1"},    {"to_mm", 10.0},
+                 {"leave", true},     {"spindle_rpm", 800}, {"entry", entry_at(9, 6)}};
   const json screw{{"action", "screw"}, {"tool", "screw-1"}, {"spindle_rpm", 240}, {"entry", entry_at(-9, 6)}};
-  Process haptic = stage.start_haptic("hand", {{"steps", json::array({json{{"action", "place"}, {"tool", "guide-1"}, {"entry", entry_at(2, -3)}},
-                                                                    drill, pin, screw})}});
+  Process haptic = stage.start_haptic(
+      "hand", {{"steps", json::array({json{{"action", "place"}, {"tool", "guide-1"}, {"entry", entry_at(2, -3)}}, drill,
+                                      pin, screw})}});
   ASSERT_EQ(haptic.wait(180s), 0) << haptic.err();
   ASSERT_TRUE(viewer.tell("wait items 3"));
   const json summary = read_json(stage / "hand.json");
@@ -97,8 +99,8 @@ Answer standing_of(const std::string& line) {
   const std::size_t from = line.find(": item ");
   EXPECT_TRUE(line.starts_with("ok ") && from != std::string::npos) << line;
   if (from == std::string::npos) return answer;
-  EXPECT_EQ(std::sscanf(line.c_str() + from, ": item %u at %lf %lf %lf along %lf %lf %lf", &answer.item, &answer.at.x(), &answer.at.y(), &answer.at.z(),
-                        &answer.along.x(), &answer.along.y(), &answer.along.z()),
+  EXPECT_EQ(std::sscanf(line.c_str() + from, ": item %u at %lf %lf %lf along %lf %lf %lf", &answer.item, &answer.at.x(),
+                        &answer.at.y(), &answer.at.z(), &answer.along.x(), &answer.along.y(), &answer.along.z()),
             7)
       << line;
   answer.seated = line.find(", seated") != std::string::npos;
@@ -134,11 +136,12 @@ TEST(Demonstration, IsOverWhenTheServerIsToStop) {
   EXPECT_NE(stage.server().err().find("drained sessions_left=0"), std::string::npos) << stage.server().err();
 }
 
-// A person at a viewer's script sets down, moves, turns, drives home and takes away what stands on the bone. The block's
-// top is z = 0; the cup and the reamer that makes its cavity are tools of the box, edited to 36 mm.
+// A person at a viewer's script sets down, moves, turns, drives home and takes away what stands on the bone. The
+// block's top is z = 0; the cup and the reamer that makes its cavity are tools of the box, edited to 36 mm.
 TEST(Scene, IsArrangedFromAViewersScript) {
   const TempDir tools;
-  for (const auto& [tool, file] : {std::pair{"trial-cup-50", "cup-36.yaml"}, std::pair{"reamer-sphere", "reamer-36.yaml"}}) {
+  for (const auto& [tool, file] :
+       {std::pair{"trial-cup-50", "cup-36.yaml"}, std::pair{"reamer-sphere", "reamer-36.yaml"}}) {
     const auto made = run(program("osteon-import"), {"tools", tool, "--set", "diameter_mm=36", "--out", tools / file});
     ASSERT_EQ(made.exit_code, 0) << made.err;
   }
@@ -167,7 +170,8 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   for (const GuideBore& hole : guide_shape(*find_tool("guide-2")).pin_holes) {
     // The guide's x is the bone's, its z goes down.
     const Vec3 tip = hole.entry_mm + (hole.length_mm + 15.0) * hole.direction;
-    const auto line = viewer.ask("place pin-1 at " + std::to_string(tip.x()) + " " + std::to_string(20.0 - tip.y()) + " " + std::to_string(-tip.z()) + " along 0 0 -1");
+    const auto line = viewer.ask("place pin-1 at " + std::to_string(tip.x()) + " " + std::to_string(20.0 - tip.y()) +
+                                 " " + std::to_string(-tip.z()) + " along 0 0 -1");
     EXPECT_NEAR(standing_of(line).at.z(), -15.0, 0.01) << line;
   }
   refused("move 1 at 0 20 1 along 0 0 -1", "fixed by pins");
@@ -196,7 +200,8 @@ TEST(Scene, IsArrangedFromAViewersScript) {
     Surgeon hand(stage.address(), stage / "cache");
     ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
     const auto entries = hand.session().tools()->entries();
-    const auto reamer = std::ranges::find(entries, "reamer-36", [](const ToolBox::Entry* entry) { return entry->tool.name; });
+    const auto reamer =
+        std::ranges::find(entries, "reamer-36", [](const ToolBox::Entry* entry) { return entry->tool.name; });
     ASSERT_NE(reamer, entries.end());
     // As a motor of 500 W could, 0.2 mm in 60 ms: more bone at once would be refused.
     constexpr std::uint64_t kCuts = 95;
@@ -242,7 +247,8 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   constexpr int kAround = 96, kRows = 48;
   const auto corner = [&](int row, int i) {
     const double polar = std::numbers::pi * row / kRows, angle = 2.0 * std::numbers::pi * i / kAround;
-    const Vec3 p = kRadius_mm * Vec3{std::sin(polar) * std::cos(angle), std::sin(polar) * std::sin(angle), std::cos(polar) - 1.0};
+    const Vec3 p =
+        kRadius_mm * Vec3{std::sin(polar) * std::cos(angle), std::sin(polar) * std::sin(angle), std::cos(polar) - 1.0};
     return std::array<float, 3>{static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
   };
   ball.positions_mm.push_back(corner(0, 0));
@@ -250,7 +256,9 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
     for (int i = 0; i < kAround; ++i) ball.positions_mm.push_back(corner(row, i));
   ball.positions_mm.push_back(corner(kRows, 0));
   const auto index = [&](int row, int i) {
-    return static_cast<std::uint32_t>(row == 0 ? 0 : row == kRows ? 1 + (kRows - 1) * kAround : 1 + (row - 1) * kAround + i % kAround);
+    return static_cast<std::uint32_t>(row == 0       ? 0
+                                      : row == kRows ? 1 + (kRows - 1) * kAround
+                                                     : 1 + (row - 1) * kAround + i % kAround);
   };
   for (int row = 0; row < kRows; ++row)
     for (int i = 0; i < kAround; ++i) {
@@ -258,8 +266,9 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
       if (row < kRows - 1) ball.triangles.push_back({index(row, i + 1), index(row + 1, i), index(row + 1, i + 1)});
     }
   ASSERT_TRUE(write_stl(ball, tools / "ball.stl"));
-  std::ofstream(tools / "ball.yaml") << "name: ball-of-the-folder\ntitle: Ball\nkind: mesh\nmesh: ball.stl\nmesh_pitch_mm: 0.25\n"
-                                        "spindle_rpm: 1000\nteeth: 4\nfeed_mm_per_rev: 1\ncut_level: 2\n";
+  std::ofstream(tools / "ball.yaml")
+      << "name: ball-of-the-folder\ntitle: Ball\nkind: mesh\nmesh: ball.stl\nmesh_pitch_mm: 0.25\n"
+         "spindle_rpm: 1000\nteeth: 4\nfeed_mm_per_rev: 1\ncut_level: 2\n";
   stage.start_server({"--tools", tools / "", "--save", kept / "bone.vdb"});
   {
     Surgeon hand(stage.address(), stage / "cache");
@@ -283,7 +292,8 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   stage.start_server({"--resume", kept / "bone.vdb"});
   Surgeon resumed(stage.address(), stage / "cache");
   ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));
-  EXPECT_TRUE(std::ranges::any_of(resumed.session().tools()->entries(), [](const auto* e) { return e->tool.name == "ball-of-the-folder"; }));
+  EXPECT_TRUE(std::ranges::any_of(resumed.session().tools()->entries(),
+                                  [](const auto* e) { return e->tool.name == "ball-of-the-folder"; }));
 }
 
 }  // namespace

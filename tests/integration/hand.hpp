@@ -19,7 +19,10 @@ class Hand {
   // `apart`: between cuts.
   Hand(const std::string& address, const std::filesystem::path& cache, std::uint64_t seed,
        std::chrono::microseconds apart = std::chrono::microseconds(500), const std::string& fast_path = {})
-      : surgeon_(address, cache, fast_path), random_(seed), apart_(apart), burr_(find_tool("burr-round-5").value()),
+      : surgeon_(address, cache, fast_path),
+        random_(seed),
+        apart_(apart),
+        burr_(find_tool("burr-round-5").value()),
         thread_([this] { cut(); }) {}
   ~Hand() { rest(); }
   void rest() {
@@ -30,7 +33,8 @@ class Hand {
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
   // When a cut was sent, on the steady clock; of the last thousands.
   [[nodiscard]] std::chrono::steady_clock::time_point sent_at(std::uint64_t author_seq) const {
-    return std::chrono::steady_clock::time_point(std::chrono::nanoseconds(sent_at_[author_seq % sent_at_.size()].load()));
+    return std::chrono::steady_clock::time_point(
+        std::chrono::nanoseconds(sent_at_[author_seq % sent_at_.size()].load()));
   }
 
  private:

@@ -143,10 +143,11 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   EXPECT_GT(felt_right.force_x_n, 0.0);
 }
 
-// What an expert did is shown again from the journal by a demonstrator, and a trainee's hand is led along it. The trainee's own
-// work is elsewhere, and they are stopped: their hand is soft, but left alone it stays where it is.
+// What an expert did is shown again from the journal by a demonstrator, and a trainee's hand is led along it. The
+// trainee's own work is elsewhere, and they are stopped: their hand is soft, but left alone it stays where it is.
 TEST(Hands, AreLedAlongWhatAnExpertDid) {
-  constexpr double kWithin_mm = 3.0;  // half a second behind, at the speed at which it is shown, and what the own hold costs
+  constexpr double kWithin_mm =
+      3.0;  // half a second behind, at the speed at which it is shown, and what the own hold costs
   TempDir folder;
   Stage stage(40.0, {"--journal", (folder / "room.journal").string()});
   const auto burr = [](double y_mm, double width_mm, double sweep_mm_per_s) {
@@ -180,7 +181,8 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   json softly = burr(12.0, 20.0, 0.5);
   softly["hand_stiffness_n_per_mm"] = softly["hand_across_n_per_mm"] = 0.3;
   Process trainee = start_hand(stage, "trainee", json::array({softly}));
-  ASSERT_TRUE(wait_until([&] { return std::regex_search(ask("people"), std::regex("\"trainee\"[^;]* cuts [1-9]")); }, 60s))
+  ASSERT_TRUE(
+      wait_until([&] { return std::regex_search(ask("people"), std::regex("\"trainee\"[^;]* cuts [1-9]")); }, 60s))
       << trainee.err();
   (void)told("freeze trainee", "^ok at ([0-9]+)");
   (void)told("wait heard trainee", "^ok at ([0-9]+)");
@@ -188,7 +190,8 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   const std::string demonstrator = told("demonstrate of #" + of + " to " + std::to_string(undone_at - 1) + " speed 0.5",
                                         "^ok demonstrator #([0-9]+) cuts [0-9]{2,}");
   (void)told("guide trainee along #" + demonstrator + " share 1", "^ok at ([0-9]+)");
-  ASSERT_TRUE(wait_until([&] { return std::regex_search(ask("people"), std::regex("#" + demonstrator + " [^;]* away")); }, 120s));
+  ASSERT_TRUE(wait_until(
+      [&] { return std::regex_search(ask("people"), std::regex("#" + demonstrator + " [^;]* away")); }, 120s));
   EXPECT_EQ(told("people", "\"trainee\"[^;]* cuts ([0-9]+)"), cuts_before) << "led, and stopped all the same";
   ASSERT_TRUE(trainee.terminate(20s).has_value());
   EXPECT_EQ(ask("quit"), "ok");
@@ -213,7 +216,8 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   std::erase_if(led, [](const Moment& moment) { return !moment.led; });
   ASSERT_FALSE(led.empty());
   const double began_ms = led.front().time_ms + 1500.0;  // until then the hand is on its way there
-  std::erase_if(led, [&](const Moment& m) { return m.time_ms < began_ms || m.time_ms > shown.back().time_ms + ahead_ms; });
+  std::erase_if(led,
+                [&](const Moment& m) { return m.time_ms < began_ms || m.time_ms > shown.back().time_ms + ahead_ms; });
   ASSERT_GT(led.size(), 300u) << "three seconds";
   const auto [low, high] = std::ranges::minmax(led, {}, &Moment::y_mm);
   const double apart_mm = apart_mm_for(0.95, led, shown, ahead_ms);
@@ -223,7 +227,8 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "of the 18 mm that the expert went to and fro";
 }
 
-// Who gives no name is nobody's second coming: what holds for one unnamed hand does not hold for the next. Of a name it does.
+// Who gives no name is nobody's second coming: what holds for one unnamed hand does not hold for the next. Of a name it
+// does.
 TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   Stage stage(24.0);
   Process console = stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"});

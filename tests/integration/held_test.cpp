@@ -1,5 +1,5 @@
-// A hand that an instructor has stopped, and whose program is started again: as processes, of a room that nothing keeps and of
-// one with a journal.
+// A hand that an instructor has stopped, and whose program is started again: as processes, of a room that nothing keeps
+// and of one with a journal.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -25,7 +25,8 @@ class Instructor {
   std::string person(std::uint64_t author) {
     const std::string all = ask("people");
     std::smatch found;
-    return std::regex_search(all, found, std::regex("#" + std::to_string(author) + " [^;]*")) ? found[0] : std::string();
+    return std::regex_search(all, found, std::regex("#" + std::to_string(author) + " [^;]*")) ? found[0]
+                                                                                              : std::string();
   }
   std::uint64_t cuts(std::uint64_t author) {
     const std::string said = person(author);
@@ -50,7 +51,9 @@ void expect_held(Stage& stage) {
   ASSERT_TRUE(first.terminate(20s).has_value());
 
   Process again = stage.start_haptic("again", plan, "Ben");
-  const auto held = [&] { return ada.person(kAgain).find("frozen force 3.000 words \"wait for me\" heard") != std::string::npos; };
+  const auto held = [&] {
+    return ada.person(kAgain).find("frozen force 3.000 words \"wait for me\" heard") != std::string::npos;
+  };
   ASSERT_TRUE(wait_until(held, 60s)) << ada.person(kAgain) << again.err();
   std::this_thread::sleep_for(1s);
   EXPECT_EQ(ada.cuts(kAgain), 0u) << "it has its plan to carry out, and may not";

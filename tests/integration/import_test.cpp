@@ -20,17 +20,22 @@ using namespace std::chrono_literals;
 class Import : public ::testing::Test {
  protected:
   void SetUp() override {
-    const auto made = start({"phantom", "block", "--layers", "5:1.9,15:0.4", "--width", "40", "--pitch", "0.5", "--out", path("case")});
+    const auto made = start(
+        {"phantom", "block", "--layers", "5:1.9,15:0.4", "--width", "40", "--pitch", "0.5", "--out", path("case")});
     ASSERT_EQ(made.exit_code, 0) << made.err;
-    std::ofstream(folder_ / "five.yaml") << "steps:\n"
-        "  - {tool: drill-3.2, axis: [0, 0, -1], from: [-14, -14, 2], to: [-14, -14, -12]}\n"
-        "  - {tool: burr-round-5, axis: [0, 0, -1], path: [{at: [-8, 10, 2]}, {at: [-8, 10, -2]}, {at: [6, 12, -2]}]}\n"
-        "  - {tool: saw-oscillating-3, axis: [0, 0, -1], across: [1, 0, 0], from: [0, -14, 2], to: [0, -14, -6]}\n"
-        "  - {tool: reamer-cylinder, axis: [0, 0, -1], from: [12, -8, 2], to: [12, -8, -9]}\n"
-        "  - {tool: broach-2, axis: [0, 0, -1], across: [1, 0, 0], from: [-2, 0, 2], to: [-2, 0, -6]}\n";
+    std::ofstream(folder_ / "five.yaml")
+        << "steps:\n"
+           "  - {tool: drill-3.2, axis: [0, 0, -1], from: [-14, -14, 2], to: [-14, -14, -12]}\n"
+           "  - {tool: burr-round-5, axis: [0, 0, -1], path: [{at: [-8, 10, 2]}, {at: [-8, 10, -2]}, {at: [6, 12, "
+           "-2]}]}\n"
+           "  - {tool: saw-oscillating-3, axis: [0, 0, -1], across: [1, 0, 0], from: [0, -14, 2], to: [0, -14, -6]}\n"
+           "  - {tool: reamer-cylinder, axis: [0, 0, -1], from: [12, -8, 2], to: [12, -8, -9]}\n"
+           "  - {tool: broach-2, axis: [0, 0, -1], across: [1, 0, 0], from: [-2, 0, 2], to: [-2, 0, -6]}\n";
   }
   [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
-  static RunResult start(const std::vector<std::string>& arguments) { return run(program("osteon-import"), arguments, 120s); }
+  static RunResult start(const std::vector<std::string>& arguments) {
+    return run(program("osteon-import"), arguments, 120s);
+  }
 
   // Exit code 1, one sentence that names what is wrong, nothing new in the folder.
   void refused(const std::vector<std::string>& arguments, const std::string& named) {
@@ -83,7 +88,9 @@ TEST_F(Import, ItsSurfaceIsACaseAgain) {
 
 TEST_F(Import, WrongFilesAreRefused) {
   ASSERT_EQ(start({"carve", path("case"), path("five.yaml"), "--out", path("a.vdb")}).exit_code, 0);
-  ASSERT_EQ(start({"phantom", "block", "--layers", "6:1", "--width", "10", "--pitch", "0.5", "--out", path("other")}).exit_code, 0);
+  ASSERT_EQ(start({"phantom", "block", "--layers", "6:1", "--width", "10", "--pitch", "0.5", "--out", path("other")})
+                .exit_code,
+            0);
   std::ofstream(folder_ / "letter.vdb") << "Dear reader\n";
   fs::copy_file(folder_ / "a.vdb", folder_ / "half.vdb");
   fs::resize_file(folder_ / "half.vdb", fs::file_size(folder_ / "a.vdb") / 2);
@@ -101,12 +108,15 @@ TEST_F(Import, CtrlCLeavesNothingBehind) {
   // A way of many thousand cuts.
   std::ofstream script(folder_ / "long.yaml");
   script << "steps:\n  - tool: reamer-sphere\n    axis: [0, 0, -1]\n    path:\n";
-  for (int i = 0; i < 2000; ++i) script << "      - {at: [" << (i % 2 == 0 ? -15 : 15) << ", " << i % 30 - 15 << ", -4]}\n";
+  for (int i = 0; i < 2000; ++i)
+    script << "      - {at: [" << (i % 2 == 0 ? -15 : 15) << ", " << i % 30 - 15 << ", -4]}\n";
   script.close();
   const auto before = names();
-  Process process(program("osteon-import"), {"carve", path("case"), path("long.yaml"), "--out", path("l.vdb"), "--surface", path("l.stl"), "--cut", "0.2"});
+  Process process(program("osteon-import"), {"carve", path("case"), path("long.yaml"), "--out", path("l.vdb"),
+                                             "--surface", path("l.stl"), "--cut", "0.2"});
   const auto end = std::chrono::steady_clock::now() + 60s;
-  while (process.err().find("carving") == std::string::npos && process.running() && std::chrono::steady_clock::now() < end)
+  while (process.err().find("carving") == std::string::npos && process.running() &&
+         std::chrono::steady_clock::now() < end)
     std::this_thread::sleep_for(2ms);
   ASSERT_TRUE(process.running()) << process.err();
   process.signal(SIGINT);

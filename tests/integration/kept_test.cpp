@@ -84,7 +84,8 @@ TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
   const std::string kept = (folder / "rooms").string();
   Stage stage(12.0, {"--rooms", kept});
   EXPECT_NE(rooms(stage, {"list"}).find("no rooms"), std::string::npos);
-  for (const char* name : {"anna", "berta", "closed"}) ASSERT_NE(rooms(stage, {"create", name}).find(name), std::string::npos);
+  for (const char* name : {"anna", "berta", "closed"})
+    ASSERT_NE(rooms(stage, {"create", name}).find(name), std::string::npos);
   const std::string closed = rooms(stage, {"close", "closed"});
   EXPECT_NE(closed.find(" closed "), std::string::npos) << closed;
   std::map<std::string, std::string> hashes;
@@ -142,7 +143,8 @@ TEST(Kept, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
   const std::filesystem::path file = folder / "my room.2026.journal";
   Stage stage(12.0, {"--journal", file.string()});
   for (const char* what : {"delete", "close"}) {
-    const RunResult refused = run(program("osteon-server"), {"rooms", what, "my room.2026", "--server", stage.address()}, 30s);
+    const RunResult refused =
+        run(program("osteon-server"), {"rooms", what, "my room.2026", "--server", stage.address()}, 30s);
     EXPECT_NE(refused.exit_code, 0);
     EXPECT_NE(refused.err.find("my room.2026.journal"), std::string::npos) << refused.err;
   }
@@ -156,7 +158,8 @@ void expect_refused(const std::vector<std::string>& arguments, const std::vector
   const RunResult server = run(program("osteon-server"), arguments, 30s);
   EXPECT_FALSE(server.timed_out);
   EXPECT_NE(server.exit_code, 0);
-  for (const std::string& word : words) EXPECT_NE(server.err.find(word), std::string::npos) << word << " in " << server.err;
+  for (const std::string& word : words)
+    EXPECT_NE(server.err.find(word), std::string::npos) << word << " in " << server.err;
 }
 
 // Of all files but the audit log, which names each command that was refused.
@@ -325,7 +328,8 @@ TEST(Kept, SaysWhatIsWrongWithAJournal) {
   expect_refused({"--case", bone, "--case", bone}, {"--case", "--rooms"});
   expect_refused({"--case", bone, "--rooms", (stage / "case" / "case.json").string()}, {"--rooms", "case.json"});
   ASSERT_EQ(stage.server().terminate(), 0);
-  expect_refused({"--case", (other / "case").string(), "--journal", file}, {"room.journal", "case", "start the server with that case"});
+  expect_refused({"--case", (other / "case").string(), "--journal", file},
+                 {"room.journal", "case", "start the server with that case"});
   const std::string text = (folder / "notes.txt").string();
   std::ofstream(text) << "not a journal";
   expect_refused({"--case", bone, "--journal", text}, {"notes.txt"});

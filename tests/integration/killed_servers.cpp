@@ -18,7 +18,8 @@ using namespace std::chrono_literals;
 constexpr double kWidth_mm = 12.0;
 
 // What the journal has of each author: the places of his cuts, by their numbers.
-std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_places(const std::filesystem::path& file, KilledServers& report) {
+std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_places(const std::filesystem::path& file,
+                                                                 KilledServers& report) {
   std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> places;
   Result<Journal> journal = Journal::open(file);
   if (!journal) {
@@ -47,7 +48,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
   Stage stage(kWidth_mm, {"--journal", file.string()});
   const std::vector<std::string> again{"--journal", file.string(), "--listen", stage.address()};
   std::vector<std::unique_ptr<Hand>> hands;
-  for (std::uint64_t i = 0; i < 2; ++i) hands.push_back(std::make_unique<Hand>(stage.address(), folder / "cache", seed * 2 + i));
+  for (std::uint64_t i = 0; i < 2; ++i)
+    hands.push_back(std::make_unique<Hand>(stage.address(), folder / "cache", seed * 2 + i));
   const auto acknowledged = [&] {
     std::uint64_t all = 0;
     for (const auto& hand : hands) all += hand->surgeon().acknowledged().size();
@@ -66,7 +68,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
     (void)stage.server().wait(10s);
     if (acknowledged() == before) ++report.killed_idle;
     for (const auto& hand : hands)
-      if (const std::string why = hand->surgeon().rejected(); !why.empty()) report.fault = "an honest cut was rejected: " + why;
+      if (const std::string why = hand->surgeon().rejected(); !why.empty())
+        report.fault = "an honest cut was rejected: " + why;
     const auto started = std::chrono::steady_clock::now();
     stage.start_server(again);
     listens = std::chrono::steady_clock::now();
@@ -74,9 +77,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
   }
   for (const auto& hand : hands) hand->rest();
   const auto settled = [&] {
-    return std::ranges::all_of(hands, [](const auto& hand) {
-      return hand->surgeon().stands() && hand->surgeon().own() >= hand->sent();
-    });
+    return std::ranges::all_of(
+        hands, [](const auto& hand) { return hand->surgeon().stands() && hand->surgeon().own() >= hand->sent(); });
   };
   if (report.fault.empty() && !wait_until(settled, 60s)) report.fault = "what was cut was not decided in the end";
   std::this_thread::sleep_for(300ms);
@@ -88,7 +90,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
   for (const auto& hand : hands) {
     report.sent += hand->sent();
     const auto found = places.find(hand->surgeon().author());
-    const std::map<std::uint64_t, RoomSeq> kept = found == places.end() ? std::map<std::uint64_t, RoomSeq>{} : found->second;
+    const std::map<std::uint64_t, RoomSeq> kept =
+        found == places.end() ? std::map<std::uint64_t, RoomSeq>{} : found->second;
     report.kept += kept.size();
     if (!kept.empty()) report.missing += kept.rbegin()->first - kept.size();
     for (const auto& [author_seq, place] : hand->surgeon().acknowledged()) {

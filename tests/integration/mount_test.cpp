@@ -1,4 +1,5 @@
-// A bone on its mount between real programs: two simulated hands press it, one of them behind a line of 150 ms each way.
+// A bone on its mount between real programs: two simulated hands press it, one of them behind a line of 150 ms each
+// way.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -17,8 +18,10 @@ using nlohmann::json;
 Process start_hand(const Stage& stage, const std::string& name, const json& step, const std::string& address,
                    std::vector<std::string> more) {
   std::ofstream(stage / (name + "-plan.json")) << json{{"steps", json::array({step})}};
-  std::vector<std::string> arguments{"--server", address, "--plan", stage / (name + "-plan.json"), "--summary",
-                                     stage / (name + ".json"), "--cache", stage / (name + "-cache")};
+  std::vector<std::string> arguments{"--server",  address,
+                                     "--plan",    stage / (name + "-plan.json"),
+                                     "--summary", stage / (name + ".json"),
+                                     "--cache",   stage / (name + "-cache")};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return stage.start("osteon-haptic", arguments);
 }
@@ -28,7 +31,8 @@ TEST(Mount, TwoHandsPressOneBone) {
   ImpairProcess line({"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
   ASSERT_FALSE(line.tcp().empty()) << line.process().err();
   ASSERT_EQ(line.command("delay 150 10"), "ok");
-  Process far = start_hand(stage, "far", drill_at(-8, 0, "expert"), line.tcp(), {"--udp", line.udp(), "--timeout", "30"});
+  Process far =
+      start_hand(stage, "far", drill_at(-8, 0, "expert"), line.tcp(), {"--udp", line.udp(), "--timeout", "30"});
   Process near = start_hand(stage, "near", drill_at(8, 0, "expert"), stage.address(), {});
   // Somebody who touches nothing, and whose datagrams do not get through.
   Process idle = start_hand(stage, "idle", {{"action", "wait"}, {"seconds", 9.0}}, stage.address(), {"--udp", "off"});

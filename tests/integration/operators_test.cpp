@@ -38,7 +38,8 @@ TEST(Operators, AWrongConfigurationIsNamedWithFileFieldAndRemedy) {
   const std::map<std::string, std::vector<std::string>> wrong{
       {"cases: case\nlisten: here\nplain: true\n", {"server.yaml:2", "\"listen\"", "HOST:PORT"}},
       {"cases: case\nlistn: 127.0.0.1:0\nplain: true\n", {"server.yaml:2", "\"listn\"", "did you mean \"listen\""}},
-      {"cases: case\nlimits:\n  power_w: none\nplain: true\n", {"server.yaml:3", "\"limits.power_w\"", "write a number"}},
+      {"cases: case\nlimits:\n  power_w: none\nplain: true\n",
+       {"server.yaml:3", "\"limits.power_w\"", "write a number"}},
       {"cases: nowhere\nplain: true\n", {"server.yaml", "nowhere", "osteon-import"}},
       {"listen: 127.0.0.1:0\nplain: true\n", {"server.yaml", "--case is required"}},
       {"cases: case\njournal: a.journal\nrooms: rooms\nplain: true\n", {"server.yaml", "--rooms excludes --journal"}},
@@ -76,8 +77,8 @@ TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
   const std::string folder = (temp / "rooms").string();
   Stage stage(12.0, {"--rooms", folder});
   ASSERT_EQ(run(program("osteon-server"), {"rooms", "create", "anna", "--server", stage.address()}, 60s).exit_code, 0);
-  const std::vector<std::string> second{"--case", (stage / "case").string(), "--rooms", folder,
-                                        "--address-file", (stage / "address").string()};
+  const std::vector<std::string> second{"--case", (stage / "case").string(), "--rooms",
+                                        folder,   "--address-file",          (stage / "address").string()};
   const RunResult refused = run(program("osteon-server"), second, 60s);
   EXPECT_FALSE(refused.timed_out);
   EXPECT_NE(refused.exit_code, 0);
@@ -133,7 +134,8 @@ std::string get_metrics(const std::string& address) {
     const std::string request = "GET /metrics HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n";
     (void)::send(socket, request.data(), request.size(), MSG_NOSIGNAL);
     char piece[4096];
-    for (ssize_t got = 0; (got = ::recv(socket, piece, sizeof piece, 0)) > 0;) text.append(piece, static_cast<std::size_t>(got));
+    for (ssize_t got = 0; (got = ::recv(socket, piece, sizeof piece, 0)) > 0;)
+      text.append(piece, static_cast<std::size_t>(got));
   }
   ::close(socket);
   const std::size_t body = text.find("\r\n\r\n");
@@ -185,12 +187,26 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
     if (!one.empty() && one.back() == '\r') one.pop_back();
     EXPECT_TRUE(one.empty() || std::regex_match(one, line)) << one;
   }
-  for (const char* family :
-       {"osteon_cut_stage_seconds", "osteon_tick_late_seconds", "osteon_tick_work_seconds", "osteon_ticks_missed_total",
-        "osteon_journal_commit_seconds", "osteon_journal_bytes", "osteon_queue_length", "osteon_sessions", "osteon_streams",
-        "osteon_cuts_total", "osteon_rejections_total", "osteon_refusals_total", "osteon_rooms", "osteon_room_serving",
-        "osteon_room_event", "osteon_draining", "osteon_links", "osteon_connections", "osteon_connections_refused_total",
-        "osteon_streams_ended_total"})
+  for (const char* family : {"osteon_cut_stage_seconds",
+                             "osteon_tick_late_seconds",
+                             "osteon_tick_work_seconds",
+                             "osteon_ticks_missed_total",
+                             "osteon_journal_commit_seconds",
+                             "osteon_journal_bytes",
+                             "osteon_queue_length",
+                             "osteon_sessions",
+                             "osteon_streams",
+                             "osteon_cuts_total",
+                             "osteon_rejections_total",
+                             "osteon_refusals_total",
+                             "osteon_rooms",
+                             "osteon_room_serving",
+                             "osteon_room_event",
+                             "osteon_draining",
+                             "osteon_links",
+                             "osteon_connections",
+                             "osteon_connections_refused_total",
+                             "osteon_streams_ended_total"})
     EXPECT_NE(text.find("# TYPE " + std::string(family) + " "), std::string::npos) << family;
   for (const char* stage_name : {"wait", "decide", "commit", "tell"}) {
     const std::string labels = R"(room="anna",stage=")" + std::string(stage_name) + "\"";
@@ -207,7 +223,8 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
 // A session of the version before: it is told nothing of the drain, and stays.
 class OlderSession {
  public:
-  explicit OlderSession(const std::string& address) : channel_(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())) {
+  explicit OlderSession(const std::string& address)
+      : channel_(grpc::CreateChannel(address, grpc::InsecureChannelCredentials())) {
     v1::JoinRequest request;
     request.set_protocol_version(3);
     request.set_kernel_version(kKernelVersion);
@@ -332,7 +349,8 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   EXPECT_EQ(surgeon.lost(), "");
   // Who did what, for whoever reads the log.
   ASSERT_EQ(stage.server().terminate(60s), 0);
-  for (const char* event : {"listening", "room open", "joined", "session over", "draining", "drained", "stopping", "room closed"})
+  for (const char* event :
+       {"listening", "room open", "joined", "session over", "draining", "drained", "stopping", "room closed"})
     EXPECT_NE(stage.server().err().find(event), std::string::npos) << event;
 }
 
@@ -351,7 +369,8 @@ TEST(Operators, AClientOfAnotherVersionIsToldBothVersionsAndTheRemedy) {
             std::string::npos)
       << refused.error_message();
   // The operator hears the same.
-  EXPECT_TRUE(wait_until([&] { return stage.server().err().find(refused.error_message()) != std::string::npos; }, kPatience))
+  EXPECT_TRUE(
+      wait_until([&] { return stage.server().err().find(refused.error_message()) != std::string::npos; }, kPatience))
       << stage.server().err();
 }
 
@@ -379,10 +398,13 @@ class OlderServer final : public v1::RoomService::Service {
 TEST(Operators, AnOlderServersRefusalEndsTheClientWithBothVersions) {
   TempDir folder;
   OlderServer server;
-  std::ofstream(folder / "plan.json") << nlohmann::json{{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}}.dump();
-  const RunResult client = run(program("osteon-haptic"), {"--server", server.address(), "--plan", folder / "plan.json"}, 60s);
+  std::ofstream(folder / "plan.json")
+      << nlohmann::json{{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}}.dump();
+  const RunResult client =
+      run(program("osteon-haptic"), {"--server", server.address(), "--plan", folder / "plan.json"}, 60s);
   EXPECT_EQ(client.exit_code, 1);
-  EXPECT_NE(client.err.find("the client speaks protocol version 4 and the server protocol version 3; install"), std::string::npos)
+  EXPECT_NE(client.err.find("the client speaks protocol version 4 and the server protocol version 3; install"),
+            std::string::npos)
       << client.err;
 }
 

@@ -1,5 +1,6 @@
-// Every program in one room beside plain drilling: a block is sawn in two, a piece is taken away and brought back, tools
-// and guides come in, and the bone is saved and resumed. The hands are clients in this process that hold replicas.
+// Every program in one room beside plain drilling: a block is sawn in two, a piece is taken away and brought back,
+// tools and guides come in, and the bone is saved and resumed. The hands are clients in this process that hold
+// replicas.
 #include <gtest/gtest.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
@@ -48,8 +49,8 @@ std::string bytes_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// Seen from (60, -80, 60) the shank of a tool that points down at the origin goes straight up from the picture's middle, 20
-// pixels wide; the gauges are to the left of it.
+// Seen from (60, -80, 60) the shank of a tool that points down at the origin goes straight up from the picture's
+// middle, 20 pixels wide; the gauges are to the left of it.
 constexpr int kShankLeft = 316, kShankRight = 324, kShankTop = 100, kShankBottom = 150;
 constexpr int kShankPixels = (kShankRight - kShankLeft) * (kShankBottom - kShankTop);
 
@@ -171,7 +172,8 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_FALSE(viewer.tell("place spoon at 0 0 2 along 0 0 -1"));
   ASSERT_TRUE(wait_until([&] { return other.items().size() == 1; }, kPatience));
   Surgeon late(stage.address(), stage / "cache");
-  ASSERT_TRUE(wait_until([&] { return late.complete() && late.items().size() == 1 && late.bodies().size() == 2; }, kPatience));
+  ASSERT_TRUE(
+      wait_until([&] { return late.complete() && late.items().size() == 1 && late.bodies().size() == 2; }, kPatience));
   const RoomSeq last{viewed().at("room_seq").get<std::uint64_t>()};
   agree(last);
   EXPECT_EQ(late.hash(), hand.hash());
@@ -198,7 +200,10 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_NE(whole_hash, parted_hash);
 
   // Another case is refused in one sentence.
-  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", stage / "other"}).exit_code, 0);
+  ASSERT_EQ(run(program("osteon-import"),
+                {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", stage / "other"})
+                .exit_code,
+            0);
   const RunResult refused = run(program("osteon-server"), {"--case", stage / "other", "--resume", kept / "bone.vdb"});
   EXPECT_GT(refused.exit_code, 0);
   EXPECT_NE(refused.err.find("bone.vdb"), std::string::npos) << refused.err;

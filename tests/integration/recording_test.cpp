@@ -24,8 +24,9 @@ class RecordedRoom : public testing::Test {
     step["feed_mm_per_s"] = 4.0;
     const auto plan = stage / (name + "-plan.json");
     std::ofstream(plan) << json{{"steps", json::array({step})}};
-    return {"--server", stage.address(),       "--plan", plan, "--summary", stage / (name + ".json"), "--cache", stage / "cache",
-            "--record", stage / (name + ".h5")};
+    return {"--server",  stage.address(),          "--plan",  plan,
+            "--summary", stage / (name + ".json"), "--cache", stage / "cache",
+            "--record",  stage / (name + ".h5")};
   }
   // What Debian's Python says of a recording `f`, as JSON.
   static json ask(const std::filesystem::path& file, const std::string& expression) {
@@ -55,12 +56,13 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   EXPECT_EQ(ask(file, "f['metadata/tools'][0].decode()"), "drill-3.2");
   // 1 kHz: the ticks' own clock says so, whatever the machine held up.
   EXPECT_NEAR(ask(file, "float(np.median(np.diff(f['data/time'][:])))").get<double>(), 1e-3, 5e-5);
-  // Chi (7.3) at 1000 rpm and 4 mm/s in the far cortex, along the tool's axis: the bone pushes back, against +z of the tool.
+  // Chi (7.3) at 1000 rpm and 4 mm/s in the far cortex, along the tool's axis: the bone pushes back, against +z of the
+  // tool.
   const double thrust_n = 134.6 * std::pow(1000.0, -0.3327) * std::pow(4.0, 0.5189) * std::pow(1.9, 1.1841);
   const std::string far = "(lambda d: (d > 26.5) & (d < 29.5) & (d >= np.maximum.accumulate(d)))(f['data/depth'][:])";
-  EXPECT_NEAR(
-      ask(file, "float(np.mean(np.linalg.norm(f['drill_force_physical/wrench'][:, :3], axis=1)[" + far + "]))").get<double>(),
-      thrust_n, 0.06 * thrust_n);
+  EXPECT_NEAR(ask(file, "float(np.mean(np.linalg.norm(f['drill_force_physical/wrench'][:, :3], axis=1)[" + far + "]))")
+                  .get<double>(),
+              thrust_n, 0.06 * thrust_n);
   EXPECT_EQ(stage.server().terminate(), 0);
 
   stage.start_server({});
@@ -69,9 +71,10 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   Process replay = stage.start("osteon-haptic", again);
   ASSERT_EQ(replay.wait(120s), 0) << replay.err();
   const json replayed = read_json(stage / "again.json");
-  // The same handle, tick by tick; patches come when real threads bring them, so cuts agree to their size, not to the bit.
-  EXPECT_EQ(ask(stage / "again.h5", "int((f['high_frequency_poses/handle_pose/pose'][:n] == h5py.File('" + file.string() +
-                                        "', 'r')['high_frequency_poses/handle_pose/pose'][:n]).all())"),
+  // The same handle, tick by tick; patches come when real threads bring them, so cuts agree to their size, not to the
+  // bit.
+  EXPECT_EQ(ask(stage / "again.h5", "int((f['high_frequency_poses/handle_pose/pose'][:n] == h5py.File('" +
+                                        file.string() + "', 'r')['high_frequency_poses/handle_pose/pose'][:n]).all())"),
             1);
   EXPECT_NEAR(replayed["removed_mm3"].get<double>(), summary["removed_mm3"].get<double>(),
               0.01 * summary["removed_mm3"].get<double>());
@@ -101,7 +104,8 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeReadAndPlayedToWhereItEnds) {
   EXPECT_EQ(ask(file, "n % 500"), 0);
   EXPECT_EQ(ask(file, "int(f['metadata/finished'][()])"), 0);
   EXPECT_EQ(ask(file, "int((f['data/state_seq'][:n] == np.arange(1, n + 1)).all())"), 1);
-  EXPECT_EQ(ask(file, "int((f['data/state'][:n] == h5py.check_enum_dtype(f['data/state'].dtype)['cutting']).any())"), 1);
+  EXPECT_EQ(ask(file, "int((f['data/state'][:n] == h5py.check_enum_dtype(f['data/state'].dtype)['cutting']).any())"),
+            1);
   EXPECT_EQ(stage.server().terminate(), 0);
 
   stage.start_server({});
@@ -139,8 +143,8 @@ TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   const Stage stage(24.0);
   // The case is fetched first, where files may be large.
   std::ofstream(stage / "wait.json") << json{{"steps", json::array({{{"action", "wait"}, {"seconds", 0.1}}})}};
-  Process first =
-      stage.start("osteon-haptic", {"--server", stage.address(), "--plan", stage / "wait.json", "--cache", stage / "cache"});
+  Process first = stage.start("osteon-haptic",
+                              {"--server", stage.address(), "--plan", stage / "wait.json", "--cache", stage / "cache"});
   ASSERT_EQ(first.wait(60s), 0) << first.err();
   // Files may not grow beyond 400 kB; the signal that comes with it is ignored, as where a disk is full.
   const std::string command = "trap '' XFSZ; ulimit -f 800; exec \"$@\"";

@@ -55,11 +55,15 @@ std::string ScriptedViewer::ask(const std::string& command, std::chrono::millise
   return process_.read_line(patience).value_or("");
 }
 
-bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds patience) { return ask(command, patience).starts_with("ok"); }
+bool ScriptedViewer::tell(const std::string& command, std::chrono::milliseconds patience) {
+  return ask(command, patience).starts_with("ok");
+}
 
 Stage::Stage(double width_mm, std::vector<std::string> server_arguments) {
-  const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
-                                                            std::to_string(width_mm), "--pitch", "0.5", "--out", temp_ / "case"}, 120s);
+  const RunResult imported = run(program("osteon-import"),
+                                 {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width",
+                                  std::to_string(width_mm), "--pitch", "0.5", "--out", temp_ / "case"},
+                                 120s);
   if (imported.exit_code != 0) throw std::runtime_error("osteon-import failed: " + imported.err);
   start_server(std::move(server_arguments));
 }
@@ -71,7 +75,8 @@ Stage::Stage(const std::function<void(const std::filesystem::path&)>& make_case,
 }
 
 void Stage::start_server(std::vector<std::string> more) {
-  std::vector<std::string> arguments{"--case", temp_ / "case", "--address-file", temp_ / "address", "--summary", temp_ / "server.json"};
+  std::vector<std::string> arguments{"--case",          temp_ / "case", "--address-file",
+                                     temp_ / "address", "--summary",    temp_ / "server.json"};
   arguments.insert(arguments.end(), more.begin(), more.end());
   std::filesystem::remove(temp_ / "address");
   server_ = std::make_unique<Process>(start("osteon-server", arguments));
@@ -93,7 +98,12 @@ Process Stage::start_haptic(const std::string& name, const nlohmann::json& plan,
 }
 
 nlohmann::json drill_at(double x_mm, double y_mm, const std::string& hand) {
-  return {{"action", "drill"}, {"tool", "drill-3.2"}, {"spindle_rpm", 1000}, {"hand", hand}, {"feed_mm_per_s", 1.0}, {"beyond_mm", 3.0},
+  return {{"action", "drill"},
+          {"tool", "drill-3.2"},
+          {"spindle_rpm", 1000},
+          {"hand", hand},
+          {"feed_mm_per_s", 1.0},
+          {"beyond_mm", 3.0},
           {"entry", {{"point_mm", {x_mm, y_mm, 0.0}}, {"axis", {0.0, 0.0, -1.0}}}}};
 }
 

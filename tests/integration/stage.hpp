@@ -29,7 +29,8 @@ class ScriptedViewer {
  public:
   ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {});
   // Says a command and waits for the line that answers; empty where none comes.
-  [[nodiscard]] std::string ask(const std::string& command, std::chrono::milliseconds patience = std::chrono::seconds{60});
+  [[nodiscard]] std::string ask(const std::string& command,
+                                std::chrono::milliseconds patience = std::chrono::seconds{60});
   // The same; true when the answer begins with "ok".
   [[nodiscard]] bool tell(const std::string& command, std::chrono::milliseconds patience = std::chrono::seconds{60});
   [[nodiscard]] Process& process() { return process_; }
@@ -51,9 +52,12 @@ class Stage {
   [[nodiscard]] Process& server() { return *server_; }
   // Another server on the same case, after the first has ended; the stage's address is its own now.
   void start_server(std::vector<std::string> more);
-  [[nodiscard]] Process start(const std::string& name, std::vector<std::string> arguments, ProcessOptions options = {}) const;
-  // A haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json, of a person or of nobody known.
-  [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan, const std::string& person = {}) const;
+  [[nodiscard]] Process start(const std::string& name, std::vector<std::string> arguments,
+                              ProcessOptions options = {}) const;
+  // A haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json, of a person or of nobody
+  // known.
+  [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan,
+                                     const std::string& person = {}) const;
 
  private:
   TempDir temp_;

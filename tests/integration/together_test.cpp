@@ -246,7 +246,10 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
 
   // The journal says so too: no cut of the hand while it was stopped, or without its tool.
   const std::string lines = (folder / "room.jsonl").string();
-  ASSERT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s, {.environment = {}, .without = {}, .folder = {}, .as_given = true}).exit_code, 0);
+  ASSERT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s,
+                {.environment = {}, .without = {}, .folder = {}, .as_given = true})
+                .exit_code,
+            0);
   std::ifstream in(lines);
   std::size_t others = 0, decisions = 0;
   for (std::string line; std::getline(in, line);) {

@@ -63,52 +63,68 @@ class ListeningSocket {
 std::string deserted_address() { return ListeningSocket().address(); }
 
 void write_plan(const std::filesystem::path& file) {
-  std::ofstream(file) << nlohmann::json{{"steps", nlohmann::json::array({{{"action", "wait"}, {"seconds", 0.1}}})}}.dump();
+  std::ofstream(file)
+      << nlohmann::json{{"steps", nlohmann::json::array({{{"action", "wait"}, {"seconds", 0.1}}})}}.dump();
 }
 
 TEST(Trouble, WithoutAServerEveryClientSaysSo) {
   const TempDir temp;
   const std::string nobody = deserted_address();
   write_plan(temp / "plan.json");
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", nobody, "--plan", temp / "plan.json", "--timeout", "1"}), "osteon-haptic",
-                      {nobody, "osteon-server"});
-  expect_one_sentence(run(program("osteon-audio"), {"--server", nobody, "--output", "none", "--timeout", "1"}), "osteon-audio",
-                      {nobody, "osteon-server"});
+  expect_one_sentence(
+      run(program("osteon-haptic"), {"--server", nobody, "--plan", temp / "plan.json", "--timeout", "1"}),
+      "osteon-haptic", {nobody, "osteon-server"});
+  expect_one_sentence(run(program("osteon-audio"), {"--server", nobody, "--output", "none", "--timeout", "1"}),
+                      "osteon-audio", {nobody, "osteon-server"});
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen);
-  expect_one_sentence(run(program("osteon-viewer"), {"--server", nobody, "--timeout", "1"}, 60s, screen->options()), "osteon-viewer",
-                      {nobody, "osteon-server"});
+  expect_one_sentence(run(program("osteon-viewer"), {"--server", nobody, "--timeout", "1"}, 60s, screen->options()),
+                      "osteon-viewer", {nobody, "osteon-server"});
 }
 
 TEST(Trouble, AViewerWithoutADisplaySaysHowToGetOne) {
   ProcessOptions blind;
   blind.without = {"DISPLAY", "WAYLAND_DISPLAY"};
-  expect_one_sentence(run(program("osteon-viewer"), {"--server", deserted_address()}, 60s, blind), "osteon-viewer", {"DISPLAY"});
+  expect_one_sentence(run(program("osteon-viewer"), {"--server", deserted_address()}, 60s, blind), "osteon-viewer",
+                      {"DISPLAY"});
 }
 
 TEST(Trouble, AServerNamesThePortThatIsInUse) {
   const TempDir temp;
-  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"}).exit_code, 0);
+  ASSERT_EQ(run(program("osteon-import"),
+                {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"})
+                .exit_code,
+            0);
   const ListeningSocket taken;
-  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--listen", taken.address()}), "osteon-server", {taken.address()});
+  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--listen", taken.address()}),
+                      "osteon-server", {taken.address()});
 }
 
 TEST(Trouble, AServerListensToThisMachineOnly) {
   const TempDir temp;
-  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"}).exit_code, 0);
-  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--listen", "0.0.0.0:0"}), "osteon-server", {"0.0.0.0"});
+  ASSERT_EQ(run(program("osteon-import"),
+                {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"})
+                .exit_code,
+            0);
+  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--listen", "0.0.0.0:0"}),
+                      "osteon-server", {"0.0.0.0"});
 }
 
 TEST(Trouble, AServerRefusesWhatIsNotACase) {
   const TempDir temp;
-  const auto serve = [&](const std::string& folder) { return run(program("osteon-server"), {"--case", temp / folder}); };
+  const auto serve = [&](const std::string& folder) {
+    return run(program("osteon-server"), {"--case", temp / folder});
+  };
   expect_one_sentence(serve("nothing"), "osteon-server", {"nothing", "osteon-import"});
   std::filesystem::create_directory(temp / "empty");
   expect_one_sentence(serve("empty"), "osteon-server", {"empty", "case.json"});
   std::ofstream(temp / "text") << "not a case\n";
   expect_one_sentence(serve("text"), "osteon-server", {"text"});
 
-  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"}).exit_code, 0);
+  ASSERT_EQ(run(program("osteon-import"),
+                {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"})
+                .exit_code,
+            0);
   auto info = read_json(temp / "case" / "case.json");
   info["schema_version"] = 99;
   std::ofstream(temp / "case" / "case.json") << info.dump();
@@ -119,31 +135,35 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   const TempDir temp;
   const auto with_plan = [&](const std::string& text) {
     std::ofstream(temp / "plan.json") << text;
-    return run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "plan.json", "--timeout", "1"});
+    return run(program("osteon-haptic"),
+               {"--server", deserted_address(), "--plan", temp / "plan.json", "--timeout", "1"});
   };
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}), "osteon-haptic", {"missing.json"});
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}),
+                      "osteon-haptic", {"missing.json"});
   expect_one_sentence(with_plan("{"), "osteon-haptic", {"plan.json"});
   expect_one_sentence(with_plan(R"({"steps":[{"action":"saw"}]})"), "osteon-haptic", {"plan.json", "action"});
   // What is misspelt is told with what could be meant.
-  expect_one_sentence(with_plan(R"({"steps":[{"action":"drill","tool":"drill-3.2","entry":{"at_mm":[0,0,0]}}]})"), "osteon-haptic",
-                      {"plan.json", "step 1", "at_mm", "point_mm"});
+  expect_one_sentence(with_plan(R"({"steps":[{"action":"drill","tool":"drill-3.2","entry":{"at_mm":[0,0,0]}}]})"),
+                      "osteon-haptic", {"plan.json", "step 1", "at_mm", "point_mm"});
   const auto drill = [&](const std::string& more, const std::string& entry = R"({"toward":[0,0,1]})") {
     return with_plan(R"({"steps":[{"action":"drill",)" + more + R"("entry":)" + entry + "}]}");
   };
   expect_one_sentence(drill(R"("law":"hooke",)"), "osteon-haptic", {"law", "hooke", "choose one of"});
-  expect_one_sentence(drill(R"("tool":"my-drill","law":"hooke",)"), "osteon-haptic", {"law", "hooke", "osteon-haptic laws"});
+  expect_one_sentence(drill(R"("tool":"my-drill","law":"hooke",)"), "osteon-haptic",
+                      {"law", "hooke", "osteon-haptic laws"});
   // No number that fills the line.
   const RunResult far = drill("", R"({"toward":[1e300,0,1]})");
   expect_one_sentence(far, "osteon-haptic", {"toward", "from -100000 to 100000"});
   EXPECT_LT(far.err.size(), 300u);
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}), "osteon-haptic", {"--plan: "});
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}),
+                      "osteon-haptic", {"--plan: "});
 }
 
 TEST(Trouble, AnAddressThatIsNoneIsSaidWithOneThatIs) {
   const TempDir temp;
   write_plan(temp / "plan.json");
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", "nonsense", "--plan", temp / "plan.json"}), "osteon-haptic",
-                      {"nonsense is not HOST:PORT", "osteon-server prints"});
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", "nonsense", "--plan", temp / "plan.json"}),
+                      "osteon-haptic", {"nonsense is not HOST:PORT", "osteon-server prints"});
 }
 
 // Nothing that was asked for is left out without a word.
@@ -151,9 +171,14 @@ TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
   const TempDir temp;
   write_plan(temp / "plan.json");
   const auto beside = [&](const std::string& option, const std::string& value) {
-    return run(program("osteon-haptic"), {"--server", deserted_address(), "--timeout", "0", "--plan", temp / "plan.json", option, value});
+    return run(program("osteon-haptic"),
+               {"--server", deserted_address(), "--timeout", "0", "--plan", temp / "plan.json", option, value});
   };
-  for (const auto& [option, value] : {std::pair<std::string, std::string>{"--wear", "1"}, {"--view", "front"}, {"--at", "0,0,0"}, {"--rpm", "0"}, {"--law", "chi"}})
+  for (const auto& [option, value] : {std::pair<std::string, std::string>{"--wear", "1"},
+                                      {"--view", "front"},
+                                      {"--at", "0,0,0"},
+                                      {"--rpm", "0"},
+                                      {"--law", "chi"}})
     expect_one_sentence(beside(option, value), "osteon-haptic", {option + " is for a hand without a plan"});
   for (const char* scale : {"0", "nan", "-0.5", "1.01", "inf"})
     expect_one_sentence(beside("--scale", scale), "osteon-haptic", {"--scale must be a number above 0"});
@@ -168,9 +193,10 @@ TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
 // A tool of the server's own, with a law of its own, in the hand of a plan.
 TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   const TempDir tools;
-  std::ofstream(tools / "my-drill.yaml") << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
-                                            "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
-                                            "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: allotta\n";
+  std::ofstream(tools / "my-drill.yaml")
+      << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
+         "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
+         "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: allotta\n";
   Stage stage(16.0, {"--tools", tools.path()});
   nlohmann::json step = drill_at(0, 0, "rig");
   step["tool"] = "my-drill";
@@ -178,8 +204,8 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   step["to_mm"] = 5.0;
   const auto plan = stage / "own.json";
   std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
-  Process own = stage.start("osteon-haptic", {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--summary",
-                                              stage / "own-summary.json", "--record", stage / "own.h5"});
+  Process own = stage.start("osteon-haptic", {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache",
+                                              "--summary", stage / "own-summary.json", "--record", stage / "own.h5"});
   ASSERT_EQ(own.wait(60s), 0) << own.err();
   auto summary = read_json(stage / "own-summary.json");
   EXPECT_EQ(summary["steps"][0]["tool"], "my-drill");
@@ -204,7 +230,8 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   step.erase("law");
   const auto played = [&](const nlohmann::json& with) {
     std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({with})}}.dump();
-    return run(program("osteon-haptic"), {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--device", recorded});
+    return run(program("osteon-haptic"),
+               {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--device", recorded});
   };
   step["tool"] = "drill-3.2";
   expect_one_sentence(played(step), "osteon-haptic", {"my-drill, not with drill-3.2"});
@@ -212,12 +239,17 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   step["to_mm"] = 6.0;
   expect_one_sentence(played(step), "osteon-haptic", {"another plan"});
   step["to_mm"] = 5.0;
-  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "10:1.9", "--width", "16", "--pitch", "0.5", "--title", "Other", "--out", stage / "other"}).exit_code, 0);
-  Process other = stage.start("osteon-server", {"--case", stage / "other", "--tools", tools.path(), "--address-file", stage / "other-address"});
+  ASSERT_EQ(run(program("osteon-import"), {"phantom", "block", "--layers", "10:1.9", "--width", "16", "--pitch", "0.5",
+                                           "--title", "Other", "--out", stage / "other"})
+                .exit_code,
+            0);
+  Process other = stage.start(
+      "osteon-server", {"--case", stage / "other", "--tools", tools.path(), "--address-file", stage / "other-address"});
   const auto address = wait_for_address(stage / "other-address", 60s);
   ASSERT_TRUE(address) << other.err();
   std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", *address, "--plan", plan, "--cache", stage / "cache", "--device", recorded}),
+  expect_one_sentence(run(program("osteon-haptic"),
+                          {"--server", *address, "--plan", plan, "--cache", stage / "cache", "--device", recorded}),
                       "osteon-haptic", {"another bone"});
 }
 
@@ -233,7 +265,8 @@ TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
   Process haptic = stage.start_haptic("soft", {{"steps", nlohmann::json::array({step})}});
   const auto code = haptic.wait(120s);
   ASSERT_TRUE(code);
-  expect_one_sentence({*code, false, haptic.out(), haptic.err()}, "osteon-haptic", {"step 1 (drill) did not finish", "feed_mm_per_s"});
+  expect_one_sentence({*code, false, haptic.out(), haptic.err()}, "osteon-haptic",
+                      {"step 1 (drill) did not finish", "feed_mm_per_s"});
   auto summary = read_json(stage / "soft.json");
   EXPECT_EQ(summary["steps"][0]["completed"], false);
   EXPECT_EQ(summary["steps"][0]["gave_up_in"], "feed");
@@ -250,8 +283,8 @@ TEST(Trouble, AHandWithoutRealTimePriorityIsToldSo) {
   // Root may always, unless that is taken from it.
   std::vector<std::string> line{"--rtprio=0"};
   if (::geteuid() == 0) line.insert(line.end(), {"setpriv", "--bounding-set", "-sys_nice"});
-  line.insert(line.end(), {program("osteon-haptic"), "--server", stage.address(), "--plan", stage / "plan.json", "--cache",
-                           stage / "cache", "--summary", stage / "summary.json", "--plain"});
+  line.insert(line.end(), {program("osteon-haptic"), "--server", stage.address(), "--plan", stage / "plan.json",
+                           "--cache", stage / "cache", "--summary", stage / "summary.json", "--plain"});
   Process haptic("/usr/bin/prlimit", line);
   ASSERT_EQ(haptic.wait(60s), 0) << haptic.err();
   EXPECT_EQ(read_json(stage / "summary.json")["loop"]["realtime"], false);
@@ -275,7 +308,8 @@ TEST(Trouble, ACheckThatMissedTicksDoesNotSayThatNothingIsLacking) {
 TEST(Trouble, ADeviceThatIsNotThereIsNamed) {
   const TempDir temp;
   write_plan(temp / "plan.json");
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "plan.json", "--device", "phantom"}),
+  expect_one_sentence(run(program("osteon-haptic"),
+                          {"--server", deserted_address(), "--plan", temp / "plan.json", "--device", "phantom"}),
                       "osteon-haptic", {"phantom", "simulated"});
 }
 
@@ -284,7 +318,8 @@ void expect_all_notice(int signal) {
   Stage stage(16.0);
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen);
-  Process audio = stage.start("osteon-audio", {"--server", stage.address(), "--output", "none", "--summary", stage / "audio.json"});
+  Process audio =
+      stage.start("osteon-audio", {"--server", stage.address(), "--output", "none", "--summary", stage / "audio.json"});
   ScriptedViewer viewer(stage.address(), *screen);
   ASSERT_TRUE(viewer.tell("wait surface"));
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});
@@ -292,7 +327,9 @@ void expect_all_notice(int signal) {
   ASSERT_TRUE(haptic.running()) << haptic.err();
   ASSERT_GT(std::filesystem::file_size(stage / "work.csv"), 1000u);
   stage.server().signal(signal);
-  for (auto& [name, process] : {std::pair<std::string, Process*>{"osteon-haptic", &haptic}, {"osteon-audio", &audio}, {"osteon-viewer", &viewer.process()}}) {
+  for (auto& [name, process] : {std::pair<std::string, Process*>{"osteon-haptic", &haptic},
+                                {"osteon-audio", &audio},
+                                {"osteon-viewer", &viewer.process()}}) {
     const auto code = process->wait(30s);
     ASSERT_TRUE(code) << name << " did not notice";
     expect_one_sentence({*code, false, process->out(), process->err()}, name, {});
@@ -326,7 +363,8 @@ TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
   auto summary = read_json(stage / "silent.json");
   EXPECT_EQ(summary["steps"][0]["completed"], true);
   EXPECT_GT(summary["held_for_room_ticks"].get<int>(), 5000);
-  // The hand never went through bone: no farther from the tool than the expert's push stretches the coupling, and then some.
+  // The hand never went through bone: no farther from the tool than the expert's push stretches the coupling, and then
+  // some.
   std::ifstream log(stage / "silent.csv");
   std::string line;
   std::getline(log, line);

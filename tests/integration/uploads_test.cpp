@@ -15,8 +15,10 @@ namespace fs = std::filesystem;
 class Uploads : public ::testing::Test {
  protected:
   Uploads() : stage_(16.0, {"--rooms", rooms_.path(), "--uploads", uploads_.path()}) {
-    const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "6:1.2", "--width", "10", "--pitch", "0.5",
-                                                              "--title", "A block from elsewhere", "--out", stage_ / "other"}, 120s);
+    const RunResult imported = run(program("osteon-import"),
+                                   {"phantom", "block", "--layers", "6:1.2", "--width", "10", "--pitch", "0.5",
+                                    "--title", "A block from elsewhere", "--out", stage_ / "other"},
+                                   120s);
     EXPECT_EQ(imported.exit_code, 0) << imported.err;
   }
   RunResult ask(const std::string& what, std::vector<std::string> arguments) const {
@@ -120,7 +122,8 @@ TEST_F(Uploads, ErrorsNameNoPathsAndNoProcesses) {
 
 TEST(UploadsNotTaken, AServerWithoutAFolderForThemSaysSo) {
   const Stage stage(16.0);
-  const RunResult refused = run(program("osteon-server"), {"cases", "upload", stage / "case", "--plain", "--server", stage.address()}, 60s);
+  const RunResult refused =
+      run(program("osteon-server"), {"cases", "upload", stage / "case", "--plain", "--server", stage.address()}, 60s);
   EXPECT_NE(refused.exit_code, 0);
   EXPECT_NE(refused.err.find("--uploads"), std::string::npos) << refused.err;
 }

@@ -35,12 +35,13 @@ void measure(const char* name, const std::string& tool, int trials, const Make& 
       sum += 100.0 * accuracy.volume_error;
       deviations.insert(deviations.end(), accuracy.deviation_pitches.begin(), accuracy.deviation_pitches.end());
     }
-    std::printf("%s{\"pitch_mm\": %g, \"error_percent_mean\": %.6f, \"error_percent_p50\": %.6f, \"error_percent_min\": %.6f, "
-                "\"error_percent_max\": %.6f, \"vertices\": %zu, \"deviation_pitches_p50\": %.6f, "
-                "\"deviation_pitches_p99\": %.6f, \"deviation_pitches_max\": %.6f}",
-                pitch == kPitches_mm[0] ? "" : ", ", pitch, sum / trials, quantile(errors, 0.5), quantile(errors, 0.0),
-                quantile(errors, 1.0), deviations.size(), quantile(deviations, 0.5), quantile(deviations, 0.99),
-                quantile(deviations, 1.0));
+    std::printf(
+        "%s{\"pitch_mm\": %g, \"error_percent_mean\": %.6f, \"error_percent_p50\": %.6f, \"error_percent_min\": %.6f, "
+        "\"error_percent_max\": %.6f, \"vertices\": %zu, \"deviation_pitches_p50\": %.6f, "
+        "\"deviation_pitches_p99\": %.6f, \"deviation_pitches_max\": %.6f}",
+        pitch == kPitches_mm[0] ? "" : ", ", pitch, sum / trials, quantile(errors, 0.5), quantile(errors, 0.0),
+        quantile(errors, 1.0), deviations.size(), quantile(deviations, 0.5), quantile(deviations, 0.99),
+        quantile(deviations, 1.0));
     std::fprintf(stderr, "%s at %g mm\n", name, pitch);
   }
   std::printf("]}%s\n", last ? "" : ",");
@@ -58,9 +59,16 @@ int main(int argc, char** argv) {
     return 1;
   }
   std::printf("{\"trials\": %d,\n", trials);
-  const auto burr = nearest_tool(ToolKind::round_burr, 3.2), drill = nearest_tool(ToolKind::drill, 3.2), saw = widest_saw();
-  if (burr) measure("sphere", burr->name, trials, [&](double p, Random& r) { return sphere_in_bone(*burr, p, r); }, false);
-  if (drill) measure("hole", drill->name, trials, [&](double p, Random& r) { return hole_through_slab(*drill, p, r); }, !saw);
-  if (saw) measure("kerf", saw->name, trials, [&](double p, Random& r) { return kerf_through_shaft(*saw, p, r); }, true);
+  const auto burr = nearest_tool(ToolKind::round_burr, 3.2), drill = nearest_tool(ToolKind::drill, 3.2),
+             saw = widest_saw();
+  if (burr)
+    measure(
+        "sphere", burr->name, trials, [&](double p, Random& r) { return sphere_in_bone(*burr, p, r); }, false);
+  if (drill)
+    measure(
+        "hole", drill->name, trials, [&](double p, Random& r) { return hole_through_slab(*drill, p, r); }, !saw);
+  if (saw)
+    measure(
+        "kerf", saw->name, trials, [&](double p, Random& r) { return kerf_through_shaft(*saw, p, r); }, true);
   std::printf("}\n");
 }

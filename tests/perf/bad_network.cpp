@@ -1,6 +1,6 @@
-// osteon-bad-network [RUNS]: real processes and sockets, good and bad networks between them: how soon all hold one bone once it
-// is quiet, and how soon what one hand cuts is in the patch that another feels. A fifth as many runs without a bad network.
-// The hands are simulated. JSON.
+// osteon-bad-network [RUNS]: real processes and sockets, good and bad networks between them: how soon all hold one bone
+// once it is quiet, and how soon what one hand cuts is in the patch that another feels. A fifth as many runs without a
+// bad network. The hands are simulated. JSON.
 #include <fcntl.h>
 #include <unistd.h>
 

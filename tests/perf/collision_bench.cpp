@@ -20,8 +20,8 @@ const Vec3 kCentre{0.13, -0.21, 0.07};
 
 void print(const char* name, std::vector<double> values) {
   std::ranges::sort(values);
-  std::printf("\"%s_p50\": %.4f, \"%s_min\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name, values.front(), name,
-              values.back());
+  std::printf("\"%s_p50\": %.4f, \"%s_min\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name,
+              values.front(), name, values.back());
 }
 
 // Along rays from outside to the first contact: mean (outwards positive), rms and largest distance from the ball.
@@ -38,8 +38,8 @@ void accuracy(const char* name, double pitch, Inside inside) {
     square += error * error / kRays;
     largest = std::max(largest, std::abs(error));
   }
-  std::printf("\"%s_mean_pitches\": %.4f, \"%s_rms_pitches\": %.4f, \"%s_largest_pitches\": %.4f, ", name, mean, name, std::sqrt(square), name,
-              largest);
+  std::printf("\"%s_mean_pitches\": %.4f, \"%s_rms_pitches\": %.4f, \"%s_largest_pitches\": %.4f, ", name, mean, name,
+              std::sqrt(square), name, largest);
 }
 
 // Points within two pitches of the surface, where a tool's points are.
@@ -50,15 +50,19 @@ void cost(const char* name, const std::vector<Vec3>& points, Inside inside) {
   for (int round = 0; round < kRounds; ++round) {
     const auto start = std::chrono::steady_clock::now();
     for (const Vec3& p : points) hits += inside(p) ? 1 : 0;
-    ns.push_back(1e9 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / static_cast<double>(points.size()));
+    ns.push_back(1e9 * std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() /
+                 static_cast<double>(points.size()));
   }
   print((std::string(name) + "_ns").c_str(), ns);
   std::printf("\"%s_hits\": %.4f, ", name, static_cast<double>(hits) / (kRounds * static_cast<double>(points.size())));
 }
 
 int run() {
-  const CutField field(make_bone({Vec3::Constant(-16.0), Vec3::Constant(16.0)}, kPitch_mm,
-                                 [](const Vec3& p) { return (p - kCentre).norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; }), {});
+  const CutField field(
+      make_bone(
+          {Vec3::Constant(-16.0), Vec3::Constant(16.0)}, kPitch_mm,
+          [](const Vec3& p) { return (p - kCentre).norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; }),
+      {});
   const CoordBox box{{-36, -36, -36}, {36, 36, 36}};
   const BoneCells cells(field, 0, box);
   const BoneDistance distance(field, 0, box);
@@ -68,7 +72,8 @@ int run() {
   const auto grid = [&](const Vec3& p) { return field.solid_mm(p) <= 0.0; };
   Random random(2);
   std::vector<Vec3> points;
-  for (int i = 0; i < kPoints; ++i) points.push_back(kCentre + (kRadius_mm + random.between(-2.0, 2.0) * kPitch_mm) * random.direction());
+  for (int i = 0; i < kPoints; ++i)
+    points.push_back(kCentre + (kRadius_mm + random.between(-2.0, 2.0) * kPitch_mm) * random.direction());
   std::printf("{\"pitch_mm\": %g, \"points\": %d, ", kPitch_mm, kPoints);
   accuracy("nearest", kPitch_mm, nearest);
   accuracy("trilinear", kPitch_mm, trilinear);

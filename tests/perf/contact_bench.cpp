@@ -1,5 +1,6 @@
-// One collision and force evaluation of a tool of 4096 points with density, against OpenVDB's sampler doing the same with
-// central differences: a bur half immersed in bone that it has cut, the same points, poses and sums, in turns. Prints JSON.
+// One collision and force evaluation of a tool of 4096 points with density, against OpenVDB's sampler doing the same
+// with central differences: a bur half immersed in bone that it has cut, the same points, poses and sums, in turns.
+// Prints JSON.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
@@ -28,8 +29,9 @@ struct Sums {
 
 // The same evaluation by samplers of any kind.
 template <class Solid, class Density>
-Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& query, double step_mm, const DensityTable& strength,
-                 double least_arm_mm, const Solid& solid, const Density& density, std::vector<double>& distances) {
+Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& query, double step_mm,
+                 const DensityTable& strength, double least_arm_mm, const Solid& solid, const Density& density,
+                 std::vector<double>& distances) {
   Sums sums;
   const Vec3 toward = query.pose_bone_tool.rotation.conjugate() * query.direction_bone;
   const Eigen::Matrix3d turn = query.pose_bone_tool.rotation.toRotationMatrix();
@@ -42,7 +44,9 @@ Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& qu
     const Vec3 tool_mm = point.inset_mm + query.lift_mm * point.outward;
     const Vec3 p = turn * tool_mm + query.pose_bone_tool.position_mm +
                    std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
-    const auto at = [&](double x, double y, double z) { return static_cast<double>(solid.wsSample(openvdb::Vec3d(x, y, z))); };
+    const auto at = [&](double x, double y, double z) {
+      return static_cast<double>(solid.wsSample(openvdb::Vec3d(x, y, z)));
+    };
     const double distance = at(p.x(), p.y(), p.z());
     gradients += Vec3(at(p.x() + step_mm, p.y(), p.z()) - at(p.x() - step_mm, p.y(), p.z()),
                       at(p.x(), p.y() + step_mm, p.z()) - at(p.x(), p.y() - step_mm, p.z()),
@@ -70,8 +74,8 @@ double us(Clock::time_point from) { return 1e6 * std::chrono::duration<double>(C
 
 void print(const char* name, std::vector<double> values) {
   std::ranges::sort(values);
-  std::printf("\"%s_p50\": %.4f, \"%s_min\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name, values.front(),
-              name, values.back());
+  std::printf("\"%s_p50\": %.4f, \"%s_min\": %.4f, \"%s_max\": %.4f, ", name, values[values.size() / 2], name,
+              values.front(), name, values.back());
 }
 
 int run() {
@@ -102,8 +106,8 @@ int run() {
     query.most_mm = 2.0 * model.fine_pitch_mm;
     query.least_facing = -1.0;  // every point is looked at
     query.strength = &model.strength;
-    // Each asks a quarter pitch before its own face, where the groove's walls are: those that look back are not to be moved
-    // along the direction.
+    // Each asks a quarter pitch before its own face, where the groove's walls are: those that look back are not to be
+    // moved along the direction.
     query.lift_mm = query.ahead_mm;
     query.ahead_mm = 0.0;
     queries.push_back(query);
@@ -127,7 +131,8 @@ int run() {
   };
   const auto samples_of = [](const CoordBox& box) {
     const Coord d = box.dims();
-    return std::vector<float>(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z));
+    return std::vector<float>(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) *
+                              static_cast<std::size_t>(d.z));
   };
   const CoordBox fine{{-40, -40, -48}, {44, 40, 48}}, coarse{{-12, -12, -14}, {13, 12, 14}};
   std::vector<float> samples = samples_of(fine);
@@ -140,7 +145,8 @@ int run() {
   const Accessor solid_accessor = solid->getConstAccessor(), density_accessor = density->getConstAccessor();
   const openvdb::tools::GridSampler<Accessor, openvdb::tools::BoxSampler> fast(solid_accessor, solid->transform()),
       fast_density(density_accessor, density->transform());
-  const openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler> plain(*solid), plain_density(*density);
+  const openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler> plain(*solid),
+      plain_density(*density);
 
   std::vector<double> ours, accessor, tree, ratios, distances(kPoints);
   double worst_mm = 0.0, worst_sum = 0.0, engaged = 0.0;
@@ -181,8 +187,8 @@ int run() {
   print("accessor_us", accessor);
   print("tree_us", tree);
   print("speedup", ratios);
-  std::printf("\"compared\": %d, \"largest_difference_mm\": %.3g, \"largest_force_difference\": %.3g}\n", compared, worst_mm,
-              worst_sum);
+  std::printf("\"compared\": %d, \"largest_difference_mm\": %.3g, \"largest_force_difference\": %.3g}\n", compared,
+              worst_mm, worst_sum);
   return 0;
 }
 

@@ -1,5 +1,5 @@
-// What one cut of a haptic client (8 ms of tool path) costs at a pitch of 0.125 mm, against the plain way of writing it;
-// and what a cut costs with each of the tools at its own level, with the memory that its field takes.
+// What one cut of a haptic client (8 ms of tool path) costs at a pitch of 0.125 mm, against the plain way of writing
+// it; and what a cut costs with each of the tools at its own level, with the memory that its field takes.
 #include <benchmark/benchmark.h>
 #include <openvdb/openvdb.h>
 #include <sys/resource.h>
@@ -30,7 +30,9 @@ constexpr double kPitch_mm = 0.5;  // so a cut at level 2 has 0.125 mm
 constexpr double kCutSeconds = 0.008;
 using Clock = std::chrono::steady_clock;
 
-double us_since(Clock::time_point start) { return std::chrono::duration<double, std::micro>(Clock::now() - start).count(); }
+double us_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(Clock::now() - start).count();
+}
 
 Tool tool_at_finest(const char* name) {
   auto tool = find_tool(name);
@@ -41,10 +43,12 @@ Tool tool_at_finest(const char* name) {
 
 // A burr half in bone moving sideways, and a drill going in.
 Cut burr_cut(const Vec3& at = Vec3::Zero()) {
-  return straight_cut(tool_at_finest("burr-round-3.2"), at + Vec3(0, 0, -1.6), at + Vec3(15 * kCutSeconds, 0, -1.6), {0, 0, -1});
+  return straight_cut(tool_at_finest("burr-round-3.2"), at + Vec3(0, 0, -1.6), at + Vec3(15 * kCutSeconds, 0, -1.6),
+                      {0, 0, -1});
 }
 Cut drill_cut(const Vec3& at = Vec3::Zero()) {
-  return straight_cut(tool_at_finest("drill-3.5"), at + Vec3(0, 0, -6), at + Vec3(0, 0, -6 - 1 * kCutSeconds), {0, 0, -1});
+  return straight_cut(tool_at_finest("drill-3.5"), at + Vec3(0, 0, -6), at + Vec3(0, 0, -6 - 1 * kCutSeconds),
+                      {0, 0, -1});
 }
 
 const Case& bone() {
@@ -54,7 +58,8 @@ const Case& bone() {
 
 class Threads {
  public:
-  explicit Threads(std::int64_t count) : limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count)) {}
+  explicit Threads(std::int64_t count)
+      : limit_(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(count)) {}
 
  private:
   tbb::global_control limit_;
@@ -91,8 +96,8 @@ struct Times {
   }
 };
 
-// Other work of the process: every line of 96 MiB, three times the largest cache, is read and written, so that code, tools,
-// bone and cut field all come from memory again.
+// Other work of the process: every line of 96 MiB, three times the largest cache, is read and written, so that code,
+// tools, bone and cut field all come from memory again.
 void flush_caches() {
   static std::vector<std::uint64_t> memory(std::size_t{12} << 20);
   for (std::size_t i = 0; i < memory.size(); i += 8) memory[i] += i;
@@ -112,12 +117,13 @@ long new_pages() {
   return usage.ru_minflt;
 }
 
-// Where memory for what the cuts add comes from: from a reserve that is refilled between cuts, as the server and the haptic
-// client do; or from the system, page by page, while it cuts.
+// Where memory for what the cuts add comes from: from a reserve that is refilled between cuts, as the server and the
+// haptic client do; or from the system, page by page, while it cuts.
 enum class Heap { reserved, given };
 
-// A place in untouched bone for every cut, and caches that hold other work. A 3.5 mm drill with its band reaches 2.3 mm to
-// each side and a leaf is 1 mm wide, so of places 7 mm apart no two share a leaf: every leaf that a cut changes is new.
+// A place in untouched bone for every cut, and caches that hold other work. A 3.5 mm drill with its band reaches 2.3 mm
+// to each side and a leaf is 1 mm wide, so of places 7 mm apart no two share a leaf: every leaf that a cut changes is
+// new.
 void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
   constexpr int kPlaces = 200, kRow = 15;
   constexpr double kApart_mm = 8.0, kScatter_mm = 0.5;  // at least 7 mm, and everywhere between the leaves' faces
@@ -186,8 +192,9 @@ class PlainCut {
     }
     const double bottom = local.min_mm.z();
     for (int corner = 0; corner < 8; ++corner)
-      world.include(from.point({(corner & 1 ? local.max_mm : local.min_mm).x(), (corner & 2 ? local.max_mm : local.min_mm).y(),
-                                (corner & 4 ? local.max_mm : local.min_mm).z()}));
+      world.include(
+          from.point({(corner & 1 ? local.max_mm : local.min_mm).x(), (corner & 2 ? local.max_mm : local.min_mm).y(),
+                      (corner & 4 ? local.max_mm : local.min_mm).z()}));
     box_ = covering_samples(world.grown(band_), pitch_);
     local_ = local.grown(band_);
     // The outline's edges, as the tool's implicit function has them. Of a drill going in, the back stays where it was.
@@ -289,7 +296,8 @@ std::vector<Cut> at_work(const char* tool_name, const Vec3& from, const Vec3& wa
   const Tool tool = tool_at_finest(tool_name);
   std::vector<Cut> cuts;
   for (int i = 0; i < count; ++i)
-    cuts.push_back(straight_cut(tool, from + i * kCutSeconds * way_mm_s, from + (i + 1) * kCutSeconds * way_mm_s, {0, 0, -1}));
+    cuts.push_back(
+        straight_cut(tool, from + i * kCutSeconds * way_mm_s, from + (i + 1) * kCutSeconds * way_mm_s, {0, 0, -1}));
   return cuts;
 }
 // 48 mm across the block, half immersed, and 6.4 mm straight in.
@@ -302,8 +310,8 @@ double middle_of(std::vector<double> values) {
 }
 
 // The same cuts by our field with one and with two threads and by the plain way on a grid of its own, in turns of some
-// cuts each. All three must hold the same bone in the end. `ratio` is that of the medians of single cuts, its least and most
-// over several passes through the whole sequence.
+// cuts each. All three must hold the same bone in the end. `ratio` is that of the medians of single cuts, its least and
+// most over several passes through the whole sequence.
 void work(benchmark::State& state, const std::vector<Cut>& cuts) {
   constexpr int kPasses = 5;
   constexpr std::size_t kTurn = 20;
@@ -354,7 +362,8 @@ void work(benchmark::State& state, const std::vector<Cut>& cuts) {
         for (std::int32_t i = 0; i < kLeafVoxels; ++i) {
           const Coord c = leaf.origin + Coord{i / 64, i / 8 % 8, i % 8};
           const std::int16_t ours = leaf.values[leaf.values.size() == 1 ? 0 : static_cast<std::size_t>(i)];
-          const auto other = static_cast<std::int32_t>(std::lround(accessor.getValue(openvdb::Coord(c.x, c.y, c.z)) * 1024.0f));
+          const auto other =
+              static_cast<std::int32_t>(std::lround(accessor.getValue(openvdb::Coord(c.x, c.y, c.z)) * 1024.0f));
           const std::int32_t apart = std::abs(other - ours);
           OSTEON_CHECK(apart <= 1);
           differing += apart;
@@ -378,8 +387,8 @@ void work(benchmark::State& state, const std::vector<Cut>& cuts) {
   }
 }
 
-// The accessor again, but with the kernel's own distances and only for leaves near the tool: what is left when the plain
-// way is given our culling.
+// The accessor again, but with the kernel's own distances and only for leaves near the tool: what is left when the
+// plain way is given our culling.
 void near_leaves(benchmark::State& state, const Cut& cut) {
   const auto tools = builtin_tool_box();
   const SweptTool swept(cut, tools->find(cut.tool)->body, kPitch_mm);
@@ -408,8 +417,8 @@ void near_leaves(benchmark::State& state, const Cut& cut) {
   count_samples(state, samples, samples, static_cast<double>(first_modified));
 }
 
-// Working motion, tip and axis: what turns in bone along its axis goes in at a millimetre a second (20 for what is driven
-// by blows), what mills and saws moves across at 15; all with the tilt of a hand, 0.1 rad/s.
+// Working motion, tip and axis: what turns in bone along its axis goes in at a millimetre a second (20 for what is
+// driven by blows), what mills and saws moves across at 15; all with the tilt of a hand, 0.1 rad/s.
 struct Motion {
   Vec3 way_mm_s;
   double tilt_rad_s = 0.1;
@@ -419,12 +428,18 @@ Motion motion_of(const Tool& tool) {
   switch (tool.kind) {
     case ToolKind::round_burr:
     case ToolKind::barrel_burr:
-    case ToolKind::contoured_burr: return {{15, 0, -1}};
-    case ToolKind::oscillating_saw: return {{1, 0, -5}};
-    case ToolKind::reciprocating_saw: return {{10, 0, -1}};
-    case ToolKind::broach: return {{0, 0, -20}};
-    case ToolKind::screw: return {{0, 0, -2}};
-    default: return {{0.2, 0, -1}};
+    case ToolKind::contoured_burr:
+      return {{15, 0, -1}};
+    case ToolKind::oscillating_saw:
+      return {{1, 0, -5}};
+    case ToolKind::reciprocating_saw:
+      return {{10, 0, -1}};
+    case ToolKind::broach:
+      return {{0, 0, -20}};
+    case ToolKind::screw:
+      return {{0, 0, -2}};
+    default:
+      return {{0.2, 0, -1}};
   }
 }
 
@@ -440,11 +455,16 @@ enum class Begin { entering, seated };
 double first_depth_mm(const Tool& tool, Begin begin, double on_the_way_mm) {
   if (begin == Begin::entering) return 0.5;
   switch (tool.kind) {
-    case ToolKind::round_burr: return tool.diameter_mm;
-    case ToolKind::sphere_reamer: return 0.5 * tool.diameter_mm;
-    case ToolKind::oscillating_saw: return 20.0;  // the plate follows its teeth
-    case ToolKind::broach: return tool.cutting_length_mm - on_the_way_mm;  // whole at the end: then it stops
-    default: return tool.cutting_length_mm;
+    case ToolKind::round_burr:
+      return tool.diameter_mm;
+    case ToolKind::sphere_reamer:
+      return 0.5 * tool.diameter_mm;
+    case ToolKind::oscillating_saw:
+      return 20.0;  // the plate follows its teeth
+    case ToolKind::broach:
+      return tool.cutting_length_mm - on_the_way_mm;  // whole at the end: then it stops
+    default:
+      return tool.cutting_length_mm;
   }
 }
 
@@ -499,12 +519,21 @@ void cut_with(benchmark::State& state, const Tool& tool, Begin begin) {
 template <class Run>
 void add(const std::string& name, Run run) {
   benchmark::RegisterBenchmark(name.c_str(), run)
-      ->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond)->UseRealTime();
+      ->ArgName("threads")
+      ->Arg(1)
+      ->Arg(2)
+      ->Unit(benchmark::kMicrosecond)
+      ->UseRealTime();
 }
 template <class Run>
 void add_timed(const std::string& name, Run run, int iterations) {
   benchmark::RegisterBenchmark(name.c_str(), run)
-      ->ArgName("threads")->Arg(1)->Arg(2)->Unit(benchmark::kMicrosecond)->UseManualTime()->Iterations(iterations);
+      ->ArgName("threads")
+      ->Arg(1)
+      ->Arg(2)
+      ->Unit(benchmark::kMicrosecond)
+      ->UseManualTime()
+      ->Iterations(iterations);
 }
 template <class Run>
 void add_plain(const std::string& name, Run run) {
@@ -514,25 +543,32 @@ void add_plain(const std::string& name, Run run) {
 const bool registered = [] {
   const auto once = [](const char* name, auto cuts) {
     benchmark::RegisterBenchmark(name, [cuts](benchmark::State& state) { work(state, cuts()); })
-        ->Iterations(1)->Unit(benchmark::kMillisecond);
+        ->Iterations(1)
+        ->Unit(benchmark::kMillisecond);
   };
   once("cut_burr/work", burr_at_work);
   once("cut_drill/work", drill_at_work);
   add("cut_burr/hot", [](benchmark::State& state) { hot(state, burr_cut()); });
   add_plain("cut_burr/world_box", [](benchmark::State& state) { world_box(state, burr_cut()); });
   add_plain("cut_burr/near_leaves", [](benchmark::State& state) { near_leaves(state, burr_cut()); });
-  add_timed("cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut, Heap::reserved); }, 1);
-  add_timed("cut_burr/cold_given", [](benchmark::State& state) { cold(state, burr_cut, Heap::given); }, 1);
+  add_timed(
+      "cut_burr/cold", [](benchmark::State& state) { cold(state, burr_cut, Heap::reserved); }, 1);
+  add_timed(
+      "cut_burr/cold_given", [](benchmark::State& state) { cold(state, burr_cut, Heap::given); }, 1);
   add("cut_drill/hot", [](benchmark::State& state) { hot(state, drill_cut()); });
   add_plain("cut_drill/world_box", [](benchmark::State& state) { world_box(state, drill_cut()); });
   add_plain("cut_drill/near_leaves", [](benchmark::State& state) { near_leaves(state, drill_cut()); });
-  add_timed("cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut, Heap::reserved); }, 1);
-  add_timed("cut_drill/cold_given", [](benchmark::State& state) { cold(state, drill_cut, Heap::given); }, 1);
+  add_timed(
+      "cut_drill/cold", [](benchmark::State& state) { cold(state, drill_cut, Heap::reserved); }, 1);
+  add_timed(
+      "cut_drill/cold_given", [](benchmark::State& state) { cold(state, drill_cut, Heap::given); }, 1);
   for (const Tool& tool : builtin_tools())
     if (tool.cuts()) {
       const std::string name = "cut_tool/" + tool.name;
-      add_timed(name + "/entering", [tool](benchmark::State& state) { cut_with(state, tool, Begin::entering); }, 1);
-      add_timed(name + "/seated", [tool](benchmark::State& state) { cut_with(state, tool, Begin::seated); }, 1);
+      add_timed(
+          name + "/entering", [tool](benchmark::State& state) { cut_with(state, tool, Begin::entering); }, 1);
+      add_timed(
+          name + "/seated", [tool](benchmark::State& state) { cut_with(state, tool, Begin::seated); }, 1);
     }
   return true;
 }();

@@ -1,5 +1,5 @@
-// Many frames each way between the Falcon's driver and an emulated device, with what goes wrong on the way: prints one JSON
-// object. Everything is emulated: rates say what this machine's emulation takes, not what a device does.
+// Many frames each way between the Falcon's driver and an emulated device, with what goes wrong on the way: prints one
+// JSON object. Everything is emulated: rates say what this machine's emulation takes, not what a device does.
 #include <nlohmann/json.hpp>
 
 #include <atomic>
@@ -83,7 +83,8 @@ int main(int argc, char** argv) {
       const DeviceReading reading = falcon->read();
       ++counted.reads;
       if (reading.usable()) ++counted.usable;
-      const double radius = std::hypot(reading.pose_device_tool.position_mm.x(), reading.pose_device_tool.position_mm.y());
+      const double radius =
+          std::hypot(reading.pose_device_tool.position_mm.x(), reading.pose_device_tool.position_mm.y());
       if (std::abs(radius - 1e3 * kReach_m) > 0.2) ++counted.wrong_places;
       falcon->write(Vec3(0.0, 0.0, 2.0));
       last = reading.sample;

@@ -1,13 +1,13 @@
 // What drilling, burring and guided drilling feel like in numbers: the reference simulations of the feed rig and of the
 // hands on virtual time, how they change with push, wear, stiffness, damping, tick and pitch, and the forces of a burr
 // over time. Takes what to run (rig, hands, steps, profiles, guided) and prints JSON with the numbers and the curves.
+#include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <tbb/parallel_for.h>
 #include <vector>
 
 #include "tests/unit/haptic_client/bench.hpp"
@@ -37,7 +37,8 @@ struct Hole {
   double after_exit_n = 0;                        // the largest force once the cone has left
   double plunge_mm = 0, after_exit_mm = 0;
   bool completed = false;
-  json curve = {{"time_s", json::array()}, {"depth_mm", json::array()}, {"force_n", json::array()}, {"engaged", json::array()}};
+  json curve = {
+      {"time_s", json::array()}, {"depth_mm", json::array()}, {"force_n", json::array()}, {"engaged", json::array()}};
 
   [[nodiscard]] json numbers() const {
     json out{{"ramp_mm", rounded(ramp_mm)},
@@ -184,8 +185,11 @@ json profile(const PlanStep& step) {
     time_s += 1e-3;
     if (tick.order.phase != SurgeonPhase::sweep || tick.report.state_seq % 4 != 0) return;
     const EntrySite& site = bench.session().surgeon().plan().steps[0].site;
-    const auto turned = [&](const Vec3& v) { return Vec3(v.dot(site.across_u), v.dot(site.across_v), v.dot(site.axis)); };
-    const Vec3 f = turned(tick.report.force_physical_n), tip = turned(tick.report.pose_bone_proxy.position_mm - site.entry_mm);
+    const auto turned = [&](const Vec3& v) {
+      return Vec3(v.dot(site.across_u), v.dot(site.across_v), v.dot(site.axis));
+    };
+    const Vec3 f = turned(tick.report.force_physical_n),
+               tip = turned(tick.report.pose_bone_proxy.position_mm - site.entry_mm);
     out["time_s"].push_back(rounded(time_s));
     out["x_n"].push_back(rounded(f.x()));
     out["y_n"].push_back(rounded(f.y()));
@@ -260,7 +264,10 @@ json guided() {
         if (tip.z() > 0.0)
           most = std::max(most, (tip - *place.entry.point_mm).head<2>().norm() / (play_mm(tip.z()) + kQuantum_mm));
       });
-      json run{{"hand", hand == HandKind::rig ? "rig" : hand == HandKind::expert ? "expert" : "novice"}, {"guided", through}};
+      json run{{"hand", hand == HandKind::rig      ? "rig"
+                        : hand == HandKind::expert ? "expert"
+                                                   : "novice"},
+               {"guided", through}};
       double excess_mm = -1e9;
       for (const Cut& cut : bench.cuts()) {
         const Vec3 tip = dequantise(cut.path.back()).position_mm;

@@ -1,7 +1,7 @@
-// osteon-felt-stages [SECONDS]: where the time goes from a cut that one hand makes until it is in the patch that another feels:
-// two clients' fast paths and replicas, a room with a journal on the disk, real sockets and threads, all in one process so that
-// one clock sees every stage; on the loopback, and at 40 +- 10 ms with 30 % lost, 10 % reordered, 5 % twice. Hands and the bad
-// network are simulated. JSON, milliseconds.
+// osteon-felt-stages [SECONDS]: where the time goes from a cut that one hand makes until it is in the patch that
+// another feels: two clients' fast paths and replicas, a room with a journal on the disk, real sockets and threads, all
+// in one process so that one clock sees every stage; on the loopback, and at 40 +- 10 ms with 30 % lost, 10 %
+// reordered, 5 % twice. Hands and the bad network are simulated. JSON, milliseconds.
 #include <array>
 #include <atomic>
 #include <condition_variable>
@@ -35,7 +35,7 @@ using Clock = std::chrono::steady_clock;
 
 // What happens to a cut of one hand until the other feels it.
 enum Moment { sent, at_server, tick_began, decided, told, came, felt, kMoments };
-constexpr std::array<const char*, kMoments> kStages{"",       "uplink",   "wait_for_tick", "decide",
+constexpr std::array<const char*, kMoments> kStages{"",       "uplink",   "wait_for_tick",    "decide",
                                                     "commit", "downlink", "replica_and_patch"};
 
 // Of one hand's cuts, by author_seq - 1.
@@ -52,8 +52,13 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
  public:
   // `port`: at which the client's datagrams reach the links, 0 for their own.
   Line(RoomRuntime& runtime, LinkServer& links, AuthorId author, std::uint16_t port, std::size_t cuts)
-      : runtime_(runtime), links_(links), author_(author), port_(port != 0 ? port : links.port()), replica_(runtime.bone(), BodyId{}),
-        model_(*find_tool("burr-round-5"), runtime.bone().pitch_mm()), times(cuts) {}
+      : runtime_(runtime),
+        links_(links),
+        author_(author),
+        port_(port != 0 ? port : links.port()),
+        replica_(runtime.bone(), BodyId{}),
+        model_(*find_tool("burr-round-5"), runtime.bone().pitch_mm()),
+        times(cuts) {}
   ~Line() override {
     if (path_) path_->stop();
     {
@@ -97,8 +102,8 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {
     link_ = links_.add(author_, 1, *this);
-    auto opened = FastPath::open(
-        "127.0.0.1", port_, link_->keys(), 1, {.row = [this](wire::IndexedRow row) { hear(std::move(row)); }, .dead = [] {}});
+    auto opened = FastPath::open("127.0.0.1", port_, link_->keys(), 1,
+                                 {.row = [this](wire::IndexedRow row) { hear(std::move(row)); }, .dead = [] {}});
     OSTEON_CHECK(opened.has_value());
     path_ = std::move(*opened);
   }
@@ -195,11 +200,13 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   std::atomic<std::uint64_t> streamed{0}, refused{0};
 };
 
-json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vector<std::string>& impairment, double seconds) {
+json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vector<std::string>& impairment,
+                double seconds) {
   const TempDir folder;
   Result<PersistedRoom> kept = RoomStore::open(folder / "room.journal", bone, {});
   OSTEON_CHECK(kept.has_value());
-  RoomRuntime runtime(std::move(kept->room), {}, [](double) {}, Detail::automatic, kept->store.get());
+  RoomRuntime runtime(
+      std::move(kept->room), {}, [](double) {}, Detail::automatic, kept->store.get());
   Result<std::unique_ptr<LinkServer>> links = LinkServer::open("127.0.0.1");
   OSTEON_CHECK(links.has_value());
   std::optional<ImpairProcess> relay;
@@ -211,7 +218,8 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   }
   const auto cuts = static_cast<std::size_t>(seconds / std::chrono::duration<double>(kCutsApart).count());
   std::array<std::shared_ptr<Line>, 2> lines;
-  for (auto& line : lines) line = std::make_shared<Line>(runtime, **links, runtime.join(MemberKind::surgeon).value(), port, cuts);
+  for (auto& line : lines)
+    line = std::make_shared<Line>(runtime, **links, runtime.join(MemberKind::surgeon).value(), port, cuts);
   lines[0]->feel(*lines[1]);
   lines[1]->feel(*lines[0]);
   for (const auto& line : lines) OSTEON_CHECK(runtime.open_session(line).has_value());
@@ -247,22 +255,25 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   for (const auto& line : lines)
     for (const auto& moments : line->times.of) {
       if (moments[felt] == 0) continue;
-      for (std::size_t i = 1; i < kMoments; ++i) took[i].push_back(1e-6 * static_cast<double>(moments[i] - moments[i - 1]));
+      for (std::size_t i = 1; i < kMoments; ++i)
+        took[i].push_back(1e-6 * static_cast<double>(moments[i] - moments[i - 1]));
       whole.push_back(1e-6 * static_cast<double>(moments[felt] - moments[sent]));
     }
   json stages;
   for (std::size_t i = 1; i < kMoments; ++i) stages[kStages[i]] = spread(took[i]);
   const TickStats tick = after.tick.since(before.tick);
   const DurationHistogram commit = after.commit.since(before.commit);
-  json out{{"cuts", 2 * cuts}, {"all_felt", there}, {"streamed", lines[0]->streamed + lines[1]->streamed},
-           {"whole", spread(whole)}, {"stages", stages}, {"round_trip_ms", rounded(path.round_trip_ms)}, {"loss", rounded(path.loss)}};
+  json out{{"cuts", 2 * cuts},          {"all_felt", there}, {"streamed", lines[0]->streamed + lines[1]->streamed},
+           {"whole", spread(whole)},    {"stages", stages},  {"round_trip_ms", rounded(path.round_trip_ms)},
+           {"loss", rounded(path.loss)}};
   // Of one client; those that came, where some are lost on the way down.
   const auto line = [&](std::uint64_t packets, std::uint64_t bytes) -> json {
     return {{"packets_per_s", rounded(static_cast<double>(packets) / seconds)},
             {"kbit_per_s", rounded(8e-3 * static_cast<double>(bytes + 28 * packets) / seconds)}};
   };
   out["up"] = line(path.packets_sent - path_before.packets_sent, path.bytes_sent - path_before.bytes_sent);
-  out["down"] = line(path.packets_received - path_before.packets_received, path.bytes_received - path_before.bytes_received);
+  out["down"] =
+      line(path.packets_received - path_before.packets_received, path.bytes_received - path_before.bytes_received);
   const auto in_ms = [](const DurationHistogram& times) -> json {
     return {{"p50", rounded(1e-3 * times.percentile_us(50))}, {"p99", rounded(1e-3 * times.percentile_us(99))}};
   };

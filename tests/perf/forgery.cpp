@@ -1,5 +1,6 @@
-// Forged, flipped, cut, extended and replayed datagrams against the class that a server opens them with (wire::ServerLink): how
-// many it takes, and how many bytes it answers. Takes their number (10 million if none is given) and prints JSON.
+// Forged, flipped, cut, extended and replayed datagrams against the class that a server opens them with
+// (wire::ServerLink): how many it takes, and how many bytes it answers. Takes their number (10 million if none is
+// given) and prints JSON.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -20,16 +21,16 @@ int main(int argc, char** argv) {
   const auto number = [](std::uint64_t value) { return static_cast<unsigned long long>(value); };
 
   const std::uint64_t forged = std::accumulate(report.sent.begin(), report.sent.end(), std::uint64_t{0});
-  std::printf("{\"forged\": %llu, \"accepted\": %llu, \"answered_bytes\": %llu, ", number(forged), number(report.accepted),
-              number(report.answered_bytes));
+  std::printf("{\"forged\": %llu, \"accepted\": %llu, \"answered_bytes\": %llu, ", number(forged),
+              number(report.accepted), number(report.answered_bytes));
   for (std::size_t i = 0; i < osteon::test::kForgeries; ++i)
     std::printf("\"%s\": %llu, ", osteon::test::kForgeryNames[i], number(report.sent[i]));
-  std::printf("\"refused_as\": {\"strangers\": %llu, \"malformed\": %llu, \"replayed\": %llu, \"forged\": %llu}, ", number(report.strangers),
-              number(report.malformed), number(report.replayed), number(report.forged));
+  std::printf("\"refused_as\": {\"strangers\": %llu, \"malformed\": %llu, \"replayed\": %llu, \"forged\": %llu}, ",
+              number(report.strangers), number(report.malformed), number(report.replayed), number(report.forged));
   std::printf("\"genuine\": %llu, \"genuine_accepted\": %llu, \"genuine_answered\": %llu, ", number(report.genuine),
               number(report.genuine_accepted), number(report.genuine_answered));
   std::printf("\"cuts\": %llu, \"cuts_told\": %llu, ", number(report.cuts), number(report.cuts_told));
   std::printf("\"moves\": %llu, \"moves_noticed\": %llu, ", number(report.moves), number(report.moves_noticed));
-  std::printf("\"generations\": %llu, \"seconds\": %.3f, \"packets_per_s\": %.0f}\n", number(report.generations), seconds,
-              static_cast<double>(forged) / seconds);
+  std::printf("\"generations\": %llu, \"seconds\": %.3f, \"packets_per_s\": %.0f}\n", number(report.generations),
+              seconds, static_cast<double>(forged) / seconds);
 }

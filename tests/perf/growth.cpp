@@ -1,4 +1,5 @@
-// What a cut costs as the bone grows, and what memory cuts take. Takes the bones' sizes in samples an axis, prints JSON.
+// What a cut costs as the bone grows, and what memory cuts take. Takes the bones' sizes in samples an axis, prints
+// JSON.
 #include <malloc.h>
 #include <tbb/global_control.h>
 
@@ -84,7 +85,8 @@ Case cube_of_bone(int samples) {
     return PartKind::samples;
   };
   const std::int32_t end = half + kBandVoxels + 1;
-  const CaseInfo info{.title = "Cube", .source = "closed form", .pitch_mm = kPitch_mm, .calibration = {}, .threshold_hu = 0.0};
+  const CaseInfo info{
+      .title = "Cube", .source = "closed form", .pitch_mm = kPitch_mm, .calibration = {}, .threshold_hu = 0.0};
   auto built = Case::build(info, CoordBox{{-end, -end, -end}, {end, end, end}}, fill);
   OSTEON_CHECK(built.has_value());
   return *built;
@@ -137,11 +139,12 @@ void cost_of_size(const std::vector<int>& sizes, const Tool& burr) {
     std::vector<double> ratios;
     for (std::size_t i = 0; i + kBatch <= kCuts; i += kBatch)
       ratios.push_back(median_of(bone.us, i) / median_of(bones[0].us, i));
-    std::printf("%s{\"samples\": %d, \"cuts\": %zu, \"us_min\": %.3f, \"us_p50\": %.3f, \"us_p99\": %.3f, \"ratio_p50\": %.4f, "
-                "\"ratio_min\": %.4f, \"ratio_max\": %.4f, \"bytes_per_cut\": %.0f, \"bone_bytes\": %.0f}",
-                b == 0 ? "" : ", ", bone.samples, kCuts, quantile(bone.us, 0), quantile(bone.us, 0.5), quantile(bone.us, 0.99),
-                quantile(ratios, 0.5), quantile(ratios, 0), quantile(ratios, 1), bone.bytes / static_cast<double>(kCuts),
-                bone.bone_bytes);
+    std::printf(
+        "%s{\"samples\": %d, \"cuts\": %zu, \"us_min\": %.3f, \"us_p50\": %.3f, \"us_p99\": %.3f, \"ratio_p50\": %.4f, "
+        "\"ratio_min\": %.4f, \"ratio_max\": %.4f, \"bytes_per_cut\": %.0f, \"bone_bytes\": %.0f}",
+        b == 0 ? "" : ", ", bone.samples, kCuts, quantile(bone.us, 0), quantile(bone.us, 0.5), quantile(bone.us, 0.99),
+        quantile(ratios, 0.5), quantile(ratios, 0), quantile(ratios, 1), bone.bytes / static_cast<double>(kCuts),
+        bone.bone_bytes);
   }
   std::printf("]");
 }
@@ -164,7 +167,8 @@ void memory_of_cuts(const Tool& burr) {
       const double bytes = heap_bytes() - before;
       const double area = std::numbers::pi * radius * length + 2.0 * std::numbers::pi * radius * radius;
       const double volume = std::numbers::pi * radius * radius * (0.5 * length + 2.0 / 3.0 * radius);
-      std::printf("%s{\"area_mm2\": %.3f, \"volume_mm3\": %.3f, \"bytes\": %.0f}", head ? "" : ", ", area, volume, bytes);
+      std::printf("%s{\"area_mm2\": %.3f, \"volume_mm3\": %.3f, \"bytes\": %.0f}", head ? "" : ", ", area, volume,
+                  bytes);
       x += length + row;
       head = false;
     }
@@ -179,7 +183,8 @@ int main(int argc, char** argv) {
   const tbb::global_control one(tbb::global_control::max_allowed_parallelism, 1);
   std::vector<int> sizes;
   for (int i = 1; i < argc; ++i) sizes.push_back(std::atoi(argv[i]));
-  const auto burr = nearest_tool(osteon::ToolKind::round_burr, 3.2), large = nearest_tool(osteon::ToolKind::round_burr, 6.0);
+  const auto burr = nearest_tool(osteon::ToolKind::round_burr, 3.2),
+             large = nearest_tool(osteon::ToolKind::round_burr, 6.0);
   if (sizes.empty() || !burr || !large || std::ranges::any_of(sizes, [](int n) { return n < 32 || n > 2048; })) {
     std::fprintf(stderr, "osteon-growth: needs sizes in samples an axis, 32 to 2048 each\n");
     return 1;

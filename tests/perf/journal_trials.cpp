@@ -11,15 +11,18 @@
 namespace {
 
 nlohmann::json said(const osteon::test::Tally& tally) {
-  return {{"trials", tally.trials},       {"acknowledged", tally.acknowledged}, {"recovered", tally.recovered},
-          {"lost", tally.lost},           {"failed_disks", tally.failed},       {"closed", tally.closed},
+  return {{"trials", tally.trials},         {"acknowledged", tally.acknowledged},
+          {"recovered", tally.recovered},   {"lost", tally.lost},
+          {"failed_disks", tally.failed},   {"closed", tally.closed},
           {"bad_trials", tally.bad_trials}, {"faults", tally.faults}};
 }
 
 nlohmann::json said(const osteon::test::DamageTally& tally) {
-  return {{"trials", tally.trials}, {"acknowledged", tally.acknowledged},     {"whole", tally.whole},
-          {"named", tally.named},   {"refused", tally.refused},               {"silent", tally.silent},
-          {"done", tally.done},     {"called_damaged", tally.called_damaged}, {"faults", tally.faults}};
+  return {{"trials", tally.trials},   {"acknowledged", tally.acknowledged},
+          {"whole", tally.whole},     {"named", tally.named},
+          {"refused", tally.refused}, {"silent", tally.silent},
+          {"done", tally.done},       {"called_damaged", tally.called_damaged},
+          {"faults", tally.faults}};
 }
 
 }  // namespace

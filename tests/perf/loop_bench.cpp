@@ -1,6 +1,6 @@
-// What a tick of the haptic loop costs, and what a silent network does to its deadlines. `tick`: one thread, as fast as it
-// goes, replica and patches between the ticks. `blackout SECONDS`: the loop at 1 kHz beside the replica's thread, so long
-// with a room that answers, so long with one that is silent, and so long again with it. Prints JSON.
+// What a tick of the haptic loop costs, and what a silent network does to its deadlines. `tick`: one thread, as fast as
+// it goes, replica and patches between the ticks. `blackout SECONDS`: the loop at 1 kHz beside the replica's thread, so
+// long with a room that answers, so long with one that is silent, and so long again with it. Prints JSON.
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -11,9 +11,9 @@
 #include <string>
 #include <thread>
 
-#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/realtime.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "haptic_client/control/confirmation_monitor.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
@@ -96,8 +96,10 @@ void measure_wedged(const char* name, const char* tool_name) {
     const LoopReport report = loop.tick(input, patch);
     const auto took = Clock::now() - begin;
     proxy = report.pose_bone_proxy;
-    if (i < kRest + kIn) kept = proxy;
-    else cost->all.record(took);
+    if (i < kRest + kIn)
+      kept = proxy;
+    else
+      cost->all.record(took);
     CutPiece piece;
     while (loop.take_piece(piece)) {
       const Cut cut = cut_of(piece, loop.tool(0), AuthorId{1}, 0);
@@ -114,8 +116,11 @@ void measure_wedged(const char* name, const char* tool_name) {
 class Blackout {
  public:
   explicit Blackout(double seconds)
-      : ticks_(static_cast<long>(1000.0 * seconds)), bone_(block_case(40.0)), ready_(*make_ready({burring(36.0)}, bone_)),
-        session_(ready_, SimulatedDeviceParams{}, 0.0), replica_(bone_, BodyId{}) {}
+      : ticks_(static_cast<long>(1000.0 * seconds)),
+        bone_(block_case(40.0)),
+        ready_(*make_ready({burring(36.0)}, bone_)),
+        session_(ready_, SimulatedDeviceParams{}, 0.0),
+        replica_(bone_, BodyId{}) {}
 
   void run() {
     std::thread replica([this] { replica_thread(); });
@@ -127,12 +132,14 @@ class Blackout {
     for (int i = 0; i < 3; ++i) {
       const TickStats& s = stats_[i];
       std::printf(
-          "%s\"%s\": {\"ticks\": %llu, \"missed\": %llu, \"late_p50_us\": %.3f, \"late_p99_us\": %.3f, \"late_p999_us\": %.3f, "
-          "\"late_max_us\": %.3f, \"work_p50_us\": %.3f, \"work_p99_us\": %.3f, \"cutting_ticks\": %ld, \"held_ticks\": %ld}",
+          "%s\"%s\": {\"ticks\": %llu, \"missed\": %llu, \"late_p50_us\": %.3f, \"late_p99_us\": %.3f, "
+          "\"late_p999_us\": %.3f, "
+          "\"late_max_us\": %.3f, \"work_p50_us\": %.3f, \"work_p99_us\": %.3f, \"cutting_ticks\": %ld, "
+          "\"held_ticks\": %ld}",
           i > 0 ? ", " : "", kNames[i], static_cast<unsigned long long>(s.work.count()),
           static_cast<unsigned long long>(s.missed), s.lateness.percentile_us(50), s.lateness.percentile_us(99),
-          s.lateness.percentile_us(99.9), s.lateness.max_us(), s.work.percentile_us(50), s.work.percentile_us(99), cutting_[i],
-          held_[i]);
+          s.lateness.percentile_us(99.9), s.lateness.max_us(), s.work.percentile_us(50), s.work.percentile_us(99),
+          cutting_[i], held_[i]);
     }
     std::printf(", \"realtime\": %s, \"most_unconfirmed\": %zu", realtime_ ? "true" : "false", most_unconfirmed_);
   }
@@ -180,10 +187,11 @@ class Blackout {
         heard = true;
       }
       most_unconfirmed_ = std::max(most_unconfirmed_, replica_.unconfirmed());
-      follows_ = watch.update(std::chrono::duration<double>(now.time_since_epoch()).count(), heard, replica_.unconfirmed()) ==
-                 RoomHealth::follows;
+      follows_ = watch.update(std::chrono::duration<double>(now.time_since_epoch()).count(), heard,
+                              replica_.unconfirmed()) == RoomHealth::follows;
       places_.refresh();
-      for (const ChangedLeaves& change : replica_.take_changes()) builder.changed(bone_.pitch_mm(), change.level, change.origins);
+      for (const ChangedLeaves& change : replica_.take_changes())
+        builder.changed(bone_.pitch_mm(), change.level, change.origins);
       Patch& patch = patches_.writable();
       builder.build(replica_.bodies(), session_.loop().tool(places_.value().second), places_.value().first, patch);
       patch.own_cuts = replica_.last_own();
@@ -227,8 +235,9 @@ int run(int argc, char** argv) {
   }
   const double seconds = what == "blackout" && argc > 2 ? std::atof(argv[2]) : 0.0;
   if (!(seconds > 0.0 && seconds <= 600.0)) {
-    std::fprintf(stderr,
-                 "osteon-loop-bench: needs `tick`, or `blackout` and the seconds of each part, more than 0 and at most 600\n");
+    std::fprintf(
+        stderr,
+        "osteon-loop-bench: needs `tick`, or `blackout` and the seconds of each part, more than 0 and at most 600\n");
     return 1;
   }
   std::printf("{");

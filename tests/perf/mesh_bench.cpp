@@ -34,7 +34,8 @@ constexpr double kHead_mm = 24.0, kFossa_mm = 6.0, kCanal_mm = 6.0;
 double head_mm(const Vec3& p) {
   const double ball = (p - kHead).norm() - kHead_mm, fossa = kFossa_mm - (p - Vec3(10, 8, 21)).norm();
   const double around = std::hypot(p.x(), p.y());
-  const double shaft = std::max({around - 13.0, p.z(), -28.0 - p.z()}), canal = std::max(kCanal_mm - around, p.z() + 8.0 - kHead_mm);
+  const double shaft = std::max({around - 13.0, p.z(), -28.0 - p.z()}),
+               canal = std::max(kCanal_mm - around, p.z() + 8.0 - kHead_mm);
   return std::max({std::min(ball, shaft), fossa, canal > -0.5 && p.z() < 0 ? kCanal_mm - around : -10.0});
 }
 
@@ -49,7 +50,8 @@ struct Scene {
 };
 
 Scene head(double pitch_mm) {
-  return {CutField(make_bone({Vec3(-28, -28, -31), Vec3(28, 28, 27)}, pitch_mm, head_mm, [](const Vec3&) { return 1.9; }), {})};
+  return {CutField(
+      make_bone({Vec3(-28, -28, -31), Vec3(28, 28, 27)}, pitch_mm, head_mm, [](const Vec3&) { return 1.9; }), {})};
 }
 
 Cut burr_cut(const Vec3& from, const Vec3& to) {
@@ -131,8 +133,8 @@ double seconds(Call call) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Both in turn, after one of each that does not count. The spread is that of eleven parts of the run, by their medians: a
-// call of microseconds that was interrupted says nothing.
+// Both in turn, after one of each that does not count. The spread is that of eleven parts of the run, by their medians:
+// a call of microseconds that was interrupted says nothing.
 template <class Ours, class Theirs>
 void versus(benchmark::State& state, int rounds, const char* unit, double per_second, Ours ours, Theirs theirs) {
   std::vector<double> a, b, ratio;
@@ -186,12 +188,13 @@ void mesh_block_versus_flying_edges(benchmark::State& state) {
   FlyingEdges flying_edges(image);
   BlockSamples samples;
   Mesh mesh;
-  versus(state, 1001, "us", 1e6,
-         [&] {
-           gather_block(scene.field, scene.blocks, key, kBonePitch_mm, samples);
-           mesh_block(samples, mesh);
-         },
-         [&] { flying_edges.run(); });
+  versus(
+      state, 1001, "us", 1e6,
+      [&] {
+        gather_block(scene.field, scene.blocks, key, kBonePitch_mm, samples);
+        mesh_block(samples, mesh);
+      },
+      [&] { flying_edges.run(); });
   state.counters["triangles"] = static_cast<double>(mesh.triangles.size());
   state.counters["flying_edges_triangles"] = flying_edges.triangles();
 }
@@ -223,12 +226,13 @@ void mesh_whole_bone_versus_flying_edges(benchmark::State& state) {
   fill(*image, scene.field, 0, bounds.grown(1));
   FlyingEdges flying_edges(image);
   std::vector<Mesh> meshes;
-  versus(state, 11, "ms", 1e3,
-         [&] {
-           meshes.clear();
-           mesh_all(scene, keys, threads, meshes);
-         },
-         [&] { flying_edges.run(); });
+  versus(
+      state, 11, "ms", 1e3,
+      [&] {
+        meshes.clear();
+        mesh_all(scene, keys, threads, meshes);
+      },
+      [&] { flying_edges.run(); });
   double triangles = 0;
   for (const Mesh& mesh : meshes) triangles += static_cast<double>(mesh.triangles.size());
   state.counters["triangles"] = triangles;
@@ -380,7 +384,12 @@ BENCHMARK(mesh_encode)->Unit(benchmark::kMicrosecond);
 BENCHMARK(mesh_decode)->Unit(benchmark::kMicrosecond);
 BENCHMARK(mesh_flying_edges)->Unit(benchmark::kMicrosecond);
 BENCHMARK(mesh_block_versus_flying_edges)->Iterations(1)->Unit(benchmark::kMillisecond);
-BENCHMARK(mesh_whole_bone_versus_flying_edges)->Arg(1)->Arg(2)->Iterations(1)->Unit(benchmark::kMillisecond)->UseRealTime();
+BENCHMARK(mesh_whole_bone_versus_flying_edges)
+    ->Arg(1)
+    ->Arg(2)
+    ->Iterations(1)
+    ->Unit(benchmark::kMillisecond)
+    ->UseRealTime();
 BENCHMARK(mesh_frame_of_33_cuts)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(mesh_bytes_per_triangle_cut)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(mesh_bytes_per_triangle_bone)->Iterations(1)->Unit(benchmark::kMillisecond);

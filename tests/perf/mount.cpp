@@ -1,5 +1,5 @@
-// osteon-mount TICKS: two users push a bone on its mount against each other over lines of 0, 50 and 150 ms, and over one line
-// of each, with jitter and loss, TICKS each. Virtual time: the same numbers on every machine. JSON.
+// osteon-mount TICKS: two users push a bone on its mount against each other over lines of 0, 50 and 150 ms, and over
+// one line of each, with jitter and loss, TICKS each. Virtual time: the same numbers on every machine. JSON.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -30,10 +30,11 @@ TwoUsersRun over(const Line& line, long ticks) {
 
 void print(const char* kind, const Line& line, const TwoUsersRun& run, bool first) {
   const TwoUsersResult r = push_each_other(run);
-  std::fprintf(stderr, "# %s, %s ms: %d rests, worst %.2f %%, %.3f mJ made\n", kind, line.name, r.rests, 100.0 * r.worst_error,
-               r.most_created_mj);
+  std::fprintf(stderr, "# %s, %s ms: %d rests, worst %.2f %%, %.3f mJ made\n", kind, line.name, r.rests,
+               100.0 * r.worst_error, r.most_created_mj);
   std::printf(
-      "%s{\"kind\": \"%s\", \"line_ms\": \"%s\", \"ticks\": %ld, \"rests\": %d, \"worst_percent\": %.4f, \"mean_percent\": %.4f, "
+      "%s{\"kind\": \"%s\", \"line_ms\": \"%s\", \"ticks\": %ld, \"rests\": %d, \"worst_percent\": %.4f, "
+      "\"mean_percent\": %.4f, "
       "\"least_other_n\": %.3f, \"made_mj\": %.6f, \"allowance_mj\": %.6g, \"force_n\": %.3f, \"growth\": %.4f, "
       "\"held_back\": %ld, \"put_in_mj\": %.3f, \"released_mj\": %.3f, \"account_mj\": %.9f, \"low_pass_s\": %.3f}",
       first ? "" : ", ", kind, line.name, run.ticks, r.rests, 100.0 * r.worst_error, 100.0 * r.mean_error,

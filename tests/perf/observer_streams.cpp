@@ -58,7 +58,8 @@ Head head_of(const ByteBuffer& message) {
 // One subscription; reads as fast as messages come, or never.
 class Stream final : public grpc::ClientBidiReactor<ByteBuffer, ByteBuffer> {
  public:
-  Stream(const std::shared_ptr<grpc::Channel>& channel, const char* method, const google::protobuf::Message& request, bool reads)
+  Stream(const std::shared_ptr<grpc::Channel>& channel, const char* method, const google::protobuf::Message& request,
+         bool reads)
       : stub_(channel), reads_(reads) {
     const std::string bytes = request.SerializeAsString();
     const grpc::Slice slice(bytes);
@@ -155,7 +156,8 @@ std::vector<Received> Observers::finish() {
   for (const auto& observer : observers_) {
     observer->mesh->end();
     observer->states->end();
-    if (observer->reads) received.push_back({std::move(observer->mesh->received), std::move(observer->states->received)});
+    if (observer->reads)
+      received.push_back({std::move(observer->mesh->received), std::move(observer->states->received)});
   }
   observers_.clear();
   return received;

@@ -22,7 +22,9 @@ struct Received {
   std::vector<Arrival> mesh, states;
 };
 
-[[nodiscard]] inline std::chrono::nanoseconds machine_time() { return std::chrono::steady_clock::now().time_since_epoch(); }
+[[nodiscard]] inline std::chrono::nanoseconds machine_time() {
+  return std::chrono::steady_clock::now().time_since_epoch();
+}
 
 // Each has a connection of its own, as people on different machines would. The first `stalled` of them never read. They
 // want the tools' states `states_hz` times a second, 0: all.
@@ -33,7 +35,8 @@ class Observers {
   Observers(const Observers&) = delete;
   Observers& operator=(const Observers&) = delete;
 
-  // Until everyone who reads has the whole surface, at this place of the room's order or a later one. False: not in time.
+  // Until everyone who reads has the whole surface, at this place of the room's order or a later one. False: not in
+  // time.
   [[nodiscard]] bool wait_for(RoomSeq place, std::chrono::milliseconds patience) const;
   // Ends all streams and says what those who read have received.
   [[nodiscard]] std::vector<Received> finish();

@@ -1,8 +1,9 @@
-// A room that many watch: one hand burs steadily while observers are sent the surface and the tools' states, some of them
-// stalled. How long a committed cut takes to everyone, how many frames a second they have, and what that costs the server.
-// Measured with a few observers, with all, and with some of these stalled, each on a server of its own. Prints JSON.
-#include <CLI/CLI.hpp>
+// A room that many watch: one hand burs steadily while observers are sent the surface and the tools' states, some of
+// them stalled. How long a committed cut takes to everyone, how many frames a second they have, and what that costs the
+// server. Measured with a few observers, with all, and with some of these stalled, each on a server of its own. Prints
+// JSON.
 #include <unistd.h>
+#include <CLI/CLI.hpp>
 
 #include <algorithm>
 #include <array>
@@ -44,7 +45,9 @@ double quantile(const std::vector<double>& sorted, double part) {
 }
 json spread(std::vector<double> values) {
   std::ranges::sort(values);
-  return {{"count", values.size()}, {"p50", rounded(quantile(values, 0.5))}, {"p99", rounded(quantile(values, 0.99))},
+  return {{"count", values.size()},
+          {"p50", rounded(quantile(values, 0.5))},
+          {"p99", rounded(quantile(values, 0.99))},
           {"max", rounded(values.empty() ? 0.0 : values.back())}};
 }
 
@@ -84,7 +87,9 @@ class Author {
     events.change = [](BonePart&&) {};
     events.scene = [](RoomSeq, const std::vector<SceneItem>&) {};
     events.noted = [](RoomSeq) {};
-    events.lost = [](const Error& why) { std::cerr << "osteon-observers: the author lost the room: " << why.message << "\n"; };
+    events.lost = [](const Error& why) {
+      std::cerr << "osteon-observers: the author lost the room: " << why.message << "\n";
+    };
     session_->open(std::move(events));
     OSTEON_CHECK(wait_until([&] { return complete_.load(); }, 20s));
   }
@@ -149,7 +154,8 @@ class Author {
   std::map<RoomSeq, Times> committed_;
 };
 
-// [a process of its own] Observers that say when they are there, wait for a place of the order, and write what they got.
+// [a process of its own] Observers that say when they are there, wait for a place of the order, and write what they
+// got.
 int watch(const std::string& address, int count, int stalled, int states_hz, const std::string& file) {
   Observers observers(address, count, stalled, states_hz);
   if (!observers.wait_for(RoomSeq{0}, 60s)) return 1;
@@ -177,14 +183,15 @@ std::vector<Received> read_received(const std::filesystem::path& file, std::size
   std::int64_t at = 0;
   std::uint64_t contains = 0;
   while (in >> who >> stream >> at >> contains >> bytes)
-    (stream == 'm' ? received.at(who).mesh : received.at(who).states).push_back({nanoseconds{at}, RoomSeq{contains}, bytes});
+    (stream == 'm' ? received.at(who).mesh : received.at(who).states)
+        .push_back({nanoseconds{at}, RoomSeq{contains}, bytes});
   return received;
 }
 
 // From each cut's sending or commit until each observer's first message that contains it.
 template <class Stream>
 std::vector<double> delays_ms(const std::map<RoomSeq, Author::Times>& commits, const std::vector<Received>& received,
-                              Stream stream, nanoseconds from, nanoseconds Author::Times::* since) {
+                              Stream stream, nanoseconds from, nanoseconds Author::Times::*since) {
   std::vector<double> delays;
   for (const Received& observer : received) {
     auto arrival = (observer.*stream).begin();
@@ -230,18 +237,19 @@ struct Setting {
 
 json measure(const Setting& setting, int count, int stalled) {
   const TempDir temp;
-  Process server(setting.server_program,
-                 {"--case", setting.case_folder, "--address-file", temp / "address", "--summary", temp / "summary.json"});
+  Process server(setting.server_program, {"--case", setting.case_folder, "--address-file", temp / "address",
+                                          "--summary", temp / "summary.json"});
   const auto address = wait_for_address(temp / "address", 120s);
   OSTEON_CHECK(address.has_value());
   Author author(*address, temp / "cache");
   const Usage alone = usage_of(server.pid());
-  Process readers(program("osteon-observers"), {"--watch", *address, "--observers", std::to_string(count), "--stalled",
-                                                std::to_string(stalled), "--states-hz",
-                                                std::to_string(setting.states_hz), "--file", temp / "received"});
+  Process readers(program("osteon-observers"),
+                  {"--watch", *address, "--observers", std::to_string(count), "--stalled", std::to_string(stalled),
+                   "--states-hz", std::to_string(setting.states_hz), "--file", temp / "received"});
   OSTEON_CHECK(readers.read_line(90s) == "ready");
 
-  const Usage before = usage_of(server.pid()), readers_before = usage_of(readers.pid()), own_before = usage_of(::getpid());
+  const Usage before = usage_of(server.pid()), readers_before = usage_of(readers.pid()),
+              own_before = usage_of(::getpid());
   const auto start = machine_time();
   author.cut_for(setting.duration);
   const auto stop = machine_time();
@@ -263,12 +271,16 @@ json measure(const Setting& setting, int count, int stalled) {
     if (times.committed >= from) to_commit.push_back(ms(times.committed - times.sent));
   const double seconds = 1e-9 * static_cast<double>((stop - start).count());
   const auto share = [&](const Usage& a, const Usage& b) { return rounded((b.cpu_s - a.cpu_s) / seconds); };
-  json out{{"observers", count}, {"stalled", stalled}, {"cuts", commits.size()}, {"everyone_there", everyone_there},
+  json out{{"observers", count},
+           {"stalled", stalled},
+           {"cuts", commits.size()},
+           {"everyone_there", everyone_there},
            {"sent_to_commit_ms", spread(to_commit)}};
   if (everyone_there) {
     out["commit_to_mesh_ms"] = spread(delays_ms(commits, received, &Received::mesh, from, &Author::Times::committed));
     out["sent_to_mesh_ms"] = spread(delays_ms(commits, received, &Received::mesh, from, &Author::Times::sent));
-    out["commit_to_state_ms"] = spread(delays_ms(commits, received, &Received::states, from, &Author::Times::committed));
+    out["commit_to_state_ms"] =
+        spread(delays_ms(commits, received, &Received::states, from, &Author::Times::committed));
   }
   out["mesh"] = rates(received, &Received::mesh, from, stop);
   out["states"] = rates(received, &Received::states, from, stop);
@@ -286,8 +298,10 @@ json measure(const Setting& setting, int count, int stalled) {
 }
 
 std::filesystem::path make_block(const TempDir& temp) {
-  const RunResult imported = run(program("osteon-import"), {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width", "40",
-                                                            "--pitch", "0.5", "--out", temp / "case"}, 120s);
+  const RunResult imported = run(
+      program("osteon-import"),
+      {"phantom", "block", "--layers", "5:1.9,20:0.3,5:1.9", "--width", "40", "--pitch", "0.5", "--out", temp / "case"},
+      120s);
   OSTEON_CHECK(imported.exit_code == 0);
   return temp / "case";
 }

@@ -1,9 +1,9 @@
-// osteon-override [TIMES | touch]: how soon and how gently an instructor's word takes hold of a hand. A real server and a haptic
-// client's own threads with osteon-impair between them, one way 0, 50 and 150 ms late, and with 30 % of the datagrams lost: from
-// the answer to Supervise, which is given when the row is kept, until the 1 kHz loop cuts no more, less the time of the way. And
-// on virtual time (that alone with `touch`) what the hand feels of being stopped, taken over, given back, limited, led and undone
-// under, at both kinds of device, on bone that stands and on a mount that another user pushes too. Hands, devices and the bad
-// line are simulated. JSON, milliseconds, newtons and millijoules.
+// osteon-override [TIMES | touch]: how soon and how gently an instructor's word takes hold of a hand. A real server and
+// a haptic client's own threads with osteon-impair between them, one way 0, 50 and 150 ms late, and with 30 % of the
+// datagrams lost: from the answer to Supervise, which is given when the row is kept, until the 1 kHz loop cuts no more,
+// less the time of the way. And on virtual time (that alone with `touch`) what the hand feels of being stopped, taken
+// over, given back, limited, led and undone under, at both kinds of device, on bone that stands and on a mount that
+// another user pushes too. Hands, devices and the bad line are simulated. JSON, milliseconds, newtons and millijoules.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -34,8 +34,9 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-// Of one contact, as of the coupling's alone (stability_worst_contact): the ledger lets none give more than 0.008 mJ beyond what
-// it got (deploy/decisions/0021), and a quarter of that is granted to how it is reckoned here from outside [A].
+// Of one contact, as of the coupling's alone (stability_worst_contact): the ledger lets none give more than 0.008 mJ
+// beyond what it got (deploy/decisions/0021), and a quarter of that is granted to how it is reckoned here from outside
+// [A].
 constexpr double kBudget_mj = 0.01;
 
 struct Line {
@@ -142,12 +143,12 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
   hand.run(400);
   Restrictions now;
   constexpr double kThrough_mm = 11.0, kOut_mm = -4.0;  // of bone from 0 to 12
-  Vec3 place_mm(0, 0, -3), from_mm = place_mm;  // where it drills, and where it is drawn out
+  Vec3 place_mm(0, 0, -3), from_mm = place_mm;          // where it drills, and where it is drawn out
   std::uint64_t seq = 0;
   double down = 0;
   for (int i = 0; i < 1000 * seconds; ++i, ++down) {
-    // Now and then it is drawn out, as a hand does whose tool is held by bone that came back, or has come through, and goes to
-    // another place.
+    // Now and then it is drawn out, as a hand does whose tool is held by bone that came back, or has come through, and
+    // goes to another place.
     const Vec3 at_mm = hand.handle_mm();
     if (i % 5000 == 4000 || (drills && down >= 0.0 && at_mm.z() > kThrough_mm)) {
       down = -1500.0;
@@ -171,16 +172,26 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
     }
     if (i % 300 == 299) {
       switch (random.index(8)) {
-        case 0: now.stopped = !now.stopped; break;
-        case 1: now.taken_by = now.taken_by ? AuthorId{} : AuthorId{3}; break;
+        case 0:
+          now.stopped = !now.stopped;
+          break;
+        case 1:
+          now.taken_by = now.taken_by ? AuthorId{} : AuthorId{3};
+          break;
         case 2:
           now.guide = now.guide ? AuthorId{} : AuthorId{3};
           now.guide_share = now.guide ? 200 + static_cast<int>(random.index(800)) : 0;
           break;
-        case 3: now.force_limit = now.force_limit > 0 ? 0 : 50 + static_cast<int>(random.index(1500)); break;
+        case 3:
+          now.force_limit = now.force_limit > 0 ? 0 : 50 + static_cast<int>(random.index(1500));
+          break;
         case 4:
-        case 5: hand.undo(1 + static_cast<int>(random.index(80))); break;
-        default: now = {}; break;
+        case 5:
+          hand.undo(1 + static_cast<int>(random.index(80)));
+          break;
+        default:
+          now = {};
+          break;
       }
       hand.decide(now);
     }
@@ -191,7 +202,8 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
     }
     // Of the leading hand now and then a state comes, one in three is lost, and sometimes there is silence.
     if (i % 16 == 0 && random.unit() > 0.3 && i % 7000 < 6000)
-      hand.guide = {true, ++seq, Vec3(6.0 * std::cos(1.3e-3 * i), 4.0 * std::sin(0.9e-3 * i), 1.0 + 3.0 * std::sin(2.1e-3 * i))};
+      hand.guide = {true, ++seq,
+                    Vec3(6.0 * std::cos(1.3e-3 * i), 4.0 * std::sin(0.9e-3 * i), 1.0 + 3.0 * std::sin(2.1e-3 * i))};
     hand.tick();
   }
   return hand.crossed();
@@ -209,7 +221,8 @@ json run_touches(bool mount, int delay_ms, int seconds) {
   std::uint64_t seed = 100 + static_cast<std::uint64_t>(delay_ms);
   for (const char* tool : {"burr-round-5", "drill-3.2"})
     for (const bool weak : {false, true}) {
-      const Crossed one = run_touch({.tool = tool, .delay_ms = delay_ms, .weak = weak, .mount = mount}, seed++, seconds);
+      const Crossed one =
+          run_touch({.tool = tool, .delay_ms = delay_ms, .weak = weak, .mount = mount}, seed++, seconds);
       worst.step_over_slew = std::max(worst.step_over_slew, one.step_over_slew);
       worst.worst_mj = std::max(worst.worst_mj, one.worst_mj);
       worst.led_mj = std::max(worst.led_mj, one.led_mj);

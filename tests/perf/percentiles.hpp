@@ -10,7 +10,9 @@ namespace osteon::test {
 
 // 0 where there is nothing.
 [[nodiscard]] inline double percentile(const std::vector<double>& sorted, double percent) {
-  return sorted.empty() ? 0.0 : sorted[static_cast<std::size_t>(0.01 * percent * static_cast<double>(sorted.size() - 1) + 0.5)];
+  return sorted.empty()
+             ? 0.0
+             : sorted[static_cast<std::size_t>(0.01 * percent * static_cast<double>(sorted.size() - 1) + 0.5)];
 }
 
 [[nodiscard]] inline double rounded(double value) { return std::round(1000.0 * value) / 1000.0; }

@@ -1,5 +1,6 @@
-// What it costs to know of pieces: labelling a ball of bone at first, keeping the labels up to date over cuts, and taking
-// a half that a kerf parted; and to build the ball's case part by part. Takes the ball's size in samples. Prints JSON.
+// What it costs to know of pieces: labelling a ball of bone at first, keeping the labels up to date over cuts, and
+// taking a half that a kerf parted; and to build the ball's case part by part. Takes the ball's size in samples. Prints
+// JSON.
 #include <sys/resource.h>
 #include <tbb/global_control.h>
 
@@ -36,8 +37,8 @@ int run(int samples) {
   const double build_ms = ms_since(start);
   rusage used{};
   ::getrusage(RUSAGE_SELF, &used);
-  std::printf("{\"samples\": %d, \"build_ms\": %.1f, \"case_megabytes\": %.2f, \"peak_megabytes\": %.1f, ", samples, build_ms,
-              static_cast<double>(built.memory_bytes()) * 1e-6, static_cast<double>(used.ru_maxrss) * 1e-3);
+  std::printf("{\"samples\": %d, \"build_ms\": %.1f, \"case_megabytes\": %.2f, \"peak_megabytes\": %.1f, ", samples,
+              build_ms, static_cast<double>(built.memory_bytes()) * 1e-6, static_cast<double>(used.ru_maxrss) * 1e-3);
 
   CutField field(built, {});
   start = std::chrono::steady_clock::now();
@@ -76,7 +77,8 @@ int run(int samples) {
         bool cuts = false;
         for (std::int32_t i = 0; i < kLeafVoxels; ++i) {
           const double mm = std::abs((x + i / 64) * pitch - x0) - 0.5;
-          leaf.values[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(std::clamp(std::lround(mm * 1024.0), -long{band}, long{band}));
+          leaf.values[static_cast<std::size_t>(i)] =
+              static_cast<std::int16_t>(std::clamp(std::lround(mm * 1024.0), -long{band}, long{band}));
           cuts |= leaf.values[static_cast<std::size_t>(i)] < band;
         }
         if (!cuts || !built.has_bone({shift_down({x, y, z}, 2), shift_down({x + 7, y + 7, z + 7}, 2)})) continue;
@@ -90,8 +92,9 @@ int run(int samples) {
   const auto pieces = finder.take_fragments(field);
   const double height = 6.0 - 0.5;
   const double exact = 3.14159265358979 * height * height * (3.0 * radius_mm - height) / 3.0;
-  std::printf("\"kerf_cells\": %zu, \"kerf_touch_ms\": %.1f, \"take_ms\": %.1f, \"pieces\": %zu, \"volume_error\": %.5f, ", cost.cells, kerf_ms,
-              ms_since(start), pieces.size(), pieces.empty() ? 1.0 : pieces[0].volume_mm3 / exact - 1.0);
+  std::printf(
+      "\"kerf_cells\": %zu, \"kerf_touch_ms\": %.1f, \"take_ms\": %.1f, \"pieces\": %zu, \"volume_error\": %.5f, ",
+      cost.cells, kerf_ms, ms_since(start), pieces.size(), pieces.empty() ? 1.0 : pieces[0].volume_mm3 / exact - 1.0);
   std::printf("\"taken_leaves\": %zu, \"left_leaves\": %zu}\n", pieces.empty() ? 0 : pieces[0].taken.size(),
               pieces.empty() ? 0 : pieces[0].left.size());
   return 0;

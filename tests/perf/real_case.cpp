@@ -121,14 +121,15 @@ int run(const char* folder, int frames, const char* vertices) {
     drawn.insert(changed.begin(), changed.end());
   }
   const Coord samples = room.bone().bounds_samples().dims();
-  std::printf("{\"pitch_mm\": %.5f, \"cut_pitch_mm\": %.5f, \"samples\": [%d, %d, %d], \"bone_cm3\": %.2f, \"case_mb\": %.1f, "
-              "\"whole_ms\": %.1f, \"triangles\": %zu, \"frames\": %d, \"cut_us_p50\": %.1f, \"cut_us_p99\": %.1f, "
-              "\"frame_ms_p50\": %.3f, \"frame_ms_min\": %.3f, \"frame_ms_max\": %.3f, \"stale_p50\": %.0f, "
-              "\"removed_mm3\": %.2f, \"cut_mb\": %.2f}\n",
-              h, level_pitch_mm(h, level), samples.x, samples.y, samples.z, room.bone().volume_mm3() / 1000.0, case_bytes / 1e6,
-              whole_ms, triangles, frames, quantile(cut_us, 0.5), quantile(cut_us, 0.99), quantile(frame_ms, 0.5),
-              quantile(frame_ms, 0), quantile(frame_ms, 1), quantile(stale, 0.5), room.field().removed_mm3(),
-              (heap_bytes() - uncut) / 1e6);
+  std::printf(
+      "{\"pitch_mm\": %.5f, \"cut_pitch_mm\": %.5f, \"samples\": [%d, %d, %d], \"bone_cm3\": %.2f, \"case_mb\": %.1f, "
+      "\"whole_ms\": %.1f, \"triangles\": %zu, \"frames\": %d, \"cut_us_p50\": %.1f, \"cut_us_p99\": %.1f, "
+      "\"frame_ms_p50\": %.3f, \"frame_ms_min\": %.3f, \"frame_ms_max\": %.3f, \"stale_p50\": %.0f, "
+      "\"removed_mm3\": %.2f, \"cut_mb\": %.2f}\n",
+      h, level_pitch_mm(h, level), samples.x, samples.y, samples.z, room.bone().volume_mm3() / 1000.0, case_bytes / 1e6,
+      whole_ms, triangles, frames, quantile(cut_us, 0.5), quantile(cut_us, 0.99), quantile(frame_ms, 0.5),
+      quantile(frame_ms, 0), quantile(frame_ms, 1), quantile(stale, 0.5), room.field().removed_mm3(),
+      (heap_bytes() - uncut) / 1e6);
   if (vertices && !write_vertices(room, drawn, vertices)) {
     std::fprintf(stderr, "osteon-real-case: cannot write %s\n", vertices);
     return 1;

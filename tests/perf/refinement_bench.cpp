@@ -26,8 +26,8 @@ double us_since(std::chrono::steady_clock::time_point start) {
 
 void print(const std::string& name, std::vector<double> values) {
   std::ranges::sort(values);
-  std::printf("\"%s_p50\": %.2f, \"%s_min\": %.2f, \"%s_max\": %.2f, ", name.c_str(), values[values.size() / 2], name.c_str(), values.front(),
-              name.c_str(), values.back());
+  std::printf("\"%s_p50\": %.2f, \"%s_min\": %.2f, \"%s_max\": %.2f, ", name.c_str(), values[values.size() / 2],
+              name.c_str(), values.front(), name.c_str(), values.back());
 }
 
 // A bur at four sites of the bone, at each some tenths of a second of strokes of 8 ms.
@@ -54,8 +54,8 @@ struct Difference {
   std::size_t compared = 0, differing = 0, cut = 0;  // samples; `cut`: those that the cuts changed
 };
 
-// The bone f that each of the methods gives, on every sample of the level: read from what was resampled, or computed from
-// the coarse bone and the cuts. The boxes lie across the sub-volumes' faces.
+// The bone f that each of the methods gives, on every sample of the level: read from what was resampled, or computed
+// from the coarse bone and the cuts. The boxes lie across the sub-volumes' faces.
 Difference difference_of(const SubVolumeField& whole, const CutField& local, int level) {
   const CoordBox bounds = local.bone().bounds_samples();
   const std::int32_t n = kSubVolumeSamples, half = n / 2;
@@ -112,13 +112,14 @@ void compare(const Case& bone, int level) {
     std::printf("\"%sreachable_mm\": %.4f, ", name.c_str(), level_pitch_mm(kPitch_mm, level) * std::cbrt(bytes / 1e9));
   }
   const Difference difference = difference_of(whole, local, level);
-  std::printf("\"%scompared_samples\": %zu, \"%scut_samples\": %zu, \"%sdiffering_samples\": %zu, ", at.c_str(), difference.compared,
-              at.c_str(), difference.cut, at.c_str(), difference.differing);
+  std::printf("\"%scompared_samples\": %zu, \"%scut_samples\": %zu, \"%sdiffering_samples\": %zu, ", at.c_str(),
+              difference.compared, at.c_str(), difference.cut, at.c_str(), difference.differing);
   std::vector<Coord> leaves;
   for (const FieldLeaf& leaf : local.leaf_places()) leaves.push_back(leaf.origin);
-  std::printf("\"%smethod1_areas\": %zu, \"%smethod2_areas\": %zu, \"%smethod1_sub_volumes\": %zu, \"%smethod2_leaves\": %zu",
-              at.c_str(), unconnected_areas(whole.sub_volumes(), kSubVolumeSamples), at.c_str(), unconnected_areas(leaves, kLeafSize),
-              at.c_str(), whole.sub_volumes().size(), at.c_str(), leaves.size());
+  std::printf(
+      "\"%smethod1_areas\": %zu, \"%smethod2_areas\": %zu, \"%smethod1_sub_volumes\": %zu, \"%smethod2_leaves\": %zu",
+      at.c_str(), unconnected_areas(whole.sub_volumes(), kSubVolumeSamples), at.c_str(),
+      unconnected_areas(leaves, kLeafSize), at.c_str(), whole.sub_volumes().size(), at.c_str(), leaves.size());
 }
 
 int run() {

@@ -1,5 +1,5 @@
-// osteon-rooms-per-core [SECONDS]: processor time of rooms in one process, each with a journal on the disk and one tool that a
-// simulated hand leads, whose cuts were made beforehand. Clients, and the network to them, are not in it. JSON.
+// osteon-rooms-per-core [SECONDS]: processor time of rooms in one process, each with a journal on the disk and one tool
+// that a simulated hand leads, whose cuts were made beforehand. Clients, and the network to them, are not in it. JSON.
 #include <sys/resource.h>
 #include <time.h>
 
@@ -24,7 +24,9 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-double seconds_of(const timeval& time) { return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec); }
+double seconds_of(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+}
 double cpu_of_process() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
@@ -76,7 +78,8 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
   } else {
     room.emplace(bone, CutLimits{});
   }
-  held.runtime = std::make_unique<RoomRuntime>(std::move(*room), RuntimeRates{}, [](double) {}, Detail::automatic, held.store.get());
+  held.runtime = std::make_unique<RoomRuntime>(
+      std::move(*room), RuntimeRates{}, [](double) {}, Detail::automatic, held.store.get());
   const Result<AuthorId> author = held.host->join(MemberKind::surgeon, "tool");
   OSTEON_CHECK(author.has_value());
   held.listener = std::make_shared<Listener>(*author);
@@ -86,7 +89,8 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
 }
 
 // `cutting` false: the rooms are there, and nobody works.
-json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t count, double seconds, bool kept, bool cutting) {
+json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t count, double seconds, bool kept,
+               bool cutting) {
   const TempDir folder;
   std::vector<HeldRoom> rooms;
   for (std::size_t i = 0; i < count; ++i)
@@ -137,7 +141,9 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
           {"behind_at_the_end_s", rounded(behind)},
           {"tick_missed_share", rounded(missed / (ticks + missed))},
           {"worst_room_ms",
-           {{"tick_late_p99", rounded(late_p99)}, {"tick_work_p99", rounded(work_p99)}, {"commit_p99", rounded(commit_p99)}}}};
+           {{"tick_late_p99", rounded(late_p99)},
+            {"tick_work_p99", rounded(work_p99)},
+            {"commit_p99", rounded(commit_p99)}}}};
 }
 
 }  // namespace
@@ -150,7 +156,8 @@ int main(int argc, char** argv) {
   const std::vector<osteon::Cut> stroke = burred_stroke(seconds);
   OSTEON_CHECK(!stroke.empty());
   nlohmann::json out{{"seconds", seconds}, {"cuts_of_the_stroke", stroke.size()}, {"cutting", nlohmann::json::array()}};
-  for (const std::size_t rooms : {1u, 4u, 16u}) out["cutting"].push_back(run_rooms(bone, stroke, rooms, seconds, true, true));
+  for (const std::size_t rooms : {1u, 4u, 16u})
+    out["cutting"].push_back(run_rooms(bone, stroke, rooms, seconds, true, true));
   out["not_kept"] = run_rooms(bone, stroke, 4, seconds, false, true);
   out["idle"] = run_rooms(bone, stroke, 4, seconds, true, false);
   std::printf("%s\n", out.dump(1).c_str());

@@ -1,4 +1,5 @@
-// osteon-server-kills [COUNT] [SEED]: kills a server of a journalled room so often at work, and says what was lost. JSON.
+// osteon-server-kills [COUNT] [SEED]: kills a server of a journalled room so often at work, and says what was lost.
+// JSON.
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>

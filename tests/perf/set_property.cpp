@@ -1,6 +1,6 @@
 // Whether a bone is a function of the set of its cuts: applies random cuts of all tools in random orders, some of them
-// again, and compares the names of the fields. Takes cuts, orders, threads that share a cut and, if wanted, the number of
-// the first order (each number is another order) and how many samples the kernel computes at once; prints JSON, and
+// again, and compares the names of the fields. Takes cuts, orders, threads that share a cut and, if wanted, the number
+// of the first order (each number is another order) and how many samples the kernel computes at once; prints JSON, and
 // progress to stderr. Linked with differently built kernels it must print the same name.
 #include <tbb/global_control.h>
 
@@ -82,17 +82,19 @@ int run(std::size_t count, int orders, int threads, int first_order, int lanes) 
         std::fprintf(stderr, "%d of %d orders, %d differ, %.0f s\n", tally.done, orders, tally.differing, seconds());
     }
   };
-  // Where each cut has one thread, as many orders are applied at once as there are processors; else one after the other.
+  // Where each cut has one thread, as many orders are applied at once as there are processors; else one after the
+  // other.
   const int at_once = threads == 1 ? std::max(1, static_cast<int>(std::thread::hardware_concurrency())) : 1;
   std::vector<std::jthread> pool;
   for (int i = 0; i < at_once; ++i) pool.emplace_back(work);
   pool.clear();
 
   tally.names.insert(expected);
-  std::printf("{\"cuts\": %zu, \"orders\": %d, \"threads\": %d, \"lanes\": %d, \"seconds\": %.1f, \"tools\": %zu, "
-              "\"names\": %zu, \"differing\": %d, \"partly_cut\": %.4f, \"name\": \"%s\", \"order_numbers\": [",
-              count, orders, threads, used, seconds(), cutting_tools(), tally.names.size(), tally.differing,
-              samples == 0 ? 0.0 : static_cast<double>(between) / static_cast<double>(samples), to_hex(expected).c_str());
+  std::printf(
+      "{\"cuts\": %zu, \"orders\": %d, \"threads\": %d, \"lanes\": %d, \"seconds\": %.1f, \"tools\": %zu, "
+      "\"names\": %zu, \"differing\": %d, \"partly_cut\": %.4f, \"name\": \"%s\", \"order_numbers\": [",
+      count, orders, threads, used, seconds(), cutting_tools(), tally.names.size(), tally.differing,
+      samples == 0 ? 0.0 : static_cast<double>(between) / static_cast<double>(samples), to_hex(expected).c_str());
   const char* before = "";
   for (const std::uint64_t number : tally.orders) {
     std::printf("%s\"%016llx\"", before, static_cast<unsigned long long>(number));

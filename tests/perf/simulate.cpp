@@ -28,14 +28,17 @@ using osteon::test::SimulationReport;
 
 constexpr const char* kUsage =
     "usage: osteon-simulate [--seeds FIRST..LAST] [--full] [--soak] [--verbose] [--break WHAT]\n"
-    "Simulates a room for each seed: a server, its clients, their networks and its disk, on virtual time in this process.\n"
+    "Simulates a room for each seed: a server, its clients, their networks and its disk, on virtual time in this "
+    "process.\n"
     "  --seeds FIRST..LAST  these; or a single one. 1..300 without it\n"
     "  --full               larger bones that fall apart, and the worst networks\n"
     "  --soak               1..100000 where no seeds are given\n"
     "  --verbose            a line for each seed, all that is wrong with it, and what the room logs\n"
-    "  --break WHAT         with a rule broken, to see that seeds fail: dedup, ordering, skipping, replica, forgetful,\n"
+    "  --break WHAT         with a rule broken, to see that seeds fail: dedup, ordering, skipping, replica, "
+    "forgetful,\n"
     "                       pruning, unsaid, hasty\n"
-    "The figures of all seeds go to standard output as JSON; all else to standard error, with the command that runs a seed\n"
+    "The figures of all seeds go to standard output as JSON; all else to standard error, with the command that runs a "
+    "seed\n"
     "that fails again. Status 0: no seed failed, 1: some did, 130: stopped with Ctrl-C, after the seed at hand.\n";
 
 const std::map<std::string_view, Breakage> kBreakages{
@@ -52,7 +55,8 @@ struct Arguments {
 
 bool parse_seeds(std::string_view text, Arguments& arguments) {
   const std::size_t dots = text.find("..");
-  const std::string_view from = text.substr(0, dots), to = dots == std::string_view::npos ? from : text.substr(dots + 2);
+  const std::string_view from = text.substr(0, dots),
+                         to = dots == std::string_view::npos ? from : text.substr(dots + 2);
   const auto number = [](std::string_view digits, std::uint64_t& value) {
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     return error == std::errc{} && end == digits.data() + digits.size();
@@ -64,12 +68,18 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   bool given = false, soak = false;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i], next = i + 1 < argc ? argv[i + 1] : "";
-    if (word == "--full") arguments.options.full = true;
-    else if (word == "--soak") soak = true;
-    else if (word == "--verbose") arguments.verbose = true;
-    else if (word == "--seeds" && parse_seeds(next, arguments)) given = true, ++i;
-    else if (word == "--break" && kBreakages.contains(next)) arguments.broken = next, ++i;
-    else return false;
+    if (word == "--full")
+      arguments.options.full = true;
+    else if (word == "--soak")
+      soak = true;
+    else if (word == "--verbose")
+      arguments.verbose = true;
+    else if (word == "--seeds" && parse_seeds(next, arguments))
+      given = true, ++i;
+    else if (word == "--break" && kBreakages.contains(next))
+      arguments.broken = next, ++i;
+    else
+      return false;
   }
   if (!arguments.broken.empty()) arguments.options.breakage = kBreakages.at(arguments.broken);
   if (soak && !given) arguments.last = 100'000;
@@ -87,9 +97,7 @@ std::string again(const Arguments& arguments, std::uint64_t seed) {
 // For a promise that is broken in the midst of a seed: which one it was.
 std::array<char, 256> abort_line{};
 int real_stderr = STDERR_FILENO;
-void say_which(int) {
-  (void)!::write(real_stderr, abort_line.data(), std::strlen(abort_line.data()));
-}
+void say_which(int) { (void)!::write(real_stderr, abort_line.data(), std::strlen(abort_line.data())); }
 
 // What rooms and journals log of the trouble that they are given is no news.
 class Silence {
@@ -122,8 +130,10 @@ class Sum {
     decisions_ += one.decisions, forbidden_ += one.forbidden;
     undone_ += one.undone, splits_ += one.splits, acknowledged_ += one.acknowledged, crashes_ += one.crashes;
     disk_failures_ += one.disk_failures, breaks_ += one.breaks, resumed_ += one.resumed, programs_ += one.programs;
-    datagrams_.sent += one.datagrams.sent, datagrams_.opened += one.datagrams.opened, datagrams_.forged += one.datagrams.forged;
-    datagrams_.rows += one.datagrams.rows, datagrams_.cuts += one.datagrams.cuts, datagrams_.moves += one.datagrams.moves;
+    datagrams_.sent += one.datagrams.sent, datagrams_.opened += one.datagrams.opened,
+        datagrams_.forged += one.datagrams.forged;
+    datagrams_.rows += one.datagrams.rows, datagrams_.cuts += one.datagrams.cuts,
+        datagrams_.moves += one.datagrams.moves;
     virtual_s_ += one.virtual_s;
     cpu_ms_.push_back(one.cpu_ms);
     settled_s_.push_back(one.settled_s);
@@ -137,22 +147,44 @@ class Sum {
   [[nodiscard]] std::uint64_t seeds() const { return seeds_; }
   [[nodiscard]] std::uint64_t failures() const { return failures_; }
   [[nodiscard]] nlohmann::ordered_json json() const {
-    return {{"seeds", seeds_}, {"failures", failures_}, {"broken_invariants", broken_}, {"fast_path_seeds", fast_path_},
-            {"cuts", cuts_}, {"rows", rows_}, {"commits", committed_}, {"rejections", rejected_}, {"undos", undone_},
-            {"decisions", decisions_}, {"forbidden", forbidden_},
-            {"splits", splits_}, {"acknowledged", acknowledged_}, {"crashes", crashes_}, {"disk_failures", disk_failures_},
-            {"breaks", breaks_}, {"resumed", resumed_}, {"programs", programs_},
-            {"datagrams", {{"sent", datagrams_.sent}, {"opened", datagrams_.opened}, {"forged", datagrams_.forged},
-                           {"cuts", datagrams_.cuts}, {"rows", datagrams_.rows}, {"moves", datagrams_.moves}}},
-            {"virtual_s", virtual_s_}, {"back_s", percentiles(back_s_)}, {"settled_s", percentiles(settled_s_)},
+    return {{"seeds", seeds_},
+            {"failures", failures_},
+            {"broken_invariants", broken_},
+            {"fast_path_seeds", fast_path_},
+            {"cuts", cuts_},
+            {"rows", rows_},
+            {"commits", committed_},
+            {"rejections", rejected_},
+            {"undos", undone_},
+            {"decisions", decisions_},
+            {"forbidden", forbidden_},
+            {"splits", splits_},
+            {"acknowledged", acknowledged_},
+            {"crashes", crashes_},
+            {"disk_failures", disk_failures_},
+            {"breaks", breaks_},
+            {"resumed", resumed_},
+            {"programs", programs_},
+            {"datagrams",
+             {{"sent", datagrams_.sent},
+              {"opened", datagrams_.opened},
+              {"forged", datagrams_.forged},
+              {"cuts", datagrams_.cuts},
+              {"rows", datagrams_.rows},
+              {"moves", datagrams_.moves}}},
+            {"virtual_s", virtual_s_},
+            {"back_s", percentiles(back_s_)},
+            {"settled_s", percentiles(settled_s_)},
             // Through all the trouble: partitions, crashes and a slow disk too.
-            {"felt_ms", {{"by_datagram", percentiles(felt_by_datagram_ms_)}, {"by_stream", percentiles(felt_by_stream_ms_)}}},
+            {"felt_ms",
+             {{"by_datagram", percentiles(felt_by_datagram_ms_)}, {"by_stream", percentiles(felt_by_stream_ms_)}}},
             {"cpu_ms", percentiles(cpu_ms_)}};
   }
 
  private:
-  std::uint64_t seeds_ = 0, failures_ = 0, fast_path_ = 0, cuts_ = 0, rows_ = 0, committed_ = 0, rejected_ = 0, undone_ = 0, decisions_ = 0, forbidden_ = 0,
-                splits_ = 0, acknowledged_ = 0, crashes_ = 0, disk_failures_ = 0, breaks_ = 0, resumed_ = 0, programs_ = 0;
+  std::uint64_t seeds_ = 0, failures_ = 0, fast_path_ = 0, cuts_ = 0, rows_ = 0, committed_ = 0, rejected_ = 0,
+                undone_ = 0, decisions_ = 0, forbidden_ = 0, splits_ = 0, acknowledged_ = 0, crashes_ = 0,
+                disk_failures_ = 0, breaks_ = 0, resumed_ = 0, programs_ = 0;
   osteon::test::DatagramCounts datagrams_;
   double virtual_s_ = 0;
   std::vector<double> cpu_ms_, settled_s_, back_s_;
@@ -162,13 +194,14 @@ class Sum {
 
 void say(const SimulationReport& one, const Arguments& arguments) {
   if (arguments.verbose)
-    std::fprintf(stderr,
-                 "seed %llu: %s, %llu cuts, %llu rows, %llu crashes, %llu breaks; back after %.2f s, settled in %.2f s; "
-                 "%.1f ms\n",
-                 static_cast<unsigned long long>(one.seed), one.fast_path ? "datagrams" : "streams",
-                 static_cast<unsigned long long>(one.cuts), static_cast<unsigned long long>(one.rows),
-                 static_cast<unsigned long long>(one.crashes), static_cast<unsigned long long>(one.breaks), one.back_s,
-                 one.settled_s, one.cpu_ms);
+    std::fprintf(
+        stderr,
+        "seed %llu: %s, %llu cuts, %llu rows, %llu crashes, %llu breaks; back after %.2f s, settled in %.2f s; "
+        "%.1f ms\n",
+        static_cast<unsigned long long>(one.seed), one.fast_path ? "datagrams" : "streams",
+        static_cast<unsigned long long>(one.cuts), static_cast<unsigned long long>(one.rows),
+        static_cast<unsigned long long>(one.crashes), static_cast<unsigned long long>(one.breaks), one.back_s,
+        one.settled_s, one.cpu_ms);
   const std::size_t count = std::min<std::size_t>(one.faults.size(), arguments.verbose ? 20 : 1);
   for (std::size_t i = 0; i < count; ++i)
     std::fprintf(stderr, "seed %llu: %s: %s\n", static_cast<unsigned long long>(one.seed),
@@ -205,7 +238,8 @@ int main(int argc, char** argv) {
   }
   if (sum.seeds() < seeds)
     std::fprintf(stderr, "stopped; go on with --seeds %llu..%llu\n",
-                 static_cast<unsigned long long>(arguments.first + sum.seeds()), static_cast<unsigned long long>(arguments.last));
+                 static_cast<unsigned long long>(arguments.first + sum.seeds()),
+                 static_cast<unsigned long long>(arguments.last));
   std::printf("%s\n", sum.json().dump(2).c_str());
   return sum.seeds() < seeds ? 130 : sum.failures() == 0 ? 0 : 1;
 }

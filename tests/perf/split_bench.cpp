@@ -77,13 +77,16 @@ int run(int samples) {
   OSTEON_CHECK(split.has_value());
   double rows_ms = 0;
   const std::size_t split_bytes = bytes_of(*split, rows_ms);
-  std::printf("\"cuts\": %llu, \"look_ms\": %.1f, \"mask_leaves\": %zu, \"split_ms\": %.2f, \"split_leaves\": %zu, \"rows_ms\": %.2f, "
-              "\"split_bytes\": %zu, \"field_mb_before\": %.2f, \"field_mb\": %.2f, ",
-              static_cast<unsigned long long>(cuts), look_ms, mask, split_ms, split->leaves.size(), rows_ms, split_bytes, before,
-              field_megabytes(room));
+  std::printf(
+      "\"cuts\": %llu, \"look_ms\": %.1f, \"mask_leaves\": %zu, \"split_ms\": %.2f, \"split_leaves\": %zu, "
+      "\"rows_ms\": %.2f, "
+      "\"split_bytes\": %zu, \"field_mb_before\": %.2f, \"field_mb\": %.2f, ",
+      static_cast<unsigned long long>(cuts), look_ms, mask, split_ms, split->leaves.size(), rows_ms, split_bytes,
+      before, field_megabytes(room));
   // Cuts elsewhere are undone; they leave the split alone.
   for (int i = 0; i < 100; ++i) {
-    Cut cut = straight_cut(*burr, {-radius_mm + 1.5, -10.0 + 0.2 * i, 0}, {-radius_mm + 1.5, -9.8 + 0.2 * i, 0}, {1, 0, 0}, ++cuts);
+    Cut cut = straight_cut(*burr, {-radius_mm + 1.5, -10.0 + 0.2 * i, 0}, {-radius_mm + 1.5, -9.8 + 0.2 * i, 0},
+                           {1, 0, 0}, ++cuts);
     cut.author = surgeon;
     const auto outcome = room.submit(cut);
     OSTEON_CHECK(outcome && outcome->committed());

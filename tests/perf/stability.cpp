@@ -1,6 +1,6 @@
-// A million ticks of a hand at the haptic loop on virtual time: stroking, pressing into a cavity and a thin wall, burring
-// and drilling, while others cut and bone is taken back, with 0 to 200 ms on the way to the room; and as many again on devices
-// that show torque to a hand that turns. Takes the number of ticks of each and prints JSON.
+// A million ticks of a hand at the haptic loop on virtual time: stroking, pressing into a cavity and a thin wall,
+// burring and drilling, while others cut and bone is taken back, with 0 to 200 ms on the way to the room; and as many
+// again on devices that show torque to a hand that turns. Takes the number of ticks of each and prints JSON.
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
@@ -27,15 +27,16 @@ StabilityResult all_scenes(long ticks, bool six_axes) {
       const StabilityResult r = run_stability(run);
       all.add(r);
       const int axes = six_axes ? 6 : 3;
-      std::fprintf(stderr, "# %d axes, %s, %d ms: %llu contacts, %.5f mJ generated\n", axes, name(run.scene), run.delay_ms,
-                   static_cast<unsigned long long>(r.episodes), r.generated_mj);
+      std::fprintf(stderr, "# %d axes, %s, %d ms: %llu contacts, %.5f mJ generated\n", axes, name(run.scene),
+                   run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj);
       std::printf(
-          "%s{\"axes\": %d, \"scene\": \"%s\", \"delay_ms\": %d, \"ticks\": %lld, \"touching\": %lld, \"episodes\": %llu, "
+          "%s{\"axes\": %d, \"scene\": \"%s\", \"delay_ms\": %d, \"ticks\": %lld, \"touching\": %lld, \"episodes\": "
+          "%llu, "
           "\"generated_mj\": %.6f, \"worst_mj\": %.6f, \"net_mj\": %.3f, \"cutting_mj\": %.3f, \"turned_mj\": %.3f, "
           "\"held_back\": %lld, \"returned\": %lld, \"undone\": %llu}",
           six_axes || scene + i > 0 ? ", " : "", axes, name(run.scene), run.delay_ms, static_cast<long long>(r.ticks),
-          static_cast<long long>(r.touching), static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj,
-          r.cutting_mj, r.turned_mj, static_cast<long long>(r.held_back), static_cast<long long>(r.returned),
+          static_cast<long long>(r.touching), static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj,
+          r.net_mj, r.cutting_mj, r.turned_mj, static_cast<long long>(r.held_back), static_cast<long long>(r.returned),
           static_cast<unsigned long long>(r.undone));
     }
   return all;
@@ -77,7 +78,8 @@ void print(const char* key, const StabilityResult& all) {
       {"cut_most_nmm", all.cut_most_nmm},
   };
   std::printf(", \"%s\": {", key);
-  for (const auto& [name, value] : values) std::printf("%s\"%s\": %.10g", name == values[0].first ? "" : ", ", name, value);
+  for (const auto& [name, value] : values)
+    std::printf("%s\"%s\": %.10g", name == values[0].first ? "" : ", ", name, value);
   std::printf("}");
 }
 

@@ -1,5 +1,5 @@
-// The cuts of a bur that a simulated hand leads to and fro over a block, as the haptic loop closes them: made once, on virtual
-// time, and then given to rooms at the loop's own rate.
+// The cuts of a bur that a simulated hand leads to and fro over a block, as the haptic loop closes them: made once, on
+// virtual time, and then given to rooms at the loop's own rate.
 #pragma once
 #include <chrono>
 #include <vector>

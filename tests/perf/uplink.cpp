@@ -1,6 +1,6 @@
-// osteon-uplink [SECONDS]: what one tool costs its line and its room's disk: a real server with a journal, and a haptic client
-// that burs without pause and then rests, with the real loop's cuts and poses; on a clean line, and at 40 +- 10 ms with 30 % of
-// the datagrams lost, 10 % reordered and 5 % twice. The hand and the bad line are simulated. JSON.
+// osteon-uplink [SECONDS]: what one tool costs its line and its room's disk: a real server with a journal, and a haptic
+// client that burs without pause and then rests, with the real loop's cuts and poses; on a clean line, and at 40 +- 10
+// ms with 30 % of the datagrams lost, 10 % reordered and 5 % twice. The hand and the bad line are simulated. JSON.
 #include <linux/tcp.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -32,13 +32,13 @@ using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 
 constexpr auto kBin = 100ms;
-constexpr std::size_t kBinsInWindow = 10;   // of the busiest second
-constexpr std::uint64_t kCutsInBin = 10;    // of 14: the tool cuts all the time
+constexpr std::size_t kBinsInWindow = 10;                           // of the busiest second
+constexpr std::uint64_t kCutsInBin = 10;                            // of 14: the tool cuts all the time
 constexpr std::uint64_t kDatagramHeader = 28, kSegmentHeader = 52;  // IPv4 with UDP, and with TCP and its time stamps
 constexpr double kIdle_s = 8.0;
 
-// Bytes that this process has sent so far, headers included: in datagrams, and over the stream, acknowledgements of what came
-// down included.
+// Bytes that this process has sent so far, headers included: in datagrams, and over the stream, acknowledgements of
+// what came down included.
 struct Sent {
   std::uint64_t datagrams = 0, stream = 0;
   [[nodiscard]] std::uint64_t all() const { return datagrams + stream; }
@@ -52,7 +52,8 @@ std::uint64_t sent_over_tcp() {
     socklen_t size = sizeof type;
     if (::getsockopt(file, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_STREAM) continue;
     size = sizeof domain;
-    if (::getsockopt(file, SOL_SOCKET, SO_DOMAIN, &domain, &size) != 0 || (domain != AF_INET && domain != AF_INET6)) continue;
+    if (::getsockopt(file, SOL_SOCKET, SO_DOMAIN, &domain, &size) != 0 || (domain != AF_INET && domain != AF_INET6))
+      continue;
     tcp_info info{};
     size = sizeof info;
     if (::getsockopt(file, IPPROTO_TCP, TCP_INFO, &info, &size) == 0)
@@ -110,7 +111,8 @@ json run_tool(const BadNetwork& network, double seconds) {
   options.patience = 20s;
   options.cache = folder / "cache";
   if (!network.impairment.empty()) {
-    relay.emplace(std::vector<std::string>{"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
+    relay.emplace(
+        std::vector<std::string>{"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
     options.address = relay->tcp();
     options.fast_path = relay->udp();
   }
@@ -155,16 +157,17 @@ json run_tool(const BadNetwork& network, double seconds) {
   json kept;
   for (const auto& [what, bytes] : at_last) kept[what] = {{"at_first", at_first.at(what)}, {"at_last", bytes}};
   kept["log_most"] = log_bytes;
-  return {{"cuts", done.cuts.size()},
-          {"cutting_s", rounded(cutting_s)},
-          {"rejected", done.rejected},
-          {"interruptions", done.interruptions},
-          {"held_for_room_ticks", done.held_for_room_ticks},
-          {"lost", done.lost ? json(done.lost->message) : json()},
-          {"fast_path", {{"loss", rounded(done.fast_path.loss)}, {"round_trip_ms", rounded(done.fast_path.round_trip_ms)}}},
-          {"cutting", rates(cutting)},
-          {"idle", rates(idle)},
-          {"journal_bytes", kept}};
+  return {
+      {"cuts", done.cuts.size()},
+      {"cutting_s", rounded(cutting_s)},
+      {"rejected", done.rejected},
+      {"interruptions", done.interruptions},
+      {"held_for_room_ticks", done.held_for_room_ticks},
+      {"lost", done.lost ? json(done.lost->message) : json()},
+      {"fast_path", {{"loss", rounded(done.fast_path.loss)}, {"round_trip_ms", rounded(done.fast_path.round_trip_ms)}}},
+      {"cutting", rates(cutting)},
+      {"idle", rates(idle)},
+      {"journal_bytes", kept}};
 }
 
 }  // namespace

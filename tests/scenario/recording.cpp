@@ -32,7 +32,8 @@ Result<Recording> read_recording(const std::filesystem::path& stem) {
     v1::Cut message;
     if (!google::protobuf::util::ParseDelimitedFromZeroCopyStream(&message, &stream, &at_end)) {
       if (at_end) break;
-      return failure(ErrorCode::invalid_input, with(stem, ".cuts").string() + " is damaged; make it again with osteon-record-scenarios");
+      return failure(ErrorCode::invalid_input,
+                     with(stem, ".cuts").string() + " is damaged; make it again with osteon-record-scenarios");
     }
     const auto cut = wire::from_wire(message);
     if (!cut) return failure(ErrorCode::invalid_input, with(stem, ".cuts").string() + ": " + cut.error().message);

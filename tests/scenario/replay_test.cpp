@@ -66,7 +66,8 @@ TEST(Replay, TwoReplicasThatHearOfEachOtherLateComeToTheRecordedField) {
   std::vector<Cut> committed;
   const auto hear = [&](Surgeon& surgeon, std::size_t until) {
     for (; surgeon.heard < until; ++surgeon.heard)
-      surgeon.replica.commit(RoomSeq{surgeon.heard + 1}, committed[surgeon.heard], committed[surgeon.heard].author == surgeon.author);
+      surgeon.replica.commit(RoomSeq{surgeon.heard + 1}, committed[surgeon.heard],
+                             committed[surgeon.heard].author == surgeon.author);
   };
   for (std::size_t i = 0; i < session.cuts.size(); ++i) {
     Surgeon& surgeon = surgeons[i % 2];

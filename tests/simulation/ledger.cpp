@@ -56,19 +56,32 @@ struct Ledger::Hands {
 
 std::string_view name(Invariant invariant) {
   switch (invariant) {
-    case Invariant::one_bone: return "one bone";
-    case Invariant::set_of_cuts: return "set of cuts";
-    case Invariant::acknowledged: return "acknowledged is kept";
-    case Invariant::replay: return "replay is live";
-    case Invariant::lease: return "lease";
-    case Invariant::bounds: return "bounds";
-    case Invariant::author_order: return "author order";
-    case Invariant::felt: return "felt";
-    case Invariant::decided: return "decided";
-    case Invariant::served: return "served";
-    case Invariant::datagrams: return "datagrams";
-    case Invariant::overseen: return "overseen";
-    case Invariant::settled: return "settled";
+    case Invariant::one_bone:
+      return "one bone";
+    case Invariant::set_of_cuts:
+      return "set of cuts";
+    case Invariant::acknowledged:
+      return "acknowledged is kept";
+    case Invariant::replay:
+      return "replay is live";
+    case Invariant::lease:
+      return "lease";
+    case Invariant::bounds:
+      return "bounds";
+    case Invariant::author_order:
+      return "author order";
+    case Invariant::felt:
+      return "felt";
+    case Invariant::decided:
+      return "decided";
+    case Invariant::served:
+      return "served";
+    case Invariant::datagrams:
+      return "datagrams";
+    case Invariant::overseen:
+      return "overseen";
+    case Invariant::settled:
+      return "settled";
   }
   return "unknown";
 }
@@ -92,7 +105,8 @@ std::optional<std::chrono::nanoseconds> Ledger::age(const Cut& cut, std::chrono:
 void Ledger::told(RoomSeq place, const Told& what) {
   told_up_to(place);
   const auto [at, first] = told_.emplace(place, what);
-  check(first || at->second == what, Invariant::acknowledged, "place " + number(place) + " was told twice, as different events");
+  check(first || at->second == what, Invariant::acknowledged,
+        "place " + number(place) + " was told twice, as different events");
 }
 
 void Ledger::told_committed(RoomSeq place, const Cut& cut) {
@@ -103,7 +117,8 @@ void Ledger::told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_
 }
 void Ledger::told_event(RoomSeq place, EventKind kind) { told(place, {kind, false, {}, 0, {}}); }
 void Ledger::told_up_to(RoomSeq place) {
-  check(place <= kept_, Invariant::acknowledged, "place " + number(place) + " was told while the rows were kept up to " + number(kept_));
+  check(place <= kept_, Invariant::acknowledged,
+        "place " + number(place) + " was told while the rows were kept up to " + number(kept_));
   furthest_ = std::max(furthest_, place);
 }
 void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
@@ -125,7 +140,8 @@ void Ledger::check_author(const RoomRow& row, AuthorId author, std::uint64_t aut
                           std::map<AuthorId, std::uint64_t>& newest) {
   const std::uint64_t next = ++newest[author];
   check(author_seq == next, Invariant::author_order,
-        "row " + number(row.place) + " is " + whose(author, author_seq) + ", where " + std::to_string(next) + " comes next");
+        "row " + number(row.place) + " is " + whose(author, author_seq) + ", where " + std::to_string(next) +
+            " comes next");
   const std::vector<Cut>& own = made_[author];
   if (author_seq == 0 || author_seq > own.size())
     return fault(Invariant::author_order,
@@ -143,18 +159,20 @@ void Ledger::check_held(const RoomRow& row, const Hands& hands) {
   const auto* redo = std::get_if<RedoRow>(&row.what);
   if (redo == nullptr) return;
   for (const RoomSeq place : redo->places)
-    if (const auto cut = hands.cuts.find(place); cut != hands.cuts.end()) check_cut(row, hands, row.author, *cut->second);
+    if (const auto cut = hands.cuts.find(place); cut != hands.cuts.end())
+      check_cut(row, hands, row.author, *cut->second);
 }
 
 void Ledger::check_cut(const RoomRow& row, const Hands& hands, AuthorId by, const Cut& cut) {
   const Restrictions now = hands.of(by);
   const auto forbidden = [&](const std::string& why) {
-    fault(Invariant::overseen, "row " + number(row.place) + " has " + whose(cut.author, cut.author_seq) + ", and author " +
-                                   std::to_string(by.value) + " " + why);
+    fault(Invariant::overseen, "row " + number(row.place) + " has " + whose(cut.author, cut.author_seq) +
+                                   ", and author " + std::to_string(by.value) + " " + why);
   };
   if (now.stopped) forbidden("was stopped");
   if (now.taken_by != AuthorId{}) forbidden("had no tool");
-  if (!now.tools.empty() && std::ranges::find(now.tools, cut.tool) == now.tools.end()) forbidden("might not cut with that tool");
+  if (!now.tools.empty() && std::ranges::find(now.tools, cut.tool) == now.tools.end())
+    forbidden("might not cut with that tool");
   if (!now.zone) return;
   for (const QuantisedPose& knot : cut.path)
     if (!lies_in(*now.zone, knot.position)) return forbidden("might not cut there");
@@ -170,15 +188,16 @@ void Ledger::check_carried(std::span<const RoomRow> rows, std::size_t join, Hand
   if (before == Restrictions{}) return;
   const auto* next = join + 1 < rows.size() ? std::get_if<SuperviseRow>(&rows[join + 1].what) : nullptr;
   check(next != nullptr && next->subject == joined.author && next->supervision == before, Invariant::overseen,
-        "row " + number(rows[join].place) + " lets a person's new hand go, author " + std::to_string(joined.author.value));
+        "row " + number(rows[join].place) + " lets a person's new hand go, author " +
+            std::to_string(joined.author.value));
 }
 
 void Ledger::check_rows(std::span<const RoomRow> rows) {
   if (furthest_.value > rows.size())
-    fault(Invariant::acknowledged,
-          "the room was said to stand at " + number(furthest_) + ", and " + std::to_string(rows.size()) + " rows are kept");
+    fault(Invariant::acknowledged, "the room was said to stand at " + number(furthest_) + ", and " +
+                                       std::to_string(rows.size()) + " rows are kept");
   std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
-  std::map<RoomSeq, bool> of_bone;                  // places of events that can be undone: whether bone comes back with them
+  std::map<RoomSeq, bool> of_bone;  // places of events that can be undone: whether bone comes back with them
   Hands hands;
   const auto lease_of = [&](AuthorId author) {
     const auto found = lease.find(author);
@@ -186,7 +205,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
   };
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const RoomRow& row = rows[i];
-    check(row.place.value == i + 1, Invariant::replay, "row " + std::to_string(i + 1) + " has the place " + number(row.place));
+    check(row.place.value == i + 1, Invariant::replay,
+          "row " + std::to_string(i + 1) + " has the place " + number(row.place));
     Told kept{*kind_of(row), false, {}, 0, {}};
     bool bone_back = false;
     check_held(row, hands);
@@ -198,7 +218,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
             "row " + number(row.place) + " is a cut that was said to be rejected");
       check(cut->cut.lease_epoch == lease_of(cut->cut.author), Invariant::lease,
             "row " + number(row.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
-                std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) + " holds");
+                std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) +
+                " holds");
       of_bone[row.place] = true;
       hands.cuts[row.place] = &cut->cut;
       check_cut(row, hands, cut->cut.author, cut->cut);
@@ -211,7 +232,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
       check_author(row, rejection->author, rejection->author_seq, rejection->bytes, newest);
       if (rejection->reason == Rejection::lease) {
         const std::vector<Cut>& own = made_[rejection->author];
-        check(rejection->author_seq <= own.size() && own[rejection->author_seq - 1].lease_epoch != lease_of(rejection->author),
+        check(rejection->author_seq <= own.size() &&
+                  own[rejection->author_seq - 1].lease_epoch != lease_of(rejection->author),
               Invariant::lease, "row " + number(row.place) + " rejects a cut of the lease that holds");
       } else {
         lease[rejection->author] = row.place.value + 1;
@@ -222,7 +244,8 @@ void Ledger::check_rows(std::span<const RoomRow> rows) {
     } else if (const auto* decided = std::get_if<SuperviseRow>(&row.what)) {
       Restrictions& before = hands.held[decided->subject];
       const Restrictions& now = decided->supervision;
-      if (before.stopped != now.stopped || before.taken_by != now.taken_by) lease[decided->subject] = row.place.value + 1;
+      if (before.stopped != now.stopped || before.taken_by != now.taken_by)
+        lease[decided->subject] = row.place.value + 1;
       before = now;
     } else if (const auto* undo = std::get_if<UndoRow>(&row.what)) {
       bone_back = std::ranges::any_of(undo->places, [&](RoomSeq place) { return of_bone[place]; });

@@ -1,4 +1,5 @@
-// What a simulated room has promised, noted where it was heard, and what is wrong with its journal in the light of that.
+// What a simulated room has promised, noted where it was heard, and what is wrong with its journal in the light of
+// that.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -16,19 +17,19 @@ namespace osteon::test {
 
 // Which promise was broken.
 enum class Invariant {
-  one_bone,        // after quiet all hold the same
-  set_of_cuts,     // any order and repetition of the standing cuts gives that bone
-  acknowledged,    // what anyone was told is in the journal: when they hear of it, and after every crash
-  replay,          // replay = live = checkpoint and tail
-  lease,           // nothing of a stale lease is committed
-  bounds,          // queues stay within them
-  author_order,    // no gap, duplicate or foreign cut of an author
-  felt,            // a hand feels those of its cuts that may still be taken, and no others
-  decided,         // every cut of a client that is there is decided
-  served,          // nobody is turned away, and what must work works
-  datagrams,       // only what a peer has sealed is taken, once, and it says what the stream says
-  overseen,        // what an instructor forbids is not committed, and after quiet each hand knows what holds for it
-  settled,         // after quiet all is decided and told within two seconds
+  one_bone,      // after quiet all hold the same
+  set_of_cuts,   // any order and repetition of the standing cuts gives that bone
+  acknowledged,  // what anyone was told is in the journal: when they hear of it, and after every crash
+  replay,        // replay = live = checkpoint and tail
+  lease,         // nothing of a stale lease is committed
+  bounds,        // queues stay within them
+  author_order,  // no gap, duplicate or foreign cut of an author
+  felt,          // a hand feels those of its cuts that may still be taken, and no others
+  decided,       // every cut of a client that is there is decided
+  served,        // nobody is turned away, and what must work works
+  datagrams,     // only what a peer has sealed is taken, once, and it says what the stream says
+  overseen,      // what an instructor forbids is not committed, and after quiet each hand knows what holds for it
+  settled,       // after quiet all is decided and told within two seconds
 };
 [[nodiscard]] std::string_view name(Invariant invariant);
 
@@ -53,8 +54,8 @@ class Ledger {
   void told_committed(RoomSeq place, const Cut& cut);
   void told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq);
   void told_event(RoomSeq place, EventKind kind);
-  void told_up_to(RoomSeq place);                                    // the room was said to stand there
-  void told_decided(AuthorId author, std::uint64_t author_seq);      // up to this one
+  void told_up_to(RoomSeq place);                                // the room was said to stand there
+  void told_decided(AuthorId author, std::uint64_t author_seq);  // up to this one
   // Where the room has put an author's cut, as it says to whoever comes back; null: it rejected the cut.
   void told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq);
 
@@ -72,14 +73,14 @@ class Ledger {
   struct Told {
     EventKind kind = EventKind::cut;
     bool rejected = false;
-    AuthorId author;               // of a cut
+    AuthorId author;  // of a cut
     std::uint64_t author_seq = 0;
-    Digest bytes;                  // of a committed cut
+    Digest bytes;  // of a committed cut
     friend bool operator==(const Told&, const Told&) = default;
   };
   void told(RoomSeq place, const Told& what);
-  // What an instructor forbids, in this page's own words: of a cut, made or done again by `by`, and of all else that changes
-  // bone or scene.
+  // What an instructor forbids, in this page's own words: of a cut, made or done again by `by`, and of all else that
+  // changes bone or scene.
   struct Hands;
   void check_held(const RoomRow& row, const Hands& hands);
   void check_cut(const RoomRow& row, const Hands& hands, AuthorId by, const Cut& cut);

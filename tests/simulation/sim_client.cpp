@@ -26,9 +26,20 @@ bool may_be_told(const std::string& why) {
 }  // namespace
 
 SimClient::SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, Datagrams& datagrams, std::uint64_t number,
-                     std::uint64_t seed, const Case& bone, const HandPlan& hand, const DatagramPlan& plan, Breakage breakage)
-    : time_(time), ledger_(ledger), server_(server), datagrams_(datagrams), number_(number), random_(seed),
-      path_(time, seed + 1, {}), plan_(plan), bone_(bone), hand_(hand), breakage_(breakage), cuts_left_(hand.cuts) {}
+                     std::uint64_t seed, const Case& bone, const HandPlan& hand, const DatagramPlan& plan,
+                     Breakage breakage)
+    : time_(time),
+      ledger_(ledger),
+      server_(server),
+      datagrams_(datagrams),
+      number_(number),
+      random_(seed),
+      path_(time, seed + 1, {}),
+      plan_(plan),
+      bone_(bone),
+      hand_(hand),
+      breakage_(breakage),
+      cuts_left_(hand.cuts) {}
 
 void SimClient::set_ways() {
   const Endpoint own = node(number_, port_), room = node(Datagrams::kServer);
@@ -69,7 +80,8 @@ void SimClient::heal() {
   up_stopped_ = down_stopped_ = 0;
   set_ways();
   held_back_until_ = requests_there_;
-  if (stream_ && stream_->delayed_until() != Time::max()) held_back_until_ = std::max(held_back_until_, stream_->delayed_until());
+  if (stream_ && stream_->delayed_until() != Time::max())
+    held_back_until_ = std::max(held_back_until_, stream_->delayed_until());
 }
 
 template <class Call>
@@ -185,9 +197,10 @@ void SimClient::open_line() {
   const auto on_line = [this, life = life_, line = stream_.get()](auto call) {
     if (life == life_ && stream_.get() == line) call();
   };
-  stream_->listen(SimStream::client, {.message = [this, on_line](std::string bytes) { on_line([&] { hear(bytes); }); },
-                                      .writable = [this, on_line] { on_line([&] { send(); }); },
-                                      .ended = [this, on_line](const Ending& ending) { on_line([&] { line_ended(ending); }); }});
+  stream_->listen(SimStream::client,
+                  {.message = [this, on_line](std::string bytes) { on_line([&] { hear(bytes); }); },
+                   .writable = [this, on_line] { on_line([&] { send(); }); },
+                   .ended = [this, on_line](const Ending& ending) { on_line([&] { line_ended(ending); }); }});
   stream_->stop_reading(SimStream::server);
   v1::SessionRequest request;
   request.mutable_open()->set_author(room_->author.value);
@@ -259,13 +272,15 @@ void SimClient::open_fast_path(std::uint64_t decided) {
   if (!up || !down) return;
   ++port_;
   set_ways();
-  fast_ = std::make_unique<SimFastPath>(datagrams_, random_.index(1 << 30), node(number_, port_),
-                                        SessionKeys{offer_->session(), *up, *down}, decided + 1, plan_.link, plan_.clock_ahead,
-                                        SimFastPath::Hears{.row = [this](wire::IndexedRow row) { hear_row(std::move(row)); },
-                                                           .dead = [this] {
-                                                             underway_->again();
-                                                             send();
-                                                           }});
+  fast_ = std::make_unique<SimFastPath>(
+      datagrams_, random_.index(1 << 30), node(number_, port_), SessionKeys{offer_->session(), *up, *down}, decided + 1,
+      plan_.link, plan_.clock_ahead,
+      SimFastPath::Hears{.row = [this](wire::IndexedRow row) { hear_row(std::move(row)); },
+                         .dead =
+                             [this] {
+                               underway_->again();
+                               send();
+                             }});
   for (const auto& [number, tool] : numbered_tools_) fast_->know_tool(number, tool);
 }
 
@@ -287,8 +302,8 @@ void SimClient::compare(const v1::SessionResponse& response) {
   const bool same = [&] {
     if (response.has_committed()) {
       const Result<Cut> cut = wire::from_wire(response.committed().cut());
-      return row.kind == wire::SessionRowKind::committed && row.room_seq.value == response.committed().room_seq() && cut &&
-             *cut == row.cut;
+      return row.kind == wire::SessionRowKind::committed && row.room_seq.value == response.committed().room_seq() &&
+             cut && *cut == row.cut;
     }
     if (response.has_rejected())
       return row.kind == wire::SessionRowKind::rejected && row.room_seq.value == response.rejected().room_seq() &&
@@ -373,8 +388,8 @@ void SimClient::work() {
   replica_->settle();
   (void)replica_->take_changes();
   ledger_.check(replica_->unconfirmed() == felt_.size(), Invariant::felt,
-                "the hand feels " + std::to_string(replica_->unconfirmed()) + " undecided cuts of its own where there are " +
-                    std::to_string(felt_.size()));
+                "the hand feels " + std::to_string(replica_->unconfirmed()) +
+                    " undecided cuts of its own where there are " + std::to_string(felt_.size()));
   watch();
 }
 
@@ -456,7 +471,8 @@ bool SimClient::settled() const {
 }
 
 bool SimClient::connected() const {
-  return time_.now() >= held_back_until_ && (gone_ || (room_ && stream_ && stream_->open() && bone_is_here_ && !interrupted_));
+  return time_.now() >= held_back_until_ &&
+         (gone_ || (room_ && stream_ && stream_->open() && bone_is_here_ && !interrupted_));
 }
 
 std::string SimClient::standing() const {
@@ -464,7 +480,8 @@ std::string SimClient::standing() const {
   if (!room_) return "not joined";
   return "author " + std::to_string(room_->author.value) + ", " + (bone_is_here_ ? "" : "without its bone, ") +
          (interrupted_ ? "interrupted, " : "") + std::to_string(underway_->undecided()) + " cuts undecided, " +
-         std::to_string(replica_->unconfirmed()) + " unconfirmed, at place " + std::to_string(replica_->room_seq().value);
+         std::to_string(replica_->unconfirmed()) + " unconfirmed, at place " +
+         std::to_string(replica_->room_seq().value);
 }
 
 // The hand's loop: a run of cuts, a pause, perhaps something else.
@@ -487,22 +504,27 @@ void SimClient::cut(int left) {
   --cuts_left_;
   ++cuts_made_;
   const Pose from = dequantise(at_);
-  const Vec3 to = from.position_mm + Vec3{random_.between(-0.4, 0.4), random_.between(-0.4, 0.4), random_.between(-0.2, 0.1)};
-  Cut one = straight_cut(hand_.tools[random_.index(hand_.tools.size())], from.position_mm, to, {0, 0, -1}, own_.size() + 1);
+  const Vec3 to =
+      from.position_mm + Vec3{random_.between(-0.4, 0.4), random_.between(-0.4, 0.4), random_.between(-0.2, 0.1)};
+  Cut one =
+      straight_cut(hand_.tools[random_.index(hand_.tools.size())], from.position_mm, to, {0, 0, -1}, own_.size() + 1);
   one.author = room_->author;
   one.lease_epoch = lease_epoch_;
   one.level = std::min(one.level, hand_.level);
   one.path_us = 8000;
   if (random_.unit() < hand_.beyond / 4) {
     // One that no room takes.
-    if (random_.unit() < 0.5) one.path.back().position[0] += 1 << 20;
-    else one.spindle_rpm = 200'000;
+    if (random_.unit() < 0.5)
+      one.path.back().position[0] += 1 << 20;
+    else
+      one.spindle_rpm = 200'000;
   }
   at_ = quantise(pose_along(to, {0, 0, -1}));
   own_.push_back(one);
   ledger_.made(one, time_.now());
   const bool pushed = underway_->push(one);
-  ledger_.check(pushed && underway_->undecided() <= kMostUnderway, Invariant::bounds, "cuts under way are beyond their bound");
+  ledger_.check(pushed && underway_->undecided() <= kMostUnderway, Invariant::bounds,
+                "cuts under way are beyond their bound");
   if (fast_) {
     CuttingState state;
     state.author = room_->author;
@@ -550,8 +572,10 @@ void SimClient::oversee() {
   const double which = random_.unit();
   word.stopped = which < 0.2;
   if (which >= 0.2 && which < 0.3) word.taken_by = room_->author;
-  if (which >= 0.3 && which < 0.4) word.zone = ZoneLimit{at_.position, 1 + static_cast<std::int32_t>(random_.index(2048))};
-  if (which >= 0.4 && which < 0.5) word.tools = {find_tool(random_.unit() < 0.5 ? "burr-round-3.2" : "drill-3.2").value().hash()};
+  if (which >= 0.3 && which < 0.4)
+    word.zone = ZoneLimit{at_.position, 1 + static_cast<std::int32_t>(random_.index(2048))};
+  if (which >= 0.4 && which < 0.5)
+    word.tools = {find_tool(random_.unit() < 0.5 ? "burr-round-3.2" : "drill-3.2").value().hash()};
   if (which < 0.6) word.words = "as I say";
   const std::uint64_t pick = random_.index(1000);
   change([word, pick](Room& room, AuthorId by) -> Result<RoomEvent> {
@@ -564,14 +588,13 @@ void SimClient::oversee() {
 }
 
 void SimClient::change(std::function<Result<RoomEvent>(Room&, AuthorId)> change) {
-  ask<RoomEvent>(
-      [this, change = std::move(change), by = room_->author](auto answer) {
-        server_.change([change, by](Room& room) { return change(room, by); }, answer);
-      },
-      5s, [this](const Result<RoomEvent>& event) {
-        if (event && event->room_seq) ledger_.told_event(event->room_seq, event->kind);
-        if (!event && event.error().code == ErrorCode::denied) ++denied_;
-      });
+  ask<RoomEvent>([this, change = std::move(change), by = room_->author](
+                     auto answer) { server_.change([change, by](Room& room) { return change(room, by); }, answer); },
+                 5s,
+                 [this](const Result<RoomEvent>& event) {
+                   if (event && event->room_seq) ledger_.told_event(event->room_seq, event->kind);
+                   if (!event && event.error().code == ErrorCode::denied) ++denied_;
+                 });
 }
 
 }  // namespace osteon::test

@@ -1,5 +1,5 @@
-// A haptic client on virtual time: joins, cuts with a seeded hand, keeps a replica, comes back when its line breaks. Between
-// SimStream and the replica are the parts that osteon-haptic has there.
+// A haptic client on virtual time: joins, cuts with a seeded hand, keeps a replica, comes back when its line breaks.
+// Between SimStream and the replica are the parts that osteon-haptic has there.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "common/link/backoff.hpp"
-#include "haptic_client/control/replica.hpp"
 #include "haptic_client/control/confirmation_monitor.hpp"
+#include "haptic_client/control/replica.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
 #include "haptic_client/net/session_reader.hpp"
 #include "tests/simulation/ledger.hpp"
@@ -25,10 +25,10 @@ namespace osteon::test {
 
 struct HandPlan {
   std::vector<Tool> tools;
-  int level = 0;                 // of every cut, at most
-  double reach_mm = 3.0;         // from the middle of the block's upper face
-  int cuts = 30;                 // in all
-  int run = 8;                   // cuts behind each other, at most
+  int level = 0;                                                         // of every cut, at most
+  double reach_mm = 3.0;                                                 // from the middle of the block's upper face
+  int cuts = 30;                                                         // in all
+  int run = 8;                                                           // cuts behind each other, at most
   std::chrono::nanoseconds pause_most = std::chrono::milliseconds(800);  // between two runs
   // Between two runs, with these chances:
   double undo = 0.12, redo = 0.10, mark = 0.05, again = 0.15, beyond = 0.08, oversee = 0.35, say = 0.05;
@@ -36,8 +36,8 @@ struct HandPlan {
 
 // How a client's datagrams fare.
 struct DatagramPlan {
-  bool wanted = false;           // it takes the fast path that it is offered
-  PathQuality quality;           // both ways
+  bool wanted = false;                            // it takes the fast path that it is offered
+  PathQuality quality;                            // both ways
   bool up_blocked = false, down_blocked = false;  // for good: something on the way lets none through
   wire::LinkOptions link;
   std::chrono::nanoseconds clock_ahead{};
@@ -48,11 +48,11 @@ class SimClient {
   using Time = VirtualTime::Time;
   static constexpr std::size_t kMostUnderway = 1024;  // RoomSession::kMaxWaitingCuts
 
-  SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, Datagrams& datagrams, std::uint64_t number, std::uint64_t seed,
-            const Case& bone, const HandPlan& hand, const DatagramPlan& plan, Breakage breakage);
-  void start();                  // the program; its hand begins when the bone is there
+  SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, Datagrams& datagrams, std::uint64_t number,
+            std::uint64_t seed, const Case& bone, const HandPlan& hand, const DatagramPlan& plan, Breakage breakage);
+  void start();  // the program; its hand begins when the bone is there
   void rest() { resting_ = true; }
-  void leave();                  // for good
+  void leave();  // for good
   void break_line(const std::string& why) {
     if (stream_) stream_->break_off(why);
   }
@@ -63,13 +63,13 @@ class SimClient {
   void stop_datagrams(bool up, bool down, Time from, Time until);
   // From now on, for good.
   void block_datagrams(bool up, bool down);
-  void heal();                   // all ways that are not blocked are good from now on
+  void heal();  // all ways that are not blocked are good from now on
 
   [[nodiscard]] bool here() const { return !gone_; }
   [[nodiscard]] bool settled() const;
   // It is on the line or gone, and what the network has held back until now has come, its requests as well.
   [[nodiscard]] bool connected() const;
-  [[nodiscard]] std::string standing() const;        // for messages
+  [[nodiscard]] std::string standing() const;  // for messages
   [[nodiscard]] AuthorId author() const { return room_ ? room_->author : AuthorId{}; }
   [[nodiscard]] const Restrictions& held() const { return held_; }  // for its hand, as it was told
   [[nodiscard]] Digest hash() const { return replica_->hash(); }
@@ -96,13 +96,14 @@ class SimClient {
     RoomSeq place;
   };
   struct Interrupted {};
-  using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, Noted, HandSupervised, Interrupted>;
+  using FromRoom =
+      std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, Noted, HandSupervised, Interrupted>;
 
   template <class Answer>
   void ask(std::function<void(std::function<void(const Result<Answer>&)>)> request, Time patience,
            std::function<void(const Result<Answer>&)> heard);
   template <class Call>
-  void later(Time in, Call call);                    // unless the program has ended by then
+  void later(Time in, Call call);  // unless the program has ended by then
   void join();
   void joined(const SimServer::Joined& room);
   void open_line();
@@ -114,13 +115,13 @@ class SimClient {
   void hear(const std::string& bytes);
   void follow(const v1::SessionResponse& response);
   void open_fast_path(std::uint64_t decided);
-  void set_ways();               // of the present address
+  void set_ways();  // of the present address
   void hear_row(wire::IndexedRow row);
   void compare(const v1::SessionResponse& response);  // with what a datagram has said of the same row
   [[nodiscard]] RoomEvents events();
 
   void pass(FromRoom event);
-  void work();                                       // the replica's thread wakes up
+  void work();  // the replica's thread wakes up
   void take(const FieldLeaf& leaf);
   void take(const RoomAtJoin& room);
   void take(const Committed& committed);
@@ -147,7 +148,7 @@ class SimClient {
   SimPath path_;
   DatagramPlan plan_;
   int up_stopped_ = 0, down_stopped_ = 0;
-  std::uint16_t port_ = 0;                           // of its address
+  std::uint16_t port_ = 0;  // of its address
   std::vector<float> felt_by_datagram_ms_, felt_by_stream_ms_;
   const Case& bone_;
   const HandPlan hand_;
@@ -160,18 +161,18 @@ class SimClient {
 
   // Of the running program.
   std::optional<SimServer::Joined> room_;
-  std::shared_ptr<SimStream> stream_;                // shared with what is under way on it
+  std::shared_ptr<SimStream> stream_;  // shared with what is under way on it
   std::optional<CutsUnderway> underway_;
   std::optional<SessionReader> reader_;
-  std::optional<v1::LinkOffer> offer_;               // of the present stream
+  std::optional<v1::LinkOffer> offer_;  // of the present stream
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools_;
   std::unique_ptr<SimFastPath> fast_;
-  std::map<std::uint64_t, wire::SessionRow> said_;   // by datagrams: rows of the present stream by index
-  bool by_datagram_ = false;                         // what is being heard
+  std::map<std::uint64_t, wire::SessionRow> said_;  // by datagrams: rows of the present stream by index
+  bool by_datagram_ = false;                        // what is being heard
   std::uint64_t state_seq_ = 0;
   Time requests_there_{}, held_back_until_{};
   std::optional<Backoff> backoff_;
-  std::shared_ptr<ToolBox> tools_;                   // shared with the replica's fields
+  std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
   std::optional<haptic::Replica> replica_;
   haptic::RoomWatch watch_;
   haptic::RoomHealth health_{};
@@ -181,7 +182,7 @@ class SimClient {
   bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;
   std::uint64_t lease_epoch_ = 0;
   Restrictions held_;
-  std::map<std::uint64_t, std::uint64_t> felt_;      // own cuts that must be predicted: their leases
+  std::map<std::uint64_t, std::uint64_t> felt_;  // own cuts that must be predicted: their leases
   QuantisedPose at_;
 };
 

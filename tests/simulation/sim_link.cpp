@@ -40,7 +40,11 @@ void Alarm::set(Time at) {
 }
 
 Datagrams::Datagrams(VirtualTime& time, Ledger& ledger, std::uint64_t seed, double forged)
-    : time_(time), ledger_(ledger), random_(seed), forged_(forged), network_(time, seed + 1),
+    : time_(time),
+      ledger_(ledger),
+      random_(seed),
+      forged_(forged),
+      network_(time, seed + 1),
       forger_(network_.open(node(kForger))) {}
 
 void Datagrams::send(Way way, SimPort& port, const Endpoint& to, std::span<const std::uint8_t> bytes) {
@@ -57,9 +61,10 @@ void Datagrams::send(Way way, SimPort& port, const Endpoint& to, std::span<const
   }
   if (random_.unit() >= forged_) return;
   const Time later = Time(static_cast<std::int64_t>(random_.unit() * random_.unit() * 1e9));
-  time_.post_in(later, [this, from = port.local(), to, copy = std::vector<std::uint8_t>(bytes.begin(), bytes.end())]() mutable {
-    forge(from, to, std::move(copy));
-  });
+  time_.post_in(
+      later, [this, from = port.local(), to, copy = std::vector<std::uint8_t>(bytes.begin(), bytes.end())]() mutable {
+        forge(from, to, std::move(copy));
+      });
 }
 
 void Datagrams::opened(Way way, std::span<const std::uint8_t> bytes) {
@@ -75,23 +80,36 @@ void Datagrams::forge(const Endpoint& from, const Endpoint& to, std::vector<std:
     bytes[first + random_.index(end - first)] ^= static_cast<std::uint8_t>(1u << random_.index(8));
   };
   switch (random_.index(6)) {
-    case 0: break;                                               // as it was
-    case 1: flip(0, bytes.size()); break;
-    case 2: flip(4, 13); break;                                  // another key or counter
-    case 3: bytes.resize(1 + random_.index(bytes.size())); break;
+    case 0:
+      break;  // as it was
+    case 1:
+      flip(0, bytes.size());
+      break;
+    case 2:
+      flip(4, 13);
+      break;  // another key or counter
+    case 3:
+      bytes.resize(1 + random_.index(bytes.size()));
+      break;
     case 4:
       for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random_.index(256));
       break;
-    default: return network_.send(to, from, bytes);              // back to whoever has sent it
+    default:
+      return network_.send(to, from, bytes);  // back to whoever has sent it
   }
   const bool own_name = random_.unit() < 0.5;
   if (own_name && to == node(kServer)) from_forger_bytes_ += bytes.size();
   network_.send(own_name ? forger_->local() : from, to, bytes);
 }
 
-SimLinks::SimLinks(Datagrams& datagrams, std::uint64_t seed, const wire::LinkOptions& options, std::function<bool()> silent)
-    : datagrams_(datagrams), random_(seed), options_(options), silent_(std::move(silent)),
-      port_(datagrams.network().open(node(Datagrams::kServer))), alarm_(datagrams.time(), [this] { turn(); }) {
+SimLinks::SimLinks(Datagrams& datagrams, std::uint64_t seed, const wire::LinkOptions& options,
+                   std::function<bool()> silent)
+    : datagrams_(datagrams),
+      random_(seed),
+      options_(options),
+      silent_(std::move(silent)),
+      port_(datagrams.network().open(node(Datagrams::kServer))),
+      alarm_(datagrams.time(), [this] { turn(); }) {
   port_->on_arrival([this] { alarm_.set(datagrams_.time().now()); });
 }
 
@@ -144,8 +162,11 @@ void SimLinks::turn() {
   if (!links_.empty()) alarm_.set(next);
 }
 
-SimLinks::Link::Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink)
-    : links_(links), keys_(keys), sink_(&sink),
+SimLinks::Link::Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq,
+                     Sink& sink)
+    : links_(links),
+      keys_(keys),
+      sink_(&sink),
       link_(keys, author, seeded(links.random_.index(1u << 30)), first_author_seq, 1, links.options_) {}
 
 std::size_t SimLinks::Link::say_news() {
@@ -178,8 +199,13 @@ bool SimLinks::Link::tell(std::uint64_t index, const wire::SessionRow& row) {
 
 SimFastPath::SimFastPath(Datagrams& datagrams, std::uint64_t seed, const Endpoint& at, const SessionKeys& keys,
                          std::uint64_t first_author_seq, const wire::LinkOptions& options, Time ahead, Hears hears)
-    : datagrams_(datagrams), random_(seed), ahead_(ahead), hears_(std::move(hears)), link_(keys, first_author_seq, 1, options),
-      pushed_(first_author_seq - 1), alarm_(datagrams.time(), [this] { turn(); }) {
+    : datagrams_(datagrams),
+      random_(seed),
+      ahead_(ahead),
+      hears_(std::move(hears)),
+      link_(keys, first_author_seq, 1, options),
+      pushed_(first_author_seq - 1),
+      alarm_(datagrams.time(), [this] { turn(); }) {
   move(at);
 }
 

@@ -1,5 +1,5 @@
-// The fast path on virtual time: what haptic_client/net/fast_path.cpp and server/net/link_server.cpp do between sockets and
-// the two links, over a simulated network, with somebody on the way who forges.
+// The fast path on virtual time: what haptic_client/net/fast_path.cpp and server/net/link_server.cpp do between sockets
+// and the two links, over a simulated network, with somebody on the way who forges.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -41,7 +41,8 @@ struct DatagramCounts {
   std::uint64_t moves = 0;           // addresses that were proven
 };
 
-// All datagrams of a simulation. Whatever an end takes for authentic must be what the other end has sealed, and only once.
+// All datagrams of a simulation. Whatever an end takes for authentic must be what the other end has sealed, and only
+// once.
 class Datagrams {
  public:
   enum Way { up, down };
@@ -69,7 +70,7 @@ class Datagrams {
   SimNetwork network_;
   std::unique_ptr<SimPort> forger_;
   std::uint64_t from_forger_bytes_ = 0, to_forger_bytes_ = 0;  // to the room, and from it
-  std::array<std::unordered_set<std::uint64_t>, 2> genuine_;  // not opened yet
+  std::array<std::unordered_set<std::uint64_t>, 2> genuine_;   // not opened yet
   std::set<Endpoint> clients_;
   DatagramCounts counts_;
 };
@@ -124,7 +125,7 @@ class SimLinks::Link {
 class SimFastPath {
  public:
   using Time = VirtualTime::Time;
-  struct Hears {                    // neither ends the path
+  struct Hears {  // neither ends the path
     std::function<void(wire::IndexedRow)> row;
     std::function<void()> dead;
   };

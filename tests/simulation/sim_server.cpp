@@ -50,9 +50,10 @@ class SimServer::Session final : public SessionSubscriber,
     const auto with = [self](auto call) {
       if (const auto session = self.lock()) call(*session);
     };
-    stream_->listen(SimStream::server, {.message = [with](std::string bytes) { with([&](Session& s) { s.take(bytes); }); },
-                                        .writable = [with] { with([](Session& s) { s.pump(); }); },
-                                        .ended = [with](const Ending&) { with([](Session& s) { s.gone(); }); }});
+    stream_->listen(SimStream::server,
+                    {.message = [with](std::string bytes) { with([&](Session& s) { s.take(bytes); }); },
+                     .writable = [with] { with([](Session& s) { s.pump(); }); },
+                     .ended = [with](const Ending&) { with([](Session& s) { s.gone(); }); }});
   }
   // The server's process is gone.
   void die() {
@@ -83,7 +84,8 @@ class SimServer::Session final : public SessionSubscriber,
     if (closing_ || done_) return;
     const auto chance = [&] { return send_queue_.takes(place) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
-    if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionRowKind::supervised && server_.random_.index(2) == 0)
+    if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionRowKind::supervised &&
+        server_.random_.index(2) == 0)
       return tell(place, noted_row(place, {}), {.room_seq = place});
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
@@ -121,9 +123,12 @@ class SimServer::Session final : public SessionSubscriber,
     v1::SessionRequest request;
     if (!request.ParseFromString(bytes)) return close({true, "a SessionRequest could not be parsed"});
     switch (request.message_case()) {
-      case v1::SessionRequest::kOpen: return open(request.open());
-      case v1::SessionRequest::kCut: return queue(request.cut());
-      default: return close({true, "SessionRequest.message is not set"});
+      case v1::SessionRequest::kOpen:
+        return open(request.open());
+      case v1::SessionRequest::kCut:
+        return queue(request.cut());
+      default:
+        return close({true, "SessionRequest.message is not set"});
     }
   }
 
@@ -131,7 +136,9 @@ class SimServer::Session final : public SessionSubscriber,
     if (request.server_epoch() != server_.store_->server_epoch())
       return close({false, "open.server_epoch is another one; join again"});
     author_ = AuthorId{request.author()};
-    if (const Result<void> opened = server_.runtime_->open_session(shared_from_this(), digest_of_secret(request.secret())); !opened)
+    if (const Result<void> opened =
+            server_.runtime_->open_session(shared_from_this(), digest_of_secret(request.secret()));
+        !opened)
       close({true, opened.error().message});
   }
 
@@ -139,8 +146,8 @@ class SimServer::Session final : public SessionSubscriber,
     Result<Cut> cut = wire::from_wire(message);
     if (!cut) return close({true, cut.error().message});
     if (cut->author != author_) return close({true, "cut.author is not the author who opened the session"});
-    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come in
-    // datagrams.
+    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come
+    // in datagrams.
     if (link_ && cut->author_seq > taken_)
       link_->offer(*cut);
     else
@@ -192,7 +199,8 @@ class SimServer::Session final : public SessionSubscriber,
   void add(bool taken) {
     if (closing_ || done_) return;
     server_.most_behind_ = std::max(server_.most_behind_, send_queue_.waiting());
-    server_.ledger_.check(send_queue_.waiting() <= SessionSendQueue::kMaxRows, Invariant::bounds, "an send_queue holds too many rows");
+    server_.ledger_.check(send_queue_.waiting() <= SessionSendQueue::kMaxRows, Invariant::bounds,
+                          "an send_queue holds too many rows");
     if (taken)
       pump();
     else
@@ -244,7 +252,12 @@ class SimServer::Session final : public SessionSubscriber,
 
 SimServer::SimServer(VirtualTime& time, Ledger& ledger, Datagrams& datagrams, std::uint64_t seed, const Case& bone,
                      const ServerCondition& condition)
-    : time_(time), ledger_(ledger), datagrams_(datagrams), random_(seed), bone_(bone), condition_(condition),
+    : time_(time),
+      ledger_(ledger),
+      datagrams_(datagrams),
+      random_(seed),
+      bone_(bone),
+      condition_(condition),
       disk_(seed, condition.sector_bytes) {}
 
 SimServer::~SimServer() {
@@ -293,7 +306,8 @@ void SimServer::boot() {
   jumped_ = {};
   runtime_ = driven_host(std::move(kept->room), *store_);
   if (condition_.fast_path)
-    links_ = std::make_unique<SimLinks>(datagrams_, random_.index(1u << 30), condition_.link, [this] { return power_is_out(); });
+    links_ = std::make_unique<SimLinks>(datagrams_, random_.index(1u << 30), condition_.link,
+                                        [this] { return power_is_out(); });
   disk_has_failed_ = false;
   ledger_.check(opened == replayed(), Invariant::replay, "the room that was opened is not the one of its rows");
   plan_tick();
@@ -358,7 +372,8 @@ Digest SimServer::reopened(bool with_checkpoint) {
   runtime_.reset();
   if (with_checkpoint) {
     const Result<void> closed = store_->close();
-    ledger_.check(closed.has_value(), Invariant::served, closed ? "" : "the journal cannot be closed: " + closed.error().message);
+    ledger_.check(closed.has_value(), Invariant::served,
+                  closed ? "" : "the journal cannot be closed: " + closed.error().message);
   }
   store_.reset();
   Result<PersistedRoom> kept = RoomStore::open(file_, bone_, options());
@@ -392,7 +407,8 @@ void SimServer::crash(bool power) {
   if (!runtime_) return;
   if (!power_fails_ && !disk_fails_ && random_.unit() < 0.3) {
     const Digest alive = live();
-    ledger_.check(replayed() == alive, Invariant::replay, "the journal's rows make another room than the one that crashes");
+    ledger_.check(replayed() == alive, Invariant::replay,
+                  "the journal's rows make another room than the one that crashes");
   }
   ++crashes_;
   down();
@@ -509,7 +525,8 @@ void SimServer::join(const JoinRequest& request, std::function<void(const Result
   after_tick();
 }
 
-void SimServer::change(std::function<Result<RoomEvent>(Room&)> change, std::function<void(const Result<RoomEvent>&)> answer) {
+void SimServer::change(std::function<Result<RoomEvent>(Room&)> change,
+                       std::function<void(const Result<RoomEvent>&)> answer) {
   if (!runtime_ || power_is_out()) return;
   runtime_->queue_event(std::move(change), [this, answer = std::move(answer)](const Result<RoomEvent>& event) {
     if (power_is_out()) return;

@@ -32,7 +32,8 @@ void SimStream::write(End from, std::string message) {
   side.under_way += message.size();
   if (!at) {
     // TCP gives up: until then nobody knows.
-    path_.time().post_in(SimPath::kPatience, [self = shared_from_this()] { self->lose("the connection has timed out"); });
+    path_.time().post_in(SimPath::kPatience,
+                         [self = shared_from_this()] { self->lose("the connection has timed out"); });
     side.last = Time::max();
   }
   if (side.last == Time::max()) return;
@@ -84,7 +85,8 @@ void SimStream::finish(const Ending& ending) {
   over_ = true;
   ends_[server].told = true;
   ends_[server].hears = {};
-  if (ends_[server].last == Time::max()) return tell_ended(client, path_.time().now() + SimPath::kPatience, {false, "timed out"});
+  if (ends_[server].last == Time::max())
+    return tell_ended(client, path_.time().now() + SimPath::kPatience, {false, "timed out"});
   const std::optional<Time> at = path_.arrival();
   if (at)
     tell_ended(client, std::max(*at, ends_[server].last), ending);

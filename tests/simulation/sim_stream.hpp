@@ -1,5 +1,5 @@
-// A stream of messages between a client and a server on virtual time, as gRPC over TCP would carry it: reliable and in order
-// until it breaks, late where the network loses, and with a bound on what is under way.
+// A stream of messages between a client and a server on virtual time, as gRPC over TCP would carry it: reliable and in
+// order until it breaks, late where the network loses, and with a bound on what is under way.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -33,7 +33,8 @@ class SimPath {
   void set(const PathCondition& condition) { condition_ = condition; }
   void partition(Time from, Time until) { partitions_.emplace_back(from, until); }
   void heal();  // no partition from now on
-  // When something sent now is there, sent again after 200, 400, 800 ms... until it comes through. Nothing: it does not.
+  // When something sent now is there, sent again after 200, 400, 800 ms... until it comes through. Nothing: it does
+  // not.
   [[nodiscard]] std::optional<Time> arrival();
   [[nodiscard]] Time delay() const { return condition_.delay; }
   [[nodiscard]] Random& random() { return random_; }
@@ -63,8 +64,8 @@ class SimStream : public std::enable_shared_from_this<SimStream> {
  public:
   using Time = VirtualTime::Time;
   enum End { client = 0, server = 1 };
-  // What an end hears, never from within its own calls. `ended` comes once and last; to the server also when the client has
-  // gone.
+  // What an end hears, never from within its own calls. `ended` comes once and last; to the server also when the client
+  // has gone.
   struct Hears {
     std::function<void(std::string)> message;
     std::function<void()> writable;
@@ -96,10 +97,10 @@ class SimStream : public std::enable_shared_from_this<SimStream> {
  private:
   struct Side {
     Hears hears;
-    std::size_t under_way = 0;          // bytes from this end
-    Time last{};                        // arrival, at the other end, of the newest message from this end
-    Time lost_from = Time::max();       // what would come to this end later does not
-    std::deque<std::string> unread;     // at this end
+    std::size_t under_way = 0;       // bytes from this end
+    Time last{};                     // arrival, at the other end, of the newest message from this end
+    Time lost_from = Time::max();    // what would come to this end later does not
+    std::deque<std::string> unread;  // at this end
     bool reads = true, told = false;
   };
   static End other(End end) { return end == client ? server : client; }

@@ -17,7 +17,8 @@ namespace {
 using namespace std::chrono_literals;
 using Time = VirtualTime::Time;
 
-constexpr Time kSettling = 60s;   // at most, after all trouble, until everyone is on the line and all is decided and told
+constexpr Time kSettling =
+    60s;  // at most, after all trouble, until everyone is on the line and all is decided and told
 constexpr double kSettled_s = 2;  // of that, once everyone is on the line
 constexpr Time kQuiet = 2s;       // then, before all must hold the same
 
@@ -39,16 +40,21 @@ const Case& large_block() {
 class Simulation {
  public:
   Simulation(std::uint64_t seed, const SimulationOptions& options)
-      : options_(options), random_(seed), link_random_(seed ^ kLinks), bone_(options.full ? large_block() : small_block()),
-        fast_path_(link_random_.unit() < 0.5), seal_(seal()),
+      : options_(options),
+        random_(seed),
+        link_random_(seed ^ kLinks),
+        bone_(options.full ? large_block() : small_block()),
+        fast_path_(link_random_.unit() < 0.5),
+        seal_(seal()),
         datagrams_(time_, ledger_, link_random_.index(1u << 30), link_random_.unit() < 0.5 ? 0.05 : 0.0),
         server_(time_, ledger_, datagrams_, random_.index(1u << 30), bone_, server_condition()) {
     const std::size_t clients = 2 + random_.index(2);
     for (std::size_t i = 0; i <= clients; ++i) {  // and one that comes late
       const bool late = i == clients;
       ways_.push_back(way());
-      clients_.push_back(std::make_unique<SimClient>(time_, ledger_, server_, datagrams_, i + 1, random_.index(1u << 30), bone_,
-                                                     hand(late), datagram_plan(), options.breakage));
+      clients_.push_back(std::make_unique<SimClient>(time_, ledger_, server_, datagrams_, i + 1,
+                                                     random_.index(1u << 30), bone_, hand(late), datagram_plan(),
+                                                     options.breakage));
     }
   }
 
@@ -67,7 +73,8 @@ class Simulation {
     ledger_.check(settled_s_ <= kSettled_s || !connected(), Invariant::settled,
                   "what was left took " + std::to_string(settled_s_) + " s to be decided and told");
     for (const auto& client : clients_)
-      if (client->here()) ledger_.check(client->settled(), Invariant::decided, "a client is not settled: " + client->standing());
+      if (client->here())
+        ledger_.check(client->settled(), Invariant::decided, "a client is not settled: " + client->standing());
     time_.run_until(time_.now() + kQuiet);
     if (server_.up())
       check();
@@ -96,7 +103,8 @@ class Simulation {
     report.rows = rows_.size();
     for (std::size_t i = 1; i < rows_.size(); ++i)
       if (const auto* held = std::get_if<SuperviseRow>(&rows_[i].what))
-        if (const auto* join = std::get_if<JoinRow>(&rows_[i - 1].what)) report.carried += held->subject == join->author;
+        if (const auto* join = std::get_if<JoinRow>(&rows_[i - 1].what))
+          report.carried += held->subject == join->author;
     for (const RoomRow& row : rows_) {
       report.committed += std::holds_alternative<CutRow>(row.what);
       report.rejected += std::holds_alternative<RejectionRow>(row.what);
@@ -152,7 +160,8 @@ class Simulation {
   ServerCondition server_condition() {
     ServerCondition condition;
     // Half of them with bounds over time as osteon-server sets; these hands cut too briefly to come near its second.
-    if (random_.unit() < 0.5) condition.limits = {.time_slack = random_.unit() < 0.5 ? 40ms : 1s, .swept_voxels_per_s = 5e8};
+    if (random_.unit() < 0.5)
+      condition.limits = {.time_slack = random_.unit() < 0.5 ? 40ms : 1s, .swept_voxels_per_s = 5e8};
     condition.sector_bytes = random_.unit() < 0.5 ? 512 : 4096;
     condition.late_most = drawn(random_, 0ms, 10ms);
     condition.fast_path = fast_path_;
@@ -246,7 +255,8 @@ class Simulation {
     const bool debris = random_.unit() < 0.2;
     server_.change(
         [this, at, debris](Room& room) {
-          const Fragment piece = part(bone_, [at](int x) { return x >= at; }, debris ? 0.5 : 1000.0);
+          const Fragment piece = part(
+              bone_, [at](int x) { return x >= at; }, debris ? 0.5 : 1000.0);
           return room.split(room.bodies().front(), {piece}, room.bone_epoch());
         },
         [this](const Result<RoomEvent>& event) {
@@ -268,7 +278,8 @@ class Simulation {
   }
 
   bool settled() {
-    return server_.up() && std::ranges::all_of(clients_, [](const auto& client) { return !client->here() || client->settled(); });
+    return server_.up() &&
+           std::ranges::all_of(clients_, [](const auto& client) { return !client->here() || client->settled(); });
   }
 
   // After quiet.
@@ -292,7 +303,8 @@ class Simulation {
                     "a hand does not know what holds for it: " + client->standing());
     }
     if (const auto standing = Ledger::standing(rows_)) check_set(*standing, status.field_hash);
-    ledger_.check(server_.reopened(false) == live, Invariant::replay, "the room is another one after it was opened again");
+    ledger_.check(server_.reopened(false) == live, Invariant::replay,
+                  "the room is another one after it was opened again");
     ledger_.check(server_.reopened(true) == live, Invariant::replay, "a checkpoint makes another room");
   }
 
@@ -301,7 +313,8 @@ class Simulation {
     for (std::size_t i = cuts.size(); i > 1; --i) std::swap(cuts[i - 1], cuts[random_.index(i)]);
     CutField field(bone_, BodyId{0}, few_tools());
     for (const Cut& cut : cuts) field.apply(cut);
-    ledger_.check(field.hash() == expected, Invariant::set_of_cuts, "the standing cuts in another order make another bone");
+    ledger_.check(field.hash() == expected, Invariant::set_of_cuts,
+                  "the standing cuts in another order make another bone");
   }
 
   const SimulationOptions options_;

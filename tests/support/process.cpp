@@ -1,6 +1,5 @@
 #include "tests/support/process.hpp"
 
-#include <algorithm>
 #include <fcntl.h>
 #include <poll.h>
 #include <sys/prctl.h>
@@ -114,13 +113,13 @@ std::vector<std::string> with_plain(const std::filesystem::path& program, std::v
   const auto has = [&](std::string_view option) { return std::ranges::find(arguments, option) != arguments.end(); };
   const std::string name = program.filename();
   if (!name.starts_with("osteon-") || has("--plain") || has("--certificates") || has("--check")) return arguments;
-  const bool serves = name == "osteon-server" && !arguments.empty() && (arguments[0] == "--case" || arguments[0] == "--config");
+  const bool serves =
+      name == "osteon-server" && !arguments.empty() && (arguments[0] == "--case" || arguments[0] == "--config");
   if (serves || has("--server")) arguments.emplace_back("--plain");
   return arguments;
 }
 
-Process::Process(const std::filesystem::path& program, const std::vector<std::string>& given,
-                 ProcessOptions options)
+Process::Process(const std::filesystem::path& program, const std::vector<std::string>& given, ProcessOptions options)
     : state_(std::make_unique<State>()) {
   const std::vector<std::string> arguments = options.as_given ? given : with_plain(program, given);
   std::vector<std::string> argument_texts{program.string()};

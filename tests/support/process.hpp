@@ -19,9 +19,10 @@ struct ProcessOptions {
   bool as_given = false;                                         // without the --plain of with_plain()
 };
 
-// The arguments with --plain behind them, where a program of Osteon serves rooms or goes to a server and is not told by which
-// way.
-[[nodiscard]] std::vector<std::string> with_plain(const std::filesystem::path& program, std::vector<std::string> arguments);
+// The arguments with --plain behind them, where a program of Osteon serves rooms or goes to a server and is not told by
+// which way.
+[[nodiscard]] std::vector<std::string> with_plain(const std::filesystem::path& program,
+                                                  std::vector<std::string> arguments);
 
 class Process {
  public:
@@ -44,7 +45,8 @@ class Process {
   [[nodiscard]] std::string err() const;
   // True as soon as standard output contains `text`.
   [[nodiscard]] bool wait_for_out(std::string_view text, std::chrono::milliseconds patience);
-  // True as soon as the last progress on standard error is at least `percent`; false when it ends or patience does before.
+  // True as soon as the last progress on standard error is at least `percent`; false when it ends or patience does
+  // before.
   [[nodiscard]] bool wait_for_percent(int percent, std::chrono::milliseconds patience);
   // The next whole line of standard output, without its end.
   [[nodiscard]] std::optional<std::string> read_line(std::chrono::milliseconds patience);

@@ -312,8 +312,8 @@ Console::Answer Console::take(const Words& words) {
   const Result<PersonSeen> subject = find(words[1]);
   AuthorId holder = room_.self();
   for (const PersonSeen& one : all)
-    if (self != all.end() && !one.name.empty() && one.name == self->name && one.role == self->role && one.hand && one.here &&
-        (!subject || one.author != subject->author))
+    if (self != all.end() && !one.name.empty() && one.name == self->name && one.role == self->role && one.hand &&
+        one.here && (!subject || one.author != subject->author))
       holder = one.author;
   return supervise(words[1], [&](Restrictions& word) {
     word.taken_by = holder;

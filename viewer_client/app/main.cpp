@@ -40,7 +40,8 @@ constexpr const char* kScriptHelp =
     "  turn ITEM TURNS                       a screw by its thread, in or (negative) out, until its head is on bone\n"
     "  seat ITEM [MOST_MM]                   an implant along its axis until bone stops it, 20 mm at most unless said\n"
     "  remove ITEM                           what stands, but no guide that pins fix\n"
-    "                                        (the answers say where it stands now; `seated`: a guide held by two pins,\n"
+    "                                        (the answers say where it stands now; `seated`: a guide held by two "
+    "pins,\n"
     "                                        a screw with its head on bone, an implant with half of it on bone)\n"
     "  save [NAME.vdb]                       the cut fields, on the server beside its --save\n"
     "  look overview                         the whole bone\n"
@@ -141,7 +142,9 @@ Result<void> run(const Arguments& arguments) {
   if (!arguments.name.empty()) watch_options.name = arguments.name;
   watch_options.patience = std::chrono::milliseconds(static_cast<long>(1000.0 * arguments.patience_s));
   watch_options.keep_trying = !scripted;
-  const auto seen_from = [size = *window_size](const CameraView& view) { return look_of(view, size.width_px, size.height_px); };
+  const auto seen_from = [size = *window_size](const CameraView& view) {
+    return look_of(view, size.width_px, size.height_px);
+  };
   watch_options.first_look = [seen_from](const Box& bone) { return seen_from(overview(bone)); };
   auto watch = RoomSubscription::start(watch_options, render_queue, [&stop] { return stop.requested(); });
   if (!watch) {
@@ -224,7 +227,8 @@ int main(int argc, char** argv) {
   app.footer(std::string(kScriptHelp) + "\n\n" + Console::help());
   app.add_option("--server,--connect", arguments.server, "Address of the server, HOST:PORT")->required();
   app.add_option("--name", arguments.name, "Who you are, shown to others");
-  app.add_option("--supervise-for", arguments.hand, "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
+  app.add_option("--supervise-for", arguments.hand,
+                 "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
   app.add_flag("--console", arguments.console, "No window: oversee the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, arguments.credentials);

@@ -106,7 +106,9 @@ std::optional<ItemPlace> parse_where(const std::vector<std::string_view>& words,
   place.along = vector_after("along");
   place.across = vector_after("across");
   if ((!place.along && !place.on_bone) || !has_length(place.along) || !has_length(place.across)) return std::nullopt;
-  if (place.along && place.across && place.across->cross(*place.along).norm() <= 1e-6 * place.across->norm() * place.along->norm()) return std::nullopt;
+  if (place.along && place.across &&
+      place.across->cross(*place.along).norm() <= 1e-6 * place.across->norm() * place.along->norm())
+    return std::nullopt;
   return place;
 }
 
@@ -132,7 +134,8 @@ Parsed parse_item_command(const std::vector<std::string_view>& words) {
   if (verb == "move") {
     std::size_t next = 2;
     const auto where = known ? parse_where(words, next) : std::nullopt;
-    if (!where || next != words.size()) return expected("move ITEM at X Y Z along X Y Z` or `move ITEM near X Y Z`, then `along X Y Z`, `across X Y Z");
+    if (!where || next != words.size())
+      return expected("move ITEM at X Y Z along X Y Z` or `move ITEM near X Y Z`, then `along X Y Z`, `across X Y Z");
     return Command(RoomRequest(MoveItem{*item, *where}));
   }
   if (verb == "remove") {
@@ -146,7 +149,8 @@ Parsed parse_item_command(const std::vector<std::string_view>& words) {
   }
   SeatItem seat{known ? *item : 0};
   if (amount) seat.most_mm = *amount;
-  if (!known || words.size() > 3 || (words.size() == 3 && !amount) || !(seat.most_mm > 0.0)) return expected("seat ITEM` or `seat ITEM MOST_MM");
+  if (!known || words.size() > 3 || (words.size() == 3 && !amount) || !(seat.most_mm > 0.0))
+    return expected("seat ITEM` or `seat ITEM MOST_MM");
   return Command(RoomRequest(seat));
 }
 
@@ -199,7 +203,8 @@ Parsed parse_say(std::string_view line, const std::vector<std::string_view>& wor
   const std::size_t end = quoted ? text.find('"', 1) : std::min(text.find_first_of(" \t"), text.size());
   if (text.empty() || end == std::string::npos) return expected("say WORDS`, `say WHO WORDS` or `say \"A NAME\" WORDS");
   const std::size_t next = text.find_first_not_of(" \t", end + (quoted ? 1 : 0));
-  return Command(Say{quoted ? text.substr(1, end - 1) : text.substr(0, end), next == std::string::npos ? "" : text.substr(next)});
+  return Command(
+      Say{quoted ? text.substr(1, end - 1) : text.substr(0, end), next == std::string::npos ? "" : text.substr(next)});
 }
 
 Parsed parse_look(const std::vector<std::string_view>& words) {
@@ -261,14 +266,16 @@ Parsed parse_command(std::string_view line) {
   }
   if (verb == "undo") return parse_number(words, "undo NUMBER", 1, [](std::uint32_t n) { return UndoLast{n}; });
   if (verb == "redo") return parse_number(words, "redo NUMBER", 1, [](std::uint32_t n) { return RedoLast{n}; });
-  if (verb == "take-away") return parse_number(words, "take-away BODY", 0, [](std::uint32_t n) { return TakeAway{BodyId{n}}; });
+  if (verb == "take-away")
+    return parse_number(words, "take-away BODY", 0, [](std::uint32_t n) { return TakeAway{BodyId{n}}; });
   if (verb == "place") return parse_place(words);
   if (verb == "move" || verb == "turn" || verb == "seat" || verb == "remove") return parse_item_command(words);
   if (verb == "save") return Command(RoomRequest(SaveBone{rest_of(line, verb)}));
   if (verb == "quit" && words.size() == 1) return Command(Quit{});
-  return failure(ErrorCode::invalid_input, "there is no command `" + std::string(verb) +
-                                               "`; the commands are wait, look, follow, tool, mark, undo, redo, take-away, place, move, "
-                                               "turn, seat, remove, point, draw, label, wipe, say, save, screenshot, status and quit");
+  return failure(ErrorCode::invalid_input,
+                 "there is no command `" + std::string(verb) +
+                     "`; the commands are wait, look, follow, tool, mark, undo, redo, take-away, place, move, "
+                     "turn, seat, remove, point, draw, label, wipe, say, save, screenshot, status and quit");
 }
 
 Result<ScriptReader> ScriptReader::open(const std::string& file) {

@@ -109,10 +109,12 @@ struct RemoveItem {
 struct SaveBone {
   std::string file_name;  // empty: the server's own
 };
-using RoomRequest = std::variant<UndoLast, RedoLast, UndoTo, MarkMoment, TakeAway, PlaceTool, MoveItem, TurnItem, SeatItem, RemoveItem, SaveBone>;
+using RoomRequest = std::variant<UndoLast, RedoLast, UndoTo, MarkMoment, TakeAway, PlaceTool, MoveItem, TurnItem,
+                                 SeatItem, RemoveItem, SaveBone>;
 
-using Command = std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool,
-                             ShowTool, SaveScreenshot, SaveStatus, RoomRequest, WaitForDrawn, LookAs, Follow, Draw, WipeOff, Say, Quit>;
+using Command =
+    std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool, ShowTool,
+                 SaveScreenshot, SaveStatus, RoomRequest, WaitForDrawn, LookAs, Follow, Draw, WipeOff, Say, Quit>;
 
 // Null for an empty line and for one that begins with #. Error invalid_input, naming the form expected.
 [[nodiscard]] Result<std::optional<Command>> parse_command(std::string_view line);

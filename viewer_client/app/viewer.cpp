@@ -49,7 +49,8 @@ Result<Viewer> Viewer::make(const ViewerOptions& options, BoneWindow& window, Re
   return viewer;
 }
 
-Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue, std::optional<ScriptReader> script)
+Viewer::Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue,
+               std::optional<ScriptReader> script)
     : options_(options), window_(&window), queue_(&render_queue), script_(std::move(script)), people_(options.hand) {}
 
 Result<Viewer::State> Viewer::turn(bool interrupted) {
@@ -328,7 +329,8 @@ std::optional<Result<void>> Viewer::obey(const Command& command) {
 
 std::optional<Result<void>> Viewer::obey_people(const Command& command) {
   using Outcome = Result<void>;
-  if (options_.people == nullptr) return Outcome(failure(ErrorCode::unavailable, "this viewer has no room whose people it sees"));
+  if (options_.people == nullptr)
+    return Outcome(failure(ErrorCode::unavailable, "this viewer has no room whose people it sees"));
   next_meeting_ = {};
   meet_people();
   if (const auto* look = std::get_if<LookAs>(&command)) return look_as(look->who);
@@ -351,7 +353,8 @@ std::optional<Result<void>> Viewer::obey_people(const Command& command) {
 Result<void> Viewer::look_as(const std::string& who) {
   const Result<PersonSeen> person = people_.find(who, PeopleView::Fit::looking);
   if (!person) return tl::unexpected(person.error());
-  if (!person->look) return failure(ErrorCode::unavailable, "nobody knows where " + who + " looks: they have no window open");
+  if (!person->look)
+    return failure(ErrorCode::unavailable, "nobody knows where " + who + " looks: they have no window open");
   look_taken_ = person->look;
   window_->look(looking_as(*person->look, window_->camera()));
   dirty_ = true;
@@ -396,7 +399,8 @@ std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
     asked_ = *answer;
   }
   if (!surface_shown_ || shown_seq_ < asked_->place) return std::nullopt;
-  if (asked_->events) pending_->line += ": " + std::to_string(*asked_->events) + (*asked_->events == 1 ? " event" : " events");
+  if (asked_->events)
+    pending_->line += ": " + std::to_string(*asked_->events) + (*asked_->events == 1 ? " event" : " events");
   if (!asked_->said.empty()) pending_->line += ": " + asked_->said;
   asked_.reset();
   return Result<void>{};

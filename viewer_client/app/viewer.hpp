@@ -16,24 +16,24 @@
 #include "common/runtime/tick_stats.hpp"
 #include "viewer_client/app/script.hpp"
 #include "viewer_client/render/window.hpp"
-#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/people_view.hpp"
+#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/room_answer.hpp"
 
 namespace osteon {
 
 struct ViewerOptions {
   std::string case_title;
-  Box bounds;                       // of the bone
-  std::filesystem::path frame_log;  // empty: none
-  bool answers = false;             // say ok or error on standard output after each command
-  bool stop_at_error = false;       // a command that fails ends the run
+  Box bounds;                                     // of the bone
+  std::filesystem::path frame_log;                // empty: none
+  bool answers = false;                           // say ok or error on standard output after each command
+  bool stop_at_error = false;                     // a command that fails ends the run
   std::function<void(const CameraView&)> looked;  // hears after every turn where the window looks
-  std::function<SpaceMouseState()> cap;           // moves the camera; its first button shows the whole, its second the tool
+  std::function<SpaceMouseState()> cap;  // moves the camera; its first button shows the whole, its second the tool
   // Asks the room and waits for its answer.
   std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
   SupervisionClient* people = nullptr;  // of the room, must outlive the viewer; null: neither seen nor drawn for
-  std::string hand;            // who sits before this window with a hand, a name or #NUMBER; empty: nobody
+  std::string hand;                     // who sits before this window with a hand, a name or #NUMBER; empty: nobody
 };
 
 // [render]
@@ -52,7 +52,8 @@ class Viewer {
   [[nodiscard]] std::string summary_json() const;
 
  private:
-  Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue, std::optional<ScriptReader> script);
+  Viewer(const ViewerOptions& options, BoneWindow& window, RenderQueue& render_queue,
+         std::optional<ScriptReader> script);
 
   void receive();
   void follow_cap();
@@ -102,7 +103,7 @@ class Viewer {
   std::map<AuthorId, std::string> names_;
   std::vector<std::string> said_;
   std::string holding_;
-  std::string followed_;           // who moves the camera; empty: nobody
+  std::string followed_;  // who moves the camera; empty: nobody
   std::optional<ViewFrustum> look_taken_;
 
   struct Pending {

@@ -43,8 +43,9 @@ Error error_of(const grpc::Status& status) {
 // A server from before consoles were a kind of their own refuses them by their kind.
 Error console_refused(const Error& why, const PeopleClientOptions& options) {
   if (options.window || why.code != ErrorCode::invalid_input || !why.message.starts_with("kind ")) return why;
-  return {ErrorCode::unsupported, "the server at " + options.address + " is older than this console and does not let it in (" +
-                                      why.message + "); install a newer Osteon where the server runs"};
+  return {ErrorCode::unsupported, "the server at " + options.address +
+                                      " is older than this console and does not let it in (" + why.message +
+                                      "); install a newer Osteon where the server runs"};
 }
 
 Result<PersonSeen> person_of(const v1::Person& sent) {
@@ -219,10 +220,10 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
   auto impl = std::make_unique<Impl>();
   impl->options = options;
   impl->stop = std::move(stop);
-  Result<wire::JoinedRoom> joined = options.window
-                                        ? options.window()
-                                        : wire::join_room(options.address, wire::ClientKind::console, options.name,
-                                                          options.patience, impl->stop, options.room, options.credentials);
+  Result<wire::JoinedRoom> joined =
+      options.window ? options.window()
+                     : wire::join_room(options.address, wire::ClientKind::console, options.name, options.patience,
+                                       impl->stop, options.room, options.credentials);
   if (!joined) return tl::unexpected(console_refused(joined.error(), options));
   impl->joined = std::move(*joined);
   std::unique_ptr<PeopleClient> client(new PeopleClient(std::move(impl)));

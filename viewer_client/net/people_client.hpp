@@ -19,8 +19,8 @@ struct PeopleClientOptions {
   wire::ClientCredentials credentials{};
   std::string name = "console";  // shown to others
   std::chrono::milliseconds patience{5000};
-  // The newest join of a window that is in the room already: people are heard of under its identity. None: joins by itself,
-  // as a console.
+  // The newest join of a window that is in the room already: people are heard of under its identity. None: joins by
+  // itself, as a console.
   std::function<wire::JoinedRoom()> window{};
 };
 

@@ -64,10 +64,13 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
   const grpc::Status status = (stub.get()->*call)(&context, request, &response);
   if (status.ok()) return response;
   switch (status.error_code()) {
-    case grpc::StatusCode::INVALID_ARGUMENT: return failure(ErrorCode::invalid_input, status.error_message());
+    case grpc::StatusCode::INVALID_ARGUMENT:
+      return failure(ErrorCode::invalid_input, status.error_message());
     case grpc::StatusCode::PERMISSION_DENIED:
-    case grpc::StatusCode::UNAUTHENTICATED: return failure(ErrorCode::denied, status.error_message());
-    default: return failure(ErrorCode::unavailable, status.error_message());
+    case grpc::StatusCode::UNAUTHENTICATED:
+      return failure(ErrorCode::denied, status.error_message());
+    default:
+      return failure(ErrorCode::unavailable, status.error_message());
   }
 }
 
@@ -108,7 +111,8 @@ v1::SetSceneItemRequest request_for(const SceneItem& standing, std::uint64_t aut
 
 // `more`: what there is to say of the answer besides where the item stands now.
 template <class More>
-Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request, More more) {
+Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request,
+                            More more) {
   const auto answer = ask(channel, &v1::RoomService::Stub::SetSceneItem, request);
   if (!answer) return tl::unexpected(answer.error());
   const auto now = wire::from_wire(answer->set());
@@ -177,7 +181,8 @@ struct RoomSubscription::Impl {
   void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
   // The same question to the room by the viewer's author.
   template <class Response, class Request>
-  Result<Response> ask_as_author(grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
+  Result<Response> ask_as_author(grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&,
+                                                                             Response*),
                                  Request request) const {
     const auto [channel, author] = line();
     request.set_author(author);
@@ -193,8 +198,9 @@ struct RoomSubscription::Impl {
 };
 
 Result<void> RoomSubscription::Impl::join(std::chrono::milliseconds patience) {
-  auto answer =
-      wire::join_room(options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room, options.credentials);
+  auto answer = wire::join_room(
+      options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room,
+      options.credentials);
   if (!answer) return tl::unexpected(answer.error());
   const std::lock_guard lock(mutex);
   joined = std::move(*answer);
@@ -264,7 +270,7 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
     }
     if (outcome) {
       render_queue.put_mesh(RoomSeq{message.room_seq()}, std::move(blocks), message.snapshot_complete(),
-                     message.snapshot_blocks(), received);
+                            message.snapshot_blocks(), received);
     }
   }
   const grpc::Status ended = reader->Finish();
@@ -272,7 +278,8 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
   if (outcome && !stopping()) {
     log::warn("mesh stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
     // Coming again would push out whoever took this viewer's place, or be refused for ever.
-    if (ended.error_code() == grpc::StatusCode::PERMISSION_DENIED || ended.error_code() == grpc::StatusCode::UNAUTHENTICATED)
+    if (ended.error_code() == grpc::StatusCode::PERMISSION_DENIED ||
+        ended.error_code() == grpc::StatusCode::UNAUTHENTICATED)
       return failure(ErrorCode::denied, "the server ended the session: " + ended.error_message());
   }
   return outcome;
@@ -302,7 +309,8 @@ void RoomSubscription::Impl::read_mesh() {
 }
 
 // [cutting thread] Those that the room knows and this program does not.
-void RoomSubscription::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known) {
+void RoomSubscription::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author,
+                                         KnownTools& known) {
   v1::ListToolsRequest list;
   list.set_author(author);
   const auto tools = ask(channel, &v1::RoomService::Stub::ListTools, list);
@@ -377,7 +385,8 @@ void RoomSubscription::Impl::say_looks() {
     std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
     {
       std::unique_lock lock(mutex);
-      changed.wait(lock, [&] { return ending.load() || (newest_look && said_look && !nearly_equal(*said_look, *newest_look)); });
+      changed.wait(
+          lock, [&] { return ending.load() || (newest_look && said_look && !nearly_equal(*said_look, *newest_look)); });
       if (ending) return;
       said_look = newest_look;
       channel = joined.channel;
@@ -397,8 +406,9 @@ void RoomSubscription::Impl::say_looks() {
 
 RoomSubscription::RoomSubscription(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubscriptionOptions& options, RenderQueue& render_queue,
-                                                    std::function<bool()> stop) {
+Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubscriptionOptions& options,
+                                                                  RenderQueue& render_queue,
+                                                                  std::function<bool()> stop) {
   auto impl = std::make_unique<Impl>(options, render_queue, std::move(stop));
   if (auto joined = impl->join(options.patience); !joined) return tl::unexpected(joined.error());
   impl->room = {impl->joined.case_title, impl->joined.pitch_mm, impl->joined.bounds};
@@ -489,7 +499,8 @@ Result<RoomAnswer> RoomSubscription::place(const std::string& tool, const ItemPl
   request.set_author(author);
   for (const v1::KnownTool& known : tools->tools())
     if (known.name() == tool) request.mutable_item()->set_tool_hash(known.tool_hash());
-  if (request.item().tool_hash().empty()) return failure(ErrorCode::not_found, "the room knows no tool of the name " + tool);
+  if (request.item().tool_hash().empty())
+    return failure(ErrorCode::not_found, "the room knows no tool of the name " + tool);
   request.mutable_item()->set_body(body.value);
   put(where, Pose{}, request);
   return set_item(channel, request);
@@ -522,7 +533,8 @@ Result<RoomAnswer> RoomSubscription::seat_item(std::uint32_t item, double most_m
   return set_item(channel, request, [&](const v1::SetSceneItemResponse& answer, const SceneItem& now) {
     char way[80];
     std::snprintf(way, sizeof way, "; advanced %.2f mm, %.0f %% of it on bone",
-                  (now.pose_bone_item.position_mm - standing->pose_bone_item.position_mm).norm(), 100.0 * answer.contact_fraction());
+                  (now.pose_bone_item.position_mm - standing->pose_bone_item.position_mm).norm(),
+                  100.0 * answer.contact_fraction());
     return std::string(way);
   });
 }

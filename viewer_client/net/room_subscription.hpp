@@ -12,15 +12,15 @@
 #include "common/surface/view_frustum.hpp"
 #include "common/wire/credentials.hpp"
 #include "common/wire/room_client.hpp"
-#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/item_place.hpp"
+#include "viewer_client/scene/render_queue.hpp"
 #include "viewer_client/scene/room_answer.hpp"
 
 namespace osteon {
 
 struct RoomSubscriptionOptions {
-  std::string address;          // host:port
-  std::string room{};           // which of the server's; empty: the only one that is open
+  std::string address;  // host:port
+  std::string room{};   // which of the server's; empty: the only one that is open
   wire::ClientCredentials credentials{};
   std::string name = "viewer";  // shown to others
   std::chrono::milliseconds patience{5000};
@@ -40,8 +40,9 @@ class RoomSubscription {
  public:
   // Joins first. Errors: unavailable, unsupported, cancelled; one sentence each. `render_queue` must outlive the watch;
   // `stop` is asked from several threads.
-  [[nodiscard]] static Result<std::unique_ptr<RoomSubscription>> start(const RoomSubscriptionOptions& options, RenderQueue& render_queue,
-                                                                std::function<bool()> stop);
+  [[nodiscard]] static Result<std::unique_ptr<RoomSubscription>> start(const RoomSubscriptionOptions& options,
+                                                                       RenderQueue& render_queue,
+                                                                       std::function<bool()> stop);
   ~RoomSubscription();
 
   [[nodiscard]] const WatchedRoom& room() const;

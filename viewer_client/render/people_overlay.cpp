@@ -43,7 +43,9 @@ constexpr std::uint32_t kStroke = 0xffd040;
 using Rgb = std::array<double, 3>;
 constexpr Rgb kLight{0.96, 0.96, 0.97}, kDark{0.06, 0.08, 0.10}, kWarning{1.0, 0.72, 0.25}, kName{0.60, 0.80, 0.95};
 
-Rgb rgb(std::uint32_t colour) { return {(colour >> 16 & 255) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0}; }
+Rgb rgb(std::uint32_t colour) {
+  return {(colour >> 16 & 255) / 255.0, (colour >> 8 & 255) / 255.0, (colour & 255) / 255.0};
+}
 
 vtkSmartPointer<vtkTextActor> text_actor(int size, const Rgb& colour) {
   auto actor = vtkSmartPointer<vtkTextActor>::New();
@@ -87,10 +89,10 @@ struct PeopleOverlay::Impl {
   struct Drawn {
     Annotation annotation;
     std::vector<Vec3> points_mm;
-    vtkSmartPointer<vtkTubeFilter> tube;        // of a line
-    vtkSmartPointer<vtkActor> solid, through;   // the same shape, among the bone and over it
+    vtkSmartPointer<vtkTubeFilter> tube;       // of a line
+    vtkSmartPointer<vtkActor> solid, through;  // the same shape, among the bone and over it
     vtkSmartPointer<vtkTextActor> words;
-    std::optional<Vec3> normal;                 // of a pointer's point
+    std::optional<Vec3> normal;  // of a pointer's point
   };
   std::map<std::uint32_t, Drawn> drawn;
   std::optional<Drawn> stroke;
@@ -165,7 +167,8 @@ PeopleOverlay::Impl::Drawn PeopleOverlay::Impl::make(const Annotation& annotatio
   Drawn one;
   one.annotation = annotation;
   for (const auto& point : annotation.points) one.points_mm.push_back(from_steps(point));
-  vtkAlgorithmOutput* shape = annotation.kind == AnnotationKind::pointer ? arrow->GetOutputPort() : ball->GetOutputPort();
+  vtkAlgorithmOutput* shape =
+      annotation.kind == AnnotationKind::pointer ? arrow->GetOutputPort() : ball->GetOutputPort();
   if (annotation.kind == AnnotationKind::line) {
     vtkNew<vtkPoints> points;
     vtkNew<vtkCellArray> cells;
@@ -246,7 +249,8 @@ void PeopleOverlay::show_tools(std::span<const CuttingState> states) {
   impl_->tools = std::move(shown);
 }
 
-void PeopleOverlay::show_words(const std::vector<std::string>& said, const std::string& holding, const std::string& hint) {
+void PeopleOverlay::show_words(const std::vector<std::string>& said, const std::string& holding,
+                               const std::string& hint) {
   const auto show = [&](vtkTextActor* actor, const std::string& text) {
     actor->SetInput(text.c_str());
     actor->SetVisibility(text.empty() ? 0 : 1);
@@ -261,7 +265,8 @@ void PeopleOverlay::show_words(const std::vector<std::string>& said, const std::
   lines.clear();
   for (std::size_t at = 0; at < holding.size();) {
     const std::size_t end = std::min(holding.find('\n', at), holding.size());
-    lines += (lines.empty() ? "" : "\n") + wrapped(std::string_view(holding).substr(at, end - at), columns(kHoldingText), 3);
+    lines +=
+        (lines.empty() ? "" : "\n") + wrapped(std::string_view(holding).substr(at, end - at), columns(kHoldingText), 3);
     at = end + 1;
   }
   show(impl_->holding, lines);
@@ -374,7 +379,8 @@ void PeopleOverlay::place() {
     impl_->put_beside(tool.name, tip - kAlongTool * impl_->mm_per_px(tip) * tool.pose.direction(Vec3::UnitZ()));
   }
   bool words = false;
-  for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()}) words = words || text->GetVisibility() != 0;
+  for (vtkTextActor* text : {impl_->said.Get(), impl_->holding.Get(), impl_->hint.Get()})
+    words = words || text->GetVisibility() != 0;
   impl_->above->SetDraw(words || named || impl_->stroke || !impl_->drawn.empty());
 }
 

@@ -1,6 +1,6 @@
-// What people draw, who holds which tool, and what is said, over the picture of the bone. All sizes are of the screen: an arrow
-// is as long in a close view as in one of the whole.
-// All functions: [render], the thread that opened the window.
+// What people draw, who holds which tool, and what is said, over the picture of the bone. All sizes are of the screen:
+// an arrow is as long in a close view as in one of the whole. All functions: [render], the thread that opened the
+// window.
 #pragma once
 #include <functional>
 #include <map>

@@ -173,7 +173,9 @@ class BoneStyle : public vtkInteractorStyleTrackballCamera {
   std::function<std::optional<Vec3>(int x, int y)> surface_at;  // of VTK's display: rows from the bottom
 
   [[nodiscard]] Pen pen() const { return pen_; }
-  [[nodiscard]] std::vector<Vec3> stroke() const { return stroke_ ? stroke_->line(kMostAnnotationPoints) : std::vector<Vec3>{}; }
+  [[nodiscard]] std::vector<Vec3> stroke() const {
+    return stroke_ ? stroke_->line(kMostAnnotationPoints) : std::vector<Vec3>{};
+  }
 
   void OnChar() override {
     switch (Interactor->GetKeyCode()) {

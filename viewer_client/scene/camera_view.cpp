@@ -19,9 +19,11 @@ Vec3 across(const Vec3& direction, const Vec3& axis, const Vec3& otherwise) {
 ViewFrustum look_of(const CameraView& view, int width_px, int height_px) {
   const double half_height = std::tan(0.5 * view.view_angle_rad);
   const double shape = static_cast<double>(width_px) / height_px;
-  ViewFrustum look{view.eye_mm, view.target_mm, 2.0 * half_height / height_px, std::atan(half_height * std::hypot(1.0, shape))};
+  ViewFrustum look{view.eye_mm, view.target_mm, 2.0 * half_height / height_px,
+                   std::atan(half_height * std::hypot(1.0, shape))};
   const Vec3 sight = view.target_mm - view.eye_mm;
-  const Vec3 up = sight.norm() > kLeastSight_mm ? across(view.up, sight.normalized(), Vec3::Zero()) : Vec3(Vec3::Zero());
+  const Vec3 up =
+      sight.norm() > kLeastSight_mm ? across(view.up, sight.normalized(), Vec3::Zero()) : Vec3(Vec3::Zero());
   if (up != Vec3::Zero()) look.up = up;
   return look;
 }

@@ -16,8 +16,8 @@ struct CameraView {
 // What a window of this size shows of it.
 [[nodiscard]] ViewFrustum look_of(const CameraView& view, int width_px, int height_px);
 
-// As somebody else looks. Where they do not say which way is up, the head is, or the face where one looks along the body. A
-// ViewFrustum has no picture's height: the angle stays that of `now`, this window's own view.
+// As somebody else looks. Where they do not say which way is up, the head is, or the face where one looks along the
+// body. A ViewFrustum has no picture's height: the angle stays that of `now`, this window's own view.
 [[nodiscard]] CameraView looking_as(const ViewFrustum& look, const CameraView& now);
 
 // The whole bone from the front, its left and a little above (DICOM LPS: +x left, -y front, +z up).
@@ -27,8 +27,9 @@ struct CameraView {
 // hole.
 [[nodiscard]] CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm);
 
-// The view after the bone was held for a while by a cap that is pushed and twisted, parts of the whole way −1 … 1 in what one
-// sees: x right, y up, z to the eye. The bone follows the cap, so the camera goes the other way; the nearer, the slower.
+// The view after the bone was held for a while by a cap that is pushed and twisted, parts of the whole way −1 … 1 in
+// what one sees: x right, y up, z to the eye. The bone follows the cap, so the camera goes the other way; the nearer,
+// the slower.
 [[nodiscard]] CameraView held_by_cap(const CameraView& view, const Vec3& push, const Vec3& twist, double dt_s);
 
 }  // namespace osteon

@@ -21,7 +21,8 @@ Pose pose_of(const ItemPlace& place, const std::optional<Vec3>& across_else) {
 std::string standing_text(const SceneItem& item) {
   const Vec3 at = item.pose_bone_item.position_mm, along = item.pose_bone_item.direction(Vec3::UnitZ());
   std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(), "item %u at %.2f %.2f %.2f along %.3f %.3f %.3f", item.id, at.x(), at.y(), at.z(), along.x(), along.y(), along.z());
+  std::snprintf(text.data(), text.size(), "item %u at %.2f %.2f %.2f along %.3f %.3f %.3f", item.id, at.x(), at.y(),
+                at.z(), along.x(), along.y(), along.z());
   std::string words = text.data();
   if (item.turns != 0.0) {
     std::snprintf(text.data(), text.size(), ", %.2f turns in", item.turns);

@@ -124,9 +124,11 @@ void PeopleView::notice_decision(const PersonSeen& person, const Restrictions& w
   const std::string whom = ours ? "you" : name_of(person.author), whose = ours ? "your" : name_of(person.author) + "'s";
   const std::string hand = whose + " hand", tool = whose + " tool", by = overseer(person);
   std::vector<std::string> said;
-  if (is.stopped != was.stopped) said.push_back(by + (is.stopped ? " has stopped " + hand : " has set " + hand + " free"));
+  if (is.stopped != was.stopped)
+    said.push_back(by + (is.stopped ? " has stopped " + hand : " has set " + hand + " free"));
   if (is.taken_by != was.taken_by)
-    said.push_back(is.taken_by ? name_of(is.taken_by) + " has taken over " + tool : by + " has given " + tool + " back");
+    said.push_back(is.taken_by ? name_of(is.taken_by) + " has taken over " + tool
+                               : by + " has given " + tool + " back");
   if (is.guide != was.guide)
     said.push_back(by + " leads " + hand + (is.guide ? " along the tool of " + name_of(is.guide) : " no more"));
   if (is.force_limit != was.force_limit)
@@ -136,7 +138,8 @@ void PeopleView::notice_decision(const PersonSeen& person, const Restrictions& w
     said.push_back(by + " lets " + whom + " cut " +
                    (is.zone ? "only within " + radius_text(*is.zone) + " of a point" : "everywhere"));
   if (is.tools != was.tools)
-    said.push_back(by + " lets " + whom + " cut with " + (is.tools.empty() ? "every tool" : tool_names(is.tools) + " only"));
+    said.push_back(by + " lets " + whom + " cut with " +
+                   (is.tools.empty() ? "every tool" : tool_names(is.tools) + " only"));
   if (is.words != was.words && !is.words.empty()) {
     if (said.empty()) said.push_back(by + " about " + hand);
     said.back() += ": " + is.words;
@@ -158,7 +161,8 @@ Result<PersonSeen> PeopleView::find(std::string_view who, Fit fit) const {
   };
   std::string known;
   for (const auto& [author, person] : people_) {
-    if (!person.name.empty() && person.name == who && (found == nullptr || rank(person) >= rank(*found))) found = &person;
+    if (!person.name.empty() && person.name == who && (found == nullptr || rank(person) >= rank(*found)))
+      found = &person;
     if (person.here) known += (known.empty() ? "" : ", ") + name_of(author);
   }
   if (found != nullptr) return *found;
@@ -168,7 +172,8 @@ Result<PersonSeen> PeopleView::find(std::string_view who, Fit fit) const {
 
 std::string PeopleView::name_of(AuthorId author) const {
   const auto person = people_.find(author);
-  return person != people_.end() && !person->second.name.empty() ? person->second.name : "#" + std::to_string(author.value);
+  return person != people_.end() && !person->second.name.empty() ? person->second.name
+                                                                 : "#" + std::to_string(author.value);
 }
 
 std::map<AuthorId, std::string> PeopleView::names() const {

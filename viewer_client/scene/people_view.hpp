@@ -13,7 +13,8 @@
 
 namespace osteon {
 
-// The text in lines of at most `columns` characters, broken at blanks where there are some; after `most` lines it is cut off.
+// The text in lines of at most `columns` characters, broken at blanks where there are some; after `most` lines it is
+// cut off.
 [[nodiscard]] std::string wrapped(std::string_view text, std::size_t columns, std::size_t most);
 
 // In which somebody draws: red, green, blue. Those who come one after the other have different ones.
@@ -35,8 +36,8 @@ class PeopleView {
   // A notice of the program's own.
   void tell(std::string text, Clock::time_point now);
 
-  // By name, or by # and the author's number. Of several of one name - a person's hand and their window - those who fit better,
-  // then those who are here, then the newest. Error not_found, naming those who are here.
+  // By name, or by # and the author's number. Of several of one name - a person's hand and their window - those who fit
+  // better, then those who are here, then the newest. Error not_found, naming those who are here.
   enum class Fit { anybody, looking, hand };
   [[nodiscard]] Result<PersonSeen> find(std::string_view who, Fit fit = Fit::anybody) const;
   // "Ada", or "#3" for somebody without a name.

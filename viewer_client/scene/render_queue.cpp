@@ -18,7 +18,7 @@ void RenderQueue::begin_stream() {
 }
 
 void RenderQueue::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
-                     std::uint32_t snapshot_blocks, std::int64_t received_mono_ns) {
+                           std::uint32_t snapshot_blocks, std::int64_t received_mono_ns) {
   {
     const std::lock_guard lock(mutex_);
     for (ReceivedBlock& block : blocks) {
@@ -41,7 +41,8 @@ void RenderQueue::put_tool(Tool tool) {
   next_.tools.push_back(std::move(tool));
 }
 
-void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items, std::vector<BodyId> bodies) {
+void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items,
+                             std::vector<BodyId> bodies) {
   {
     const std::lock_guard lock(mutex_);
     next_.states = std::move(states);

@@ -31,9 +31,9 @@ struct Delivery {
   bool any_mesh = false;
   bool any_states = false;
   std::vector<CuttingState> states;
-  std::vector<SceneItem> items;   // with any_states
-  std::vector<BodyId> bodies;     // with any_states
-  std::vector<Tool> tools;        // that this program did not know
+  std::vector<SceneItem> items;  // with any_states
+  std::vector<BodyId> bodies;    // with any_states
+  std::vector<Tool> tools;       // that this program did not know
 };
 
 // Any thread may call any function; one mutex, held for a few moves at a time.

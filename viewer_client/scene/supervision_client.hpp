@@ -20,20 +20,20 @@ namespace osteon {
 
 struct PersonSeen {
   AuthorId author;
-  std::string name;                // empty: nobody's
+  std::string name;  // empty: nobody's
   Role role = Role::none;
   bool here = false, hand = false;
-  Restrictions supervision;         // what holds for the hand
-  RoomSeq decided, heard;          // the place of what was decided last, null for nothing; the newest that their client has
-  AuthorId decided_by;             // who decided it; null: nobody knows
-  std::optional<ViewFrustum> look;        // from where they look, where somebody knows
-  std::uint32_t cuts = 0;          // that were taken
+  Restrictions supervision;  // what holds for the hand
+  RoomSeq decided, heard;    // the place of what was decided last, null for nothing; the newest that their client has
+  AuthorId decided_by;       // who decided it; null: nobody knows
+  std::optional<ViewFrustum> look;  // from where they look, where somebody knows
+  std::uint32_t cuts = 0;           // that were taken
   [[nodiscard]] bool pending() const { return decided && heard < decided; }
 };
 
 struct WordsSeen {
   RoomSeq place;
-  AuthorId from, to;               // null: to all
+  AuthorId from, to;  // null: to all
   std::string words;
 };
 
@@ -50,16 +50,16 @@ struct RoomSeen {
 // One of them.
 struct WhatToUndo {
   std::uint32_t count = 0;
-  AuthorId of{};                   // with count; null: of all
+  AuthorId of{};  // with count; null: of all
   RoomSeq to{};
   std::chrono::milliseconds newest{};
   bool all = false;
 };
 
 struct WhatToDemonstrate {
-  std::string room;                // empty: this one
-  AuthorId of{};                   // null: everyone's
-  RoomSeq from{}, to{};            // null: its beginning, its end
+  std::string room;      // empty: this one
+  AuthorId of{};         // null: everyone's
+  RoomSeq from{}, to{};  // null: its beginning, its end
   double speed = 1.0;
 };
 
@@ -77,7 +77,8 @@ class SupervisionClient {
 
   // Place of the event, of the last where there are several. `subject` null: every hand that can be overseen.
   [[nodiscard]] virtual Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) = 0;
-  [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> undo(const WhatToUndo& what) = 0;  // and how many events
+  [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> undo(
+      const WhatToUndo& what) = 0;  // and how many events
   [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) = 0;
   [[nodiscard]] virtual Result<RoomSeq> mark(const std::string& label) = 0;
   [[nodiscard]] virtual Result<std::uint32_t> draw(const Annotation& drawn) = 0;         // which it is

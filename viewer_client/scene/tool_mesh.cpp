@@ -122,7 +122,9 @@ ToolMesh surface_mesh(const Tool& tool) {
     normals.push_back(gradient(solid, p));
     mesh.cutting.push_back(tool.cuts() && part(p) <= solid(p) + 1e-9 ? 1 : 0);
   }
-  const auto add_normal = [&mesh](const Vec3& n) { mesh.normals.push_back({float(n.x()), float(n.y()), float(n.z())}); };
+  const auto add_normal = [&mesh](const Vec3& n) {
+    mesh.normals.push_back({float(n.x()), float(n.y()), float(n.z())});
+  };
   for (const Vec3& n : normals) add_normal(n);
   for (const auto& triangle : surface.triangles) {
     const Vec3 a = position(surface, triangle[0]);

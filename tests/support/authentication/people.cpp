@@ -42,7 +42,8 @@ std::filesystem::path People::ticket_file(const std::string& text) {
   return file;
 }
 
-std::filesystem::path People::ticket(const std::string& user, const std::string& room, Role role, std::chrono::seconds good_for) {
+std::filesystem::path People::ticket(const std::string& user, const std::string& room, Role role,
+                                     std::chrono::seconds good_for) {
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
   return ticket_file(sign_ticket(make_ticket(room, user, role, now + good_for).value(), key()));
 }

@@ -1,4 +1,5 @@
-// An authority of a test's own, a server and people with certificates of it, and tickets: made by deploy/certs, as for others.
+// An authority of a test's own, a server and people with certificates of it, and tickets: made by deploy/certs, as for
+// others.
 #pragma once
 #include <chrono>
 #include <filesystem>

@@ -18,9 +18,9 @@ constexpr std::uint8_t kHeaders = 1, kReset = 3, kEndHeaders = 0x4;
 
 std::string frame(std::uint8_t type, std::uint8_t flags, std::uint32_t stream, const std::string& payload) {
   const auto byte = [](std::size_t value, int shift) { return static_cast<char>(value >> shift & 0xff); };
-  std::string all{byte(payload.size(), 16), byte(payload.size(), 8), byte(payload.size(), 0), static_cast<char>(type),
-                  static_cast<char>(flags), byte(stream, 24),        byte(stream, 16),        byte(stream, 8),
-                  byte(stream, 0)};
+  std::string all{byte(payload.size(), 16), byte(payload.size(), 8),  byte(payload.size(), 0),
+                  static_cast<char>(type),  static_cast<char>(flags), byte(stream, 24),
+                  byte(stream, 16),         byte(stream, 8),          byte(stream, 0)};
   return all + payload;
 }
 

@@ -31,15 +31,19 @@ Life live(std::uint64_t seed, MemoryDisk& disk, std::uint64_t killed_at, bool po
   if (writer.open()) {
     writer.work(static_cast<int>(random() % 20));
     life.images.push_back(disk.image());
-    if (power_fails) disk.fail_power_at(killed_at);
-    else disk.fail_at(killed_at, EIO, MemoryDisk::Lasting::from_then_on);
+    if (power_fails)
+      disk.fail_power_at(killed_at);
+    else
+      disk.fail_at(killed_at, EIO, MemoryDisk::Lasting::from_then_on);
     while (writer.work(5)) life.images.push_back(disk.image());
   }
   life.acknowledged = writer.acknowledged();
   life.asked = writer.asked();
   writer.drop();
-  if (power_fails) disk.power_returns();
-  else disk.mend();
+  if (power_fails)
+    disk.power_returns();
+  else
+    disk.mend();
   life.images.push_back(disk.image());
   return life;
 }
@@ -61,12 +65,24 @@ std::string damage(Random& random, const std::string& name, const Life& life, co
       if (bytes.empty()) break;
       bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
       return "flip";
-    case 1: bytes.replace(at, count, std::string(count, '\0')); return "zero";
-    case 2: bytes.replace(at, count, random_bytes(random, count)); return "overwrite";
-    case 3: bytes.resize(at); return "truncate";
-    case 4: image.erase(name); return "delete";
-    case 5: bytes.replace(at, count, bytes.substr(random() % (bytes.size() - count + 1), count)); return "duplicate";
-    case 6: bytes += random_bytes(random, count); return "append";
+    case 1:
+      bytes.replace(at, count, std::string(count, '\0'));
+      return "zero";
+    case 2:
+      bytes.replace(at, count, random_bytes(random, count));
+      return "overwrite";
+    case 3:
+      bytes.resize(at);
+      return "truncate";
+    case 4:
+      image.erase(name);
+      return "delete";
+    case 5:
+      bytes.replace(at, count, bytes.substr(random() % (bytes.size() - count + 1), count));
+      return "duplicate";
+    case 6:
+      bytes += random_bytes(random, count);
+      return "append";
     case 7:
       if (const auto& older = life.images[random() % life.images.size()]; older.contains(name)) bytes = older.at(name);
       return "older copy";
@@ -116,7 +132,8 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
     const bool doubted = !report || !std::ranges::all_of(report->faults, [](const std::string& fault) {
       return fault.find(".checkpoint") != fault.npos;
     });
-    if (doubted) return {Verdict::Kind::whole,
+    if (doubted)
+      return {Verdict::Kind::whole,
               "verify finds damage, and it takes rows: " + (report ? report->faults.front() : report.error().message)};
     const JournalRow next{RoomSeq{rows.size() + 1}, 0, "next"};
     return {Verdict::Kind::whole, opened->append({&next, 1}) ? "" : "it is whole and takes no rows"};

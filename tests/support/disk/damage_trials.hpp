@@ -8,18 +8,18 @@
 namespace osteon::test {
 
 enum class DamagedFiles {
-  one,              // of the journal's files, any
-  only_log_left,    // the mirror is gone, as if there had never been one, and the log is damaged
+  one,            // of the journal's files, any
+  only_log_left,  // the mirror is gone, as if there had never been one, and the log is damaged
 };
 
 struct DamageTally {
   std::uint64_t trials = 0;
-  std::uint64_t acknowledged = 0;             // rows, in all trials
-  std::uint64_t whole = 0;                    // all acknowledged rows are there, and the journal goes on
-  std::uint64_t named = 0;  // opened to be read, with the right number of missing rows, or "cannot be told"
-  std::uint64_t refused = 0;                  // not opened, with a sentence
-  std::uint64_t silent = 0;                   // rows are missing or differ, and nothing says so
-  std::uint64_t called_damaged = 0;           // though nothing was done to it
+  std::uint64_t acknowledged = 0;    // rows, in all trials
+  std::uint64_t whole = 0;           // all acknowledged rows are there, and the journal goes on
+  std::uint64_t named = 0;           // opened to be read, with the right number of missing rows, or "cannot be told"
+  std::uint64_t refused = 0;         // not opened, with a sentence
+  std::uint64_t silent = 0;          // rows are missing or differ, and nothing says so
+  std::uint64_t called_damaged = 0;  // though nothing was done to it
   std::map<std::string, std::uint64_t> done;  // trials by what was done
   std::vector<std::string> faults;            // the first few, with their seeds
 };

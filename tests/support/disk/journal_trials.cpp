@@ -25,7 +25,9 @@ Digest sha256(const std::string& bytes) {
 
 std::string raw(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
 
-bool same(const JournalRow& a, const JournalRow& b) { return a.place == b.place && a.at_ns == b.at_ns && a.bytes == b.bytes; }
+bool same(const JournalRow& a, const JournalRow& b) {
+  return a.place == b.place && a.at_ns == b.at_ns && a.bytes == b.bytes;
+}
 
 void add(Tally& tally, const JournalWriter& writer, std::uint64_t seed, bool failed) {
   ++tally.trials;
@@ -46,8 +48,8 @@ JournalHead plain_head(const std::string& genesis, const std::vector<JournalRow>
   JournalHead head{RoomSeq{0}, sha256(little_endian(name.size()) + name + little_endian(genesis.size()) + genesis)};
   for (const JournalRow& row : rows)
     head = {row.place,
-            sha256(raw(head.chain) + little_endian(row.place.value) + little_endian(static_cast<std::uint64_t>(row.at_ns)) +
-                   little_endian(row.bytes.size()) + row.bytes)};
+            sha256(raw(head.chain) + little_endian(row.place.value) +
+                   little_endian(static_cast<std::uint64_t>(row.at_ns)) + little_endian(row.bytes.size()) + row.bytes)};
   return head;
 }
 
@@ -112,7 +114,9 @@ bool JournalWriter::work(int count) {
   for (; count > 0; --count) {
     bool done = true;
     switch (below(16)) {
-      case 0: done = write_checkpoint(); break;
+      case 0:
+        done = write_checkpoint();
+        break;
       case 1: {
         const auto epoch = journal_->next_server_epoch();
         done = epoch.has_value();
@@ -121,7 +125,8 @@ bool JournalWriter::work(int count) {
         break;
       }
       case 2: {
-        const Person person{"p" + std::to_string(below(6)), std::string(below(40), 'n'), static_cast<std::int32_t>(below(9))};
+        const Person person{"p" + std::to_string(below(6)), std::string(below(40), 'n'),
+                            static_cast<std::int32_t>(below(9))};
         person_asked_ = person.pseudonym;
         done = journal_->set_person(person).has_value();
         if (done) people_[person.pseudonym] = person;
@@ -136,16 +141,20 @@ bool JournalWriter::work(int count) {
         if (done) person_asked_.reset();
         break;
       }
-      case 4: done = journal_->tidy().has_value(); break;
+      case 4:
+        done = journal_->tidy().has_value();
+        break;
       case 5:
         done = journal_->close().has_value();
         journal_.reset();
         done = done && open();
         break;
-      default: done = append();
+      default:
+        done = append();
     }
     if (done && journal_->closed_because() == nullptr) continue;
-    if (!asked_.empty() && journal_ && journal_->closed_because() == nullptr) fault("an append failed without a word why");
+    if (!asked_.empty() && journal_ && journal_->closed_because() == nullptr)
+      fault("an append failed without a word why");
     if (!disk_.has_failed()) fault("refuses work on a sound disk");
     return false;
   }
@@ -205,8 +214,7 @@ void JournalWriter::check() {
 void JournalWriter::check_failed() {
   if (!journal_ || journal_->closed_because() == nullptr) return;
   const JournalRow next{RoomSeq{journal_->head().place.value + 1}, 0, "late"};
-  if (journal_->append({&next, 1}) || journal_->next_server_epoch())
-    fault("goes on after a write that failed");
+  if (journal_->append({&next, 1}) || journal_->next_server_epoch()) fault("goes on after a write that failed");
 }
 
 void JournalWriter::recover() {

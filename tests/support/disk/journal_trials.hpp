@@ -39,7 +39,9 @@ class JournalWriter {
   [[nodiscard]] const std::vector<JournalRow>& acknowledged() const { return acknowledged_; }
   [[nodiscard]] const std::vector<JournalRow>& asked() const { return asked_; }  // of an append that failed
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
-  [[nodiscard]] std::uint64_t kept_unasked() const { return kept_unasked_; }  // rows that were not acknowledged, yet are there
+  [[nodiscard]] std::uint64_t kept_unasked() const {
+    return kept_unasked_;
+  }  // rows that were not acknowledged, yet are there
   [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
 
  private:
@@ -67,8 +69,8 @@ class JournalWriter {
 
 struct Tally {
   std::uint64_t trials = 0;
-  std::uint64_t acknowledged = 0;   // rows
-  std::uint64_t recovered = 0;      // rows found again, those not acknowledged included
+  std::uint64_t acknowledged = 0;  // rows
+  std::uint64_t recovered = 0;     // rows found again, those not acknowledged included
   std::uint64_t kept_unasked = 0;
   std::uint64_t lost = 0;           // acknowledged rows that were gone
   std::uint64_t failed = 0;         // trials in which the disk did fail
@@ -79,12 +81,12 @@ struct Tally {
 
 // The power fails at a random write or sync, up to three times; what was not synced is lost, torn, spoiled or kept.
 [[nodiscard]] Tally power_loss_trials(std::uint64_t first_seed, std::uint64_t count, bool durable = true);
-// The n-th write or sync fails, for each n of the first `count`: once or from then on, with a full disk or a failing one.
-// Then the process goes, in half of the trials the power too, and the room goes on from what is there.
+// The n-th write or sync fails, for each n of the first `count`: once or from then on, with a full disk or a failing
+// one. Then the process goes, in half of the trials the power too, and the room goes on from what is there.
 [[nodiscard]] Tally failing_disk_trials(std::uint64_t first_seed, std::uint64_t count, int error);
 
-// A sync fails, and nothing can be noted about it; the next process finds what looks written, and the power fails while it
-// opens the journal.
+// A sync fails, and nothing can be noted about it; the next process finds what looks written, and the power fails while
+// it opens the journal.
 [[nodiscard]] Tally forgotten_sync_trials(std::uint64_t first_seed, std::uint64_t count);
 
 }  // namespace osteon::test

@@ -32,10 +32,10 @@ Result<void> done_or(int reason, const char* what, const fs::path& file) {
 }  // namespace
 
 struct MemoryDisk::Content {
-  std::string seen;              // what reading gives
-  std::string kept;              // what is on the disk
-  std::set<std::size_t> waiting; // sectors written since they were last synced
-  int exclusive = 0, shared = 0; // locks held since `boot`
+  std::string seen;               // what reading gives
+  std::string kept;               // what is on the disk
+  std::set<std::size_t> waiting;  // sectors written since they were last synced
+  int exclusive = 0, shared = 0;  // locks held since `boot`
   std::uint64_t boot = 0;
 
   void mark(std::size_t sector_bytes, std::uint64_t from, std::uint64_t to) {
@@ -51,7 +51,8 @@ struct MemoryDisk::Content {
   // Puts a sector where it is, as far as `into` goes.
   static void place(std::string& into, std::size_t sector_bytes, std::size_t at, const std::string& bytes) {
     const std::size_t from = at * sector_bytes;
-    if (from < into.size()) into.replace(from, std::min(sector_bytes, into.size() - from), bytes, 0, into.size() - from);
+    if (from < into.size())
+      into.replace(from, std::min(sector_bytes, into.size() - from), bytes, 0, into.size() - from);
   }
   // The sector reaches the disk.
   void keep(std::size_t sector_bytes, std::size_t at) {
@@ -129,9 +130,9 @@ struct MemoryDisk::Sqlite {
   static int character(sqlite3_file* file) { return file_of(file).powersafe ? SQLITE_IOCAP_POWERSAFE_OVERWRITE : 0; }
 
   static int open(sqlite3_vfs* vfs, const char* name, sqlite3_file* file, int flags, int* flags_out) {
-    static const sqlite3_io_methods kMethods{1,       close,   read,    write,       truncate,  sync,    size,
-                                             lock,    lock,    is_reserved, control, sector_size, character,
-                                             nullptr, nullptr, nullptr, nullptr, nullptr, nullptr};
+    static const sqlite3_io_methods kMethods{1,       close,   read,        write,   truncate,    sync,      size,
+                                             lock,    lock,    is_reserved, control, sector_size, character, nullptr,
+                                             nullptr, nullptr, nullptr,     nullptr, nullptr};
     MemoryDisk& disk = disk_of(vfs);
     file->pMethods = nullptr;
     OSTEON_CHECK(name != nullptr);  // a temporary file: the journal keeps those in memory
@@ -270,7 +271,8 @@ int MemoryDisk::sync(Content& content) {
     for (const std::size_t sector : content.waiting) {
       const std::uint64_t fate = random_() % 3;
       if (fate == 0) content.keep(sector_bytes_, sector);
-      if (fate == 1) Content::place(content.seen, sector_bytes_, sector, Content::sector(content.kept, sector_bytes_, sector));
+      if (fate == 1)
+        Content::place(content.seen, sector_bytes_, sector, Content::sector(content.kept, sector_bytes_, sector));
     }
   }
   content.waiting.clear();
@@ -326,8 +328,11 @@ void MemoryDisk::lose_power(Content& content) {
         break;
       case 2:
       case 3:
-      case 4: sector = written; break;
-      default: break;  // forgotten
+      case 4:
+        sector = written;
+        break;
+      default:
+        break;  // forgotten
     }
     Content::place(left, sector_bytes_, at, sector);
   }
@@ -401,7 +406,8 @@ void MemoryDisk::load(const Image& image) {
   for (const auto& [name, bytes] : image) put(name, bytes);
 }
 
-// ---------------------------------------------------------------------------------------------- under the journal's files
+// ---------------------------------------------------------------------------------------------- under the journal's
+// files
 
 class MemoryDisk::OpenFile final : public DiskFile {
  public:
@@ -509,7 +515,9 @@ Result<void> MemoryDisk::remove(const fs::path& file) {
   return done_or(change_names({{name_of(file), nullptr}}), "remove", file);
 }
 
-Result<void> MemoryDisk::sync_folder(const fs::path& folder) { return done_or(sync_names(name_of(folder)), "sync", folder); }
+Result<void> MemoryDisk::sync_folder(const fs::path& folder) {
+  return done_or(sync_names(name_of(folder)), "sync", folder);
+}
 
 Result<std::vector<std::string>> MemoryDisk::list(const fs::path& folder) {
   if (off_) return cannot("list", folder, EIO);

@@ -1,5 +1,5 @@
-// A disk in memory that forgets, tears and fails as real ones do, deterministic by its seed: one store both under the files
-// of server/journal/disk.hpp and, as a virtual file system, under SQLite.
+// A disk in memory that forgets, tears and fails as real ones do, deterministic by its seed: one store both under the
+// files of server/journal/disk.hpp and, as a virtual file system, under SQLite.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -13,10 +13,11 @@
 
 namespace osteon::test {
 
-// What is written can be read at once, and is lost with the power until it was synced: of the sectors written since, each is
-// then as before, as after, torn between the two, or spoiled. Names made, changed or removed may be forgotten until their
-// folder was synced. After a sync that failed, a sector may look written, never to be written (as Linux does), or be as
-// before. Not synchronised: one thread. Making one also seeds SQLite's generator, which is the process's.
+// What is written can be read at once, and is lost with the power until it was synced: of the sectors written since,
+// each is then as before, as after, torn between the two, or spoiled. Names made, changed or removed may be forgotten
+// until their folder was synced. After a sync that failed, a sector may look written, never to be written (as Linux
+// does), or be as before. Not synchronised: one thread. Making one also seeds SQLite's generator, which is the
+// process's.
 class MemoryDisk final : public Disk {
  public:
   explicit MemoryDisk(std::uint64_t seed, std::size_t sector_bytes = 4096);
@@ -38,14 +39,15 @@ class MemoryDisk final : public Disk {
 
   // Faults. They count from now, 1 being the next; `error` is an errno value: EIO, ENOSPC.
   enum class Lasting { once, from_then_on };
-  void fail_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);        // the n-th write or sync
-  void fail_write_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // writes, and new, renamed, removed names
-  void fail_sync_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);   // of files and folders
+  void fail_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // the n-th write or sync
+  void fail_write_at(std::uint64_t n, int error,
+                     Lasting lasting = Lasting::once);  // writes, and new, renamed, removed names
+  void fail_sync_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // of files and folders
   // The power fails at the n-th write or sync: that and all later calls fail, reads too, until power_returns().
   void fail_power_at(std::uint64_t n);
   // With only what is left of what was not synced. Nobody may have a file open.
   void power_returns();
-  void mend();  // no fault to come
+  void mend();                                               // no fault to come
   [[nodiscard]] bool has_failed() const { return failed_; }  // since the last mend() or power_returns()
 
   // Damage, synced at once.
@@ -62,8 +64,8 @@ class MemoryDisk final : public Disk {
   [[nodiscard]] const Counts& counts() const { return counts_; }
   [[nodiscard]] std::size_t sector_bytes() const { return sector_bytes_; }
 
-  struct Sqlite;   // the virtual file system
-  struct Content;  // of a file
+  struct Sqlite;                              // the virtual file system
+  struct Content;                             // of a file
   using Contents = std::shared_ptr<Content>;  // held by its names, and by those who have it open though it was removed
 
  private:

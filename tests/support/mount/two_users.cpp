@@ -59,11 +59,11 @@ struct User {
   static constexpr double kApart_mm = 2.0;  // of a hand that does not push
 
   MountFollower bone;
-  Hand hand;                  // its x: how far the tip is beyond the face of the unloaded bone, into it
+  Hand hand;  // its x: how far the tip is beyond the face of the unloaded bone, into it
   Line<MountLoad> up;
   Line<MountPose> down;
-  double side = 1.0;          // it pushes along x or against it
-  Vec3 face_mm;               // where it touches, bone frame
+  double side = 1.0;  // it pushes along x or against it
+  Vec3 face_mm;       // where it touches, bone frame
   double push_mm = 0, from_s = 0, ramp_s = 0;
   double force_n = 0, face_x_mm = 0;
   Load load;
@@ -159,8 +159,8 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
       user.force_n = deep_mm > 0.0 ? std::max(0.0, kCoupling * (deep_mm + kDt * speed)) : 0.0;
       user.hand.step(command, {-user.force_n, 0, 0}, kDt);
       const Pose pose = user.bone.pose_world_bone();
-      user.load = Load::at({user.side * user.force_n, 0, 0},
-                           pose.point(user.face_mm) - pose.point(run.server.mount.centre_mm));
+      user.load =
+          Load::at({user.side * user.force_n, 0, 0}, pose.point(user.face_mm) - pose.point(run.server.mount.centre_mm));
       double& most_n = result.most_force_n[2 * tick >= run.ticks];
       most_n = std::max(most_n, user.force_n);
       if (tick % 8 == static_cast<long>(3 * i)) {

@@ -13,14 +13,14 @@ namespace osteon::test {
 // One direction of a path. Shares are of datagrams, 0 to 1, each drawn on its own.
 struct PathQuality {
   double loss = 0;
-  double duplicate = 0;                       // arrive a second time, up to `reorder_by` later
-  double reorder = 0;                         // are held back, so that later ones overtake them
-  double corrupt = 0;                         // arrive with 1 to 3 bits flipped
-  std::chrono::nanoseconds delay{};           // one way
-  std::chrono::nanoseconds jitter{};          // delay is between delay - jitter and delay + jitter; keeps the order
+  double duplicate = 0;               // arrive a second time, up to `reorder_by` later
+  double reorder = 0;                 // are held back, so that later ones overtake them
+  double corrupt = 0;                 // arrive with 1 to 3 bits flipped
+  std::chrono::nanoseconds delay{};   // one way
+  std::chrono::nanoseconds jitter{};  // delay is between delay - jitter and delay + jitter; keeps the order
   std::chrono::nanoseconds reorder_by = std::chrono::milliseconds(30);  // held back so long at most
-  double bytes_per_s = 0;                     // 0: no limit
-  std::size_t queue_bytes = 64 * 1024;        // waiting for their turn at the limit; what comes beyond is lost
+  double bytes_per_s = 0;                                               // 0: no limit
+  std::size_t queue_bytes = 64 * 1024;  // waiting for their turn at the limit; what comes beyond is lost
 };
 
 struct ImpairmentCounts {
@@ -36,8 +36,8 @@ class Impairment {
   [[nodiscard]] const PathQuality& quality() const { return quality_; }
 
   struct Copy {
-    Time at;           // of arrival
-    bool spoiled;      // apply spoil() to it
+    Time at;       // of arrival
+    bool spoiled;  // apply spoil() to it
   };
   // What becomes of a datagram given now: none, one or two copies.
   [[nodiscard]] std::vector<Copy> pass(Time now, std::size_t bytes);

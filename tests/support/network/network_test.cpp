@@ -134,9 +134,10 @@ TEST(SimNetwork, DoesToDatagramsWhatItWasAskedTo) {
   }
   EXPECT_GT(overtaken, 500) << "held back, or a second copy";
   std::printf("%d sent: %llu lost, %llu twice, %llu held back, %llu spoiled; %d overtaken\n", kSent,
-              static_cast<unsigned long long>(counts.paths.lost), static_cast<unsigned long long>(counts.paths.duplicated),
-              static_cast<unsigned long long>(counts.paths.held_back), static_cast<unsigned long long>(counts.paths.corrupted),
-              overtaken);
+              static_cast<unsigned long long>(counts.paths.lost),
+              static_cast<unsigned long long>(counts.paths.duplicated),
+              static_cast<unsigned long long>(counts.paths.held_back),
+              static_cast<unsigned long long>(counts.paths.corrupted), overtaken);
 }
 
 TEST(SimNetwork, JitterAloneKeepsTheOrder) {

@@ -25,7 +25,7 @@ struct NetworkCounts {
   std::uint64_t unreachable = 0;  // nobody at that endpoint when they arrived
   std::uint64_t crowded_out = 0;  // the receiver had too many waiting
   std::uint64_t delivered = 0;
-  ImpairmentCounts paths;         // of all directions together
+  ImpairmentCounts paths;  // of all directions together
 };
 
 class SimPort;

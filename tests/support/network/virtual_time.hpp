@@ -21,7 +21,9 @@ class VirtualTime {
   // All that is posted up to `until`, with what that posts; the clock stands at `until` afterwards.
   void run_until(Time until);
   [[nodiscard]] std::size_t posted() const { return events_.size(); }
-  [[nodiscard]] std::optional<Time> next_at() const { return events_.empty() ? std::nullopt : std::optional(events_.front().at); }
+  [[nodiscard]] std::optional<Time> next_at() const {
+    return events_.empty() ? std::nullopt : std::optional(events_.front().at);
+  }
 
  private:
   struct Event {

@@ -1,5 +1,6 @@
 #include "tests/support/relay/relay.hpp"
 
+#include <unistd.h>
 #include <asio/buffer.hpp>
 #include <asio/io_context.hpp>
 #include <asio/ip/tcp.hpp>
@@ -10,7 +11,6 @@
 #include <asio/steady_timer.hpp>
 #include <asio/streambuf.hpp>
 #include <asio/write.hpp>
-#include <unistd.h>
 
 #include <array>
 #include <csignal>
@@ -31,7 +31,8 @@ using asio::ip::udp;
 using Time = VirtualTime::Time;
 using namespace std::chrono_literals;
 
-constexpr std::size_t kMostPendingBytes = 256 * 1024;  // of one direction of a TCP connection, before it is read no further
+constexpr std::size_t kMostPendingBytes =
+    256 * 1024;  // of one direction of a TCP connection, before it is read no further
 constexpr std::size_t kMostUdpClients = 256;
 constexpr Time kRetransmission = 200ms, kSignalPartition = 3s;
 
@@ -215,15 +216,16 @@ struct Relay::Impl {
     TcpLink::Direction& way = link->directions[d];
     if (!link->open || way.reading || way.ended || way.pending > kMostPendingBytes) return;
     way.reading = true;
-    link->ends[d].async_read_some(asio::buffer(way.buffer), [this, link, d](const asio::error_code& error, std::size_t size) {
-      TcpLink::Direction& from = link->directions[d];
-      from.reading = false;
-      if (!link->open) return;
-      if (error && error != asio::error::eof) return close(*link, true);
-      if (error) from.ended = true;
-      arrive_later(link, d, error ? std::string() : std::string(from.buffer.data(), size));
-      read(link, d);
-    });
+    link->ends[d].async_read_some(
+        asio::buffer(way.buffer), [this, link, d](const asio::error_code& error, std::size_t size) {
+          TcpLink::Direction& from = link->directions[d];
+          from.reading = false;
+          if (!link->open) return;
+          if (error && error != asio::error::eof) return close(*link, true);
+          if (error) from.ended = true;
+          arrive_later(link, d, error ? std::string() : std::string(from.buffer.data(), size));
+          read(link, d);
+        });
   }
 
   void arrive_later(const std::shared_ptr<TcpLink>& link, std::size_t d, std::string bytes) {
@@ -248,20 +250,22 @@ struct Relay::Impl {
       asio::error_code ignored;
       to.shutdown(tcp::socket::shutdown_send, ignored);
       way.arrived.clear();
-      if (link->directions[0].ended && link->directions[1].ended && link->directions[1 - d].pending == 0) close(*link, false);
+      if (link->directions[0].ended && link->directions[1].ended && link->directions[1 - d].pending == 0)
+        close(*link, false);
       return;
     }
     way.writing = true;
-    asio::async_write(to, asio::buffer(way.arrived.front()), [this, link, d](const asio::error_code& error, std::size_t size) {
-      TcpLink::Direction& sent = link->directions[d];
-      sent.writing = false;
-      if (!link->open) return;
-      if (error) return close(*link, true);
-      sent.pending -= size;
-      sent.arrived.pop_front();
-      write(link, d);
-      read(link, d);
-    });
+    asio::async_write(to, asio::buffer(way.arrived.front()),
+                      [this, link, d](const asio::error_code& error, std::size_t size) {
+                        TcpLink::Direction& sent = link->directions[d];
+                        sent.writing = false;
+                        if (!link->open) return;
+                        if (error) return close(*link, true);
+                        sent.pending -= size;
+                        sent.arrived.pop_front();
+                        write(link, d);
+                        read(link, d);
+                      });
   }
 
   void close(TcpLink& link, bool reset) {
@@ -349,8 +353,8 @@ std::string Relay::Impl::command(const std::string& line) {
   } else if (what == "counts") {
     const ImpairmentCounts &up = fates[0].counts(), &down = fates[1].counts();
     std::ostringstream out;
-    out << "ok udp " << up.given + down.given << ' ' << up.lost + down.lost << ' ' << up.duplicated + down.duplicated << ' '
-        << up.held_back + down.held_back << " tcp " << connections << ' ' << resets;
+    out << "ok udp " << up.given + down.given << ' ' << up.lost + down.lost << ' ' << up.duplicated + down.duplicated
+        << ' ' << up.held_back + down.held_back << " tcp " << connections << ' ' << resets;
     return out.str();
   } else if (what == "quit") {
     io.stop();
@@ -408,7 +412,9 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
 
 std::vector<std::string> Relay::addresses() const {
   std::vector<std::string> out;
-  const auto add = [&](const char* kind, std::uint16_t port) { out.push_back(kind + (" 127.0.0.1:" + std::to_string(port))); };
+  const auto add = [&](const char* kind, std::uint16_t port) {
+    out.push_back(kind + (" 127.0.0.1:" + std::to_string(port)));
+  };
   for (const auto& side : impl_->udp_sides) add("udp", side.socket.local_endpoint().port());
   for (const auto& side : impl_->tcp_sides) add("tcp", side.acceptor.local_endpoint().port());
   return out;

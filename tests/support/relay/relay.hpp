@@ -11,14 +11,15 @@
 namespace osteon::test {
 
 struct RelayOptions {
-  std::vector<std::string> udp, tcp;  // HOST:PORT of each server, the host a numeric address; one listening port for each
-  PathQuality quality;                // of both directions
+  std::vector<std::string> udp,
+      tcp;              // HOST:PORT of each server, the host a numeric address; one listening port for each
+  PathQuality quality;  // of both directions
   std::uint64_t seed = 1;
 };
 
-// UDP: each client has a socket of its own towards the server, as behind a router, so that answers find back. TCP stays in
-// order and loses nothing: what would be lost comes 200 ms later, as after a retransmission, and all behind it too. What is
-// sent in a partition is lost (UDP) or waits for its end (TCP).
+// UDP: each client has a socket of its own towards the server, as behind a router, so that answers find back. TCP stays
+// in order and loses nothing: what would be lost comes 200 ms later, as after a retransmission, and all behind it too.
+// What is sent in a partition is lost (UDP) or waits for its end (TCP).
 class Relay {
  public:
   // Listens on ports of 127.0.0.1 that the system chooses. Errors: invalid_input (a target), unavailable (no socket).
@@ -27,11 +28,12 @@ class Relay {
 
   // "udp 127.0.0.1:PORT" or "tcp 127.0.0.1:PORT", in the order of the options, UDP first.
   [[nodiscard]] std::vector<std::string> addresses() const;
-  // Until a command or a signal ends it: SIGTERM and SIGINT do; SIGUSR1 is a partition of 3 s. Commands are lines of standard
-  // input, each answered by a line on standard output, "ok" or what is wrong:
-  //   partition MS | reset | rebind | loss P | reorder P | duplicate P | delay MS [JITTER_MS] | kbit N | good | counts | quit
-  // reset breaks all TCP connections; rebind gives the UDP clients new ports towards the server; good ends all impairment;
-  // counts answers "ok udp GIVEN LOST TWICE HELD_BACK tcp CONNECTIONS RESET".
+  // Until a command or a signal ends it: SIGTERM and SIGINT do; SIGUSR1 is a partition of 3 s. Commands are lines of
+  // standard input, each answered by a line on standard output, "ok" or what is wrong:
+  //   partition MS | reset | rebind | loss P | reorder P | duplicate P | delay MS [JITTER_MS] | kbit N | good | counts
+  //   | quit
+  // reset breaks all TCP connections; rebind gives the UDP clients new ports towards the server; good ends all
+  // impairment; counts answers "ok udp GIVEN LOST TWICE HELD_BACK tcp CONNECTIONS RESET".
   void run();
   // One command, as above.
   std::string command(const std::string& line);

@@ -1,11 +1,11 @@
 // Counts, never times: how long things take here is the machine's business.
+#include <gtest/gtest.h>
 #include <asio/connect.hpp>
 #include <asio/io_context.hpp>
 #include <asio/ip/tcp.hpp>
 #include <asio/ip/udp.hpp>
 #include <asio/read.hpp>
 #include <asio/write.hpp>
-#include <gtest/gtest.h>
 
 #include <atomic>
 #include <chrono>
@@ -125,10 +125,13 @@ TEST(Impair, LosesAllInAPartitionAndNothingAfter) {
   send(*client, there, numbered(100));
   EXPECT_EQ(drain(*server).numbers, std::vector<std::uint32_t>{100});
   relay.process().signal(SIGUSR1);
-  EXPECT_TRUE(wait_until([&] {
-    send(*client, there, numbered(101));
-    return drain(*server, 50ms).numbers.empty();
-  }, 2900ms)) << "a signal begins one too";
+  EXPECT_TRUE(wait_until(
+      [&] {
+        send(*client, there, numbered(101));
+        return drain(*server, 50ms).numbers.empty();
+      },
+      2900ms))
+      << "a signal begins one too";
   EXPECT_EQ(relay.command("loss 2"), "loss needs a share from 0 to 1");
   EXPECT_EQ(relay.command("dance"), "no such command: dance");
   EXPECT_EQ(relay.process().terminate(), 0);
@@ -178,8 +181,8 @@ tcp::socket connect(asio::io_context& io, const std::string& address) {
 
 TEST(Impair, AStreamStaysWholeAndInOrder) {
   Echo echo;
-  ImpairProcess relay({"--tcp", echo.address(), "--loss", "0.02", "--delay-ms", "2", "--jitter-ms", "2", "--reorder", "0.2",
-                       "--duplicate", "0.2", "--seed", "3"});
+  ImpairProcess relay({"--tcp", echo.address(), "--loss", "0.02", "--delay-ms", "2", "--jitter-ms", "2", "--reorder",
+                       "0.2", "--duplicate", "0.2", "--seed", "3"});
   asio::io_context io;
   tcp::socket socket = connect(io, relay.tcp());
   std::string sent(1'000'000, '\0'), back(sent.size(), '\0');

@@ -23,7 +23,8 @@ Case make_bone(const Box& extent, double pitch_mm, const std::function<double(co
         density.at({x, y, z}) = static_cast<float>(density_g_cm3(p));
         if (tissue) labels.tissue.at({x, y, z}) = tissue(p);
       }
-  CaseInfo info{.title = "Test bone", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
+  CaseInfo info{
+      .title = "Test bone", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
   auto built = Case::build(info, surface, density, labels);
   OSTEON_CHECK(built.has_value());
   return *built;
@@ -68,7 +69,8 @@ Case marked_block(double width_mm, double thickness_mm, double pitch_mm,
 Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3) {
   const auto fill = [&](const CoordBox& part, PartSamples& samples) {
     const Vec3 low = position_mm(part.min, pitch_mm), high = position_mm(part.max, pitch_mm);
-    const double middle = (0.5 * (low + high)).norm() - radius_mm, reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * pitch_mm;
+    const double middle = (0.5 * (low + high)).norm() - radius_mm,
+                 reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * pitch_mm;
     if (middle > reach) return PartKind::outside;
     std::ranges::fill(samples.density_g_cm3, static_cast<float>(density_g_cm3));
     if (middle < -reach) return PartKind::inside;
@@ -80,13 +82,15 @@ Case large_ball(double radius_mm, double pitch_mm, double density_g_cm3) {
     return PartKind::samples;
   };
   const Vec3 half = Vec3::Constant(radius_mm + (kBandVoxels + 1) * pitch_mm);
-  const CaseInfo info{.title = "Ball", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
+  const CaseInfo info{
+      .title = "Ball", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
   auto built = Case::build(info, covering_samples({-half, half}, pitch_mm), fill);
   OSTEON_CHECK(built.has_value());
   return *built;
 }
 
-Cut straight_cut(const Tool& tool, const Vec3& from_tip_mm, const Vec3& to_tip_mm, const Vec3& axis, std::uint64_t author_seq) {
+Cut straight_cut(const Tool& tool, const Vec3& from_tip_mm, const Vec3& to_tip_mm, const Vec3& axis,
+                 std::uint64_t author_seq) {
   return {.author = {1},
           .author_seq = author_seq,
           .lease_epoch = 1,

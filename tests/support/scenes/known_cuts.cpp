@@ -20,7 +20,13 @@ constexpr double kEdgePitches = 2.0;
 double density(const Vec3&) { return 1.9; }
 
 Cut pose_cut(const Tool& tool, const std::vector<Pose>& path) {
-  Cut cut{.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = tool.hash(), .level = kLevel, .path = {},
+  Cut cut{.author = {1},
+          .author_seq = 1,
+          .lease_epoch = 1,
+          .body = {},
+          .tool = tool.hash(),
+          .level = kLevel,
+          .path = {},
           .spindle_rpm = 1000};
   for (const Pose& pose : path) cut.path.push_back(quantise(pose));
   return cut;
@@ -63,7 +69,8 @@ KnownCut hole_through_slab(const Tool& drill, double pitch_mm, Random& random) {
   const Vec3 into = -near_z(random, kPi / 6.0);
   const double point_mm = radius / std::tan(0.5 * drill.point_angle_rad);
   const double way = half / std::abs(into.z()) + radius * std::tan(std::acos(-into.z())) + point_mm + 5.0 * pitch_mm;
-  const Cut cut = pose_cut(drill, {pose_along(middle - (way + point_mm) * into, into), pose_along(middle + way * into, into)});
+  const Cut cut =
+      pose_cut(drill, {pose_along(middle - (way + point_mm) * into, into), pose_along(middle + way * into, into)});
   const Pose end = dequantise(cut.path.back());
   const Vec3 axis = end.direction(Vec3::UnitZ()), through = end.position_mm;
   return {make_bone({middle - sides, middle + sides}, h, distance, density), cut,
@@ -92,13 +99,16 @@ KnownCut kerf_through_shaft(const Tool& saw, double pitch_mm, Random& random) {
   const Eigen::Quaterniond rotation(axes);
   const double way = shaft / normal.z() + 6.0 * pitch_mm;
   // The teeth enter beside the shaft and leave well behind it, as far as the corners of a swinging blade trail.
-  const double trail = 0.5 * saw.width_mm * std::tan(0.5 * saw.swing_rad) + saw.pivot_mm * (1.0 - std::cos(0.5 * saw.swing_rad));
-  const Cut cut = pose_cut(saw, {{middle - (way + 1.0) * into, rotation}, {middle + (way + trail + 1.0) * into, rotation}});
+  const double trail =
+      0.5 * saw.width_mm * std::tan(0.5 * saw.swing_rad) + saw.pivot_mm * (1.0 - std::cos(0.5 * saw.swing_rad));
+  const Cut cut =
+      pose_cut(saw, {{middle - (way + 1.0) * into, rotation}, {middle + (way + trail + 1.0) * into, rotation}});
   const Pose end = dequantise(cut.path.back());
   const Vec3 y = end.direction(Vec3::UnitY()), on = end.position_mm;
-  return {make_bone({middle - half, middle + half}, h, distance, density), cut, kPi * shaft * shaft * kerf / std::abs(y.z()),
-          [=](const Vec3& p) -> std::optional<double> {
-            if (shaft - std::hypot(p.x() - middle.x(), p.y() - middle.y()) < kEdgePitches * pitch_mm) return std::nullopt;
+  return {make_bone({middle - half, middle + half}, h, distance, density), cut,
+          kPi * shaft * shaft * kerf / std::abs(y.z()), [=](const Vec3& p) -> std::optional<double> {
+            if (shaft - std::hypot(p.x() - middle.x(), p.y() - middle.y()) < kEdgePitches * pitch_mm)
+              return std::nullopt;
             return std::abs((p - on).dot(y)) - 0.5 * kerf;
           }};
 }

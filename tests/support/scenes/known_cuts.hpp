@@ -13,7 +13,7 @@ namespace osteon::test {
 struct KnownCut {
   Case bone;
   Cut cut;
-  double removed_mm3;                                    // closed form
+  double removed_mm3;  // closed form
   // Signed distance of a point on the cut face to where that face must be; none near an edge of the cut, where two
   // faces meet and marching cubes rounds the corner.
   std::function<std::optional<double>(const Vec3&)> deviation_mm;
@@ -33,8 +33,8 @@ struct KnownCut {
 [[nodiscard]] std::optional<Tool> widest_saw();
 
 struct CutAccuracy {
-  double volume_error = 0;                 // of the closed form, signed
-  std::vector<double> deviation_pitches;   // of every vertex on the cut face away from edges, absolute
+  double volume_error = 0;                // of the closed form, signed
+  std::vector<double> deviation_pitches;  // of every vertex on the cut face away from edges, absolute
 };
 [[nodiscard]] CutAccuracy accuracy_of(const KnownCut& known);
 

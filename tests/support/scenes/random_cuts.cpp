@@ -34,8 +34,9 @@ std::vector<Cutter> all_cutters() {
 
 Case ball_of_bone() {
   const Vec3 corner = Vec3::Constant(kRadius_mm);
-  return make_bone({-corner, corner}, kPitch_mm, [](const Vec3& p) { return p.norm() - kRadius_mm; },
-                   [](const Vec3&) { return 1.9; });
+  return make_bone(
+      {-corner, corner}, kPitch_mm, [](const Vec3& p) { return p.norm() - kRadius_mm; },
+      [](const Vec3&) { return 1.9; });
 }
 
 std::vector<Cut> grazing_cuts(std::size_t count, Random& random) {
@@ -47,8 +48,8 @@ std::vector<Cut> grazing_cuts(std::size_t count, Random& random) {
     const Vec3 out = random.direction();
     const double depth = i % 200 == 7 ? random.between(1.0, 2.5) : random.between(-0.3, 0.35);
     // The tool's inward normal there along the bone's outward one, any turn about it.
-    const Eigen::Quaterniond facing = Eigen::AngleAxisd(random.between(0.0, 6.283), out) *
-                                      Eigen::Quaterniond::FromTwoVectors(point.inward, out);
+    const Eigen::Quaterniond facing =
+        Eigen::AngleAxisd(random.between(0.0, 6.283), out) * Eigen::Quaterniond::FromTwoVectors(point.inward, out);
     const auto pose = [&](const Eigen::Quaterniond& rotation, const Vec3& contact) {
       return Pose{contact - rotation * point.position_mm, rotation};
     };
@@ -57,8 +58,14 @@ std::vector<Cut> grazing_cuts(std::size_t count, Random& random) {
     const Vec3 way = random.in_cube(0.4);
     const Vec3 moved = contact + way - way.dot(out) * out;
     const Eigen::Quaterniond turned = Eigen::AngleAxisd(random.between(-0.01, 0.01), random.direction()) * facing;
-    Cut cut{.author = {1 + i % 3}, .author_seq = 1 + i / 3, .lease_epoch = 1, .body = {}, .tool = cutter.hash,
-            .level = cutter.tool.cut_level, .path = {quantise(pose(facing, contact))}, .spindle_rpm = 1000};
+    Cut cut{.author = {1 + i % 3},
+            .author_seq = 1 + i / 3,
+            .lease_epoch = 1,
+            .body = {},
+            .tool = cutter.hash,
+            .level = cutter.tool.cut_level,
+            .path = {quantise(pose(facing, contact))},
+            .spindle_rpm = 1000};
     if (i % 8 != 0) cut.path.push_back(quantise(pose(i % 2 == 0 ? facing : turned, moved)));
     cuts.push_back(std::move(cut));
   }

@@ -44,15 +44,17 @@ OverseenHand::OverseenHand(const OverseenRun& run)
   LoopParams params = loop_params(device.limits, 0.0);
   params.ramp_s = 1e-9;
   params.slew_n_per_ms = run.slew_n_per_ms;
-  loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool(run.tool), bone_.pitch_mm())});
+  loop_ =
+      std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool(run.tool), bone_.pitch_mm())});
   loop_->feel_partners();
   const Pose start{{0, 0, -3}, rotation_};
   WorkspaceMapping mapping;
-  mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), run.weak ? 0.5 : 1.0, Vec3::Zero(),
-                start.position_mm);
+  mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), run.weak ? 0.5 : 1.0,
+                Vec3::Zero(), start.position_mm);
   loop_->take_up(0, start, mapping);
   device_ = std::make_unique<SimulatedDevice>(device);
-  device_->take(scaled(expert_hand(), params.force_scale, mapping.scale()), mapping.pose_device_tool(start).position_mm);
+  device_->take(scaled(expert_hand(), params.force_scale, mapping.scale()),
+                mapping.pose_device_tool(start).position_mm);
   builder_.build(replica_.bodies(), loop_->tool(0), start, patch_);
   command.target_mm = start.position_mm;
   if (!run.mount) return;
@@ -90,8 +92,8 @@ void OverseenHand::hear() {
   for (; !undone_due_.empty() && undone_due_.front() <= ticks_; undone_due_.pop_front()) ++count.undone;
 }
 
-// What the lines bring, a millisecond of the bone, and what goes out. The hand's work is reckoned from the force that the
-// device showed and the way of the place that the tool stands at.
+// What the lines bring, a millisecond of the bone, and what goes out. The hand's work is reckoned from the force that
+// the device showed and the way of the place that the tool stands at.
 void OverseenHand::move_bone() {
   if (!yielding_) return;
   Yielding& bone = *yielding_;
@@ -136,7 +138,8 @@ LoopReport OverseenHand::tick() {
   HandCommand device_command = command;
   device_command.target_mm = mapping.pose_device_tool({command.target_mm, rotation_}).position_mm;
   device_command.axis = mapping.to_device(command.axis);
-  device_->command(device_command, mapping.pose_device_tool({Vec3::Zero(), rotation_}).rotation, pedal ? kSpindlePedal : 0u);
+  device_->command(device_command, mapping.pose_device_tool({Vec3::Zero(), rotation_}).rotation,
+                   pedal ? kSpindlePedal : 0u);
   device_->step(1e-3);
   const DeviceReading reading = device_->read();
   LoopInput input;
@@ -165,12 +168,13 @@ void OverseenHand::run(int ticks, const std::function<void(const LoopReport&)>& 
 void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   const LoopParams& params = loop_->params();
   const Vec3 moved_mm = seen_ ? Vec3(handle_mm - handle_mm_) : Vec3(Vec3::Zero());
-  // The hand's motion raises the coupling's spring and damping, and nothing else. It feels the sum: where one force lessens at
-  // once another that it held back would come at once.
+  // The hand's motion raises the coupling's spring and damping, and nothing else. It feels the sum: where one force
+  // lessens at once another that it held back would come at once.
   const double k = params.force_scale * loop_->coupling_n_per_mm() * loop_->mapping().scale();
   const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_);
   const Vec3 together_n = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
-  const double grown_n = std::max(growth(report.coupling_device_n, coupling_n_).norm(), growth(together_n, together_n_).norm());
+  const double grown_n =
+      std::max(growth(report.coupling_device_n, coupling_n_).norm(), growth(together_n, together_n_).norm());
   // Against what is meant to be the limit, whatever the loop was told.
   constexpr double kSlew_n = 0.5;
   crossed_.step_over_slew = std::max(crossed_.step_over_slew, (grown_n - by_hand_n) / kSlew_n);

@@ -1,6 +1,6 @@
-// A simulated hand at the haptic loop while an instructor decides about it: stopped, taken over, led, limited, its cuts taken
-// back, all as late as a line makes it; and what crosses its handle meanwhile. The bone stands still, or on a mount on which
-// this hand and another user push it.
+// A simulated hand at the haptic loop while an instructor decides about it: stopped, taken over, led, limited, its cuts
+// taken back, all as late as a line makes it; and what crosses its handle meanwhile. The bone stands still, or on a
+// mount on which this hand and another user push it.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "common/mechanics/compliant_mount.hpp"
-#include "haptic_client/control/haptic_loop.hpp"
 #include "haptic_client/control/felt_mount.hpp"
+#include "haptic_client/control/haptic_loop.hpp"
 #include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/device/simulated_device.hpp"
 #include "tests/support/stability/delayed_room.hpp"
@@ -19,10 +19,10 @@ namespace osteon::test {
 
 struct OverseenRun {
   const char* tool = "burr-round-5";
-  int delay_ms = 0;           // of everything, each way
-  bool weak = false;          // a device of 3.3 N with half of its stiffness, on a workspace of another size
-  double slew_n_per_ms = 0.5; // of the loop
-  bool mount = false;         // the bone yields
+  int delay_ms = 0;            // of everything, each way
+  bool weak = false;           // a device of 3.3 N with half of its stiffness, on a workspace of another size
+  double slew_n_per_ms = 0.5;  // of the loop
+  bool mount = false;          // the bone yields
 };
 
 // How often something took hold of the hand while its tool touched bone.
@@ -57,7 +57,7 @@ class OverseenHand {
   void run(int ticks, const std::function<void(const haptic::LoopReport&)>& each = {});
   HandCommand command;
   bool pedal = false;
-  Load other;                 // of the other user on a bone that yields; held until it is set anew
+  Load other;  // of the other user on a bone that yields; held until it is set anew
   haptic::GuideSeen guide;
   std::vector<haptic::PartnerTool> partners;
 
@@ -92,8 +92,8 @@ class OverseenHand {
     };
     std::deque<Push> up;
     std::deque<Seen> down;
-    double put_in_mj = 0;      // by both, reckoned here
-    double by_hand_mj = 0;     // of it in this tick by the hand
+    double put_in_mj = 0;   // by both, reckoned here
+    double by_hand_mj = 0;  // of it in this tick by the hand
   };
 
   OverseenRun run_;
@@ -114,7 +114,7 @@ class OverseenHand {
   std::deque<Decided> decided_;
   std::deque<std::int64_t> undone_due_;
   std::unique_ptr<Yielding> yielding_;  // null: the bone stands
-  Restrictions now_, heard_;     // as the room has decided, and as the hand knows it
+  Restrictions now_, heard_;            // as the room has decided, and as the hand knows it
   std::uint64_t decisions_ = 0, epoch_ = 0;
   std::int64_t ticks_ = 0;
   Eigen::Quaterniond rotation_;

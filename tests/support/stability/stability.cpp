@@ -19,12 +19,12 @@ namespace {
 using namespace haptic;
 
 constexpr double kPitch_mm = 0.5;
-constexpr double kRound_s = 10.0;      // then a new hand, new bone
-constexpr double kPatch_s = 0.008;     // between two patches
+constexpr double kRound_s = 10.0;   // then a new hand, new bone
+constexpr double kPatch_s = 0.008;  // between two patches
 constexpr double kStallEvery_s = 1.7, kStall_s = 0.006;
 constexpr double kThinWall_mm = 1.0;
-constexpr double kCavity_mm = 5.0;     // radius of a hollow 4 mm deep
-constexpr double kTorqueArm_mm = 50.0; // of a device that shows torque: its largest torque over its continuous force
+constexpr double kCavity_mm = 5.0;      // radius of a hollow 4 mm deep
+constexpr double kTorqueArm_mm = 50.0;  // of a device that shows torque: its largest torque over its continuous force
 
 // A block 16 mm wide, entered along +z through z = 0.
 Case scene_bone(StabilityScene scene) {
@@ -33,7 +33,9 @@ Case scene_bone(StabilityScene scene) {
     const double block = std::max({std::abs(p.x()) - 8.0, std::abs(p.y()) - 8.0, -p.z(), p.z() - thick});
     return scene == StabilityScene::cavity ? std::max(block, kCavity_mm - (p - Vec3(0, 0, -1.0)).norm()) : block;
   };
-  const auto density = [=](const Vec3& p) { return scene != StabilityScene::drill || p.z() < 2.0 || p.z() > 6.0 ? 1.9 : 0.3; };
+  const auto density = [=](const Vec3& p) {
+    return scene != StabilityScene::drill || p.z() < 2.0 || p.z() > 6.0 ? 1.9 : 0.3;
+  };
   return make_bone({{-10, -10, -4}, {10, 10, thick + 6.0}}, kPitch_mm, distance, density);
 }
 
@@ -62,13 +64,13 @@ struct Gesture {
     const double u = wave(across_hz[0], phase[0]), v = wave(across_hz[1], phase[1]);
     if (!hollow) return Vec3(across_mm * u, across_mm * v, press) + tremor_mm * tremor;
     // Round the inside of a hollow, pressing outwards: the burr's middle is half as far out as the wall.
-    return Vec3(0, 0, -1.0) + (kCavity_mm - 2.5 + press) * Vec3(0.9 * u, 0.9 * v, 1.0).normalized() + tip_from_middle_mm +
-           tremor_mm * tremor;
+    return Vec3(0, 0, -1.0) + (kCavity_mm - 2.5 + press) * Vec3(0.9 * u, 0.9 * v, 1.0).normalized() +
+           tip_from_middle_mm + tremor_mm * tremor;
   }
 };
 
-// How a hand that turns means to tilt: about two axes by up to 15 degrees together, and a little about a third. It gives way
-// to torque as a wrist does, with some inertia, damping and stiffness [A].
+// How a hand that turns means to tilt: about two axes by up to 15 degrees together, and a little about a third. It
+// gives way to torque as a wrist does, with some inertia, damping and stiffness [A].
 class Wrist {
  public:
   Wrist(Random& random, double strength) : strength_(strength) {
@@ -122,11 +124,13 @@ class Observer {
     const Vec3& force_n = report.coupling_device_n;
     const Vec3& torque_nmm = report.coupling_device_nmm;
     const bool touching = report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
-    if (!touching && force_n.isZero() && torque_nmm.isZero()) finish();
-    else open_ = true;
+    if (!touching && force_n.isZero() && torque_nmm.isZero())
+      finish();
+    else
+      open_ = true;
 
-    // The hand's motion raises spring and damping: k for each millimetre of this tick, b/T for what it went faster than in
-    // the last.
+    // The hand's motion raises spring and damping: k for each millimetre of this tick, b/T for what it went faster than
+    // in the last.
     const double k = s * coupling_n_per_mm_ * scale_;
     const double at_arm_mm = Proxy::kTurnArm_mm / scale_;  // of a turn, at the handle
     const double moved_by_mm = std::hypot(moved_mm.norm(), at_arm_mm * turned_rad.norm());
@@ -216,7 +220,8 @@ class Round {
         bone_(scene_bone(run.scene)),
         replica_(bone_, BodyId{}),
         room_(bone_, static_cast<int>(std::lround(1e-3 * run.delay_ms / run.dt_s))) {
-    const SimulatedDeviceParams device = number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
+    const SimulatedDeviceParams device =
+        number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
     LoopParams params = loop_params(device.limits, 0.0);
     params.dt_s = run.dt_s;
     // Fifty millimetres for each newton that it can hold, as sigma.7 and omega.7 have it.
@@ -227,8 +232,9 @@ class Round {
     loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{ToolModel(*find_tool(tool), bone_.pitch_mm())});
     full_rpm_ = std::max(1000.0, loop_->tool(0).tool.spindle_rpm);
 
-    const Pose start{{0, 0, -3},
-                     Eigen::Quaterniond(Eigen::AngleAxisd(run.scene == StabilityScene::drill ? 0.0 : 0.5, Vec3::UnitX()))};
+    const Pose start{
+        {0, 0, -3},
+        Eigen::Quaterniond(Eigen::AngleAxisd(run.scene == StabilityScene::drill ? 0.0 : 0.5, Vec3::UnitX()))};
     upright_ = rotation_ = start.rotation;
     WorkspaceMapping mapping;
     mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())),
@@ -261,9 +267,11 @@ class Round {
 
     // From where it was taken up into the gesture within half a second.
     const double in = std::min(1.0, 2.0 * t);
-    if (wrist_) rotation_ = wrist_->step(walked_s_, in, rig_, loop_->mapping().to_bone(torque_nmm_), run_.dt_s) * upright_;
-    const Vec3 target_mm = in * gesture_->at(walked_s_, 2.5 * (rotation_ * Vec3::UnitZ()), run_.scene == StabilityScene::cavity) +
-                           (1.0 - in) * Vec3(0, 0, -3);
+    if (wrist_)
+      rotation_ = wrist_->step(walked_s_, in, rig_, loop_->mapping().to_bone(torque_nmm_), run_.dt_s) * upright_;
+    const Vec3 target_mm =
+        in * gesture_->at(walked_s_, 2.5 * (rotation_ * Vec3::UnitZ()), run_.scene == StabilityScene::cavity) +
+        (1.0 - in) * Vec3(0, 0, -3);
     const WorkspaceMapping& mapping = loop_->mapping();
     HandCommand command;
     command.mode = rig_ ? HandMode::rig : HandMode::carry;
@@ -300,22 +308,25 @@ class Round {
       replica_.add_own(cut);
       room_.send(cut);
     }
-    const auto every = [&](double seconds) { return i % std::max<std::int64_t>(1, std::llround(seconds / run_.dt_s)) == 0; };
+    const auto every = [&](double seconds) {
+      return i % std::max<std::int64_t>(1, std::llround(seconds / run_.dt_s)) == 0;
+    };
     // A thin wall that others open is no wall any more.
     if (run_.others && run_.scene != StabilityScene::thin_wall) {
       if (every(0.4)) {
         const Tool other = *find_tool("burr-round-3.2");
         const Vec3 at = report.pose_bone_proxy.position_mm + random_.in_cube(2.0);
         const Vec3 tip(at.x(), at.y(), std::clamp(at.z(), 0.2, 3.0));
-        room_.commit_other(
-            straight_cut(other, tip, tip + Vec3(random_.between(-1.5, 1.5), random_.between(-1.5, 1.5), 0.0), Vec3::UnitZ()));
+        room_.commit_other(straight_cut(
+            other, tip, tip + Vec3(random_.between(-1.5, 1.5), random_.between(-1.5, 1.5), 0.0), Vec3::UnitZ()));
       }
       // Also under a handle that stands still.
       if (every(1.55) && i > 0) room_.undo(1 + static_cast<int>(random_.index(30)));
     }
     room_.tick(replica_);
     if (!every(kPatch_s)) return;
-    for (const ChangedLeaves& change : replica_.take_changes()) builder_.changed(kPitch_mm, change.level, change.origins);
+    for (const ChangedLeaves& change : replica_.take_changes())
+      builder_.changed(kPitch_mm, change.level, change.origins);
     builder_.build(replica_.bodies(), loop_->tool(0), report.pose_bone_proxy, patch_);
     patch_.own_cuts = replica_.last_own();
     patch_.room_seq = replica_.room_seq();
@@ -348,10 +359,13 @@ const char* name(StabilityScene scene) {
 }
 
 void StabilityResult::add(const StabilityResult& other) {
-  ticks += other.ticks, late += other.late, touching += other.touching, cutting += other.cutting, uncovered += other.uncovered;
+  ticks += other.ticks, late += other.late, touching += other.touching, cutting += other.cutting,
+      uncovered += other.uncovered;
   held_back += other.held_back, returned += other.returned, slew_limited += other.slew_limited;
-  episodes += other.episodes, others_cuts += other.others_cuts, undone += other.undone, allocations += other.allocations;
-  generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj, turned_mj += other.turned_mj;
+  episodes += other.episodes, others_cuts += other.others_cuts, undone += other.undone,
+      allocations += other.allocations;
+  generated_mj += other.generated_mj, net_mj += other.net_mj, cutting_mj += other.cutting_mj,
+      turned_mj += other.turned_mj;
   worst_mj = std::max(worst_mj, other.worst_mj);
   least_cutting_n_mm = std::min(least_cutting_n_mm, other.least_cutting_n_mm);
   pushed_back += other.pushed_back;

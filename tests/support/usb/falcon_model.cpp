@@ -58,8 +58,10 @@ void FalconModel::take(std::span<const std::uint8_t> bytes) {
       if (line_.size() > kGreeting.size()) line_.erase(line_.begin());
       if (dtr_ == 1 && std::equal(line_.begin(), line_.end(), kGreeting.begin(), kGreeting.end())) {
         line_.clear();
-        if (deaf > 0) --deaf;
-        else say(kGreetingAnswer);
+        if (deaf > 0)
+          --deaf;
+        else
+          say(kGreetingAnswer);
       }
     } else if (baud_ == kRun && loaded_) {
       if (byte == '<') line_ = {byte};

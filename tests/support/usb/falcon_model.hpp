@@ -1,5 +1,6 @@
-// A Novint Falcon as its USB wire shows it: the serial chip's settings, the boot loader, and firmware that exchanges frames.
-// Knows the protocol by itself, independent of the driver that is tested against it. The image is a made-up one.
+// A Novint Falcon as its USB wire shows it: the serial chip's settings, the boot loader, and firmware that exchanges
+// frames. Knows the protocol by itself, independent of the driver that is tested against it. The image is a made-up
+// one.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -28,7 +29,8 @@ class FalconModel {
   // The world outside: encoders, buttons, which axes have found their ends (−1: each after some frames of homing).
   std::array<std::int16_t, 3> encoders{};
   int buttons = 0, homed = -1;
-  // Trouble: it says nothing; it spoils a byte of so many frames; it misses so many greetings; it echoes falsely from a byte on.
+  // Trouble: it says nothing; it spoils a byte of so many frames; it misses so many greetings; it echoes falsely from a
+  // byte on.
   bool silent = false;
   int spoil = 0, deaf = 0;
   long false_echo_at = -1;

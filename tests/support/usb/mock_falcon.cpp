@@ -21,7 +21,8 @@ constexpr const char* kDescription =
     "N: bus/usb/001/005\n"
     "E: DEVTYPE=usb_device\nE: SUBSYSTEM=usb\nE: BUSNUM=001\nE: DEVNUM=005\nE: DEVNAME=/dev/bus/usb/001/005\n"
     "E: MAJOR=189\nE: MINOR=4\n"
-    "A: busnum=1\\n\nA: devnum=5\\n\nA: idVendor=0403\\n\nA: idProduct=cb48\\n\nA: bConfigurationValue=1\\n\nA: speed=12\\n\n"
+    "A: busnum=1\\n\nA: devnum=5\\n\nA: idVendor=0403\\n\nA: idProduct=cb48\\n\nA: bConfigurationValue=1\\n\nA: "
+    "speed=12\\n\n"
     "H: descriptors="
     "12011001000000400304 48CB0004010203 01"
     "0902200001010080 32"
@@ -70,24 +71,32 @@ MockFalcon::~MockFalcon() {
 void MockFalcon::ioctl(Call* call) {
   switch (static_cast<unsigned>(umockdev_ioctl_client_get_request(call))) {
     case USBDEVFS_GET_CAPABILITIES: {
-      UMockdevIoctlData* data = umockdev_ioctl_data_resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(__u32), nullptr);
-      const __u32 capabilities = USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_BULK_CONTINUATION;
+      UMockdevIoctlData* data =
+          umockdev_ioctl_data_resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(__u32), nullptr);
+      const __u32 capabilities =
+          USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM | USBDEVFS_CAP_BULK_CONTINUATION;
       std::memcpy(data->data, &capabilities, sizeof(capabilities));
       complete(call, 0);
       g_object_unref(data);
       return;
     }
-    case USBDEVFS_SUBMITURB: return submit(call);
-    case static_cast<unsigned>(USBDEVFS_BULK): return bulk(call);
+    case USBDEVFS_SUBMITURB:
+      return submit(call);
+    case static_cast<unsigned>(USBDEVFS_BULK):
+      return bulk(call);
     case USBDEVFS_REAPURB:
-    case USBDEVFS_REAPURBNDELAY: return reap(call);
-    case USBDEVFS_DISCARDURB: return discard(call);
+    case USBDEVFS_REAPURBNDELAY:
+      return reap(call);
+    case USBDEVFS_DISCARDURB:
+      return discard(call);
     case static_cast<unsigned>(USBDEVFS_DISCONNECT_CLAIM):
     case USBDEVFS_CLAIMINTERFACE:
     case USBDEVFS_RELEASEINTERFACE:
     case USBDEVFS_CLEAR_HALT:
-    case USBDEVFS_RESET: return complete(call, 0);
-    default: return complete(call, -1, ENOTTY);
+    case USBDEVFS_RESET:
+      return complete(call, 0);
+    default:
+      return complete(call, -1, ENOTTY);
   }
 }
 
@@ -195,7 +204,8 @@ void MockFalcon::reap(Call* call) {
 void MockFalcon::discard(Call* call) {
   std::uint64_t address = 0;
   std::memcpy(&address, umockdev_ioctl_client_get_arg(call)->data, sizeof(address));
-  const auto found = std::find_if(reading_.begin(), reading_.end(), [&](const Block& block) { return block.address == address; });
+  const auto found =
+      std::find_if(reading_.begin(), reading_.end(), [&](const Block& block) { return block.address == address; });
   if (found == reading_.end()) return complete(call, -1, EINVAL);
   const Block block = *found;
   reading_.erase(found);

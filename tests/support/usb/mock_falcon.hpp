@@ -16,7 +16,7 @@ class MockFalcon {
   MockFalcon& operator=(const MockFalcon&) = delete;
 
   FalconModel model;
-  int failing = 0;            // so many bulk transfers end with an error of the bus
+  int failing = 0;  // so many bulk transfers end with an error of the bus
   std::uint64_t transfers = 0;
 
  private:

@@ -63,7 +63,8 @@ void MockHid::report(std::vector<std::uint8_t> bytes) {
 }
 
 void MockHid::ioctl(Call* call) {
-  if (static_cast<unsigned>(umockdev_ioctl_client_get_request(call)) != HIDIOCGRDESCSIZE) return complete(call, -1, ENOTTY);
+  if (static_cast<unsigned>(umockdev_ioctl_client_get_request(call)) != HIDIOCGRDESCSIZE)
+    return complete(call, -1, ENOTTY);
   UMockdevIoctlData* data = umockdev_ioctl_data_resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(int), nullptr);
   const int size = static_cast<int>(kind_.descriptor.size());
   std::memcpy(data->data, &size, sizeof(size));

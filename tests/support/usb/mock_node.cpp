@@ -98,9 +98,15 @@ void MockNode::take_readable() {
   if (read(slave_, &byte, 1) != 1 && errno != EAGAIN) give_up("pseudo terminal");
 }
 
-gboolean MockNode::handle_ioctl(UMockdevIoctlBase*, Call* call, gpointer self) { return answer(&MockNode::on_ioctl, call, self); }
-gboolean MockNode::handle_read(UMockdevIoctlBase*, Call* call, gpointer self) { return answer(&MockNode::on_read, call, self); }
-gboolean MockNode::handle_write(UMockdevIoctlBase*, Call* call, gpointer self) { return answer(&MockNode::on_write, call, self); }
+gboolean MockNode::handle_ioctl(UMockdevIoctlBase*, Call* call, gpointer self) {
+  return answer(&MockNode::on_ioctl, call, self);
+}
+gboolean MockNode::handle_read(UMockdevIoctlBase*, Call* call, gpointer self) {
+  return answer(&MockNode::on_read, call, self);
+}
+gboolean MockNode::handle_write(UMockdevIoctlBase*, Call* call, gpointer self) {
+  return answer(&MockNode::on_write, call, self);
+}
 
 void complete(Call* call, long result, int error) {
   g_object_ref(call);

@@ -1,6 +1,6 @@
-// A device node that a program under libumockdev-preload opens: a pseudo terminal, so that its poll() sleeps until we let it
-// go on, and every ioctl, read and write of it answered here. They come on a thread of umockdev's own: whoever else touches
-// a node, or what its answers use, holds the lock of all nodes.
+// A device node that a program under libumockdev-preload opens: a pseudo terminal, so that its poll() sleeps until we
+// let it go on, and every ioctl, read and write of it answered here. They come on a thread of umockdev's own: whoever
+// else touches a node, or what its answers use, holds the lock of all nodes.
 #pragma once
 #include <umockdev.h>
 
@@ -32,7 +32,7 @@ class MockNode {
 
   // May the client's poll() return because it could write, or read?
   void let_write(bool ready);
-  void add_readable();   // once for each thing to read
+  void add_readable();  // once for each thing to read
   void take_readable();
 
  private:

@@ -1,10 +1,9 @@
 // osteon-usb-host: plays the USB devices of a machine for a program under libumockdev-preload. Prints the folder of its
 // testbed, then takes commands on standard input and answers each with one line; ends with its input.
 //
-//   plug falcon [loaded] | plug DEVICE [VENDOR PRODUCT]     unplug DEVICE       (spacemouse, switch, joystick; ids in hex)
-//   report DEVICE HEX…                                      written DEVICE      unread DEVICE
-//   falcon encoders A B C | buttons N | homed N | silent N | spoil N | deaf N | fail N | false-echo AT | power-cut
-//   falcon told
+//   plug falcon [loaded] | plug DEVICE [VENDOR PRODUCT]     unplug DEVICE       (spacemouse, switch, joystick; ids in
+//   hex) report DEVICE HEX…                                      written DEVICE      unread DEVICE falcon encoders A B
+//   C | buttons N | homed N | silent N | spoil N | deaf N | fail N | false-echo AT | power-cut falcon told
 #include <glib-unix.h>
 #include <umockdev.h>
 
@@ -23,18 +22,19 @@ namespace {
 using namespace osteon::test;
 
 // A cap with six axes of 16 bits in one report; two buttons.
-const std::vector<std::uint8_t> kCap{0x05, 0x01, 0x09, 0x08, 0xa1, 0x01, 0x85, 0x01, 0x16, 0xa2, 0xfe, 0x26, 0x5e, 0x01, 0x75,
-                                     0x10, 0x95, 0x06, 0x09, 0x30, 0x09, 0x31, 0x09, 0x32, 0x09, 0x33, 0x09, 0x34, 0x09, 0x35,
-                                     0x81, 0x02, 0x85, 0x03, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15, 0x00, 0x25, 0x01, 0x75,
-                                     0x01, 0x95, 0x02, 0x81, 0x02, 0x95, 0x0e, 0x81, 0x03, 0xc0};
+const std::vector<std::uint8_t> kCap{0x05, 0x01, 0x09, 0x08, 0xa1, 0x01, 0x85, 0x01, 0x16, 0xa2, 0xfe, 0x26, 0x5e, 0x01,
+                                     0x75, 0x10, 0x95, 0x06, 0x09, 0x30, 0x09, 0x31, 0x09, 0x32, 0x09, 0x33, 0x09, 0x34,
+                                     0x09, 0x35, 0x81, 0x02, 0x85, 0x03, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15, 0x00,
+                                     0x25, 0x01, 0x75, 0x01, 0x95, 0x02, 0x81, 0x02, 0x95, 0x0e, 0x81, 0x03, 0xc0};
 // Three switches in two bytes.
-const std::vector<std::uint8_t> kSwitch{0x05, 0x0c, 0x09, 0x03, 0xa1, 0x01, 0x05, 0x09, 0x19, 0x01, 0x29, 0x03, 0x15, 0x00,
-                                        0x25, 0x01, 0x75, 0x01, 0x95, 0x03, 0x81, 0x02, 0x95, 0x0d, 0x81, 0x03, 0xc0};
+const std::vector<std::uint8_t> kSwitch{0x05, 0x0c, 0x09, 0x03, 0xa1, 0x01, 0x05, 0x09, 0x19,
+                                        0x01, 0x29, 0x03, 0x15, 0x00, 0x25, 0x01, 0x75, 0x01,
+                                        0x95, 0x03, 0x81, 0x02, 0x95, 0x0d, 0x81, 0x03, 0xc0};
 // Two buttons and six bits of nothing, then x of 8 bits and z of 10, both from zero.
-const std::vector<std::uint8_t> kJoystick{0x05, 0x01, 0x09, 0x04, 0xa1, 0x01, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15, 0x00,
-                                          0x25, 0x01, 0x75, 0x01, 0x95, 0x02, 0x81, 0x02, 0x95, 0x06, 0x81, 0x03, 0x05, 0x01,
-                                          0x09, 0x30, 0x26, 0xff, 0x00, 0x75, 0x08, 0x95, 0x01, 0x81, 0x02, 0x09, 0x32, 0x26,
-                                          0xff, 0x03, 0x75, 0x0a, 0x95, 0x01, 0x81, 0x02, 0x75, 0x06, 0x81, 0x03, 0xc0};
+const std::vector<std::uint8_t> kJoystick{
+    0x05, 0x01, 0x09, 0x04, 0xa1, 0x01, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15, 0x00, 0x25, 0x01, 0x75, 0x01, 0x95,
+    0x02, 0x81, 0x02, 0x95, 0x06, 0x81, 0x03, 0x05, 0x01, 0x09, 0x30, 0x26, 0xff, 0x00, 0x75, 0x08, 0x95, 0x01, 0x81,
+    0x02, 0x09, 0x32, 0x26, 0xff, 0x03, 0x75, 0x0a, 0x95, 0x01, 0x81, 0x02, 0x75, 0x06, 0x81, 0x03, 0xc0};
 
 class Host {
  public:
@@ -85,10 +85,14 @@ class Host {
       return "ok";
     }
     HidKind kind;
-    if (device == "spacemouse") kind = {0x256f, 0xc635, "SpaceMouse Compact", kCap, 4};
-    else if (device == "switch") kind = {0x05f3, 0x00ff, "VEC Footpedal", kSwitch, 6};
-    else if (device == "joystick") kind = {0x068e, 0x00f2, "Emulated Pedals", kJoystick, 7};
-    else return "no device " + device;
+    if (device == "spacemouse")
+      kind = {0x256f, 0xc635, "SpaceMouse Compact", kCap, 4};
+    else if (device == "switch")
+      kind = {0x05f3, 0x00ff, "VEC Footpedal", kSwitch, 6};
+    else if (device == "joystick")
+      kind = {0x068e, 0x00f2, "Emulated Pedals", kJoystick, 7};
+    else
+      return "no device " + device;
     unsigned vendor = 0, model = 0;
     if (words >> std::hex >> vendor >> model) {
       kind.vendor = static_cast<std::uint16_t>(vendor);
@@ -101,8 +105,10 @@ class Host {
   }
 
   std::string unplug(const std::string& device) {
-    if (device == "falcon") falcon_.reset();
-    else hids_.erase(device);
+    if (device == "falcon")
+      falcon_.reset();
+    else
+      hids_.erase(device);
     return "ok";
   }
 
@@ -126,14 +132,22 @@ class Host {
     if (what == "encoders") {
       model.encoders[0] = static_cast<std::int16_t>(value);
       for (std::size_t i = 1; i < 3; ++i) words >> model.encoders[i];
-    } else if (what == "buttons") model.buttons = static_cast<int>(value);
-    else if (what == "homed") model.homed = static_cast<int>(value);
-    else if (what == "silent") model.silent = value != 0;
-    else if (what == "spoil") model.spoil = static_cast<int>(value);
-    else if (what == "deaf") model.deaf = static_cast<int>(value);
-    else if (what == "fail") falcon_->failing = static_cast<int>(value);
-    else if (what == "false-echo") model.false_echo_at = value;
-    else return "no command falcon " + what;
+    } else if (what == "buttons")
+      model.buttons = static_cast<int>(value);
+    else if (what == "homed")
+      model.homed = static_cast<int>(value);
+    else if (what == "silent")
+      model.silent = value != 0;
+    else if (what == "spoil")
+      model.spoil = static_cast<int>(value);
+    else if (what == "deaf")
+      model.deaf = static_cast<int>(value);
+    else if (what == "fail")
+      falcon_->failing = static_cast<int>(value);
+    else if (what == "false-echo")
+      model.false_echo_at = value;
+    else
+      return "no command falcon " + what;
     return "ok";
   }
 

@@ -29,7 +29,8 @@ void write_image(const std::filesystem::path& file, std::string_view beginning, 
 void enter_usb_emulation(char** argv) {
   const char* now = std::getenv("LD_PRELOAD");
   if (now != nullptr && std::string_view(now).find("umockdev") != std::string_view::npos) return;
-  setenv("LD_PRELOAD", (std::string(kLibrary) + (now != nullptr && *now != 0 ? std::string(":") + now : "")).c_str(), 1);
+  setenv("LD_PRELOAD", (std::string(kLibrary) + (now != nullptr && *now != 0 ? std::string(":") + now : "")).c_str(),
+         1);
   // A sanitizer wants to be the first library; behind this one it works as well.
   const char* options = std::getenv("ASAN_OPTIONS");
   setenv("ASAN_OPTIONS", (std::string(options != nullptr ? options : "") + ":verify_asan_link_order=0").c_str(), 1);
@@ -85,7 +86,9 @@ void UsbStage::report(const std::string& device, const std::vector<std::uint8_t>
   command(line.str());
 }
 
-void write_running_image(const std::filesystem::path& file, std::size_t size) { write_image(file, kRunningImage, size); }
+void write_running_image(const std::filesystem::path& file, std::size_t size) {
+  write_image(file, kRunningImage, size);
+}
 void write_other_image(const std::filesystem::path& file, std::size_t size) {
   write_image(file, "another device's firmware", size);
 }

@@ -1,5 +1,5 @@
-// A machine's USB for one test: a testbed played by osteon-usb-host, seen by this process through libumockdev-preload, with
-// the real libusb and hidapi in between. What is measured here is emulated, never a device.
+// A machine's USB for one test: a testbed played by osteon-usb-host, seen by this process through libumockdev-preload,
+// with the real libusb and hidapi in between. What is measured here is emulated, never a device.
 #pragma once
 #include <array>
 #include <cstdint>

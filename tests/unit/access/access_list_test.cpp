@@ -24,7 +24,8 @@ TEST(AccessList, RefusesWhatWasRevokedAndNothingElse) {
   const AccessList list = list_of(
       "# who left\n\nrevoke certificate 0A:1f\n  revoke user ben \nrevoke ticket 00ff00ff00ff00ff00ff00ff00ff00ff\r\n");
   EXPECT_EQ(list.size(), 3u);
-  for (const char* serial : {"A1F", "0a1f", "00:0A:1F"}) EXPECT_THAT(list.refuses(serial, "x", "1").value_or(""), HasSubstr("certificate")) << serial;
+  for (const char* serial : {"A1F", "0a1f", "00:0A:1F"})
+    EXPECT_THAT(list.refuses(serial, "x", "1").value_or(""), HasSubstr("certificate")) << serial;
   EXPECT_THAT(list.refuses("1", "ben", "1").value_or(""), HasSubstr("ben"));
   EXPECT_THAT(list.refuses("1", "x", "00FF00FF00FF00FF00FF00FF00FF00FF").value_or(""), HasSubstr("ticket"));
   EXPECT_FALSE(list.refuses("A1F0", "Ben", "ff"));
@@ -41,8 +42,9 @@ TEST(AccessList, ChangesRolesInOneRoomOrInAll) {
 }
 
 TEST(AccessList, NamesTheLineThatIsWrong) {
-  for (const char* line : {"revoke", "revoke user", "revoke user a b", "revoke user a/b", "revoke room x", "revoke certificate xyz",
-                           "role ben", "role ben king", "role b/n observer", "allow ben", "Revoke user ben"}) {
+  for (const char* line :
+       {"revoke", "revoke user", "revoke user a b", "revoke user a/b", "revoke room x", "revoke certificate xyz",
+        "role ben", "role ben king", "role b/n observer", "allow ben", "Revoke user ben"}) {
     const Result<AccessList> list = AccessList::parse(std::string("# one\n") + line + "\n", "access.txt");
     ASSERT_FALSE(list) << line;
     EXPECT_EQ(list.error().code, ErrorCode::invalid_input);

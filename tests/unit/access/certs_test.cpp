@@ -1,6 +1,7 @@
-// deploy/certs beside a server that runs as a user of its own: whatever it renews or revokes, the server can still read.
-#include <gtest/gtest.h>
+// deploy/certs beside a server that runs as a user of its own: whatever it renews or revokes, the server can still
+// read.
 #include <grp.h>
+#include <gtest/gtest.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -34,12 +35,15 @@ Rights rights_of(const fs::path& file) {
 }
 
 // True in the child, which is then another user.
-bool becomes(uid_t user, gid_t group) { return ::setgroups(0, nullptr) == 0 && ::setgid(group) == 0 && ::setuid(user) == 0; }
+bool becomes(uid_t user, gid_t group) {
+  return ::setgroups(0, nullptr) == 0 && ::setgid(group) == 0 && ::setuid(user) == 0;
+}
 
 // Whether another user gets to files of tests at all: the root of a chroot may be its owner's alone.
 bool others_get_there(uid_t user, gid_t group) {
   const pid_t child = ::fork();
-  if (child == 0) ::_exit(becomes(user, group) && ::access(fs::temp_directory_path().c_str(), R_OK | X_OK) == 0 ? 0 : 1);
+  if (child == 0)
+    ::_exit(becomes(user, group) && ::access(fs::temp_directory_path().c_str(), R_OK | X_OK) == 0 ? 0 : 1);
   int status = 0;
   return ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
@@ -53,7 +57,8 @@ const gid_t kServersGroup = kMayBeOthers ? kOthersGroup : ::getegid();
 
 // How many entries the list has as the server's user reads it; -1: it cannot.
 int entries_for_the_server(const fs::path& file) {
-  if (::geteuid() == 0 && !kMayBeOthers) std::printf("no other user gets to files of tests here: root reads %s itself\n", file.c_str());
+  if (::geteuid() == 0 && !kMayBeOthers)
+    std::printf("no other user gets to files of tests here: root reads %s itself\n", file.c_str());
   const pid_t child = ::fork();
   if (child == 0) {
     if (kMayBeOthers && !becomes(kServer, kServersGroup)) ::_exit(255);
@@ -109,13 +114,15 @@ TEST_F(Certs, WhatTheyRenewStaysReadable) {
   people_.certs({"server", "127.0.0.1"});
   EXPECT_NE(fs::last_write_time(people_.server() / "server.pem"), renewed);
   for (const auto& [name, rights] : before) EXPECT_EQ(rights_of(people_.server() / name), rights) << name;
-  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 8) << "nothing is left beside";
+  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 8)
+      << "nothing is left beside";
 }
 
 // Of its own accord it opens nothing to others.
 TEST(CertsMade, AreForTheirOwnerAlone) {
   const test::People people;
-  for (const char* file : {"server.key", "access.txt"}) EXPECT_EQ(rights_of(people.server() / file).mode & 0077u, 0u) << file;
+  for (const char* file : {"server.key", "access.txt"})
+    EXPECT_EQ(rights_of(people.server() / file).mode & 0077u, 0u) << file;
   EXPECT_EQ(rights_of(people.ticket_key()).mode & 0077u, 0u);
 }
 

@@ -17,7 +17,8 @@ namespace osteon {
 namespace {
 
 using Names = std::set<std::string>;
-constexpr Role kAll[] = {Role::none, Role::observer, Role::trainee, Role::collaborator, Role::instructor, Role::operator_};
+constexpr Role kAll[] = {Role::none,         Role::observer,   Role::trainee,
+                         Role::collaborator, Role::instructor, Role::operator_};
 
 Names compiled_calls() {
   Names names;
@@ -32,18 +33,20 @@ Names compiled_calls() {
 
 // What each role may call beyond the one before it, as the roles are described to people.
 Names allowed(Role role) {
-  const std::string room = "/osteon.v1.RoomService/", watch = "/osteon.v1.WatchService/", people = "/osteon.v1.PeopleService/",
-                    rooms = "/osteon.v1.RoomsService/", cases = "/osteon.v1.CaseService/";
+  const std::string room = "/osteon.v1.RoomService/", watch = "/osteon.v1.WatchService/",
+                    people = "/osteon.v1.PeopleService/", rooms = "/osteon.v1.RoomsService/",
+                    cases = "/osteon.v1.CaseService/";
   Names names;
   if (role == Role::operator_) {
-    for (const char* call : {"ListRooms", "CreateRoom", "CloseRoom", "ResumeRoom", "BranchRoom", "DeleteRoom", "VerifyRoom", "BackUpRoom", "ReplayRoom"})
+    for (const char* call : {"ListRooms", "CreateRoom", "CloseRoom", "ResumeRoom", "BranchRoom", "DeleteRoom",
+                             "VerifyRoom", "BackUpRoom", "ReplayRoom"})
       names.insert(rooms + call);
     names.insert({cases + "UploadCase", cases + "ListCases"});
     return names;
   }
   if (role >= Role::observer)
-    names.insert({room + "Join", room + "GetStatus", room + "GetCase", room + "ListTools", room + "GetTool", watch + "WatchMesh",
-                  watch + "WatchCutting", watch + "LookFrom", people + "WatchPeople"});
+    names.insert({room + "Join", room + "GetStatus", room + "GetCase", room + "ListTools", room + "GetTool",
+                  watch + "WatchMesh", watch + "WatchCutting", watch + "LookFrom", people + "WatchPeople"});
   if (role >= Role::trainee)
     names.insert({"/osteon.v1.CuttingService/Session", room + "AddTool", room + "Undo", room + "Redo", room + "Mark",
                   room + "SetSceneItem", room + "RemoveSceneItem", people + "Say"});
@@ -58,8 +61,10 @@ TEST(RoleTable, HasARowForEveryCallOfTheProtocolAndNoOther) {
   const Names compiled = compiled_calls();
   ASSERT_GT(compiled.size(), 30u);
   Names rows;
-  for (const CallRow& row : call_rows()) EXPECT_TRUE(rows.insert(std::string(row.method)).second) << row.method << " has two rows";
-  for (const std::string& call : compiled) EXPECT_TRUE(rows.contains(call)) << call << " has no row in common/access/role_table.cpp";
+  for (const CallRow& row : call_rows())
+    EXPECT_TRUE(rows.insert(std::string(row.method)).second) << row.method << " has two rows";
+  for (const std::string& call : compiled)
+    EXPECT_TRUE(rows.contains(call)) << call << " has no row in common/access/role_table.cpp";
   for (const std::string& row : rows) EXPECT_TRUE(compiled.contains(row)) << row << " is no call of the protocol";
 }
 
@@ -73,8 +78,8 @@ TEST(RoleTable, LetsEveryRoleCallWhatItIsFor) {
 
 TEST(RoleTable, RefusesWhatItDoesNotKnow) {
   for (const Role role : kAll)
-    for (const char* call : {"", "/", "Join", "/osteon.v1.RoomService/join", "/osteon.v1.RoomService/Join ", "/osteon.v1.RoomService/Joi",
-                             "/grpc.health.v1.Health/Watch"})
+    for (const char* call : {"", "/", "Join", "/osteon.v1.RoomService/join", "/osteon.v1.RoomService/Join ",
+                             "/osteon.v1.RoomService/Joi", "/grpc.health.v1.Health/Watch"})
       EXPECT_FALSE(may_call(role, call)) << to_string(role) << " " << call;
 }
 
@@ -102,15 +107,14 @@ TEST(RoleTable, TellsOfOthersToTheInstructorAlone) {
 }
 
 TEST(RoleTable, GivesRightsInSteps) {
-  const std::map<Role, std::vector<bool>> expected{{Role::none, {false, false, false, false}},
-                                                   {Role::observer, {false, false, false, false}},
-                                                   {Role::trainee, {true, true, false, false}},
-                                                   {Role::collaborator, {true, true, true, false}},
-                                                   {Role::instructor, {true, true, true, true}},
-                                                   {Role::operator_, {false, false, false, false}}};
+  const std::map<Role, std::vector<bool>> expected{
+      {Role::none, {false, false, false, false}},   {Role::observer, {false, false, false, false}},
+      {Role::trainee, {true, true, false, false}},  {Role::collaborator, {true, true, true, false}},
+      {Role::instructor, {true, true, true, true}}, {Role::operator_, {false, false, false, false}}};
   for (const auto& [role, rights] : expected)
     for (int right = 0; right < kRights; ++right)
-      EXPECT_EQ(has_right(role, static_cast<Right>(right)), rights[static_cast<std::size_t>(right)]) << to_string(role) << " " << right;
+      EXPECT_EQ(has_right(role, static_cast<Right>(right)), rights[static_cast<std::size_t>(right)])
+          << to_string(role) << " " << right;
 }
 
 TEST(Role, IsWrittenAndReadBack) {

@@ -30,17 +30,20 @@ std::string signed_text(const std::string& contents, const std::string& purpose 
   const TicketKey k = key();
   crypto_sign_seed_keypair(open.data(), secret.data(), k.seed.data());
   const std::string all = purpose + contents;
-  crypto_sign_detached(signature.data(), nullptr, reinterpret_cast<const unsigned char*>(all.data()), all.size(), secret.data());
+  crypto_sign_detached(signature.data(), nullptr, reinterpret_cast<const unsigned char*>(all.data()), all.size(),
+                       secret.data());
   const auto base64 = [](const void* bytes, std::size_t size) {
     std::string text(sodium_base64_encoded_len(size, sodium_base64_VARIANT_URLSAFE_NO_PADDING), '\0');
-    sodium_bin2base64(text.data(), text.size(), static_cast<const unsigned char*>(bytes), size, sodium_base64_VARIANT_URLSAFE_NO_PADDING);
+    sodium_bin2base64(text.data(), text.size(), static_cast<const unsigned char*>(bytes), size,
+                      sodium_base64_VARIANT_URLSAFE_NO_PADDING);
     text.pop_back();
     return text;
   };
   return "osteon1." + base64(contents.data(), contents.size()) + "." + base64(signature.data(), signature.size());
 }
 
-std::string contents(char role, const std::string& room, const std::string& user, std::uint64_t seconds = 1'800'000'000) {
+std::string contents(char role, const std::string& room, const std::string& user,
+                     std::uint64_t seconds = 1'800'000'000) {
   std::string bytes(16, 'i');
   for (int i = 0; i < 8; ++i) bytes += static_cast<char>(seconds >> (8 * i));
   bytes += role;
@@ -82,7 +85,8 @@ TEST(Ticket, ComesBackAsItWasSigned) {
     const Ticket ticket = make_ticket(std::string(kAnyRoom), "u", role, kNoon).value();
     const std::string text = sign_ticket(ticket, key());
     EXPECT_LE(text.size(), kMostTicketChars);
-    EXPECT_EQ(text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_."), std::string::npos);
+    EXPECT_EQ(text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-_."),
+              std::string::npos);
     const Result<Ticket> back = open_ticket(text, check_key());
     ASSERT_TRUE(back.has_value()) << back.error().message;
     EXPECT_EQ(*back, ticket);
@@ -119,7 +123,8 @@ TEST(Ticket, IsRefusedAfterAnyChangeOfABit) {
 
 TEST(Ticket, IsRefusedWhenCutOrLengthened) {
   const std::string text = sign_ticket(a_ticket(), key());
-  for (std::size_t size = 0; size < text.size(); ++size) EXPECT_FALSE(open_ticket(text.substr(0, size), check_key())) << size;
+  for (std::size_t size = 0; size < text.size(); ++size)
+    EXPECT_FALSE(open_ticket(text.substr(0, size), check_key())) << size;
   for (const char* more : {"A", "=", ".", " ", "\n"}) EXPECT_FALSE(open_ticket(text + more, check_key()));
   EXPECT_FALSE(open_ticket(text + std::string(5000, 'A'), check_key()));
   EXPECT_FALSE(open_ticket(" " + text, check_key()));
@@ -132,7 +137,8 @@ TEST(Ticket, IsRefusedWithAnotherKeysSignature) {
   EXPECT_EQ(forged.error().code, ErrorCode::invalid_input);
   EXPECT_THAT(forged.error().message, HasSubstr("signature"));
   // One ticket's signature under another's contents.
-  const std::string mine = sign_ticket(a_ticket(), key()), better = sign_ticket(make_ticket("r", "u", Role::instructor, kNoon).value(), forger);
+  const std::string mine = sign_ticket(a_ticket(), key()),
+                    better = sign_ticket(make_ticket("r", "u", Role::instructor, kNoon).value(), forger);
   const std::string mixed = better.substr(0, better.rfind('.')) + mine.substr(mine.rfind('.'));
   ASSERT_FALSE(open_ticket(mixed, check_key()));
 }

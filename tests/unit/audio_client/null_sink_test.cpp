@@ -85,8 +85,8 @@ class Monitor {
   std::jthread thread_;
 };
 
-// A machine that is too busy leaves gaps, which are silence in the monitor: no sound of ours is ever 0 for so long. What lies on
-// both sides of one is shifted, and a tone across it has another frequency.
+// A machine that is too busy leaves gaps, which are silence in the monitor: no sound of ours is ever 0 for so long.
+// What lies on both sides of one is shifted, and a tone across it has another frequency.
 bool has_gap(std::span<const float> sound) {
   constexpr int kGap = 32;
   int zeros = 0;

@@ -224,9 +224,9 @@ TEST(AudioProgram, WithoutAServerAnEarlierRecordingStays) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "a.wav", "earlier sound"));
   ASSERT_TRUE(write_file(temp / "a.csv", "earlier rows"));
-  const test::RunResult result =
-      test::run(test::program("osteon-audio"), {"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0.2", "--wav",
-                                                (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string()});
+  const test::RunResult result = test::run(test::program("osteon-audio"),
+                                           {"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0.2", "--wav",
+                                            (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(*read_file(temp / "a.wav"), "earlier sound");
   EXPECT_EQ(*read_file(temp / "a.csv"), "earlier rows");

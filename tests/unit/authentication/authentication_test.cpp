@@ -1,5 +1,5 @@
-// The doors of a server in this process, on TLS and the loopback device: every call by every role, and those who come with the
-// wrong thing in their hands.
+// The doors of a server in this process, on TLS and the loopback device: every call by every role, and those who come
+// with the wrong thing in their hands.
 #include <gmock/gmock.h>
 #include <google/protobuf/dynamic_message.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -27,8 +27,8 @@
 #include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
-#include "server/net/room_server.hpp"
 #include "server/net/room_admin_client.hpp"
+#include "server/net/room_server.hpp"
 #include "tests/architecture/proto_rules.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/authentication/proxy.hpp"
@@ -69,7 +69,8 @@ class Authentication : public ::testing::Test {
   // Where clients come.
   virtual const std::string& address() { return server_->address(); }
   void expect_every_role_to_make_the_calls_that_are_for_it();
-  Result<wire::JoinedRoom> join(const wire::ClientCredentials& credentials, wire::ClientKind kind = wire::ClientKind::viewer, const std::string& room = "ward") {
+  Result<wire::JoinedRoom> join(const wire::ClientCredentials& credentials,
+                                wire::ClientKind kind = wire::ClientKind::viewer, const std::string& room = "ward") {
     return wire::join_room(address(), kind, "whatever", 5s, {}, room, credentials);
   }
   std::string refusal(const wire::ClientCredentials& credentials, const std::string& room = "ward") {
@@ -152,7 +153,8 @@ std::vector<Method> methods() {
   for (const auto* file : protocol().files)
     for (int s = 0; s < file->service_count(); ++s)
       for (int m = 0; m < file->service(s)->method_count(); ++m)
-        all.push_back({"/" + file->service(s)->full_name() + "/" + file->service(s)->method(m)->name(), file->service(s)->method(m)->input_type()});
+        all.push_back({"/" + file->service(s)->full_name() + "/" + file->service(s)->method(m)->name(),
+                       file->service(s)->method(m)->input_type()});
   return all;
 }
 
@@ -160,7 +162,8 @@ std::vector<Method> methods() {
 ByteBuffer request_of(const Method& method, std::uint64_t author) {
   google::protobuf::DynamicMessageFactory factory;
   const std::unique_ptr<google::protobuf::Message> message(factory.GetPrototype(method.request)->New());
-  if (const auto* field = method.request->FindFieldByName("author")) message->GetReflection()->SetUInt64(message.get(), field, author);
+  if (const auto* field = method.request->FindFieldByName("author"))
+    message->GetReflection()->SetUInt64(message.get(), field, author);
   const std::string bytes = message->SerializeAsString();
   const grpc::Slice slice(bytes);
   return {&slice, 1};
@@ -170,7 +173,8 @@ bool has_author(const Method& method) { return method.request->FindFieldByName("
 
 void Authentication::expect_every_role_to_make_the_calls_that_are_for_it() {
   // By the rules as people are told them: what a role may do beyond looking.
-  const std::set<std::string> hands{"Session", "AddTool", "Undo", "Redo", "Mark", "SetSceneItem", "RemoveSceneItem", "Say"},
+  const std::set<std::string> hands{"Session",      "AddTool",         "Undo", "Redo", "Mark",
+                                    "SetSceneItem", "RemoveSceneItem", "Say"},
       instructors{"RemoveBody", "SaveFields", "Supervise", "Annotate", "Demonstrate", "EndDemonstration"},
       both{"ListRooms", "DeleteRoom", "VerifyRoom", "BranchRoom", "ReplayRoom", "ListCases"},
       operators{"CreateRoom", "CloseRoom", "ResumeRoom", "BackUpRoom", "UploadCase"};
@@ -186,15 +190,17 @@ void Authentication::expect_every_role_to_make_the_calls_that_are_for_it() {
     const std::string user = "user-" + std::string(to_string(role));
     const wire::ClientCredentials credentials = people_.credentials(user, role, "ward");
     const auto line = channel(credentials);
-    const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(credentials)}};
+    const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"},
+                                                      {"osteon-ticket", wire::ticket_text(credentials)}};
     for (const Method& method : methods()) {
       const std::string name = method.name.substr(method.name.rfind('/') + 1);
       const Called called = call(line, method.name, request_of(method, 0), metadata);
       ++calls;
       const bool refused_by_role = called.status.error_code() == StatusCode::PERMISSION_DENIED &&
                                    called.status.error_message().find("may not call " + name) != std::string::npos;
-      EXPECT_EQ(!refused_by_role, may(role, name)) << to_string(role) << " " << method.name << ": " << called.status.error_code() << " "
-                                                   << called.status.error_message();
+      EXPECT_EQ(!refused_by_role, may(role, name))
+          << to_string(role) << " " << method.name << ": " << called.status.error_code() << " "
+          << called.status.error_message();
       EXPECT_NE(called.status.error_code(), StatusCode::UNAUTHENTICATED) << method.name;
       EXPECT_NE(called.status.error_code(), StatusCode::UNAVAILABLE) << method.name << called.status.error_message();
     }
@@ -223,13 +229,13 @@ TEST_F(AuthenticationBehindAProxy, LetEveryRoleMakeTheCallsThatAreForIt) {
 
 TEST_F(AuthenticationBehindAProxy, KnowPeopleByTheirCertificatesAndAddresses) {
   EXPECT_EQ(refusal(people_.credentials("anna", Role::trainee, "ward")), "");
-  EXPECT_THAT(
-      refusal({.certificates = people_.person("ben"), .ticket = people_.credentials("anna", Role::trainee, "ward").ticket}),
-      HasSubstr("the ticket is for anna and the certificate for ben"));
+  EXPECT_THAT(refusal({.certificates = people_.person("ben"),
+                       .ticket = people_.credentials("anna", Role::trainee, "ward").ticket}),
+              HasSubstr("the ticket is for anna and the certificate for ben"));
   // Two people over one connection of the proxy to the server stay two.
-  EXPECT_THAT(
-      refusal({.certificates = people_.person("anna"), .ticket = people_.credentials("ben", Role::trainee, "ward").ticket}),
-      HasSubstr("the ticket is for ben and the certificate for anna"));
+  EXPECT_THAT(refusal({.certificates = people_.person("anna"),
+                       .ticket = people_.credentials("ben", Role::trainee, "ward").ticket}),
+              HasSubstr("the ticket is for ben and the certificate for anna"));
 }
 
 TEST_F(AuthenticationBehindAProxy, BelieveNoHeaderThatAClientSends) {
@@ -239,9 +245,8 @@ TEST_F(AuthenticationBehindAProxy, BelieveNoHeaderThatAClientSends) {
   for (std::string line; std::getline(lines, line);)
     if (!line.starts_with("-----")) base64 += line;
   const std::string ticket = wire::ticket_text(people_.credentials("anna", Role::instructor, "ward"));
-  const std::map<std::string, std::string> metadata{{"osteon-ticket", ticket},
-                                                    {"osteon-client-certificate", base64},
-                                                    {"osteon-client-address", "10.1.2.3"}};
+  const std::map<std::string, std::string> metadata{
+      {"osteon-ticket", ticket}, {"osteon-client-certificate", base64}, {"osteon-client-address", "10.1.2.3"}};
   const wire::ClientCredentials ben = people_.credentials("ben", Role::trainee, "ward");
   const std::vector<std::string> places{server_->address(), proxy_->address()};
   for (const std::string& place : places) {
@@ -292,7 +297,8 @@ TEST_F(Authentication, LetNobodyCallAsSomebodyElse) {
   const auto ben = join(people_.credentials("ben", Role::instructor, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
   const wire::ClientCredentials credentials = people_.credentials("anna", Role::instructor, "ward");
-  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(credentials)}};
+  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"},
+                                                    {"osteon-ticket", wire::ticket_text(credentials)}};
   const auto line = channel(credentials);
   int tried = 0;
   for (const Method& method : methods()) {
@@ -317,26 +323,39 @@ TEST_F(Authentication, NeedACertificateOfTheirOwnAuthority) {
   test::People strangers;
   EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "") << "of another authority";
   // The server's authority, and a certificate that another has signed.
-  std::filesystem::copy_file(people_.person("anna") / "ca.pem", strangers.person("anna") / "ca.pem", std::filesystem::copy_options::overwrite_existing);
-  EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "") << "signed by another authority";
+  std::filesystem::copy_file(people_.person("anna") / "ca.pem", strangers.person("anna") / "ca.pem",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "")
+      << "signed by another authority";
   // None at all.
-  const auto bare = grpc::CreateChannel(address(), grpc::SslCredentials({.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""}));
+  const auto bare = grpc::CreateChannel(
+      address(),
+      grpc::SslCredentials(
+          {.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""}));
   EXPECT_EQ(call(bare, "/osteon.v1.RoomsService/ListRooms", {}, {}).status.error_code(), StatusCode::UNAVAILABLE);
   // Nor does a client take another authority's server for the right one.
-  std::filesystem::copy_file(strangers.server() / "ca.pem", people_.person("ben") / "ca.pem", std::filesystem::copy_options::overwrite_existing);
-  EXPECT_NE(refusal({.certificates = people_.person("ben"), .ticket = people_.ticket("ben", "ward", Role::trainee)}), "");
+  std::filesystem::copy_file(strangers.server() / "ca.pem", people_.person("ben") / "ca.pem",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_NE(refusal({.certificates = people_.person("ben"), .ticket = people_.ticket("ben", "ward", Role::trainee)}),
+            "");
   EXPECT_EQ(refusal(anna), "");
 }
 
 TEST_F(Authentication, SayInOneSentenceWhatIsWrongWithATicket) {
   const std::filesystem::path anna = people_.person("anna");
-  const auto with = [&](const std::filesystem::path& ticket) { return refusal({.certificates = anna, .ticket = ticket}); };
+  const auto with = [&](const std::filesystem::path& ticket) {
+    return refusal({.certificates = anna, .ticket = ticket});
+  };
   EXPECT_THAT(with(people_.ticket("anna", "ward", Role::trainee, -5s)), HasSubstr("the ticket expired"));
-  EXPECT_THAT(with(people_.ticket("ben", "ward", Role::trainee)), HasSubstr("the ticket is for ben and the certificate for anna"));
+  EXPECT_THAT(with(people_.ticket("ben", "ward", Role::trainee)),
+              HasSubstr("the ticket is for ben and the certificate for anna"));
   EXPECT_THAT(with(people_.ticket("anna", "theatre", Role::trainee)), HasSubstr("the ticket is for room theatre"));
   EXPECT_THAT(with(people_.ticket_file("osteon1.aaaa.bbbb")), HasSubstr("malformed"));
   EXPECT_THAT(with(people_.ticket_file(sign_ticket(
-                  make_ticket("ward", "anna", Role::trainee, std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()) + 1h).value(), new_ticket_key()))),
+                  make_ticket("ward", "anna", Role::trainee,
+                              std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()) + 1h)
+                      .value(),
+                  new_ticket_key()))),
               HasSubstr("signature"));
   EXPECT_THAT(with(people_.folder() / "none"), HasSubstr("no ticket came"));
   // An observer comes to look, not to cut.
@@ -363,8 +382,10 @@ TEST_F(Authentication, TakeNewCertificatesWithoutAStartAnew) {
   // A surgeon's certificate of an authority that comes to be trusted while the server runs.
   test::People others;
   const std::filesystem::path guest = others.person("guest");
-  std::filesystem::copy_file(people_.server() / "ca.pem", guest / "ca.pem", std::filesystem::copy_options::overwrite_existing);
-  const wire::ClientCredentials credentials{.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)};
+  std::filesystem::copy_file(people_.server() / "ca.pem", guest / "ca.pem",
+                             std::filesystem::copy_options::overwrite_existing);
+  const wire::ClientCredentials credentials{.certificates = guest,
+                                            .ticket = people_.ticket("guest", "ward", Role::observer)};
   EXPECT_NE(refusal(credentials), "");
   const std::string both = content(people_.server() / "ca.pem") + content(others.server() / "ca.pem");
   std::ofstream(dir_ / "both.pem") << both;
@@ -375,15 +396,17 @@ TEST_F(Authentication, TakeNewCertificatesWithoutAStartAnew) {
   const std::string fresh = content(people_.server() / "server.pem");
   EXPECT_TRUE(test::wait_until(
       [&] {
-        const auto line = grpc::CreateChannel(address(), grpc::SslCredentials({.pem_root_certs = content(people_.server() / "ca.pem"),
-                                                                               .pem_private_key = content(people_.person("anna") / "person.key"),
-                                                                               .pem_cert_chain = content(people_.person("anna") / "person.pem")}));
+        const auto line = grpc::CreateChannel(
+            address(), grpc::SslCredentials({.pem_root_certs = content(people_.server() / "ca.pem"),
+                                             .pem_private_key = content(people_.person("anna") / "person.key"),
+                                             .pem_cert_chain = content(people_.person("anna") / "person.pem")}));
         grpc::ClientContext context;
         context.set_deadline(std::chrono::system_clock::now() + 2s);
         v1::GetStatusResponse response;
         (void)v1::RoomService::NewStub(line)->GetStatus(&context, {}, &response);
         const auto auth = context.auth_context();
-        const auto shown = auth ? auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME) : std::vector<grpc::string_ref>();
+        const auto shown =
+            auth ? auth->FindPropertyValues(GRPC_X509_PEM_CERT_PROPERTY_NAME) : std::vector<grpc::string_ref>();
         return shown.size() == 1 && std::string(shown[0].data(), shown[0].size()) == fresh;
       },
       test::kPatience));
@@ -449,7 +472,8 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   EXPECT_FALSE(is_there("annex"));
   // Less in one room than elsewhere.
   const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
-  for (const char* in : {"", "ward", "theatre"}) EXPECT_EQ(asked(otto, in, "ward").error_code(), StatusCode::PERMISSION_DENIED) << in;
+  for (const char* in : {"", "ward", "theatre"})
+    EXPECT_EQ(asked(otto, in, "ward").error_code(), StatusCode::PERMISSION_DENIED) << in;
   EXPECT_TRUE(is_there("ward"));
   auto rooms = RoomAdminClient::reach(address(), 5s, {}, otto);
   ASSERT_TRUE(rooms.has_value());
@@ -540,7 +564,8 @@ TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
   const auto server = start(at);
   ASSERT_TRUE(server.has_value()) << server.error().message;
   EXPECT_EQ((*server)->link_port(), port);
-  test::Surgeon surgeon((*server)->address(), dir / "cache", "", "ward", people.credentials("sue", Role::trainee, "ward"));
+  test::Surgeon surgeon((*server)->address(), dir / "cache", "", "ward",
+                        people.credentials("sue", Role::trainee, "ward"));
   EXPECT_TRUE(test::wait_until([&] { return surgeon.session().fast_path().alive; }, test::kPatience));
   // A second server finds it taken, before it prepares anything too.
   const auto second = start(at);
@@ -557,7 +582,8 @@ class DoorsAtWork : public Authentication {
  protected:
   void SetUp() override {
     Authentication::SetUp();
-    surgeon_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward", people_.credentials("sue", Role::trainee, "ward"));
+    surgeon_ = std::make_unique<test::Surgeon>(address(), dir_ / "cache", "", "ward",
+                                               people_.credentials("sue", Role::trainee, "ward"));
     ASSERT_TRUE(test::wait_until([&] { return surgeon_->complete(); }, test::kPatience));
   }
   // Cuts on, and expects it to arrive; her session is the one that she began with.
@@ -578,7 +604,8 @@ class DoorsAtWork : public Authentication {
       stream = v1::WatchService::NewStub(room.channel)->WatchMesh(&context, request);
       EXPECT_TRUE(stream->Read(&message));
       end = std::async(std::launch::async, [this] {
-        while (stream->Read(&message)) {}
+        while (stream->Read(&message)) {
+        }
         return stream->Finish();
       });
     }
@@ -618,15 +645,18 @@ TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
   v1::GetCaseRequest request;
   request.set_case_hash(wire::to_wire(test::test_block().hash()));
   const auto unread = v1::RoomService::NewStub(ben->channel)->GetCase(&context, request);
-  ASSERT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others + 1; }, test::kPatience));
-  EXPECT_FALSE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 2s)) << "by itself it goes on";
+  ASSERT_TRUE(
+      test::wait_until([&] { return server_->connection_health().authorizer.streams == others + 1; }, test::kPatience));
+  EXPECT_FALSE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 2s))
+      << "by itself it goes on";
   people_.certs({"revoke", "ben"});
   EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 10s));
   context.TryCancel();
   expect_undisturbed();
 }
 
-// A newer program of the same person, and the older one coming again behind it: whoever is in the queue, the newer one stays.
+// A newer program of the same person, and the older one coming again behind it: whoever is in the queue, the newer one
+// stays.
 TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
   const wire::ClientCredentials credentials = people_.credentials("ben", Role::observer, "ward");
   const auto older = join(credentials);
@@ -709,18 +739,23 @@ TEST_F(DoorsAtWork, GiveAConsoleAPlaceBesideTheWindow) {
   EXPECT_FALSE(newer.over(600ms));
   EXPECT_FALSE(seen.over(1ms));
   EXPECT_TRUE(wire::join_again(*window, wire::ClientKind::viewer, {}));
-  EXPECT_EQ(wire::join_again(*window, wire::ClientKind::console, {}).error().code, ErrorCode::denied) << "a place is of one kind";
+  EXPECT_EQ(wire::join_again(*window, wire::ClientKind::console, {}).error().code, ErrorCode::denied)
+      << "a place is of one kind";
   expect_undisturbed();
 }
 
 TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
   const wire::ClientCredentials credentials = people_.credentials("ben", Role::trainee, "ward");
   const auto line = channel(credentials);
-  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"}, {"osteon-ticket", wire::ticket_text(credentials)}};
+  const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"},
+                                                    {"osteon-ticket", wire::ticket_text(credentials)}};
   const std::string large(5 * 1024 * 1024, 'x'), nonsense = "\xff\xff\xff\xff\xff\x01\x02";
-  for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.RoomService/AddTool", "/osteon.v1.WatchService/WatchMesh", "/osteon.v1.CuttingService/Session"}) {
+  for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.RoomService/AddTool",
+                             "/osteon.v1.WatchService/WatchMesh", "/osteon.v1.CuttingService/Session"}) {
     const grpc::Slice too_large(large), no_message(nonsense);
-    EXPECT_EQ(call(line, method, ByteBuffer(&too_large, 1), metadata).status.error_code(), StatusCode::RESOURCE_EXHAUSTED) << method;
+    EXPECT_EQ(call(line, method, ByteBuffer(&too_large, 1), metadata).status.error_code(),
+              StatusCode::RESOURCE_EXHAUSTED)
+        << method;
     const Called malformed = call(line, method, ByteBuffer(&no_message, 1), metadata);
     EXPECT_FALSE(malformed.answered) << method;
     // gRPC itself says of a single request that it cannot read that there was none.
@@ -737,14 +772,17 @@ TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
 TEST_F(DoorsAtWork, RefuseFurtherConnectionsAndLetThemInAgain) {
   const ListenerCounts before = server_->connection_health().connections;
   std::vector<std::unique_ptr<RawConnection>> strangers;
-  for (std::size_t i = 0; i < 2 * kMostConnections; ++i) strangers.push_back(std::make_unique<RawConnection>(address()));
+  for (std::size_t i = 0; i < 2 * kMostConnections; ++i)
+    strangers.push_back(std::make_unique<RawConnection>(address()));
   ASSERT_TRUE(test::wait_until([&] { return server_->connection_health().connections.refused > before.refused; }, 10s));
   EXPECT_LE(server_->connection_health().connections.open, kMostConnections);
   expect_undisturbed();
   strangers.clear();
-  EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().connections.open <= before.open; }, test::kPatience))
+  EXPECT_TRUE(
+      test::wait_until([&] { return server_->connection_health().connections.open <= before.open; }, test::kPatience))
       << "connections that are gone are counted";
-  EXPECT_TRUE(test::wait_until([&] { return refusal(people_.credentials("ben", Role::observer, "ward")).empty(); }, test::kPatience));
+  EXPECT_TRUE(test::wait_until([&] { return refusal(people_.credentials("ben", Role::observer, "ward")).empty(); },
+                               test::kPatience));
 }
 
 }  // namespace

@@ -34,16 +34,19 @@ class GateTest : public ::testing::Test {
   static void TearDownTestSuite() { delete people_; }
   void SetUp() override {
     std::ofstream(people_->server() / "access.txt") << "";
-    Result<std::unique_ptr<Authorizer>> authorizer = Authorizer::open(people_->server(), refusals_, [this] { return UnixTime{std::chrono::seconds(now_)}; });
+    Result<std::unique_ptr<Authorizer>> authorizer =
+        Authorizer::open(people_->server(), refusals_, [this] { return UnixTime{std::chrono::seconds(now_)}; });
     ASSERT_TRUE(authorizer.has_value()) << authorizer.error().message;
     authorizer_ = std::move(*authorizer);
   }
   std::string certificate(const std::string& user) { return content(people_->person(user) / "person.pem"); }
   std::string ticket(const std::string& user, const std::string& room, Role role, std::chrono::seconds good_for = 1h) {
-    return sign_ticket(make_ticket(room, user, role, UnixTime{std::chrono::seconds(now_)} + good_for).value(), people_->key());
+    return sign_ticket(make_ticket(room, user, role, UnixTime{std::chrono::seconds(now_)} + good_for).value(),
+                       people_->key());
   }
   // The refusal's sentence, with the word it is counted under; empty: let in.
-  std::string refused(const std::string& user, const std::string& with, const std::string& room, const std::string& method, bool is_known) {
+  std::string refused(const std::string& user, const std::string& with, const std::string& room,
+                      const std::string& method, bool is_known) {
     const auto caller =
         authorizer_->admit({.peer = shown(certificate(user)), .ticket = with, .room = room, .method = method});
     if (caller) return {};
@@ -52,9 +55,9 @@ class GateTest : public ::testing::Test {
   }
   Caller let_in(const std::string& user, Role role, const std::string& room = "ward") {
     const auto caller = authorizer_->admit({.peer = shown(certificate(user)),
-                                      .ticket = ticket(user, room, role),
-                                      .room = room,
-                                      .method = "/osteon.v1.RoomService/GetStatus"});
+                                            .ticket = ticket(user, room, role),
+                                            .room = room,
+                                            .method = "/osteon.v1.RoomService/GetStatus"});
     EXPECT_TRUE(caller.has_value()) << caller.error().sentence;
     return caller.value_or(Caller{});
   }
@@ -64,12 +67,14 @@ class GateTest : public ::testing::Test {
   }
   bool let_in_with(const std::string& certificate) {
     const std::string text = ticket("anna", "ward", Role::trainee);
-    return authorizer_->admit({.peer = shown(certificate), .ticket = text, .room = "ward", .method = kUndo}).has_value();
+    return authorizer_->admit({.peer = shown(certificate), .ticket = text, .room = "ward", .method = kUndo})
+        .has_value();
   }
 
   static test::People* people_;
   RefusalCounts refusals_;
-  std::atomic<std::int64_t> now_ = std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
+  std::atomic<std::int64_t> now_ =
+      std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
   std::unique_ptr<Authorizer> authorizer_;
 };
 test::People* GateTest::people_ = nullptr;
@@ -83,7 +88,8 @@ TEST_F(GateTest, ReadsWhoACertificateIsOf) {
   EXPECT_GE(days, 363);
   EXPECT_LE(days, 366);
   // The server's own names nobody.
-  EXPECT_THAT(read_person_certificate(content(people_->server() / "server.pem")).error().message, HasSubstr("osteon://person/"));
+  EXPECT_THAT(read_person_certificate(content(people_->server() / "server.pem")).error().message,
+              HasSubstr("osteon://person/"));
   for (const std::string& text : {std::string(), std::string("nonsense"), certificate("anna").substr(0, 300)})
     EXPECT_FALSE(read_person_certificate(text));
 }
@@ -98,14 +104,20 @@ TEST_F(GateTest, LetsInWhoHasBoth) {
 TEST_F(GateTest, SaysWhyNot) {
   EXPECT_THAT(refused("anna", "", "ward", kUndo, false), HasSubstr("ticket: no ticket"));
   EXPECT_THAT(refused("anna", "osteon1.x.y", "ward", kUndo, false), HasSubstr("malformed"));
-  EXPECT_THAT(refused("anna", sign_ticket(make_ticket("ward", "anna", Role::trainee, UnixTime{2h + std::chrono::seconds(now_)}).value(), new_ticket_key()), "ward", kUndo, false),
-              HasSubstr("signature"));
+  EXPECT_THAT(
+      refused("anna",
+              sign_ticket(make_ticket("ward", "anna", Role::trainee, UnixTime{2h + std::chrono::seconds(now_)}).value(),
+                          new_ticket_key()),
+              "ward", kUndo, false),
+      HasSubstr("signature"));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee, -1s), "ward", kUndo, false), HasSubstr("expired"));
-  EXPECT_THAT(refused("anna", ticket("ben", "ward", Role::trainee), "ward", kUndo, true), HasSubstr("person: the ticket is for ben"));
+  EXPECT_THAT(refused("anna", ticket("ben", "ward", Role::trainee), "ward", kUndo, true),
+              HasSubstr("person: the ticket is for ben"));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "other", kUndo, true), HasSubstr("room: "));
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::observer), "ward", kUndo, true),
               HasSubstr("role: an observer may not call Undo"));
-  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::instructor), "ward", "/osteon.v1.RoomService/Nothing", true), HasSubstr("call: "));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::instructor), "ward", "/osteon.v1.RoomService/Nothing", true),
+              HasSubstr("call: "));
   EXPECT_FALSE(let_in_with(content(people_->server() / "server.pem")));
   EXPECT_FALSE(let_in_with(""));
   const auto counts = refusals_.counts();
@@ -121,7 +133,8 @@ TEST_F(GateTest, GoesByTheClock) {
   now_ += 10;
   EXPECT_THAT(refused("anna", good, "ward", kUndo, false), HasSubstr("expired"));
   now_ += 400 * 86400;
-  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, false), HasSubstr("certificate: the certificate has expired"));
+  EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, false),
+              HasSubstr("certificate: the certificate has expired"));
 }
 
 TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
@@ -158,7 +171,8 @@ TEST_F(GateTest, ReadsTheKeysOfTicketsWhileItRuns) {
   const Caller anna = let_in("anna", Role::trainee);
   std::optional<Refusal> ended;
   std::atomic<int> calls = 0;
-  const auto stream = authorizer_->enter(anna, "ward", AuthorId{}, kWatch, [&](const Refusal& why) { ended = why, ++calls; });
+  const auto stream =
+      authorizer_->enter(anna, "ward", AuthorId{}, kWatch, [&](const Refusal& why) { ended = why, ++calls; });
   ASSERT_TRUE(stream.has_value());
   people_->certs({"rotate-tickets"});
   EXPECT_THROW(people_->certs({"rotate-tickets"}), std::runtime_error) << "one rotation at a time";
@@ -212,7 +226,8 @@ TEST_F(GateTest, NamesTheFileThatIsWrong) {
   }
   std::filesystem::remove_all(dir / "d");
   std::filesystem::copy(people_->server(), dir / "d");
-  std::filesystem::copy(people_->person("anna") / "person.key", dir / "d" / "server.key", std::filesystem::copy_options::overwrite_existing);
+  std::filesystem::copy(people_->person("anna") / "person.key", dir / "d" / "server.key",
+                        std::filesystem::copy_options::overwrite_existing);
   EXPECT_THAT(Authorizer::open(dir / "d", refusals_).error().message, HasSubstr("not that of the certificate"));
 }
 
@@ -264,8 +279,10 @@ TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
   (void)authorizer_->joined(ben, "ward", 1, AuthorId{2});
   std::string ended, bystander;
-  const auto older = authorizer_->enter(anna, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
-  const auto others = authorizer_->enter(ben, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { bystander += why.sentence; });
+  const auto older =
+      authorizer_->enter(anna, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto others =
+      authorizer_->enter(ben, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { bystander += why.sentence; });
   (void)authorizer_->joined(anna, "ward", 2, AuthorId{3});
   (void)authorizer_->joined(anna, "other", 1, AuthorId{1});
   EXPECT_EQ(ended, "") << "another kind of program, another room";
@@ -288,7 +305,8 @@ TEST_F(GateTest, WhoComesAgainTooLateTakesNoPlace) {
   // A newer program comes between the question and the answer.
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{2}));
   std::string ended;
-  const auto newer = authorizer_->enter(anna, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto newer =
+      authorizer_->enter(anna, "ward", AuthorId{2}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
   const auto late = authorizer_->joined(anna, "ward", 1, AuthorId{1}, Authorizer::Coming::again);
   ASSERT_FALSE(late);
   EXPECT_THAT(late.error().message, HasSubstr("newer session of anna"));
@@ -312,7 +330,8 @@ TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
   EXPECT_TRUE(test::wait_until([&] { return refused("anna", annas, "ward", kSay, true).empty(); }, 10s));
 }
 
-// Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost unseen.
+// Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost
+// unseen.
 TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}) && authorizer_->joined(ben, "ward", 1, AuthorId{2}));
@@ -324,7 +343,8 @@ TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
   EXPECT_EQ(enter(anna, AuthorId{1}), "");
   EXPECT_THAT(enter(anna, AuthorId{2}), HasSubstr("author 2 is not yours"));
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{3}));
-  EXPECT_THAT(enter(anna, AuthorId{1}), HasSubstr("author 1 is not yours in this room, or no more")) << "a newer session took its place";
+  EXPECT_THAT(enter(anna, AuthorId{1}), HasSubstr("author 1 is not yours in this room, or no more"))
+      << "a newer session took its place";
   EXPECT_EQ(enter(anna, AuthorId{3}), "");
   EXPECT_EQ(enter(anna, {}), "") << "as nobody";
   people_->append_access("role anna observer");
@@ -343,7 +363,8 @@ TEST_F(GateTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
   // Deleted and made again behind the authorizer's back: its authors are counted anew.
   (void)authorizer_->joined(ben, "ward", 1, AuthorId{1});
   std::string ended;
-  const auto bens = authorizer_->enter(ben, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
+  const auto bens =
+      authorizer_->enter(ben, "ward", AuthorId{1}, kWatch, [&](const Refusal& why) { ended += why.sentence; });
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{2});
   EXPECT_EQ(ended, "");
   EXPECT_TRUE(authorizer_->check_author(ben, "ward", AuthorId{1}));
@@ -413,7 +434,8 @@ TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
   EXPECT_LT(in_an_hour, 5 * 3600);
   // As somebody may who has a bad line for a minute.
   EXPECT_EQ(through("anna", 500ms, 60s), 120);
-  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(rates.take("anna", "/osteon.v1.WatchService/LookFrom", now)) << "what costs nothing is not counted";
+  for (int i = 0; i < 1000; ++i)
+    EXPECT_TRUE(rates.take("anna", "/osteon.v1.WatchService/LookFrom", now)) << "what costs nothing is not counted";
   // Time that goes back gives nothing.
   for (int i = 0; i < 1000; ++i) (void)rates.take("eve", kJoin, now);
   EXPECT_FALSE(rates.take("eve", kJoin, now - 10s));
@@ -435,7 +457,8 @@ TEST(CallRates, AreThoseOfCallsThatThereAre) {
   for (const CallRow& row : call_rows()) limited += find_call_rate(row.method) != nullptr ? 1 : 0;
   EXPECT_EQ(limited, 21);
   // All that makes a row of the journal.
-  for (const char* method : {"Join", "Mark", "Undo", "Redo", "AddTool", "RemoveBody", "SetSceneItem", "RemoveSceneItem"})
+  for (const char* method :
+       {"Join", "Mark", "Undo", "Redo", "AddTool", "RemoveBody", "SetSceneItem", "RemoveSceneItem"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.RoomService/") + method), nullptr) << method;
   for (const char* method : {"Say", "Annotate", "Supervise", "Demonstrate"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.PeopleService/") + method), nullptr) << method;

@@ -51,7 +51,8 @@ class GoingOn : public ::testing::Test {
   }
   RoomRuntime& host() { return (*server_->rooms().find("ward"))->host(); }
   wire::JoinedRoom join(const wire::ClientCredentials& credentials) {
-    auto joined = wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
+    auto joined =
+        wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     return joined.value();
   }
@@ -103,7 +104,8 @@ TEST_F(GoingOn, ADemonstrationEndsWithTheRightOfWhoStartedIt) {
     grpc::ClientContext context;
     return v1::PeopleService::NewStub(by.channel)->EndDemonstration(&context, request, &response);
   };
-  const auto ina = join(people_.credentials("ina", Role::instructor, "ward")), ira = join(people_.credentials("ira", Role::instructor, "ward")),
+  const auto ina = join(people_.credentials("ina", Role::instructor, "ward")),
+             ira = join(people_.credentials("ira", Role::instructor, "ward")),
              ida = join(people_.credentials("ida", Role::instructor, "ward"));
   const std::uint64_t of_ina = show(ina), of_ira = show(ira), of_ida = show(ida);
   const auto sessions = [&] { return host().health().sessions; };
@@ -267,14 +269,16 @@ TEST_F(GoingOn, WhoseAuthorityIsTrustedNoMoreIsOutWithTheAgeOfTheConnection) {
   std::ofstream(people_.server() / "ca.pem") << own << content(others.server() / "ca.pem");
   start({.connection_age = 400ms});
   const auto sue = surgeon("sue");
-  const wire::JoinedRoom joined = join({.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)});
+  const wire::JoinedRoom joined =
+      join({.certificates = guest, .ticket = people_.ticket("guest", "ward", Role::observer)});
   std::ofstream(dir_ / "own.pem") << own;
   fs::rename(dir_ / "own.pem", people_.server() / "ca.pem");
   const auto refused = [&] {
     v1::GetStatusResponse response;
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + 2s);
-    return v1::RoomService::NewStub(joined.channel)->GetStatus(&context, {}, &response).error_code() == StatusCode::UNAVAILABLE;
+    return v1::RoomService::NewStub(joined.channel)->GetStatus(&context, {}, &response).error_code() ==
+           StatusCode::UNAVAILABLE;
   };
   EXPECT_TRUE(test::wait_until(refused, test::kPatience));
   cut(*sue, 3);

@@ -87,10 +87,14 @@ class Insiders : public ::testing::Test {
 
 // gRPC 1.51 ends the process where an AuthMetadataProcessor is handed the first of these.
 TEST_F(Insiders, AreRefusedForHeadersThatNoClientHas) {
-  const RawHttp2::Headers strange[] = {{{"grpclb_client_stats", "x"}}, {{"lb-token", "x"}},
-                                       {{"lb-cost-bin", "x"}},        {{"grpc-tags-bin", "x"}},
-                                       {{"x-osteon-certificate", "x"}}, {{"grpc-previous-rpc-attempts", "1"}},
-                                       {{"grpc-retry-pushback-ms", "1"}}, {{"endpoint-load-metrics-bin", "x"}}};
+  const RawHttp2::Headers strange[] = {{{"grpclb_client_stats", "x"}},
+                                       {{"lb-token", "x"}},
+                                       {{"lb-cost-bin", "x"}},
+                                       {{"grpc-tags-bin", "x"}},
+                                       {{"x-osteon-certificate", "x"}},
+                                       {{"grpc-previous-rpc-attempts", "1"}},
+                                       {{"grpc-retry-pushback-ms", "1"}},
+                                       {{"endpoint-load-metrics-bin", "x"}}};
   for (const RawHttp2::Headers& headers : strange)
     for (const char* path : {kGetStatus, kSession, "/osteon.v1.RoomService/Nothing", "/grpc.health.v1.Health/Check"}) {
       RawHttp2 line(address(), people_.person("mallory"));
@@ -181,7 +185,8 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
   EXPECT_TRUE(line.closed_within(kPatience));
   EXPECT_GE(counted("flood"), 1u);
   // What had arrived when the connection was closed may still begin; it is refused.
-  EXPECT_LT(server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused, 20'000u);
+  EXPECT_LT(server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused,
+            20'000u);
   // They do not come again at once, whatever connection they take.
   EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value());
   EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());

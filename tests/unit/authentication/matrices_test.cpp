@@ -417,12 +417,12 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
 TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
   for (const Role role : {Role::observer, Role::operator_}) {
     SCOPED_TRACE(to_string(role));
-    const wire::ClientCredentials credentials = people_.credentials("eve-" + std::string(to_string(role)), role, "ward");
+    const wire::ClientCredentials credentials =
+        people_.credentials("eve-" + std::string(to_string(role)), role, "ward");
     const auto as_hand = wire::join_room(address(), wire::ClientKind::haptic, "whatever", 5s, {}, "ward", credentials);
     ASSERT_FALSE(as_hand);
     EXPECT_EQ(as_hand.error().code, ErrorCode::denied);
-    EXPECT_THAT(as_hand.error().message,
-                HasSubstr(role == Role::observer ? "holds no tool" : "may not call Join"));
+    EXPECT_THAT(as_hand.error().message, HasSubstr(role == Role::observer ? "holds no tool" : "may not call Join"));
     // Nor does a session of a watcher, or of another's hand, get as far as the keys.
     std::uint64_t author = sue_->author().value;
     if (role == Role::observer) author = join(credentials, wire::ClientKind::viewer).author.value;

@@ -9,9 +9,9 @@
 #include <set>
 #include <string>
 
+#include "server/net/room_admin_client.hpp"
 #include "server/net/room_owners.hpp"
 #include "server/net/room_server.hpp"
-#include "server/net/room_admin_client.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"

@@ -51,7 +51,9 @@ TEST(Units, AddAndCompareWithinTheirKind) {
   static_assert(!std::is_convertible_v<double, Newtons> && !std::is_convertible_v<Millimetres, Newtons>);
 }
 
-TEST(CheckDeathTest, SaysWhichPromiseWasBroken) { EXPECT_DEATH(OSTEON_CHECK(1 + 1 == 3), "broken promise: 1 \\+ 1 == 3"); }
+TEST(CheckDeathTest, SaysWhichPromiseWasBroken) {
+  EXPECT_DEATH(OSTEON_CHECK(1 + 1 == 3), "broken promise: 1 \\+ 1 == 3");
+}
 
 TEST(WithoutPaths, LeavesTheLastNames) {
   EXPECT_EQ(without_paths("cannot write /srv/rooms/anna.journal: no space"), "cannot write anna.journal: no space");

@@ -90,7 +90,8 @@ CutBody sampled_ball(double radius, double pitch) {
   for (std::int32_t x = -n; x <= n; ++x)
     for (std::int32_t y = -n; y <= n; ++y)
       for (std::int32_t z = middle - n; z <= middle + n; ++z)
-        lattice->values.push_back(static_cast<std::int16_t>(q((Vec3(x, y, z) * pitch + Vec3(0, 0, radius)).norm() - radius)));
+        lattice->values.push_back(
+            static_cast<std::int16_t>(q((Vec3(x, y, z) * pitch + Vec3(0, 0, radius)).norm() - radius)));
   CutBody body = ball(radius);
   body.kind = CutKind::sampled;
   body.radius = 0;
@@ -135,7 +136,14 @@ double nearest_pose_distance(const CutBody& body, const Pose& a, const Pose& b, 
 }
 
 Cut cut_along(std::vector<Pose> path, int level = 2) {
-  Cut cut{.author = {1}, .author_seq = 1, .lease_epoch = 1, .body = {}, .tool = {}, .level = level, .path = {}, .spindle_rpm = 1000};
+  Cut cut{.author = {1},
+          .author_seq = 1,
+          .lease_epoch = 1,
+          .body = {},
+          .tool = {},
+          .level = level,
+          .path = {},
+          .spindle_rpm = 1000};
   for (const Pose& pose : path) cut.path.push_back(quantise(pose));
   return cut;
 }
@@ -148,9 +156,10 @@ std::vector<Vec3> points_around(const Vec3& centre, double reach, int count, uns
   return points;
 }
 
-// Where the sweep's distance says outside it must be that of the nearest pose. Inside, the swept volume's own surface is
-// at least as far as that of any one pose.
-void expect_sweep_matches(const CutBody& body, const Pose& a, const Pose& b, double tolerance_mm, bool exact_inside = false) {
+// Where the sweep's distance says outside it must be that of the nearest pose. Inside, the swept volume's own surface
+// is at least as far as that of any one pose.
+void expect_sweep_matches(const CutBody& body, const Pose& a, const Pose& b, double tolerance_mm,
+                          bool exact_inside = false) {
   const SweptTool swept(cut_along({a, b}), body, kPitch);
   const Pose from = dequantise(quantise(a)), to = dequantise(quantise(b));
   const Vec3 middle = 0.5 * (a.point({0, 0, -2}) + b.point({0, 0, -2}));
@@ -202,8 +211,10 @@ TEST_P(TurnedSweep, ObliquelyIsWithinTheSearch) {
   const bool ring = GetParam() == hollow_mill;
   const double tolerance = kSearched_mm + (ring ? 0.125 * kFine : 0.0);
   expect_sweep_matches(GetParam()(), pose_along({0, 0, 0}, {0, 0, -1}), pose_along({3, 2, -1}, {0, 0, -1}), tolerance);
-  expect_sweep_matches(GetParam()(), pose_along({0, 0, 0}, {0, 0, -1}), pose_along({0.05, 0, -0.2}, {0, 0, -1}), tolerance);
-  expect_sweep_matches(GetParam()(), pose_along({0, 0, 0}, {0, 1, -1}), pose_along({-1, 0.5, 1.5}, {0, 1, -1}), tolerance);
+  expect_sweep_matches(GetParam()(), pose_along({0, 0, 0}, {0, 0, -1}), pose_along({0.05, 0, -0.2}, {0, 0, -1}),
+                       tolerance);
+  expect_sweep_matches(GetParam()(), pose_along({0, 0, 0}, {0, 1, -1}), pose_along({-1, 0.5, 1.5}, {0, 1, -1}),
+                       tolerance);
 }
 
 TEST_P(TurnedSweep, TiltingIsCutAtPosesAQuarterPitchApart) {
@@ -264,9 +275,11 @@ TEST(Kernel, ABladesKerfIsItsThickness) {
 
 TEST(Kernel, ASampledBallCutsAsABall) {
   const Pose a = pose_along({0, 0, 0}, {0, 0.4, -1}), b = pose_along({1.5, 0.5, -0.5}, {0.1, 0.4, -1});
-  const SweptTool exact(cut_along({a, b}), ball(2.0), kPitch), sampled(cut_along({a, b}), sampled_ball(2.0, 0.125), kPitch);
+  const SweptTool exact(cut_along({a, b}), ball(2.0), kPitch),
+      sampled(cut_along({a, b}), sampled_ball(2.0, 0.125), kPitch);
   for (const Vec3& p : points_around(a.point({0, 0, -2}), 4.0, 500, 9)) {
-    const double ball_mm = static_cast<double>(exact.distance_mm(p)), lattice_mm = static_cast<double>(sampled.distance_mm(p));
+    const double ball_mm = static_cast<double>(exact.distance_mm(p)),
+                 lattice_mm = static_cast<double>(sampled.distance_mm(p));
     // Half a step of the sub-poses and the curvature within a cell; beyond the lattice only a bound is known.
     if (ball_mm > 0.9) {
       ASSERT_LE(lattice_mm, ball_mm + 0.02);
@@ -286,9 +299,16 @@ struct Motion {
 std::vector<Motion> motions() {
   std::vector<Motion> all;
   const Pose a = pose_along({0, 0, 0}, {0.2, 0.1, -1}), near = pose_along({0.1, 0.05, -0.1}, {0.22, 0.1, -1}),
-             across = pose_along({3, 1, -0.5}, {0.2, 0.1, -1}), deep = pose_along(2.0 * Vec3(0.2, 0.1, -1), {0.2, 0.1, -1});
-  for (const auto& [name, body] : {std::pair{"ball", ball(1.6)}, {"drill", drill()}, {"barrel", barrel()}, {"hemisphere", hemisphere()},
-                                   {"ring", hollow_mill()}, {"blade", blade()}, {"wedge", wedge()}, {"sampled", sampled_ball(1.5, 0.125)}}) {
+             across = pose_along({3, 1, -0.5}, {0.2, 0.1, -1}),
+             deep = pose_along(2.0 * Vec3(0.2, 0.1, -1), {0.2, 0.1, -1});
+  for (const auto& [name, body] : {std::pair{"ball", ball(1.6)},
+                                   {"drill", drill()},
+                                   {"barrel", barrel()},
+                                   {"hemisphere", hemisphere()},
+                                   {"ring", hollow_mill()},
+                                   {"blade", blade()},
+                                   {"wedge", wedge()},
+                                   {"sampled", sampled_ball(1.5, 0.125)}}) {
     all.push_back({name, body, {a}});
     all.push_back({name, body, {a, near}});
     all.push_back({name, body, {a, deep}});
@@ -328,7 +348,8 @@ TEST(Kernel, WhatIsPassedOverChangesNothing) {
             const float exact = std::clamp(swept.distance_mm(p), -band, band);
             // Beyond the box of the body only a bound is known of hulls, and lattices are off by their interpolation.
             if (!listed && exact < band) continue;
-            ASSERT_NEAR(values[static_cast<std::size_t>(i)], exact, 0.52 * kQuantum_mm) << motion.name << ' ' << p.transpose();
+            ASSERT_NEAR(values[static_cast<std::size_t>(i)], exact, 0.52 * kQuantum_mm)
+                << motion.name << ' ' << p.transpose();
           }
           if (!listed) continue;
           // The same after another cut has gone there: the lower of both, whatever the kernel spared itself.
@@ -392,8 +413,9 @@ TEST(Kernel, AWideSwingLeavesACleanGroove) {
   double least = 1e9, most = -1e9;
   for (double t = -0.48 * angle; t <= 0.48 * angle; t += 0.0007) {
     const Vec3 out{std::sin(t), 0, -std::cos(t)};
-    const double bottom = static_cast<double>(swept.distance_mm(radius * out));                        // the tip's path
-    const double side = static_cast<double>(swept.distance_mm((radius - 1.0) * out + Vec3(0, 1.0, 0)));  // a radius aside
+    const double bottom = static_cast<double>(swept.distance_mm(radius * out));  // the tip's path
+    const double side =
+        static_cast<double>(swept.distance_mm((radius - 1.0) * out + Vec3(0, 1.0, 0)));  // a radius aside
     least = std::min({least, bottom, side});
     most = std::max({most, bottom, side});
   }
@@ -403,7 +425,8 @@ TEST(Kernel, AWideSwingLeavesACleanGroove) {
   EXPECT_GE(least, -3.0 * kQuantum_mm);
 
   // A straight swing has no chords: the groove is true to the rounding.
-  const SweptTool straight(cut_along({pose_along({-10, 0, 0}, {0, 0, -1}), pose_along({10, 0, 0}, {0, 0, -1})}), ball(1.0), kPitch);
+  const SweptTool straight(cut_along({pose_along({-10, 0, 0}, {0, 0, -1}), pose_along({10, 0, 0}, {0, 0, -1})}),
+                           ball(1.0), kPitch);
   for (double x = -9.9; x < 9.9; x += 0.013) {
     EXPECT_NEAR(static_cast<double>(straight.distance_mm({x, 0, 0})), 0.0, kQuantum_mm);
     EXPECT_NEAR(static_cast<double>(straight.distance_mm({x, 1.0, 1.0})), 0.0, kQuantum_mm);
@@ -444,14 +467,16 @@ std::vector<BodyCut> random_cuts(int count) {
   // Only whole numbers are drawn: distributions of reals may differ between libraries.
   std::mt19937 random(11);
   const auto draw = [&](double most) { return most * (static_cast<double>(random() % 2001) / 1000.0 - 1.0); };
-  const std::vector<CutBody> bodies{ball(2.5), drill(), barrel(), hemisphere(), hollow_mill(), blade(), wedge(), sampled_ball(1.5, 0.25)};
+  const std::vector<CutBody> bodies{ball(2.5),     drill(), barrel(), hemisphere(),
+                                    hollow_mill(), blade(), wedge(),  sampled_ball(1.5, 0.25)};
   std::vector<BodyCut> cuts;
   for (int i = 0; i < count; ++i) {
     const Vec3 axis{draw(1.0), draw(1.0), -1.5}, tip{draw(4.0), draw(4.0), draw(4.0)};
     const Vec3 tilted = axis + 0.02 * Vec3{draw(1.0), draw(1.0), 0.0};
     const Pose from = pose_along(tip, axis);
     const Vec3 way = i % 5 == 0 ? Vec3(draw(1.0) * axis) : Vec3{draw(1.0), draw(1.0), draw(1.0)};
-    cuts.push_back({cut_along({from, pose_along(tip + way, i % 4 == 0 ? tilted : axis)}, i % 3), bodies[static_cast<std::size_t>(i) % bodies.size()]});
+    cuts.push_back({cut_along({from, pose_along(tip + way, i % 4 == 0 ? tilted : axis)}, i % 3),
+                    bodies[static_cast<std::size_t>(i) % bodies.size()]});
   }
   return cuts;
 }
@@ -480,7 +505,8 @@ TEST(Kernel, EqualCutsGiveEqualBytesOnEveryCompilerAndProcessor) {
     const int used = limit_kernel_lanes(lanes);
     CutSet set;
     for (const BodyCut& c : random_cuts(96)) set.apply(c.cut, c.body);
-    EXPECT_EQ(to_hex(set.hash()), "b286545f018249309d151c5949c4fbeef23aa19a9c713ad60f50f6e8f0e89d94") << used << " lanes";
+    EXPECT_EQ(to_hex(set.hash()), "b286545f018249309d151c5949c4fbeef23aa19a9c713ad60f50f6e8f0e89d94")
+        << used << " lanes";
   }
 }
 

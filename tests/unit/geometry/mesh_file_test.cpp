@@ -85,11 +85,13 @@ TEST(MeshFile, BinaryStlComesBackWithItsVerticesShared) {
 TEST(MeshFile, AsciiStlIsReadEvenWithOddBlanks) {
   const test::TempDir folder;
   put(folder / "t.stl",
-      "solid a name of several words\r\n facet normal 0 0 -1\r\n  outer loop\n vertex 0 0 0\n vertex 0 +1e0 0\n\tvertex 1 0 -0\n "
+      "solid a name of several words\r\n facet normal 0 0 -1\r\n  outer loop\n vertex 0 0 0\n vertex 0 +1e0 "
+      "0\n\tvertex 1 0 -0\n "
       "endloop\n endfacet\n"
       "facet normal 0 -1 0 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 0 1 endloop endfacet\n"
       "facet normal -1 0 0 outer loop vertex 0 0 0 vertex 0 0 1 vertex 0 1 0 endloop endfacet\n"
-      "facet normal 1 1 1 outer loop vertex 1 0 0 vertex 0 1 0 vertex 0 0 1 endloop endfacet\nendsolid a name of several "
+      "facet normal 1 1 1 outer loop vertex 1 0 0 vertex 0 1 0 vertex 0 0 1 endloop endfacet\nendsolid a name of "
+      "several "
       "words\n");
   const auto mesh = read_stl(folder / "t.stl");
   ASSERT_TRUE(mesh) << mesh.error().message;
@@ -148,16 +150,19 @@ TEST(MeshFile, EveryBadStlIsRefusedWithItsNameAndARemedy) {
       {"", "empty"},
       {good.substr(0, good.size() - 7), "cut off"},
       {good.substr(0, 40), "not an STL"},
-      {"PK\x03\x04 a zip file of some kind or other, longer than the head of a binary STL file is, so that it is looked at",
+      {"PK\x03\x04 a zip file of some kind or other, longer than the head of a binary STL file is, so that it is "
+       "looked at",
        "not an STL"},
       {nan, "not a number"},
       {none, "no triangles"},
       {"solid x\nendsolid x\n", "no triangles"},
       {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "line 5"},
       {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 zero 0\n", "line 4"},
-      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e99 0\nendloop\nendfacet\nendsolid\n",
+      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1e99 "
+       "0\nendloop\nendfacet\nendsolid\n",
        "not a number"},
-      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 1 1\n", "three vertices"},
+      {"solid x\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nvertex 0 1 1\n",
+       "three vertices"},
   };
   for (const auto& bad : cases) {
     put(folder / "bad.stl", bad.bytes);

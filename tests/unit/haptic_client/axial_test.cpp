@@ -47,7 +47,8 @@ TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
   cut.author_seq = 1;
   cut.tool = tool.hash();
   cut.level = std::min(tool.cut_level, finest_level(bone.pitch_mm()));
-  cut.path = {quantise(pose_along({0.1, -0.2, -1}, Vec3::UnitZ())), quantise(pose_along({0.1, -0.2, deepest}, Vec3::UnitZ()))};
+  cut.path = {quantise(pose_along({0.1, -0.2, -1}, Vec3::UnitZ())),
+              quantise(pose_along({0.1, -0.2, deepest}, Vec3::UnitZ()))};
   swept.apply(cut);
   std::printf("  %s: %.2f mm deep, %.1f mm3 removed, straight sweep %.1f mm3\n", which.tool, deepest,
               bench.replica().removed_mm3(), swept.removed_mm3());
@@ -65,9 +66,9 @@ INSTANTIATE_TEST_SUITE_P(All, AxialTool,
                            return name;
                          });
 
-// The end drill of 9.5 mm asks for 146 N at 2 mm/s in cortical bone; a device that shows 60 N feeds it as slowly as Chi's law
-// says for that force, however far ahead the rig is: 0.36 mm/s at 600 rpm, less 6 % of the speed under its 142 N mm. The slack
-// rule lets the rest of the way go. At its end the rig waits, with what stretch there is left.
+// The end drill of 9.5 mm asks for 146 N at 2 mm/s in cortical bone; a device that shows 60 N feeds it as slowly as
+// Chi's law says for that force, however far ahead the rig is: 0.36 mm/s at 600 rpm, less 6 % of the speed under its
+// 142 N mm. The slack rule lets the rest of the way go. At its end the rig waits, with what stretch there is left.
 TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
   PlanStep step = straight_down("end-drill", HandKind::rig);
   step.feed_mm_per_s = 2;
@@ -86,7 +87,8 @@ TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
   EXPECT_TRUE(bench.session().surgeon().results()[0].completed);
   EXPECT_GE(bench.session().surgeon().results()[0].deepest_mm, 4.0);
   EXPECT_NEAR(force_n, 60.0, 0.1);
-  const double droop_rpm = 0.7 * 0.6 * 0.6 * 60.0 * 9.5 / 4.0;  // a motor of that power at 600 rpm; flat: sin(beta/2) = 1
+  const double droop_rpm =
+      0.7 * 0.6 * 0.6 * 60.0 * 9.5 / 4.0;  // a motor of that power at 600 rpm; flat: sin(beta/2) = 1
   EXPECT_NEAR(rpm, 600.0 - droop_rpm, 3.0);
   const double at_one_n = 134.6 * std::pow(600.0 - droop_rpm, -0.3327) * std::pow(1.9, 1.1841) * 9.5 / 3.2;
   const double feed = std::pow(60.0 / at_one_n, 1.0 / 0.5189), got = (to_mm - from_mm) / (to_s - from_s);
@@ -94,7 +96,8 @@ TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
   EXPECT_NEAR(got, feed, 0.03 * feed);  // it blunts by 1 % on the way
 }
 
-// What the proxy takes for cut is what the kernel cuts: the outline's sign against the field's, on both sides of the wall.
+// What the proxy takes for cut is what the kernel cuts: the outline's sign against the field's, on both sides of the
+// wall.
 TEST(SweptOutline, HasTheSignOfTheCut) {
   const Case bone = block_case(24.0);
   for (const char* name : {"drill-3.2", "end-drill", "pin-1", "reamer-cylinder"}) {
@@ -113,7 +116,7 @@ TEST(SweptOutline, HasTheSignOfTheCut) {
       for (double x = 0.05; x < 8.0; x += 0.13) {
         const double outline = model.outline.distance_mm({x, 0, z - 8.0}), solid = field.solid_mm({x, 0, z});
         if (std::abs(solid) < 0.75 * model.fine_pitch_mm) continue;
-        EXPECT_EQ(outline < 0.0, solid > 0.0) << name << " at " << x << ", " << z;
+        EXPECT_EQ(outline<0.0, solid> 0.0) << name << " at " << x << ", " << z;
         ++(outline < 0.0 ? in : out);
       }
     EXPECT_GT(in, 50) << name;
@@ -151,8 +154,10 @@ TEST(ScrewStep, FollowsItsThreadAndStays) {
   ASSERT_TRUE(bench.session().done());
   const std::vector<LeftItem>& left = bench.session().surgeon().left();
   ASSERT_EQ(left.size(), 2u);
-  // 240 turns a minute of 1.25 mm each are 5 mm/s: never more, and a little less where the driver droops under its torque.
-  const double advance_mm_per_s = (last_mm - first_mm) / (last_s - first_s), thread_mm_per_s = screw.thread_pitch_mm * 4.0;
+  // 240 turns a minute of 1.25 mm each are 5 mm/s: never more, and a little less where the driver droops under its
+  // torque.
+  const double advance_mm_per_s = (last_mm - first_mm) / (last_s - first_s),
+               thread_mm_per_s = screw.thread_pitch_mm * 4.0;
   EXPECT_LE(advance_mm_per_s, thread_mm_per_s);
   EXPECT_GT(advance_mm_per_s, 0.95 * thread_mm_per_s);
   EXPECT_NEAR(left[0].pose_bone_item.position_mm.z(), screw.cutting_length_mm, 0.3);
@@ -160,8 +165,8 @@ TEST(ScrewStep, FollowsItsThreadAndStays) {
   EXPECT_NEAR((left[0].pose_bone_item.position_mm - Vec3(0.1, -0.2, 0)).head<2>().norm(), 0.0, 0.01);
   EXPECT_EQ(left[1].step, 1u);
   EXPECT_GE(left[1].pose_bone_item.position_mm.z(), 6.0);
-  std::printf("  screw: %.2f mm deep after %.2f turns; pin %.2f mm deep\n", left[0].pose_bone_item.position_mm.z(), left[0].turns,
-              left[1].pose_bone_item.position_mm.z());
+  std::printf("  screw: %.2f mm deep after %.2f turns; pin %.2f mm deep\n", left[0].pose_bone_item.position_mm.z(),
+              left[0].turns, left[1].pose_bone_item.position_mm.z());
 }
 
 TEST(Plan, TakesEachToolForWhatItIsMadeFor) {
@@ -178,7 +183,8 @@ TEST(Plan, TakesEachToolForWhatItIsMadeFor) {
   };
   for (const char* name : {"drill-3.2", "saw-oscillating-1", "saw-reciprocating", "broach-1", "broach-2", "end-drill"})
     EXPECT_EQ(asked(name, Action::drill), "") << name;
-  for (const char* name : {"burr-round", "burr-barrel", "burr-contoured"}) EXPECT_EQ(asked(name, Action::burr), "") << name;
+  for (const char* name : {"burr-round", "burr-barrel", "burr-contoured"})
+    EXPECT_EQ(asked(name, Action::burr), "") << name;
   EXPECT_NE(asked("burr-barrel", Action::drill).find("choose a drill"), std::string::npos);
   EXPECT_NE(asked("screw-1", Action::drill).find("choose a drill"), std::string::npos);
   EXPECT_NE(asked("guide-1", Action::drill).find("choose a drill"), std::string::npos);

@@ -12,7 +12,8 @@ Case block_case(double width_mm, double pitch_mm) {
   info.title = "block";
   info.source = "phantom";
   info.pitch_mm = pitch_mm;
-  const int half = static_cast<int>(std::lround(0.5 * width_mm / pitch_mm)), deep = static_cast<int>(std::lround(30.0 / pitch_mm)), border = 6;
+  const int half = static_cast<int>(std::lround(0.5 * width_mm / pitch_mm)),
+            deep = static_cast<int>(std::lround(30.0 / pitch_mm)), border = 6;
   const CoordBox box{{-half - border, -half - border, -border}, {half + border, half + border, deep + border}};
   DenseVolume<float> surface(box, 0.0f), density(box, 0.0f);
   for (int x = box.min.x; x <= box.max.x; ++x)
@@ -48,11 +49,12 @@ PlanStep straight_down(const std::string& tool, HandKind hand) {
   return step;
 }
 
-Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device, double force_scale,
-             const BenchDelays& delays, double dt_s)
+Bench::Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device,
+             double force_scale, const BenchDelays& delays, double dt_s)
     : Bench(bone, ready(plan, bone), device, force_scale, delays, dt_s) {}
 
-Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale, const BenchDelays& delays, double dt_s)
+Bench::Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device, double force_scale,
+             const BenchDelays& delays, double dt_s)
     : delays_(delays), session_(std::move(plan), device, force_scale, dt_s), replica_(bone, BodyId{}) {}
 
 SessionTick Bench::tick(int periods) {

@@ -12,7 +12,8 @@
 
 namespace osteon::haptic::test {
 
-// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³. It is entered along +z. `pitch_mm`: h, a part of 5 mm.
+// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³. It is entered along +z. `pitch_mm`: h, a part of
+// 5 mm.
 [[nodiscard]] Case block_case(double width_mm = 12.0, double pitch_mm = 0.5);
 
 // A step straight down into it, at a place that falls on no sample.
@@ -25,8 +26,8 @@ struct BenchDelays {
 
 class Bench {
  public:
-  Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
-        const BenchDelays& delays = {}, double dt_s = 1e-3);
+  Bench(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device = {},
+        double force_scale = 0.0, const BenchDelays& delays = {}, double dt_s = 1e-3);
   Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
         const BenchDelays& delays = {}, double dt_s = 1e-3);
 

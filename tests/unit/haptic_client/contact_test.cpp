@@ -25,7 +25,9 @@ struct Widest {
 class ContactOnBlock : public ::testing::Test {
  protected:
   ContactOnBlock()
-      : bone_(block_case(16.0)), field_(bone_, BodyId{}), model_(*find_tool("burr-round-5"), bone_.pitch_mm(), 1.0, 900) {
+      : bone_(block_case(16.0)),
+        field_(bone_, BodyId{}),
+        model_(*find_tool("burr-round-5"), bone_.pitch_mm(), 1.0, 900) {
     field_.apply(osteon::test::straight_cut(*find_tool("drill-3.2"), {0, 0, -1}, {0, 0, 6}, Vec3::UnitZ()));
     values_.make_room(kMostContactPoints);
   }
@@ -55,7 +57,8 @@ class ContactOnBlock : public ::testing::Test {
 
 // To the block: 16 mm square, 30 mm deep.
 double to_block_mm(const Vec3& p) {
-  return Vec3(std::max(0.0, std::abs(p.x()) - 8.0), std::max(0.0, std::abs(p.y()) - 8.0), std::max({0.0, -p.z(), p.z() - 30.0}))
+  return Vec3(std::max(0.0, std::abs(p.x()) - 8.0), std::max(0.0, std::abs(p.y()) - 8.0),
+              std::max({0.0, -p.z(), p.z() - 30.0}))
       .norm();
 }
 
@@ -103,7 +106,8 @@ TEST_F(ContactOnBlock, FindsWhatEachPointFindsAlone) {
       if (part.minCoeff() < 0.02 || part.maxCoeff() > 0.98) continue;
       for (int axis = 0; axis < 3; ++axis) {
         double above = 0.0, below = 0.0;
-        ASSERT_TRUE(patch_.solid(p + step * Vec3::Unit(axis), above) && patch_.solid(p - step * Vec3::Unit(axis), below));
+        ASSERT_TRUE(patch_.solid(p + step * Vec3::Unit(axis), above) &&
+                    patch_.solid(p - step * Vec3::Unit(axis), below));
         EXPECT_NEAR(gradient[axis], (above - below) / (2.0 * step), 2e-3);
       }
     }
@@ -171,8 +175,8 @@ TEST_F(ContactOnBlock, SumsAreThoseOfThePoints) {
       const double facing = p.outward.dot(toward);
       if (facing < query.least_facing) continue;
       area += p.area_mm2 * facing;
-      const Vec3 probe =
-          query.pose_bone_tool.point(p.inset_mm) + std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
+      const Vec3 probe = query.pose_bone_tool.point(p.inset_mm) +
+                         std::min(query.ahead_mm / facing, query.most_mm) * query.direction_bone;
       double solid = 1.0;
       if (!patch_.solid(probe, solid) || solid >= 0.0) continue;
       const double density = patch_.density_at(probe), share = p.area_mm2 * facing;
@@ -192,8 +196,8 @@ TEST_F(ContactOnBlock, SumsAreThoseOfThePoints) {
   }
 }
 
-// A ball with its middle on the face of the block, going along the face: half of its disc is in bone, and by symmetry its
-// moment about the line of the feed through its middle is none.
+// A ball with its middle on the face of the block, going along the face: half of its disc is in bone, and by symmetry
+// its moment about the line of the feed through its middle is none.
 TEST_F(ContactOnBlock, AHalfImmersedBallHasHalfItsDisc) {
   ContactQuery query;
   query.pose_bone_tool = {{4.5, 3.0, 2.5}, Eigen::Quaterniond::Identity()};

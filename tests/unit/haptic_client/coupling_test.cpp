@@ -1,4 +1,5 @@
-// The coupling's rules, each from its own arithmetic: the energy account, slack, offset, smoothing; and the motor's port.
+// The coupling's rules, each from its own arithmetic: the energy account, slack, offset, smoothing; and the motor's
+// port.
 #include "haptic_client/control/coupling.hpp"
 
 #include <gtest/gtest.h>
@@ -19,13 +20,15 @@ constexpr double kT = 1e-3;
 
 constexpr double kArm_mm = 20.0;  // of a turn
 
-// A sampled wall, spring and damper, whose force is held for a tick: what it gives a handle that is thrown about at random
-// with no more than `most_mm_per_s2`. Most of one contact, mJ. `turned`: the same about an axis, at the arm of a turn.
+// A sampled wall, spring and damper, whose force is held for a tick: what it gives a handle that is thrown about at
+// random with no more than `most_mm_per_s2`. Most of one contact, mJ. `turned`: the same about an axis, at the arm of a
+// turn.
 struct Wall {
   double worst_mj = -1e9;
   int contacts = 0;
 };
-Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_s2, bool monitored, bool turned = false) {
+Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_s2, bool monitored,
+            bool turned = false) {
   const auto wrench = [turned](double n) {
     const Vec3 of(n, 0, 0);
     return turned ? Wrench{.torque_nmm = kArm_mm * of} : Wrench{.force_n = of};
@@ -37,7 +40,8 @@ Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_
   bool inside = false;
   for (int i = 0; i < 400'000; ++i) {
     // Kept near the wall by a soft pull, else random.
-    const double a = std::clamp(most_mm_per_s2 * random.between(-1.0, 1.0) - 40.0 * v - 4e4 * x, -most_mm_per_s2, most_mm_per_s2);
+    const double a =
+        std::clamp(most_mm_per_s2 * random.between(-1.0, 1.0) - 40.0 * v - 4e4 * x, -most_mm_per_s2, most_mm_per_s2);
     v += a * kT;
     x += v * kT;
     given += -force * v * kT;  // force is outward, -x
@@ -49,7 +53,9 @@ Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_
     const double damping = std::clamp(damping_share * stiffness_n_per_mm * (e - e_before), -spring, spring);
     ledger.settle(0.0, 0.5 * stiffness_n_per_mm * e * e);
     const Wrench shown = ledger.limited(wrench(-(spring + damping)), wrench(-damping), touching);
-    force = monitored ? -(turned ? shown.torque_nmm.x() / kArm_mm : shown.force_n.x()) : touching ? spring + damping : 0.0;
+    force = monitored  ? -(turned ? shown.torque_nmm.x() / kArm_mm : shown.force_n.x())
+            : touching ? spring + damping
+                       : 0.0;
     e_before = e;
     if (inside && !touching) {
       wall.worst_mj = std::max(wall.worst_mj, given);
@@ -76,8 +82,8 @@ TEST(EnergyLedger, NoContactGivesMoreThanItsAllowance) {
   EXPECT_GT(bounce(50.0, 0.0, params.surprise_mm_per_s2, false).worst_mj, 0.01);
 }
 
-// Nobody has put anything in: force and torque together may give the allowance over the way and the turn that a handle at
-// rest can make in a tick, 0.01 mm each, of a turn at its arm. Both are held back by one share.
+// Nobody has put anything in: force and torque together may give the allowance over the way and the turn that a handle
+// at rest can make in a tick, 0.01 mm each, of a turn at its arm. Both are held back by one share.
 TEST(EnergyLedger, ForceAndTorqueAreHeldBackTogether) {
   EnergyLedger ledger(EnergyParams{.allowance_mj = 0.006, .surprise_mm_per_s2 = 1e4, .calm_mm_per_s2 = 1e4});
   ledger.observe(Vec3::Zero());
@@ -114,8 +120,8 @@ TEST(EnergyLedger, CountsWhatTheDamperTook) {
   ASSERT_TRUE(ledger.report().ended);
   // In: force of tick i over the way of tick i + 1. Sum over in and out of k·(e ± d)·d by hand.
   double expected = 0.0;
-  for (int i = 1; i < n; ++i) expected -= k * d * (i + 1) * d;      // in, i = 1 … n-1
-  expected += k * d * (n + 1) * d;                                  // turning: the damper still pushes
+  for (int i = 1; i < n; ++i) expected -= k * d * (i + 1) * d;  // in, i = 1 … n-1
+  expected += k * d * (n + 1) * d;                              // turning: the damper still pushes
   for (int i = n + 1; i < 2 * n; ++i) expected += k * d * (2 * n - i - 1) * d;
   EXPECT_NEAR(given_mj, expected, 1e-9);
   EXPECT_LT(given_mj, 0.0);
@@ -155,8 +161,9 @@ class CouplingAtWall : public ::testing::Test {
     ledger_.observe(handle_mm - handle_mm_);
     handle_mm_ = handle_mm;
     const CouplingForce force = coupling_.step(moment_, step_, ledger_, kT, 2e-3);
-    static_cast<void>(ledger_.limited({force.spring_n + force.damping_n, force.turn_spring_nmm + force.turn_damping_nmm},
-                                       {force.damping_n, force.turn_damping_nmm}, moment_.touching));
+    static_cast<void>(
+        ledger_.limited({force.spring_n + force.damping_n, force.turn_spring_nmm + force.turn_damping_nmm},
+                        {force.damping_n, force.turn_damping_nmm}, moment_.touching));
     return force;
   }
   Coupling coupling_;
@@ -227,8 +234,8 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
     const double released = offset - coupling_.offset_mm().norm();
     EXPECT_GE(released, -1e-12);
     if (released > 0.0) {
-      paid_mj -=
-          ledger_.report().stored_mj - 0.5 * 50.0 * std::pow(std::sqrt(2.0 * ledger_.report().stored_mj / 50.0) - released, 2);
+      paid_mj -= ledger_.report().stored_mj -
+                 0.5 * 50.0 * std::pow(std::sqrt(2.0 * ledger_.report().stored_mj / 50.0) - released, 2);
     }
     EXPECT_GE(paid_mj, -1e-6) << i;
     handle = next;
@@ -237,9 +244,9 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
   EXPECT_GT(coupling_.offset_mm().norm(), 0.0);
 }
 
-// The end of a shank 80 mm from the tip meets a wall while the hand turns and does not move. With both springs in a row the
-// move bears 1/17 of the way that the end is kept from, and the turn's arm 4/17. Where torque is shown the turn pays for both;
-// where it is not nothing may be stored that nobody paid for.
+// The end of a shank 80 mm from the tip meets a wall while the hand turns and does not move. With both springs in a row
+// the move bears 1/17 of the way that the end is kept from, and the turn's arm 4/17. Where torque is shown the turn
+// pays for both; where it is not nothing may be stored that nobody paid for.
 TEST_F(CouplingAtWall, ATurnPaysForTheMoveItCauses) {
   for (const bool six_axes : {true, false}) {
     coupling_.reset(Vec3::Zero(), Vec3::Zero());
@@ -316,8 +323,8 @@ MotorMoment turning(double rpm, const Vec3& normal_n) {
   return moment;
 }
 
-// Bone at +x of a tool that points along +z and turns clockwise for its holder: its flank goes towards +y there, and the
-// bone holds it back.
+// Bone at +x of a tool that points along +z and turns clockwise for its holder: its flank goes towards +y there, and
+// the bone holds it back.
 TEST(MotorPort, DragsAgainstTheFlank) {
   MotorPort port;
   MotorMoment moment = turning(30000, {-10, 0, 0});
@@ -341,8 +348,9 @@ TEST(MotorPort, DragsAgainstTheFlank) {
   EXPECT_NEAR(force.norm(), 0.0, 1e-9);
 }
 
-// Teeth that go to and fro 100 times a second pull along their stroke, by the law's force at most, with no mean and nothing
-// to the side or out of the bone; at 12 000 strokes a minute as long as the loop can show it, beyond 300 a second not at all.
+// Teeth that go to and fro 100 times a second pull along their stroke, by the law's force at most, with no mean and
+// nothing to the side or out of the bone; at 12 000 strokes a minute as long as the loop can show it, beyond 300 a
+// second not at all.
 TEST(MotorPort, ASawPullsToAndFroAlongItsStroke) {
   for (const auto& [strokes, amplitude_n] : {std::pair{6000.0, 1.5}, {12'000.0, 1.5}, {24'000.0, 0.0}}) {
     MotorPort port;

@@ -44,8 +44,8 @@ TEST(DeviceExchange, AForceLastsAsLongAsItIsWritten) {
   EXPECT_EQ(exchange.demanded(start + 30ms).force_n, Vec3(0, 0, 0));
 }
 
-// Haptic thread and device at 1 kHz, their ticks apart by any part of one: the last force lasts through two missed ticks
-// and ends with the third. A tick that is late, but not by three, interrupts nothing.
+// Haptic thread and device at 1 kHz, their ticks apart by any part of one: the last force lasts through two missed
+// ticks and ends with the third. A tick that is late, but not by three, interrupts nothing.
 TEST(DeviceExchange, TheForceIsZeroAfterThreeMissedTicks) {
   constexpr int kLastTick = 20;
   for (const auto phase : {1us, 250us, 500us, 750us, 999us}) {
@@ -256,7 +256,8 @@ TEST(DeviceList, NamesArePutTogetherOrRefusedWithTheRemedy) {
   EXPECT_NE(message("fantom").find("choose among"), std::string::npos);
   EXPECT_NE(message("").find("choose among"), std::string::npos);
   EXPECT_NE(message("phantom+").find("--device phantom+: a name is missing"), std::string::npos);
-  EXPECT_NE(message("phantom+simulated").find("simulated has a hand of our own making; name it alone"), std::string::npos);
+  EXPECT_NE(message("phantom+simulated").find("simulated has a hand of our own making; name it alone"),
+            std::string::npos);
   EXPECT_NE(message("spacemouse+spacemouse").find("spacemouse is named twice"), std::string::npos);
   EXPECT_NE(message("falcon+spacemouse+spacemouse").find("two devices for the rotation"), std::string::npos);
   for (const char* nothing : {"recorded", "recorded:"})
@@ -270,8 +271,10 @@ TEST(DeviceList, NamesArePutTogetherOrRefusedWithTheRemedy) {
   EXPECT_NE(message("force-dimension:x").find("0 to 15"), std::string::npos);
   EXPECT_TRUE(make_devices("falcon+pedal-axis:z:inverted", {}));
   EXPECT_TRUE(make_devices("falcon+spacemouse+pedal:left", {}));
-  EXPECT_NE(message("falcon+pedal-axis:up").find("--device pedal-axis:up: what follows must be \"inverted\""), std::string::npos);
-  EXPECT_NE(message("falcon+pedal:up").find("--device pedal:up: the pedal must be left, middle or right"), std::string::npos);
+  EXPECT_NE(message("falcon+pedal-axis:up").find("--device pedal-axis:up: what follows must be \"inverted\""),
+            std::string::npos);
+  EXPECT_NE(message("falcon+pedal:up").find("--device pedal:up: the pedal must be left, middle or right"),
+            std::string::npos);
 }
 
 // The list names all that --device takes, and tells of a file that the user named whether it can be used.
@@ -288,7 +291,9 @@ TEST(DeviceList, ShowsEveryKindAndWhatIsWrongWithTheFilesOfTheUser) {
   for (const DeviceLine& line : look_for_devices(wrong)) {
     const bool has_file = line.name == "phantom" || line.name == "force-dimension" || line.name == "falcon";
     EXPECT_EQ(line.finding.wrong_file, has_file) << line.name;
-    if (has_file) { EXPECT_NE(line.finding.missing.find("/nowhere/"), std::string::npos) << line.name; }
+    if (has_file) {
+      EXPECT_NE(line.finding.missing.find("/nowhere/"), std::string::npos) << line.name;
+    }
   }
 }
 

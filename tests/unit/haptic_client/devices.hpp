@@ -66,13 +66,14 @@ class Heard {
 // Holds a device with a force on another thread, as a haptic loop does, until it is destroyed.
 class Holding {
  public:
-  explicit Holding(HapticDevice& device, const DeviceOutput& output) : thread_([this, &device, output] {
-    while (!over_) {
-      last_ = static_cast<int>(device.read().status);
-      device.write(output);
-      std::this_thread::sleep_for(1ms);
-    }
-  }) {}
+  explicit Holding(HapticDevice& device, const DeviceOutput& output)
+      : thread_([this, &device, output] {
+          while (!over_) {
+            last_ = static_cast<int>(device.read().status);
+            device.write(output);
+            std::this_thread::sleep_for(1ms);
+          }
+        }) {}
   ~Holding() {
     over_ = true;
     thread_.join();

@@ -94,8 +94,8 @@ HandRun drill_by_hand(HandKind hand, double push_n = 29) {
   run.result = bench.session().surgeon().results()[0];
   std::printf("  %s: force %.2f/%.2f/%.2f N, feed %.3f/%.2f/%.3f mm/s, plunge %.2f mm, %.2f after the exit\n",
               hand == HandKind::expert ? "expert" : "novice", run.layers.force[0].value(), run.layers.force[1].value(),
-              run.layers.force[2].value(), run.layers.feed[0].value(), run.layers.feed[1].value(), run.layers.feed[2].value(),
-              run.result.plunge_mm, run.result.after_exit_mm);
+              run.layers.force[2].value(), run.layers.feed[0].value(), run.layers.feed[1].value(),
+              run.layers.feed[2].value(), run.result.plunge_mm, run.result.after_exit_mm);
   return run;
 }
 
@@ -181,8 +181,8 @@ TEST(DrillingBlock, TheWorkspaceScaleDoesNotChangeTheBone) {
     EXPECT_NEAR(layers.force[0].value(), 27, 2.7) << device.name;
     EXPECT_NEAR(layers.feed[0].value(), 0.89, 0.09) << device.name;
     EXPECT_NEAR(layers.force[1].value(), 11, 1.1) << device.name;
-    // Closed form of the released hand: F/K, and the coupling's stretch F/K_c, which is let go at breakthrough and comes
-    // back by at most a tenth of the way.
+    // Closed form of the released hand: F/K, and the coupling's stretch F/K_c, which is let go at breakthrough and
+    // comes back by at most a tenth of the way.
     const double released = 27 / 5.5 + std::min(27 / coupling, 0.1 * 27 / 5.5);
     EXPECT_NEAR(bench.session().surgeon().results()[0].after_exit_mm, released, 0.15 * released) << device.name;
   }
@@ -225,7 +225,8 @@ TEST(DrillingBlock, RemovesTheClosedFormVolume) {
   step.beyond_mm = 3.0;
   Bench bench(block_case(), {step});
   bench.run();
-  EXPECT_NEAR(bench.replica().committed().removed_mm3(), std::numbers::pi * 1.6 * 1.6 * 30.0, 0.02 * std::numbers::pi * 1.6 * 1.6 * 30.0);
+  EXPECT_NEAR(bench.replica().committed().removed_mm3(), std::numbers::pi * 1.6 * 1.6 * 30.0,
+              0.02 * std::numbers::pi * 1.6 * 1.6 * 30.0);
   EXPECT_EQ(bench.replica().unconfirmed(), 0u);
   EXPECT_EQ(bench.replica().committed().hash(), bench.replica().predicted().hash());
 }

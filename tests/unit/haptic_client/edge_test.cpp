@@ -1,5 +1,5 @@
-// The cutting edge that a tool's contact points find in bone: teeth of a saw, millimetres of a reamer's and a bur's edges,
-// against closed forms.
+// The cutting edge that a tool's contact points find in bone: teeth of a saw, millimetres of a reamer's and a bur's
+// edges, against closed forms.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -41,12 +41,12 @@ Met met(const Case& bone, const ToolModel& model, const Pose& pose, const Vec3& 
 
 // Bone from z = 0 to 30 where `keep` is negative, a distance in mm.
 Case cut_out(double half_mm, double pitch_mm, const std::function<double(const Vec3&)>& keep) {
-  return osteon::test::make_bone({Vec3(-half_mm - 4, -half_mm - 4, -4), Vec3(half_mm + 4, half_mm + 4, 34)}, pitch_mm,
-                                 [=](const Vec3& p) {
-                                   return std::max({-p.z(), p.z() - 30.0, std::abs(p.x()) - half_mm,
-                                                    std::abs(p.y()) - half_mm, keep(p)});
-                                 },
-                                 [](const Vec3&) { return 1.0; });
+  return osteon::test::make_bone(
+      {Vec3(-half_mm - 4, -half_mm - 4, -4), Vec3(half_mm + 4, half_mm + 4, 34)}, pitch_mm,
+      [=](const Vec3& p) {
+        return std::max({-p.z(), p.z() - 30.0, std::abs(p.x()) - half_mm, std::abs(p.y()) - half_mm, keep(p)});
+      },
+      [](const Vec3&) { return 1.0; });
 }
 Case bar(double low_mm, double high_mm) {
   return cut_out(24.0, 0.5, [=](const Vec3& p) { return std::max(low_mm - p.x(), p.x() - high_mm); });
@@ -61,7 +61,9 @@ TEST(EngagedEdge, ASawMeetsTheTeethOverTheBone) {
     const Tool saw = *find_tool(name);
     const ToolModel model(saw, 0.5);
     const double pitch = saw.width_mm / saw.teeth, reach = saw.pivot_mm * std::sin(0.5 * saw.swing_rad);
-    const auto teeth = [&](double low, double high) { return met(bar(low, high), model, kTouching, Vec3::UnitZ()).edge; };
+    const auto teeth = [&](double low, double high) {
+      return met(bar(low, high), model, kTouching, Vec3::UnitZ()).edge;
+    };
     // Contact points half a millimetre apart: so exact is the length of each face, at both ends.
     const double one = 0.5 / pitch;
     EXPECT_NEAR(teeth(-5.0, 5.0), 10.0 / pitch, one) << name;
@@ -81,8 +83,8 @@ TEST(EngagedEdge, ASawMeetsTheTeethOverTheBone) {
   EXPECT_NEAR(met(plate, model, along, Vec3::UnitX()).edge, 8.0 * per_mm, 0.5 * per_mm);
 }
 
-// Z edges from r to R are Z (R - r) long as seen along the feed, and half of that where half of it is in bone: over a hole
-// of half the radius that is half the edge, though three quarters of the area.
+// Z edges from r to R are Z (R - r) long as seen along the feed, and half of that where half of it is in bone: over a
+// hole of half the radius that is half the edge, though three quarters of the area.
 TEST(EngagedEdge, AReamersEdgesGoWithTheRadiusNotTheArea) {
   struct Reamer {
     const char* name;
@@ -106,12 +108,13 @@ TEST(EngagedEdge, AReamersEdgesGoWithTheRadiusNotTheArea) {
   const Tool ring = *find_tool("reamer-outside");
   const double wall = 0.5 * (ring.diameter_mm - ring.bore_mm);
   const Pose in_bone{{0, 0, 3}, Eigen::Quaterniond::Identity()};
-  const Met all = met(cut_out(30.0, 1.0, [](const Vec3&) { return -10.0; }), ToolModel(ring, 1.0), in_bone, Vec3::UnitZ());
+  const Met all =
+      met(cut_out(30.0, 1.0, [](const Vec3&) { return -10.0; }), ToolModel(ring, 1.0), in_bone, Vec3::UnitZ());
   EXPECT_NEAR(all.edge, ring.teeth * wall, 0.01 * ring.teeth * wall);
 }
 
-// The meridians of a round bur pushed across its axis: half of them when it is wholly in bone, Z pi R / 2; the half of those
-// when only one half of it is, square to its axis or along it.
+// The meridians of a round bur pushed across its axis: half of them when it is wholly in bone, Z pi R / 2; the half of
+// those when only one half of it is, square to its axis or along it.
 TEST(EngagedEdge, ABursEdgesAreItsMeridians) {
   const Tool burr = *find_tool("burr-round-5");
   const ToolModel model(burr, 0.5, 1.0, 900);
@@ -132,8 +135,8 @@ TEST(EngagedEdge, ABursEdgesAreItsMeridians) {
 TEST(EngagedEdge, ADrillsLipsAreAsLongAsItsPoint) {
   const Tool drill = *find_tool("drill-3.2");
   const ToolModel model(drill, 0.5);
-  const Met whole = met(cut_out(8.0, 0.5, [](const Vec3&) { return -10.0; }), model, {{0, 0, 6}, Eigen::Quaterniond::Identity()},
-                        Vec3::UnitZ());
+  const Met whole = met(cut_out(8.0, 0.5, [](const Vec3&) { return -10.0; }), model,
+                        {{0, 0, 6}, Eigen::Quaterniond::Identity()}, Vec3::UnitZ());
   EXPECT_NEAR(whole.edge, 2.0 * 1.6 / std::sin(0.5 * drill.point_angle_rad), 0.03);
   EXPECT_NEAR(whole.share, 1.0, 1e-6);
 }

@@ -67,8 +67,8 @@ TEST(Plan, NamesWhatIsWrong) {
   EXPECT_NE(message(step).find("choose a drill"), std::string::npos);
 }
 
-// A tool whose file names a law that there is not, or that is for others, is refused whoever takes it up, in a sentence that
-// names tool, law and remedy; another law that fits can be chosen instead.
+// A tool whose file names a law that there is not, or that is for others, is refused whoever takes it up, in a sentence
+// that names tool, law and remedy; another law that fits can be chosen instead.
 TEST(Plan, RefusesAToolWithALawThatDoesNotFit) {
   const Case bone = block_case();
   for (const char* law : {"hooke", "saw"}) {
@@ -87,7 +87,8 @@ TEST(Plan, RefusesAToolWithALawThatDoesNotFit) {
     ASSERT_FALSE(by_hand);
     for (const Error& error : {planned.error(), by_hand.error()}) {
       EXPECT_EQ(error.code, ErrorCode::invalid_input);
-      for (const std::string& part : {std::string("drill-3.2"), '"' + std::string(law) + '"', std::string("choose one of chi")})
+      for (const std::string& part :
+           {std::string("drill-3.2"), '"' + std::string(law) + '"', std::string("choose one of chi")})
         EXPECT_NE(error.message.find(part), std::string::npos) << error.message;
     }
     step.law = "allotta";

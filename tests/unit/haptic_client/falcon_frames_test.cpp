@@ -25,7 +25,10 @@ TEST(FalconFrames, NibblesAreShiftedLettersLowestFirst) {
 }
 
 TEST(FalconFrames, EncodersButtonsAndHoming) {
-  const auto state = decode_state(frame("<AMOPCAAAPPPP" "\x85" "A>"));  // 0x41 + 4 (centre) + 0x40 (third axis homed)
+  const auto state =
+      decode_state(frame("<AMOPCAAAPPPP"
+                         "\x85"
+                         "A>"));  // 0x41 + 4 (centre) + 0x40 (third axis homed)
   ASSERT_TRUE(state);
   EXPECT_EQ(state->encoders, (FalconCounts{static_cast<std::int16_t>(0xfec0), 2, -1}));
   EXPECT_EQ(state->buttons, kFalconCentre);
@@ -44,7 +47,8 @@ TEST(FalconFrames, ThereAndBack) {
     EXPECT_EQ(back->encoders, state.encoders);
     EXPECT_EQ(back->buttons, state.buttons);
     EXPECT_EQ(back->homed, state.homed);
-    const FalconCommand command{{number(), number(), number()}, (random() & 1) != 0, static_cast<std::uint8_t>(random() & 14)};
+    const FalconCommand command{
+        {number(), number(), number()}, (random() & 1) != 0, static_cast<std::uint8_t>(random() & 14)};
     const auto told = decode_command(encode(command));
     ASSERT_TRUE(told);
     EXPECT_EQ(told->motors, command.motors);
@@ -66,7 +70,7 @@ TEST(FalconFrames, NoFrameWithAnyLetterOutOfRange) {
 
 TEST(FalconFrames, TheReaderJoinsPiecesAndFindsItsPlaceAgain) {
   FalconFrameReader reader;
-  EXPECT_FALSE(reader.take(bytes("AAA>AA")));        // the end of something before
+  EXPECT_FALSE(reader.take(bytes("AAA>AA")));  // the end of something before
   EXPECT_FALSE(reader.take(bytes("<BAAAAAA")));
   const auto joined = reader.take(bytes("AAAAAAA>"));
   ASSERT_TRUE(joined);
@@ -74,7 +78,10 @@ TEST(FalconFrames, TheReaderJoinsPiecesAndFindsItsPlaceAgain) {
   EXPECT_EQ(reader.broken(), 0u);
 
   // A lost byte ends one frame, not the next; of two whole ones the newest counts.
-  const auto newest = reader.take(bytes("<AAAAAAAAAAAAA>" "<CAAAAAAAAAAAAA>" "<DAAAAAAAAAAAAA>"));
+  const auto newest =
+      reader.take(bytes("<AAAAAAAAAAAAA>"
+                        "<CAAAAAAAAAAAAA>"
+                        "<DAAAAAAAAAAAAA>"));
   ASSERT_TRUE(newest);
   EXPECT_EQ(newest->encoders[0], 3);
   EXPECT_EQ(reader.broken(), 1u);

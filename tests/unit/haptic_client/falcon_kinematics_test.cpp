@@ -83,7 +83,8 @@ TEST(FalconKinematics, RoundedCountsKeepThePlace) {
   double worst_mm = 0.0;
   for (const Vector3d& place : places(500)) {
     Vector3d angles = *falcon_angles(place);
-    for (int i = 0; i < 3; ++i) angles[i] = falcon_angle_rad(static_cast<double>(std::lround(falcon_counts(angles[i]))));
+    for (int i = 0; i < 3; ++i)
+      angles[i] = falcon_angle_rad(static_cast<double>(std::lround(falcon_counts(angles[i]))));
     const auto back = falcon_place(angles, place);
     ASSERT_TRUE(back);
     worst_mm = std::max(worst_mm, 1e3 * (*back - place).norm());

@@ -1,5 +1,5 @@
-// Two haptic loops at one bone on a mount, a simulated hand at each, lines between them and the server's end: what one hand
-// does is felt by the other, through the bone.
+// Two haptic loops at one bone on a mount, a simulated hand at each, lines between them and the server's end: what one
+// hand does is felt by the other, through the bone.
 #include "haptic_client/control/felt_mount.hpp"
 
 #include <gtest/gtest.h>
@@ -67,14 +67,17 @@ struct User {
         into(0, 0, from_above ? -1.0 : 1.0),
         face_mm(from_above ? Vec3(0, 0, 0) : Vec3(0, 0, -kThickness_mm)),
         replica(block(), BodyId{}),
-        mounted(mount_about(kMiddle_mm)), up(line, seed), down(line, seed + 1) {
+        mounted(mount_about(kMiddle_mm)),
+        up(line, seed),
+        down(line, seed + 1) {
     LoopParams params = loop_params(device.limits(), 1.0);
     params.ramp_s = 1e-9;
     std::vector<ToolModel> tools{ToolModel(*find_tool("burr-round-5"), block().pitch_mm())};
     loop = std::make_unique<HapticLoop>(params, std::move(tools));
     const Pose start{face_mm - kAway_mm * into, rotation};
     WorkspaceMapping mapping;
-    mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), 1.0, Vec3::Zero(), start.position_mm);
+    mapping.align(Eigen::Quaterniond(Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized())), 1.0, Vec3::Zero(),
+                  start.position_mm);
     loop->take_up(0, start, mapping);
     device.take(expert_hand(), mapping.pose_device_tool(start).position_mm);
     build(start);
@@ -103,7 +106,8 @@ struct User {
     device.write({last.force_device_n, last.torque_device_nmm});
     // Growth of the force beyond what the handle's own way explains: spring and damping of the coupling.
     const Vec3 handle_mm = input.pose_device_tool.position_mm;
-    const double by_hand_n = loop->coupling_n_per_mm() * (2.0 * (handle_mm - handle_before_mm).norm() + moved_before_mm);
+    const double by_hand_n =
+        loop->coupling_n_per_mm() * (2.0 * (handle_mm - handle_before_mm).norm() + moved_before_mm);
     if (ticks > 1) step_n = std::max(step_n, last.force_device_n.norm() - force_n() - by_hand_n);
     moved_before_mm = (handle_mm - handle_before_mm).norm();
     handle_before_mm = handle_mm;
@@ -112,7 +116,8 @@ struct User {
     const Vec3 tip_mm = last.pose_bone_proxy.position_mm;
     put_in_mj += mounted.load().force_n.dot(mounted.pose_rest_bone().point(tip_mm) - before.point(tip_mm));
     least_mj = std::min(least_mj, put_in_mj);
-    if (++ticks % 12 == 0 && (last.pose_bone_proxy.position_mm - built_at_mm).norm() > 0.05) build(last.pose_bone_proxy);
+    if (++ticks % 12 == 0 && (last.pose_bone_proxy.position_mm - built_at_mm).norm() > 0.05)
+      build(last.pose_bone_proxy);
   }
   double force_n() const { return shown_n; }
   double shown_along_n() const { return -loop->mapping().to_bone(last.coupling_device_n).dot(into); }
@@ -203,11 +208,12 @@ TEST(FeltMount, LetsOneHandFeelTheOtherThroughTheBone) {
     const double x_mm = (f0[0] - f0[1]) / (mount + 2.0 * k);  // along the first one's push
     const double expected_n[2] = {f0[0] - k * x_mm, f0[1] + k * x_mm};
     const double other_makes_n = expected_n[0] - alone_expected_n;
-    std::printf("  %.0f and %.0f ms: alone %.2f N (%.2f), together %.2f and %.2f N (%.2f and %.2f); most %.2f mm, step %.2f N, "
-                "given back %.2f and %.2f mJ\n",
-                line[0].delay_ms, line[1].delay_ms, alone_n, alone_expected_n, room.users[0]->pressed_n(),
-                room.users[1]->pressed_n(), expected_n[0], expected_n[1], room.users[0]->mounted.most_mm(),
-                std::max(room.users[0]->step_n, room.users[1]->step_n), -room.users[0]->least_mj, -room.users[1]->least_mj);
+    std::printf(
+        "  %.0f and %.0f ms: alone %.2f N (%.2f), together %.2f and %.2f N (%.2f and %.2f); most %.2f mm, step %.2f N, "
+        "given back %.2f and %.2f mJ\n",
+        line[0].delay_ms, line[1].delay_ms, alone_n, alone_expected_n, room.users[0]->pressed_n(),
+        room.users[1]->pressed_n(), expected_n[0], expected_n[1], room.users[0]->mounted.most_mm(),
+        std::max(room.users[0]->step_n, room.users[1]->step_n), -room.users[0]->least_mj, -room.users[1]->least_mj);
     ASSERT_GT(other_makes_n, 2.0);
     EXPECT_NEAR(room.users[0]->pressed_n() - alone_n, other_makes_n, 0.05 * other_makes_n);
     EXPECT_NEAR(room.users[1]->pressed_n(), expected_n[1], 0.05 * expected_n[1]);
@@ -248,8 +254,9 @@ TEST(FeltMount, TurnsForcesWithTheBone) {
   }
 }
 
-// What a hand is deeper in bone than its device can show lies between hand and tool and stays with them: a bone that turns under
-// the tip of the tool does not swing it about, and the loop counts what that does to hand and bone as one does outside.
+// What a hand is deeper in bone than its device can show lies between hand and tool and stays with them: a bone that
+// turns under the tip of the tool does not swing it about, and the loop counts what that does to hand and bone as one
+// does outside.
 TEST(FeltMount, TurnsUnderSlackWithoutIt) {
   User user({}, true, 1);
   user.push_mm = 25.0;
@@ -285,7 +292,8 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
   EXPECT_NEAR(user.last.energy.episode_mj - before_mj, given_mj, 0.02 * std::abs(given_mj));
 }
 
-// A bone that comes at the hand as fast as one is ever shown, 60 mm/s: what would be 3 N more in every millisecond comes slowly.
+// A bone that comes at the hand as fast as one is ever shown, 60 mm/s: what would be 3 N more in every millisecond
+// comes slowly.
 TEST(FeltMount, WhatMovesTheBoneRaisesTheForceSlowly) {
   User user({}, true, 1);
   user.push_mm = 0.5;

@@ -21,7 +21,8 @@ TEST(FootPedal, SwitchReportsAreTwoBytes) {
 TEST(FootPedal, TheWayHasPlayAtBothEnds) {
   PedalAxis axis({.play = 0.1});
   axis.take(0.0);
-  for (const auto& [share, value] : {std::pair{0.05, 0.0}, {0.1, 0.0}, {0.5, 0.5}, {0.3, 0.25}, {0.9, 1.0}, {1.0, 1.0}}) {
+  for (const auto& [share, value] :
+       {std::pair{0.05, 0.0}, {0.1, 0.0}, {0.5, 0.5}, {0.3, 0.25}, {0.9, 1.0}, {1.0, 1.0}}) {
     axis.take(share);
     EXPECT_NEAR(axis.value(), value, 1e-12) << share;
   }
@@ -48,8 +49,8 @@ TEST(FootPedal, TurnsNothingUntilItWasReleased) {
   EXPECT_EQ(axis.value(), 0.0);
 }
 
-// One that rests at the other end, or in the middle, passes its way's beginning when it is pressed: taken for released there,
-// it would turn the spindle as soon as the foot leaves it.
+// One that rests at the other end, or in the middle, passes its way's beginning when it is pressed: taken for released
+// there, it would turn the spindle as soon as the foot leaves it.
 TEST(FootPedal, TurnsNothingWhereItRestsElsewhere) {
   for (const bool inverted : {false, true}) {
     for (const double rest : {1.0, 0.9, 0.5}) {
@@ -81,8 +82,13 @@ TEST(FootPedal, SwitchAndAxisAreChosenByWords) {
     bool inverted;
     int page, usage;  // 0: none
   };
-  for (const Said& said : {Said{"", false, 0, 0}, {"inverted", true, 0, 0}, {"z", false, 1, 0x32}, {"rz:inverted", true, 1, 0x35},
-                           {"inverted:0x30", true, 1, 0x30}, {"54", false, 1, 0x36}, {"brake", false, 2, 0xc5}}) {
+  for (const Said& said : {Said{"", false, 0, 0},
+                           {"inverted", true, 0, 0},
+                           {"z", false, 1, 0x32},
+                           {"rz:inverted", true, 1, 0x35},
+                           {"inverted:0x30", true, 1, 0x30},
+                           {"54", false, 1, 0x36},
+                           {"brake", false, 2, 0xc5}}) {
     const auto options = read_pedal_axis(said.words);
     ASSERT_TRUE(options) << said.words;
     EXPECT_TRUE(options->proportional);
@@ -92,12 +98,14 @@ TEST(FootPedal, SwitchAndAxisAreChosenByWords) {
     EXPECT_EQ(options->axis_usage->page, said.page) << said.words;
     EXPECT_EQ(options->axis_usage->usage, said.usage) << said.words;
   }
-  for (const char* wrong : {"upside-down", "z:x", "inverted:inverted", "z:", ":z", "0x", "0", "0x10000", "z inverted"}) {
+  for (const char* wrong :
+       {"upside-down", "z:x", "inverted:inverted", "z:", ":z", "0x", "0", "0x10000", "z inverted"}) {
     const auto options = read_pedal_axis(wrong);
     ASSERT_FALSE(options) << wrong;
-    EXPECT_EQ(options.error().message, std::string("--device pedal-axis:") + wrong +
-                                           ": what follows must be \"inverted\", an axis (accelerator, brake, throttle, slider, "
-                                           "z, rz, x, y, rx, ry, or a HID usage such as 0x32), or both joined by \":\"");
+    EXPECT_EQ(options.error().message,
+              std::string("--device pedal-axis:") + wrong +
+                  ": what follows must be \"inverted\", an axis (accelerator, brake, throttle, slider, "
+                  "z, rz, x, y, rx, ry, or a HID usage such as 0x32), or both joined by \":\"");
   }
 }
 

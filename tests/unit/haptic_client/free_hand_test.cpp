@@ -220,8 +220,8 @@ TEST(FreeHandView, IsNamedOrGiven) {
   EXPECT_NE(read_point("1;2;3", "--at").error().message.find("--at"), std::string::npos);
 }
 
-// Without a place of its own the tool is taken up over the side from which the user looks; over the middle as far as a case
-// knows it, whose bounds are of whole leaves of eight samples.
+// Without a place of its own the tool is taken up over the side from which the user looks; over the middle as far as a
+// case knows it, whose bounds are of whole leaves of eight samples.
 TEST_F(FreeHand, LooksAtTheBonesMiddle) {
   FreeHandOptions options;
   options.tool = "drill-3.2";

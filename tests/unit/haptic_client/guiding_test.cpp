@@ -68,7 +68,8 @@ Hole drill_hole(bool guided, HandKind hand) {
   Bench bench(bone, *ready);
   Hole hole;
   bench.run([&](const SessionTick& tick) { hole.guided |= (tick.report.events & kGuided) != 0; });
-  hole.completed = bench.session().done() && std::ranges::all_of(bench.session().surgeon().results(), &StepResult::completed);
+  hole.completed =
+      bench.session().done() && std::ranges::all_of(bench.session().surgeon().results(), &StepResult::completed);
   const Vec3 line(0.3, -0.2, 0);
   for (const Cut& cut : bench.cuts())
     for (const QuantisedPose& knot : cut.path) {
@@ -82,13 +83,16 @@ Hole drill_hole(bool guided, HandKind hand) {
       hole.tilt_rad = std::max(hole.tilt_rad, std::acos(std::clamp(pose.direction(Vec3::UnitZ()).z(), -1.0, 1.0)));
     }
   std::printf("  %s, %s: off the line at the entry %.3f mm, at most %.3f mm, tilt at most %.2f degrees\n",
-              guided ? "guided" : "by eye", hand == HandKind::rig ? "rig" : hand == HandKind::expert ? "expert" : "novice", hole.at_entry_mm,
-              hole.worst_mm, hole.tilt_rad * 180.0 / std::numbers::pi);
+              guided ? "guided" : "by eye",
+              hand == HandKind::rig      ? "rig"
+              : hand == HandKind::expert ? "expert"
+                                         : "novice",
+              hole.at_entry_mm, hole.worst_mm, hole.tilt_rad * 180.0 / std::numbers::pi);
   return hole;
 }
 
-// The sleeve's play bounds the hole: c (1 + 2 l / L) at depth l. Poses of cuts are quantised and the proxy follows the hand
-// by a tick, so a hundredth of a millimetre is allowed.
+// The sleeve's play bounds the hole: c (1 + 2 l / L) at depth l. Poses of cuts are quantised and the proxy follows the
+// hand by a tick, so a hundredth of a millimetre is allowed.
 TEST(GuidedDrilling, StaysWithinTheSleevesPlay) {
   for (const HandKind hand : {HandKind::rig, HandKind::expert}) {
     const Hole guided = drill_hole(true, hand), free = drill_hole(false, hand);
@@ -98,8 +102,8 @@ TEST(GuidedDrilling, StaysWithinTheSleevesPlay) {
     EXPECT_FALSE(free.guided);
     EXPECT_GT(guided.knots, 500);
     EXPECT_LE(guided.worst_excess_mm, 0.01);
-    // Two points within the play, a sleeve's length apart. The hand is kept to that; the drill, which its own hole holds too,
-    // may lean a little more, by less than 0.03 mm at either end of the sleeve.
+    // Two points within the play, a sleeve's length apart. The hand is kept to that; the drill, which its own hole
+    // holds too, may lean a little more, by less than 0.03 mm at either end of the sleeve.
     EXPECT_LE(guided.tilt_rad, 2.0 * kPlay_mm / kLength_mm + 2e-3);
     EXPECT_GT(free.worst_mm, kPlay_mm * (1.0 + 2.0));
     EXPECT_GT(free.worst_excess_mm, 0.1);
@@ -144,8 +148,8 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   EXPECT_FALSE(report.events & kGuided);
 }
 
-// A drill about a sleeve that stands on the bone, its top at z = -30: the hand leads it from place to place, on a device so
-// strong that its slack does not keep the hand from reaching through the wall.
+// A drill about a sleeve that stands on the bone, its top at z = -30: the hand leads it from place to place, on a
+// device so strong that its slack does not keep the hand from reaching through the wall.
 class AtASleeve : public ::testing::Test {
  protected:
   AtASleeve()
@@ -187,7 +191,8 @@ class AtASleeve : public ::testing::Test {
   bool guided_ = false;
 };
 
-// Pressed against the sleeve from outside, as far as its middle and beyond, the drill stays outside: it does not pop in.
+// Pressed against the sleeve from outside, as far as its middle and beyond, the drill stays outside: it does not pop
+// in.
 TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
   take_up({-12, 0, -15});
   lead({-6.5, 0, -15}, 20.0);
@@ -204,8 +209,8 @@ TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
   EXPECT_LT(fastest_mm_, 0.1);
 }
 
-// Pressed on the rim of its mouth and led over it, the drill goes in where the mouth is, no sooner, and the force that it was
-// pressed with is gone.
+// Pressed on the rim of its mouth and led over it, the drill goes in where the mouth is, no sooner, and the force that
+// it was pressed with is gone.
 TEST_F(AtASleeve, IsEnteredFromItsRimThroughTheMouth) {
   take_up({2.8, 0, -33});
   lead({2.8, 0, -29.6}, 10.0);

@@ -1,5 +1,5 @@
-// Every tool of the box in the hand: what cuts takes bone where it is pushed and leaves force and torque on the hand, what
-// does not cut only touches, and a saw or broach comes out of what it has made.
+// Every tool of the box in the hand: what cuts takes bone where it is pushed and leaves force and torque on the hand,
+// what does not cut only touches, and a saw or broach comes out of what it has made.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,7 +22,8 @@ namespace {
 class HandStage {
  public:
   HandStage(Case bone, const Tool& tool, const Pose& start)
-      : replica_(std::move(bone), BodyId{}), loop_(LoopParams{}, {ToolModel(tool, replica_.predicted().bone().pitch_mm())}) {
+      : replica_(std::move(bone), BodyId{}),
+        loop_(LoopParams{}, {ToolModel(tool, replica_.predicted().bone().pitch_mm())}) {
     input_.pose_device_tool = start;
     loop_.take_up(0, start, WorkspaceMapping{});
     build(start);
@@ -36,8 +37,8 @@ class HandStage {
     work_min_ = std::min(work_min_, report.cutting_force_n.dot(report.moved_mm));
     const bool cuts = report.phase == CuttingPhase::cutting;
     cutting_ += cuts;
-    // What cuts has a force; what was cut took work, torque and feed, all or none, also in a tick whose turning pushed the tool
-    // back by more than that. A broach is driven by its blows, not by a force.
+    // What cuts has a force; what was cut took work, torque and feed, all or none, also in a tick whose turning pushed
+    // the tool back by more than that. A broach is driven by its blows, not by a force.
     const bool worked = report.cutting_work_mj > 0.0;
     pushed_ += worked && !cuts;
     if (loop_.tool(0).tool.kind != ToolKind::broach)
@@ -105,7 +106,8 @@ Pose held(const Tool& tool) {
       const Eigen::Quaterniond edge(Eigen::AngleAxisd(-0.5 * std::numbers::pi, Vec3::UnitY()));
       return {{17.0 - tool.cutting_length_mm, 0, -0.5 * tool.width_mm - 0.4}, edge};  // its plate is beside the block
     }
-    default: return {{0.1, -0.1, -0.4}, Eigen::Quaterniond::Identity()};
+    default:
+      return {{0.1, -0.1, -0.4}, Eigen::Quaterniond::Identity()};
   }
 }
 
@@ -121,9 +123,10 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     const LoopReport pushed = stage.lead({0, 0, 2.0}, 2.0);
     const LoopReport back = stage.lead({0, 0, -3.5}, 0.7);
     const double removed = stage.replica_.removed_mm3() - before;
-    std::printf("  %-20s cut for %4d of 2700 ticks, pushed back in %3d, %8.2f mm3, at most %6.1f N, %8.1f N mm, %.2f mm deep\n",
-                tool.name.c_str(), stage.cutting_, stage.pushed_, removed, stage.force_n_, stage.torque_nmm_,
-                pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
+    std::printf(
+        "  %-20s cut for %4d of 2700 ticks, pushed back in %3d, %8.2f mm3, at most %6.1f N, %8.1f N mm, %.2f mm deep\n",
+        tool.name.c_str(), stage.cutting_, stage.pushed_, removed, stage.force_n_, stage.torque_nmm_,
+        pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
     // A broach moves in its blows only: one a second, of some 5 ms.
     if (tool.kind == ToolKind::broach) {
       EXPECT_GE(stage.cutting_, 2 * 5) << tool.name;
@@ -136,13 +139,14 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     EXPECT_GE(stage.work_min_, 0.0) << tool.name;
     EXPECT_EQ(stage.disagree_, 0) << tool.name;
     // A thin bur's shank soon lies on the bone: the bur digs in, its turning back to the hand's lifts it, and so on.
-    const bool lies = held(tool).rotation.angularDistance(Eigen::Quaterniond::Identity()) > 0.1 && tool.shank_diameter_mm > 0.0 &&
-                      0.5 * (tool.diameter_mm - tool.shank_diameter_mm) < 1.0;
+    const bool lies = held(tool).rotation.angularDistance(Eigen::Quaterniond::Identity()) > 0.1 &&
+                      tool.shank_diameter_mm > 0.0 && 0.5 * (tool.diameter_mm - tool.shank_diameter_mm) < 1.0;
     EXPECT_LE(stage.pushed_, (lies ? 1.0 : 0.1) * stage.cutting_) << tool.name;
     EXPECT_EQ(stage.allocations_, 0) << tool.name;
     // Drawn back it is free: nothing jams in what it has made.
     EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
-    EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5) << tool.name;
+    EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5)
+        << tool.name;
     ++tried;
   }
   EXPECT_GE(tried, 21);
@@ -221,8 +225,8 @@ TEST(HandTools, ABurDraggedOverMetalSendsNothing) {
   EXPECT_EQ(stage.replica_.removed_mm3(), 0.0);
 }
 
-// A bur in its groove that a hand rocks hard, by 9 degrees 1.5 times a second: turning cuts nothing and lifts it out, its
-// coupling cuts it in again. Where a tick does more of the first it rubs; but what was cut in it took its work.
+// A bur in its groove that a hand rocks hard, by 9 degrees 1.5 times a second: turning cuts nothing and lifts it out,
+// its coupling cuts it in again. Where a tick does more of the first it rubs; but what was cut in it took its work.
 TEST(HandTools, ARockedBurIsPushedBackAndCutsAgain) {
   const Tool bur = *find_tool("burr-round-3.2");
   const Case bone = block(0.5, 40.0, 12.0);
@@ -239,7 +243,8 @@ TEST(HandTools, ARockedBurIsPushedBackAndCutsAgain) {
   double work_mj = 0, pushed_mj = 0;
   for (int i = 0; i < 6000; ++i) {
     if (i % 12 == 0) {
-      for (const ChangedLeaves& change : replica.take_changes()) builder.changed(bone.pitch_mm(), change.level, change.origins);
+      for (const ChangedLeaves& change : replica.take_changes())
+        builder.changed(bone.pitch_mm(), change.level, change.origins);
       builder.build(replica.predicted(), model, proxy.pose(), patch);
       patch.own_cuts = replica.last_own();
     }
@@ -272,8 +277,8 @@ TEST(HandTools, ARockedBurIsPushedBackAndCutsAgain) {
     replica.add_own(cut);
     replica.commit(RoomSeq{cuts}, cut, true);
   }
-  std::printf("  rocked bur: %d ticks cut, %d pushed it back; %.3g mJ beside %.3g mJ of cutting\n", cutting, pushed, pushed_mj,
-              work_mj);
+  std::printf("  rocked bur: %d ticks cut, %d pushed it back; %.3g mJ beside %.3g mJ of cutting\n", cutting, pushed,
+              pushed_mj, work_mj);
   EXPECT_GT(cutting, 1000);
   EXPECT_GT(pushed, 0);
   EXPECT_LT(pushed, cutting);
@@ -327,15 +332,16 @@ TEST(OwnHole, DoesNotJamAtAnyAngle) {
     Bench bench(block_case(24.0), {step});
     double deepest = 0, out_n = 0, spindle_nmm = 0, turning_nmm = 0;
     bench.run([&](const SessionTick& tick) {
-      const double depth = (tick.report.pose_bone_proxy.position_mm - Vec3(0.1, -0.2, 0)).dot(step.entry.axis->normalized());
+      const double depth =
+          (tick.report.pose_bone_proxy.position_mm - Vec3(0.1, -0.2, 0)).dot(step.entry.axis->normalized());
       deepest = std::max(deepest, depth);
       if (tick.order.phase != SurgeonPhase::retract || depth >= deepest - 1.0) return;
       out_n = std::max(out_n, tick.report.force_physical_n.norm());
       spindle_nmm = std::max(spindle_nmm, tick.report.torque_nmm);
       turning_nmm = std::max(turning_nmm, tick.report.torque_physical_nmm.norm());
     });
-    std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N and %.3f N mm on the way out\n", degrees, deepest,
-                out_n, turning_nmm);
+    std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N and %.3f N mm on the way out\n", degrees,
+                deepest, out_n, turning_nmm);
     EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << degrees;
     EXPECT_GE(deepest, 9.0) << degrees;
     EXPECT_LT(out_n, 0.5) << degrees;

@@ -25,7 +25,8 @@ TEST(LawsCommand, ListsEveryLawWithAllThatIsToBeKnown) {
     ASSERT_NE(at, std::string::npos) << law.name;
     const std::size_t end = std::min(text.find("\n\n", at), text.size());
     const std::string paragraph = text.substr(at, end - at);
-    for (const char* label : {"equation", "source", "units", "constants", "wear", "range", "notes", "fits", "default of"})
+    for (const char* label :
+         {"equation", "source", "units", "constants", "wear", "range", "notes", "fits", "default of"})
       EXPECT_NE(paragraph.find("\n  " + std::string(label) + " "), std::string::npos) << law.name << " " << label;
     // What it can be chosen for: all that fits, and no more.
     for (const auto& [kind, name] : tool_kinds()) {

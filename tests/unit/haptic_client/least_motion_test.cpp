@@ -14,7 +14,9 @@
 namespace osteon::haptic::test {
 namespace {
 
-Condition wall(const Vec3& n, double least_mm = 0.0, const Vec3& at = Vec3::Zero()) { return {n, at.cross(n), least_mm}; }
+Condition wall(const Vec3& n, double least_mm = 0.0, const Vec3& at = Vec3::Zero()) {
+  return {n, at.cross(n), least_mm};
+}
 Motion solve(const Motion& wanted, const std::vector<Condition>& walls, bool& held, const MotionLimits& limits = {}) {
   Conditions conditions;
   for (const Condition& condition : walls) conditions.add(condition);
@@ -27,7 +29,8 @@ double breaks_mm(const Motion& m, const std::vector<Condition>& walls) {
   return most;
 }
 
-// Two walls that nearly face each other, as those of a kerf: what goes down into the wedge between them ends in its edge.
+// Two walls that nearly face each other, as those of a kerf: what goes down into the wedge between them ends in its
+// edge.
 TEST(LeastMotion, AWedgeHoweverNarrowIsExact) {
   for (const double half_angle : {0.5, 0.1, 0.02, 0.004}) {
     // The wedge opens along +z; its walls are a tenth of a millimetre from the tip along their normals.
@@ -147,7 +150,8 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
   EXPECT_GE(tried, 40);
 }
 
-// A sweep that begins where the one before is seen to end leaves out that place, and both together leave what they left.
+// A sweep that begins where the one before is seen to end leaves out that place, and both together leave what they
+// left.
 TEST(SweepView, LeavesOutOnlyWhatTheOneBeforeShows) {
   std::mt19937 random(12);
   std::uniform_real_distribution<double> even(-1.0, 1.0);

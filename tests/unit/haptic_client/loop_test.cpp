@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "common/volume/cut_field.hpp"
-#include "haptic_client/control/patch_builder.hpp"
 #include "haptic_client/control/confirmation_monitor.hpp"
+#include "haptic_client/control/patch_builder.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {
@@ -64,8 +64,8 @@ TEST_F(LoopOnBlock, FreeAirHasNoForce) {
   EXPECT_EQ(report.phase, CuttingPhase::idle);
 }
 
-// A tool that was held far from bone while its hand went on, as by a room that stopped: where it is wanted nothing is known of
-// the bone, and what is built about the tool never reaches there. It goes as far as is known, patch by patch.
+// A tool that was held far from bone while its hand went on, as by a room that stopped: where it is wanted nothing is
+// known of the bone, and what is built about the tool never reaches there. It goes as far as is known, patch by patch.
 TEST_F(LoopOnBlock, AToolFarBehindItsHandInTheAirComesUp) {
   for (const double height_mm : {-5.0, -20.0, -45.0}) {
     const Vec3 tool_mm(-40, 3, height_mm), hand_mm(30, -10, height_mm);
@@ -135,8 +135,8 @@ TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
   }
 }
 
-// A device that comes back has its handle elsewhere: the tool stays where it was, nothing is felt of the difference, and
-// force comes up over the ramp.
+// A device that comes back has its handle elsewhere: the tool stays where it was, nothing is felt of the difference,
+// and force comes up over the ramp.
 TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
   ASSERT_GT(press_with_ramp(), 8.0);
   input_.device_ok = false;
@@ -208,7 +208,9 @@ TEST_F(LoopOnBlock, AtTheEndTheHandIsLetGoOverTheRamp) {
     const LoopReport report = tick();
     EXPECT_LE(report.force_device_n.norm(), full_n * (1.0 - i / 200.0) + 1e-9) << i;
     EXPECT_TRUE(report.events & kRamping);
-    if (i == 100) { EXPECT_GT(report.force_device_n.norm(), 0.2 * full_n); }
+    if (i == 100) {
+      EXPECT_GT(report.force_device_n.norm(), 0.2 * full_n);
+    }
   }
   EXPECT_EQ(tick().force_device_n.norm(), 0.0);
 }
@@ -294,7 +296,7 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   step.tool = "drill-3.2";
   step.hand = HandKind::rig;
   step.feed_mm_per_s = 3;  // 51 N in the cortex, less than the device's 60
-  step.beyond_mm = -20;  // stops 10 mm deep
+  step.beyond_mm = -20;    // stops 10 mm deep
   step.entry.point_mm = Vec3(0, 0, 0);
   step.entry.axis = Vec3(0, 0, 1);
   Bench bench(block_case(), {step});
@@ -335,7 +337,8 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
 // A hand at the loop whose cuts go through a replica, as late as a real client's; the device and bone frames are alike.
 class HandOnBlock {
  public:
-  explicit HandOnBlock(const char* tool) : loop_(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool(tool), bone_.pitch_mm())}) {
+  explicit HandOnBlock(const char* tool)
+      : loop_(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool(tool), bone_.pitch_mm())}) {
     lead({0, 0, -1});
     loop_.take_up(0, input_.pose_device_tool, WorkspaceMapping{});
     builder_.build(replica_.bodies(), loop_.tool(0), input_.pose_device_tool, patch_);
@@ -379,8 +382,8 @@ class HandOnBlock {
   std::int64_t ticks_ = 0;
 };
 
-// However long it is pressed, a drill that does not turn stays where it is, but for what its points are inset, and takes
-// nothing away.
+// However long it is pressed, a drill that does not turn stays where it is, but for what its points are inset, and
+// takes nothing away.
 TEST(DrillInItsHole, TakesNothingWhileItStands) {
   HandOnBlock hand("drill-3.2");
   hand.drill_to(2.0);
@@ -433,8 +436,8 @@ TEST(Burr, TakesAWindowToItsDepth) {
   EXPECT_GT(force_max, 0.2);
   EXPECT_LT(force_max, 20.0);
   const CutField& bone = bench.replica().predicted();
-  EXPECT_GT(bone.solid_mm({0, 0, 1.0}), 0.0);   // taken away
-  EXPECT_LT(bone.solid_mm({0, 0, 2.0}), 0.0);   // left
+  EXPECT_GT(bone.solid_mm({0, 0, 1.0}), 0.0);    // taken away
+  EXPECT_LT(bone.solid_mm({0, 0, 2.0}), 0.0);    // left
   EXPECT_LT(bone.solid_mm({6.0, 0, 0.3}), 0.0);  // outside the window
   // Closed form of a sphere swept over a rectangle: cap, half segments along the edges, slab. The hand gives way a
   // little, so less comes off.
@@ -560,7 +563,8 @@ TEST(WorkspaceMapping, ReachesFarWithTheClutch) {
   EXPECT_NEAR((mapping.to_bone(mapping.to_device(Vec3(1, 2, 3))) - Vec3(1, 2, 3)).norm(), 0.0, 1e-12);
   // Re-anchoring keeps the tool where it is.
   mapping.anchor({0, 0, 0}, tool.position_mm);
-  EXPECT_NEAR((mapping.pose_bone_tool({Vec3::Zero(), handle.rotation}).position_mm - tool.position_mm).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((mapping.pose_bone_tool({Vec3::Zero(), handle.rotation}).position_mm - tool.position_mm).norm(), 0.0,
+              1e-12);
 }
 
 TEST(CutRecorder, KeepsACornerAndDropsWhatIsStraight) {

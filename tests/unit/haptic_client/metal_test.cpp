@@ -19,7 +19,9 @@ constexpr double kRadius_mm = 1.6;
 Case plate_case() {
   return osteon::test::make_bone(
       {Vec3(-10, -10, 0), Vec3(10, 10, 20)}, kPitch_mm,
-      [](const Vec3& p) { return std::max({-p.z(), p.z() - 20.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0}); },
+      [](const Vec3& p) {
+        return std::max({-p.z(), p.z() - 20.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0});
+      },
       [](const Vec3& p) { return p.z() >= kPlate_mm && p.z() <= 7.0 ? 2.1 : 1.9; },
       [](const Vec3& p) { return p.z() >= kPlate_mm && p.z() <= 7.0 ? Tissue::metal : Tissue::none; });
 }
@@ -67,8 +69,7 @@ TEST(Metal, HoldsADrillAsSteelWould) {
     EXPECT_EQ(r.feed_mm_per_s, 0.0);
     EXPECT_TRUE(r.cutting_force_n.isZero());
     EXPECT_EQ(r.torque_nmm, 0.0);
-    const double stretch_mm =
-        (r.pose_bone_device.position_mm + r.offset_mm - r.pose_bone_proxy.position_mm).norm();
+    const double stretch_mm = (r.pose_bone_device.position_mm + r.offset_mm - r.pose_bone_proxy.position_mm).norm();
     const double pull_n = bench.session().loop().coupling_n_per_mm() * stretch_mm;
     strongest_n = std::max(strongest_n, r.force_physical_n.norm());
     if (!(r.events & kForceLimited)) off += std::abs(r.force_physical_n.norm() - pull_n) > 0.05 * pull_n;
@@ -127,7 +128,9 @@ TEST(Metal, DoesNothingBesideIt) {
   const auto half_plate = [](bool metal) {
     return osteon::test::make_bone(
         {Vec3(-10, -10, 0), Vec3(10, 10, 12)}, kPitch_mm,
-        [](const Vec3& p) { return std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0}); },
+        [](const Vec3& p) {
+          return std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0});
+        },
         [](const Vec3&) { return 1.9; },
         [=](const Vec3& p) { return metal && p.x() >= 4.0 && p.z() >= 2.0 ? Tissue::metal : Tissue::none; });
   };
@@ -151,9 +154,10 @@ TEST(Metal, DoesNothingBesideIt) {
 TEST(Metal, StaysWhereABurGoesOver) {
   const Case bone = osteon::test::make_bone(
       {Vec3(-10, -10, 0), Vec3(10, 10, 8)}, kPitch_mm,
-      [](const Vec3& p) { return std::max({-p.z(), p.z() - 8.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0}); },
-      [](const Vec3&) { return 1.9; },
-      [](const Vec3& p) { return p.x() >= 1.0 ? Tissue::metal : Tissue::none; });
+      [](const Vec3& p) {
+        return std::max({-p.z(), p.z() - 8.0, std::abs(p.x()) - 10.0, std::abs(p.y()) - 10.0});
+      },
+      [](const Vec3&) { return 1.9; }, [](const Vec3& p) { return p.x() >= 1.0 ? Tissue::metal : Tissue::none; });
   PlanStep step = straight_down("burr-round-5", HandKind::expert);
   step.action = Action::burr;
   step.window_u_mm = step.window_v_mm = 8.0;

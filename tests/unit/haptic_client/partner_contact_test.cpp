@@ -40,7 +40,8 @@ struct Pair {
   }
 };
 
-// Two balls that overlap by d are pushed apart with k d along the line of their centres; samples miss the tip by a little.
+// Two balls that overlap by d are pushed apart with k d along the line of their centres; samples miss the tip by a
+// little.
 TEST(PartnerContact, PushesApartByTheOverlap) {
   for (const double overlap_mm : {0.4, 1.0, 1.6}) {
     Pair pair;
@@ -144,7 +145,8 @@ Meeting meet(double delay_s, double told_lag_s) {
   constexpr double kMass = 2.5e-3, kHand = 0.2, kPush_mm = 1.0;  // N·s²/mm, N/mm, each beyond the middle
   Pair pairs[2];
   std::deque<double> sent[2];
-  double z_mm[2] = {-0.3, -0.3}, speed[2] = {}, known_mm[2] = {-0.3, -0.3};  // of each tip towards the other, from the middle
+  double z_mm[2] = {-0.3, -0.3}, speed[2] = {},
+         known_mm[2] = {-0.3, -0.3};  // of each tip towards the other, from the middle
   Meeting result;
   for (int i = 0; i < 20'000; ++i) {
     for (int user = 0; user < 2; ++user) {

@@ -109,7 +109,8 @@ TEST(Patch, KnowsNothingOutside) {
   Patch patch;
   double value = 0.0;
   EXPECT_FALSE(patch.solid(Vec3::Zero(), value));
-  PatchBuilder().build(field, ToolModel(*find_tool("drill-3.2"), 0.5), {{0, 0, -1}, Eigen::Quaterniond::Identity()}, patch);
+  PatchBuilder().build(field, ToolModel(*find_tool("drill-3.2"), 0.5), {{0, 0, -1}, Eigen::Quaterniond::Identity()},
+                       patch);
   EXPECT_TRUE(patch.solid({0, 0, 0}, value));
   EXPECT_FALSE(patch.solid({0, 0, 29}, value));
 }

@@ -22,7 +22,10 @@ constexpr double kStiffness = 50.0;
 class Stage {
  public:
   Stage(Case bone, const char* tool, int patch_ticks = 12)
-      : bone_(std::move(bone)), field_(bone_, BodyId{}), model_(*find_tool(tool), bone_.pitch_mm()), patch_ticks_(patch_ticks) {}
+      : bone_(std::move(bone)),
+        field_(bone_, BodyId{}),
+        model_(*find_tool(tool), bone_.pitch_mm()),
+        patch_ticks_(patch_ticks) {}
   void place(const Pose& pose) {
     device_ = pose;
     proxy_.place(pose);
@@ -38,7 +41,8 @@ class Stage {
   // Moves and turns the device to a pose at a speed, then waits.
   ProxyStep lead(const Pose& to, double speed_mm_per_s, int wait_ticks = 200, double rpm = 0.0) {
     const Pose from = device_;
-    const double way = std::max((to.position_mm - from.position_mm).norm(), 50.0 * from.rotation.angularDistance(to.rotation));
+    const double way =
+        std::max((to.position_mm - from.position_mm).norm(), 50.0 * from.rotation.angularDistance(to.rotation));
     const int ticks = std::max(1, static_cast<int>(std::ceil(way / speed_mm_per_s * 1e3)));
     for (int i = 1; i <= ticks; ++i) {
       const double t = static_cast<double>(i) / ticks;
@@ -83,18 +87,23 @@ Pose tilted(const Vec3& at, const Vec3& about, double angle_rad) {
 double dense(const Vec3&) { return 1.9; }
 
 Case half_space(double pitch_mm = 0.5) {
-  return osteon::test::make_bone({Vec3(-14, -14, -3), Vec3(14, 14, 12)}, pitch_mm, [](const Vec3& p) { return -p.z(); }, dense);
+  return osteon::test::make_bone(
+      {Vec3(-14, -14, -3), Vec3(14, 14, 12)}, pitch_mm, [](const Vec3& p) { return -p.z(); }, dense);
 }
 Case wall(double thickness_mm, double pitch_mm) {
-  return osteon::test::make_bone({Vec3(-8, -8, -3), Vec3(8, 8, 4)}, pitch_mm,
-                                 [=](const Vec3& p) { return std::abs(p.z() - 0.5 * thickness_mm) - 0.5 * thickness_mm; }, dense);
+  return osteon::test::make_bone(
+      {Vec3(-8, -8, -3), Vec3(8, 8, 4)}, pitch_mm,
+      [=](const Vec3& p) { return std::abs(p.z() - 0.5 * thickness_mm) - 0.5 * thickness_mm; }, dense);
 }
 // A hole of this diameter along z into a half-space.
 Case hole(double diameter_mm, double deep_mm, double pitch_mm = 0.5) {
-  return osteon::test::make_bone({Vec3(-14, -14, -3), Vec3(14, 14, 20)}, pitch_mm, [=](const Vec3& p) {
-    const double in_hole = std::max(std::hypot(p.x(), p.y()) - 0.5 * diameter_mm, p.z() - deep_mm);
-    return std::max(-p.z(), -in_hole);
-  }, dense);
+  return osteon::test::make_bone(
+      {Vec3(-14, -14, -3), Vec3(14, 14, 20)}, pitch_mm,
+      [=](const Vec3& p) {
+        const double in_hole = std::max(std::hypot(p.x(), p.y()) - 0.5 * diameter_mm, p.z() - deep_mm);
+        return std::max(-p.z(), -in_hole);
+      },
+      dense);
 }
 
 // ---- walls
@@ -123,8 +132,9 @@ TEST_P(ThinWall, IsNeverTunnelled) {
     }
   EXPECT_EQ(stage.allocations_, 0);
 }
-INSTANTIATE_TEST_SUITE_P(All, ThinWall, ::testing::Values(WallCase{"drill-3.2", 0.5, 0.25}, WallCase{"drill-3.2", 2.0, 0.5},
-                                                          WallCase{"burr-round-5", 0.5, 0.25}, WallCase{"end-drill", 1.0, 0.5}));
+INSTANTIATE_TEST_SUITE_P(All, ThinWall,
+                         ::testing::Values(WallCase{"drill-3.2", 0.5, 0.25}, WallCase{"drill-3.2", 2.0, 0.5},
+                                           WallCase{"burr-round-5", 0.5, 0.25}, WallCase{"end-drill", 1.0, 0.5}));
 
 // A shank that is swung through a wall stops on it.
 TEST(SwungShank, StopsAtAWall) {
@@ -148,8 +158,8 @@ TEST(SwungShank, StopsAtAWall) {
 
 // The wall is so thin that the shank would be beyond it within a tick, while its tip stays where it is.
 TEST(SwungShank, IsNeverTakenThroughAThinWall) {
-  const Case plate = osteon::test::make_bone({Vec3(-8, -8, -30), Vec3(12, 8, 4)}, 0.25,
-                                             [](const Vec3& p) { return std::abs(p.x() - 3.0) - 0.25; }, dense);
+  const Case plate = osteon::test::make_bone(
+      {Vec3(-8, -8, -30), Vec3(12, 8, 4)}, 0.25, [](const Vec3& p) { return std::abs(p.x() - 3.0) - 0.25; }, dense);
   Stage stage(plate, "drill-3.2");
   for (const double speed : {20.0, 500.0, 5000.0, 100000.0}) {
     stage.place(straight(0, 0, 0));
@@ -175,7 +185,8 @@ TEST(PegInHole, ANarrowerOneCannotBeEntered) {
     double deepest = 0.0;
     for (int i = 0; i < 1500; ++i) {
       const double turn = 0.01 * i, rock = 6.0 * kDegree * std::sin(0.023 * i);
-      stage.device_ = tilted({0.6 * std::cos(turn), 0.6 * std::sin(turn), 3.0}, Vec3(std::cos(turn), std::sin(turn), 0), rock);
+      stage.device_ =
+          tilted({0.6 * std::cos(turn), 0.6 * std::sin(turn), 3.0}, Vec3(std::cos(turn), std::sin(turn), 0), rock);
       stage.tick();
       const Vec3 middle_of_end = stage.proxy_.pose().position_mm;
       deepest = std::max(deepest, middle_of_end.z());
@@ -272,8 +283,10 @@ TEST(Torque, IsSymmetricOverAnEdge) {
   double lean[2], force_n = 0.0;
   for (const int side : {0, 1}) {
     const double s = side ? -1.0 : 1.0;
-    Stage stage(osteon::test::make_bone({Vec3(-14, -14, -3), Vec3(14, 14, 8)}, 0.5,
-                                        [=](const Vec3& p) { return std::max(-p.z(), s * p.x() + 2.0); }, dense), "end-drill");
+    Stage stage(osteon::test::make_bone(
+                    {Vec3(-14, -14, -3), Vec3(14, 14, 8)}, 0.5,
+                    [=](const Vec3& p) { return std::max(-p.z(), s * p.x() + 2.0); }, dense),
+                "end-drill");
     stage.place(straight(0, 0, -1));
     const ProxyStep step = stage.lead(straight(0, 0, 0.6), 20, 600);
     torque[side] = step.contact_torque_nmm;
@@ -284,7 +297,8 @@ TEST(Torque, IsSymmetricOverAnEdge) {
     EXPECT_GT(s * arm, -4.75);
     EXPECT_LT(s * arm, -1.5);
   }
-  std::printf("  torque over an edge %.1f and %.1f N mm, lean %.4f and %.4f\n", torque[0].y(), torque[1].y(), lean[0], lean[1]);
+  std::printf("  torque over an edge %.1f and %.1f N mm, lean %.4f and %.4f\n", torque[0].y(), torque[1].y(), lean[0],
+              lean[1]);
   EXPECT_GT(std::abs(torque[0].y()), 20.0);
   // Its points lie half a millimetre apart and not as in a mirror, so the arm of either side is known to half of that.
   constexpr double kArm_mm = 0.27;
@@ -302,7 +316,8 @@ TEST(Torque, IsTheArmTimesTheForce) {
   const Pose& pose = stage.proxy_.pose();
   const Vec3 arm = pose.direction(Vec3(0, 0, -2.5)) + 2.5 * Vec3::UnitZ();
   const Vec3 expected = arm.cross(stage.force_n());
-  std::printf("  torque of a ball held aslant %.1f N mm, arm times force %.1f\n", step.contact_torque_nmm.y(), expected.y());
+  std::printf("  torque of a ball held aslant %.1f N mm, arm times force %.1f\n", step.contact_torque_nmm.y(),
+              expected.y());
   // Its points are 0.37 mm apart, so the arm is known to half of that.
   EXPECT_NEAR((step.contact_torque_nmm - expected).norm(), 0.0, 0.19 * stage.force_n().norm());
   // It leans the way that it is pushed.
@@ -451,7 +466,8 @@ TEST(Skiving, ThePointSlidesDownASlopeUntilItBites) {
     });
     EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << slope;
     EXPECT_LT(sunk_mm, 1.5) << slope;  // the hand's 29 N on K_c of 50 N/mm are 0.58
-    std::printf("  slope %.0f degrees: the tip drifts %.3f mm downhill at most, %.3f mm at the end\n", slope, drifted, at_end);
+    std::printf("  slope %.0f degrees: the tip drifts %.3f mm downhill at most, %.3f mm at the end\n", slope, drifted,
+                at_end);
     drift[i++] = drifted;
   }
   EXPECT_LT(drift[0], 0.05);

@@ -15,7 +15,8 @@ TEST(RateControl, TheSameWayWhateverTheStep) {
     RateControl rate(params);
     for (int i = 0; i < steps; ++i) rate.step(full, 1.0 / steps);
     EXPECT_NEAR((rate.pose().position_mm - Vec3(60, 0, 0)).norm(), 0.0, 1e-9);
-    EXPECT_NEAR(rate.pose().rotation.angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Vec3::UnitZ()))), 0.0, 1e-9);
+    EXPECT_NEAR(rate.pose().rotation.angularDistance(Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Vec3::UnitZ()))), 0.0,
+                1e-9);
   }
 }
 

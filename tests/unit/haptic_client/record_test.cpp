@@ -157,7 +157,8 @@ TEST(Recording, IsOfOneBoneToolAndPlan) {
   };
   using testing::HasSubstr;
   EXPECT_THAT(said(std::string(64, 'd'), tools, info.plan_digest), HasSubstr("a.h5 is of another bone, \"block\""));
-  EXPECT_THAT(said(info.case_hash, {"drill-3.2"}, info.plan_digest), HasSubstr("drill-3.2, burr-round-5, not with drill-3.2"));
+  EXPECT_THAT(said(info.case_hash, {"drill-3.2"}, info.plan_digest),
+              HasSubstr("drill-3.2, burr-round-5, not with drill-3.2"));
   EXPECT_THAT(said(info.case_hash, {"burr-round-5", "drill-3.2"}, info.plan_digest), HasSubstr("--plan or --tool"));
   EXPECT_THAT(said(info.case_hash, tools, std::string(64, 'q')), HasSubstr("another plan"));
 }
@@ -180,11 +181,14 @@ TEST(Recording, BeganOnBoneInOneState) {
   EXPECT_TRUE(check_played_on(**recorded, uncut));
   const Result<void> refused = check_played_on(**recorded, cut);
   ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().message, testing::HasSubstr("a.h5 began on bone in another state (field aaaaaaaaaaaa) than the "
-                                                          "room's (field bbbbbbbbbbbb); start osteon-server anew"));
-  const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
-                           "assert f['metadata/field_hash_at_start'].attrs['meaning']\n"
-                           "del f['metadata/field_hash_at_start']\nf.close()", temp / "a.h5");
+  EXPECT_THAT(refused.error().message,
+              testing::HasSubstr("a.h5 began on bone in another state (field aaaaaaaaaaaa) than the "
+                                 "room's (field bbbbbbbbbbbb); start osteon-server anew"));
+  const auto done = python(
+      "import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
+      "assert f['metadata/field_hash_at_start'].attrs['meaning']\n"
+      "del f['metadata/field_hash_at_start']\nf.close()",
+      temp / "a.h5");
   ASSERT_EQ(done.exit_code, 0) << done.err;
   const auto old = make_recorded_device(temp / "a.h5");
   ASSERT_TRUE(old) << old.error().message;
@@ -202,8 +206,10 @@ TEST(Recording, SaysWhetherItsRoomWasLost) {
     const TickRow one = row(0);
     ASSERT_TRUE(recording->append({&one, 1}));
     ASSERT_TRUE(recording->finish({std::string(64, 'f'), 321, 0, lost}));
-    const auto read = python("import sys, h5py; f = h5py.File(sys.argv[1], 'r'); "
-                             "print(f['metadata/finished'][()], f['metadata/room_seq'][()])", file);
+    const auto read = python(
+        "import sys, h5py; f = h5py.File(sys.argv[1], 'r'); "
+        "print(f['metadata/finished'][()], f['metadata/room_seq'][()])",
+        file);
     EXPECT_EQ(read.out, lost ? "0 321\n" : "1 321\n") << read.err;
   }
 }
@@ -244,8 +250,10 @@ TEST(Recording, OfABoneThatStoodMovesNone) {
     ASSERT_TRUE(recording->finish({}));
   }
   write_rows(temp / "old.h5", 3);
-  const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
-                           "del f['high_frequency_poses/bone_pose']\nf.close()", temp / "old.h5");
+  const auto done = python(
+      "import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
+      "del f['high_frequency_poses/bone_pose']\nf.close()",
+      temp / "old.h5");
   ASSERT_EQ(done.exit_code, 0) << done.err;
   for (const char* name : {"stood.h5", "old.h5"}) {
     const auto device = make_recorded_device(temp / name);
@@ -259,8 +267,10 @@ TEST(Recording, OfABoneThatStoodMovesNone) {
 TEST(Recording, RefusesAPlaceOfTheBoneThatIsNone) {
   const TempDir temp;
   write_rows(temp / "a.h5", 3);
-  const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\nf['high_frequency_poses/bone_pose/pose'][1] = 0\n"
-                           "f.close()", temp / "a.h5");
+  const auto done = python(
+      "import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\nf['high_frequency_poses/bone_pose/pose'][1] = 0\n"
+      "f.close()",
+      temp / "a.h5");
   ASSERT_EQ(done.exit_code, 0) << done.err;
   const auto session = read_recording(temp / "a.h5");
   ASSERT_FALSE(session);
@@ -340,7 +350,8 @@ print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i,
   double got[5], want[5];
   ASSERT_EQ(std::sscanf(read.out.c_str(), "%lf,%lf,%lf,%lf,%lf", &got[0], &got[1], &got[2], &got[3], &got[4]), 5);
   ASSERT_EQ(std::sscanf(expected, "%lf,%lf,%lf,%lf,%lf", &want[0], &want[1], &want[2], &want[3], &want[4]), 5);
-  for (int i = 0; i < 5; ++i) EXPECT_NEAR(got[i], want[i], i < 2 ? 1e-6 : 4e-6) << i;  // poses are doubles, forces floats
+  for (int i = 0; i < 5; ++i)
+    EXPECT_NEAR(got[i], want[i], i < 2 ? 1e-6 : 4e-6) << i;  // poses are doubles, forces floats
 }
 
 // What the loop would have shown on a stronger device is shown by no motor: neither recording nor log says that it was.
@@ -367,9 +378,11 @@ TEST(Recording, ADeviceWithoutMotorsShowsNothing) {
     ASSERT_TRUE(lines.open(log, info.device_info));
     lines.write(one, "drill-3.2");
     ASSERT_TRUE(lines.finish());
-    const auto read = python("import sys, csv, h5py; f = h5py.File(sys.argv[1], 'r'); g = f['drill_force_feedback']\n"
-                             "log = next(csv.DictReader(open(sys.argv[1][:-2] + 'csv')))\n"
-                             "print(g['wrench'][0].tolist(), g['motor_force'][0, 0], float(log['force_rendered_n']))", file);
+    const auto read = python(
+        "import sys, csv, h5py; f = h5py.File(sys.argv[1], 'r'); g = f['drill_force_feedback']\n"
+        "log = next(csv.DictReader(open(sys.argv[1][:-2] + 'csv')))\n"
+        "print(g['wrench'][0].tolist(), g['motor_force'][0, 0], float(log['force_rendered_n']))",
+        file);
     EXPECT_EQ(read.out, device.torque_axes  ? "[1.0, 2.0, 2.0, 4.0, 5.0, 6.0] 0.5 3.0\n"
                         : device.force_axes ? "[1.0, 2.0, 2.0, 0.0, 0.0, 0.0] 0.5 3.0\n"
                                             : "[0.0, 0.0, 0.0, 0.0, 0.0, 0.0] 0.0 0.0\n")
@@ -461,8 +474,8 @@ TEST(RangeWatch, TellsOfEachLawOnce) {
   EXPECT_EQ(uses[1].ticks, 300u);
 }
 
-// A cone that enters is outside for less than 0.2 s: nothing is said, however many holes follow, but each tick is counted. What
-// is outside two ticks of three is not missed: it gains one tick in three.
+// A cone that enters is outside for less than 0.2 s: nothing is said, however many holes follow, but each tick is
+// counted. What is outside two ticks of three is not missed: it gains one tick in three.
 TEST(RangeWatch, TellsOnlyOfWhatLasts) {
   const ToolModel drill(*find_tool("drill-3.2"), 0.5);
   RangeTicks holes;
@@ -481,7 +494,8 @@ TEST(RangeWatch, TellsOnlyOfWhatLasts) {
   EXPECT_NEAR(told_after, 600, 6);
 }
 
-// A surgeon's drill that enters cortical bone is worth no word; a rig that feeds it more slowly than the law was made for is.
+// A surgeon's drill that enters cortical bone is worth no word; a rig that feeds it more slowly than the law was made
+// for is.
 TEST(RangeWatch, SaysNothingOfAnEnteringDrill) {
   PlanStep hole = straight_down("drill-3.2");
   hole.to_mm = 4.0;
@@ -623,8 +637,8 @@ TEST(Recording, AFullDiskIsSaidInASentenceAndLeavesWhatWasWritten) {
         appended = recording->append({&one, 1});
       }
       ASSERT_FALSE(appended);
-      EXPECT_EQ(appended.error().message,
-                "the recording " + (temp / "a.h5").string() + " cannot be continued: the disk is full (File too large)");
+      EXPECT_EQ(appended.error().message, "the recording " + (temp / "a.h5").string() +
+                                              " cannot be continued: the disk is full (File too large)");
       fitted = recording->rows_written();
     }
     const auto session = read_recording(temp / "a.h5");
@@ -649,10 +663,12 @@ TEST(Recording, LeavesALittleOfTheDisk) {
     }
     ASSERT_FALSE(appended);
     EXPECT_EQ(i, RecordFile::kChunkRows);
-    EXPECT_EQ(appended.error().message, "the recording " + (temp / "a.h5").string() + " ends here: the disk is all but full");
+    EXPECT_EQ(appended.error().message,
+              "the recording " + (temp / "a.h5").string() + " ends here: the disk is all but full");
   }
   const auto read = python(
-      "import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and f['metadata/finished'][()] == 0",
+      "import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and "
+      "f['metadata/finished'][()] == 0",
       temp / "a.h5");
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
@@ -713,7 +729,8 @@ class WrongFile : public ::testing::Test {
   // A good recording after Python has done something to it as `f`.
   void spoil(const std::string& how) {
     write_rows(temp_ / "a.h5", 600);
-    const auto done = python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n" + how + "\nf.close()", temp_ / "a.h5");
+    const auto done =
+        python("import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n" + how + "\nf.close()", temp_ / "a.h5");
     ASSERT_EQ(done.exit_code, 0) << done.err;
   }
   TempDir temp_;
@@ -730,7 +747,8 @@ TEST_F(WrongFile, IsNoHdf5) {
 }
 TEST_F(WrongFile, IsOfAnotherProgram) {
   const auto made =
-      python("import sys, h5py\nf = h5py.File(sys.argv[1], 'w')\nf['drill_force_feedback/wrench'] = [[0.0] * 6]", temp_ / "a.h5");
+      python("import sys, h5py\nf = h5py.File(sys.argv[1], 'w')\nf['drill_force_feedback/wrench'] = [[0.0] * 6]",
+             temp_ / "a.h5");
   ASSERT_EQ(made.exit_code, 0) << made.err;
   expect(ErrorCode::invalid_input, "no recording of Osteon");
 }

@@ -105,7 +105,8 @@ Session replay(const Case& bone, const std::vector<PlanStep>& plan, const std::f
 TEST(Replay, MakesTheSameCutsAndForces) {
   const osteon::test::TempDir temp;
   const Case bone = block_case(16.0);
-  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}), burr(), drill(HandKind::rig, {3.4, 4.2, 0})};
+  const std::vector<PlanStep> plan{drill(HandKind::expert, {3.1, -0.2, 0}), burr(),
+                                   drill(HandKind::rig, {3.4, 4.2, 0})};
   for (const char* name : {"simulated", "simulated-3.3N"}) {
     const Session made = record(bone, plan, *find_simulated_device(name), temp / "a.h5");
     const Session again = replay(bone, plan, temp / "a.h5");
@@ -113,12 +114,13 @@ TEST(Replay, MakesTheSameCutsAndForces) {
     EXPECT_EQ(again.cuts, made.cuts) << name;
     EXPECT_EQ(again.forces, made.forces) << name;
     EXPECT_GT(made.cuts.size(), 500u);
-    std::printf("  %s: %zu ticks, %zu cuts, field %.12s\n", name, made.forces.size(), made.cuts.size(), made.field_hash.c_str());
+    std::printf("  %s: %zu ticks, %zu cuts, field %.12s\n", name, made.forces.size(), made.cuts.size(),
+                made.field_hash.c_str());
   }
 }
 
-// A bone that swayed on its mount sways again, also where it is played on bone that stands: tools are taken up, felt and cut
-// with where the bone then was.
+// A bone that swayed on its mount sways again, also where it is played on bone that stands: tools are taken up, felt
+// and cut with where the bone then was.
 TEST(Replay, MovesTheBoneAsItMoved) {
   const osteon::test::TempDir temp;
   const Case bone = block_case(16.0);

@@ -59,30 +59,38 @@ struct Heard {
   std::vector<std::string> events;
   std::vector<std::uint64_t> decided, partners, places;
   int free = 0;  // times that a stream began with nothing decided about this hand
-  SessionReader reader{AuthorId{7}, builtin_tool_box(),
-                       {.complete = [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
-                        .committed = [this](RoomSeq place, const Cut& cut) {
-                          events.push_back(std::to_string(place.value) + " of " + std::to_string(cut.author.value));
-                        },
-                        .rejected = [this](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
-                          events.push_back(std::to_string(place.value) + " rejects " + std::to_string(seq) + " until " +
-                                           std::to_string(lease) + ": " + why);
-                        },
-                        .scene = [this](RoomSeq place, const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); },
-                        .supervised = [this](const HandSupervised& now) {
-                          if (now.place.value == 0 && now.supervision == Restrictions{}) return ++free;
-                          events.push_back(std::to_string(now.place.value) + (now.supervision.stopped ? " stops" : " frees") + " until " +
-                                           std::to_string(now.lease_epoch) + now.supervision.words);
-                          return free;
-                        },
-                        .said = [this](const WordsSaid& said) {
-                          events.push_back(std::to_string(said.place.value) + ": " + std::to_string(said.from.value) + " says " + said.words);
-                        },
-                        .partner = [this](const CuttingState& state) {
-                          partners.push_back(100 * state.author.value + state.state_seq);
-                        },
-                        .bone = [this](const MountPose& seen) { places.push_back(seen.seen_seq); }},
-                       [this](std::uint64_t seq) { decided.push_back(seq); }, [this](std::uint64_t seq) { decided.push_back(seq); }};
+  SessionReader reader{
+      AuthorId{7},
+      builtin_tool_box(),
+      {.complete =
+           [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
+       .committed =
+           [this](RoomSeq place, const Cut& cut) {
+             events.push_back(std::to_string(place.value) + " of " + std::to_string(cut.author.value));
+           },
+       .rejected =
+           [this](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
+             events.push_back(std::to_string(place.value) + " rejects " + std::to_string(seq) + " until " +
+                              std::to_string(lease) + ": " + why);
+           },
+       .scene = [this](RoomSeq place,
+                       const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); },
+       .supervised =
+           [this](const HandSupervised& now) {
+             if (now.place.value == 0 && now.supervision == Restrictions{}) return ++free;
+             events.push_back(std::to_string(now.place.value) + (now.supervision.stopped ? " stops" : " frees") +
+                              " until " + std::to_string(now.lease_epoch) + now.supervision.words);
+             return free;
+           },
+       .said =
+           [this](const WordsSaid& said) {
+             events.push_back(std::to_string(said.place.value) + ": " + std::to_string(said.from.value) + " says " +
+                              said.words);
+           },
+       .partner = [this](const CuttingState& state) { partners.push_back(100 * state.author.value + state.state_seq); },
+       .bone = [this](const MountPose& seen) { places.push_back(seen.seen_seq); }},
+      [this](std::uint64_t seq) { decided.push_back(seq); },
+      [this](std::uint64_t seq) { decided.push_back(seq); }};
 };
 
 v1::SessionResponse row(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
@@ -93,7 +101,8 @@ v1::SessionResponse row(std::uint64_t index, std::uint64_t place, std::uint64_t 
   return response;
 }
 wire::IndexedRow fast(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
-  return {index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::committed, .cut = cut_of(author, author_seq)}};
+  return {index,
+          {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::committed, .cut = cut_of(author, author_seq)}};
 }
 
 TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
@@ -109,16 +118,22 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   ASSERT_TRUE(heard.reader.take(row(2, 11, 7, 6)));  // again, over the stream
   ASSERT_TRUE(heard.reader.take(fast(1, 10, 2, 1)));
   // A change of the scene comes over the stream alone; what the fast path has after it waits.
-  ASSERT_TRUE(heard.reader.take(wire::IndexedRow{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionRowKind::streamed}}));
-  ASSERT_TRUE(heard.reader.take(wire::IndexedRow{4, {.room_seq = RoomSeq{13}, .kind = wire::SessionRowKind::rejected, .author_seq = 7,
-                                                     .reason = static_cast<std::uint32_t>(Rejection::place), .lease_epoch = 14}}));
+  ASSERT_TRUE(
+      heard.reader.take(wire::IndexedRow{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionRowKind::streamed}}));
+  ASSERT_TRUE(heard.reader.take(wire::IndexedRow{4,
+                                                 {.room_seq = RoomSeq{13},
+                                                  .kind = wire::SessionRowKind::rejected,
+                                                  .author_seq = 7,
+                                                  .reason = static_cast<std::uint32_t>(Rejection::place),
+                                                  .lease_epoch = 14}}));
   EXPECT_EQ(heard.reader.taken(), 2u);
   v1::SessionResponse scene;
   scene.set_index(3);
   scene.mutable_scene()->set_room_seq(12);
   ASSERT_TRUE(heard.reader.take(scene));
-  EXPECT_EQ(heard.events, (std::vector<std::string>{"complete 3", "10 of 2", "11 of 7", "scene 12",
-                                                    "13 rejects 7 until 14: the path leaves the surroundings of the bone"}));
+  EXPECT_EQ(heard.events,
+            (std::vector<std::string>{"complete 3", "10 of 2", "11 of 7", "scene 12",
+                                      "13 rejects 7 until 14: the path leaves the surroundings of the bone"}));
   EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{5, 6, 7}));
   EXPECT_EQ(heard.reader.taken(), 4u);
 }
@@ -126,8 +141,9 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
 // Where the room has put the cuts that a rejoin confirms; what it does not say stays unknown.
 TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
   std::optional<RoomAtJoin> told;
-  SessionReader reader(AuthorId{7}, builtin_tool_box(), {.complete = [&](const RoomAtJoin& room) { told = room; }},
-                       [](std::uint64_t) {}, [](std::uint64_t) {});
+  SessionReader reader(
+      AuthorId{7}, builtin_tool_box(), {.complete = [&](const RoomAtJoin& room) { told = room; }}, [](std::uint64_t) {},
+      [](std::uint64_t) {});
   v1::SessionResponse complete;
   complete.mutable_complete()->set_room_seq(30);
   complete.mutable_complete()->set_decided_author_seq(5);
@@ -144,7 +160,8 @@ TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
 }
 
 wire::IndexedRow word(std::uint64_t index, std::uint64_t place, bool stopped) {
-  wire::IndexedRow row{index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::supervised, .lease_epoch = place + 1}};
+  wire::IndexedRow row{
+      index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::supervised, .lease_epoch = place + 1}};
   row.row.supervision.stopped = stopped;
   return row;
 }
@@ -173,11 +190,13 @@ TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
   said.mutable_said()->set_from(4);
   said.mutable_said()->set_words("look here");
   ASSERT_TRUE(heard.reader.take(said));
-  EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 7", "11 stops until 12", "12: 4 says look here", "13 frees until 14"}));
+  EXPECT_EQ(heard.events,
+            (std::vector<std::string>{"10 of 7", "11 stops until 12", "12: 4 says look here", "13 frees until 14"}));
   EXPECT_EQ(heard.reader.place(), RoomSeq{13});
 }
 
-// What held when the stream began is said before its leaves are complete; where nothing is said, nothing holds any more.
+// What held when the stream began is said before its leaves are complete; where nothing is said, nothing holds any
+// more.
 TEST(SessionReader, EveryStreamSaysWhatHoldsForTheHand) {
   Heard heard;
   v1::SessionResponse complete;
@@ -230,8 +249,8 @@ TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
   EXPECT_EQ(heard.places.size(), 1u);
 }
 
-// A server that was killed may have lost what an earlier one told: of its order, nothing has been heard yet. What was said to
-// be kept is what shows the loss.
+// A server that was killed may have lost what an earlier one told: of its order, nothing has been heard yet. What was
+// said to be kept is what shows the loss.
 TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
   Heard heard;
   heard.reader.begin();
@@ -268,7 +287,8 @@ TEST(SessionReader, BeginsAnewWithEachStream) {
   EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 2", "13 of 2"}));
 }
 
-// The first outcome of a cut that was sent again: it was told before, or is in the leaves, where an undo may have come since.
+// The first outcome of a cut that was sent again: it was told before, or is in the leaves, where an undo may have come
+// since.
 TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
   Heard heard;
   heard.reader.begin();

@@ -1,5 +1,5 @@
-// A short run of what tests/perf measures over a million ticks: the coupling gives the hand nothing that it did not get, on
-// devices of three axes and of six.
+// A short run of what tests/perf measures over a million ticks: the coupling gives the hand nothing that it did not
+// get, on devices of three axes and of six.
 #include "tests/support/stability/stability.hpp"
 
 #include <gtest/gtest.h>
@@ -19,20 +19,22 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   run.ticks = 40'000;  // rig and hand on a strong device and on a weak one
   const StabilityResult r = run_stability(run);
   std::printf(
-      "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still %.3f N, "
+      "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still "
+      "%.3f N, "
       "falls %.2f N; "
-      "motor %.2f N; uncovered %lld, held back %lld, returned %lld; %lld of %lld cutting ticks pushed back, %.4f mJ at most\n",
+      "motor %.2f N; uncovered %lld, held back %lld, returned %lld; %lld of %lld cutting ticks pushed back, %.4f mJ at "
+      "most\n",
       name(run.scene), run.delay_ms, static_cast<unsigned long long>(r.episodes), r.generated_mj, r.worst_mj, r.net_mj,
       r.cutting_mj, r.step_over_n, r.still_step_n, r.fall_n, r.motor_most_n, static_cast<long long>(r.uncovered),
       static_cast<long long>(r.held_back), static_cast<long long>(r.returned), static_cast<long long>(r.pushed_back),
       static_cast<long long>(r.cutting), r.pushed_back_most_mj);
   if (run.six_axes)
-    std::printf("    and torque: %.1f mJ put in by turning, %.0f N mm at most, of the cut %.1f; slew limited %lld\n", r.turned_mj,
-                r.torque_most_nmm, r.cut_most_nmm, static_cast<long long>(r.slew_limited));
+    std::printf("    and torque: %.1f mJ put in by turning, %.0f N mm at most, of the cut %.1f; slew limited %lld\n",
+                r.turned_mj, r.torque_most_nmm, r.cut_most_nmm, static_cast<long long>(r.slew_limited));
   EXPECT_LE(r.worst_mj, 0.01);
   EXPECT_LE(r.generated_mj, 1.0);
-  // So by construction: a tick that would be otherwise is made rubbing. What counts is that those are few, so that means over
-  // cutting ticks hold to a hundredth.
+  // So by construction: a tick that would be otherwise is made rubbing. What counts is that those are few, so that
+  // means over cutting ticks hold to a hundredth.
   EXPECT_GE(r.least_cutting_n_mm, 0.0);
   EXPECT_LE(r.pushed_back, r.cutting / 100);
   EXPECT_LE(r.step_over_n, 1e-9);
@@ -71,7 +73,8 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, Stability,
-                         ::testing::Combine(::testing::Range(0, kStabilityScenes), ::testing::Values(0, 100), ::testing::Bool()));
+                         ::testing::Combine(::testing::Range(0, kStabilityScenes), ::testing::Values(0, 100),
+                                            ::testing::Bool()));
 
 }  // namespace
 }  // namespace osteon::test

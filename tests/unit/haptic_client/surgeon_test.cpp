@@ -81,8 +81,8 @@ TEST(Surgeon, SaysHowDeepAStepIsToCome) {
   EXPECT_NEAR(ready->steps[2].asked_mm(), 2.0 - 2.5 * (1.0 - std::cos(std::numbers::pi / 6.0)), 0.05);
 }
 
-// A window hardly wider than the bur is a place, or a few close together: the hand is given the time to follow there, and
-// what is gone is at least the cap of the bur's sphere as deep as it came.
+// A window hardly wider than the bur is a place, or a few close together: the hand is given the time to follow there,
+// and what is gone is at least the cap of the bur's sphere as deep as it came.
 TEST(Surgeon, BursASmallWindowAsDeepAsAsked) {
   for (const double window_mm : {2.0, 4.0, 5.5, 6.0})
     for (const double deep_mm : {1.0, 2.0}) {
@@ -94,7 +94,8 @@ TEST(Surgeon, BursASmallWindowAsDeepAsAsked) {
       bench.run();
       const StepResult& result = bench.session().results()[0];
       const double asked_mm = bench.session().plan().steps[0].asked_mm();
-      std::printf("  window of %.1f mm: %.2f of %.2f mm in %.1f s\n", window_mm, result.deepest_mm, asked_mm, result.duration_s);
+      std::printf("  window of %.1f mm: %.2f of %.2f mm in %.1f s\n", window_mm, result.deepest_mm, asked_mm,
+                  result.duration_s);
       EXPECT_TRUE(result.completed) << window_mm;
       EXPECT_GE(result.deepest_mm, 0.9 * asked_mm) << window_mm;
       const double sphere_mm = 2.5, cap_mm = result.deepest_mm + sphere_mm * (1.0 - std::cos(std::numbers::pi / 6.0));
@@ -154,7 +155,8 @@ TEST(Plan, HasADigestOfItsOwn) {
                    }),
             own);
   const auto by_hand = [&](const char* view) {
-    return to_hex(plan_digest(*make_free_hand({.tool = "drill-3.2", .toward = *read_view(view), .at_mm = Vec3(0, 0, 0)}, bone)));
+    return to_hex(
+        plan_digest(*make_free_hand({.tool = "drill-3.2", .toward = *read_view(view), .at_mm = Vec3(0, 0, 0)}, bone)));
   };
   EXPECT_EQ(by_hand("top"), by_hand("top"));
   EXPECT_NE(by_hand("top"), by_hand("bottom"));

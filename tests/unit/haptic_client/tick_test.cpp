@@ -1,4 +1,5 @@
-// What must not depend on how time and space are cut up, and the spindle in bone: it stalls under the hand and turns again.
+// What must not depend on how time and space are cut up, and the spindle in bone: it stalls under the hand and turns
+// again.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -35,8 +36,8 @@ TEST(Ticks, NeitherTheirRateNorThePitchIsFelt) {
   }
 }
 
-// A loop that comes late shows no force for some milliseconds, and the hand goes on. When it is over the coupling is what the
-// hand pays for again: drilling goes on as fast as before, and the force is the hand's.
+// A loop that comes late shows no force for some milliseconds, and the hand goes on. When it is over the coupling is
+// what the hand pays for again: drilling goes on as fast as before, and the force is the hand's.
 TEST(Ticks, AStallIsOverWhenItIsOver) {
   Bench bench(block_case(), {straight_down("drill-3.2")});
   int ticks = 0, stalls = 0;
@@ -61,8 +62,9 @@ TEST(Ticks, AStallIsOverWhenItIsOver) {
   EXPECT_NEAR(result.plunge_mm, 6.0, 0.15 * 6.0);
 }
 
-// A motor of 5 N mm, an eightieth of a drill's, under a hand that pushes for 27: it stands in the bone, nothing advances; drawn
-// back it turns again. A sharp, clean drill's own motor never stalls under a hand; a bur's does, see the tools' effects.
+// A motor of 5 N mm, an eightieth of a drill's, under a hand that pushes for 27: it stands in the bone, nothing
+// advances; drawn back it turns again. A sharp, clean drill's own motor never stalls under a hand; a bur's does, see
+// the tools' effects.
 TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   const Case bone = block_case();
   ReadyPlan plan = *make_ready({straight_down("drill-3.2")}, bone);
@@ -86,8 +88,8 @@ TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
     last_mm = r.pose_bone_proxy.position_mm.z();
     if (tick.order.phase == SurgeonPhase::retract) again_rpm = std::max(again_rpm, r.spindle_rpm);
   });
-  EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm << " N mm, "
-                           << last_mm << " mm";
+  EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm
+                           << " N mm, " << last_mm << " mm";
   EXPECT_NEAR(pushed_n, 29.0, 3.0);
   EXPECT_LT(advanced_mm, 0.2);  // all ways of a minute, both ways, added
   EXPECT_GT(again_rpm, 60.0);

@@ -23,8 +23,8 @@ Case slab(double deep_mm, double density_g_cm3, double pitch_mm = 0.5, double wi
   const auto surface = [=](const Vec3& p) {
     return std::max({-p.z(), p.z() - deep_mm, std::abs(p.x()) - half, std::abs(p.y()) - half});
   };
-  return osteon::test::make_bone({Vec3(-half - 3, -half - 3, -3), Vec3(half + 3, half + 3, deep_mm + 3)}, pitch_mm, surface,
-                                 [=](const Vec3&) { return density_g_cm3; });
+  return osteon::test::make_bone({Vec3(-half - 3, -half - 3, -3), Vec3(half + 3, half + 3, deep_mm + 3)}, pitch_mm,
+                                 surface, [=](const Vec3&) { return density_g_cm3; });
 }
 
 // A machine holds the handle exactly where it is told, over the tool's axis.
@@ -67,7 +67,8 @@ class Rig {
     const int ticks = static_cast<int>(1000 * seconds);
     std::vector<LoopReport> reports;
     for (int i = 1; i <= ticks; ++i) {
-      input_.pose_device_tool.rotation = from * Eigen::Quaterniond(Eigen::AngleAxisd(by_rad.norm() * i / ticks, by_rad.normalized()));
+      input_.pose_device_tool.rotation =
+          from * Eigen::Quaterniond(Eigen::AngleAxisd(by_rad.norm() * i / ticks, by_rad.normalized()));
       reports.push_back(tick());
     }
     return reports;
@@ -127,8 +128,10 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   const Tool drill = *find_tool("drill-3.2");
   LoopParams params;
   params.peak_n = 200.0;
-  const struct { const char* law; double newtons; } kLaws[] = {
-      {nullptr, 28.9}, {"chi", 28.9}, {"allotta", 53.5}, {"spring-damper", 29.0}, {"multi-point", 28.9}};
+  const struct {
+    const char* law;
+    double newtons;
+  } kLaws[] = {{nullptr, 28.9}, {"chi", 28.9}, {"allotta", 53.5}, {"spring-damper", 29.0}, {"multi-point", 28.9}};
   for (const auto& chosen : kLaws) {
     Rig rig(slab(12.0, 1.9), drill, params, chosen.law);
     // The coupling's stretch settles within some force / K_c / feed, a second.
@@ -139,20 +142,24 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   }
 }
 
-// Chi's law was made for 0.3 to 2.0 g/cm3 and 0.5 to 3 mm/s: every tick that cuts says what it is outside of, others nothing.
+// Chi's law was made for 0.3 to 2.0 g/cm3 and 0.5 to 3 mm/s: every tick that cuts says what it is outside of, others
+// nothing.
 TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
   const Tool drill = *find_tool("drill-3.2");
-  const struct { double density, feed; unsigned outside; } kMoments[] = {
-      {1.9, 1.0, 0u},
-      {0.2, 1.0, static_cast<unsigned>(OutOfRange::density)},
-      {0.6, 5.0, static_cast<unsigned>(OutOfRange::feed)},
-      {0.2, 5.0, static_cast<unsigned>(OutOfRange::density) | static_cast<unsigned>(OutOfRange::feed)}};
+  const struct {
+    double density, feed;
+    unsigned outside;
+  } kMoments[] = {{1.9, 1.0, 0u},
+                  {0.2, 1.0, static_cast<unsigned>(OutOfRange::density)},
+                  {0.6, 5.0, static_cast<unsigned>(OutOfRange::feed)},
+                  {0.2, 5.0, static_cast<unsigned>(OutOfRange::density) | static_cast<unsigned>(OutOfRange::feed)}};
   for (const auto& moment : kMoments) {
     Rig rig(slab(12.0, moment.density), drill);
     int cutting = 0;
     for (const LoopReport& r : rig.move({0, 0, 9.0}, 9.0 / moment.feed)) {
       const double z = r.pose_bone_proxy.position_mm.z();
-      if (r.phase != CuttingPhase::cutting) EXPECT_EQ(r.out_of_range, 0u);
+      if (r.phase != CuttingPhase::cutting)
+        EXPECT_EQ(r.out_of_range, 0u);
       else if (z > 5.0 && z < 7.0) {
         ++cutting;
         EXPECT_EQ(r.out_of_range, moment.outside) << moment.density << " g/cm3, " << r.feed_mm_per_s << " mm/s";
@@ -162,13 +169,15 @@ TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
   }
 }
 
-// A bar 10 mm wide under a blade of 19 mm with 14 teeth: 10 / (19/14) teeth are in it, 0.15 of which bear; each with the thrust
-// of its depth of cut at 1 mm/s, and 4 N along the cut, which the crank feels and the hand along the stroke.
+// A bar 10 mm wide under a blade of 19 mm with 14 teeth: 10 / (19/14) teeth are in it, 0.15 of which bear; each with
+// the thrust of its depth of cut at 1 mm/s, and 4 N along the cut, which the crank feels and the hand along the stroke.
 TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   const Tool saw = *find_tool("saw-oscillating-2");
   const auto bar = osteon::test::make_bone(
       {Vec3(-8, -10, -3), Vec3(8, 10, 15)}, 0.5,
-      [](const Vec3& p) { return std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 5.0, std::abs(p.y()) - 7.0}); },
+      [](const Vec3& p) {
+        return std::max({-p.z(), p.z() - 12.0, std::abs(p.x()) - 5.0, std::abs(p.y()) - 7.0});
+      },
       [](const Vec3&) { return 1.9; });
   Rig rig(bar, saw);
   const auto reports = rig.move({0, 0, 4.0}, 4.0);
@@ -177,12 +186,13 @@ TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   const double pitch = 19.0 / 14.0, stroke = 80.0 * 5.0 * std::numbers::pi / 180.0, bearing = 0.15 * 10.0 / pitch;
   const double depth_um = 1e3 * 1.0 * pitch / (0.15 * 2.0 * stroke * 200.0);
   const double thrust_n = bearing * 7.5 * (1.0 + 0.3 * (depth_um - 2.0) / 8.0);
-  std::printf("  saw over 10 mm: %.2f N, by hand %.2f N; %.2f N mm, by hand %.2f N mm\n", mean.force_n, thrust_n, mean.torque_nmm,
-              bearing * 4.0 * stroke / std::numbers::pi);
+  std::printf("  saw over 10 mm: %.2f N, by hand %.2f N; %.2f N mm, by hand %.2f N mm\n", mean.force_n, thrust_n,
+              mean.torque_nmm, bearing * 4.0 * stroke / std::numbers::pi);
   // Contact points are half a millimetre apart.
   EXPECT_NEAR(mean.force_n, thrust_n, 0.06 * thrust_n);
   EXPECT_NEAR(mean.torque_nmm, bearing * 4.0 * stroke / std::numbers::pi, 0.06 * mean.torque_nmm);
-  // The hand has of it what the motor's port lets through, 0.6 of friction's 0.3, along the stroke and 200 times a second.
+  // The hand has of it what the motor's port lets through, 0.6 of friction's 0.3, along the stroke and 200 times a
+  // second.
   double sum_n = 0.0, square = 0.0, aside = 0.0;
   int ticks = 0;
   for (const LoopReport& r : reports) {
@@ -242,9 +252,9 @@ TEST(ToolEffects, ADeepHoleClogsTheDrillUntilItIsDrawnBack) {
   EXPECT_NEAR(cleared.torque_nmm / shallow.torque_nmm, 1.0, 0.06);
 }
 
-// A barrel bur lies on a bar of cortical bone, shorter than it, and is pressed in with its side, its teeth 3 mm from the axis.
-// Its own motor has 80 N mm, four times a drill's power at twenty times its speed: it carries on at less than 80 / 3 N and
-// stands in the bone at more, where it goes no farther, and turns again when it is drawn back.
+// A barrel bur lies on a bar of cortical bone, shorter than it, and is pressed in with its side, its teeth 3 mm from
+// the axis. Its own motor has 80 N mm, four times a drill's power at twenty times its speed: it carries on at less than
+// 80 / 3 N and stands in the bone at more, where it goes no farther, and turns again when it is drawn back.
 TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   const Tool bur = *find_tool("burr-barrel");
   const Pose lying{{4, 0, -3.5}, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
@@ -319,8 +329,8 @@ TEST(ToolEffects, ASawThatIsPressedAsideBinds) {
   EXPECT_GT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.3);
 }
 
-// One that is turned by a degree about its width or its length, more than its play, is wedged between the walls: pushed on with
-// 25 N it stands, and the hand feels the turn's own spring, K times its arm squared. Straight again it goes on.
+// One that is turned by a degree about its width or its length, more than its play, is wedged between the walls: pushed
+// on with 25 N it stands, and the hand feels the turn's own spring, K times its arm squared. Straight again it goes on.
 TEST(ToolEffects, ASawThatIsTurnedInItsKerfStands) {
   const Tool saw = *find_tool("saw-oscillating-2");
   constexpr double kTurn_rad = 0.02;
@@ -365,15 +375,15 @@ std::vector<Stretch> runs_of(const std::vector<LoopReport>& reports) {
   }
   return runs;
 }
-// The keel broach `deep_mm` in a face: its section there, 40 x 12 mm at the top, 5 degrees of taper over its 40 mm, with
-// corners bevelled by 1.5 mm.
+// The keel broach `deep_mm` in a face: its section there, 40 x 12 mm at the top, 5 degrees of taper over its 40 mm,
+// with corners bevelled by 1.5 mm.
 double section_mm2(double deep_mm) {
   const double less = 2.0 * (40.0 - deep_mm) * std::tan(5.0 * std::numbers::pi / 180.0);
   return (40.0 - less) * (12.0 - less) - 2.0 * 1.5 * 1.5;
 }
 
-// E = 0.7 (2.8 N s)^2 / (2 · 0.7 kg) of a blow against the resistance of the broach's section: so far each drives it, within
-// some 5 ms, and in between it stays however hard it is pushed; without blows it stays for good.
+// E = 0.7 (2.8 N s)^2 / (2 · 0.7 kg) of a blow against the resistance of the broach's section: so far each drives it,
+// within some 5 ms, and in between it stays however hard it is pushed; without blows it stays for good.
 TEST(ToolEffects, ABroachGoesByBlows) {
   LoopParams params;
   params.peak_n = 400.0;  // room for the hand's lead over the next blow
@@ -383,7 +393,8 @@ TEST(ToolEffects, ABroachGoesByBlows) {
   int blows = 0;
   for (const Stretch& run : runs_of(rig.move({0, 0, 8.5}, 6.0))) {
     const double advance_mm = 3920.0 / (130.0 * (0.6 / 1.9) * (0.6 / 1.9) * section_mm2(run.from_mm));
-    std::printf("  a blow at %.2f mm: %.3f mm in %d ms, by hand %.3f mm\n", run.from_mm, run.way_mm, run.ticks, advance_mm);
+    std::printf("  a blow at %.2f mm: %.3f mm in %d ms, by hand %.3f mm\n", run.from_mm, run.way_mm, run.ticks,
+                advance_mm);
     // The 38 points on the end's face, 160 mm2, stand for 173: so exact is the area that a blow is spent on.
     EXPECT_NEAR(run.way_mm, advance_mm, 0.08 * advance_mm);
     EXPECT_GE(run.ticks, 5);
@@ -400,8 +411,8 @@ TEST(ToolEffects, ABroachGoesByBlows) {
   EXPECT_GE(runs_of(rig.move({0, 0, 1.0}, 2.0)).size(), 1u);
 }
 
-// Six times blunt and in 1 g/cm3 a blow does 0.1 mm when 3920 N mm / 0.1 mm = 6 · 130 (1/1.9)^2 A: 181 mm2, 2.5 mm deep. There
-// it is seated: blows go on, the hand pushes, nothing moves.
+// Six times blunt and in 1 g/cm3 a blow does 0.1 mm when 3920 N mm / 0.1 mm = 6 · 130 (1/1.9)^2 A: 181 mm2, 2.5 mm
+// deep. There it is seated: blows go on, the hand pushes, nothing moves.
 TEST(ToolEffects, ABroachStopsWhenSeated) {
   Tool broach = *find_tool("broach-2");
   broach.spindle_rpm = 240;
@@ -416,8 +427,8 @@ TEST(ToolEffects, ABroachStopsWhenSeated) {
   }
   EXPECT_EQ(way, 0.0);
   const double deep_mm = last.pose_bone_proxy.position_mm.z(), seat_mm2 = 39200.0 / (6.0 * 130.0 / (1.9 * 1.9));
-  std::printf("  seated %.2f mm deep after %zu blows, its section %.1f mm2, by hand %.1f mm2; %.1f N of push\n", deep_mm,
-              runs.size(), section_mm2(deep_mm), seat_mm2, last.force_physical_n.norm());
+  std::printf("  seated %.2f mm deep after %zu blows, its section %.1f mm2, by hand %.1f mm2; %.1f N of push\n",
+              deep_mm, runs.size(), section_mm2(deep_mm), seat_mm2, last.force_physical_n.norm());
   EXPECT_NEAR(section_mm2(deep_mm), seat_mm2, 0.08 * seat_mm2);  // as above
   EXPECT_GT(last.force_physical_n.norm(), 20.0);
 }

@@ -1,5 +1,6 @@
-// Torque from the bone to the hand, the whole way: a drill whose shank leans on a wall, led by the handle of a device with
-// six degrees of freedom. What holds its turn back is known in closed form: the wall's push, times its arm from the tip.
+// Torque from the bone to the hand, the whole way: a drill whose shank leans on a wall, led by the handle of a device
+// with six degrees of freedom. What holds its turn back is known in closed form: the wall's push, times its arm from
+// the tip.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -43,7 +44,8 @@ class Before {
     session_ = std::make_unique<FreeHandSession>(std::move(*plan), device, 0.0);
   }
   const LoopReport& tick() {
-    if (taken_ && ticks_++ % 12 == 0) builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
+    if (taken_ && ticks_++ % 12 == 0)
+      builder_.build(field_, session_->loop().tool(0), last_.report.pose_bone_proxy, patch_);
     last_ = session_->tick(patch_, RoomLink::follows);
     taken_ |= last_.order.take_up;
     return last_.report;
@@ -131,9 +133,10 @@ TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
     EXPECT_NEAR(side.beyond_mm(), beyond_mm, 1e-9);
     const LoopReport& report = side.report();
     const Vec3 &force_n = report.force_physical_n, &torque_nmm = report.torque_physical_nmm;
-    std::printf("  simulated: %.2f N (closed form %.2f) at the end of %.0f mm, torque %.1f N mm (%.1f), on the device %.1f\n",
-                force_n.norm(), push_n(side), kReach_mm, torque_nmm.norm(), side.arm_times_force().norm(),
-                handle.written.torque_nmm.norm());
+    std::printf(
+        "  simulated: %.2f N (closed form %.2f) at the end of %.0f mm, torque %.1f N mm (%.1f), on the device %.1f\n",
+        force_n.norm(), push_n(side), kReach_mm, torque_nmm.norm(), side.arm_times_force().norm(),
+        handle.written.torque_nmm.norm());
     EXPECT_GT(force_n.x(), 0.999 * force_n.norm());  // the wall is smooth
     EXPECT_NEAR((torque_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n.norm());
     // Points lie within the tool by half a patch pitch and a quantum, a hundredth of a millimetre.
@@ -147,9 +150,9 @@ TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
   }
 }
 
-// The hand turns on by 40 mrad and does not move: the end of the shank would go 3.18 mm further into the wall, 80 (sin 0.10 -
-// sin 0.06) less what its rim turns away. Force and torque rise as if it had been pressed there, and go down again as it turns
-// back. On a device of three axes, where turning costs the hand nothing, the force may not rise.
+// The hand turns on by 40 mrad and does not move: the end of the shank would go 3.18 mm further into the wall, 80 (sin
+// 0.10 - sin 0.06) less what its rim turns away. Force and torque rise as if it had been pressed there, and go down
+// again as it turns back. On a device of three axes, where turning costs the hand nothing, the force may not rise.
 TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
   constexpr double kFrom_rad = 0.06, kTo_rad = 0.10, kBeyond_mm = 0.5;
   const double to_mm = kBeyond_mm + kReach_mm * (std::sin(kTo_rad) - std::sin(kFrom_rad)) +
@@ -176,9 +179,11 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
       continue;
     }
     // As push_n(), of what the handle did alone, whatever the loop let go.
-    const double arm = kReach_mm / Proxy::kTurnArm_mm, expected_n = side.coupling_n_per_mm() * to_mm / (1.0 + arm * arm);
+    const double arm = kReach_mm / Proxy::kTurnArm_mm,
+                 expected_n = side.coupling_n_per_mm() * to_mm / (1.0 + arm * arm);
     std::printf(
-        "  simulated: turned on by 40 mrad, %.2f N (closed form %.2f, before %.2f), %.1f N mm on the device (%.1f, %.1f)\n",
+        "  simulated: turned on by 40 mrad, %.2f N (closed form %.2f, before %.2f), %.1f N mm on the device (%.1f, "
+        "%.1f)\n",
         force_n, expected_n, before_n, torque_nmm, kShown * kReach_mm * expected_n, before_nmm);
     EXPECT_NEAR(force_n, expected_n, expected_n * (0.02 + 0.07 / to_mm));
     EXPECT_NEAR(torque_nmm, kShown * kReach_mm * expected_n, kShown * kReach_mm * expected_n * (0.02 + 0.07 / to_mm));
@@ -253,7 +258,8 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
     EXPECT_NEAR(handle.written.torque_nmm.norm(), -nmm[i], 0.02 * std::abs(nmm[i]) + 0.5);
   }
   const double per_rad = kShown * hole.coupling_n_per_mm() * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm;
-  std::printf("  simulated: %.0f N mm/rad in a hole (closed form %.0f)\n", (nmm[0] - nmm[2]) / (turn[2] - turn[0]), per_rad);
+  std::printf("  simulated: %.0f N mm/rad in a hole (closed form %.0f)\n", (nmm[0] - nmm[2]) / (turn[2] - turn[0]),
+              per_rad);
   EXPECT_NEAR((nmm[0] - nmm[1]) / (turn[1] - turn[0]), per_rad, 0.02 * per_rad);
   EXPECT_NEAR((nmm[1] - nmm[2]) / (turn[2] - turn[1]), per_rad, 0.02 * per_rad);
   // Its play of 0.1 mm, and as much again for points inset and a field between samples, at either end of 30 mm.
@@ -265,8 +271,8 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
   EXPECT_NEAR(handle.written.torque_nmm.norm(), 0.0, 1e-6);
 }
 
-// The same wall through our stand-in for Force Dimension's library: a sigma.7 whose simulated hand holds the handle. Time is
-// the test's: a tick, and the device's cycle with what the tick has written.
+// The same wall through our stand-in for Force Dimension's library: a sigma.7 whose simulated hand holds the handle.
+// Time is the test's: a tick, and the device's cycle with what the tick has written.
 class Sigma : public WithArm {
  protected:
   Sigma() {
@@ -294,8 +300,8 @@ class Sigma : public WithArm {
     } while (device_->read().sample <= sample_ && std::chrono::steady_clock::now() - began < kPatience);
     sample_ = device_->read().sample;
   }
-  // The hand takes the handle back to where it began; nobody presses, and nothing pushes: these cycles may take less time than
-  // the device holds the force that was last written.
+  // The hand takes the handle back to where it began; nobody presses, and nothing pushes: these cycles may take less
+  // time than the device holds the force that was last written.
   bool let_go() {
     device_->write({});
     arm().hand(0.0, 0.0, 0.0);
@@ -311,8 +317,8 @@ class Sigma : public WithArm {
       tick(side);
     }
   }
-  // Pressed on the wall, and at rest with nothing let go. False where the machine took the core from us for 3 ms: the device
-  // ends the force then.
+  // Pressed on the wall, and at rest with nothing let go. False where the machine took the core from us for 3 ms: the
+  // device ends the force then.
   bool press(Before& side) {
     lead(side, 0.0, 0.0, 160);  // all of the force is shown by then
     lead(side, 0.0, -14.0, 250);

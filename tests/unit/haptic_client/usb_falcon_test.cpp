@@ -23,10 +23,10 @@ namespace osteon::haptic {
 namespace {
 
 using namespace std::chrono_literals;
+using test::wait_until;
 using testing::AssertionFailure;
 using testing::AssertionResult;
 using testing::AssertionSuccess;
-using test::wait_until;
 
 constexpr auto kPatience = 20s;
 constexpr std::size_t kImageBytes = 5000;  // no multiple of a piece
@@ -92,7 +92,8 @@ TEST_F(FalconOnUsb, LoadsItsFirmwareHomesAndReadsPlaces) {
   ASSERT_TRUE(becomes_ready(*falcon));
   EXPECT_EQ(falcon->advice(), "");
   const Vec3 place = falcon->read().pose_device_tool.position_mm;
-  EXPECT_LT((place - Vec3(0.0, 0.0, -30.0)).norm(), 0.1) << place.transpose();  // 120 mm, seen from the middle at 150 mm
+  EXPECT_LT((place - Vec3(0.0, 0.0, -30.0)).norm(), 0.1)
+      << place.transpose();  // 120 mm, seen from the middle at 150 mm
 
   hold_at({0.02, 0.01, 0.12});
   EXPECT_TRUE(reads(*falcon, [](const DeviceReading& r) {
@@ -171,10 +172,12 @@ TEST_F(FalconOnUsb, MotorsDoTheWorkOfTheForceAndStopWithTheHapticThread) {
   EXPECT_NEAR(work, force_n.dot(2.0 * move_m), 0.01 * force_n.norm() * 2.0 * move_m.norm());
 
   // Nothing is written any more: the force ends although the device goes on.
-  EXPECT_TRUE(wait_until([&] {
-    const auto now = usb_.falcon_told();
-    return now.motors == std::array<int, 3>{} && now.control == kFalconBlue;
-  }, kPatience));
+  EXPECT_TRUE(wait_until(
+      [&] {
+        const auto now = usb_.falcon_told();
+        return now.motors == std::array<int, 3>{} && now.control == kFalconBlue;
+      },
+      kPatience));
 }
 
 struct End {
@@ -197,8 +200,8 @@ TEST_P(FalconsEnd, StopsTheMotors) {
   EXPECT_EQ(told.bad_frames, 0u);
 }
 INSTANTIATE_TEST_SUITE_P(Ends, FalconsEnd,
-                         testing::Values(End{"wait", SIGTERM}, End{"wait", SIGHUP}, End{"wait", SIGQUIT}, End{"exit", 0},
-                                         End{"abort", 0}, End{"crash", 0}, End{"check", 0}),
+                         testing::Values(End{"wait", SIGTERM}, End{"wait", SIGHUP}, End{"wait", SIGQUIT},
+                                         End{"exit", 0}, End{"abort", 0}, End{"crash", 0}, End{"check", 0}),
                          [](const auto& end) { return std::string(end.param.how) + std::to_string(end.param.signal); });
 
 TEST_F(FalconOnUsb, AForceBeyondItsLimitKeepsItsDirection) {
@@ -208,17 +211,19 @@ TEST_F(FalconOnUsb, AForceBeyondItsLimitKeepsItsDirection) {
   ASSERT_TRUE(opens(*falcon));
   ASSERT_TRUE(becomes_ready(*falcon));
   test::UsbStage::Told told;
-  ASSERT_TRUE(wait_until([&] {
-    std::thread writer([&] {
-      for (int i = 0; i < 40; ++i) {
-        falcon->write(Vec3(0.0, 0.0, 1000.0));
-        std::this_thread::sleep_for(500us);
-      }
-    });
-    told = usb_.falcon_told();
-    writer.join();
-    return told.motors != std::array<int, 3>{};
-  }, kPatience));
+  ASSERT_TRUE(wait_until(
+      [&] {
+        std::thread writer([&] {
+          for (int i = 0; i < 40; ++i) {
+            falcon->write(Vec3(0.0, 0.0, 1000.0));
+            std::this_thread::sleep_for(500us);
+          }
+        });
+        told = usb_.falcon_told();
+        writer.join();
+        return told.motors != std::array<int, 3>{};
+      },
+      kPatience));
   // 8 N along z are the same torque in all three legs, by symmetry; at the middle about 0.18 N m.
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(told.motors[static_cast<std::size_t>(i)], told.motors[0], 20.0);
   const double dz = 1e-5;
@@ -255,7 +260,8 @@ TEST_F(FalconOnUsb, AFalseEchoStopsTheLoading) {
   const Result<void> opened = falcon->open();
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
-  EXPECT_NE(opened.error().message.find("byte 992"), std::string::npos) << opened.error().message;  // of its 62-byte piece
+  EXPECT_NE(opened.error().message.find("byte 992"), std::string::npos)
+      << opened.error().message;  // of its 62-byte piece
   usb_.command("falcon false-echo -1");
   EXPECT_TRUE(opens(*falcon));
 }
@@ -284,7 +290,8 @@ TEST_F(FalconOnUsb, ABrokenBusIsADeviceError) {
   ASSERT_TRUE(wait_until([&] { return !falcon->tend(); }, kPatience));
   EXPECT_FALSE(falcon->read().usable());
   EXPECT_EQ(falcon->read().buttons, 0u);
-  EXPECT_NE(falcon->tend().error().message.find("failed (LIBUSB_ERROR_IO)"), std::string::npos) << falcon->tend().error().message;
+  EXPECT_NE(falcon->tend().error().message.find("failed (LIBUSB_ERROR_IO)"), std::string::npos)
+      << falcon->tend().error().message;
   falcon->close();
   usb_.command("falcon fail 0");
   ASSERT_TRUE(opens(*falcon));
@@ -374,11 +381,13 @@ TEST_F(FalconOnUsb, ThousandsOfCycles) {
   ASSERT_TRUE(becomes_ready(*falcon));
   const auto begun = usb_.falcon_told();
   const std::uint64_t first = falcon->read().sample;
-  ASSERT_TRUE(wait_until([&] {
-    const DeviceReading r = falcon->read();
-    falcon->write(Vec3(0.5, 0.0, 0.5));
-    return r.sample > first + kCycles;
-  }, 60s));
+  ASSERT_TRUE(wait_until(
+      [&] {
+        const DeviceReading r = falcon->read();
+        falcon->write(Vec3(0.5, 0.0, 0.5));
+        return r.sample > first + kCycles;
+      },
+      60s));
   const auto told = usb_.falcon_told();
   EXPECT_GE(told.frames - begun.frames, kCycles);
   EXPECT_EQ(told.bad_frames, 0u);

@@ -53,11 +53,13 @@ TEST_F(HidOnUsb, WhyADeviceCannotBeOpened) {
     EXPECT_EQ(error.code, ErrorCode::unavailable);
     return error.message;
   };
-  EXPECT_EQ(said(EACCES), "no permission to use the foot pedal at /dev/hidraw7; install deploy/udev/70-osteon-devices.rules and "
-                          "plug it in again");
+  EXPECT_EQ(said(EACCES),
+            "no permission to use the foot pedal at /dev/hidraw7; install deploy/udev/70-osteon-devices.rules and "
+            "plug it in again");
   EXPECT_EQ(said(ENODEV), "the foot pedal at /dev/hidraw7 was unplugged; plug it in again");
   EXPECT_EQ(said(EBUSY), "another program uses the foot pedal at /dev/hidraw7; end it");
-  EXPECT_EQ(said(EIO), "the foot pedal at /dev/hidraw7 cannot be opened (Input/output error); unplug it and plug it in again");
+  EXPECT_EQ(said(EIO),
+            "the foot pedal at /dev/hidraw7 cannot be opened (Input/output error); unplug it and plug it in again");
   // One that went between the look and the opening.
   usb_.command("plug switch");
   const std::vector<HidFound> found = list_hid_devices();
@@ -125,11 +127,13 @@ TEST_F(HidOnUsb, ALostDeflectionEndsByItself) {
   EXPECT_EQ(usb_.command("written spacemouse"), "");
   usb_.report("spacemouse", {1, 0x5e, 0x01, 0, 0, 0, 0});  // and never again
   ASSERT_TRUE(reads(*mouse, [](const DeviceReading& r) { return r.pose_device_tool.position_mm.x() > 1.0; }));
-  EXPECT_TRUE(wait_until([&] {
-    const double before = mouse->read().pose_device_tool.position_mm.x();
-    std::this_thread::sleep_for(50ms);
-    return mouse->read().pose_device_tool.position_mm.x() == before;
-  }, kPatience));
+  EXPECT_TRUE(wait_until(
+      [&] {
+        const double before = mouse->read().pose_device_tool.position_mm.x();
+        std::this_thread::sleep_for(50ms);
+        return mouse->read().pose_device_tool.position_mm.x() == before;
+      },
+      kPatience));
   EXPECT_LT(mouse->read().pose_device_tool.position_mm.x(), 99.0);  // long before the end of its reach
 }
 
@@ -172,7 +176,8 @@ TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   const auto pedal = make_foot_pedal({.proportional = true, .axis = {.play = 0.0}});
   ASSERT_EQ(why(pedal->open()), "");
   usb_.report("joystick", {0, 0, 0x80, 0x00});  // a little down already
-  ASSERT_TRUE(wait_until([&] { return usb_.command("unread joystick") == "0" && !pedal->advice().empty(); }, kPatience));
+  ASSERT_TRUE(
+      wait_until([&] { return usb_.command("unread joystick") == "0" && !pedal->advice().empty(); }, kPatience));
   EXPECT_EQ(pedal->read().spindle(), 0.0);
   EXPECT_EQ(pedal->advice(), "let the foot pedal go once; until then it turns nothing");
   usb_.report("joystick", {0, 0, 0, 0});
@@ -182,7 +187,8 @@ TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   usb_.report("joystick", {0, 0xff, 0xff, 0x03});
   EXPECT_TRUE(reads(*pedal, [](const DeviceReading& r) { return r.spindle() == 1.0; }));
 
-  const auto other = make_foot_pedal({.proportional = true, .axis_usage = HidUsage{1, 0x35}});  // an axis that it has not
+  const auto other =
+      make_foot_pedal({.proportional = true, .axis_usage = HidUsage{1, 0x35}});  // an axis that it has not
   const Result<void> opened = other->open();
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
@@ -229,7 +235,8 @@ TEST_F(HidOnUsb, UnpluggedAndPluggedInAgain) {
       usb_.report(name, kind.pressed);
       ASSERT_TRUE(reads(*kind.device, [](const DeviceReading& r) { return r.spindle() == 1.0; })) << name;
       usb_.command("unplug " + name);
-      EXPECT_TRUE(reads(*kind.device, [](const DeviceReading& r) { return !r.usable() && r.spindle() == 0.0; })) << name;
+      EXPECT_TRUE(reads(*kind.device, [](const DeviceReading& r) { return !r.usable() && r.spindle() == 0.0; }))
+          << name;
       ASSERT_TRUE(wait_until([&] { return !kind.device->tend(); }, kPatience)) << name;
       EXPECT_NE(kind.device->tend().error().message.find("unplugged"), std::string::npos);
       kind.device->close();

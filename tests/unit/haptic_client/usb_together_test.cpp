@@ -1,4 +1,5 @@
-// A Falcon for the hand, a SpaceMouse for the rotation and a pedal for the spindle, all emulated, kept by their connections.
+// A Falcon for the hand, a SpaceMouse for the rotation and a pedal for the spindle, all emulated, kept by their
+// connections.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -48,10 +49,13 @@ class Together : public testing::Test {
     return wait_until([&] { return wanted(device_->read()); }, kPatience);
   }
   bool was_told(const std::string& part) {
-    return wait_until([&] {
-      const std::lock_guard lock(mutex_);
-      return std::any_of(lost_.begin(), lost_.end(), [&](const std::string& s) { return s.find(part) != std::string::npos; });
-    }, kPatience);
+    return wait_until(
+        [&] {
+          const std::lock_guard lock(mutex_);
+          return std::any_of(lost_.begin(), lost_.end(),
+                             [&](const std::string& s) { return s.find(part) != std::string::npos; });
+        },
+        kPatience);
   }
 
   test::UsbStage usb_;

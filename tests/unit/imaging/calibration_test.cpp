@@ -15,7 +15,8 @@ TEST(Calibration, FollowsRhoHobathoAshman) {
 TEST(Calibration, IsNeverNegative) { EXPECT_EQ(density_g_cm3(kRho1995, kAir_hu), 0.0); }
 
 TEST(Calibration, InvertsToTheSameDensity) {
-  for (const double density : {0.2, 0.3, 1.0, 1.9}) EXPECT_NEAR(density_g_cm3(kRho1995, hounsfield(kRho1995, density)), density, 1e-12);
+  for (const double density : {0.2, 0.3, 1.0, 1.9})
+    EXPECT_NEAR(density_g_cm3(kRho1995, hounsfield(kRho1995, density)), density, 1e-12);
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ TEST(HuVolume, ScanEndsHalfAVoxelBeyondTheOuterCentres) {
   const HuVolume volume = oblique();
   EXPECT_NEAR(outside_scan_mm(volume, volume.position_mm(Vec3(9.5, 10, 15))), 0.0, 1e-9);
   EXPECT_NEAR(outside_scan_mm(volume, volume.position_mm(Vec3(5, 10, -0.5))), 0.0, 1e-9);
-  EXPECT_NEAR(outside_scan_mm(volume, volume.position_mm(Vec3(11.5, 10, 15))), 1.0, 1e-9);   // two columns of 0.5 mm
+  EXPECT_NEAR(outside_scan_mm(volume, volume.position_mm(Vec3(11.5, 10, 15))), 1.0, 1e-9);     // two columns of 0.5 mm
   EXPECT_NEAR(outside_scan_mm(volume, volume.position_mm(Vec3(4.5, 0.5, 14.5))), -0.7, 1e-9);  // one row of 0.7 mm
 }
 

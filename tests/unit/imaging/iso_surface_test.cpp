@@ -37,7 +37,8 @@ double worst_error(const DenseVolume<float>& field, double within_mm, Distance d
     for (int y = inner.min.y; y <= inner.max.y; ++y)
       for (int z = inner.min.z; z <= inner.max.z; ++z) {
         const double truth = distance_mm(position_mm({x, y, z}, kPitch_mm));
-        if (std::abs(truth) < within_mm) worst = std::max(worst, std::abs(static_cast<double>(s->at({x, y, z})) - truth) / kPitch_mm);
+        if (std::abs(truth) < within_mm)
+          worst = std::max(worst, std::abs(static_cast<double>(s->at({x, y, z})) - truth) / kPitch_mm);
       }
   return worst;
 }
@@ -63,7 +64,8 @@ TEST(IsoSurface, ErrorOfASphereShrinksWithItsCurvature) {
   const auto error = [](double radius_mm) {
     const auto distance = [&](const Vec3& p) { return (p - Vec3(0.11, -0.07, 0.2)).norm() - radius_mm; };
     const int reach = static_cast<int>(radius_mm / kPitch_mm) + 12;
-    return worst_error(edge_field({{-reach, -reach, -reach}, {reach, reach, reach}}, 80.0, distance), 3.9 * kPitch_mm, distance);
+    return worst_error(edge_field({{-reach, -reach, -reach}, {reach, reach, reach}}, 80.0, distance), 3.9 * kPitch_mm,
+                       distance);
   };
   EXPECT_LT(error(16.0), 0.6 * error(8.0));  // in proportion to 1 / r
 }

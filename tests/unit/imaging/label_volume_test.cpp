@@ -21,9 +21,10 @@ LabelVolume labelled(int edge, const std::function<bool(const Vec3&)>& inside) {
   return volume;
 }
 
-// Root mean square of (S - true distance) in voxels, over samples within two voxels of the surface and `margin` from the
-// box's faces.
-double surface_error(const LabelVolume& volume, const SmoothingParams& params, const std::function<double(const Vec3&)>& distance, int margin) {
+// Root mean square of (S - true distance) in voxels, over samples within two voxels of the surface and `margin` from
+// the box's faces.
+double surface_error(const LabelVolume& volume, const SmoothingParams& params,
+                     const std::function<double(const Vec3&)>& distance, int margin) {
   const auto field = smooth_labels(volume, params, keep_going);
   const auto surface = signed_distance_mm(*field, 0.0f, 1.0, keep_going);
   double sum = 0;
@@ -70,7 +71,8 @@ TEST(LabelVolume, EveryVoxelStaysOnItsSide) {
   });
   const auto field = smooth_labels(thin, {}, keep_going);
   ASSERT_TRUE(field);
-  for (std::size_t i = 0; i < field->values.size(); ++i) ASSERT_EQ(field->values[i] > 0.0f, thin.labels.values[i] != 0) << i;
+  for (std::size_t i = 0; i < field->values.size(); ++i)
+    ASSERT_EQ(field->values[i] > 0.0f, thin.labels.values[i] != 0) << i;
 }
 
 TEST(LabelVolume, ABallKeepsItsVolume) {
@@ -111,7 +113,8 @@ TEST(LabelVolume, DensityReachesTwoVoxelsBeyondTheBone) {
 }
 
 TEST(LabelVolume, TheBoneBoxIsTight) {
-  const auto box = bone_voxels(labelled(16, [](const Vec3& p) { return p.x() >= 3.0 && p.x() <= 5.0 && p.y() == 7.0 && p.z() <= 2.0; }));
+  const auto box = bone_voxels(
+      labelled(16, [](const Vec3& p) { return p.x() >= 3.0 && p.x() <= 5.0 && p.y() == 7.0 && p.z() <= 2.0; }));
   EXPECT_EQ(box, (CoordBox{{3, 7, 0}, {5, 7, 2}}));
   EXPECT_TRUE(bone_voxels(labelled(4, [](const Vec3&) { return false; })).empty());
 }

@@ -20,7 +20,9 @@ TEST(Resample, ReproducesALinearFieldOnAnObliqueGrid) {
   volume.values.resize(volume.count());
   for (int k = 0; k < 20; ++k)
     for (int j = 0; j < 30; ++j)
-      for (int i = 0; i < 30; ++i) volume.values[volume.index(i, j, k)] = static_cast<std::int16_t>(std::lround(truth(volume.position_mm(Vec3(i, j, k)))));
+      for (int i = 0; i < 30; ++i)
+        volume.values[volume.index(i, j, k)] =
+            static_cast<std::int16_t>(std::lround(truth(volume.position_mm(Vec3(i, j, k)))));
 
   // Around the middle of the volume, at a pitch that fits the grid nowhere.
   const double pitch_mm = 0.37;
@@ -32,7 +34,8 @@ TEST(Resample, ReproducesALinearFieldOnAnObliqueGrid) {
   for (int x = box.min.x; x <= box.max.x; ++x)
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z)
-        worst = std::max(worst, std::abs(static_cast<double>(out->at({x, y, z})) - truth(position_mm({x, y, z}, pitch_mm))));
+        worst = std::max(worst,
+                         std::abs(static_cast<double>(out->at({x, y, z})) - truth(position_mm({x, y, z}, pitch_mm))));
   EXPECT_LT(worst, 0.5 + 1e-3);  // the source is rounded to whole HU; interpolation adds nothing
 }
 

@@ -21,7 +21,7 @@ constexpr auto kGoOn = [](double) { return true; };
 // some of the crumbs away, or what holds them, sooner or later.
 std::vector<CarveStep> crossing_steps(std::size_t count) {
   constexpr std::array kTools = {"saw-oscillating-3", "burr-round-3.2", "saw-oscillating-1", "drill-1-8in",
-                                 "saw-reciprocating", "burr-barrel", "saw-oscillating-2", "drill-3.2"};
+                                 "saw-reciprocating", "burr-barrel",    "saw-oscillating-2", "drill-3.2"};
   test::Random random(14);
   std::vector<CarveStep> steps;
   for (std::size_t i = 0; i < count; ++i) {

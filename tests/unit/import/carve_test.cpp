@@ -1,4 +1,5 @@
-// Carving without a room: volumes against closed forms, closed surfaces, pieces that come apart, scripts that are wrong.
+// Carving without a room: volumes against closed forms, closed surfaces, pieces that come apart, scripts that are
+// wrong.
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -24,7 +25,9 @@ Case block(double pitch_mm = 0.5) {
   return *build_phantom_case(phantom, pitch_mm, "Block", keep_going);
 }
 
-CarveStep step(const char* tool, std::vector<Pose> path, std::optional<int> level = {}) { return {*find_tool(tool), std::move(path), level}; }
+CarveStep step(const char* tool, std::vector<Pose> path, std::optional<int> level = {}) {
+  return {*find_tool(tool), std::move(path), level};
+}
 Pose down(double x, double y, double z) { return pose_along({x, y, z}, {0, 0, -1}); }
 
 TEST(Carving, ABurrsGrooveHasItsVolume) {
@@ -83,7 +86,9 @@ TEST(Carving, SawingThroughTakesAPieceOff) {
   // A blade upright across y, from above through the block at x = 2, in two plunges beside each other.
   const Vec3 in(0, 0, -1), across(0, 1, 0);
   const double volume = carving.field(0).bone().volume_mm3();
-  const auto report = carving.run(step("saw-oscillating-1", {pose_across({2, 0, 2}, in, across), pose_across({2, 0, -10}, in, across)}, 1), keep_going);
+  const auto report = carving.run(
+      step("saw-oscillating-1", {pose_across({2, 0, 2}, in, across), pose_across({2, 0, -10}, in, across)}, 1),
+      keep_going);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->pieces, 1);
   ASSERT_EQ(carving.bodies(), 2u);
@@ -101,7 +106,9 @@ TEST(Carving, SawingThroughTakesAPieceOff) {
   const auto again = carving.run(step("drill-3.2", {down(5.6, 0, 1), down(5.6, 0, -10)}), keep_going);
   ASSERT_TRUE(again);
   // The drill's circle less its segment beyond the face at x = 6.
-  const double r = 1.6, in_bone = std::numbers::pi * r * r - (r * r * std::acos(0.4 / r) - 0.4 * std::sqrt(r * r - 0.16)), hole = in_bone * 8.0;
+  const double r = 1.6,
+               in_bone = std::numbers::pi * r * r - (r * r * std::acos(0.4 / r) - 0.4 * std::sqrt(r * r - 0.16)),
+               hole = in_bone * 8.0;
   EXPECT_NEAR(again->removed_mm3, hole, 0.05 * hole) << "from the piece alone";
   EXPECT_LT(enclosed_mm3(*bone_surface(carving.field(1), keep_going)), enclosed_mm3(*piece) - 0.9 * hole);
   const SavedFields fields = carving.fields();
@@ -113,7 +120,9 @@ TEST(Carving, APieceIsSawnInTwoAgain) {
   Carving carving(block(), 1.0);
   const Vec3 in(0, 0, -1);
   const auto sawn = [&](const Vec3& at, const Vec3& across) {
-    return carving.run(step("saw-oscillating-1", {pose_across(at, in, across), pose_across(at - Vec3(0, 0, 12), in, across)}, 1), keep_going);
+    return carving.run(
+        step("saw-oscillating-1", {pose_across(at, in, across), pose_across(at - Vec3(0, 0, 12), in, across)}, 1),
+        keep_going);
   };
   const double whole = carving.field(0).bone().volume_mm3(), kerf = 1.27;
   const auto first = sawn({2, 0, 2}, Vec3::UnitY());
@@ -133,7 +142,8 @@ TEST(Carving, APieceIsSawnInTwoAgain) {
     const auto mesh = bone_surface(carving.field(body), keep_going);
     ASSERT_TRUE(mesh);
     EXPECT_EQ(open_edges(*mesh), 0u) << body;
-    const auto vertices = static_cast<std::int64_t>(mesh->positions_mm.size()), faces = static_cast<std::int64_t>(mesh->triangles.size());
+    const auto vertices = static_cast<std::int64_t>(mesh->positions_mm.size()),
+               faces = static_cast<std::int64_t>(mesh->triangles.size());
     EXPECT_EQ(vertices - faces / 2, 2) << "one ball each; body " << body;
     solid += enclosed_mm3(*mesh);
   }
@@ -148,7 +158,8 @@ TEST(BoneSurface, ABlockIsClosedAndHasItsVolume) {
   EXPECT_EQ(open_edges(*mesh), 0u);
   EXPECT_NEAR(enclosed_mm3(*mesh), 12.0 * 12.0 * 8.0, 0.02 * 1152.0);
   // Euler characteristic of a ball: 2.
-  const auto vertices = static_cast<std::int64_t>(mesh->positions_mm.size()), faces = static_cast<std::int64_t>(mesh->triangles.size());
+  const auto vertices = static_cast<std::int64_t>(mesh->positions_mm.size()),
+             faces = static_cast<std::int64_t>(mesh->triangles.size());
   EXPECT_EQ(vertices - faces / 2, 2);
 }
 
@@ -159,7 +170,8 @@ TEST(BoneSurface, ADrilledBlockIsARing) {
     const auto mesh = bone_surface(carving.field(0), keep_going);
     ASSERT_TRUE(mesh);
     EXPECT_EQ(open_edges(*mesh), 0u);
-    const auto vertices = static_cast<std::int64_t>(mesh->positions_mm.size()), faces = static_cast<std::int64_t>(mesh->triangles.size());
+    const auto vertices = static_cast<std::int64_t>(mesh->positions_mm.size()),
+               faces = static_cast<std::int64_t>(mesh->triangles.size());
     EXPECT_EQ(vertices - faces / 2, 0);  // one hole
   }
 }
@@ -181,10 +193,11 @@ class Scripts : public ::testing::Test {
 };
 
 TEST_F(Scripts, PosesAreWhatTheySay) {
-  const auto steps = read_carve_script(write("steps:\n"
-                                             "  - {tool: drill-3.2, from: [1, 2, 3], to: [1, 2, -3], axis: [0, 0, -2]}\n"
-                                             "  - tool: saw-oscillating-3\n    level: 1\n    axis: [0, 1, 0]\n    across: [1, 1, 0]\n"
-                                             "    path: [{at: [0, 0, 0]}, {at: [0, 5, 0], axis: [1, 0, 0], across: [0, 0, 1]}]\n"));
+  const auto steps =
+      read_carve_script(write("steps:\n"
+                              "  - {tool: drill-3.2, from: [1, 2, 3], to: [1, 2, -3], axis: [0, 0, -2]}\n"
+                              "  - tool: saw-oscillating-3\n    level: 1\n    axis: [0, 1, 0]\n    across: [1, 1, 0]\n"
+                              "    path: [{at: [0, 0, 0]}, {at: [0, 5, 0], axis: [1, 0, 0], across: [0, 0, 1]}]\n"));
   ASSERT_TRUE(steps) << steps.error().message;
   ASSERT_EQ(steps->size(), 2u);
   const CarveStep& drill = (*steps)[0];
@@ -222,15 +235,21 @@ TEST_F(Scripts, WrongOnesAreOneSentence) {
   refused("steps: [{tool: drill-3.2, axis: [0, 0, 1]}]", "from and to, or at, or path");
   refused("steps: [{tool: drill-3.2, at: [0, 0, 0], axis: [0, 0, 1], level: 7}]", "level");
   refused("steps: [{tool: drill-3.2, at: [0, 0, 0], axis: [0, 0, 1], depth: 7}]", "depth");
-  refused("steps: [{tool: drill-3.2, at: [0, 0, 0], axis: [0, 0, 1]}, {tool: guide-1, at: [0, 0, 0], axis: [0, 0, 1]}]", "step 2: guide-1 does not cut");
+  refused("steps: [{tool: drill-3.2, at: [0, 0, 0], axis: [0, 0, 1]}, {tool: guide-1, at: [0, 0, 0], axis: [0, 0, 1]}]",
+          "step 2: guide-1 does not cut");
   EXPECT_EQ(read_carve_script(folder_ / "absent.yaml").error().code, ErrorCode::not_found);
 }
 
 TEST_F(Scripts, TheProgramsAgree) {
   const std::string program = OSTEON_IMPORT_PROGRAM;
-  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "8:1.5", "--width", "12", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
-  const auto script = write("steps: [{tool: burr-round-5, from: [-8, 0, -2], to: [8, 0, -2], axis: [0, 0, -1]}]").string();
-  const auto carved = test::run(program, {"carve", path("case"), script, "--out", path("f.vdb"), "--surface", path("f.stl"), "--report", path("f.json")});
+  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "8:1.5", "--width", "12", "--pitch", "0.5", "--out",
+                                path("case")})
+                .exit_code,
+            0);
+  const auto script =
+      write("steps: [{tool: burr-round-5, from: [-8, 0, -2], to: [8, 0, -2], axis: [0, 0, -1]}]").string();
+  const auto carved = test::run(program, {"carve", path("case"), script, "--out", path("f.vdb"), "--surface",
+                                          path("f.stl"), "--report", path("f.json")});
   ASSERT_EQ(carved.exit_code, 0) << carved.err;
   const auto hash = test::run(program, {"hash", path("f.vdb")});
   ASSERT_EQ(hash.exit_code, 0) << hash.err;
@@ -265,7 +284,10 @@ TEST_F(Scripts, TheProgramsAgree) {
   refused({"surface", path("case"), "--fields", path("f.stl"), "--out", path("n.stl")}, "f.stl");
   refused({"surface", path("case"), "--fields", path("f.vdb"), "--body", "3", "--out", path("n.stl")}, "no body 3");
   refused({"hash", path("absent.vdb")}, path("absent.vdb"));
-  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "6:1.5", "--width", "12", "--pitch", "0.5", "--out", path("other")}).exit_code, 0);
+  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "6:1.5", "--width", "12", "--pitch", "0.5", "--out",
+                                path("other")})
+                .exit_code,
+            0);
   refused({"surface", path("other"), "--fields", path("f.vdb"), "--out", path("n.stl")}, "f.vdb");
 }
 
@@ -281,8 +303,9 @@ TEST_F(Scripts, TheToolBoxIsListedAndWritten) {
     EXPECT_EQ(open_edges(*mesh), 0u) << tool.name;
     EXPECT_GT(enclosed_mm3(*mesh), 0.0) << tool.name;
   }
-  std::ofstream(folder_ / "mine.yaml") << "name: my-burr\ntitle: My bur\nkind: round-burr\ndiameter_mm: 4\nshank_diameter_mm: 2\nshank_length_mm: 50\n"
-                                          "spindle_rpm: 20000\nteeth: 8\nfeed_mm_per_rev: 0.02\ncut_level: 1\n";
+  std::ofstream(folder_ / "mine.yaml")
+      << "name: my-burr\ntitle: My bur\nkind: round-burr\ndiameter_mm: 4\nshank_diameter_mm: 2\nshank_length_mm: 50\n"
+         "spindle_rpm: 20000\nteeth: 8\nfeed_mm_per_rev: 0.02\ncut_level: 1\n";
   const auto own = test::run(program, {"tools", "--file", path("mine.yaml")});
   ASSERT_EQ(own.exit_code, 0) << own.err;
   EXPECT_NE(own.out.find("my-burr"), std::string::npos);
@@ -299,7 +322,10 @@ std::ptrdiff_t meeting(const std::string& text) {
 
 TEST_F(Scripts, ContactIsAskedInThreeWays) {
   const std::string program = OSTEON_IMPORT_PROGRAM;
-  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "8:1.5", "--width", "12", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
+  ASSERT_EQ(test::run(program, {"phantom", "block", "--layers", "8:1.5", "--width", "12", "--pitch", "0.5", "--out",
+                                path("case")})
+                .exit_code,
+            0);
   const auto asked = [&](const char* at, std::vector<std::string> more = {}) {
     std::vector<std::string> arguments{"contact", path("case"), "burr-round-3.2", "--at", at, "--axis", "0,0,-1"};
     arguments.insert(arguments.end(), more.begin(), more.end());
@@ -312,29 +338,37 @@ TEST_F(Scripts, ContactIsAskedInThreeWays) {
   EXPECT_EQ(asked("0,0,1"), 0);
   EXPECT_EQ(asked("0,0,-1"), 3);
   // In a groove of a bur of 5 mm, 3 mm deep, one of 3.2 mm is free a millimetre above its bottom, and not at the wall.
-  const auto script = write("steps: [{tool: burr-round-5, from: [-8, 0, -3], to: [8, 0, -3], axis: [0, 0, -1]}]").string();
+  const auto script =
+      write("steps: [{tool: burr-round-5, from: [-8, 0, -3], to: [8, 0, -3], axis: [0, 0, -1]}]").string();
   ASSERT_EQ(test::run(program, {"carve", path("case"), script, "--out", path("f.vdb")}).exit_code, 0);
   EXPECT_EQ(asked("0,0,-2", {"--fields", path("f.vdb"), "--level", "1"}), 0);
   EXPECT_EQ(asked("0,0,-2"), 3) << "before the cut";
   EXPECT_EQ(asked("0,2,-2", {"--fields", path("f.vdb"), "--level", "1"}), 3);
-  const auto beyond = test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,500", "--axis", "0,0,-1"});
+  const auto beyond =
+      test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,500", "--axis", "0,0,-1"});
   EXPECT_NE(beyond.out.find("beyond the bone"), std::string::npos) << beyond.out;
-  EXPECT_EQ(test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,0"}).exit_code, 1);
+  EXPECT_EQ(
+      test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,0"}).exit_code, 1);
   for (const char* nowhere : {"nan,0,0", "0,0,inf"}) {
-    const auto refused = test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", nowhere, "--axis", "0,0,-1"});
+    const auto refused =
+        test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", nowhere, "--axis", "0,0,-1"});
     EXPECT_EQ(refused.exit_code, 1) << nowhere;
     EXPECT_NE(refused.err.find("--at"), std::string::npos) << refused.err;
   }
-  EXPECT_EQ(test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,nan"}).exit_code, 1);
+  EXPECT_EQ(
+      test::run(program, {"contact", path("case"), "burr-round-3.2", "--at", "0,0,0", "--axis", "0,0,nan"}).exit_code,
+      1);
 }
 
 TEST_F(Scripts, AToolOfTheBoxIsChangedWithoutWritingAFile) {
   const std::string program = OSTEON_IMPORT_PROGRAM;
   const auto limits = test::run(program, {"tools", "drill-3.2"});
   ASSERT_EQ(limits.exit_code, 0) << limits.err;
-  for (const char* field : {"diameter_mm", "cutting_length_mm", "spindle_rpm", "teeth", "feed_mm_per_rev"}) EXPECT_NE(limits.out.find(field), std::string::npos) << limits.out;
-  const auto made = test::run(program, {"tools", "drill-3.2", "--set", "diameter_mm=4.5", "--set", "cutting_length_mm=90", "--set", "spindle_rpm=900",
-                                        "--set", "teeth=3", "--set", "feed_mm_per_rev=0.07", "--out", path("drill-4.5.yaml")});
+  for (const char* field : {"diameter_mm", "cutting_length_mm", "spindle_rpm", "teeth", "feed_mm_per_rev"})
+    EXPECT_NE(limits.out.find(field), std::string::npos) << limits.out;
+  const auto made = test::run(program, {"tools", "drill-3.2", "--set", "diameter_mm=4.5", "--set",
+                                        "cutting_length_mm=90", "--set", "spindle_rpm=900", "--set", "teeth=3", "--set",
+                                        "feed_mm_per_rev=0.07", "--out", path("drill-4.5.yaml")});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   EXPECT_TRUE(made.out.starts_with("drill-4.5 ")) << made.out;
   const auto tool = load_tool(path("drill-4.5.yaml"));
@@ -346,7 +380,8 @@ TEST_F(Scripts, AToolOfTheBoxIsChangedWithoutWritingAFile) {
   EXPECT_EQ(tool->teeth, 3);
   EXPECT_EQ(tool->feed_mm_per_rev, 0.07);
   EXPECT_EQ(tool->shank_length_mm, find_tool("drill-3.2")->shank_length_mm) << "the rest is as it was";
-  const auto again = test::run(program, {"tools", "--file", path("drill-4.5.yaml"), "--set", "teeth=2", "--out", path("b.yaml"), "--name", "drill-b", "--title", "B"});
+  const auto again = test::run(program, {"tools", "--file", path("drill-4.5.yaml"), "--set", "teeth=2", "--out",
+                                         path("b.yaml"), "--name", "drill-b", "--title", "B"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
   const auto second = load_tool(path("b.yaml"));
   ASSERT_TRUE(second);

@@ -12,11 +12,13 @@ namespace osteon::import {
 namespace {
 
 // Through the phantom's DICOM files and back, at the scan's own pitch unless another is given.
-Result<Case> round_trip(const Phantom& phantom, double spacing_mm, double threshold_hu, std::optional<double> pitch_mm = {}) {
+Result<Case> round_trip(const Phantom& phantom, double spacing_mm, double threshold_hu,
+                        std::optional<double> pitch_mm = {}) {
   const test::TempDir folder;
   auto scan = scan_phantom(phantom, spacing_mm, keep_going);
   if (!scan) return tl::unexpected(scan.error());
-  if (auto written = write_dicom_series(*scan, folder / "series", keep_going); !written) return tl::unexpected(written.error());
+  if (auto written = write_dicom_series(*scan, folder / "series", keep_going); !written)
+    return tl::unexpected(written.error());
   auto read = read_dicom_series(folder / "series", keep_going);
   if (!read) return tl::unexpected(read.error());
   return import_bone(std::move(*read), {.pitch_mm = pitch_mm, .threshold_hu = threshold_hu}, keep_going);
@@ -41,7 +43,8 @@ double surface_error(const Case& bone, const Phantom& phantom, double spacing_mm
           at({u, side, -v});
         }
     } else {
-      for (double angle = 0.0; angle < 2.0 * std::numbers::pi; angle += 0.05) at({deep * std::cos(angle), deep * std::sin(angle), u});
+      for (double angle = 0.0; angle < 2.0 * std::numbers::pi; angle += 0.05)
+        at({deep * std::cos(angle), deep * std::sin(angle), u});
       for (double r = 0.0; r < deep - 2.0; r += 0.5)
         for (const double end : {-half, half}) at({r, 0.3, end});
     }
@@ -264,8 +267,7 @@ TEST(CtImport, WhatIsLeftOutIsSaidWithItsVolume) {
   const auto made = import_ct(three_cubes(), {}, keep_going);
   ASSERT_TRUE(made);
   const std::string text = segmentation_text(made->found);
-  EXPECT_NE(text.find("kept       1.00 of 1.58 cm3; 2 islands with 0.58 cm3 (37 %) left out\n"),
-            std::string::npos)
+  EXPECT_NE(text.find("kept       1.00 of 1.58 cm3; 2 islands with 0.58 cm3 (37 %) left out\n"), std::string::npos)
       << text;
 }
 

@@ -54,7 +54,8 @@ TEST(DicomSeries, OrderOfFileNamesDoesNotMatter) {
   const auto volume = numbered_volume(7, 5, 4);
   ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
   const auto files = files_of(folder / "series");
-  for (std::size_t i = 0; i < files.size(); ++i) fs::rename(files[i], folder / "series" / (std::string(1, "qdza"[i]) + "-renamed"));
+  for (std::size_t i = 0; i < files.size(); ++i)
+    fs::rename(files[i], folder / "series" / (std::string(1, "qdza"[i]) + "-renamed"));
   const auto scan = read_dicom_series(folder / "series", keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   expect_same(scan->volume, volume);

@@ -59,8 +59,10 @@ void set_tag(const fs::path& file, std::uint16_t group, std::uint16_t element, c
   edit(file, [&](gdcm::DataSet& data) {
     const gdcm::Tag tag(group, element);
     gdcm::DataElement changed(tag);
-    if (data.FindDataElement(tag)) changed.SetVR(data.GetDataElement(tag).GetVR());
-    else changed.SetVR(vr_if_new == 0 ? gdcm::VR(gdcm::VR::IS) : gdcm::VR(static_cast<gdcm::VR::VRType>(vr_if_new)));
+    if (data.FindDataElement(tag))
+      changed.SetVR(data.GetDataElement(tag).GetVR());
+    else
+      changed.SetVR(vr_if_new == 0 ? gdcm::VR(gdcm::VR::IS) : gdcm::VR(static_cast<gdcm::VR::VRType>(vr_if_new)));
     const std::string even = value.size() % 2 == 0 ? value : value + ' ';
     changed.SetByteValue(even.data(), static_cast<std::uint32_t>(even.size()));
     data.Replace(changed);
@@ -73,12 +75,13 @@ void remove_tag(const fs::path& file, std::uint16_t group, std::uint16_t element
 
 void write_inv3(const fs::path& file, const Inv3& project) {
   const auto integer = [](int n) { return "<integer>" + std::to_string(n) + "</integer>"; };
-  const std::string list = "<?xml version=\"1.0\"?><plist version=\"1.0\"><dict><key>modality</key><string>" + project.modality +
-                           "</string><key>name</key><string>Somebody's name</string><key>orientation</key><integer>" + project.orientation +
-                           "</integer><key>matrix</key><dict><key>dtype</key><string>" + project.dtype +
-                           "</string><key>filename</key><string>matrix.dat</string><key>shape</key><array>" + integer(project.slices) +
-                           integer(project.rows) + integer(project.columns) + "</array></dict><key>spacing</key><array>" + project.spacing +
-                           "</array></dict></plist>";
+  const std::string list =
+      "<?xml version=\"1.0\"?><plist version=\"1.0\"><dict><key>modality</key><string>" + project.modality +
+      "</string><key>name</key><string>Somebody's name</string><key>orientation</key><integer>" + project.orientation +
+      "</integer><key>matrix</key><dict><key>dtype</key><string>" + project.dtype +
+      "</string><key>filename</key><string>matrix.dat</string><key>shape</key><array>" + integer(project.slices) +
+      integer(project.rows) + integer(project.columns) + "</array></dict><key>spacing</key><array>" + project.spacing +
+      "</array></dict></plist>";
   std::string matrix;
   for (int k = 0; k < project.slices; ++k)
     for (int j = 0; j < project.rows; ++j)

@@ -34,10 +34,12 @@ void write_slice(const fs::path& file, int width, int height, const std::functio
 }
 
 // plane000.png, plane001.png, … plane0010.png: numbered without padding, as the temporal bone is.
-void write_stack(const fs::path& folder, int width, int height, int slices, const std::function<Rgba(int, int, int)>& colour) {
+void write_stack(const fs::path& folder, int width, int height, int slices,
+                 const std::function<Rgba(int, int, int)>& colour) {
   fs::create_directories(folder);
   for (int z = 0; z < slices; ++z)
-    write_slice(folder / ("plane00" + std::to_string(z) + ".png"), width, height, [&](int x, int y) { return colour(x, y, z); });
+    write_slice(folder / ("plane00" + std::to_string(z) + ".png"), width, height,
+                [&](int x, int y) { return colour(x, y, z); });
 }
 
 constexpr double kRadius = 11.0;  // voxels
@@ -86,9 +88,11 @@ TEST_F(Labels, ABallBecomesABall) {
   const Vec3 centre = Vec3(14.2, 15.4, 13.8) * h;
   EXPECT_NEAR(made->bone.density_g_cm3(centre), 1.9, 1e-6);
   EXPECT_EQ(made->bone.tissue({14, 15, 14}), Tissue::cortical);
-  // On the true surface, in all directions, S is within 0.3 voxel of zero, a label's own error,, and the density does not fade.
+  // On the true surface, in all directions, S is within 0.3 voxel of zero, a label's own error,, and the density does
+  // not fade.
   for (int i = 0; i < 200; ++i) {
-    const Vec3 way = Vec3(std::cos(2.4 * i) * std::sqrt(1 - std::pow(i / 100.0 - 1, 2)), std::sin(2.4 * i) * std::sqrt(1 - std::pow(i / 100.0 - 1, 2)), i / 100.0 - 1);
+    const Vec3 way = Vec3(std::cos(2.4 * i) * std::sqrt(1 - std::pow(i / 100.0 - 1, 2)),
+                          std::sin(2.4 * i) * std::sqrt(1 - std::pow(i / 100.0 - 1, 2)), i / 100.0 - 1);
     const Vec3 at = centre + kRadius * h * way;
     if ((at - Vec3(14, 4, 14) * h).norm() < 2.5 * h) continue;  // a voxel of noise makes a pit there
     EXPECT_NEAR(made->bone.surface_mm(at), 0.0, 0.3 * h) << way.transpose();
@@ -117,12 +121,15 @@ TEST_F(Labels, ColoursNearABonesAreBoneAndOthersNot) {
 }
 
 TEST_F(Labels, ALegendGivesDensities) {
-  std::ofstream(folder_ / "legend.yaml") << "tolerance: 2\nbones:\n  - {name: cortical, colour: [200, 0, 0], density_g_cm3: 1.9}\n"
-                                            "  - {name: trabecular, colour: [0, 200, 0], density_g_cm3: 0.6}\n";
+  std::ofstream(folder_ / "legend.yaml")
+      << "tolerance: 2\nbones:\n  - {name: cortical, colour: [200, 0, 0], density_g_cm3: 1.9}\n"
+         "  - {name: trabecular, colour: [0, 200, 0], density_g_cm3: 0.6}\n";
   const auto legend = read_legend(folder_ / "legend.yaml");
   ASSERT_TRUE(legend) << legend.error().message;
   EXPECT_EQ(legend->bones[1].name, "trabecular");
-  write_stack(folder_ / "s", 20, 10, 10, [](int x, int, int) { return x < 10 ? Rgba{200, 0, 0, 255} : Rgba{0, 201, 0, 255}; });
+  write_stack(folder_ / "s", 20, 10, 10, [](int x, int, int) {
+    return x < 10 ? Rgba{200, 0, 0, 255} : Rgba{0, 201, 0, 255};
+  });
   auto stack = read_label_stack(folder_ / "s", *legend, Vec3::Ones(), keep_going);
   ASSERT_TRUE(stack) << stack.error().message;
   const auto made = import_labels(std::move(*stack), *legend, {}, keep_going);
@@ -157,7 +164,9 @@ TEST_F(Labels, ColoursOnTheCommandLine) {
   EXPECT_EQ(bone->rgb, (std::array<std::uint8_t, 3>{1, 20, 255}));
   EXPECT_EQ(bone->density_g_cm3, 0.75);
   EXPECT_EQ(parse_bone_colour("1,2,3")->density_g_cm3, 1.9);
-  for (const char* wrong : {"", "1,2", "1,2,3,4", "1,2,256", "-1,2,3", "1,2,3:", "1,2,3:x", "1,2,3:0", "1,2,3:9", "red"}) EXPECT_FALSE(parse_bone_colour(wrong)) << wrong;
+  for (const char* wrong :
+       {"", "1,2", "1,2,3,4", "1,2,256", "-1,2,3", "1,2,3:", "1,2,3:x", "1,2,3:0", "1,2,3:9", "red"})
+    EXPECT_FALSE(parse_bone_colour(wrong)) << wrong;
 }
 
 std::uint32_t png_checksum(std::string_view bytes) {
@@ -203,7 +212,8 @@ TEST_F(Labels, BadStacksAreOneSentence) {
   ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "text", 6, 6, 5, [](int, int, int) { return kBone; }));
   std::ofstream(folder_ / "text" / "plane002.png", std::ios::trunc) << "Dear reader\n";
   expect_refused("text", "plane002.png");
-  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "cut", 60, 60, 5, [](int x, int y, int z) { return (x * y + z) % 3 != 0 ? kBone : kNoise; }));
+  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "cut", 60, 60, 5,
+                                      [](int x, int y, int z) { return (x * y + z) % 3 != 0 ? kBone : kNoise; }));
   truncate_file(folder_ / "cut" / "plane002.png", 0.5);
   expect_refused("cut", "plane002.png");
   ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "soft", 6, 6, 5, [](int, int, int) { return kNoise; }));
@@ -221,7 +231,8 @@ TEST_F(Labels, BadStacksAreOneSentence) {
 
 TEST_F(Labels, TheProgramImportsAndReports) {
   ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 29, 30, 28, ball));
-  const auto made = test::run(OSTEON_IMPORT_PROGRAM, {"labels", path("s"), "--spacing", "0.25", "--out", path("case"), "--title", "Ball"});
+  const auto made = test::run(OSTEON_IMPORT_PROGRAM,
+                              {"labels", path("s"), "--spacing", "0.25", "--out", path("case"), "--title", "Ball"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   EXPECT_NE(made.out.find("title      Ball"), std::string::npos) << made.out;
   EXPECT_NE(made.out.find("109,178,173"), std::string::npos) << made.out;
@@ -244,9 +255,12 @@ TEST_F(Labels, TheProgramImportsAndReports) {
 }
 
 TEST_F(Labels, CtrlCLeavesNothing) {
-  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 200, 200, 150, [](int x, int y, int z) { return (x / 9 + y / 7 + z / 8) % 2 == 0 ? kBone : kEmpty; }));
+  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 200, 200, 150, [](int x, int y, int z) {
+    return (x / 9 + y / 7 + z / 8) % 2 == 0 ? kBone : kEmpty;
+  }));
   for (const int percent : {10, 40}) {
-    test::Process process(OSTEON_IMPORT_PROGRAM, {"labels", path("s"), "--spacing", "0.2", "--pitch", "0.12", "--out", path("case")});
+    test::Process process(OSTEON_IMPORT_PROGRAM,
+                          {"labels", path("s"), "--spacing", "0.2", "--pitch", "0.12", "--out", path("case")});
     ASSERT_TRUE(process.wait_for_percent(percent, 60s)) << "too quick to be stopped: " << process.err();
     process.signal(SIGINT);
     EXPECT_EQ(process.wait(60s), 130);

@@ -10,7 +10,9 @@
 namespace osteon::import {
 namespace {
 
-Phantom plate() { return {.kind = PhantomKind::block, .layers = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}}, .width_mm = 12.0}; }
+Phantom plate() {
+  return {.kind = PhantomKind::block, .layers = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}}, .width_mm = 12.0};
+}
 Phantom long_bone() { return {.kind = PhantomKind::tube, .layers = {{4.0, 1.9}, {6.0, 0.3}}, .width_mm = 24.0}; }
 
 TEST(ParseLayers, ReadsThicknessAndDensity) {
@@ -22,7 +24,8 @@ TEST(ParseLayers, ReadsThicknessAndDensity) {
 }
 
 TEST(ParseLayers, RefusesNonsenseAndSaysHowToWriteIt) {
-  for (const char* text : {"", "5", "5:", ":1.9", "5:1.9,", "5;1.9", "five:1.9", "5:1.9x", "-5:1.9", "0:1.9", "5:0", "5:-1", "5:7", "900:1", "5:nan"}) {
+  for (const char* text : {"", "5", "5:", ":1.9", "5:1.9,", "5;1.9", "five:1.9", "5:1.9x", "-5:1.9", "0:1.9", "5:0",
+                           "5:-1", "5:7", "900:1", "5:nan"}) {
     const auto layers = parse_layers(text);
     ASSERT_FALSE(layers) << text;
     expect_one_sentence(layers.error(), "--layers");
@@ -118,7 +121,8 @@ TEST(PhantomCase, RefusesAPitchThatLosesALayer) {
 }
 
 TEST(PhantomCase, RefusesMoreSamplesThanFit) {
-  const auto bone = build_phantom_case({.kind = PhantomKind::block, .layers = {{500.0, 1.0}}, .width_mm = 1000.0}, 0.05, "test", keep_going);
+  const auto bone = build_phantom_case({.kind = PhantomKind::block, .layers = {{500.0, 1.0}}, .width_mm = 1000.0}, 0.05,
+                                       "test", keep_going);
   ASSERT_FALSE(bone);
   expect_one_sentence(bone.error(), "--pitch");
 }
@@ -141,8 +145,9 @@ TEST(PhantomScan, HoldsTheMassOfThePhantom) {
     double outer = phantom.thickness_mm();
     for (const Layer& layer : phantom.layers) {
       const double inner = outer - layer.thickness_mm;
-      const double volume = phantom.kind == PhantomKind::block ? phantom.width_mm * phantom.width_mm * layer.thickness_mm
-                                                               : std::numbers::pi * (outer * outer - inner * inner) * phantom.width_mm;
+      const double volume = phantom.kind == PhantomKind::block
+                                ? phantom.width_mm * phantom.width_mm * layer.thickness_mm
+                                : std::numbers::pi * (outer * outer - inner * inner) * phantom.width_mm;
       truth += volume * (imaging::hounsfield(imaging::kRho1995, layer.density_g_cm3) - imaging::kAir_hu);
       outer = inner;
     }

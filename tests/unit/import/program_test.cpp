@@ -56,7 +56,8 @@ TEST_F(Program, HelpNamesTheCommands) {
 }
 
 TEST_F(Program, MakesAPhantomAndReportsIt) {
-  const auto made = test::run(kProgram, {"phantom", "block", "--layers", "3:1.9,4:0.5", "--width", "8", "--pitch", "0.5", "--out", path("case"), "--title", "Plate"});
+  const auto made = test::run(kProgram, {"phantom", "block", "--layers", "3:1.9,4:0.5", "--width", "8", "--pitch",
+                                         "0.5", "--out", path("case"), "--title", "Plate"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const auto info = test::run(kProgram, {"info", path("case"), "--json"});
   ASSERT_EQ(info.exit_code, 0) << info.err;
@@ -76,7 +77,10 @@ TEST_F(Program, MakesAPhantomAndReportsIt) {
 }
 
 TEST_F(Program, ImportsThePhantomsDicomSeries) {
-  ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "3:1.9,2:1.5", "--width", "12", "--pitch", "0.5", "--out", path("truth"), "--dicom", path("series")}).exit_code, 0);
+  ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "3:1.9,2:1.5", "--width", "12", "--pitch", "0.5",
+                                 "--out", path("truth"), "--dicom", path("series")})
+                .exit_code,
+            0);
   const auto imported = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--pitch", "0.4"});
   ASSERT_EQ(imported.exit_code, 0) << imported.err;
   const auto truth = Case::load(path("truth"));
@@ -232,11 +236,12 @@ TEST_F(Program, AStepThatRemovesNothingSaysWhy) {
                                  path("case")})
                 .exit_code,
             0);
-  std::ofstream(folder_ / "script.yaml") << "steps:\n"
-      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
-      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
-      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, 80], to: [1, 0, 80]}\n"
-      "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, 5], to: [1, 0, 5]}\n";
+  std::ofstream(folder_ / "script.yaml")
+      << "steps:\n"
+         "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
+         "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, -2], to: [1, 0, -2]}\n"
+         "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, 80], to: [1, 0, 80]}\n"
+         "  - {tool: burr-round-5, axis: [0, 0, -1], from: [0, 0, 5], to: [1, 0, 5]}\n";
   const auto carved = test::run(kProgram, {"carve", path("case"), path("script.yaml"), "--out", path("cut.vdb")});
   ASSERT_EQ(carved.exit_code, 0) << carved.err;
   EXPECT_EQ(carved.out.find("step 1 removed nothing"), std::string::npos) << carved.out;
@@ -285,9 +290,11 @@ TEST_F(Program, WrongUsageIsOneSentence) {
 // Who holds it would find out too late.
 TEST_F(Program, AToolWithALawThatDoesNotFitIsRefused) {
   const auto write = [&](const std::string& law) {
-    std::ofstream(folder_ / "my-drill.yaml") << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
-                                                "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
-                                                "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: " << law << "\n";
+    std::ofstream(folder_ / "my-drill.yaml")
+        << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
+           "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
+           "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: "
+        << law << "\n";
   };
   write("allotta");
   EXPECT_EQ(test::run(kProgram, {"tools", "--file", path("my-drill.yaml")}).exit_code, 0);
@@ -301,7 +308,8 @@ TEST_F(Program, NothingIsOverwritten) {
   fs::create_directory(folder_ / "mine");
   std::ofstream(folder_ / "mine" / "letter.txt") << "keep me\n";
   expect_refused({"phantom", "block", "--layers", "5:1", "--out", path("mine")}, path("mine"), folder_);
-  expect_refused({"phantom", "block", "--layers", "5:1", "--out", path("case"), "--dicom", path("mine")}, path("mine"), folder_);
+  expect_refused({"phantom", "block", "--layers", "5:1", "--out", path("case"), "--dicom", path("mine")}, path("mine"),
+                 folder_);
   expect_refused({"ct", path("mine"), "--out", path("mine")}, path("mine"), folder_);
   EXPECT_EQ(files_of(folder_ / "mine").size(), 1u);
 }
@@ -314,14 +322,19 @@ TEST_F(Program, AFolderThatCannotBeMadeIsOneSentence) {
 }
 
 TEST_F(Program, InfoOfABrokenCaseIsOneSentence) {
-  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "3:1.9", "--width", "4", "--pitch", "0.5", "--out", path("case")}).exit_code, 0);
+  ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "3:1.9", "--width", "4", "--pitch", "0.5", "--out",
+                                 path("case")})
+                .exit_code,
+            0);
   expect_refused({"info", path("absent")}, path("absent"), folder_);
   fs::create_directory(folder_ / "empty");
   expect_refused({"info", path("empty")}, path("empty"), folder_);
 
   nlohmann::json description;
   std::ifstream(folder_ / "case" / "case.json") >> description;
-  const auto describe = [&](const nlohmann::json& j) { std::ofstream(folder_ / "case" / "case.json", std::ios::trunc) << j.dump(2); };
+  const auto describe = [&](const nlohmann::json& j) {
+    std::ofstream(folder_ / "case" / "case.json", std::ios::trunc) << j.dump(2);
+  };
   auto newer = description;
   newer["schema_version"] = 99;
   describe(newer);
@@ -372,11 +385,16 @@ TEST_F(Program, CtrlCWhileUnpackingLeavesNothing) {
 }
 
 TEST_F(Program, CtrlCLeavesNothing) {
-  ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "4:1.9,6:0.9", "--width", "30", "--pitch", "0.4", "--out", path("case"), "--dicom", path("series")}).exit_code, 0);
-  const std::vector<std::string> import{"ct", path("series"), "--out", path("imported"), "--threshold", "0", "--pitch", "0.12"};
+  ASSERT_EQ(test::run(kProgram, {"phantom", "tube", "--layers", "4:1.9,6:0.9", "--width", "30", "--pitch", "0.4",
+                                 "--out", path("case"), "--dicom", path("series")})
+                .exit_code,
+            0);
+  const std::vector<std::string> import{"ct", path("series"), "--out", path("imported"), "--threshold",
+                                        "0",  "--pitch",      "0.12"};
   expect_stopped(import, 20, folder_);
   expect_stopped(import, 50, folder_);
-  const std::vector<std::string> phantom{"phantom", "block", "--layers", "40:1.9", "--width", "50", "--pitch", "0.25", "--out", path("p"), "--dicom", path("d")};
+  const std::vector<std::string> phantom{"phantom", "block", "--layers", "40:1.9",  "--width", "50",
+                                         "--pitch", "0.25",  "--out",    path("p"), "--dicom", path("d")};
   expect_stopped(phantom, 10, folder_);
   expect_stopped(phantom, 60, folder_);  // while it writes the DICOM files
 }

@@ -195,7 +195,9 @@ TEST_F(SharedScans, Jpeg2000InAnyFileOrder) {
   EXPECT_EQ(most, 1839);
 }
 
-TEST_F(SharedScans, TiltedGantryBesideAScout) { expect_refused(data_ / "dicom-tricky" / "tilt-and-localizer", "18.5 degrees"); }
+TEST_F(SharedScans, TiltedGantryBesideAScout) {
+  expect_refused(data_ / "dicom-tricky" / "tilt-and-localizer", "18.5 degrees");
+}
 
 // Two copies of one slice, the second 2 mm higher: a series in that file's encoding.
 Result<CtScan> read_pair(const fs::path& file) {
@@ -230,7 +232,8 @@ TEST_F(SharedScans, EveryTransferSyntaxGivesTheReferencesValuesOrIsRefused) {
     int worst = 0;
     // Below -1024 is outside of the scanned circle, which the lossy ones clip.
     for (std::size_t i = 0; i < scan->volume.values.size(); ++i)
-      if (reference->volume.values[i] >= -1024) worst = std::max(worst, std::abs(scan->volume.values[i] - reference->volume.values[i]));
+      if (reference->volume.values[i] >= -1024)
+        worst = std::max(worst, std::abs(scan->volume.values[i] - reference->volume.values[i]));
     EXPECT_LE(worst, allowed) << name;
     ++compared;
   }

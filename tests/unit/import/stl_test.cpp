@@ -22,7 +22,8 @@ TriangleMesh ball(double radius_mm, int parallels = 90) {
   TriangleMesh mesh;
   const int meridians = 2 * parallels;
   const auto corner = [&](double polar, double around) {
-    const Vec3 p = kCentre + radius_mm * Vec3(std::sin(polar) * std::cos(around), std::sin(polar) * std::sin(around), std::cos(polar));
+    const Vec3 p = kCentre + radius_mm * Vec3(std::sin(polar) * std::cos(around), std::sin(polar) * std::sin(around),
+                                              std::cos(polar));
     mesh.positions_mm.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
   };
   corner(0, 0);
@@ -55,11 +56,13 @@ TEST(MeshCase, ABallHasItsDistancesVolumeAndDensity) {
   const auto bone = made(ball(r), pitch);
   ASSERT_TRUE(bone) << bone.error().message;
   EXPECT_NEAR(bone->volume_mm3(), 4.0 / 3.0 * kPi * r * r * r, 0.003 * 7238.0);
-  // The middles of the quads lie up to 2 r (1 - cos(pi / 180)) = 0.0037 mm within the ball; between samples a distance that bends by
-  // 1 / r is off by h² / 4r. Cells at the end of the band, 2 mm away, have clipped corners.
+  // The middles of the quads lie up to 2 r (1 - cos(pi / 180)) = 0.0037 mm within the ball; between samples a distance
+  // that bends by 1 / r is off by h² / 4r. Cells at the end of the band, 2 mm away, have clipped corners.
   for (double at = -1.1; at < 1.1; at += 0.13)
-    for (const Vec3& way : {Vec3(1, 0, 0), Vec3(0.6, 0, 0.8), Vec3(-1, 2, 3).normalized(), Vec3(1, -1, -1).normalized()})
-      EXPECT_NEAR(bone->surface_mm(kCentre + (r + at) * way), at, 0.004 + pitch * pitch / (4 * (r - 2))) << way.transpose();
+    for (const Vec3& way :
+         {Vec3(1, 0, 0), Vec3(0.6, 0, 0.8), Vec3(-1, 2, 3).normalized(), Vec3(1, -1, -1).normalized()})
+      EXPECT_NEAR(bone->surface_mm(kCentre + (r + at) * way), at, 0.004 + pitch * pitch / (4 * (r - 2)))
+          << way.transpose();
   EXPECT_EQ(bone->surface_mm(kCentre), -4 * pitch);
   EXPECT_EQ(bone->surface_mm(kCentre + Vec3(0, 0, r + 6)), 4 * pitch);
   EXPECT_NEAR(bone->density_g_cm3(kCentre), 1.4, 0.01);
@@ -120,7 +123,8 @@ TEST(MeshCase, TheProgramScalesAndRefuses) {
     more.insert(more.begin(), "stl");
     return test::run(OSTEON_IMPORT_PROGRAM, more);
   };
-  const auto result = run({path("cm.stl"), "--unit", "cm", "--pitch", "0.6", "--density", "0.8", "--out", path("case")});
+  const auto result =
+      run({path("cm.stl"), "--unit", "cm", "--pitch", "0.6", "--density", "0.8", "--out", path("case")});
   ASSERT_EQ(result.exit_code, 0) << result.err;
   const auto bone = Case::load(folder / "case");
   ASSERT_TRUE(bone);

@@ -24,7 +24,8 @@ TEST(HidReport, FieldsLieWhereTheDescriptorSays) {
   EXPECT_EQ(fields[1].usage, 2);
   EXPECT_EQ(fields[1].bit, 1u);
   const HidUsage x{1, 0x30}, z{1, 0x32}, throttle{2, 0xbb}, none{1, 0x35};
-  const auto fx = find_field(fields, {&x, 1}), fz = find_field(fields, {&z, 1}), ft = find_field(fields, {&throttle, 1});
+  const auto fx = find_field(fields, {&x, 1}), fz = find_field(fields, {&z, 1}),
+             ft = find_field(fields, {&throttle, 1});
   ASSERT_TRUE(fx && fz && ft);
   EXPECT_FALSE(find_field(fields, {&none, 1}));
   EXPECT_EQ(fx->report, 1);
@@ -57,7 +58,7 @@ TEST(HidReport, DamagedDescriptorsEndQuietly) {
     const std::vector<HidField> fields = hid_input_fields(std::span(kDescriptor).first(cut));
     EXPECT_LE(fields.size(), 5u);
   }
-  EXPECT_TRUE(hid_input_fields(Bytes{0xb4, 0x81, 0x02}).empty());              // pop of nothing
+  EXPECT_TRUE(hid_input_fields(Bytes{0xb4, 0x81, 0x02}).empty());  // pop of nothing
   EXPECT_TRUE(hid_input_fields(Bytes{0x97, 0xff, 0xff, 0xff, 0xff, 0x75, 0x08, 0x09, 0x30, 0x81, 0x02})
                   .empty());  // four thousand million fields
 }

@@ -11,7 +11,8 @@ namespace {
 using Report = std::vector<std::uint8_t>;
 
 // 350 = 0x015e, −350 = 0xfea2, 175 = 0x00af.
-const Report kRight{1, 0x5e, 0x01, 0, 0, 0, 0}, kTowardsUser{1, 0, 0, 0x5e, 0x01, 0, 0}, kDown{1, 0, 0, 0, 0, 0x5e, 0x01};
+const Report kRight{1, 0x5e, 0x01, 0, 0, 0, 0}, kTowardsUser{1, 0, 0, 0x5e, 0x01, 0, 0},
+    kDown{1, 0, 0, 0, 0, 0x5e, 0x01};
 
 TEST(SpaceMouseReport, TheCapsAxesInTheDeviceFrame) {
   SpaceMouseState state;

@@ -1,5 +1,5 @@
-// A journal that something has damaged, anywhere: each byte of each of its files flipped, each of them cut at every length.
-// What is then read is exactly what was acknowledged, or it is said that it is not.
+// A journal that something has damaged, anywhere: each byte of each of its files flipped, each of them cut at every
+// length. What is then read is exactly what was acknowledged, or it is said that it is not.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -49,8 +49,8 @@ class DamageTest : public ::testing::TestWithParam<bool> {
   }
   void TearDown() override {
     std::printf("%s: %d whole, %d closed to rows, %d refused, %d behind a client; verify found %d\n",
-                GetParam() ? "closed" : "killed", outcomes_.whole, outcomes_.closed, outcomes_.refused, outcomes_.behind,
-                outcomes_.found);
+                GetParam() ? "closed" : "killed", outcomes_.whole, outcomes_.closed, outcomes_.refused,
+                outcomes_.behind, outcomes_.found);
     EXPECT_GT(outcomes_.whole, 0);
     EXPECT_GT(outcomes_.closed, 0);
     EXPECT_GT(outcomes_.refused, 0);
@@ -126,7 +126,7 @@ TEST_P(DamageTest, FlippedAtAnyByteItIsWholeOrSaysSo) {
 TEST_P(DamageTest, CutAtAnyLengthItIsWholeOrSaysSo) {
   const MemoryDisk::Image sound = disk_.image();
   for (const auto& [name, bytes] : sound)
-    for (std::size_t size = 0; size < bytes.size(); size += bytes.size() > 4096 ? 7 : 1) {
+    for (std::size_t size = 0; size<bytes.size(); size += bytes.size()> 4096 ? 7 : 1) {
       disk_.load(sound);
       disk_.cut(name, size);
       look(name + " cut to " + std::to_string(size));

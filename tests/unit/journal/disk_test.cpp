@@ -41,7 +41,8 @@ TEST(MemoryDisk, KeepsWhatWasSyncedAndMayForgetTheRest) {
     }
     disk.power_returns();
     ASSERT_EQ(disk.read("/a/kept", 0, 9000).value(), old);
-    const bool unnamed = disk.size("/a/unnamed").value().has_value(), renamed = disk.size("/a/renamed").value().has_value();
+    const bool unnamed = disk.size("/a/unnamed").value().has_value(),
+               renamed = disk.size("/a/renamed").value().has_value();
     ASSERT_FALSE(unnamed && renamed) << "a rename happens or not";
     ++outcomes[unnamed ? "not renamed" : renamed ? "renamed" : "not there"];
     if (!disk.size("/a/tail").value()) {
@@ -133,7 +134,8 @@ void keep_promises(Disk& disk, const std::filesystem::path& folder) {
     const auto written = file->finish();
     ASSERT_TRUE(written);
     EXPECT_EQ(written->size, 3u);
-    EXPECT_EQ(to_hex(written->digest), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad") << "FIPS 180-2, B.1";
+    EXPECT_EQ(to_hex(written->digest), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad")
+        << "FIPS 180-2, B.1";
   }
   { ASSERT_TRUE(DurableFile::begin(disk, folder / "dropped")->write("x")); }
   EXPECT_EQ(disk.list(folder).value(), std::vector<std::string>{"file"});

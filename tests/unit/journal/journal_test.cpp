@@ -115,7 +115,8 @@ TEST_F(JournalTest, HoldsWitnessesAgainstItsHistory) {
   Journal journal = create();
   append(journal, rows, 0, 5);
   for (std::size_t n = 0; n <= rows.size(); ++n)
-    EXPECT_TRUE(journal.check_witness(plain_head("bone", {rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(n)})));
+    EXPECT_TRUE(
+        journal.check_witness(plain_head("bone", {rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(n)})));
 
   const Result<void> other = journal.check_witness(plain_head("other bone", {rows.begin(), rows.begin() + 3}));
   ASSERT_FALSE(other);
@@ -389,7 +390,8 @@ TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
     std::iota(order.begin(), order.end(), 0);
     std::shuffle(order.begin(), order.end(), random);
     const auto set = [&](int i) {
-      const std::string label = i % 2 == 0 ? "Wilhelmina" + std::string(random() % 70, 'x') : std::string(random() % 90, 'y');
+      const std::string label =
+          i % 2 == 0 ? "Wilhelmina" + std::string(random() % 70, 'x') : std::string(random() % 90, 'y');
       ASSERT_TRUE(journal.set_person({"p" + std::to_string(i), label, i % 2}));
     };
     for (const int i : order) {
@@ -397,7 +399,8 @@ TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
       if (random() % 3 == 0) set(order[random() % order.size()]);
     }
     EXPECT_EQ(journal.forget_people_before(1).value(), 750u);
-    for (const auto& [file, bytes] : disk.image()) EXPECT_EQ(bytes.find("Wilhelmina"), std::string::npos) << seed << ", " << file;
+    for (const auto& [file, bytes] : disk.image())
+      EXPECT_EQ(bytes.find("Wilhelmina"), std::string::npos) << seed << ", " << file;
   }
 }
 
@@ -450,19 +453,21 @@ TEST(JournalOnDisk, HasOneUserAtATime) {
 
 std::vector<std::string> names_in(const std::filesystem::path& folder) {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) names.push_back(entry.path().filename().string());
+  for (const auto& entry : std::filesystem::directory_iterator(folder))
+    names.push_back(entry.path().filename().string());
   return names;
 }
 
 TEST(JournalOnDisk, IsNotTakenFromAnyFile) {
   const test::TempDir folder;
   const std::string magic("SQLite format 3\0", 16);
-  const std::pair<std::string, const char*> cases[]{{"", "is empty"},
-                                                    {"short", "is no journal; name a file"},
-                                                    {"{\"case\": \"" + std::string(170, 'x') + "\"}", "is no journal; name a file"},
-                                                    {std::string(5000, 'x'), "is no journal; name a file"},
-                                                    {magic.substr(0, 9), "has been cut to 9 bytes"},
-                                                    {magic + std::string(300, '\1'), "has been cut to 316 bytes"}};
+  const std::pair<std::string, const char*> cases[]{
+      {"", "is empty"},
+      {"short", "is no journal; name a file"},
+      {"{\"case\": \"" + std::string(170, 'x') + "\"}", "is no journal; name a file"},
+      {std::string(5000, 'x'), "is no journal; name a file"},
+      {magic.substr(0, 9), "has been cut to 9 bytes"},
+      {magic + std::string(300, '\1'), "has been cut to 316 bytes"}};
   for (const auto& [content, why] : cases) {
     std::ofstream(folder / "file", std::ios::binary | std::ios::trunc) << content;
     const auto opened = Journal::open(folder / "file");
@@ -479,7 +484,8 @@ TEST(JournalOnDisk, IsNotTakenFromAnotherProgramsDatabase) {
   const test::TempDir folder;
   sqlite3* other = nullptr;
   ASSERT_EQ(sqlite3_open((folder / "file").c_str(), &other), SQLITE_OK);
-  ASSERT_EQ(sqlite3_exec(other, "CREATE TABLE songs(name TEXT); BEGIN EXCLUSIVE", nullptr, nullptr, nullptr), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(other, "CREATE TABLE songs(name TEXT); BEGIN EXCLUSIVE", nullptr, nullptr, nullptr),
+            SQLITE_OK);
   const auto opened = Journal::open(folder / "file");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);
@@ -497,7 +503,8 @@ TEST(JournalOnDisk, NamesTheJournalThatIsInTheWay) {
       std::ofstream(folder / (name + end)) << "x";
     const auto made = Journal::create(folder / name, "bone");
     ASSERT_FALSE(made);
-    EXPECT_EQ(made.error().message, "there is " + (folder / name).string() + " already; give the new journal another name");
+    EXPECT_EQ(made.error().message,
+              "there is " + (folder / name).string() + " already; give the new journal another name");
   }
 }
 
@@ -508,7 +515,9 @@ TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
   ASSERT_TRUE(Journal::create(file, "bone")->close());
   std::filesystem::create_directory(sub);
   const auto why = [](const Result<Journal>& journal) { return journal ? std::string() : journal.error().message; };
-  const auto code = [](const Result<Journal>& journal) { return journal ? ErrorCode::cancelled : journal.error().code; };
+  const auto code = [](const Result<Journal>& journal) {
+    return journal ? ErrorCode::cancelled : journal.error().code;
+  };
 
   EXPECT_EQ(code(Journal::open(sub)), ErrorCode::invalid_input) << "and so nobody makes a new one there";
   EXPECT_THAT(why(Journal::open(sub)), AllOf(HasSubstr(sub.string()), HasSubstr("name a file, not a folder")));
@@ -523,9 +532,11 @@ TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
   EXPECT_NE(code(Journal::open(file)), ErrorCode::not_found) << "and so nobody makes a new one there";
   EXPECT_FALSE(std::filesystem::exists(folder / "journal.lock"));
   std::filesystem::permissions(file, perms::owner_read);
-  EXPECT_THAT(why(Journal::open(file)), HasSubstr(file.string() + " cannot be written to; see to its permissions, or copy it"));
+  EXPECT_THAT(why(Journal::open(file)),
+              HasSubstr(file.string() + " cannot be written to; see to its permissions, or copy it"));
   std::filesystem::permissions(sub, perms::owner_read | perms::owner_exec);
-  EXPECT_THAT(why(Journal::create(sub / "journal", "bone")), HasSubstr("see to the permissions, or choose another place"));
+  EXPECT_THAT(why(Journal::create(sub / "journal", "bone")),
+              HasSubstr("see to the permissions, or choose another place"));
   std::filesystem::permissions(sub, perms::owner_all);
 }
 

@@ -1,8 +1,8 @@
 // A real process that appends to a journal on the real disk, killed at any moment.
 #include <gtest/gtest.h>
 
-#include <csignal>
 #include <algorithm>
+#include <csignal>
 #include <cstdio>
 #include <fstream>
 #include <random>
@@ -97,12 +97,18 @@ std::string damage(const std::filesystem::path& file, std::mt19937_64& random) {
       if (!bytes.empty()) bytes[at] = static_cast<char>(bytes[at] ^ (1 << random() % 8));
       done = "flip";
       break;
-    case 1: bytes.replace(at, count, std::string(count, '\0')), done = "zero"; break;
-    case 2: bytes.resize(at), done = "truncate"; break;
+    case 1:
+      bytes.replace(at, count, std::string(count, '\0')), done = "zero";
+      break;
+    case 2:
+      bytes.resize(at), done = "truncate";
+      break;
     case 3:
       bytes.replace(at, count, bytes.substr(random() % (bytes.size() - count + 1), count)), done = "duplicate";
       break;
-    default: std::filesystem::remove(file); return "delete";
+    default:
+      std::filesystem::remove(file);
+      return "delete";
   }
   std::ofstream(file, std::ios::binary | std::ios::trunc) << bytes;
   return done;

@@ -18,7 +18,8 @@ int main(int argc, char** argv) {
   options.log_bytes = 200 << 10;  // so that it is carried into the file every now and then
   auto journal = std::filesystem::exists(file) ? Journal::open(file, options) : Journal::create(file, "bone", options);
   if (!journal || journal->closed_because() != nullptr) {
-    std::fprintf(stderr, "%s\n", journal ? journal->closed_because()->message.c_str() : journal.error().message.c_str());
+    std::fprintf(stderr, "%s\n",
+                 journal ? journal->closed_because()->message.c_str() : journal.error().message.c_str());
     return 1;
   }
   std::uint64_t place = journal->head().place.value;
@@ -35,7 +36,8 @@ int main(int argc, char** argv) {
     if (::write(STDOUT_FILENO, line, static_cast<std::size_t>(length)) != length) return 1;
     if ((random >> 40) % 8 == 0) {
       auto checkpoint = journal->begin_checkpoint(journal->head(), "");
-      if (!checkpoint || !checkpoint->write("room") || !checkpoint->finish() || !journal->add_checkpoint(std::move(*checkpoint)))
+      if (!checkpoint || !checkpoint->write("room") || !checkpoint->finish() ||
+          !journal->add_checkpoint(std::move(*checkpoint)))
         return 1;
     }
   }

@@ -4,8 +4,8 @@
 #include <fstream>
 #include <sstream>
 
-#include "server/journal/mirrored_log.hpp"
 #include "server/journal/maintenance.hpp"
+#include "server/journal/mirrored_log.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"

@@ -48,7 +48,8 @@ inline void append(Journal& journal, const std::vector<JournalRow>& rows, std::s
 // The file of a checkpoint, found by its place.
 inline std::filesystem::path checkpoint_path(const test::MemoryDisk& disk, const JournalHead& at) {
   for (const auto& [name, bytes] : disk.image())
-    if (name.find("-" + std::to_string(at.place.value) + "-") != std::string::npos && name.ends_with(".checkpoint")) return name;
+    if (name.find("-" + std::to_string(at.place.value) + "-") != std::string::npos && name.ends_with(".checkpoint"))
+      return name;
   return {};
 }
 

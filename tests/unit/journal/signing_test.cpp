@@ -266,8 +266,9 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
 TEST_F(SignedJournal, NamesAFooterThatAScriptWrote) {
   write(keys_, 0, 20, true);
   write(keys_, 20, 30, true);
-  run_sql("DELETE FROM rows WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
-          "DELETE FROM registers WHERE name IN ('footer', 'log generation')");
+  run_sql(
+      "DELETE FROM rows WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
+      "DELETE FROM registers WHERE name IN ('footer', 'log generation')");
   write(nullptr, 0, 0, true);
   EXPECT_THAT(vouched(key_).other_entries, Contains("the footer"));
 }
@@ -361,7 +362,8 @@ TEST_F(SignedJournal, KeepsItsSignaturesInACopyThatItsServerMakes) {
   append(journal, rows_, 20, 30);
   auto copy = JournalCopy::begin(journal, folder_ / "copy");
   ASSERT_TRUE(copy);
-  while (!copy->step().value()) {}
+  while (!copy->step().value()) {
+  }
   const Vouched found = vouched(key_, folder_ / "copy");
   EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
   EXPECT_THAT(text_of(found.rows), ElementsAre("1-30"));
@@ -374,7 +376,8 @@ TEST_F(SignedJournal, SignsNoBranchOfRowsThatItFound) {
   append(journal, rows_, 20, 30);
   auto copy = JournalCopy::begin_branch(journal, folder_ / "branch", RoomSeq{30}, "another bone", {});
   ASSERT_TRUE(copy);
-  while (!copy->step().value()) {}
+  while (!copy->step().value()) {
+  }
   EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").by_nobody), ElementsAre("1-30"));
 }
 
@@ -383,7 +386,8 @@ TEST_F(SignedJournal, SignsABranchThatItsServerMakes) {
   Journal journal = open(keys_);
   auto copy = JournalCopy::begin_branch(journal, folder_ / "branch", RoomSeq{10}, "another bone", {});
   ASSERT_TRUE(copy);
-  while (!copy->step().value()) {}
+  while (!copy->step().value()) {
+  }
   EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").rows), ElementsAre("1-10"));
 }
 

@@ -31,11 +31,13 @@ TEST(Backoff, StaysUnderALimitThatDoublesUpToItsBound) {
 TEST(Backoff, SpreadsClientsEvenly) {
   // Kolmogorov's distance of 4000 first waits from an even spread; beyond 1.95 / sqrt(n) with a chance of 0.1 %.
   std::vector<double> waits;
-  for (std::uint64_t seed = 0; seed < 4000; ++seed) waits.push_back((Backoff(seed).next() - Time(100ms)) / 1.0ms / 100.0);
+  for (std::uint64_t seed = 0; seed < 4000; ++seed)
+    waits.push_back((Backoff(seed).next() - Time(100ms)) / 1.0ms / 100.0);
   std::ranges::sort(waits);
   double distance = 0;
   for (std::size_t i = 0; i < waits.size(); ++i)
-    distance = std::max(distance, std::abs(waits[i] - (static_cast<double>(i) + 0.5) / static_cast<double>(waits.size())));
+    distance =
+        std::max(distance, std::abs(waits[i] - (static_cast<double>(i) + 0.5) / static_cast<double>(waits.size())));
   EXPECT_LT(distance, 1.95 / std::sqrt(4000.0));
 }
 

@@ -1,5 +1,5 @@
-// Two ends of a session made of SendWindow, ReceiveWindow and SendRate over any DatagramPort, as simple as can be: plain
-// bytes, nothing sealed. For carrying_test and for what send_window_test measures.
+// Two ends of a session made of SendWindow, ReceiveWindow and SendRate over any DatagramPort, as simple as can be:
+// plain bytes, nothing sealed. For carrying_test and for what send_window_test measures.
 #pragma once
 #include <cstring>
 #include <functional>
@@ -16,8 +16,8 @@ namespace osteon::test {
 struct PeerParams {
   SendWindowLimits window;
   SendRateParams rate;
-  int repeats = 0;            // 0: as SendRate says
-  std::size_t budget = 0;     // most bytes of a datagram, 0: as SendRate says
+  int repeats = 0;                    // 0: as SendRate says
+  std::size_t budget = 0;             // most bytes of a datagram, 0: as SendRate says
   std::size_t fixed_bytes = 29 + 60;  // what a real packet holds beside items: seal, acknowledgement, times, a pose
   std::uint64_t most_ahead = 1024;
 };
@@ -53,20 +53,26 @@ class Peer {
   using Time = SendWindow::Time;
 
   Peer(DatagramPort& port, const Endpoint& to, const PeerParams& params, std::function<void(std::string)> take)
-      : port_(port), to_(to), params_(params), window_(params.window), rate_(params.rate), in_(1, params.most_ahead),
+      : port_(port),
+        to_(to),
+        params_(params),
+        window_(params.window),
+        rate_(params.rate),
+        in_(1, params.most_ahead),
         take_(std::move(take)) {}
 
-  // At most 254 bytes, as the first of which its length goes, and a head of at least 5 for a mark and the number. `follows`:
-  // its head is saved after the item before. False when the window is full.
+  // At most 254 bytes, as the first of which its length goes, and a head of at least 5 for a mark and the number.
+  // `follows`: its head is saved after the item before. False when the window is full.
   bool say(const std::string& bytes, std::string head, bool follows) {
     OSTEON_CHECK(bytes.size() < kHead && head.size() >= 5);
-    return window_.push({static_cast<char>(bytes.size()) + bytes, std::move(head), follows ? window_.next() - 1 : 0}).has_value();
+    return window_.push({static_cast<char>(bytes.size()) + bytes, std::move(head), follows ? window_.next() - 1 : 0})
+        .has_value();
   }
 
   void heard(const Datagram& datagram, Time now) {
     PacketReader in{datagram.bytes};
-    const auto counter = in.get<std::uint64_t>(), acknowledged = in.get<std::uint64_t>(), newest = in.get<std::uint64_t>(),
-               received = in.get<std::uint64_t>(), beyond = in.get<std::uint64_t>();
+    const auto counter = in.get<std::uint64_t>(), acknowledged = in.get<std::uint64_t>(),
+               newest = in.get<std::uint64_t>(), received = in.get<std::uint64_t>(), beyond = in.get<std::uint64_t>();
     const auto echo = in.get<std::int64_t>(), sent = in.get<std::int64_t>();
     in.skip(params_.fixed_bytes - 7 * 8);
     if (!replays_.is_fresh(counter)) return;

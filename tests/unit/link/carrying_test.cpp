@@ -23,7 +23,7 @@ struct Outcome {
   bool complete = false;           // and all of them, within the quiet time
   std::size_t cuts = 0, refused = 0;
   Time quiet_until_complete{};
-  std::vector<double> felt_ms;     // from a cut until the other author has it
+  std::vector<double> felt_ms;  // from a cut until the other author has it
   PeerExtremes worst;
   double worst_kbit_per_s = 0;
   NetworkCounts network;
@@ -43,11 +43,11 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
     int author;
     std::uint64_t number;
   };
-  std::vector<Row> rows;                               // the server's order
-  std::array<std::uint64_t, 2> last_row{};             // in both down windows, of each author
-  std::array<std::vector<Time>, 2> made;               // by number - 1
-  std::array<std::uint64_t, 2> taken{};                // cuts that the server has of each
-  std::array<std::size_t, 2> known{};                  // rows that each author has
+  std::vector<Row> rows;                    // the server's order
+  std::array<std::uint64_t, 2> last_row{};  // in both down windows, of each author
+  std::array<std::vector<Time>, 2> made;    // by number - 1
+  std::array<std::uint64_t, 2> taken{};     // cuts that the server has of each
+  std::array<std::size_t, 2> known{};       // rows that each author has
   std::array<bool, 2> pausing{};
 
   const std::array<std::unique_ptr<SimPort>, 2> server_ports{network.open(node(1, 1)), network.open(node(1, 2))};
@@ -56,29 +56,33 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
   PeerParams up, down;
   down.rate.bytes_per_s = 600'000.0 / 8.0;
   for (std::size_t a = 0; a < 2; ++a) {
-    servers[a] = std::make_unique<Peer<Receive>>(*server_ports[a], ports[a]->local(), down, [&, a](const std::string& cut) {
-      const std::uint64_t number = std::stoull(cut);
-      if (number != ++taken[a]) outcome.each_once_in_order = false;
-      rows.push_back({static_cast<int>(a), number});
-      std::string text = std::to_string(a) + " " + std::to_string(number);
-      text.resize(12, ' ');
-      for (const auto& server : servers) {
-        // A row is joined to the author's last one where that is the row before; a real packet joins it over others too.
-        const bool follows = last_row[a] != 0 && last_row[a] + 1 == rows.size();
-        if (!server->say(text, std::string(40, 'h'), follows)) outcome.each_once_in_order = false;
-      }
-      last_row[a] = rows.size();
-    });
-    authors[a] = std::make_unique<Peer<Receive>>(*ports[a], server_ports[a]->local(), up, [&, a](const std::string& row) {
-      const int author = row[0] - '0';
-      const std::uint64_t number = std::stoull(row.substr(2));
-      const std::size_t at = known[a]++;
-      if (at >= rows.size() || rows[at].author != author || rows[at].number != number) outcome.each_once_in_order = false;
-      else if (author != static_cast<int>(a)) {
-        const Time since = made[static_cast<std::size_t>(author)][number - 1];
-        outcome.felt_ms.push_back(std::chrono::duration<double, std::milli>(time.now() - since).count());
-      }
-    });
+    servers[a] =
+        std::make_unique<Peer<Receive>>(*server_ports[a], ports[a]->local(), down, [&, a](const std::string& cut) {
+          const std::uint64_t number = std::stoull(cut);
+          if (number != ++taken[a]) outcome.each_once_in_order = false;
+          rows.push_back({static_cast<int>(a), number});
+          std::string text = std::to_string(a) + " " + std::to_string(number);
+          text.resize(12, ' ');
+          for (const auto& server : servers) {
+            // A row is joined to the author's last one where that is the row before; a real packet joins it over others
+            // too.
+            const bool follows = last_row[a] != 0 && last_row[a] + 1 == rows.size();
+            if (!server->say(text, std::string(40, 'h'), follows)) outcome.each_once_in_order = false;
+          }
+          last_row[a] = rows.size();
+        });
+    authors[a] =
+        std::make_unique<Peer<Receive>>(*ports[a], server_ports[a]->local(), up, [&, a](const std::string& row) {
+          const int author = row[0] - '0';
+          const std::uint64_t number = std::stoull(row.substr(2));
+          const std::size_t at = known[a]++;
+          if (at >= rows.size() || rows[at].author != author || rows[at].number != number)
+            outcome.each_once_in_order = false;
+          else if (author != static_cast<int>(a)) {
+            const Time since = made[static_cast<std::size_t>(author)][number - 1];
+            outcome.felt_ms.push_back(std::chrono::duration<double, std::milli>(time.now() - since).count());
+          }
+        });
   }
 
   const Time input_ends = 2s;
@@ -91,8 +95,10 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
         if (!pausing[a]) {
           std::string cut = std::to_string(made[a].size() + 1);
           cut.resize(10, ' ');
-          if (authors[a]->say(cut, std::string(36, 'h'), !made[a].empty())) made[a].push_back(t);
-          else ++outcome.refused;
+          if (authors[a]->say(cut, std::string(36, 'h'), !made[a].empty()))
+            made[a].push_back(t);
+          else
+            ++outcome.refused;
         }
       }
       for (const auto* side : {&authors, &servers}) {
@@ -165,10 +171,12 @@ TEST(Carrying, EveryCutArrivesOnceAndInOrderWhateverTheNetworkDoes) {
   const auto share = [&](double of) {
     return felt_ms.at(static_cast<std::size_t>(of * static_cast<double>(felt_ms.size() - 1)));
   };
-  std::printf("%llu seeds: %zu cuts, %llu datagrams, %llu lost; most waiting %zu bytes, held %zu, datagram %zu bytes; %.0f kbit/s "
-              "up; ",
-              static_cast<unsigned long long>(kSeeds), cuts, static_cast<unsigned long long>(sent),
-              static_cast<unsigned long long>(lost), worst.waiting_bytes, worst.held, worst.datagram, worst_kbit);
+  std::printf(
+      "%llu seeds: %zu cuts, %llu datagrams, %llu lost; most waiting %zu bytes, held %zu, datagram %zu bytes; %.0f "
+      "kbit/s "
+      "up; ",
+      static_cast<unsigned long long>(kSeeds), cuts, static_cast<unsigned long long>(sent),
+      static_cast<unsigned long long>(lost), worst.waiting_bytes, worst.held, worst.datagram, worst_kbit);
   std::printf("all there %lld ms after the last cut; felt after p50 %.0f p99 %.0f max %.0f ms\n",
               static_cast<long long>(longest / 1ms), share(0.5), share(0.99), felt_ms.back());
   EXPECT_LE(worst.waiting_bytes, 16u * 1024);
@@ -199,12 +207,15 @@ TEST(Carrying, LongItemsGoThroughASmallRate) {
   params.rate.bytes_per_s = 10'000;
   std::size_t taken = 0;
   Peer<> sender(*near, far->local(), params, [](const std::string&) {});
-  Peer<> receiver(*far, near->local(), params, [&](const std::string& text) { EXPECT_EQ(text.size(), 20 + 23 * (taken++ % 10)); });
+  Peer<> receiver(*far, near->local(), params,
+                  [&](const std::string& text) { EXPECT_EQ(text.size(), 20 + 23 * (taken++ % 10)); });
   DatagramBuffer buffer;
   std::size_t said = 0;
   for (Time t{}; t < 60s; t += 1ms) {
     time.run_until(t);
-    if (t < 30s && t % 250ms == 0ms && sender.say(std::string(20 + 23 * (said % 10), 'x'), std::string(36, 'h'), said > 0)) ++said;
+    if (t < 30s && t % 250ms == 0ms &&
+        sender.say(std::string(20 + 23 * (said % 10), 'x'), std::string(36, 'h'), said > 0))
+      ++said;
     while (const auto got = near->receive(buffer)) sender.heard(*got, t);
     while (const auto got = far->receive(buffer)) receiver.heard(*got, t);
     sender.step(t);

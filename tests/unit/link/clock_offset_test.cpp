@@ -36,8 +36,8 @@ TEST(ClockOffset, ErrsByHalfTheDifferenceOfTheWays) {
   EXPECT_EQ(clock.at(2s)->offset, 3s + 40ms);
 }
 
-// Queues that grow and empty, different on both ways: the truth is always within the error that is stated, which is half of
-// the least round trip of the samples kept.
+// Queues that grow and empty, different on both ways: the truth is always within the error that is stated, which is
+// half of the least round trip of the samples kept.
 TEST(ClockOffset, StaysWithinItsStatedErrorOnAnyNetwork) {
   Time worst{0};
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
@@ -86,9 +86,9 @@ TEST(ClockOffset, ForgetsWhatIsOldOrPushedOut) {
 
 TEST(ClockOffset, RefusesWhatNoClocksCanShow) {
   ClockOffset clock;
-  EXPECT_FALSE(clock.add({1s, 5s, 4s, 2s}));     // the peer sent before it received
-  EXPECT_FALSE(clock.add({1s, 5s, 7s, 2s}));     // and kept it for longer than it was away
-  EXPECT_FALSE(clock.add({2s, 5s, 5s, 1s}));     // it came back before it went
+  EXPECT_FALSE(clock.add({1s, 5s, 4s, 2s}));  // the peer sent before it received
+  EXPECT_FALSE(clock.add({1s, 5s, 7s, 2s}));  // and kept it for longer than it was away
+  EXPECT_FALSE(clock.add({2s, 5s, 5s, 1s}));  // it came back before it went
   const Time most(std::numeric_limits<std::int64_t>::max()), least(std::numeric_limits<std::int64_t>::min());
   for (const Time peer : {most, least}) EXPECT_FALSE(clock.add({1s, peer, peer, 2s}));
   EXPECT_FALSE(clock.add({least, 0s, 0s, most}));

@@ -126,8 +126,8 @@ TEST(PathWatch, WaitsWithAChallengeUntilEnoughHasCome) {
   EXPECT_TRUE(watch.challenge_due(48, 300ms));
 }
 
-// Any order of events: it is only ever at an address that echoed the last token sent there, nobody unproven is sent more than
-// three times what came from him, and at most one address is challenged at a time.
+// Any order of events: it is only ever at an address that echoed the last token sent there, nobody unproven is sent
+// more than three times what came from him, and at most one address is challenged at a time.
 TEST(PathWatch, KeepsItsRulesUnderAnyOrderOfEvents) {
   std::uint64_t moves = 0, challenges = 0;
   for (std::uint64_t seed = 0; seed < 300; ++seed) {

@@ -65,8 +65,8 @@ TEST(ReceiveWindow, SaysWhatHasComeBeyondTheMissing) {
   }
 }
 
-// Any order and repetition of packets of neighbouring items gives 1, 2, 3, ... and nothing twice, and never holds more than
-// the bound; packets go on coming until all have arrived.
+// Any order and repetition of packets of neighbouring items gives 1, 2, 3, ... and nothing twice, and never holds more
+// than the bound; packets go on coming until all have arrived.
 TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
   std::uint64_t offers = 0;
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {

@@ -66,7 +66,8 @@ TEST(ReplayWindow, AgreesWithASetOfAllThatWasSeen) {
     std::uint64_t front = seed % 3 == 0 ? 0 : seed % 3 == 1 ? random() >> 1 : kLast - 40000;
     std::vector<std::uint64_t> counters;
     for (int i = 0; i < 3000; ++i) {
-      const std::uint64_t jumps[] = {0, 1, random() % 70, random() % 70, 2040 + random() % 150, 2112, random() % 100000};
+      const std::uint64_t jumps[] = {
+          0, 1, random() % 70, random() % 70, 2040 + random() % 150, 2112, random() % 100000};
       const bool far = random() % 100 == 0;
       const std::uint64_t jump = jumps[far ? 4 + random() % 3 : random() % 4];
       front += std::min(jump, kLast - front);

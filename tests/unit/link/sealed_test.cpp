@@ -63,16 +63,20 @@ Bytes some_plain(std::size_t size, std::uint64_t seed) {
 // RFC 8439, section 2.8.2: the library's primitive is the one of the standard.
 TEST(Sealed, StandsOnThePrimitiveOfTheStandard) {
   const std::string text =
-      "Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, sunscreen would be it.";
+      "Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, sunscreen would be "
+      "it.";
   const Bytes key = from_hex("808182838485868788898a8b8c8d8e8f909192939495969798999a9b9c9d9e9f");
   const Bytes nonce = from_hex("070000004041424344454647"), header = from_hex("50515253c0c1c2c3c4c5c6c7");
   const Bytes expected = from_hex(
-      "d31a8d34648e60db7b86afbc53ef7ec2a4aded51296e08fea9e2b5a736ee62d63dbea45e8ca9671282fafb69da92728b1a71de0a9e060b2905d6a5b6"
-      "7ecd3b3692ddbd7f2d778b8c9803aee328091b58fab324e4fad675945585808b4831d7bc3ff4def08e4b7a9de576d26586cec64b61161ae10b594f09"
+      "d31a8d34648e60db7b86afbc53ef7ec2a4aded51296e08fea9e2b5a736ee62d63dbea45e8ca9671282fafb69da92728b1a71de0a9e060b29"
+      "05d6a5b6"
+      "7ecd3b3692ddbd7f2d778b8c9803aee328091b58fab324e4fad675945585808b4831d7bc3ff4def08e4b7a9de576d26586cec64b61161ae1"
+      "0b594f09"
       "e26a7e902ecbd0600691");
   Bytes out(text.size() + 16);
-  crypto_aead_chacha20poly1305_ietf_encrypt(out.data(), nullptr, reinterpret_cast<const std::uint8_t*>(text.data()), text.size(),
-                                            header.data(), header.size(), nullptr, nonce.data(), key.data());
+  crypto_aead_chacha20poly1305_ietf_encrypt(out.data(), nullptr, reinterpret_cast<const std::uint8_t*>(text.data()),
+                                            text.size(), header.data(), header.size(), nullptr, nonce.data(),
+                                            key.data());
   EXPECT_EQ(out, expected);
 }
 
@@ -87,8 +91,9 @@ TEST(Sealed, IsWhatAnotherProgramMakes) {
   const Bytes first = seal(sealer, plain, 0s), second = seal(sealer, plain, 0s);
   EXPECT_EQ(first, from_hex("d4c3b2a1000807060504030201f343bcfcb41fc72c5fe9639c242604d4937c734c07d2d83afc871e9d2ecc72"
                             "01ba96f1452d3404ed0b164fc0f5d46a251a61fd79ac4200cfa86d039553"));
-  EXPECT_EQ(second, from_hex("d4c3b2a1010907060504030201f8e3de574c906601a170a77ddd2e1d6842f1d5309c27093624a403564859d494"
-                             "9f89f1c807b60a11f104e26311e60ff5f028e5b6ebb2c645b848266217"));
+  EXPECT_EQ(second,
+            from_hex("d4c3b2a1010907060504030201f8e3de574c906601a170a77ddd2e1d6842f1d5309c27093624a403564859d494"
+                     "9f89f1c807b60a11f104e26311e60ff5f028e5b6ebb2c645b848266217"));
   const Bytes next = from_hex("32af0b6f61463e5d87f37a8c919c49530c0f6d7a7851fc276b0eeb1d724e389e");
   EXPECT_TRUE(std::ranges::equal(next_key(a_key()).bytes, next));
 }
@@ -106,7 +111,8 @@ TEST(Sealed, OpensWhatWasSealedAndNothingThatWasChanged) {
       changed[bit / 8] ^= static_cast<std::uint8_t>(1 << bit % 8);
       ASSERT_FALSE(open(opener, changed, 0s)) << "bit " << bit;
     }
-    for (std::size_t less = 0; less < sealed.size(); ++less) ASSERT_FALSE(open(opener, std::span(sealed).first(less), 0s));
+    for (std::size_t less = 0; less < sealed.size(); ++less)
+      ASSERT_FALSE(open(opener, std::span(sealed).first(less), 0s));
     Bytes longer = sealed;
     for (int more = 0; more < 40; ++more) {
       longer.push_back(0);
@@ -169,8 +175,8 @@ TEST(Sealed, ChangesItsKeyByTimeAndByNumber) {
   EXPECT_EQ(silent.generation(), 1u) << "a silent sender does not run ahead of its peer";
 }
 
-// Datagrams under two keys arrive in any order, with others lost and repeated: all of them are opened, once, through more
-// generations than a byte can number.
+// Datagrams under two keys arrive in any order, with others lost and repeated: all of them are opened, once, through
+// more generations than a byte can number.
 TEST(Sealed, OpensBothGenerationsInFlight) {
   std::mt19937_64 random(5);
   Sealer sealer(kSession, a_key());
@@ -206,11 +212,15 @@ TEST(Sealed, OpensBothGenerationsInFlight) {
       }
     }
   }
-  EXPECT_EQ(opened + lost + [&] {
-    std::set<std::uint64_t> left;
-    for (const Flying& one : flying) left.insert(one.counter);
-    return left.size();
-  }(), sent) << "each is opened once, lost or still on its way";
+  EXPECT_EQ(
+      opened + lost +
+          [&] {
+            std::set<std::uint64_t> left;
+            for (const Flying& one : flying) left.insert(one.counter);
+            return left.size();
+          }(),
+      sent)
+      << "each is opened once, lost or still on its way";
   EXPECT_EQ(opener.counts().forged, 0u);
   EXPECT_GT(sealer.generation(), 256u);
   EXPECT_EQ(opener.generation(), sealer.generation());

@@ -100,7 +100,8 @@ TEST(SendRate, WaitsForAPacketWorthSending) {
   EXPECT_NEAR(packets, (30.0 * 10'000 + static_cast<double>(params.burst_bytes)) / 280.0, 2.0);
 }
 
-// The fewest k with loss^k R/T at most 0.0002, from the estimate of the loss, which strays by about sqrt(p (1 - p) / 128).
+// The fewest k with loss^k R/T at most 0.0002, from the estimate of the loss, which strays by about sqrt(p (1 - p) /
+// 128).
 TEST(SendRate, RepeatsAsOftenAsTheLossAsksFor) {
   for (const double loss : {0.02, 0.1, 0.2, 0.3, 0.4, 0.7}) {
     for (const auto round_trip : {10ms, 80ms, 200ms}) {
@@ -148,7 +149,8 @@ TEST(PoseDeadband, LetsThroughWhatIsSeenOrFelt) {
   const auto moved = [&](double mm, double degrees, const Vec3& axis) {
     Pose now = said;
     now.position_mm += mm * Vec3(0.6, 0.0, -0.8);
-    now.rotation = now.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(degrees * std::numbers::pi / 180.0, axis.normalized()));
+    now.rotation =
+        now.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(degrees * std::numbers::pi / 180.0, axis.normalized()));
     Pose negative = now;
     negative.rotation.coeffs() *= -1.0;
     EXPECT_EQ(has_moved(said, now), has_moved(said, negative)) << "q and -q are one rotation";

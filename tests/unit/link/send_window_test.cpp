@@ -68,7 +68,8 @@ TEST(SendWindow, RepeatsEachItemInTheNextPacketsAndThenWaits) {
   // Its acknowledgement, though, is overdue a retransmission time after the first time.
   EXPECT_TRUE(window.pick(window.retransmission_time() - 1ns, 1000, 5).numbers.empty());
   EXPECT_EQ(window.pick(window.retransmission_time(), 1000, 5).numbers, Numbers{1});
-  EXPECT_EQ(window.pick(window.retransmission_time() + 8ms, 1000, 5).numbers, Numbers{1}) << "in every packet from then on";
+  EXPECT_EQ(window.pick(window.retransmission_time() + 8ms, 1000, 5).numbers, Numbers{1})
+      << "in every packet from then on";
   EXPECT_EQ(window.pick(1s, 1000, 5).numbers, (Numbers{1, 2, 3}));
 }
 
@@ -98,7 +99,8 @@ TEST(SendWindow, PutsTheOverdueFirstThenTheNewInOrderThenTheLeastOftenSent) {
   window.push(item(10));
   window.push(item(30));
   window.push(item(1));
-  EXPECT_EQ(window.pick(1s + 8ms, 25, 5).numbers, (Numbers{1, 10})) << "12 must not go before 11, for which there is no room";
+  EXPECT_EQ(window.pick(1s + 8ms, 25, 5).numbers, (Numbers{1, 10}))
+      << "12 must not go before 11, for which there is no room";
 }
 
 // Bytes counted by hand: a head is paid where the item before is not in the packet, and once saved when it joins later.
@@ -168,8 +170,8 @@ TEST(SendWindow, SaysHowMuchRoomItNeeds) {
   EXPECT_EQ(window.pick(1s, 846, 5).numbers, (Numbers{1, 2}));
 }
 
-// Whatever happens: the budget holds, what was never sent goes without a gap, nothing acknowledged is sent again, and the
-// bytes are those of the items and of one head for each that misses its predecessor.
+// Whatever happens: the budget holds, what was never sent goes without a gap, nothing acknowledged is sent again, and
+// the bytes are those of the items and of one head for each that misses its predecessor.
 TEST(SendWindow, KeepsItsPromisesUnderAnythingThatIsAskedOfIt) {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     test::Random random(seed);
@@ -188,7 +190,8 @@ TEST(SendWindow, KeepsItsPromisesUnderAnythingThatIsAskedOfIt) {
         const std::uint64_t upto = random.index(known.size() + 3);
         const std::uint64_t beyond = random.unit() < 0.5 ? 0 : random.index(16);
         const bool news = window.acknowledge(upto, beyond);
-        if (upto > acknowledged && upto <= newest_sent) acknowledged = upto;
+        if (upto > acknowledged && upto <= newest_sent)
+          acknowledged = upto;
         else if (beyond == 0) {
           EXPECT_FALSE(news);
         }
@@ -265,10 +268,12 @@ Carried carry(std::chrono::nanoseconds one_way, double kbit_per_s, int repeats, 
   const auto share = [&](double of) {
     return delays_ms.at(static_cast<std::size_t>(of * static_cast<double>(delays_ms.size() - 1)));
   };
-  return {share(0.5), share(0.99), share(0.999), bytes / said, bytes * 8.0 / 1000.0 / (14.0 * static_cast<double>(seeds))};
+  return {share(0.5), share(0.99), share(0.999), bytes / said,
+          bytes * 8.0 / 1000.0 / (14.0 * static_cast<double>(seeds))};
 }
 
-// What k and the budget do to the delay until an item is passed on, in order. The columns are what SendRate's choice rests on.
+// What k and the budget do to the delay until an item is passed on, in order. The columns are what SendRate's choice
+// rests on.
 TEST(SendWindow, Table) {
   for (const auto one_way : {40ms, 100ms}) {
     std::map<int, Carried> wide;
@@ -276,17 +281,20 @@ TEST(SendWindow, Table) {
     for (const double kbit : {300.0, 200.0}) {
       for (const int k : {2, 3, 4, 5, 6, 7, 8, 10, 12, 0}) {
         const Carried c = carry(one_way, kbit, k, 8);
-        if (kbit == 300.0) wide[k] = c;
-        else short_of_bytes = c;
+        if (kbit == 300.0)
+          wide[k] = c;
+        else
+          short_of_bytes = c;
         std::printf("one way %3lld ms, %3.0f kbit/s, k %2s: ", static_cast<long long>(one_way.count()), kbit,
                     k == 0 ? "-" : std::to_string(k).c_str());
-        std::printf("delay p50 %4.0f p99 %4.0f p99.9 %4.0f ms, %3.0f B an item, %3.0f kbit/s\n", c.p50_ms, c.p99_ms, c.p999_ms,
-                    c.bytes_per_item, c.kbit_per_s);
+        std::printf("delay p50 %4.0f p99 %4.0f p99.9 %4.0f ms, %3.0f B an item, %3.0f kbit/s\n", c.p50_ms, c.p99_ms,
+                    c.p999_ms, c.bytes_per_item, c.kbit_per_s);
         EXPECT_LE(c.kbit_per_s, kbit);
       }
     }
     const double way_ms = std::chrono::duration<double, std::milli>(one_way).count();
-    // p^k R/T: 6 % of items wait a round trip at k = 5 of 100 ms, so the 99th percentile does; 0.01 % at k = 10, so it does not.
+    // p^k R/T: 6 % of items wait a round trip at k = 5 of 100 ms, so the 99th percentile does; 0.01 % at k = 10, so it
+    // does not.
     if (one_way == 100ms) {
       EXPECT_GT(wide[5].p99_ms, 2.0 * way_ms);
     }

@@ -35,7 +35,8 @@ std::optional<Came> next(UdpPort& port) {
   std::optional<Came> came;
   static_cast<void>(test::wait_until(
       [&] {
-        if (const auto datagram = port.receive(into)) came = {datagram->from, {datagram->bytes.begin(), datagram->bytes.end()}};
+        if (const auto datagram = port.receive(into))
+          came = {datagram->from, {datagram->bytes.begin(), datagram->bytes.end()}};
         return came.has_value();
       },
       10s));
@@ -102,7 +103,8 @@ TEST(UdpPort, DropsWhatIsLongerThanADatagramMayBe) {
   to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   for (const std::size_t size : {kMostDatagramBytes + 1, std::size_t{60000}, kMostDatagramBytes}) {
     const Bytes bytes(size, 7);
-    EXPECT_EQ(sendto(raw, bytes.data(), size, 0, reinterpret_cast<const sockaddr*>(&to), sizeof(to)), static_cast<ssize_t>(size));
+    EXPECT_EQ(sendto(raw, bytes.data(), size, 0, reinterpret_cast<const sockaddr*>(&to), sizeof(to)),
+              static_cast<ssize_t>(size));
   }
   close(raw);
   const auto came = next(*server);
@@ -112,7 +114,8 @@ TEST(UdpPort, DropsWhatIsLongerThanADatagramMayBe) {
   EXPECT_EQ(server->counts().received, 1u);
 }
 
-// A program that is not there is reported by ICMP. Systems differ in whom they tell: here the kernel is asked to tell us.
+// A program that is not there is reported by ICMP. Systems differ in whom they tell: here the kernel is asked to tell
+// us.
 TEST(UdpPort, OutlivesAPeerThatRefuses) {
   const auto port = a_port(), other = a_port();
   const int on = 1;
@@ -199,8 +202,8 @@ TEST(UdpPort, IsHeardOnAnyAddress) {
   EXPECT_EQ(came->from, client->local());
 }
 
-// Where the machine has IPv6, a port of both families says of a peer of IPv4 what a port of IPv4 says; where it has not,
-// opening says so.
+// Where the machine has IPv6, a port of both families says of a peer of IPv4 what a port of IPv4 says; where it has
+// not, opening says so.
 TEST(UdpPort, HearsBothFamilies) {
   const auto both = UdpPort::open({.address = "::"});
   if (!both) {

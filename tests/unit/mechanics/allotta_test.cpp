@@ -21,8 +21,9 @@ double torque(double diameter_mm, double feed_mm_per_rev, GramsPerCm3 density = 
 
 // Points of comparison: cortical bone, 1000 rpm and 1 mm/s, so 0.06 mm a turn.
 TEST(Allotta, GivesThePointsOfComparison) {
-  const struct { double diameter, newtons, newton_mm, last_digit; } kPoints[] = {
-      {2.5, 41.8, 30.5, 0.1}, {3.2, 53.5, 49.9, 0.1}, {4.5, 75.2, 98.7, 0.1}, {7.94, 132.7, 307, 1}};
+  const struct {
+    double diameter, newtons, newton_mm, last_digit;
+  } kPoints[] = {{2.5, 41.8, 30.5, 0.1}, {3.2, 53.5, 49.9, 0.1}, {4.5, 75.2, 98.7, 0.1}, {7.94, 132.7, 307, 1}};
   for (const auto& point : kPoints) {
     EXPECT_NEAR(at_1000_rpm(point.diameter), point.newtons, 0.06) << point.diameter;
     EXPECT_NEAR(torque(point.diameter, 0.06), point.newton_mm, 0.6 * point.last_digit) << point.diameter;

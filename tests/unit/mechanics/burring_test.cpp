@@ -53,7 +53,8 @@ TEST(Agus, FrictionNearThePoleHasItsClosedForm) {
   const AgusParams params;
   const Newtons normal{3.0};
   const double contact = std::sqrt(agus_depth_mm(params, normal) * params.radius_mm), d = 0.1 * contact;
-  EXPECT_NEAR(agus_friction(params, normal, d).value(), 0.9 * 3.0 * std::numbers::pi / 8.0 * 0.1, 0.05 * 0.9 * 0.1 * 1.18);
+  EXPECT_NEAR(agus_friction(params, normal, d).value(), 0.9 * 3.0 * std::numbers::pi / 8.0 * 0.1,
+              0.05 * 0.9 * 0.1 * 1.18);
 }
 
 // The sum over the disc near the pole and the series far from it meet.
@@ -73,7 +74,8 @@ TEST(Agus, ErosionBalancesPower) {
 
 TEST(Agus, ErosionScales) {
   const auto v = [](double rpm, double force, double arm, double area, double density, double wear = 1.0) {
-    return agus_erosion({.wear = wear}, RevolutionsPerMinute{rpm}, Newtons{force}, arm, area, GramsPerCm3{density}).value();
+    return agus_erosion({.wear = wear}, RevolutionsPerMinute{rpm}, Newtons{force}, arm, area, GramsPerCm3{density})
+        .value();
   };
   const double at = v(20'000, 2, 2, 6, 1.8);
   EXPECT_NEAR(v(40'000, 2, 2, 6, 1.8), 2.0 * at, 1e-9);

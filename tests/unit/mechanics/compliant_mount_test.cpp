@@ -86,8 +86,8 @@ TEST(MountFollower, PaysForWhatItGivesWhateverIsTold) {
     bone.step(load, kTick);
     const Pose after = bone.pose_world_bone();
     const Eigen::AngleAxisd turned(after.rotation * before.rotation.conjugate());
-    given_mj -= load.force_n.dot(after.position_mm - before.position_mm) +
-                load.moment_nmm.dot(turned.angle() * turned.axis());
+    given_mj -=
+        load.force_n.dot(after.position_mm - before.position_mm) + load.moment_nmm.dot(turned.angle() * turned.axis());
     worst_mj = std::max(worst_mj, given_mj);
     held_back += bone.held_back();
   }
@@ -126,8 +126,8 @@ TEST(MountFollower, ForgetsNothingThatItHeldBack) {
   EXPECT_FALSE(bone.held_back());
 }
 
-// The ledger of a hand at it looks a tick ahead and reckons with no more: where what it may give comes to its end, and where a
-// hand that held it lets go at once.
+// The ledger of a hand at it looks a tick ahead and reckons with no more: where what it may give comes to its end, and
+// where a hand that held it lets go at once.
 TEST(MountFollower, SetsOutAndStopsNoFasterThanABoneDoes) {
   const MountFollowerParams params;
   const Load loads[] = {{{20.0, 0, 0}, Vec3::Zero()}, {Vec3::Zero(), {0, 800.0, 0}}, {{20.0, 0, 0}, {0, 800.0, 0}}};

@@ -194,7 +194,8 @@ TEST(BroachDrive, StopsWhenSeated) {
   const double density = 0.5, strength = 130.0 * (0.5 / 1.9) * (0.5 / 1.9);
   const double area_per_mm = 100.0, seat_mm = 3920.0 / (0.1 * strength * area_per_mm);
   FollowedBroach broach;
-  for (int i = 0; i < 2'000'000 && !broach.drive.seated(); ++i) broach.step(120.0, area_per_mm * broach.way_mm, density, 20.0);
+  for (int i = 0; i < 2'000'000 && !broach.drive.seated(); ++i)
+    broach.step(120.0, area_per_mm * broach.way_mm, density, 20.0);
   ASSERT_TRUE(broach.drive.seated());
   EXPECT_NEAR(broach.way_mm, seat_mm, 0.1);
   const double seated_mm = broach.way_mm;
@@ -233,7 +234,8 @@ TEST(BroachDrive, GoesNoFurtherThanTheHandFollows) {
   EXPECT_NEAR(way, 3 * 0.5, 1e-9);
 }
 
-// A hand that follows slowly has what it followed of a blow while that lasted, some 5 ms, and nothing more until the next.
+// A hand that follows slowly has what it followed of a blow while that lasted, some 5 ms, and nothing more until the
+// next.
 TEST(BroachDrive, ABlowIsOverWhenItsContactIs) {
   BroachDrive drive;
   double way = 0.0, gone = 0.0;
@@ -253,7 +255,8 @@ TEST(BroachDrive, ABlowIsOverWhenItsContactIs) {
 TEST(BroachDrive, GoesHalfAsFarWhenTwiceBlunt) {
   const auto way_mm = [](double wear) {
     CuttingEffects effects(*find_tool("broach-2"), wear);
-    EffectMoment moment{.spindle_rpm = 60.0, .engaged = 1.0, .engaged_area_mm2 = 400.0, .density_g_cm3 = 0.6, .push_n = 20.0};
+    EffectMoment moment{
+        .spindle_rpm = 60.0, .engaged = 1.0, .engaged_area_mm2 = 400.0, .density_g_cm3 = 0.6, .push_n = 20.0};
     double way = 0.0;
     for (int i = 0; i < 500; ++i) {
       moment.advance_mm = kDt * effects.felt({}).max_feed_mm_per_s;
@@ -276,7 +279,9 @@ TEST(Motor, KeepsItsPowerAtEverySpeed) {
   const SpindleParams slow = motor_of(*find_tool("drill-5-16in"));
   EXPECT_EQ(slow.full_rpm, 600.0);
   EXPECT_NEAR(slow.most_nmm * slow.full_rpm, drill.most_nmm * drill.full_rpm, 1e-6);
-  const auto droop = [](const SpindleParams& motor) { return motor.droop_rpm_per_nmm * motor.most_nmm / motor.full_rpm; };
+  const auto droop = [](const SpindleParams& motor) {
+    return motor.droop_rpm_per_nmm * motor.most_nmm / motor.full_rpm;
+  };
   EXPECT_NEAR(droop(burr), droop(drill), 1e-9);
   const SpindleParams reamer = motor_of(*find_tool("reamer-sphere"));
   EXPECT_NEAR(reamer.most_nmm * reamer.full_rpm, 4.0 * drill.most_nmm * drill.full_rpm, 1e-6);
@@ -330,8 +335,12 @@ TEST(CuttingEffects, AFreshToolFeelsAsItsLaw) {
 TEST(CuttingEffects, ADeepHoleClogsADrillButNoBurr) {
   const Tool drill = *find_tool("drill-3.2"), burr = *find_tool("burr-round-5");
   CuttingEffects drilling(drill), burring(burr);
-  const EffectMoment deeper{
-      .spindle_rpm = 1000, .engaged = 1.0, .density_g_cm3 = 1.9, .cutting = true, .cutting_n = 29.0, .advance_mm = 0.01};
+  const EffectMoment deeper{.spindle_rpm = 1000,
+                            .engaged = 1.0,
+                            .density_g_cm3 = 1.9,
+                            .cutting = true,
+                            .cutting_n = 29.0,
+                            .advance_mm = 0.01};
   for (int i = 0; i < 4000; ++i) {
     drilling.step(deeper, kDt);
     burring.step(deeper, kDt);
@@ -358,8 +367,11 @@ TEST(CuttingEffects, AJammedSawStandsAndABroachWaitsForItsBlow) {
   const FeedLaw blows = default_law(broach).feed_law(law_tool(broach), soft);
   ASSERT_GT(blows.max_feed_mm_per_s, 0.0);
   EXPECT_EQ(broaching.felt(blows).max_feed_mm_per_s, 0.0);  // nobody has struck yet
-  EffectMoment held{.spindle_rpm = 60, .engaged = 1.0, .engaged_area_mm2 = law_tool(broach).leading_area_mm2,
-                          .density_g_cm3 = 0.3, .push_n = 20.0};
+  EffectMoment held{.spindle_rpm = 60,
+                    .engaged = 1.0,
+                    .engaged_area_mm2 = law_tool(broach).leading_area_mm2,
+                    .density_g_cm3 = 0.3,
+                    .push_n = 20.0};
   double way = 0.0;
   for (int i = 0; i < 10'000; ++i) {
     broaching.step(held, kDt);

@@ -16,7 +16,8 @@ const FeedLaw kCortical = drilling_law({}, RevolutionsPerMinute{1000}, GramsPerC
 TEST(FeedLaw, SolutionBalancesCouplingAndResistance) {
   for (const double extension : {0.05, 0.2, 0.58, 0.7}) {
     const FeedSolution solution = solve_feed(kCortical, kStiffness, extension, kDt);
-    EXPECT_NEAR(kStiffness * (extension - solution.feed_mm_per_s * kDt), resistance_n(kCortical, solution.feed_mm_per_s), 1e-6);
+    EXPECT_NEAR(kStiffness * (extension - solution.feed_mm_per_s * kDt),
+                resistance_n(kCortical, solution.feed_mm_per_s), 1e-6);
     EXPECT_FALSE(solution.rubbing);
   }
 }
@@ -77,7 +78,8 @@ TEST(FeedLaw, RootsAndSquaresHaveTheirClosedForms) {
     const double s = (-b + std::sqrt(b * b + 4.0 * kt * c)) / (2.0 * kt);  // kt s^2 + b s - c = 0, v = s^2
     const double most = extension / kDt;
     EXPECT_NEAR(solve_feed(root, k, extension, kDt).feed_mm_per_s, std::min(s * s, most), 1e-6 * s * s);
-    const FeedLaw square{.offset_n = offset, .scale_n = b, .exponent = 2.0, .max_feed_mm_per_s = 1e6, .threshold_n = 0.0};
+    const FeedLaw square{
+        .offset_n = offset, .scale_n = b, .exponent = 2.0, .max_feed_mm_per_s = 1e6, .threshold_n = 0.0};
     const double v = (-kt + std::sqrt(kt * kt + 4.0 * b * c)) / (2.0 * b);  // b v^2 + kt v - c = 0
     EXPECT_NEAR(solve_feed(square, k, extension, kDt).feed_mm_per_s, v, 1e-9);
   }
@@ -101,7 +103,9 @@ TEST(FeedLaw, EveryOffsetAndPowerIsBracketed) {
                 ASSERT_EQ(v, 0.0);
               } else {
                 // Never more than the coupling has; and where no cap limits, a little more feed would ask for too much.
-                const auto left = [&](double feed) { return stiffness * (extension - feed * kDt) - resistance_n(law, feed); };
+                const auto left = [&](double feed) {
+                  return stiffness * (extension - feed * kDt) - resistance_n(law, feed);
+                };
                 if (v > 0.0) {
                   ASSERT_GE(left(v), -1e-9 * stiffness * extension);
                 }
@@ -115,7 +119,8 @@ TEST(FeedLaw, EveryOffsetAndPowerIsBracketed) {
 
 TEST(FeedLaw, InvertsItself) {
   for (const double exponent : {0.163, 0.5189, 1.0, 2.0}) {
-    const FeedLaw law{.offset_n = 2.0, .scale_n = 7.0, .exponent = exponent, .max_feed_mm_per_s = 10.0, .threshold_n = 0.0};
+    const FeedLaw law{
+        .offset_n = 2.0, .scale_n = 7.0, .exponent = exponent, .max_feed_mm_per_s = 10.0, .threshold_n = 0.0};
     for (const double v : {0.01, 1.0, 30.0}) EXPECT_NEAR(feed_at_mm_per_s(law, resistance_n(law, v)), v, 1e-9 * v);
     EXPECT_EQ(feed_at_mm_per_s(law, 2.0), 0.0);
     EXPECT_EQ(feed_at_mm_per_s(law, -1.0), 0.0);

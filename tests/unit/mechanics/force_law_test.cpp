@@ -51,7 +51,8 @@ TEST(ForceLaws, EveryOneSaysWhatItIs) {
     EXPECT_NE(l.torque_nmm, nullptr);
   }
   // Every row of the page of laws.
-  for (const char* name : {"allotta", "chi", "agus", "milling", "spring-damper", "multi-point", "saw", "reamer", "broach"})
+  for (const char* name :
+       {"allotta", "chi", "agus", "milling", "spring-damper", "multi-point", "saw", "reamer", "broach"})
     EXPECT_TRUE(names.contains(name)) << name;
   EXPECT_EQ(names.size(), 9u);
   EXPECT_EQ(find_force_law("hooke"), nullptr);
@@ -70,15 +71,21 @@ std::set<int> numbers_of(const ForceLaw& l) {
   return found;
 }
 
-// Every numbered equation of chapter 7 but 7.15, which is a filter, computed by hand: what the law that claims it must give.
-// The whole point of a 3.2 mm drill at 1000 rpm in cortical bone; a 5 mm burr at 20 000 rpm with 10 mm2 at 2 mm from its axis.
+// Every numbered equation of chapter 7 but 7.15, which is a filter, computed by hand: what the law that claims it must
+// give. The whole point of a 3.2 mm drill at 1000 rpm in cortical bone; a 5 mm burr at 20 000 rpm with 10 mm2 at 2 mm
+// from its axis.
 TEST(ForceLaws, ComputeEveryNumberedEquation) {
   const LawTool drill = tool_of("drill-3.2"), burr = tool_of("burr-round-5");
   const LawInputs drilled{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0, .directed_density = 0.4};
-  const LawInputs burred{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 0.5, .engaged_area_mm2 = 10.0,
-                         .edge_length_mm = 40.0, .mean_arm_mm = 2.0};
+  const LawInputs burred{.spindle_rpm = 20'000,
+                         .density_g_cm3 = 1.9,
+                         .engaged = 0.5,
+                         .engaged_area_mm2 = 10.0,
+                         .edge_length_mm = 40.0,
+                         .mean_arm_mm = 2.0};
   LawInputs at_pole = burred;
-  // (7.4): 3 N press a sphere of 2.5 mm in by h; Hertz's disc has a^2 = h R. There friction's directions differ: 3 pi d / (8 a).
+  // (7.4): 3 N press a sphere of 2.5 mm in by h; Hertz's disc has a^2 = h R. There friction's directions differ: 3 pi d
+  // / (8 a).
   const double h_mm = 2.5 * std::pow(3.0 / (25'000.0 * 2.5 * 2.5), 2.0 / 3.0), a_mm = std::sqrt(h_mm * 2.5);
   at_pole.mean_arm_mm = 0.2 * a_mm;
   const double omega = 20'000 * 2.0 * std::numbers::pi / 60.0, half_point = std::sin(59.0 * std::numbers::pi / 180.0);
@@ -89,22 +96,60 @@ TEST(ForceLaws, ComputeEveryNumberedEquation) {
     double is, expected, within;
   };
   const std::map<int, std::function<Given(const ForceLaw&)>> equations = {
-      {1, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0), 650.0 * 0.12 * 1.6 * half_point, 1e-9}; }},
-      {2, [&](auto& l) { return Given{l.torque_nmm(drill, drilled, thrust(l, drill, drilled, 2.0)),
-                                      650.0 * 0.12 * 3.2 * 3.2 / 8.0, 1e-9}; }},
-      {3, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0),
-                                      134.6 * std::pow(1000, -0.3327) * std::pow(2.0, 0.5189) * std::pow(1.9, 1.1841), 1e-9}; }},
-      {4, [&](auto& l) { return Given{l.across_n(burr, at_pole, 3.0), 0.9 * 3.0 * std::numbers::pi / 8.0 * 0.2, 0.05}; }},
-      {5, [&](auto& l) { return Given{l.across_n(burr, burred, 3.0), 0.9, 2e-4}; }},
-      {6, [&](auto& l) { return Given{feed_at_mm_per_s(l.feed_law(burr, burred), 3.0),
-                                      0.3 * 3.0 * omega * 2.0 / (1000.0 * 10.0), 1e-9}; }},
-      {7, [&](auto& l) { return Given{thrust(l, burr, burred, 8.0), 200.0 * 10.0 * 8.0 / (omega * 2.0) + 0.4, 1e-9}; }},
-      {8, [&](auto& l) { return Given{l.across_n(burr, burred, 5.0), 0.5 * (5.0 - 0.4), 1e-9}; }},
-      {9, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0), 5.0 + 24.0 * 2.0, 1e-9}; }},
-      {10, [&](auto& l) { return Given{thrust(l, drill, drilled, 1e-9), 5.0, 1e-6}; }},  // the spring, even bone or not
-      {11, [&](auto& l) { return Given{thrust(l, drill, drilled, 3.0) - thrust(l, drill, drilled, 1.0), 24.0 * 2.0, 1e-9}; }},
-      {12, [&](auto& l) { return Given{thrust(l, drill, drilled, 2.0), 17.7 * 0.4 * 2.0, 1e-9}; }},
-      {14, [&](auto& l) { return Given{feed_at_mm_per_s(l.feed_law(drill, drilled), 17.7), 1.0 / 0.4, 1e-9}; }},
+      {1,
+       [&](auto& l) {
+         return Given{thrust(l, drill, drilled, 2.0), 650.0 * 0.12 * 1.6 * half_point, 1e-9};
+       }},
+      {2,
+       [&](auto& l) {
+         return Given{l.torque_nmm(drill, drilled, thrust(l, drill, drilled, 2.0)), 650.0 * 0.12 * 3.2 * 3.2 / 8.0,
+                      1e-9};
+       }},
+      {3,
+       [&](auto& l) {
+         return Given{thrust(l, drill, drilled, 2.0),
+                      134.6 * std::pow(1000, -0.3327) * std::pow(2.0, 0.5189) * std::pow(1.9, 1.1841), 1e-9};
+       }},
+      {4,
+       [&](auto& l) {
+         return Given{l.across_n(burr, at_pole, 3.0), 0.9 * 3.0 * std::numbers::pi / 8.0 * 0.2, 0.05};
+       }},
+      {5,
+       [&](auto& l) {
+         return Given{l.across_n(burr, burred, 3.0), 0.9, 2e-4};
+       }},
+      {6,
+       [&](auto& l) {
+         return Given{feed_at_mm_per_s(l.feed_law(burr, burred), 3.0), 0.3 * 3.0 * omega * 2.0 / (1000.0 * 10.0), 1e-9};
+       }},
+      {7,
+       [&](auto& l) {
+         return Given{thrust(l, burr, burred, 8.0), 200.0 * 10.0 * 8.0 / (omega * 2.0) + 0.4, 1e-9};
+       }},
+      {8,
+       [&](auto& l) {
+         return Given{l.across_n(burr, burred, 5.0), 0.5 * (5.0 - 0.4), 1e-9};
+       }},
+      {9,
+       [&](auto& l) {
+         return Given{thrust(l, drill, drilled, 2.0), 5.0 + 24.0 * 2.0, 1e-9};
+       }},
+      {10,
+       [&](auto& l) {
+         return Given{thrust(l, drill, drilled, 1e-9), 5.0, 1e-6};
+       }},  // the spring, even bone or not
+      {11,
+       [&](auto& l) {
+         return Given{thrust(l, drill, drilled, 3.0) - thrust(l, drill, drilled, 1.0), 24.0 * 2.0, 1e-9};
+       }},
+      {12,
+       [&](auto& l) {
+         return Given{thrust(l, drill, drilled, 2.0), 17.7 * 0.4 * 2.0, 1e-9};
+       }},
+      {14,
+       [&](auto& l) {
+         return Given{feed_at_mm_per_s(l.feed_law(drill, drilled), 17.7), 1.0 / 0.4, 1e-9};
+       }},
   };
   std::set<int> claimed;
   for (const ForceLaw& l : force_laws())
@@ -126,8 +171,9 @@ TEST(ForceLaws, GiveThePointsOfComparison) {
     const LawInputs in{.spindle_rpm = 1000, .density_g_cm3 = point.density, .engaged = 1.0};
     EXPECT_NEAR(resistance_n(law("chi").feed_law(drill, in), 1.0), point.newtons, 0.06) << point.density;
   }
-  const struct { double diameter, newtons, newton_mm, last_digit; } kAllotta[] = {
-      {2.5, 41.8, 30.5, 0.1}, {3.2, 53.5, 49.9, 0.1}, {4.5, 75.2, 98.7, 0.1}, {7.94, 132.7, 307, 1}};
+  const struct {
+    double diameter, newtons, newton_mm, last_digit;
+  } kAllotta[] = {{2.5, 41.8, 30.5, 0.1}, {3.2, 53.5, 49.9, 0.1}, {4.5, 75.2, 98.7, 0.1}, {7.94, 132.7, 307, 1}};
   for (const auto& point : kAllotta) {
     Tool tool = *find_tool("drill-3.2");
     tool.diameter_mm = point.diameter;
@@ -145,10 +191,13 @@ TEST(ForceLaws, GiveThePointsOfComparison) {
 
 // How thrust grows: x 2 of the speed, the feed, the density; and what stays out.
 TEST(ForceLaws, ScaleAsTheirEquationsSay) {
-  const struct { const char* law; double speed, feed, density; } kRatios[] = {
-      {"chi", 0.794, 1.433, 2.272},           // N^-0.3327, v^0.5189, rho^1.1841
-      {"allotta", 0.5, 2.0, 4.0},             // a = 60 v / N, R_u ~ rho^2
-      {"agus", 0.5, 2.0, 2.272},              // v = mu F omega r / (u A)
+  const struct {
+    const char* law;
+    double speed, feed, density;
+  } kRatios[] = {
+      {"chi", 0.794, 1.433, 2.272},  // N^-0.3327, v^0.5189, rho^1.1841
+      {"allotta", 0.5, 2.0, 4.0},    // a = 60 v / N, R_u ~ rho^2
+      {"agus", 0.5, 2.0, 2.272},     // v = mu F omega r / (u A)
       {"multi-point", 1.0, 2.0, 2.0},
   };
   for (const auto& expected : kRatios) {
@@ -243,12 +292,14 @@ TEST(ForceLaws, AreFiniteAtTheEdges) {
           const double torque = l.torque_nmm(tool_of(usual(l).tool), in, 10.0);
           for (const double value :
                {feed_law.offset_n, feed_law.scale_n, feed_law.max_feed_mm_per_s, feed_law.threshold_n, torque})
-            EXPECT_TRUE(std::isfinite(value) && value >= 0.0) << l.name << " " << density << " " << engaged << " " << rpm;
+            EXPECT_TRUE(std::isfinite(value) && value >= 0.0)
+                << l.name << " " << density << " " << engaged << " " << rpm;
         }
 }
 
-// A burr wholly in bone of one density: the sum over small faces of its leading half, by the points' road, is the closed
-// form at the harmonic mean distance. For a sphere fed across its axis the faces' sum of area / distance is pi R.
+// A burr wholly in bone of one density: the sum over small faces of its leading half, by the points' road, is the
+// closed form at the harmonic mean distance. For a sphere fed across its axis the faces' sum of area / distance is pi
+// R.
 TEST(ForceLaws, MillingFromPointsIsMillingOfTheFace) {
   const double radius = 2.5, density = 1.9;
   const MillingParams params{.diameter_mm = 2.0 * radius, .pole_radius = 0.0};
@@ -272,8 +323,8 @@ TEST(ForceLaws, MultiPointTakesItsSumFromThePoints) {
   EXPECT_NEAR(resistance_n(law("multi-point").feed_law(tool_of("drill-3.2"), in), 2.0), 17.7 * 0.4 * 2.0, 1e-9);
 }
 
-// Published: human cortical bone was drilled with 0 to 50 N; Hobkirk and Rusiniak's operators pressed with means of 4.22
-// to 18.93 N and peaks of 5.98 to 24.32 N. At these a 3.2 mm drill must advance, and no faster than drills do.
+// Published: human cortical bone was drilled with 0 to 50 N; Hobkirk and Rusiniak's operators pressed with means
+// of 4.22 to 18.93 N and peaks of 5.98 to 24.32 N. At these a 3.2 mm drill must advance, and no faster than drills do.
 TEST(ForceLaws, DrillAtThePublishedThrusts) {
   for (const char* name : {"chi", "multi-point", "spring-damper"}) {
     const LawInputs in{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0};
@@ -292,7 +343,8 @@ TEST(ForceLaws, EveryToolThatCutsHasALawThatFits) {
     const ForceLaw& l = default_law(tool);
     EXPECT_TRUE(l.fits(tool.kind)) << tool.name;
     used.insert(l.name);
-    const FeedLaw feed_law = l.feed_law(law_tool(tool), {.spindle_rpm = tool.spindle_rpm, .density_g_cm3 = 0.5, .engaged = 0.5});
+    const FeedLaw feed_law =
+        l.feed_law(law_tool(tool), {.spindle_rpm = tool.spindle_rpm, .density_g_cm3 = 0.5, .engaged = 0.5});
     EXPECT_GT(feed_law.max_feed_mm_per_s, 0.0) << tool.name;
   }
   EXPECT_EQ(used, (std::set<std::string_view>{"chi", "milling", "saw", "reamer", "broach", "multi-point"}));
@@ -304,8 +356,8 @@ TEST(ForceLaws, EveryToolThatCutsHasALawThatFits) {
   EXPECT_EQ(default_law(*find_tool("screw-1")).name, "multi-point");
 }
 
-// A tool used as it comes, in the middle of the law's densities, is not outside what its law was made for: nobody who chose
-// nothing is to be warned.
+// A tool used as it comes, in the middle of the law's densities, is not outside what its law was made for: nobody who
+// chose nothing is to be warned.
 TEST(ForceLaws, ADefaultIsWithinItsRangeAtTheToolsOwnSpeed) {
   const unsigned pressed = static_cast<unsigned>(OutOfRange::feed) | static_cast<unsigned>(OutOfRange::depth_of_cut);
   for (const Tool& tool : builtin_tools()) {
@@ -332,8 +384,9 @@ TEST(ForceLaws, FitTheToolsThatTheirRangeNames) {
       {"saw", {oscillating_saw, reciprocating_saw}},
       {"reamer", {sphere_reamer, cylinder_reamer, outside_reamer}},
       {"broach", {broach}}};
-  const std::map<std::string_view, std::string_view> words = {{"chi", "drills"}, {"allotta", "drills"}, {"agus", "round burs"},
-      {"milling", "burs"}, {"saw", "saws"}, {"reamer", "reamers"}, {"broach", "broaches"}};
+  const std::map<std::string_view, std::string_view> words = {
+      {"chi", "drills"}, {"allotta", "drills"}, {"agus", "round burs"}, {"milling", "burs"},
+      {"saw", "saws"},   {"reamer", "reamers"}, {"broach", "broaches"}};
   for (const auto& [name, fitting] : kinds) {
     for (const auto& [kind, word] : tool_kinds())
       EXPECT_EQ(law(name).fits(kind), fitting.contains(kind)) << name << " " << word;
@@ -345,7 +398,8 @@ TEST(ForceLaws, FitTheToolsThatTheirRangeNames) {
       << drilled.error().message;
 }
 
-// Burs' teeth stand out for five usual feeds: 0.1 mm a turn, 33 mm/s at 20 000 rpm. A drill's heel is a third of its diameter.
+// Burs' teeth stand out for five usual feeds: 0.1 mm a turn, 33 mm/s at 20 000 rpm. A drill's heel is a third of its
+// diameter.
 TEST(ForceLaws, TeethAndHeelsLimitTheFeed) {
   const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0};
   for (const char* name : {"burr-round-5", "burr-barrel"})
@@ -386,9 +440,9 @@ TEST(ForceLaws, FitEveryBuiltinTool) {
   for (const Tool& tool : builtin_tools()) EXPECT_TRUE(choose_law(tool).has_value()) << tool.name;
 }
 
-// Across the feed: (7.8) K_r of what cuts, without the edges' ploughing; (7.5) mu of the contact's force but at the pole; of
-// a saw's teeth the force along the cut, which depth does not change and torque is made of. All round a drill or reamer it
-// cancels.
+// Across the feed: (7.8) K_r of what cuts, without the edges' ploughing; (7.5) mu of the contact's force but at the
+// pole; of a saw's teeth the force along the cut, which depth does not change and torque is made of. All round a drill
+// or reamer it cancels.
 TEST(ForceLaws, ActAcrossTheFeedAsTheirEquationsSay) {
   const LawTool burr = tool_of("burr-round-5"), blade = tool_of("saw-oscillating-1");
   const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0, .edge_length_mm = 40.0};

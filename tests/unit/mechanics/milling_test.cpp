@@ -12,7 +12,8 @@ const RevolutionsPerMinute kSpeed{20000.0};
 constexpr double kEdge_mm = 20.0;
 // What one face of 2 mm² at the equator of a 5 mm burr resists with, moved at `v` mm/s.
 double force(double v, MillingParams params = {}, RevolutionsPerMinute speed = kSpeed, double edge_mm = kEdge_mm) {
-  return resistance_n(milling_law(params, speed, milling_resistance(params, 2.0, 2.5, 1.9), edge_mm, GramsPerCm3{1.9}), v);
+  return resistance_n(milling_law(params, speed, milling_resistance(params, 2.0, 2.5, 1.9), edge_mm, GramsPerCm3{1.9}),
+                      v);
 }
 
 // (7.7): F_t = K_t · MRR / v_c + k_e L.

@@ -66,8 +66,7 @@ TEST(Mount, NeverHasMoreEnergyThanWasPutIn) {
         double put_in_mj = 0.0;
         Load load;
         for (int i = 0; i < 2000; ++i) {
-          if (i % 7 == 0)
-            load = {60.0 * any(), 9000.0 * any()};
+          if (i % 7 == 0) load = {60.0 * any(), 9000.0 * any()};
           const Shift before = mount.shift();
           mount.step(load, dt);
           put_in_mj += load.force_n.dot(mount.shift().place_mm - before.place_mm) +
@@ -102,7 +101,9 @@ TEST(Mount, TurnsTheBoneAboutItsCentre) {
   EXPECT_LT((pose.point(centre_bone_mm) - params.centre_mm - shift.place_mm).norm(), 1e-12);
   // A point beside the centre along x goes round by the angle.
   const Vec3 beside = params.pose_world_rest.inverse().point(params.centre_mm + Vec3(8, 0, 0));
-  EXPECT_LT((pose.point(beside) - params.centre_mm - shift.place_mm - 8.0 * Vec3(std::cos(0.2), std::sin(0.2), 0)).norm(), 1e-12);
+  EXPECT_LT(
+      (pose.point(beside) - params.centre_mm - shift.place_mm - 8.0 * Vec3(std::cos(0.2), std::sin(0.2), 0)).norm(),
+      1e-12);
 }
 
 TEST(Mount, TakesNoBadNumbers) {

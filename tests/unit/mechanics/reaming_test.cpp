@@ -62,7 +62,8 @@ TEST(Reaming, TorqueIsTheTangentialForceAtItsArm) {
   const ReamingParams reamer{.teeth = 40};
   const double edge = 1000.0, t = 60.0 * 0.5 / (250.0 * 40.0);
   const Newtons along{thrust(reamer, 0.5, edge, GramsPerCm3{1.9})};
-  EXPECT_NEAR(reaming_torque(reamer, along, edge, GramsPerCm3{1.9}, 12.5).value(), (200.0 * t + 0.01) * edge * 12.5, 1e-6);
+  EXPECT_NEAR(reaming_torque(reamer, along, edge, GramsPerCm3{1.9}, 12.5).value(), (200.0 * t + 0.01) * edge * 12.5,
+              1e-6);
 }
 
 // E = efficiency J^2 / (2 m): 0.7 · 2.8^2 / 1.4 = 3.92 J against 130 (0.3/1.9)^2 · 400 mm2.

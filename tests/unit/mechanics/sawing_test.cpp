@@ -14,7 +14,8 @@ const RevolutionsPerMinute kStrokes{12'000};
 // Published of single teeth in cortical bone: resultants of 8 to 11 N from 2.5 to 10 micrometres.
 TEST(Sawing, ResultantLiesInThePublishedBand) {
   for (double depth = 2.5; depth <= 10.0; depth += 0.5) {
-    const double resultant = std::hypot(tooth_thrust({}, depth, kCortical).value(), tooth_cutting_force({}, kCortical).value());
+    const double resultant =
+        std::hypot(tooth_thrust({}, depth, kCortical).value(), tooth_cutting_force({}, kCortical).value());
     EXPECT_GE(resultant, 8.0) << depth;
     EXPECT_LE(resultant, 11.0) << depth;
   }

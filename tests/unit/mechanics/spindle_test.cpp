@@ -1,4 +1,5 @@
-// The spindle under load: closed forms of a motor with a straight line of speed over torque, an end to its torque, and inertia.
+// The spindle under load: closed forms of a motor with a straight line of speed over torque, an end to its torque, and
+// inertia.
 #include "common/mechanics/spindle.hpp"
 
 #include <gtest/gtest.h>
@@ -9,10 +10,12 @@ namespace osteon {
 namespace {
 
 constexpr double kDt = 1e-3;
-constexpr SpindleParams kMotor{.full_rpm = 1000, .run_up_s = 0.3, .droop_rpm_per_nmm = 0.2, .most_nmm = 400, .response_s = 0.02};
+constexpr SpindleParams kMotor{
+    .full_rpm = 1000, .run_up_s = 0.3, .droop_rpm_per_nmm = 0.2, .most_nmm = 400, .response_s = 0.02};
 
 void run(Spindle& spindle, double command_rpm, double torque_nmm, double seconds, double dt_s = kDt) {
-  for (int i = 0; i < static_cast<int>(std::lround(seconds / dt_s)); ++i) spindle.step(kMotor, command_rpm, torque_nmm, dt_s);
+  for (int i = 0; i < static_cast<int>(std::lround(seconds / dt_s)); ++i)
+    spindle.step(kMotor, command_rpm, torque_nmm, dt_s);
 }
 
 TEST(Spindle, RunsUpAndDownInItsTime) {

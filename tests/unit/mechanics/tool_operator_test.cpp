@@ -26,7 +26,8 @@ TEST(Hand, PushesWithItsPush) {
 TEST(Hand, PlungesByPushOverStiffness) {
   for (const HandParams& params : {expert_hand(), novice_hand()}) {
     Hand hand(params, Vec3::Zero());
-    const HandCommand push{HandMode::push, Vec3::Zero(), Vec3::UnitX()}, release{HandMode::release, Vec3::Zero(), Vec3::UnitX()};
+    const HandCommand push{HandMode::push, Vec3::Zero(), Vec3::UnitX()},
+        release{HandMode::release, Vec3::Zero(), Vec3::UnitX()};
     for (int i = 0; i < 4000; ++i) hand.step(push, {-50.0 * hand.position_mm().x(), 0, 0}, kDt);
     const double start = hand.position_mm().x();
     double furthest = start;
@@ -34,7 +35,8 @@ TEST(Hand, PlungesByPushOverStiffness) {
       hand.step(release, Vec3::Zero(), kDt);
       furthest = std::max(furthest, hand.position_mm().x());
     }
-    EXPECT_NEAR(furthest - start, params.push_n / params.stiffness_n_per_mm, 0.08 * params.push_n / params.stiffness_n_per_mm);
+    EXPECT_NEAR(furthest - start, params.push_n / params.stiffness_n_per_mm,
+                0.08 * params.push_n / params.stiffness_n_per_mm);
     // And comes back to where it was frozen.
     EXPECT_NEAR(hand.position_mm().x(), start, 0.1);
   }

@@ -1,5 +1,5 @@
-// A recording that is cut again in a live room: seen at rest while it is stopped, over when the server is to stop, and in
-// nobody's way while its journal is read.
+// A recording that is cut again in a live room: seen at rest while it is stopped, over when the server is to stop, and
+// in nobody's way while its journal is read.
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
@@ -11,9 +11,9 @@
 #include "osteon/v1/cases.grpc.pb.h"
 #include "osteon/v1/people.grpc.pb.h"
 #include "osteon/v1/rooms.grpc.pb.h"
-#include "server/upload_validation/case_archive.hpp"
 #include "server/net/authorizer.hpp"
 #include "server/net/room_server.hpp"
+#include "server/upload_validation/case_archive.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/kept_room.hpp"
 #include "tests/unit/room/members.hpp"
@@ -33,7 +33,8 @@ class SeenTools final : public StateSubscriber {
     const std::lock_guard lock(mutex_);
     for (const v1::CuttingState& state : told.states()) {
       std::vector<v1::CuttingState>& of_author = states_[state.author()];
-      if (of_author.empty() || of_author.back().SerializeAsString() != state.SerializeAsString()) of_author.push_back(state);
+      if (of_author.empty() || of_author.back().SerializeAsString() != state.SerializeAsString())
+        of_author.push_back(state);
     }
   }
   void end(const std::string&) override {}
@@ -101,7 +102,8 @@ class DemonstrationTest : public ::testing::Test {
     fs::permissions(dir_ / "checker", fs::perms::owner_all);
     auto store = CaseRepository::open(dir_ / "cases", dir_ / "checker", {});
     ASSERT_TRUE(store.has_value()) << store.error().message;
-    RoomsOptions options{.cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .store = std::move(*store)};
+    RoomsOptions options{
+        .cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .store = std::move(*store)};
     options.rates.mount = true;
     auto rooms = std::make_unique<Rooms>(std::move(options));
     ASSERT_TRUE(rooms->resume("ward"));
@@ -124,7 +126,7 @@ class DemonstrationTest : public ::testing::Test {
   void decide(AuthorId about, const Restrictions& word) {
     std::promise<Result<RoomEvent>> answer;
     room_->runtime().queue_event([&](Room& room) { return room.supervise(instructor_, about, word); },
-                              [&](const Result<RoomEvent>& decided) { answer.set_value(decided); });
+                                 [&](const Result<RoomEvent>& decided) { answer.set_value(decided); });
     const Result<RoomEvent> decided = answer.get_future().get();
     ASSERT_TRUE(decided) << decided.error().message;
   }
@@ -196,7 +198,8 @@ TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
   }
 }
 
-// What one hand puts into the bone is for the others who are pushed by it, and a demonstrator's tool is where it was on the bone.
+// What one hand puts into the bone is for the others who are pushed by it, and a demonstrator's tool is where it was on
+// the bone.
 TEST_F(DemonstrationTest, NeitherMovesTheBoneOnItsMountNorTakesOfItsEnergy) {
   const auto open = [&] {
     auto hand = std::make_shared<MountedHand>(room_->runtime().join(MemberKind::surgeon).value());
@@ -308,7 +311,8 @@ TEST_F(DemonstrationTest, RoomsAreMadeAndClosedWhileACaseIsLookedThrough) {
   v1::CreateRoomRequest create;
   create.set_name("new");
   v1::CreateRoomResponse created;
-  const grpc::Status made = CallsOfOthers::ask([&](auto* context) { return stub->CreateRoom(context, create, &created); });
+  const grpc::Status made =
+      CallsOfOthers::ask([&](auto* context) { return stub->CreateRoom(context, create, &created); });
   EXPECT_TRUE(made.ok()) << made.error_message();
   v1::CloseRoomRequest close;
   close.set_name("new");

@@ -35,7 +35,8 @@ Digest bone_after(const std::vector<Cut>& cuts) {
 
 // One side of x = 0.
 Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
-  Fragment fragment = part(bone, [&](int x) { return (x >= 0) == upper; }, volume_mm3);
+  Fragment fragment = part(
+      bone, [&](int x) { return (x >= 0) == upper; }, volume_mm3);
   (upper ? fragment.bounds.min_mm : fragment.bounds.max_mm).x() = 0.0;
   return fragment;
 }
@@ -77,7 +78,8 @@ TEST(RoomUndo, LeavesTheBoneOfTheOtherCuts) {
 
 TEST(RoomUndo, CountsTheEventsOfOneAuthorOrOfAll) {
   Room room(test_block());
-  const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon), watcher = room.join(MemberKind::watcher);
+  const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon),
+                 watcher = room.join(MemberKind::watcher);
   const auto of_a = strokes(a, 2, 32), of_b = strokes(b, 2, 33);
   for (int i = 0; i < 2; ++i) {
     commit(room, of_a[static_cast<std::size_t>(i)]);
@@ -144,7 +146,8 @@ TEST(RoomUndo, NamesEveryBlockThatItMakesStale) {
   for (const BlockKey& key : keys) {
     const BlockPayload anew = make_block(room.gather_block(key));
     const auto kept = live.blocks().find(key);
-    EXPECT_EQ(anew, kept == live.blocks().end() ? BlockPayload{} : kept->second.payload) << key.body.value << ": " << key.index.x;
+    EXPECT_EQ(anew, kept == live.blocks().end() ? BlockPayload{} : kept->second.payload)
+        << key.body.value << ": " << key.index.x;
     of_piece += key.body == BodyId{1} && !anew.bytes.empty();
   }
   EXPECT_GT(of_piece, 0) << "the piece is drawn";
@@ -168,7 +171,8 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_LT(room.field().solid_mm(down), 0.0);
   EXPECT_LT(room.find_field(BodyId{1})->solid_mm(up), 0.0);
   EXPECT_GT(room.find_field(BodyId{1})->solid_mm(down), 0.0);
-  const double parted_mm3 = room.field().removed_mm3() + room.find_field(BodyId{1})->removed_mm3() - room.bone().volume_mm3();
+  const double parted_mm3 =
+      room.field().removed_mm3() + room.find_field(BodyId{1})->removed_mm3() - room.bone().volume_mm3();
   EXPECT_NEAR(parted_mm3, before_mm3, 0.02 * room.bone().volume_mm3()) << "no bone is lost by parting";
 
   // A burr across the parting line takes bone of both.
@@ -395,7 +399,8 @@ TEST(RoomScene, PinsFixAGuideUntilOneIsDrawn) {
     const GuideBore& bore = shape.pin_holes[hole];
     SceneItem pin;
     pin.tool = tool_named("pin-1").hash();
-    pin.pose_bone_item = guide.pose_bone_item * Pose{bore.entry_mm + (bore.length_mm + 20.0) * bore.direction, Eigen::Quaterniond::Identity()};
+    pin.pose_bone_item = guide.pose_bone_item *
+                         Pose{bore.entry_mm + (bore.length_mm + 20.0) * bore.direction, Eigen::Quaterniond::Identity()};
     const auto set = room.set_item(surgeon, pin);
     ASSERT_TRUE(set) << set.error().message;
     pins.push_back(set->item);
@@ -509,7 +514,8 @@ TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   const auto cuts = strokes(a, 4, 40);
   Replica replica(room.bone(), BodyId{0});
   for (int i = 0; i < 2; ++i) replica.add_own(cuts[static_cast<std::size_t>(i)]);
-  for (int i = 0; i < 2; ++i) replica.commit(commit(room, cuts[static_cast<std::size_t>(i)]), cuts[static_cast<std::size_t>(i)], true);
+  for (int i = 0; i < 2; ++i)
+    replica.commit(commit(room, cuts[static_cast<std::size_t>(i)]), cuts[static_cast<std::size_t>(i)], true);
   replica.add_own(cuts[2]);  // on its way when the other hand undoes
   const auto undo = room.undo_last(b, 1, {});
   ASSERT_TRUE(undo);
@@ -561,10 +567,15 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
       const std::size_t who = random() % 2;
       Result<RoomEvent> event = failure(ErrorCode::internal, "");
       switch (random() % 8) {
-        case 0: event = room.undo_last(hands[who], 1 + random() % 3, {}); break;
-        case 1: event = room.redo_last(hands[who], 1); break;
+        case 0:
+          event = room.undo_last(hands[who], 1 + random() % 3, {});
+          break;
+        case 1:
+          event = room.redo_last(hands[who], 1);
+          break;
         case 2:
-          if (room.bodies().size() == 1) event = room.split(BodyId{0}, {half(room.bone(), upper = !upper)}, room.bone_epoch());
+          if (room.bodies().size() == 1)
+            event = room.split(BodyId{0}, {half(room.bone(), upper = !upper)}, room.bone_epoch());
           break;
         case 3:
           if (room.bodies().size() > 1) event = room.remove_body(hands[who], room.bodies().back());
@@ -597,12 +608,13 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
 
 std::vector<FieldLeaf> leaves_of(const Room& room) {
   std::vector<FieldLeaf> leaves;
-  for (const BodyId body : room.bodies()) std::ranges::move(room.find_field(body)->leaves(), std::back_inserter(leaves));
+  for (const BodyId body : room.bodies())
+    std::ranges::move(room.find_field(body)->leaves(), std::back_inserter(leaves));
   return leaves;
 }
 
-// Whatever was missed while the line was down, a client that comes back has the room's bone, with its own undecided cuts on
-// top, and nothing changes under the tool where nothing has.
+// Whatever was missed while the line was down, a client that comes back has the room's bone, with its own undecided
+// cuts on top, and nothing changes under the tool where nothing has.
 TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
@@ -641,7 +653,8 @@ TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
     if (pending == 0 && !same_turn) {
       EXPECT_EQ(replica.hash(), room.field_hash());
     }
-    for (std::size_t i = reached; !undoes && i < 6; ++i) replica.commit(commit(room, cuts[next + i]), cuts[next + i], true);
+    for (std::size_t i = reached; !undoes && i < 6; ++i)
+      replica.commit(commit(room, cuts[next + i]), cuts[next + i], true);
     replica.settle();
     EXPECT_EQ(replica.hash(), room.field_hash());
     EXPECT_EQ(replica.room_seq(), room.room_seq());

@@ -1,5 +1,5 @@
-// Cuts that come in datagrams wait for the room as those of the stream do, and as few: a client that waits for nothing fills
-// no memory.
+// Cuts that come in datagrams wait for the room as those of the stream do, and as few: a client that waits for nothing
+// fills no memory.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -18,14 +18,15 @@ namespace {
 using namespace std::chrono_literals;
 using namespace test;
 
-constexpr std::size_t kWindow = 1024;       // cuts that a haptic client sends and has not heard of, at most
-constexpr std::size_t kOfTheStream = 256;   // that are read from a stream before any is decided
+constexpr std::size_t kWindow = 1024;      // cuts that a haptic client sends and has not heard of, at most
+constexpr std::size_t kOfTheStream = 256;  // that are read from a stream before any is decided
 
 SealKey key_in(const std::string& bytes) {
   return key_of({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}).value();
 }
 
-// A room that decides when it is told to, as slowly as one on a bad disk; and one session, with no other rule than the wire's.
+// A room that decides when it is told to, as slowly as one on a bad disk; and one session, with no other rule than the
+// wire's.
 class FloodTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -134,17 +135,20 @@ TEST_F(FloodTest, AWindowOfCutsWaitsForASlowRoom) {
   ASSERT_TRUE(send(cuts, [&] { return queued() == kWindow || is_over(); })) << queued();
   ASSERT_FALSE(is_over()) << end().error_message();
   tick();
-  EXPECT_TRUE(send({}, [&] { return link().acknowledged() == kWindow; })) << "each has its answer: " << link().acknowledged();
+  EXPECT_TRUE(send({}, [&] { return link().acknowledged() == kWindow; }))
+      << "each has its answer: " << link().acknowledged();
   EXPECT_FALSE(is_over());
 }
 
 TEST_F(FloodTest, WhoDoesNotWaitForTheRoomIsToldSoAndEnded) {
   const std::vector<Cut> cuts = strokes(author(), 4 * static_cast<int>(kWindow), 1);
   std::size_t most = 0;
-  EXPECT_TRUE(send(cuts, [&] {
-    most = std::max(most, queued());
-    return is_over();
-  })) << most << " cuts wait";
+  EXPECT_TRUE(send(cuts,
+                   [&] {
+                     most = std::max(most, queued());
+                     return is_over();
+                   }))
+      << most << " cuts wait";
   EXPECT_GE(most, kWindow) << "which nobody is refused";
   EXPECT_LE(most, kWindow + kOfTheStream);
   if (!is_over()) return;

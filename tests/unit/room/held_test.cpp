@@ -1,4 +1,5 @@
-// What holds for a person: wherever their hand comes back, in all that they do beside cutting, and told to whoever is there.
+// What holds for a person: wherever their hand comes back, in all that they do beside cutting, and told to whoever is
+// there.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -86,7 +87,8 @@ TEST(CarriedOver, OnlyToTheSamePersonsHand) {
   EXPECT_TRUE(all.cut(all.again(kCy, Role::collaborator)).committed());
   EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed()) << "nobody knows who that is";
   // A hand of the server itself, which shows something, is nobody's that comes back.
-  EXPECT_EQ(all.room.people().supervised(all.room.join(MemberKind::surgeon, kBen, {}, Role::collaborator)).place, RoomSeq{});
+  EXPECT_EQ(all.room.people().supervised(all.room.join(MemberKind::surgeon, kBen, {}, Role::collaborator)).place,
+            RoomSeq{});
   EXPECT_EQ(all.room.room_seq().value, before.value + 6) << "four joins, two cuts and nothing else";
   // Nor do those whom nobody knows hold each other.
   all.decide(all.again(0, Role::trainee), {.stopped = true});
@@ -105,7 +107,8 @@ TEST(CarriedOver, AWordAboutAnOlderHandHoldsForTheNewestToo) {
   EXPECT_EQ(all.room.people().supervised(again).supervision, (Restrictions{.force_limit = 100}));
   // Without roles anybody may be called the same: only who is named is meant.
   Room plain(test_block());
-  const AuthorId one = plain.join(MemberKind::surgeon, kBen, kSecret), other = plain.join(MemberKind::surgeon, kBen, kSecret);
+  const AuthorId one = plain.join(MemberKind::surgeon, kBen, kSecret),
+                 other = plain.join(MemberKind::surgeon, kBen, kSecret);
   ASSERT_TRUE(plain.supervise(other, one, {.stopped = true}));
   EXPECT_TRUE(plain.people().supervised(other).supervision.may_cut());
 }
@@ -186,7 +189,8 @@ TEST(Held, DoesNothingAgainThatItMayNotCut) {
   all.decide(all.ben, {.tools = {tool_named("burr-round-5").hash()}});
   const Result<RoomEvent> denied = all.room.redo_last(all.ben, 1);
   ASSERT_EQ(all.refused(denied), ErrorCode::denied);
-  EXPECT_NE(denied.error().message.find("event " + std::to_string(drilled.value)), std::string::npos) << denied.error().message;
+  EXPECT_NE(denied.error().message.find("event " + std::to_string(drilled.value)), std::string::npos)
+      << denied.error().message;
   EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "nor does a friend, for it";
   EXPECT_EQ(all.room.field_hash(), bone);
   all.decide(all.ben, {.tools = {tool_named("drill-3.2").hash()}});
@@ -238,7 +242,8 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
   EXPECT_EQ(older->places, std::vector{own}) << "of that author alone";
   EXPECT_EQ(all.refused(all.room.redo_last(all.viewer, 1)), ErrorCode::denied) << "another's undo";
   // Whom nobody knows has only their own number.
-  const AuthorId nobody = all.again(0, Role::trainee), stranger = all.room.join(MemberKind::watcher, 0, kSecret, Role::trainee);
+  const AuthorId nobody = all.again(0, Role::trainee),
+                 stranger = all.room.join(MemberKind::watcher, 0, kSecret, Role::trainee);
   const RoomSeq cut[] = {all.cut(nobody).room_seq};
   EXPECT_EQ(all.refused(all.room.undo(stranger, cut)), ErrorCode::denied);
   EXPECT_TRUE(all.room.undo(nobody, cut));
@@ -281,7 +286,7 @@ struct HeldRuntime {
   }
   void supervise(AuthorId by, AuthorId subject, const Restrictions& word) {
     runtime.queue_event([=](Room& room) { return room.supervise(by, subject, word); },
-                     [](const Result<RoomEvent>& decided) { EXPECT_TRUE(decided); });
+                        [](const Result<RoomEvent>& decided) { EXPECT_TRUE(decided); });
     runtime.tick(now += 8ms);
   }
   std::shared_ptr<Placed> session(AuthorId author) {

@@ -62,7 +62,8 @@ class FakeSession final : public SessionSubscriber {
       if (response.has_scene()) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
       if (!response.has_committed()) continue;
       EXPECT_GT(response.committed().room_seq(), seq_.value) << "every row once and in order";
-      replica_.commit(RoomSeq{response.committed().room_seq()}, wire::from_wire(response.committed().cut()).value(), false);
+      replica_.commit(RoomSeq{response.committed().room_seq()}, wire::from_wire(response.committed().cut()).value(),
+                      false);
       seq_ = RoomSeq{response.committed().room_seq()};
     }
   }
@@ -193,7 +194,8 @@ TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
   std::vector<BoneStatus> said;
   std::vector<std::shared_ptr<FakeSession>> late;
   while (runtime.health().counts.committed < kCuts) {
-    if (BoneStatus status = runtime.bone_status(); said.empty() || said.back().room_seq < status.room_seq) said.push_back(status);
+    if (BoneStatus status = runtime.bone_status(); said.empty() || said.back().room_seq < status.room_seq)
+      said.push_back(status);
     if (late.size() >= 4) continue;
     late.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(runtime.open_session(late.back()));

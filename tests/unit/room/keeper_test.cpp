@@ -6,8 +6,8 @@
 #include <atomic>
 #include <thread>
 
-#include "haptic_client/control/cut_recorder.hpp"
 #include "haptic_client/control/confirmation_monitor.hpp"
+#include "haptic_client/control/cut_recorder.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/kept_room.hpp"
@@ -42,7 +42,8 @@ class KeeperTest : public ::testing::Test {
   }
   std::size_t files_of(const std::string& path) const {
     const MemoryDisk::Image image = disk_.image();
-    return static_cast<std::size_t>(std::ranges::count_if(image, [&](const auto& file) { return file.first.starts_with(path); }));
+    return static_cast<std::size_t>(
+        std::ranges::count_if(image, [&](const auto& file) { return file.first.starts_with(path); }));
   }
   MemoryDisk disk_{1};
 };
@@ -172,7 +173,8 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
 }
 
 TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
-  // What a hand may have done since the last row: cuts until it hears nothing for so long, or leaves so many unconfirmed.
+  // What a hand may have done since the last row: cuts until it hears nothing for so long, or leaves so many
+  // unconfirmed.
   constexpr double kTick_s = 0.001, kAway_s = std::chrono::duration<double>(kTimeAway).count();
   static_assert(kAway_s > haptic::RoomWatch::kSilence_s);
   static_assert(kAway_s > haptic::RoomWatch::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
@@ -273,12 +275,14 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   kept.checkpoint();
   const RoomSeq good = kept.room->room_seq();
   kept.cut(1);
-  ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), earlier)) << "which it cannot know to be of an earlier place";
+  ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), earlier))
+      << "which it cannot know to be of an earlier place";
   Result<RoomReport> report = kept.store->verify(test_block(), kept.bone());
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
-  EXPECT_THAT(report->faults[0], AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
-                                       HasSubstr("is not what its rows make")));
+  EXPECT_THAT(report->faults[0],
+              AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
+                    HasSubstr("is not what its rows make")));
   EXPECT_EQ(report->checkpoints, 2u) << "its bytes are those that were written";
 
   for (const auto& [name, bytes] : disk_.image())
@@ -376,7 +380,8 @@ TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   EXPECT_EQ(disk_.image(), failed);
 }
 
-// On the computer's disk, and each waits for the other: so rows get through between any two slices of a check or a copy.
+// On the computer's disk, and each waits for the other: so rows get through between any two slices of a check or a
+// copy.
 TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   const test::TempDir folder;
   KeptCuts kept(folder.path() / "room", nullptr, "room");
@@ -396,9 +401,9 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
     const JournalHead head = store.head();
     int waits = 0;
     const MaintenanceCalls calls{[&](double fraction) {
-                              if (++waits % 20 == 0) wait_for_a_row(fraction);
-                            },
-                            {}};
+                                   if (++waits % 20 == 0) wait_for_a_row(fraction);
+                                 },
+                                 {}};
     if (copied) {
       const Result<JournalHead> made = store.backup(folder.path() / "copy", calls);
       ASSERT_TRUE(made) << made.error().message;
@@ -413,12 +418,14 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
     }
     EXPECT_GE(written - before, static_cast<std::uint64_t>(waits / 20));
     std::printf("%s of %llu rows: %llu rows written meanwhile, %d waited for\n", copied ? "a copy" : "a check",
-                static_cast<unsigned long long>(head.place.value), static_cast<unsigned long long>(written - before), waits / 20);
+                static_cast<unsigned long long>(head.place.value), static_cast<unsigned long long>(written - before),
+                waits / 20);
   }
   // Without any waiting: how often is the scheduler's to say.
   const std::uint64_t before = written;
   ASSERT_TRUE(store.verify(test_block(), std::nullopt));
-  std::printf("a check that waits for nobody: %llu rows written meanwhile\n", static_cast<unsigned long long>(written - before));
+  std::printf("a check that waits for nobody: %llu rows written meanwhile\n",
+              static_cast<unsigned long long>(written - before));
   end = true;
   writer.join();
   ASSERT_TRUE(store.close());
@@ -471,11 +478,11 @@ TEST_F(KeeperTest, ABackupPassesOverCheckpointsThatWereReplacedMeanwhile) {
   const Digest hash = kept.room->room_hash();
   int calls = 0;
   const MaintenanceCalls replacing{[&](double) {
-                                if (++calls > 4) return;
-                                kept.cut(1);
-                                kept.checkpoint();
-                              },
-                              {}};
+                                     if (++calls > 4) return;
+                                     kept.cut(1);
+                                     kept.checkpoint();
+                                   },
+                                   {}};
   const Result<JournalHead> made = kept.store->backup(kTo, replacing);
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(*made, head);
@@ -491,9 +498,9 @@ TEST_F(KeeperTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
   kept.cut(150);
   std::optional<MemoryDisk::Image> half;
   const MaintenanceCalls calls{[&](double) {
-                            if (!half) half = disk_.image();
-                          },
-                          {}};
+                                 if (!half) half = disk_.image();
+                               },
+                               {}};
   (void)kept.store->backup(kTo, calls);
   ASSERT_TRUE(half && half->contains("/else/copy.copying") && half->contains("/else/copy.copying-wal"));
   kept.store.reset();
@@ -521,8 +528,9 @@ TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
   ASSERT_TRUE(kept.store->checkpoint(RoomSeq{5}, leaves)) << "there is a newer one";
   ASSERT_TRUE(kept.store->checkpoint(RoomSeq{kept.store->head().place.value + 1}, leaves)) << "not kept yet";
   EXPECT_EQ(files_of(kFile), files);
-  EXPECT_EQ(kept.store->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
-            ErrorCode::cancelled);
+  EXPECT_EQ(
+      kept.store->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
+      ErrorCode::cancelled);
   EXPECT_EQ(files_of(kFile), files);
 
   const Digest hash = kept.room->room_hash();
@@ -566,12 +574,14 @@ TEST(KeeperThreads, ACheckpointThatIsBeingWrittenIsGivenUpByClosing) {
   KeptCuts kept(folder.path() / "room", nullptr, "room");
   kept.cut(5);
   std::vector<FieldLeaf> leaves;
-  for (int i = 0; i < 8000; ++i) leaves.push_back({BodyId{0}, 0, {8 * i, 0, 0}, std::vector<std::int16_t>(kLeafVoxels, 5)});
+  for (int i = 0; i < 8000; ++i)
+    leaves.push_back({BodyId{0}, 0, {8 * i, 0, 0}, std::vector<std::int16_t>(kLeafVoxels, 5)});
   for (FieldLeaf& leaf : leaves) leaf.values[0] = 6;
   std::atomic<bool> begun = false, closing = false;
   Result<void> written;
   std::thread slow([&] {
-    written = kept.store->checkpoint(kept.room->room_seq(), leaves, {[&](double) {
+    written = kept.store->checkpoint(kept.room->room_seq(), leaves,
+                                     {[&](double) {
                                         begun = true;
                                         while (!closing) std::this_thread::yield();
                                       },
@@ -584,7 +594,8 @@ TEST(KeeperThreads, ACheckpointThatIsBeingWrittenIsGivenUpByClosing) {
   EXPECT_TRUE(closed) << closed.error().message;
   EXPECT_TRUE(written || written.error().code == ErrorCode::cancelled) << written.error().message;
   std::printf("the checkpoint was %s\n", written ? "finished" : "given up");
-  for (const auto& file : fs::directory_iterator(folder.path())) EXPECT_FALSE(file.path().string().ends_with(kPartial)) << file.path();
+  for (const auto& file : fs::directory_iterator(folder.path()))
+    EXPECT_FALSE(file.path().string().ends_with(kPartial)) << file.path();
   const Result<VerifyReport> report = verify_journal(folder.path() / "room");
   ASSERT_TRUE(report);
   EXPECT_TRUE(report->sound());

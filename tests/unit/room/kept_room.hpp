@@ -18,7 +18,12 @@ namespace osteon::test {
 struct KeptCuts {
   // A new one, or, where there is a journal, that one gone on with.
   KeptCuts(const std::filesystem::path& file, Disk* disk, const std::string& name, unsigned seed = 1)
-      : options{.name = name, .limits = {}, .tools = nullptr, .journal = {.disk = disk}, .retention_days = 0, .today = {},
+      : options{.name = name,
+                .limits = {},
+                .tools = nullptr,
+                .journal = {.disk = disk},
+                .retention_days = 0,
+                .today = {},
                 .random = {}} {
     open(file);
     hand = room->join(MemberKind::surgeon, 1);
@@ -68,7 +73,8 @@ inline std::vector<RoomRow> plain_rows(RoomSeq after, std::size_t count, std::si
   for (std::size_t i = 1; i <= count; ++i) {
     const RoomSeq place{after.value + i};
     std::string label = std::to_string(place.value) + ".";
-    rows.push_back({place, std::chrono::nanoseconds(place.value), AuthorId{1}, MarkRow{label + std::string(bytes, 'x')}});
+    rows.push_back(
+        {place, std::chrono::nanoseconds(place.value), AuthorId{1}, MarkRow{label + std::string(bytes, 'x')}});
   }
   return rows;
 }

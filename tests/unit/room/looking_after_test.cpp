@@ -1,6 +1,6 @@
 // What an operator asks a server: places to listen, certificates, refusals, health, figures, a drain.
-#include <gtest/gtest.h>
 #include <grpcpp/health_check_service_interface.h>
+#include <gtest/gtest.h>
 #include <openssl/evp.h>
 #include <openssl/pem.h>
 #include <openssl/x509.h>
@@ -38,7 +38,8 @@ TEST(HostPort, TakesAHostAndAPortAndKnowsThisMachine) {
     EXPECT_EQ(parsed.error().message.find("--x "), 0u);
   }
   for (const std::string own : {"localhost", "[::1]", "127.0.0.1", "127.1.2.3"}) EXPECT_TRUE(is_loopback(own)) << own;
-  for (const std::string other : {"0.0.0.0", "127.0.0.1.example", "127", "128.0.0.1", "[::]", "localhost.", "127.0.0.256"})
+  for (const std::string other :
+       {"0.0.0.0", "127.0.0.1.example", "127", "128.0.0.1", "[::]", "localhost.", "127.0.0.256"})
     EXPECT_FALSE(is_loopback(other)) << other;
 }
 
@@ -190,14 +191,16 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   const auto joined = host.join(MemberKind::watcher);
   ASSERT_FALSE(joined);
   EXPECT_EQ(joined.error().code, ErrorCode::unavailable);
-  EXPECT_NE(joined.error().message.find("takes no more cuts: " + file.string()), std::string::npos) << joined.error().message;
+  EXPECT_NE(joined.error().message.find("takes no more cuts: " + file.string()), std::string::npos)
+      << joined.error().message;
   const auto again = rooms.resume("femur");
   ASSERT_FALSE(again);
   EXPECT_NE(again.error().message.find(file.string()), std::string::npos) << again.error().message;
   // Who was in it before is told too, also where the session is opened before the first tick.
   const auto hand = std::make_shared<Hand>(kept.hand);
   (void)host.open_session(hand);
-  EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience)) << hand->ended();
+  EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience))
+      << hand->ended();
   host.leave(*hand);
 }
 
@@ -217,7 +220,8 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   EXPECT_TRUE(host.stopped());
   EXPECT_FALSE(host.health().serving);
   EXPECT_FALSE(rooms.list()[0].open);
-  EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience)) << hand->ended();
+  EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience))
+      << hand->ended();
   host.leave(*hand);
 }
 
@@ -266,12 +270,15 @@ TEST_F(DrainTest, EveryHandLeavesWithWhatItSentDecidedAndNobodyComesIn) {
 }
 
 TEST_F(DrainTest, MetricsAreForThisMachineAlone) {
-  for (const auto& [listen, word] : std::map<std::string, std::string>{
-           {"0.0.0.0:0", "127.0.0.1"}, {"example.org:9464", "127.0.0.1"}, {"port", "HOST:PORT"}, {"70000", "HOST:PORT"}}) {
+  for (const auto& [listen, word] : std::map<std::string, std::string>{{"0.0.0.0:0", "127.0.0.1"},
+                                                                       {"example.org:9464", "127.0.0.1"},
+                                                                       {"port", "HOST:PORT"},
+                                                                       {"70000", "HOST:PORT"}}) {
     const auto refused = Metrics::start(listen, *server_, {});
     ASSERT_FALSE(refused.has_value()) << listen;
     EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
-    EXPECT_NE(refused.error().message.find("--metrics " + (listen.find(':') == std::string::npos ? "" : listen)), std::string::npos)
+    EXPECT_NE(refused.error().message.find("--metrics " + (listen.find(':') == std::string::npos ? "" : listen)),
+              std::string::npos)
         << refused.error().message;
     EXPECT_NE(refused.error().message.find(word), std::string::npos) << refused.error().message;
   }

@@ -45,15 +45,20 @@ class Surgeon {
  public:
   Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {},
           const std::string& in_room = {}, const wire::ClientCredentials& credentials = {}) {
-    auto joined = RoomSession::join({.address = address, .room = in_room, .credentials = credentials, .cache = cache, .fast_path = fast_path}, {});
+    auto joined = RoomSession::join(
+        {.address = address, .room = in_room, .credentials = credentials, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
-    session_->open({.leaf = [this](const FieldLeaf& leaf) { on([&] { interrupted_ ? renewed_.push_back(leaf) : replica_->restore(leaf); }); },
+    session_->open({.leaf =
+                        [this](const FieldLeaf& leaf) {
+                          on([&] { interrupted_ ? renewed_.push_back(leaf) : replica_->restore(leaf); });
+                        },
                     .complete =
                         [this](const RoomAtJoin& room) {
                           on([&] {
-                            if (interrupted_) replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
+                            if (interrupted_)
+                              replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
                             replica_->settle();
                             renewed_.clear();
                             interrupted_ = false;
@@ -79,12 +84,14 @@ class Surgeon {
                             EXPECT_TRUE(acknowledged_.emplace(cut.author_seq, seq).second) << "acknowledged twice";
                           });
                         },
-                    .rejected = [this](RoomSeq, std::uint64_t, std::uint64_t lease, const std::string& reason) { on([&] { rejected_ = reason, lease_ = lease; }); },
+                    .rejected = [this](RoomSeq, std::uint64_t, std::uint64_t lease,
+                                       const std::string& reason) { on([&] { rejected_ = reason, lease_ = lease; }); },
                     .change =
                         [this](BonePart&& part) {
                           on([&] {
                             replica_->change(part.place, part.bodies, part.leaves);
-                            if (part.last) seq_ = part.place, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
+                            if (part.last)
+                              seq_ = part.place, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
                           });
                         },
                     .scene =
@@ -92,10 +99,7 @@ class Surgeon {
                           on([&] { items_ = items, seq_ = std::max(seq_, seq); });
                         },
                     .noted = [this](RoomSeq seq) { on([&] { seq_ = std::max(seq_, seq); }); },
-                    .interrupted =
-                        [this](const Error&) {
-                          on([&] { interrupted_ = complete_, ++interruptions_; });
-                        },
+                    .interrupted = [this](const Error&) { on([&] { interrupted_ = complete_, ++interruptions_; }); },
                     .lost = [this](const Error& why) { on([&] { lost_ = why.message; }); }});
   }
   ~Surgeon() { session_->close(); }
@@ -161,7 +165,8 @@ inline bool settled(RoomRuntime& room, const std::vector<Surgeon*>& holders) {
 // What a viewer holds of the surface.
 class MeshReader {
  public:
-  explicit MeshReader(const std::string& address, const std::string& room = {}) : room_(join(address, wire::ClientKind::viewer, room)) {
+  explicit MeshReader(const std::string& address, const std::string& room = {})
+      : room_(join(address, wire::ClientKind::viewer, room)) {
     v1::WatchMeshRequest request;
     request.set_author(room_.author.value);
     stream_ = v1::WatchService::NewStub(room_.channel)->WatchMesh(&context_, request);

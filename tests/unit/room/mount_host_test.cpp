@@ -35,12 +35,14 @@ class HeardBone final : public SessionSubscriber {
 
 // A driven runtime with two hands.
 struct Pair {
-  explicit Pair(bool mount) : runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns, .mount = mount}, {}) {
+  explicit Pair(bool mount)
+      : runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns, .mount = mount}, {}) {
     for (auto& session : sessions) session = open(join());
   }
   AuthorId join() {
     AuthorId author;
-    runtime.join(MemberKind::surgeon, "", {}, Role::none, [&](const Result<AuthorId>& given) { author = given.value(); });
+    runtime.join(MemberKind::surgeon, "", {}, Role::none,
+                 [&](const Result<AuthorId>& given) { author = given.value(); });
     tick();
     return author;
   }
@@ -53,7 +55,8 @@ struct Pair {
     for (int i = 0; i < times; ++i) runtime.tick(now += 8ms);
   }
   void push(const std::shared_ptr<HeardBone>& session, const Load& load, double energy_mj = 0.0) {
-    runtime.push_bone(session->author(), {++pushes, load, energy_mj, session->seen_.empty() ? 0 : session->seen_.back().seen_seq});
+    runtime.push_bone(session->author(),
+                      {++pushes, load, energy_mj, session->seen_.empty() ? 0 : session->seen_.back().seen_seq});
   }
 
   std::chrono::nanoseconds now{};

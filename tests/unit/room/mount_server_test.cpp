@@ -1,4 +1,5 @@
-// Pushes and places between a served room and real sessions: in datagrams, over the stream, and when a session begins anew.
+// Pushes and places between a served room and real sessions: in datagrams, over the stream, and when a session begins
+// anew.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -116,7 +117,8 @@ TEST_F(ServedMount, NumbersBeginAnewWithTheNextSession) {
   ASSERT_TRUE(wait_until([&] { return one.interruptions() > 0 && one.first() > 0; }, test::kPatience));
   EXPECT_LT(one.first(), 100u) << "they begin anew, after the interruption was told";
   const std::uint64_t pushed = one.newest().push_seq;
-  EXPECT_TRUE(one.push_until(10.0, [&] { return one.newest().push_seq > pushed && one.x_mm() > 1.9; })) << "and it pushes on";
+  EXPECT_TRUE(one.push_until(10.0, [&] { return one.newest().push_seq > pushed && one.x_mm() > 1.9; }))
+      << "and it pushes on";
 }
 
 TEST_F(ServedMount, NobodyIsToldWhereThereIsNone) {

@@ -1,4 +1,5 @@
-// A large bone is drawn in full only where somebody looks: what viewers hold follows their looks, and stays one closed surface.
+// A large bone is drawn in full only where somebody looks: what viewers hold follows their looks, and stays one closed
+// surface.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -20,8 +21,9 @@ using namespace std::chrono_literals;
 constexpr double kPitch_mm = 0.8, kRadius_mm = 30.0;
 
 Case ball() {
-  return test::make_bone({Vec3::Constant(-kRadius_mm - 4), Vec3::Constant(kRadius_mm + 4)}, kPitch_mm,
-                         [](const Vec3& p) { return p.norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; });
+  return test::make_bone(
+      {Vec3::Constant(-kRadius_mm - 4), Vec3::Constant(kRadius_mm + 4)}, kPitch_mm,
+      [](const Vec3& p) { return p.norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; });
 }
 
 // Close enough for full detail, in a picture of `wide_mm` from its middle to its corner.
@@ -188,7 +190,8 @@ TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
   runtime.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // so that both pieces are far
   ASSERT_TRUE(test::wait_until([&] { return one.level_at({0, 0, kRadius_mm}) == 0; }, 20s));
   const auto remove = [&](BodyId body) {
-    runtime.queue_event([=](Room& r) { return r.remove_body(surgeon, body); }, [](const Result<RoomEvent>& event) { EXPECT_TRUE(event); });
+    runtime.queue_event([=](Room& r) { return r.remove_body(surgeon, body); },
+                        [](const Result<RoomEvent>& event) { EXPECT_TRUE(event); });
   };
   using Bodies = std::set<BodyId>;
   ASSERT_EQ(one.bodies(), (Bodies{BodyId{0}, BodyId{1}, BodyId{2}}));

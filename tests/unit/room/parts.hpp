@@ -25,8 +25,10 @@ inline Fragment part(const Case& bone, const std::function<bool(int)>& has, doub
           taken.values[i] = of_piece ? static_cast<std::int16_t>(-band) : band;
           left.values[i] = of_piece ? band : static_cast<std::int16_t>(-band);
         }
-        if (std::ranges::any_of(taken.values, [](std::int16_t v) { return v < 0; })) fragment.taken.push_back(std::move(taken));
-        if (std::ranges::any_of(left.values, [](std::int16_t v) { return v < 0; })) fragment.left.push_back(std::move(left));
+        if (std::ranges::any_of(taken.values, [](std::int16_t v) { return v < 0; }))
+          fragment.taken.push_back(std::move(taken));
+        if (std::ranges::any_of(left.values, [](std::int16_t v) { return v < 0; }))
+          fragment.left.push_back(std::move(left));
       }
   return fragment;
 }

@@ -139,7 +139,8 @@ TEST(PeopleHost, AnAuthorOfAnotherRoleDoesNotComeBack) {
   Lesson lesson;
   const Digest secret{{7}};
   AuthorId author;
-  lesson.runtime.join(MemberKind::surgeon, "Eve", secret, Role::instructor, [&](const Result<AuthorId>& given) { author = given.value(); });
+  lesson.runtime.join(MemberKind::surgeon, "Eve", secret, Role::instructor,
+                      [&](const Result<AuthorId>& given) { author = given.value(); });
   lesson.tick();
   EXPECT_TRUE(lesson.runtime.resume(author, secret, {}, Role::instructor));
   EXPECT_TRUE(lesson.runtime.resume(author, secret, {}));  // over plain text nobody has a role
@@ -271,7 +272,7 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
   const auto window = [&](const std::string& name) {
     AuthorId author;
     lesson.runtime.join(MemberKind::watcher, name, {}, Role::trainee,
-                     [&](const Result<AuthorId>& given) { author = given.value(); });
+                        [&](const Result<AuthorId>& given) { author = given.value(); });
     lesson.tick();
     return author;
   };
@@ -392,12 +393,12 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   {
     PersistedRoom kept = open();
     RoomRuntime runtime(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
-                  kept.store.get());
+                        kept.store.get());
     const AuthorId instructor = runtime.join(MemberKind::watcher, "Ada", {}, Role::instructor).value();
     trainee = runtime.join(MemberKind::surgeon, "Ben", {}, Role::trainee).value();
     std::promise<RoomSeq> decided;
     runtime.queue_event([&](Room& room) { return room.supervise(instructor, trainee, {.stopped = true}); },
-                     [](const Result<RoomEvent>&) {});
+                        [](const Result<RoomEvent>&) {});
     runtime.queue_event(
         [&](Room& room) {
           return room.annotate(instructor, {.points = {{1, 2, 3}}, .words = "here"});
@@ -409,7 +410,7 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   }
   PersistedRoom kept = open();
   RoomRuntime runtime(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
-                kept.store.get());
+                      kept.store.get());
   PresenceCursor cursor;
   v1::WatchPeopleResponse news;
   ASSERT_TRUE(news.ParseFromString(*runtime.people().news(cursor, {}, {})));

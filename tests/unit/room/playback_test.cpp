@@ -26,7 +26,9 @@ Playback of(std::deque<std::chrono::nanoseconds> times, double speed) {
 TEST(Player, GivesRowsAtTheirTimesOverItsSpeed) {
   for (const double speed : {0.5, 1.0, 4.0}) {
     Player player(of({10s, 12s, 16s}, speed), 10s);
-    const auto at = [&](double s) { return 100s + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * s / speed)); };
+    const auto at = [&](double s) {
+      return 100s + std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 * s / speed));
+    };
     ASSERT_TRUE(player.take(at(0.0)));
     EXPECT_FALSE(player.take(at(1.99)));
     const auto second = player.take(at(2.01));

@@ -43,7 +43,8 @@ TEST(RoomsFolder, IsOneServersAsLongAsItHoldsIt) {
   const Result<std::unique_ptr<DiskLock>> second = lock_rooms(dir.path());
   ASSERT_FALSE(second);
   EXPECT_EQ(second.error().code, ErrorCode::exists);
-  EXPECT_THAT(second.error().message, AllOf(HasSubstr(dir.path().string()), HasSubstr("--rooms"), HasSubstr("end that one first")));
+  EXPECT_THAT(second.error().message,
+              AllOf(HasSubstr(dir.path().string()), HasSubstr("--rooms"), HasSubstr("end that one first")));
   // What is done to a journal that no server has open goes on beside it, and the lock is no room.
   KeptCuts kept(dir / "femur.journal", nullptr, "femur");
   kept.cut(3);
@@ -108,8 +109,10 @@ TEST_F(RoomFilesTest, ARoomIsOpenedOnlyUnderItsName) {
   const auto refused = RoomStore::open(kFile, test_block(), options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message,
-            std::string(kFile) + " holds the room femur, not tibia; give the file its name again, or rename the room: "
-                                 "osteon-server rename-room " + kFile + " tibia");
+            std::string(kFile) +
+                " holds the room femur, not tibia; give the file its name again, or rename the room: "
+                "osteon-server rename-room " +
+                kFile + " tibia");
   {
     Journal journal = std::move(Journal::open(kFile, {.disk = &disk_}).value());
     ASSERT_TRUE(journal.set_register(kNameRegister, "tibia"));
@@ -287,7 +290,8 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
   live.cut(2);
   const RoomSeq newest = live.store->head().place;
   ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
-  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists) << "nobody but the store can know";
+  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists)
+      << "nobody but the store can know";
   const HasHead has = [&](const fs::path& file, const JournalHead& head) {
     return file == kFile ? live.store->has_head(head) : has_head(file, head, &disk_);
   };
@@ -305,7 +309,8 @@ TEST_F(FamilyTest, DeletedWithItsBranchesNothingOfItIsLeft) {
   ASSERT_TRUE(gone) << gone.error().message;
   EXPECT_THAT(*gone, ElementsAre("/rooms/b11", "/rooms/b2", "/rooms/b1", kFile));
   for (const std::string& name : names())
-    EXPECT_TRUE(name.starts_with("/rooms/other") || name.starts_with("/rooms/c1") || name == "/rooms/notes.txt") << name;
+    EXPECT_TRUE(name.starts_with("/rooms/other") || name.starts_with("/rooms/c1") || name == "/rooms/notes.txt")
+        << name;
   EXPECT_TRUE(verify_journal("/rooms/other", &disk_)->sound());
   EXPECT_TRUE(verify_journal("/rooms/c1", &disk_)->sound());
   EXPECT_EQ(delete_room(kFile, true, &disk_).error().code, ErrorCode::not_found);
@@ -315,7 +320,8 @@ TEST_F(FamilyTest, DeletedWithItsBranchesNothingOfItIsLeft) {
 
 TEST_F(FamilyTest, AloneItLeavesItsBranchesWhole) {
   ASSERT_THAT(*delete_room(kFile, false, &disk_), ElementsAre(kFile));
-  for (const char* file : {"/rooms/b1", "/rooms/b2", "/rooms/b11"}) EXPECT_TRUE(verify_journal(file, &disk_)->sound()) << file;
+  for (const char* file : {"/rooms/b1", "/rooms/b2", "/rooms/b11"})
+    EXPECT_TRUE(verify_journal(file, &disk_)->sound()) << file;
   ASSERT_TRUE(delete_room("/rooms/b1", true, &disk_));
   EXPECT_FALSE(disk_.size("/rooms/b11").value());
   EXPECT_TRUE(disk_.size("/rooms/b2").value());
@@ -345,7 +351,8 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   EXPECT_EQ(confirmed->place, RoomSeq{29});
 }
 
-// Not closed, so that its last rows are only in its log; the power fails at every write and sync of the deletion in turn.
+// Not closed, so that its last rows are only in its log; the power fails at every write and sync of the deletion in
+// turn.
 TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   RoomSeq head;
   {

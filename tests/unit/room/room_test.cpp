@@ -22,7 +22,8 @@ Outcome commit(Room& room, const Cut& cut) {
 
 TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
   Room room(test_block());
-  const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon), c = room.join(MemberKind::watcher);
+  const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon),
+                 c = room.join(MemberKind::watcher);
   EXPECT_NE(a, b);
   EXPECT_NE(b, c);
   EXPECT_TRUE(room.knows(c));
@@ -42,7 +43,8 @@ TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
 TEST(Room, LeavesTheSameBoneForEveryInterleaving) {
   const auto hash_of = [](const std::vector<int>& turns) {
     Room room(test_block());
-    std::vector<std::vector<Cut>> rows{strokes(room.join(MemberKind::surgeon), 4, 3), strokes(room.join(MemberKind::surgeon), 4, 4)};
+    std::vector<std::vector<Cut>> rows{strokes(room.join(MemberKind::surgeon), 4, 3),
+                                       strokes(room.join(MemberKind::surgeon), 4, 4)};
     std::size_t next[2] = {0, 0};
     for (const int who : turns) commit(room, rows[static_cast<std::size_t>(who)][next[who]++]);
     return room.field_hash();
@@ -143,20 +145,35 @@ INSTANTIATE_TEST_SUITE_P(
         Breach{"level_negative", Rejection::level, [](Cut& c) { c.level = -1; }},
         Breach{"no_path", Rejection::path, [](Cut& c) { c.path.clear(); }},
         Breach{"long_path", Rejection::path, [](Cut& c) { c.path.assign(65, c.path.front()); }},
-        Breach{"null_rotation", Rejection::rotation, [](Cut& c) { c.path.back().rotation = {0, 0, 0, 0}; }},
-        Breach{"half_rotation", Rejection::rotation, [](Cut& c) { c.path.back().rotation = {0, 0, 0, 16384}; }},
-        Breach{"far_away", Rejection::place, [](Cut& c) { c.path = {at({0, 0, 500})}; }},
+        Breach{"null_rotation", Rejection::rotation,
+               [](Cut& c) {
+                 c.path.back().rotation = {0, 0, 0, 0};
+               }},
+        Breach{"half_rotation", Rejection::rotation,
+               [](Cut& c) {
+                 c.path.back().rotation = {0, 0, 0, 16384};
+               }},
+        Breach{"far_away", Rejection::place,
+               [](Cut& c) {
+                 c.path = {at({0, 0, 500})};
+               }},
         Breach{"end_of_integers", Rejection::place, [](Cut& c) { c.path.back().position[1] = INT32_MIN; }},
-        Breach{"long_way", Rejection::sweep, [](Cut& c) { c.path = {at({-13, 0, 0}), at({13, 0, 0})}; }},
-        Breach{"to_and_fro", Rejection::sweep, [](Cut& c) {
+        Breach{"long_way", Rejection::sweep,
+               [](Cut& c) {
+                 c.path = {at({-13, 0, 0}), at({13, 0, 0})};
+               }},
+        Breach{"to_and_fro", Rejection::sweep,
+               [](Cut& c) {
                  c.path.clear();
                  for (int i = 0; i < 60; ++i) c.path.push_back(at({i % 2 ? 0.5 : 0.0, 0, 0}));
                }},
-        Breach{"many_turns", Rejection::sweep, [](Cut& c) {
+        Breach{"many_turns", Rejection::sweep,
+               [](Cut& c) {
                  const Tool drill = test::tool_named("drill-3.2");
                  c.tool = drill.hash();
                  c.path.clear();
-                 for (int i = 0; i < 20; ++i) c.path.push_back(quantise(pose_along({0, 0, 0}, i % 2 ? Vec3{1, 0, 0} : Vec3{0, 0, -1})));
+                 for (int i = 0; i < 20; ++i)
+                   c.path.push_back(quantise(pose_along({0, 0, 0}, i % 2 ? Vec3{1, 0, 0} : Vec3{0, 0, -1})));
                }},
         Breach{"spindle", Rejection::spindle, [](Cut& c) { c.spindle_rpm = 1'000'000; }}),
     [](const auto& test_case) { return std::string(test_case.param.name); });
@@ -219,7 +236,8 @@ TEST(RoomSurface, StaleBlocksAreAllThatACutChanges) {
     if (!drawn) continue;
     const BlockPayload anew = make_block(room.gather_block(key));
     const auto kept = live.blocks().find(key);
-    EXPECT_EQ(anew.bytes.empty() ? BlockPayload{} : anew, kept == live.blocks().end() ? BlockPayload{} : kept->second.payload)
+    EXPECT_EQ(anew.bytes.empty() ? BlockPayload{} : anew,
+              kept == live.blocks().end() ? BlockPayload{} : kept->second.payload)
         << "block " << key.index.x << ' ' << key.index.y << ' ' << key.index.z << " of level " << key.level;
     fine += key.level > 0;
   }

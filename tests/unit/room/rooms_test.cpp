@@ -1,12 +1,12 @@
-// Many rooms in one server: who is in one hears nothing of another, and each can be closed, opened again, branched, shown
-// again, checked, copied and deleted while the others go on.
+// Many rooms in one server: who is in one hears nothing of another, and each can be closed, opened again, branched,
+// shown again, checked, copied and deleted while the others go on.
 #include <gtest/gtest.h>
 
 #include <fstream>
 
 #include "server/journal/maintenance.hpp"
-#include "server/net/room_server.hpp"
 #include "server/net/room_admin_client.hpp"
+#include "server/net/room_server.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -51,7 +51,13 @@ class RoomsTest : public ::testing::Test {
       cuts[i].lease_epoch = by.lease();
       ASSERT_TRUE(wait_until([&] { return by.session().send(cuts[i]); }, kPatience));
     }
-    ASSERT_TRUE(wait_until([&] { return by.own() == from + cuts.size() - 1 && settled((*server_->rooms().find(by.session().room().name))->runtime(), {&by}); }, kPatience)) << by.rejected();
+    ASSERT_TRUE(wait_until(
+        [&] {
+          return by.own() == from + cuts.size() - 1 &&
+                 settled((*server_->rooms().find(by.session().room().name))->runtime(), {&by});
+        },
+        kPatience))
+        << by.rejected();
   }
   std::string hash_of(const std::string& room) {
     return status_of(join(server_->address(), wire::ClientKind::viewer, room)).field_hash();
@@ -65,7 +71,8 @@ class RoomsTest : public ::testing::Test {
     return names;
   }
   std::string refusal_of(const std::string& room) {
-    const auto joined = wire::join_room(server_->address(), wire::ClientKind::viewer, "test", std::chrono::seconds(5), {}, room);
+    const auto joined =
+        wire::join_room(server_->address(), wire::ClientKind::viewer, "test", std::chrono::seconds(5), {}, room);
     return joined ? "" : joined.error().message;
   }
 
@@ -298,7 +305,8 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   seeing.TryCancel();
   (void)tools->Finish();
   // Nobody changes it.
-  const auto hand = wire::join_room(server_->address(), wire::ClientKind::haptic, "test", std::chrono::seconds(5), {}, "film");
+  const auto hand =
+      wire::join_room(server_->address(), wire::ClientKind::haptic, "test", std::chrono::seconds(5), {}, "film");
   ASSERT_FALSE(hand.has_value());
   EXPECT_NE(hand.error().message.find("watch"), std::string::npos);
   const wire::JoinedRoom watcher = join(server_->address(), wire::ClientKind::viewer, "film");

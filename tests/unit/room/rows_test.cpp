@@ -1,5 +1,5 @@
-// What a room decides as rows: replayed, through their bytes, they make the same room again, from the beginning or from any
-// place on.
+// What a room decides as rows: replayed, through their bytes, they make the same room again, from the beginning or from
+// any place on.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -28,7 +28,8 @@ Fragment half(const Case& bone, bool upper) {
 class BusyRoom {
  public:
   explicit BusyRoom(unsigned seed) : room(test_block()), random_(seed) {
-    for (std::size_t i = 0; i < 2; ++i) hands_[i] = room.join(MemberKind::surgeon, static_cast<std::uint32_t>(i + 1), Digest{{1}});
+    for (std::size_t i = 0; i < 2; ++i)
+      hands_[i] = room.join(MemberKind::surgeon, static_cast<std::uint32_t>(i + 1), Digest{{1}});
     for (std::size_t i = 0; i < 2; ++i) cuts_[i] = strokes(hands_[i], 200, seed + static_cast<unsigned>(i) * 100);
   }
 
@@ -37,10 +38,15 @@ class BusyRoom {
     const std::size_t who = random_() % 2;
     const AuthorId hand = hands_[who];
     switch (random_() % 12) {
-      case 0: (void)room.undo_last(hand, 1 + random_() % 3, {}); return;
-      case 1: (void)room.redo_last(hand, 1 + random_() % 2); return;
+      case 0:
+        (void)room.undo_last(hand, 1 + random_() % 3, {});
+        return;
+      case 1:
+        (void)room.redo_last(hand, 1 + random_() % 2);
+        return;
       case 2:
-        if (room.bodies().size() == 1) (void)room.split(BodyId{0}, {half(room.bone(), upper_ = !upper_)}, room.bone_epoch());
+        if (room.bodies().size() == 1)
+          (void)room.split(BodyId{0}, {half(room.bone(), upper_ = !upper_)}, room.bone_epoch());
         return;
       case 3:
         if (room.bodies().size() > 1) (void)room.remove_body(hand, room.bodies()[random_() % room.bodies().size()]);
@@ -49,7 +55,8 @@ class BusyRoom {
         SceneItem guide;
         guide.body = room.bodies().front();
         guide.tool = tool_named("guide-1").hash();
-        guide.pose_bone_item = pose_along({0.1 * static_cast<double>(random_() % 50), 2, 0}, Vec3{0.1, 0.2, -1}.normalized());
+        guide.pose_bone_item =
+            pose_along({0.1 * static_cast<double>(random_() % 50), 2, 0}, Vec3{0.1, 0.2, -1}.normalized());
         const auto standing = room.items();
         if (!standing.empty() && random_() % 2) guide.id = standing.front().id;
         (void)room.set_item(hand, guide);
@@ -108,8 +115,10 @@ void expect_same(Room& one, Room& other) {
   ASSERT_EQ(one.marks(), other.marks());
   for (int round = 0; round < 2; ++round) {
     for (Room* room : {&one, &other}) {
-      if (round == 0) (void)room->undo_to(AuthorId{1}, RoomSeq{2});
-      else (void)room->redo_last(AuthorId{1}, 1);
+      if (round == 0)
+        (void)room->undo_to(AuthorId{1}, RoomSeq{2});
+      else
+        (void)room->redo_last(AuthorId{1}, 1);
     }
     ASSERT_EQ(one.room_hash(), other.room_hash()) << (round == 0 ? "after an undo of everything" : "after its redo");
   }
@@ -188,7 +197,8 @@ TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
   of_no_tool.tool.bytes[3] ^= 1;
   of_no_body.body = BodyId{4};
   far.path.back().position[0] = INT32_MAX;
-  const Mask torn = std::make_shared<const std::vector<FieldLeaf>>(std::vector<FieldLeaf>{{BodyId{0}, 0, {1, 0, 0}, {5}}});
+  const Mask torn =
+      std::make_shared<const std::vector<FieldLeaf>>(std::vector<FieldLeaf>{{BodyId{0}, 0, {1, 0, 0}, {5}}});
   const Mask whole = std::make_shared<const std::vector<FieldLeaf>>();
   SceneItem item;
   item.id = 1;
@@ -204,21 +214,41 @@ TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
   constexpr std::int32_t kFurthest = std::numeric_limits<std::int32_t>::max() - 7;
   const CoordBox everywhere{{INT32_MIN, INT32_MIN, INT32_MIN}, {INT32_MAX, INT32_MAX, INT32_MAX}};
   const decltype(RoomRow::what) impossible[] = {
-      CutRow{of_nobody}, CutRow{of_no_tool}, CutRow{of_no_body}, CutRow{too_early}, CutRow{far},
-      JoinRow{hand, MemberKind::surgeon, 0, {}}, JoinRow{AuthorId{7}, MemberKind::watcher, 0, {}},
-      RejectionRow{hand, 3, {}, Rejection::place}, RejectionRow{hand, 2, {}, Rejection::none},
+      CutRow{of_nobody},
+      CutRow{of_no_tool},
+      CutRow{of_no_body},
+      CutRow{too_early},
+      CutRow{far},
+      JoinRow{hand, MemberKind::surgeon, 0, {}},
+      JoinRow{AuthorId{7}, MemberKind::watcher, 0, {}},
+      RejectionRow{hand, 3, {}, Rejection::place},
+      RejectionRow{hand, 2, {}, Rejection::none},
       RejectionRow{hand, 2, {}, static_cast<Rejection>(kRejections)},
-      SplitRow{BodyId{3}, whole, {}}, SplitRow{BodyId{0}, torn, {}}, SplitRow{BodyId{0}, nullptr, {}},
+      SplitRow{BodyId{3}, whole, {}},
+      SplitRow{BodyId{0}, torn, {}},
+      SplitRow{BodyId{0}, nullptr, {}},
       SplitRow{BodyId{0}, whole, {{BodyId{5}, {}, whole}}},
-      SplitRow{BodyId{0}, mask_at(0, {kFurthest, 0, 0}), {}}, SplitRow{BodyId{0}, mask_at(2, {0, -4096, 0}), {}},
+      SplitRow{BodyId{0}, mask_at(0, {kFurthest, 0, 0}), {}},
+      SplitRow{BodyId{0}, mask_at(2, {0, -4096, 0}), {}},
       SplitRow{BodyId{0}, whole, {{BodyId{1}, {}, mask_at(1, {0, 0, kFurthest})}}},
       SplitRow{BodyId{0}, whole, {{BodyId{1}, everywhere, whole}}},
-      UndoRow{{}}, UndoRow{{RoomSeq{1}}}, UndoRow{{RoomSeq{9}}}, UndoRow{{RoomSeq{2}, RoomSeq{2}}},
-      RedoRow{{}, {}}, RedoRow{{RoomSeq{2}}, {}}, RedoRow{{RoomSeq{8}}, {}},
-      RemoveBodyRow{BodyId{0}}, RemoveBodyRow{BodyId{6}},
-      ItemRow{1, std::nullopt}, ItemRow{2, item}, ItemRow{1, of_gone_body},
-      ItemRow{1, of_another_number}, ItemRow{1, of_another_place},
-      ToolRow{tool_named("guide-1")}, MarkRow{""}, MarkRow{std::string(kMostLabelBytes + 1, 'x')}};
+      UndoRow{{}},
+      UndoRow{{RoomSeq{1}}},
+      UndoRow{{RoomSeq{9}}},
+      UndoRow{{RoomSeq{2}, RoomSeq{2}}},
+      RedoRow{{}, {}},
+      RedoRow{{RoomSeq{2}}, {}},
+      RedoRow{{RoomSeq{8}}, {}},
+      RemoveBodyRow{BodyId{0}},
+      RemoveBodyRow{BodyId{6}},
+      ItemRow{1, std::nullopt},
+      ItemRow{2, item},
+      ItemRow{1, of_gone_body},
+      ItemRow{1, of_another_number},
+      ItemRow{1, of_another_place},
+      ToolRow{tool_named("guide-1")},
+      MarkRow{""},
+      MarkRow{std::string(kMostLabelBytes + 1, 'x')}};
   for (std::size_t i = 0; i < std::size(impossible); ++i) {
     EXPECT_FALSE(room.replay({RoomSeq{3}, 1s, hand, impossible[i]})) << "row " << i;
     EXPECT_EQ(room.room_hash(), before) << "row " << i;
@@ -232,8 +262,8 @@ TEST(RoomReplay, RefusesATimeBeforeTheLastRowsOrBeyondAnyRooms) {
   const AuthorId hand = room.join(MemberKind::surgeon);
   ASSERT_TRUE(room.replay({RoomSeq{2}, 2s, hand, MarkRow{"here"}}));
   const Digest before = room.room_hash();
-  for (const std::chrono::nanoseconds at : {std::chrono::nanoseconds::min(), std::chrono::nanoseconds(-1s), std::chrono::nanoseconds(1999ms),
-                                            std::chrono::nanoseconds::max()}) {
+  for (const std::chrono::nanoseconds at : {std::chrono::nanoseconds::min(), std::chrono::nanoseconds(-1s),
+                                            std::chrono::nanoseconds(1999ms), std::chrono::nanoseconds::max()}) {
     EXPECT_FALSE(room.replay({RoomSeq{3}, at, hand, MarkRow{"there"}})) << at.count();
     EXPECT_EQ(room.room_hash(), before);
     EXPECT_EQ(room.time(), 2s);
@@ -249,8 +279,8 @@ TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
   ASSERT_TRUE(room.undo_last(hand, 1, {}) && room.undo_last(hand, 1, {}));
   const RoomSeq first{2}, second{3}, undo{4}, next_undo{5};
   const Digest before = room.room_hash();
-  for (const RedoRow& redo : {RedoRow{{undo, undo}, {second}}, RedoRow{{undo, next_undo}, {first, second}}, RedoRow{{undo}, {second, second}},
-                              RedoRow{{next_undo, undo}, {second, first}}}) {
+  for (const RedoRow& redo : {RedoRow{{undo, undo}, {second}}, RedoRow{{undo, next_undo}, {first, second}},
+                              RedoRow{{undo}, {second, second}}, RedoRow{{next_undo, undo}, {second, first}}}) {
     EXPECT_FALSE(room.replay({RoomSeq{6}, 1s, hand, redo}));
     EXPECT_EQ(room.room_hash(), before);
   }
@@ -261,8 +291,9 @@ TEST(RoomReplay, RefusesFieldsThatAreNoneOfTheBones) {
   Room room(test_block());
   const Digest before = room.room_hash();
   const std::int32_t furthest = std::numeric_limits<std::int32_t>::max() - 7;
-  for (const FieldLeaf& leaf : {FieldLeaf{BodyId{0}, 0, {furthest, 0, 0}, {5}}, FieldLeaf{BodyId{0}, 2, {0, 0, -4096}, {5}},
-                                FieldLeaf{BodyId{0}, kLevels, {}, {5}}, FieldLeaf{BodyId{0}, 0, {}, {}}, FieldLeaf{BodyId{1}, 0, {}, {5}}}) {
+  for (const FieldLeaf& leaf :
+       {FieldLeaf{BodyId{0}, 0, {furthest, 0, 0}, {5}}, FieldLeaf{BodyId{0}, 2, {0, 0, -4096}, {5}},
+        FieldLeaf{BodyId{0}, kLevels, {}, {5}}, FieldLeaf{BodyId{0}, 0, {}, {}}, FieldLeaf{BodyId{1}, 0, {}, {5}}}) {
     EXPECT_FALSE(room.set_fields({&leaf, 1}));
     EXPECT_EQ(room.room_hash(), before);
   }
@@ -343,10 +374,11 @@ TEST(RoomLimits, BoundWhatIsSweptOverTime) {
 }
 
 // Each of the samples stands for a 64th of the bur, and eight of them are forgiven: 1.1 J.
-// A block of 1.9 g/cm3 has an ultimate stress of 130 N/mm2: a bur of 5 mm, wholly in it, needs at least 130 N/mm2 * pi/6 * 125
-// mm3 = 8.5 J, and half of that where half of it is in air.
+// A block of 1.9 g/cm3 has an ultimate stress of 130 N/mm2: a bur of 5 mm, wholly in it, needs at least 130 N/mm2 *
+// pi/6 * 125 mm3 = 8.5 J, and half of that where half of it is in air.
 TEST(RoomLimits, BoundTheEnergyOfACutByTheMotor) {
-  const auto rejection_of = [](const std::string& tool, const Vec3& at, double power_w, double blow_j, std::uint32_t path_us) {
+  const auto rejection_of = [](const std::string& tool, const Vec3& at, double power_w, double blow_j,
+                               std::uint32_t path_us) {
     Room room(test_block(), {.power_w = power_w, .blow_j = blow_j});
     Cut cut = test::straight_cut(tool_named(tool), at, at, {0, 0, -1});
     cut.author = room.join(MemberKind::surgeon);

@@ -14,8 +14,8 @@ class RoomRpc : public ServedRoom {
  protected:
   // One call of a member who joined to watch.
   template <class Request, class Response>
-  grpc::Status call(grpc::Status (v1::RoomService::Stub::*rpc)(grpc::ClientContext*, const Request&, Response*), Request request,
-                    Response& response, std::optional<std::uint64_t> author = std::nullopt) {
+  grpc::Status call(grpc::Status (v1::RoomService::Stub::*rpc)(grpc::ClientContext*, const Request&, Response*),
+                    Request request, Response& response, std::optional<std::uint64_t> author = std::nullopt) {
     if (!watcher_) watcher_ = join(address(), wire::ClientKind::viewer);
     request.set_author(author.value_or(watcher_->author.value));
     grpc::ClientContext context;
@@ -86,7 +86,8 @@ TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
   send(*first, dimples(first->author(), -8.0));
   send(*second, dimples(second->author(), 3.0));
   MeshReader viewer(address());
-  ASSERT_TRUE(wait_until([&] { return first->own() == 12 && second->own() == 12 && first->seq() == second->seq(); }, kPatience));
+  ASSERT_TRUE(wait_until([&] { return first->own() == 12 && second->own() == 12 && first->seq() == second->seq(); },
+                         kPatience));
   // Who watches may have come after the last cut, which is a row as well.
   const RoomSeq last_cut = std::max(first->acknowledged().at(12), second->acknowledged().at(12));
   ASSERT_TRUE(viewer.read_to(last_cut));
@@ -103,7 +104,8 @@ TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
   const auto late = surgeon();
   ASSERT_TRUE(wait_until([&] { return late->complete(); }, kPatience));
   const auto status = status_of(late->session().room());
-  for (Surgeon* holder : {first.get(), second.get(), late.get()}) EXPECT_EQ(wire::to_wire(holder->hash()), status.field_hash());
+  for (Surgeon* holder : {first.get(), second.get(), late.get()})
+    EXPECT_EQ(wire::to_wire(holder->hash()), status.field_hash());
   EXPECT_EQ(first->lease(), second->lease());
   EXPECT_NE(first->hash(), all);
   ASSERT_TRUE(viewer.read_to(RoomSeq{undone.room_seq()}));
@@ -209,7 +211,8 @@ TEST_F(RoomRpc, SavesOnRequestAndAtTheEnd) {
 
   for (const char* name : {"../half.vdb", "/half.vdb", "half.txt", "a/b.vdb", ".vdb", ".."}) {
     request.set_file_name(name);
-    EXPECT_EQ(call(&v1::RoomService::Stub::SaveFields, request, saved).error_code(), grpc::StatusCode::INVALID_ARGUMENT) << name;
+    EXPECT_EQ(call(&v1::RoomService::Stub::SaveFields, request, saved).error_code(), grpc::StatusCode::INVALID_ARGUMENT)
+        << name;
   }
   const Digest hash = hand->hash();
   const RoomSummary summary = server_->stop();
@@ -295,7 +298,8 @@ TEST_F(RoomRpc, ASawnOffPieceBecomesABodyForEveryone) {
   remove.set_body(1);
   v1::RemoveBodyResponse removed;
   ASSERT_TRUE(call(&v1::RoomService::Stub::RemoveBody, remove, removed).ok());
-  ASSERT_TRUE(wait_until([&] { return hand->bodies().size() == 1 && other->seq().value == removed.room_seq(); }, kPatience));
+  ASSERT_TRUE(
+      wait_until([&] { return hand->bodies().size() == 1 && other->seq().value == removed.room_seq(); }, kPatience));
   ASSERT_TRUE(viewer.read_to(RoomSeq{removed.room_seq()}));
   EXPECT_EQ(of_piece(), 0);
   status = status_of(hand->session().room());

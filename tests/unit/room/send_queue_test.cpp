@@ -70,7 +70,8 @@ TEST(MeshSendQueue, StalledReadersShareOneVersionOfEachBlock) {
   MeshUpdate surface;
   for (int x = 0; x < kBlocks; ++x) surface.blocks[key_at(x)] = block(x, 1);
   std::vector<MeshSendQueue> stalled(kReaders, MeshSendQueue(surface));
-  for (MeshSendQueue& send_queue : stalled) EXPECT_FALSE(send_queue.take().empty()) << "a message in flight, never finished";
+  for (MeshSendQueue& send_queue : stalled)
+    EXPECT_FALSE(send_queue.take().empty()) << "a message in flight, never finished";
   std::vector<std::weak_ptr<const std::string>> made;
   for (std::uint64_t seq = 1; seq <= 1000; ++seq) {
     const int x = static_cast<int>(seq * 7 % kBlocks);
@@ -131,8 +132,8 @@ TEST(MeshSendQueue, BlocksThatChangeAllTheTimeStarveNoOther) {
 TEST(MeshSendQueue, ClaimsOnlyWhatTheReaderHolds) {
   std::mt19937 random(11);
   for (int run = 0; run < 50; ++run) {
-    std::map<int, std::uint64_t> now;                             // version by block
-    std::vector<std::map<int, std::uint64_t>> at;                 // the same at every room_seq
+    std::map<int, std::uint64_t> now;              // version by block
+    std::vector<std::map<int, std::uint64_t>> at;  // the same at every room_seq
     MeshUpdate surface;
     for (int x = 0; x < 30; ++x) surface.blocks[key_at(x)] = block(x, now[x] = 1, 20'000);
     at.push_back(now);

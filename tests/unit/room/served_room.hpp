@@ -12,7 +12,9 @@ class ServedRoom : public ::testing::Test {
   void SetUp() override {
     const Case bone = test_block();
     ASSERT_TRUE(bone.save(dir_ / "case"));
-    auto started = RoomServer::start(Room(bone), {.listen = "127.0.0.1:0", .case_folder = dir_ / "case", .save = dir_ / "bone.vdb", .rates = {}}, {});
+    auto started = RoomServer::start(
+        Room(bone), {.listen = "127.0.0.1:0", .case_folder = dir_ / "case", .save = dir_ / "bone.vdb", .rates = {}},
+        {});
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
   }

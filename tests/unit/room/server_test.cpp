@@ -40,7 +40,8 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   ASSERT_TRUE(wait_until([&] { return settled(runtime(), holders); }, kPatience));
   const auto status = status_of(later->session().room());
   EXPECT_GE(status.room_seq(), 60u);
-  for (std::size_t i = 0; i < holders.size(); ++i) EXPECT_EQ(wire::to_wire(holders[i]->hash()), status.field_hash()) << "holder " << i;
+  for (std::size_t i = 0; i < holders.size(); ++i)
+    EXPECT_EQ(wire::to_wire(holders[i]->hash()), status.field_hash()) << "holder " << i;
   EXPECT_GT(status.removed_mm3(), 0.0);
   EXPECT_EQ(status.rejected(), 0u);
 }
@@ -172,7 +173,8 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
   ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled(runtime(), {survivor.get()}); }, kPatience));
   EXPECT_TRUE(watcher.read_to(survivor->seq()));
   EXPECT_EQ(wire::to_wire(survivor->hash()), status_of(survivor->session().room()).field_hash());
-  EXPECT_TRUE(wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));
+  EXPECT_TRUE(
+      wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));
 }
 
 TEST_F(RoomServerTest, ShowsTheNewestStateAndAnIdleToolOnceItsHandIsGone) {
@@ -225,13 +227,20 @@ TEST_F(RoomServerTest, VersionsMustAgree) {
   };
   EXPECT_TRUE(ask(wire::kProtocolVersion, kKernelVersion, v1::CLIENT_KIND_HAPTIC).ok());
   EXPECT_TRUE(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_VIEWER).ok()) << "a viewer has no kernel";
-  for (const grpc::Status& status : {ask(77, kKernelVersion, v1::CLIENT_KIND_HAPTIC), ask(wire::kProtocolVersion, 77, v1::CLIENT_KIND_HAPTIC)}) {
+  for (const grpc::Status& status :
+       {ask(77, kKernelVersion, v1::CLIENT_KIND_HAPTIC), ask(wire::kProtocolVersion, 77, v1::CLIENT_KIND_HAPTIC)}) {
     EXPECT_EQ(status.error_code(), grpc::StatusCode::FAILED_PRECONDITION);
     EXPECT_NE(status.error_message().find("77"), std::string::npos) << status.error_message();
-    EXPECT_NE(status.error_message().find("version " + std::to_string(status.error_message().find("kernel") == std::string::npos ? wire::kProtocolVersion : kKernelVersion)), std::string::npos) << status.error_message();
+    EXPECT_NE(status.error_message().find("version " +
+                                          std::to_string(status.error_message().find("kernel") == std::string::npos
+                                                             ? wire::kProtocolVersion
+                                                             : kKernelVersion)),
+              std::string::npos)
+        << status.error_message();
   }
   EXPECT_EQ(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_HAPTIC).error_code(), grpc::StatusCode::FAILED_PRECONDITION);
-  EXPECT_EQ(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_UNSPECIFIED).error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_EQ(ask(wire::kProtocolVersion, 0, v1::CLIENT_KIND_UNSPECIFIED).error_code(),
+            grpc::StatusCode::INVALID_ARGUMENT);
 }
 
 // One session whose requests are made by hand; what the server says of them.
@@ -351,7 +360,8 @@ TEST_F(RoomServerTest, StoppingEndsEveryStreamWithAReason) {
 
 TEST_F(RoomServerTest, RefusesAPortInUseAndAddressesOfOtherMachines) {
   const auto start = [&](const std::string& listen) {
-    return RoomServer::start(Room(test::test_block()), {.listen = listen, .case_folder = dir_ / "case", .rates = {}}, {});
+    return RoomServer::start(Room(test::test_block()), {.listen = listen, .case_folder = dir_ / "case", .rates = {}},
+                             {});
   };
   const auto second = start(address());
   ASSERT_FALSE(second.has_value());
@@ -396,7 +406,8 @@ TEST(RoomClient, SaysInOneSentenceThatNobodyAnswers) {
   EXPECT_NE(nobody.error().message.find("127.0.0.1:1"), std::string::npos);
   EXPECT_EQ(wire::join_room("127.0.0.1:1", wire::ClientKind::viewer, "test", 10s, [] { return true; }).error().code,
             ErrorCode::cancelled);
-  EXPECT_EQ(wire::join_room("nonsense", wire::ClientKind::viewer, "test", 1s, {}).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(wire::join_room("nonsense", wire::ClientKind::viewer, "test", 1s, {}).error().code,
+            ErrorCode::invalid_input);
 }
 
 }  // namespace

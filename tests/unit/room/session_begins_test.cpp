@@ -78,8 +78,8 @@ class BegunSession : public ::testing::Test {
     Result<PersistedRoom> kept = RoomStore::open("/rooms/femur", test_block(), options());
     ASSERT_TRUE(kept) << kept.error().message;
     store = std::move(kept->store);
-    runtime = std::make_unique<RoomRuntime>(std::move(kept->room), RuntimeRates{.tick = 0ns, .mesh = 1s, .pieces = 0ns}, nullptr,
-                                      Detail::automatic, store.get());
+    runtime = std::make_unique<RoomRuntime>(std::move(kept->room), RuntimeRates{.tick = 0ns, .mesh = 1s, .pieces = 0ns},
+                                            nullptr, Detail::automatic, store.get());
   }
   RoomStore::Options options() {
     RoomStore::Options options;
@@ -134,7 +134,8 @@ std::size_t count(const Told& sink, v1::SessionResponse::MessageCase kind) {
 std::uint64_t furthest(const Told& sink) {
   std::uint64_t place = 0;
   for (const v1::SessionResponse& one : sink.told)
-    place = std::max({place, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(), one.supervised().room_seq()});
+    place = std::max({place, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(),
+                      one.supervised().room_seq()});
   return place;
 }
 
@@ -155,7 +156,8 @@ TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
   ASSERT_EQ(count(*hand, v1::SessionResponse::kSupervised), 1u);
   ASSERT_EQ(count(*hand, v1::SessionResponse::kComplete), 1u);
   EXPECT_EQ(furthest(*hand), kept.value + 3);
-  EXPECT_TRUE(std::ranges::any_of(hand->told, [](const auto& one) { return one.supervised().supervision().stopped(); }));
+  EXPECT_TRUE(
+      std::ranges::any_of(hand->told, [](const auto& one) { return one.supervised().supervision().stopped(); }));
 }
 
 // Whoever comes while the disk is slow, and the room is killed before it was done: nobody knows of what it has lost.

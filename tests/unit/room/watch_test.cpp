@@ -22,7 +22,8 @@ Digest hash_of(const MeshReader& reader) {
 TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
   const auto hand = surgeon();
   std::vector<std::unique_ptr<MeshReader>> readers;
-  for (int i = 0; i < 4; ++i) readers.push_back(std::make_unique<MeshReader>(address()));  // two of them read only at the end
+  for (int i = 0; i < 4; ++i)
+    readers.push_back(std::make_unique<MeshReader>(address()));  // two of them read only at the end
   std::atomic<bool> cutting{true};
   std::atomic<int> comings{0};
   std::vector<std::thread> people;

@@ -56,13 +56,15 @@ TEST(Machine, EachLackIsNamedWithItsRemedy) {
     void (*spoil)(MachineFacts&);
   };
   const Case cases[] = {
-      {"real-time priority 80", "rtprio 95", Finding::lacking, [](MachineFacts& f) { f.fifo_works = false, f.rtprio_limit = 0; }},
+      {"real-time priority 80", "rtprio 95", Finding::lacking,
+       [](MachineFacts& f) { f.fifo_works = false, f.rtprio_limit = 0; }},
       {"8192 KiB", "memlock unlimited", Finding::lacking, [](MachineFacts& f) { f.memlock_limit_kib = 8192; }},
       {"may be locked", "memlock unlimited", Finding::lacking, [](MachineFacts& f) { f.lock_works = false; }},
       {"slack", "PR_SET_TIMERSLACK", Finding::lacking, [](MachineFacts& f) { f.slack_works = false; }},
       {"4000000 ns", "HIGH_RES_TIMERS", Finding::lacking, [](MachineFacts& f) { f.timer_resolution_ns = 4'000'000; }},
       {"one core", "two cores", Finding::lacking, [](MachineFacts& f) { f.cores = 1; }},
-      {"100 ms of every second", "sched_rt_runtime_us", Finding::lacking, [](MachineFacts& f) { f.rt_runtime_us = 100'000; }},
+      {"100 ms of every second", "sched_rt_runtime_us", Finding::lacking,
+       [](MachineFacts& f) { f.rt_runtime_us = 100'000; }},
       {"powersave", "cpupower", Finding::note, [](MachineFacts& f) { f.governors[1] = "powersave"; }},
       {"voluntary", "preempt=full", Finding::note, [](MachineFacts& f) { f.preemption = "voluntary"; }},
       {"hpet", "clocksource=tsc", Finding::note, [](MachineFacts& f) { f.clock_source = "hpet"; }},

@@ -5,12 +5,12 @@
 #include <csignal>
 #include <thread>
 
-#include "common/runtime/spsc_queue.hpp"
 #include "common/runtime/files.hpp"
-#include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/log.hpp"
 #include "common/runtime/periodic.hpp"
+#include "common/runtime/spsc_queue.hpp"
 #include "common/runtime/stop_signal.hpp"
+#include "common/runtime/triple_buffer.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace osteon {
@@ -64,7 +64,8 @@ TEST(SpscQueue, RefusesWhenFull) {
 TEST(DurationHistogram, PercentilesAreRightToThreePerCent) {
   DurationHistogram histogram;
   for (int us = 1; us <= 10'000; ++us) histogram.record(std::chrono::microseconds(us));
-  for (const double percent : {1.0, 50.0, 99.0, 99.9}) EXPECT_NEAR(histogram.percentile_us(percent), 100.0 * percent, 3.0 * percent);
+  for (const double percent : {1.0, 50.0, 99.0, 99.9})
+    EXPECT_NEAR(histogram.percentile_us(percent), 100.0 * percent, 3.0 * percent);
   EXPECT_DOUBLE_EQ(histogram.max_us(), 10'000.0);
   histogram.record(-5ns);
   EXPECT_EQ(histogram.count(), 10'001u);
@@ -167,10 +168,12 @@ TEST(Files, SayBeforehandWhetherTheyCanBeWritten) {
   EXPECT_TRUE(check_writable(temp / "old", "the log", "--log"));
   EXPECT_EQ(*read_file(temp / "old"), "kept");
   // Root may write into /proc, and still no file can be made there.
-  for (const std::filesystem::path& wrong : {temp / "no-folder" / "a", temp.path(), std::filesystem::path("/proc/a.log")}) {
+  for (const std::filesystem::path& wrong :
+       {temp / "no-folder" / "a", temp.path(), std::filesystem::path("/proc/a.log")}) {
     const Result<void> answer = check_writable(wrong, "the log", "--log");
     ASSERT_FALSE(answer) << wrong;
-    EXPECT_NE(answer.error().message.find("give --log a file in a folder"), std::string::npos) << answer.error().message;
+    EXPECT_NE(answer.error().message.find("give --log a file in a folder"), std::string::npos)
+        << answer.error().message;
   }
 }
 
@@ -179,7 +182,9 @@ TEST(Log, LinesHaveKeysAndQuotesWhereNeeded) {
   testing::internal::CaptureStderr();
   log::warn("case_loaded", {{"path", "a b"}, {"voxels", 12}, {"pitch_mm", 0.5}, {"ok", true}});
   const std::string line = testing::internal::GetCapturedStderr();
-  EXPECT_NE(line.find("warning runtime-test case_loaded path=\"a b\" voxels=12 pitch_mm=0.5 ok=true"), std::string::npos) << line;
+  EXPECT_NE(line.find("warning runtime-test case_loaded path=\"a b\" voxels=12 pitch_mm=0.5 ok=true"),
+            std::string::npos)
+      << line;
 }
 
 }  // namespace

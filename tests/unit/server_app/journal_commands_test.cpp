@@ -7,8 +7,8 @@
 #include <iterator>
 
 #include "common/volume/field_file.hpp"
-#include "server/journal/signing.hpp"
 #include "server/journal/maintenance.hpp"
+#include "server/journal/signing.hpp"
 #include "server/net/room_owners.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -36,7 +36,8 @@ class JournalCommands : public ::testing::Test {
     ASSERT_EQ(kept.store->person("Anna").value(), 1u);
     kept.cut(4);
     for (int i = 0; i < 40; ++i)
-      ASSERT_TRUE(kept.room->mark(kept.hand, std::to_string(kept.room->room_seq().value + 1) + "." + std::string(20, 'x')));
+      ASSERT_TRUE(
+          kept.room->mark(kept.hand, std::to_string(kept.room->room_seq().value + 1) + "." + std::string(20, 'x')));
     kept.keep();
     last_ = kept.store->head().place.value;
     ASSERT_TRUE(kept.store->close());
@@ -57,7 +58,8 @@ class JournalCommands : public ::testing::Test {
     EXPECT_FALSE(result.timed_out);
     return result;
   }
-  void refused(const std::string& command, const std::vector<std::string>& arguments, const std::vector<std::string>& words) {
+  void refused(const std::string& command, const std::vector<std::string>& arguments,
+               const std::vector<std::string>& words) {
     const RunResult result = server(command, arguments);
     EXPECT_NE(result.exit_code, 0) << command << ": " << result.out;
     for (const std::string& word : words) EXPECT_THAT(result.err, HasSubstr(word)) << command;
@@ -113,7 +115,9 @@ TEST_F(JournalCommands, AnExportOfNobodyLeavesNoFile) {
 
 TEST_F(JournalCommands, AReplayReplacesOnlyFields) {
   const std::string bone = (dir_ / "case").string(), notes = make("notes.txt", "of the day");
-  const auto fields = [&](const std::string& file) { return std::vector<std::string>{"--case", bone, "--fields", file}; };
+  const auto fields = [&](const std::string& file) {
+    return std::vector<std::string>{"--case", bone, "--fields", file};
+  };
   refused("replay", fields(notes), {"there is " + notes, "--fields another name"});
   EXPECT_EQ(bytes_of(notes), "of the day");
   refused("replay", fields(file_.string()), {"give another name"});
@@ -135,7 +139,8 @@ TEST_F(JournalCommands, AReplayReplacesOnlyFields) {
 
 TEST_F(JournalCommands, ADamagedJournalIsSaidToBeOneAndGivesWhatIsConfirmed) {
   damage();
-  const std::string fault = "row " + std::to_string(bad_) + " does not fit the chain of hashes", bone = (dir_ / "case").string();
+  const std::string fault = "row " + std::to_string(bad_) + " does not fit the chain of hashes",
+                    bone = (dir_ / "case").string();
   const std::string confirmed = std::to_string(bad_ - 1), beyond = std::to_string(bad_);
   const auto file = [&](const std::string& name) { return (dir_ / name).string(); };
   refused("replay", {"--case", bone}, {fault, "--to " + confirmed});
@@ -241,7 +246,9 @@ TEST_F(JournalCommands, AFileThatIsNoJournalIsSaidToBeNone) {
   for (const auto& [file, why] : {std::pair<std::string, std::string>{json, "is no journal; name a file"},
                                   {(dir_ / "folder").string(), "name a file, not a folder"}}) {
     for (const std::vector<std::string>& arguments :
-         {std::vector<std::string>{"verify", file}, {"people", file}, {"backup", file, (dir_ / "copy").string()},
+         {std::vector<std::string>{"verify", file},
+          {"people", file},
+          {"backup", file, (dir_ / "copy").string()},
           {"--plain", "--listen", "127.0.0.1:0", "--case", (dir_ / "case").string(), "--journal", file}}) {
       const RunResult result = run(program("osteon-server"), arguments, std::chrono::seconds(60));
       EXPECT_FALSE(result.timed_out);

@@ -161,7 +161,8 @@ TEST_F(ServerConfigTest, EveryFieldIsWrongOnce) {
     const ConfigRead got = read("# a comment\n" + line + "\n");
     ASSERT_EQ(got.faults.size(), 1u) << line;
     const std::string& said = got.faults.front();
-    EXPECT_EQ(said.find((dir_ / "server.yaml").string() + ":" + (limit ? "3" : "2") + ": \"" + field + "\" is "), 0u) << said;
+    EXPECT_EQ(said.find((dir_ / "server.yaml").string() + ":" + (limit ? "3" : "2") + ": \"" + field + "\" is "), 0u)
+        << said;
     EXPECT_NE(said.find(wrong.second), std::string::npos) << said;
     EXPECT_EQ(said.find('\n'), std::string::npos);
   }
@@ -205,7 +206,8 @@ TEST_F(ServerConfigTest, WhatDoesNotFitTogetherIsSaid) {
   ServerConfig config;
   EXPECT_NE(check_server_config(config).error().message.find("--case"), std::string::npos);
   config.case_folders = {"a"};
-  EXPECT_NE(check_server_config(config).error().message.find("--certificates"), std::string::npos) << "nobody says how clients come in";
+  EXPECT_NE(check_server_config(config).error().message.find("--certificates"), std::string::npos)
+      << "nobody says how clients come in";
   config.certificates = "c";
   EXPECT_TRUE(check_server_config(config).has_value());
   config.plain = true;

@@ -51,9 +51,9 @@ struct Drawn {
 };
 
 struct Check {
-  int open = 0;    // edges that are not matched by as many in the other direction
-  int pinched = 0; // edges with more than two triangles
-  int shrunk = 0;  // triangles lost by welding
+  int open = 0;     // edges that are not matched by as many in the other direction
+  int pinched = 0;  // edges with more than two triangles
+  int shrunk = 0;   // triangles lost by welding
   int euler = 0;
   double volume_mm3 = 0;
 };
@@ -91,8 +91,9 @@ Check check(const std::vector<Mesh>& blocks) {
 Drawn ball(double radius_mm, double pitch_mm = kPitch_mm) {
   const Vec3 centre(0.21, -0.13, 0.07);
   const double r = radius_mm + 3;
-  return {CutField(test::make_bone({Vec3(-r, -r, -r), Vec3(r, r, r)}, pitch_mm,
-                                   [=](const Vec3& p) { return (p - centre).norm() - radius_mm; }, [](const Vec3&) { return 1.9; }),
+  return {CutField(test::make_bone(
+                       {Vec3(-r, -r, -r), Vec3(r, r, r)}, pitch_mm,
+                       [=](const Vec3& p) { return (p - centre).norm() - radius_mm; }, [](const Vec3&) { return 1.9; }),
                    {})};
 }
 
@@ -174,7 +175,8 @@ TEST(Seams, FarBlocksAreCoarseAndTheSurfaceStaysClosed) {
   EXPECT_EQ(check(drawn.meshes()).open, 0);
 }
 
-// The loops for whole blocks beside the road for any box of samples: the same bits, at every level, below and above zero.
+// The loops for whole blocks beside the road for any box of samples: the same bits, at every level, below and above
+// zero.
 TEST(BlockSource, GathersWhatTheFieldGathers) {
   Drawn drawn = ball(7.0);
   for (int i = 0; i < 6; ++i) {
@@ -197,12 +199,14 @@ TEST(BlockSource, GathersWhatTheFieldGathers) {
           const auto gathered = drawn.field.gather_block(level, box, solid, surface);
           if (gathered == CutField::Gathered::nothing) {
             ++skipped;
-            EXPECT_EQ(std::ranges::count_if(f, [](float v) { return v < 0; }) % static_cast<std::ptrdiff_t>(f.size()), 0);
+            EXPECT_EQ(std::ranges::count_if(f, [](float v) { return v < 0; }) % static_cast<std::ptrdiff_t>(f.size()),
+                      0);
             continue;
           }
           (gathered == CutField::Gathered::solid ? uncut : both) += 1;
           ASSERT_EQ(solid, f) << level << ": " << x << ' ' << y << ' ' << z;
-          ASSERT_EQ(gathered == CutField::Gathered::solid ? solid : surface, s) << level << ": " << x << ' ' << y << ' ' << z;
+          ASSERT_EQ(gathered == CutField::Gathered::solid ? solid : surface, s)
+              << level << ": " << x << ' ' << y << ' ' << z;
         }
   }
   EXPECT_GT(uncut, 10);

@@ -35,7 +35,8 @@ std::map<BlockKey, BlockPayload> blocks_of(Distance distance, double pitch, int 
         std::vector<float> f;
         for (std::int32_t i = box.min.x; i <= box.max.x; ++i)
           for (std::int32_t j = box.min.y; j <= box.max.y; ++j)
-            for (std::int32_t k = box.min.z; k <= box.max.z; ++k) f.push_back(static_cast<float>(distance(position_mm({i, j, k}, pitch))));
+            for (std::int32_t k = box.min.z; k <= box.max.z; ++k)
+              f.push_back(static_cast<float>(distance(position_mm({i, j, k}, pitch))));
         blocks[key] = encode_block(f, f, 0, pitch);
       }
   return blocks;
@@ -133,7 +134,8 @@ TEST(MarchingCubes, HasAsManyTrianglesAsFlyingEdgesOnSmoothSurfaces) {
         for (int z = 0; z < kBlockApron; ++z)
           gathered.push_back(static_cast<float>(std::hypot(x - 9.1, y - 8.7, z - 9.4) - radius));
     const Mesh mesh = *decode_block({}, encode_block(gathered, gathered, 0, 1.0), 1.0);
-    EXPECT_EQ(static_cast<vtkIdType>(mesh.triangles.size()), flying_edges_triangles(inner_samples(gathered), kBlockSamples));
+    EXPECT_EQ(static_cast<vtkIdType>(mesh.triangles.size()),
+              flying_edges_triangles(inner_samples(gathered), kBlockSamples));
   }
 }
 
@@ -146,7 +148,9 @@ TEST(MarchingCubes, NoiseToo) {
   // Every crossed edge has its vertex, however wild the field is.
   std::size_t crossings = 0;
   const std::vector<float> f = inner_samples(gathered);
-  const auto at = [&](int x, int y, int z) { return f[static_cast<std::size_t>((x * kBlockSamples + y) * kBlockSamples + z)] < 0.0f; };
+  const auto at = [&](int x, int y, int z) {
+    return f[static_cast<std::size_t>((x * kBlockSamples + y) * kBlockSamples + z)] < 0.0f;
+  };
   for (int x = 0; x < kBlockSamples; ++x)
     for (int y = 0; y < kBlockSamples; ++y)
       for (int z = 0; z < kBlockSamples; ++z) {
@@ -176,7 +180,9 @@ TEST(BlockCodec, LeavesOutCoveredCells) {
   for (int x = 0; x < kBlockApron; ++x)
     for (int y = 0; y < kBlockApron; ++y)
       for (int z = 0; z < kBlockApron; ++z) plane.push_back(static_cast<float>(z) - 7.5f);
-  const auto triangles = [&](CoveredGroups covered) { return decode_block({}, encode_block(plane, plane, covered, 1.0), 1.0)->triangles.size(); };
+  const auto triangles = [&](CoveredGroups covered) {
+    return decode_block({}, encode_block(plane, plane, covered, 1.0), 1.0)->triangles.size();
+  };
   EXPECT_EQ(triangles(0), 512u);                                 // 16 · 16 cells, two triangles each
   EXPECT_EQ(triangles(CoveredGroups{1} << 1), 512u - 2u * 16u);  // the group with cells z = 4 to 7 at x = y = 0
   EXPECT_EQ(triangles(CoveredGroups{1} << 0), 512u);             // nothing crosses z = 0 to 3
@@ -197,7 +203,8 @@ struct DrawnSurface {
     const CoordBox b = field.bone().bounds_samples();
     for (int x = (b.min.x >> 4) - 1; x <= (b.max.x >> 4) + 1; ++x)
       for (int y = (b.min.y >> 4) - 1; y <= (b.max.y >> 4) + 1; ++y)
-        for (int z = (b.min.z >> 4) - 1; z <= (b.max.z >> 4) + 1; ++z) made[{{}, 0, {x, y, z}}] = make({{}, 0, {x, y, z}});
+        for (int z = (b.min.z >> 4) - 1; z <= (b.max.z >> 4) + 1; ++z)
+          made[{{}, 0, {x, y, z}}] = make({{}, 0, {x, y, z}});
     for (const BlockKey& key : blocks.fine_blocks()) made[key] = make(key);
     for (const BlockKey& key : blocks.coarse_blocks()) made[key] = make(key);
     return made;
@@ -226,7 +233,8 @@ TEST(SurfaceBlocks, NameEveryBlockThatACutChanges) {
     for (const auto& [key, payload] : surface.all()) {
       const auto old = before.find(key);
       if (old == before.end() ? !payload.bytes.empty() : old->second != payload) {
-        EXPECT_TRUE(stale.contains(key)) << key.level << ": " << key.index.x << ' ' << key.index.y << ' ' << key.index.z;
+        EXPECT_TRUE(stale.contains(key)) << key.level << ": " << key.index.x << ' ' << key.index.y << ' '
+                                         << key.index.z;
       }
     }
   }
@@ -235,7 +243,8 @@ TEST(SurfaceBlocks, NameEveryBlockThatACutChanges) {
 TEST(SurfaceBlocks, FineAndCoarseTogetherDrawEveryFaceOnce) {
   DrawnSurface surface{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
   const Welded before = weld(surface.all(), 0.5);
-  const CutReport report = surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
+  const CutReport report =
+      surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
   (void)surface.blocks.touch(report.level, report.changed_leaves);
   const Welded after = weld(surface.all(), 0.5);
   // The hole's wall is won and its two mouths are lost. A fine block drawn twice or not at all would be off by its
@@ -313,7 +322,8 @@ TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
 
 TEST(SurfaceBlocks, CutFacesAreMarked) {
   DrawnSurface surface{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
-  const CutReport report = surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
+  const CutReport report =
+      surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
   (void)surface.blocks.touch(report.level, report.changed_leaves);
   for (const auto& [key, payload] : surface.all()) {
     const Mesh mesh = *decode_block(key, payload, level_pitch_mm(0.5, key.level));

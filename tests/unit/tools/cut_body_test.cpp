@@ -132,7 +132,8 @@ TEST_P(EveryCutter, BodyKeepsTheRulesOfItsKind) {
                         c = body.profile[(i + 2) % body.profile.size()];
     EXPECT_GE(a.r, 0);
     // Turns to the left at every corner: convex and counter-clockwise.
-    EXPECT_GT(static_cast<std::int64_t>(b.r - a.r) * (c.z - b.z) - static_cast<std::int64_t>(b.z - a.z) * (c.r - b.r), 0);
+    EXPECT_GT(static_cast<std::int64_t>(b.r - a.r) * (c.z - b.z) - static_cast<std::int64_t>(b.z - a.z) * (c.r - b.r),
+              0);
   }
   EXPECT_EQ(body, GetParam().cut_body());
 }
@@ -190,7 +191,8 @@ TEST(CutBody, AReciprocatingSawsBodyIsItsBladeLongerByTheStroke) {
   const CutBody body = saw.cut_body();
   const double kerf = saw.thickness_mm + saw.set_mm;
   EXPECT_EQ(body.highest, (std::array<std::int32_t, 3>{4096, static_cast<std::int32_t>(512 * kerf), 1536}));
-  EXPECT_EQ(body.lowest, (std::array<std::int32_t, 3>{-4096, static_cast<std::int32_t>(-512 * kerf), -26 * 1024 - 512}));
+  EXPECT_EQ(body.lowest,
+            (std::array<std::int32_t, 3>{-4096, static_cast<std::int32_t>(-512 * kerf), -26 * 1024 - 512}));
 }
 
 TEST(CutBody, AKerfIsThePlateAndTheSetOfTheTeeth) {
@@ -221,9 +223,11 @@ TEST(CutBody, ArcsAreWithinTheirChordsShareOfACell) {
   const Implicit barrel_part = cutting_part(barrel), contoured_part = cutting_part(contoured);
   for (int i = 0; i <= 1000; ++i) {
     const double z = -barrel.cutting_length_mm * i / 1000.0, off = z + 0.5 * barrel.cutting_length_mm;
-    const double r = 0.5 * barrel.diameter_mm - barrel.corner_mm + std::sqrt(barrel.corner_mm * barrel.corner_mm - off * off);
+    const double r =
+        0.5 * barrel.diameter_mm - barrel.corner_mm + std::sqrt(barrel.corner_mm * barrel.corner_mm - off * off);
     ASSERT_NEAR(barrel_part({r, 0, z}), 0.0, kShare_mm);
-    const double end = end_radius_mm(contoured), angle = contoured.taper_rad + (0.5 * kPi - contoured.taper_rad) * i / 1000.0;
+    const double end = end_radius_mm(contoured),
+                 angle = contoured.taper_rad + (0.5 * kPi - contoured.taper_rad) * i / 1000.0;
     ASSERT_NEAR(contoured_part({end * std::cos(angle), 0, end * std::sin(angle) - end}), 0.0, kShare_mm);
   }
   // The taper goes on from the rounded end to the full diameter.

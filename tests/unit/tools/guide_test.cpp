@@ -57,7 +57,8 @@ const Pose kPlace{{12.0, -40.0, 7.0}, Eigen::Quaterniond(Eigen::AngleAxisd(1.1, 
 
 Eigen::Quaterniond small_turn(double x, double y, double z) {
   const Vec3 v(x, y, z);
-  return v.norm() > 0.0 ? Eigen::Quaterniond(Eigen::AngleAxisd(v.norm(), v.normalized())) : Eigen::Quaterniond::Identity();
+  return v.norm() > 0.0 ? Eigen::Quaterniond(Eigen::AngleAxisd(v.norm(), v.normalized()))
+                        : Eigen::Quaterniond::Identity();
 }
 
 // Seen from the guide: how far the axis is from the bore's middle at a depth below the mouth.
@@ -170,8 +171,10 @@ TEST(Guide, LeavesWhatIsAllowedAsItIs) {
   ShakyHand hand(2);
   for (int i = 0; i < 5000; ++i) {
     // An axis through two points within the play, turned about itself at will.
-    const double a = 6.3 * hand.one(), b = 6.3 * hand.one(), depth = hand.between(0.5, 80.0), end = std::min(depth, length);
-    const Vec3 in(0.99 * c * std::cos(a), 0.99 * c * std::sin(a), -length), out(0.99 * c * std::cos(b), 0.99 * c * std::sin(b), -length + end);
+    const double a = 6.3 * hand.one(), b = 6.3 * hand.one(), depth = hand.between(0.5, 80.0),
+                 end = std::min(depth, length);
+    const Vec3 in(0.99 * c * std::cos(a), 0.99 * c * std::sin(a), -length),
+        out(0.99 * c * std::cos(b), 0.99 * c * std::sin(b), -length + end);
     Pose wanted = pose_along(in + (out - in) * (depth / end), out - in);
     wanted.rotation = wanted.rotation * Eigen::AngleAxisd(3.0 * hand.one(), Vec3::UnitZ());
     const Pose there = kPlace * wanted;
@@ -198,7 +201,8 @@ TEST(Guide, FindsTheNearestAxis) {
   };
   for (int i = 0; i < 300; ++i) {
     const double depth = hand.between(2.0, 60.0), end = std::min(depth, length);
-    const Pose wanted = kPlace * Pose{{0.6 * hand.one(), 0.6 * hand.one(), -length + depth}, small_turn(0.02 * hand.one(), 0.02 * hand.one(), 0)};
+    const Pose wanted = kPlace * Pose{{0.6 * hand.one(), 0.6 * hand.one(), -length + depth},
+                                      small_turn(0.02 * hand.one(), 0.02 * hand.one(), 0)};
     const auto guided = constrain(shape, 0, kPlace, tool, wanted);
     ASSERT_TRUE(guided);
     const double best = measure(guided->pose_bone_tool, wanted);
@@ -206,7 +210,8 @@ TEST(Guide, FindsTheNearestAxis) {
       // Random ones in the play, half of them beside the answer.
       const bool beside = j % 2;
       const auto place = [&](double z) {
-        Eigen::Vector2d v = beside ? Eigen::Vector2d(off_axis(shape.bores[0], guided->pose_bone_tool, z) + 0.02 * Eigen::Vector2d(hand.one(), hand.one()))
+        Eigen::Vector2d v = beside ? Eigen::Vector2d(off_axis(shape.bores[0], guided->pose_bone_tool, z) +
+                                                     0.02 * Eigen::Vector2d(hand.one(), hand.one()))
                                    : Eigen::Vector2d(c * hand.one(), c * hand.one());
         return Eigen::Vector2d(v.norm() > c ? v * (c / v.norm()) : v);
       };
@@ -227,7 +232,8 @@ TEST(Guide, NothingJumps) {
     double length, lead_in;
   };
   const GuideShape cutting = guide_shape(block(ToolKind::distal_block));
-  const Scene scenes[] = {{guide_shape(sleeve()), 0, drill(), 30.0, 1.75}, {cutting, cutting.pin_holes.size(), saw(), 12.0, 1.8}};
+  const Scene scenes[] = {{guide_shape(sleeve()), 0, drill(), 30.0, 1.75},
+                          {cutting, cutting.pin_holes.size(), saw(), 12.0, 1.8}};
   for (const Scene& scene : scenes) {
     std::optional<std::size_t> held;
     Pose before = kPlace * Pose{{0, 0, -scene.length - 4.0}, Eigen::Quaterniond::Identity()}, wanted_before = before;
@@ -235,15 +241,18 @@ TEST(Guide, NothingJumps) {
     int inside = 0;
     for (int i = 0; i <= 40000; ++i) {
       const double t = i / 40000.0, depth = -4.0 + 60.0 * std::sin(3.14159265 * t);
-      const Pose wanted = kPlace * Pose{{1.3 * std::sin(211.0 * t), 1.1 * std::sin(170.0 * t + 1.0), -scene.length + depth},
-                                        small_turn(0.05 * std::sin(190.0 * t), 0.05 * std::cos(140.0 * t), 0.06 * std::sin(230.0 * t))};
+      const Pose wanted =
+          kPlace * Pose{{1.3 * std::sin(211.0 * t), 1.1 * std::sin(170.0 * t + 1.0), -scene.length + depth},
+                        small_turn(0.05 * std::sin(190.0 * t), 0.05 * std::cos(140.0 * t), 0.06 * std::sin(230.0 * t))};
       if (!held) held = entered(scene.shape, kPlace, scene.tool, wanted);
       Pose now = wanted;
       if (held) {
         ASSERT_EQ(*held, scene.opening);
         const auto guided = constrain(scene.shape, *held, kPlace, scene.tool, wanted);
-        if (guided) now = guided->pose_bone_tool;
-        else held.reset();
+        if (guided)
+          now = guided->pose_bone_tool;
+        else
+          held.reset();
         inside += guided.has_value();
       }
       // As far as the hand itself moved in this step, and what a line that is held at its other end adds.
@@ -273,16 +282,20 @@ TEST(Guide, ABladeStaysInItsSlotsPlane) {
     double largest = 0.0;
     for (int i = 0; i < 2000; ++i) {
       const double depth = hand.between(0.01, 50.0);
-      const Pose wanted = pose_bone_slot * Pose{{8.0 * hand.one(), 3.0 * hand.one(), depth}, small_turn(0.1 * hand.one(), 0.1 * hand.one(), 0.1 * hand.one())};
+      const Pose wanted = pose_bone_slot * Pose{{8.0 * hand.one(), 3.0 * hand.one(), depth},
+                                                small_turn(0.1 * hand.one(), 0.1 * hand.one(), 0.1 * hand.one())};
       const auto guided = constrain(shape, opening, kPlace, tool, wanted);
       ASSERT_TRUE(guided);
       const Pose seen = pose_bone_slot.inverse() * guided->pose_bone_tool;
       const Vec3 normal = seen.direction(Vec3::UnitY()), axis = seen.direction(Vec3::UnitZ());
       for (const double z : {0.0, std::min(depth, slot.depth_mm)})
         for (const double side : {-1.0, 1.0}) {
-          const double x = seen.position_mm.x() + axis.x() * (z - seen.position_mm.z()) / axis.z() + side * 0.5 * tool.width_mm;
+          const double x =
+              seen.position_mm.x() + axis.x() * (z - seen.position_mm.z()) / axis.z() + side * 0.5 * tool.width_mm;
           // The blade's plane there.
-          const double y = seen.position_mm.y() - (normal.x() * (x - seen.position_mm.x()) + normal.z() * (z - seen.position_mm.z())) / normal.y();
+          const double y =
+              seen.position_mm.y() -
+              (normal.x() * (x - seen.position_mm.x()) + normal.z() * (z - seen.position_mm.z())) / normal.y();
           ASSERT_LE(std::abs(y), c + 1e-6) << depth;
           largest = std::max(largest, std::abs(y));
         }

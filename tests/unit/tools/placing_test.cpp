@@ -53,7 +53,8 @@ TEST(Placing, OntoABallItStandsOnTheRadius) {
   EXPECT_LT(between(along->item.pose_bone_item.direction(Vec3::UnitZ()), Vec3(0, 0, -1)), 1e-9);
   EXPECT_NEAR(along->item.pose_bone_item.position_mm.norm(), 20.0, 1e-3);
 
-  EXPECT_FALSE(placed(OntoBone{{0, 0, 50}, {}, Vec3::UnitX()}, nullptr, one("guide-1"), ball(20))) << "no bone within 20 mm";
+  EXPECT_FALSE(placed(OntoBone{{0, 0, 50}, {}, Vec3::UnitX()}, nullptr, one("guide-1"), ball(20)))
+      << "no bone within 20 mm";
 }
 
 TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
@@ -64,14 +65,16 @@ TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
   ASSERT_TRUE(turned) << turned.error().message;
   EXPECT_DOUBLE_EQ(turned->item.turns, 3.25);
   EXPECT_NEAR(turned->item.pose_bone_item.position_mm.z(), 1.25 * pitch, 1e-9);
-  EXPECT_LT(between(turned->item.pose_bone_item.direction(Vec3::UnitX()), Vec3::UnitY()), 1e-9) << "a turn and a quarter";
+  EXPECT_LT(between(turned->item.pose_bone_item.direction(Vec3::UnitX()), Vec3::UnitY()), 1e-9)
+      << "a turn and a quarter";
 
   // All the way: its head's underside lies one length above the tip.
   const auto home = placed(ByThread{80.0 / pitch}, &screw, screw, reamed(0.0));
   ASSERT_TRUE(home) << home.error().message;
   EXPECT_NEAR(home->item.pose_bone_item.position_mm.z(), length, 0.01);
   EXPECT_NEAR(home->item.turns - 2.0, length / pitch, 0.01 / pitch);
-  EXPECT_TRUE(set_by_rules({}, &screw, {home->item, screw.tool}, reamed(0.0))) << "its way is its pitch times its turns";
+  EXPECT_TRUE(set_by_rules({}, &screw, {home->item, screw.tool}, reamed(0.0)))
+      << "its way is its pitch times its turns";
 
   const auto out = placed(ByThread{-0.5}, &screw, screw, reamed(0.0));
   ASSERT_TRUE(out);

@@ -93,11 +93,13 @@ TEST(SamplePoints, StandForTheWholeCuttingFace) {
 
   // A hemisphere of 50 mm.
   double dome = 0.0;
-  for (const SamplePoint& point : sample_points(*find_tool("reamer-sphere"), 200)) dome += point.active ? point.area_mm2 : 0.0;
+  for (const SamplePoint& point : sample_points(*find_tool("reamer-sphere"), 200))
+    dome += point.active ? point.area_mm2 : 0.0;
   EXPECT_NEAR(dome, 2.0 * kPi * 25.0 * 25.0, 0.02 * 2.0 * kPi * 25.0 * 25.0);
   // A flat disc of 9.5 mm.
   double end = 0.0;
-  for (const SamplePoint& point : sample_points(*find_tool("end-drill"), 200)) end += point.active ? point.area_mm2 : 0.0;
+  for (const SamplePoint& point : sample_points(*find_tool("end-drill"), 200))
+    end += point.active ? point.area_mm2 : 0.0;
   EXPECT_NEAR(end, kPi * 4.75 * 4.75, 0.02 * kPi * 4.75 * 4.75);
 }
 
@@ -130,13 +132,15 @@ TEST(SpreadPoints, AreNowhereTooNearAndLeaveNoBarePatch) {
     const double packed = std::sqrt(2.0 / std::sqrt(3.0) * 4.0 * kPi * 9.0 / static_cast<double>(points.size()));
     double closest = 1e9;
     for (std::size_t i = 0; i < points.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j) closest = std::min(closest, (points[i].position_mm - points[j].position_mm).norm());
+      for (std::size_t j = 0; j < i; ++j)
+        closest = std::min(closest, (points[i].position_mm - points[j].position_mm).norm());
     EXPECT_GT(closest, 0.6 * packed) << count;
     // Of a random throw the closest two would be 0.05 of it apart at the same count. Bare patches: over places of a
     // golden spiral, which know nothing of the points.
     double barest = 0.0;
     for (int i = 0; i < 5000; ++i) {
-      const double z = 1.0 - (2.0 * i + 1.0) / 5000.0, angle = i * kPi * (3.0 - std::sqrt(5.0)), r = std::sqrt(1.0 - z * z);
+      const double z = 1.0 - (2.0 * i + 1.0) / 5000.0, angle = i * kPi * (3.0 - std::sqrt(5.0)),
+                   r = std::sqrt(1.0 - z * z);
       const Vec3 p = 3.0 * Vec3(r * std::cos(angle), r * std::sin(angle), z);
       double nearest = 1e9;
       for (const SamplePoint& point : points) nearest = std::min(nearest, (p - point.position_mm).norm());

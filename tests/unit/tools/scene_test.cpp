@@ -27,7 +27,8 @@ Tool cup(double diameter_mm) {
 
 // The cup starts with its pole at the surface.
 Seating driven(double cup_mm, double cavity_mm) {
-  const Result<Seating> seating = drive_home(cup(cup_mm), {Vec3(0, 0, -1.0), Eigen::Quaterniond::Identity()}, 60.0, reamed(0.5 * cavity_mm));
+  const Result<Seating> seating =
+      drive_home(cup(cup_mm), {Vec3(0, 0, -1.0), Eigen::Quaterniond::Identity()}, 60.0, reamed(0.5 * cavity_mm));
   EXPECT_TRUE(seating.has_value());
   return *seating;
 }
@@ -71,7 +72,8 @@ TEST(PlaceOnBone, FindsTheNearestPointAndItsNormal) {
       ASSERT_TRUE(place);
       EXPECT_LT((place->point_mm - Vec3(5, -3, 2) - 20.0 * out.normalized()).norm(), 0.02) << r;
       EXPECT_GT(place->outward.dot(out.normalized()), 0.9999);
-      const Result<Pose> pose = place_on_bone(ball, Vec3(5, -3, 2) + r * out.normalized(), std::nullopt, Vec3(0, 1, 0.1));
+      const Result<Pose> pose =
+          place_on_bone(ball, Vec3(5, -3, 2) + r * out.normalized(), std::nullopt, Vec3(0, 1, 0.1));
       ASSERT_TRUE(pose.has_value());
       EXPECT_GT(pose->direction(Vec3::UnitZ()).dot(-out.normalized()), 0.9999);
       // x lies in the plane of axis and `across`.
@@ -90,7 +92,9 @@ TEST(Pins, TwoFixAGuide) {
   const GuideShape shape = guide_shape(block);
   const auto pin_in = [&](std::size_t hole, double beyond_mm, double aside_mm = 0.0) {
     const GuideBore& bore = shape.pin_holes[hole];
-    return standing(pin, place * Pose{bore.entry_mm + (bore.length_mm + beyond_mm) * bore.direction + Vec3(0, aside_mm, 0), Eigen::Quaterniond::Identity()});
+    return standing(pin,
+                    place * Pose{bore.entry_mm + (bore.length_mm + beyond_mm) * bore.direction + Vec3(0, aside_mm, 0),
+                                 Eigen::Quaterniond::Identity()});
   };
   EXPECT_EQ(pins_in(block, place, {}), 0);
   std::vector<Standing> scene{pin_in(0, 20.0)};
@@ -116,13 +120,16 @@ TEST(Pins, TwoFixAGuide) {
 }
 
 TEST(Pins, MoveAlongTheirAxisOnly) {
-  const Standing before = standing(*find_tool("pin-1"), {{0, 0, 10}, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Vec3::UnitX()))}, 4);
+  const Standing before =
+      standing(*find_tool("pin-1"), {{0, 0, 10}, Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Vec3::UnitX()))}, 4);
   Standing wanted = before;
-  wanted.item.pose_bone_item = before.item.pose_bone_item * Pose{{0, 0, 7}, Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Vec3::UnitZ()))};
+  wanted.item.pose_bone_item =
+      before.item.pose_bone_item * Pose{{0, 0, 7}, Eigen::Quaterniond(Eigen::AngleAxisd(1.0, Vec3::UnitZ()))};
   EXPECT_TRUE(set_by_rules({}, &before, wanted, slab).has_value());
   wanted.item.pose_bone_item = before.item.pose_bone_item * Pose{{0.5, 0, 7}, Eigen::Quaterniond::Identity()};
   EXPECT_FALSE(set_by_rules({}, &before, wanted, slab).has_value());
-  wanted.item.pose_bone_item = before.item.pose_bone_item * Pose{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Vec3::UnitX()))};
+  wanted.item.pose_bone_item =
+      before.item.pose_bone_item * Pose{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Vec3::UnitX()))};
   EXPECT_FALSE(set_by_rules({}, &before, wanted, slab).has_value());
   wanted = standing(*find_tool("pin-2"), before.item.pose_bone_item, 4);
   EXPECT_FALSE(set_by_rules({}, &before, wanted, slab).has_value());
@@ -153,7 +160,8 @@ TEST(Screw, FollowsItsThreadAndStopsAtItsHead) {
   const Pose leaning{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vec3::UnitX()))};
   const Driven leant = turn_screw(screw, leaning, 1000.0, slab);
   const double along = leant.turns * screw.thread_pitch_mm;
-  EXPECT_NEAR((along - screw.cutting_length_mm) * std::cos(tilt) + 0.5 * screw.shank_diameter_mm * std::sin(tilt), 0.0, 0.02);
+  EXPECT_NEAR((along - screw.cutting_length_mm) * std::cos(tilt) + 0.5 * screw.shank_diameter_mm * std::sin(tilt), 0.0,
+              0.02);
 
   Standing before = standing(screw, start, 2), wanted = before;
   wanted.item.pose_bone_item = home.pose_bone_item;
@@ -167,8 +175,9 @@ TEST(Screw, FollowsItsThreadAndStopsAtItsHead) {
 // A cup of 50 mm in a hemisphere of 50: everything touches, and its rim is level with the bone.
 TEST(TrialCup, FillsItsOwnHemisphere) {
   const Seating seating = driven(50, 50);
-  std::printf("  50 in 50: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n", seating.pose_bone_item.position_mm.z(),
-              seating.fit.contact_fraction, seating.fit.largest_gap_mm, seating.fit.largest_overlap_mm);
+  std::printf("  50 in 50: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",
+              seating.pose_bone_item.position_mm.z(), seating.fit.contact_fraction, seating.fit.largest_gap_mm,
+              seating.fit.largest_overlap_mm);
   EXPECT_TRUE(seating.seated);
   EXPECT_NEAR(seating.pose_bone_item.position_mm.z(), 25.0, 0.1);
   EXPECT_GT(seating.fit.contact_fraction, 0.98);
@@ -176,12 +185,13 @@ TEST(TrialCup, FillsItsOwnHemisphere) {
   EXPECT_LE(seating.fit.largest_overlap_mm, 0.02 + 1e-6);
 }
 
-// In one of 52 it lies on its pole, 1 mm deeper than centred: the gap at polar angle t is 26 − √(25² + 1 + 50 cos t), within
-// 0.2 mm for the share 1 − cos t of the hemisphere where it is that.
+// In one of 52 it lies on its pole, 1 mm deeper than centred: the gap at polar angle t is 26 − √(25² + 1 + 50 cos t),
+// within 0.2 mm for the share 1 − cos t of the hemisphere where it is that.
 TEST(TrialCup, IsLooseInALargerOne) {
   const Seating seating = driven(50, 52);
-  std::printf("  50 in 52: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n", seating.pose_bone_item.position_mm.z(),
-              seating.fit.contact_fraction, seating.fit.largest_gap_mm, seating.fit.largest_overlap_mm);
+  std::printf("  50 in 52: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",
+              seating.pose_bone_item.position_mm.z(), seating.fit.contact_fraction, seating.fit.largest_gap_mm,
+              seating.fit.largest_overlap_mm);
   EXPECT_TRUE(seating.stopped);
   EXPECT_FALSE(seating.seated);
   EXPECT_NEAR(seating.pose_bone_item.position_mm.z(), 26.0, 0.05);
@@ -194,8 +204,9 @@ TEST(TrialCup, IsLooseInALargerOne) {
 // middle, so its pole is at 18 mm, 6 mm above the cavity's, and its rim stands 7 mm above the bone.
 TEST(TrialCup, StandsProudInASmallerOne) {
   const Seating seating = driven(50, 48);
-  std::printf("  50 in 48: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n", seating.pose_bone_item.position_mm.z(),
-              seating.fit.contact_fraction, seating.fit.largest_gap_mm, seating.fit.largest_overlap_mm);
+  std::printf("  50 in 48: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",
+              seating.pose_bone_item.position_mm.z(), seating.fit.contact_fraction, seating.fit.largest_gap_mm,
+              seating.fit.largest_overlap_mm);
   EXPECT_TRUE(seating.stopped);
   EXPECT_FALSE(seating.seated);
   EXPECT_NEAR(seating.pose_bone_item.position_mm.z(), 18.0, 0.3);

@@ -60,7 +60,8 @@ TEST(ToolFile, AMeshGoesAlongAsItsSamples) {
     return samples;
   };
   const std::string text =
-      "name: rasp\nkind: mesh\nmesh: rasp.stl\nmesh_pitch_mm: 0.5\nspindle_rpm: 60\nteeth: 10\nfeed_mm_per_rev: 1\ncut_level: "
+      "name: rasp\nkind: mesh\nmesh: rasp.stl\nmesh_pitch_mm: 0.5\nspindle_rpm: 60\nteeth: 10\nfeed_mm_per_rev: "
+      "1\ncut_level: "
       "1\n";
   const auto tool = parse_tool(text, "rasp.yaml", loader);
   ASSERT_TRUE(tool) << tool.error().message;
@@ -76,12 +77,16 @@ TEST(ToolFile, AMeshGoesAlongAsItsSamples) {
   EXPECT_EQ(*back->mesh, *samples);
 
   EXPECT_NE(parse_tool(text, "rasp.yaml").error().message.find("this program reads none"), std::string::npos);
-  EXPECT_NE(parse_tool(with(text, "mesh", "mesh: other.stl"), "rasp.yaml", loader).error().message.find("other.stl is not there"),
+  EXPECT_NE(parse_tool(with(text, "mesh", "mesh: other.stl"), "rasp.yaml", loader)
+                .error()
+                .message.find("other.stl is not there"),
             std::string::npos);
-  EXPECT_NE(parse_tool(with(text, "mesh", ""), "rasp.yaml", loader).error().message.find("name the STL file"), std::string::npos);
-  EXPECT_NE(
-      parse_tool(with(text, "mesh_pitch_mm", "mesh_pitch_mm: 50"), "rasp.yaml", loader).error().message.find("from 0.05 to 5"),
-      std::string::npos);
+  EXPECT_NE(parse_tool(with(text, "mesh", ""), "rasp.yaml", loader).error().message.find("name the STL file"),
+            std::string::npos);
+  EXPECT_NE(parse_tool(with(text, "mesh_pitch_mm", "mesh_pitch_mm: 50"), "rasp.yaml", loader)
+                .error()
+                .message.find("from 0.05 to 5"),
+            std::string::npos);
 }
 
 TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
@@ -126,7 +131,8 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
       {with(drill, "cut_level", "cut_level: 1.5"), {"\"cut_level\" is 1.5", "whole number"}},
       {with(with(drill, "cutting_length_mm", "cutting_length_mm: 2"), "point_angle_deg", "point_angle_deg: 20"),
        {"\"point_angle_deg\"", "wider"}},
-      {with(burr, "cutting_length_mm", "cutting_length_mm: 5"), {"\"cutting_length_mm\" is not a field of a round-burr"}},
+      {with(burr, "cutting_length_mm", "cutting_length_mm: 5"),
+       {"\"cutting_length_mm\" is not a field of a round-burr"}},
       {with(burr, "mesh", "mesh: a.stl"), {"\"mesh\" is not a field of a round-burr"}},
       {with(burr, "shank_diameter_mm", "shank_diameter_mm: 5.1"), {"wider than the cutting part"}},
       {with(saw, "pivot_mm", "pivot_mm: 20"), {"\"pivot_mm\"", "width_mm"}},
@@ -135,7 +141,8 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
       {with(good("burr-barrel"), "corner_mm", "corner_mm: 3"), {"\"corner_mm\" is 3", "at least 4"}},
       {with(good("burr-barrel"), "shank_diameter_mm", "shank_diameter_mm: 5.9"), {"\"shank_diameter_mm\"", "narrower"}},
       {with(good("burr-contoured"), "taper_deg", "taper_deg: 30"), {"\"taper_deg\"", "smaller"}},
-      {with(good("burr-contoured"), "cutting_length_mm", "cutting_length_mm: 0.8"), {"\"cutting_length_mm\"", "longer"}},
+      {with(good("burr-contoured"), "cutting_length_mm", "cutting_length_mm: 0.8"),
+       {"\"cutting_length_mm\"", "longer"}},
       {with(good("reamer-sphere"), "diameter_mm", "diameter_mm: 34"), {"\"diameter_mm\" is 34", "from 36 to 64"}},
       {with(good("reamer-sphere"), "diameter_mm", "diameter_mm: 66"), {"from 36 to 64"}},
       {with(good("reamer-cylinder"), "corner_mm", "corner_mm: 7"), {"\"corner_mm\" is 7", "smaller"}},

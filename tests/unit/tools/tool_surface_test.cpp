@@ -25,7 +25,8 @@ TEST(ToolSurface, KeepsSharpEdgesAndRoundFaces) {
   // Round faces: the error falls with the square of the cell.
   const Implicit sphere = ball({0.1, 0.2, 0.3}, 3.0);
   const double volume = 4.0 / 3.0 * kPi * 27.0;
-  const double coarse = volume - enclosed_mm3(surface_of(sphere, 0.6)), fine = volume - enclosed_mm3(surface_of(sphere, 0.3));
+  const double coarse = volume - enclosed_mm3(surface_of(sphere, 0.6)),
+               fine = volume - enclosed_mm3(surface_of(sphere, 0.3));
   EXPECT_LT(std::abs(coarse), 0.03 * volume);
   EXPECT_LT(std::abs(fine), 0.35 * std::abs(coarse));
 }

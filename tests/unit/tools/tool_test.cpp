@@ -105,16 +105,20 @@ TEST(Tools, EveryFieldIsPartOfTheHash) {
       [](Tool& t) { t.feed_mm_per_rev += 1e-9; },
       [](Tool& t) { t.cut_level -= 1; },
       [](Tool& t) {
-        t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 512, std::vector<std::int16_t>(8, 5)});
+        t.mesh = std::make_shared<SampledDistance>(
+            SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 512, std::vector<std::int16_t>(8, 5)});
       },
       [](Tool& t) {
-        t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 512, std::vector<std::int16_t>(8, 6)});
+        t.mesh = std::make_shared<SampledDistance>(
+            SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 512, std::vector<std::int16_t>(8, 6)});
       },
       [](Tool& t) {
-        t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 513, std::vector<std::int16_t>(8, 6)});
+        t.mesh = std::make_shared<SampledDistance>(
+            SampledDistance{{{0, 0, 0}, {1, 1, 1}}, 513, std::vector<std::int16_t>(8, 6)});
       },
       [](Tool& t) {
-        t.mesh = std::make_shared<SampledDistance>(SampledDistance{{{0, 0, 1}, {1, 1, 2}}, 513, std::vector<std::int16_t>(8, 6)});
+        t.mesh = std::make_shared<SampledDistance>(
+            SampledDistance{{{0, 0, 1}, {1, 1, 2}}, 513, std::vector<std::int16_t>(8, 6)});
       },
   };
   std::set<Digest> hashes{drill.hash()};

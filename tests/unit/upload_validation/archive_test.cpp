@@ -18,8 +18,8 @@ using Bytes = std::vector<std::byte>;
 struct Entry {
   std::string path;
   std::string content{};
-  std::string link{};       // where a symbolic link goes
-  bool hard = false;        // a hard one
+  std::string link{};  // where a symbolic link goes
+  bool hard = false;   // a hard one
   unsigned type = AE_IFREG;
 };
 
@@ -80,7 +80,8 @@ TEST(CaseArchive, FilesAtTheTopOrInOneFolderComeOut) {
   const auto top = unpack(zip(kCase));
   ASSERT_TRUE(top) << top.error().message;
   EXPECT_EQ(top->files.at("bone.vdb"), "not really");
-  const auto within = unpack(zip({{"skull/", "", "", false, AE_IFDIR}, {"skull/case.json", "{}"}, {"skull/bone.vdb", "x"}}));
+  const auto within =
+      unpack(zip({{"skull/", "", "", false, AE_IFDIR}, {"skull/case.json", "{}"}, {"skull/bone.vdb", "x"}}));
   ASSERT_TRUE(within) << within.error().message;
   EXPECT_EQ(within->files.size(), 2U);
 }
@@ -162,15 +163,17 @@ TEST(CaseArchive, DamagedAndOtherFilesAreSaid) {
   }
   const auto folder = unpack_case(std::filesystem::path("/"), {}, [](auto, auto) { return Result<void>{}; });
   EXPECT_FALSE(folder);
-  const auto missing = unpack_case(std::filesystem::path("/no/such.zip"), {}, [](auto, auto) { return Result<void>{}; });
+  const auto missing =
+      unpack_case(std::filesystem::path("/no/such.zip"), {}, [](auto, auto) { return Result<void>{}; });
   ASSERT_FALSE(missing);
   EXPECT_EQ(missing.error().code, ErrorCode::not_found);
 }
 
 TEST(CaseArchive, AFullDiskIsPassedOn) {
-  const auto out = unpack_case(zip(kCase), "a.zip", {}, [](std::string_view, std::span<const std::byte>) -> Result<void> {
-    return failure(ErrorCode::internal, "the disk takes no more");
-  });
+  const auto out =
+      unpack_case(zip(kCase), "a.zip", {}, [](std::string_view, std::span<const std::byte>) -> Result<void> {
+        return failure(ErrorCode::internal, "the disk takes no more");
+      });
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::internal);
 }

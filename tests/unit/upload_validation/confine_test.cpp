@@ -1,4 +1,5 @@
-// What a process that has confined itself can still do. Each attempt is one of a child's own, made by the system's own calls.
+// What a process that has confined itself can still do. Each attempt is one of a child's own, made by the system's own
+// calls.
 #include "server/upload_validation/confine.hpp"
 
 #include <fcntl.h>
@@ -55,7 +56,9 @@ class ConfineTest : public ::testing::Test {
     EXPECT_EQ(in_child(attempt, nullptr), 0) << what << " is no attempt";
     EXPECT_GT(in_child(attempt, &own_), 0) << what;
   }
-  void expect_left(const char* what, const std::function<int()>& attempt) const { EXPECT_EQ(in_child(attempt, &own_), 0) << what; }
+  void expect_left(const char* what, const std::function<int()>& attempt) const {
+    EXPECT_EQ(in_child(attempt, &own_), 0) << what;
+  }
 
   test::TempDir temp_;
   const fs::path own_ = temp_ / "own", other_ = temp_ / "other";
@@ -69,7 +72,8 @@ TEST_F(ConfineTest, ItsOwnFolderIsAllThatItHas) {
   expect_left("writing", [&] { return open_to(own_ / "given", O_WRONLY | O_TRUNC); });
   expect_left("making a file", [&] { return open_to(own_ / "new", O_WRONLY | O_CREAT); });
   expect_left("a folder in it, and files there", [&] {
-    const bool made = ::mkdir((own_ / "sub").c_str(), 0700) == 0 && open_to(own_ / "sub" / "new", O_WRONLY | O_CREAT) >= 0;
+    const bool made =
+        ::mkdir((own_ / "sub").c_str(), 0700) == 0 && open_to(own_ / "sub" / "new", O_WRONLY | O_CREAT) >= 0;
     return made && ::rename((own_ / "sub" / "new").c_str(), (own_ / "sub" / "newer").c_str()) == 0 ? 0 : -1;
   });
   if (!can_hold_files_) GTEST_SKIP() << "this kernel has no Landlock";
@@ -129,10 +133,12 @@ TEST_F(ConfineTest, TheProcessThatLooksCasesThroughIsConfined) {
   ASSERT_TRUE(test::plain_block(6, 3, 0.5).save(temp_ / "case"));
   ASSERT_TRUE(pack_case(temp_ / "case", own_ / "upload.zip"));
   fs::copy_file(own_ / "upload.zip", temp_ / "elsewhere.zip");
-  const std::string quota = R"({"archive_bytes":1000000000,"unpacked_bytes":1000000000,"entries":16,"ratio":200.0,"ratio_free_bytes":1000000})";
+  const std::string quota =
+      R"({"archive_bytes":1000000000,"unpacked_bytes":1000000000,"entries":16,"ratio":200.0,"ratio_free_bytes":1000000})";
   const auto looked = [&](const fs::path& archive) {
     fs::remove_all(own_ / "sent");
-    return test::run(test::program("osteon-server"), {"check-case", archive, own_, quota}, std::chrono::seconds(60), {.environment = {}, .without = {}, .folder = {}, .as_given = true});
+    return test::run(test::program("osteon-server"), {"check-case", archive, own_, quota}, std::chrono::seconds(60),
+                     {.environment = {}, .without = {}, .folder = {}, .as_given = true});
   };
   const auto sound = looked(own_ / "upload.zip");
   EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;

@@ -29,7 +29,8 @@ class StoreTest : public ::testing::Test {
     EXPECT_TRUE(pack_case(temp_ / "case", temp_ / "case.zip"));
     store_ = make_store({});
   }
-  std::unique_ptr<CaseRepository> make_store(const UploadQuota& quota, const fs::path& program = test::program("osteon-server")) {
+  std::unique_ptr<CaseRepository> make_store(const UploadQuota& quota,
+                                             const fs::path& program = test::program("osteon-server")) {
     auto store = CaseRepository::open(temp_ / "cases", program, quota);
     EXPECT_TRUE(store) << store.error().message;
     return std::move(*store);
@@ -42,7 +43,8 @@ class StoreTest : public ::testing::Test {
   }
   [[nodiscard]] std::size_t left_over() const {
     std::size_t count = 0;
-    for (const auto& entry : fs::directory_iterator(temp_ / "cases")) count += digest_from_hex(entry.path().filename().string()) ? 0 : 1;
+    for (const auto& entry : fs::directory_iterator(temp_ / "cases"))
+      count += digest_from_hex(entry.path().filename().string()) ? 0 : 1;
     return count;
   }
 
@@ -88,7 +90,8 @@ TEST_F(StoreTest, ADamagedCaseIsRefusedAndNothingIsLeft) {
       EXPECT_EQ(out->hash, bone_.hash());  // it was a byte that says nothing
       continue;
     }
-    EXPECT_TRUE(out.error().code == ErrorCode::invalid_input || out.error().code == ErrorCode::exhausted) << out.error().message;
+    EXPECT_TRUE(out.error().code == ErrorCode::invalid_input || out.error().code == ErrorCode::exhausted)
+        << out.error().message;
   }
   std::ofstream(temp_ / "case" / "bone.vdb", std::ios::binary) << std::string(100, 'x');
   ASSERT_TRUE(pack_case(temp_ / "case", temp_ / "broken.zip"));
@@ -151,8 +154,10 @@ TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
   EXPECT_EQ(with(lie).code, ErrorCode::invalid_input) << "nothing";
   const std::string plain = "mkdir $3/sound; echo > $3/sound/case.json; ";
   EXPECT_EQ(with(plain + "ln -s /etc/passwd $3/sound/bone.vdb; " + lie).code, ErrorCode::invalid_input) << "a link";
-  EXPECT_EQ(with(plain + "echo > $3/sound/bone.vdb; echo > $3/sound/more; " + lie).code, ErrorCode::invalid_input) << "more than a case has";
-  EXPECT_EQ(with("mkdir $3/real; ln -s real $3/sound; echo > $3/real/case.json; echo > $3/real/bone.vdb; " + lie).code, ErrorCode::invalid_input);
+  EXPECT_EQ(with(plain + "echo > $3/sound/bone.vdb; echo > $3/sound/more; " + lie).code, ErrorCode::invalid_input)
+      << "more than a case has";
+  EXPECT_EQ(with("mkdir $3/real; ln -s real $3/sound; echo > $3/real/case.json; echo > $3/real/bone.vdb; " + lie).code,
+            ErrorCode::invalid_input);
   EXPECT_EQ(with("exec yes").code, ErrorCode::exhausted);
   EXPECT_EQ(with("exec 1>&-; exec sleep 60").code, ErrorCode::invalid_input);  // says nothing more, and stays
   EXPECT_EQ(left_over(), 0U);

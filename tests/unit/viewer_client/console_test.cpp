@@ -161,13 +161,13 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
   EXPECT_EQ(say("take Ben").find("ok"), 0u);
   EXPECT_EQ(say("freeze Ben look here").find("ok"), 0u);
   const Restrictions all{.stopped = true,
-                        .taken_by = {1},
-                        .guide = {1},
-                        .guide_share = 250,
-                        .force_limit = 250,
-                        .zone = ZoneLimit{{1024, -2048, 3072}, 10240},
-                        .tools = {digest(1), digest(2)},
-                        .words = "look here"};
+                         .taken_by = {1},
+                         .guide = {1},
+                         .guide_share = 250,
+                         .force_limit = 250,
+                         .zone = ZoneLimit{{1024, -2048, 3072}, 10240},
+                         .tools = {digest(1), digest(2)},
+                         .words = "look here"};
   EXPECT_EQ(desk.asked_.back(), (std::pair(AuthorId{2}, all)));
   EXPECT_NE(say("people").find("#2 \"Ben\" trainee here hand frozen taken by #1 guided along #1 share 0.250 force "
                                "2.500 zone 1.000 -2.000 3.000 "

@@ -27,7 +27,8 @@ constexpr std::uint32_t kGreen = 0x10e040;
 
 bool greenish(const Vec3& colour) { return colour.y() > 1.25 * colour.x() && colour.y() > 1.25 * colour.z(); }
 
-Annotation mark(std::uint32_t id, AnnotationKind kind, const std::vector<Vec3>& points_mm, const std::string& words = {}) {
+Annotation mark(std::uint32_t id, AnnotationKind kind, const std::vector<Vec3>& points_mm,
+                const std::string& words = {}) {
   Annotation one{.id = id, .author = AuthorId{3}, .kind = kind, .words = words, .colour = kGreen};
   for (const Vec3& point : points_mm) one.points.push_back(in_steps(point));
   return one;
@@ -57,7 +58,8 @@ class PeoplePicture : public test::Picture {
     return colour(image, x, y);
   }
   static int green_pixels(const Image& image) {
-    return static_cast<int>(std::ranges::count_if(image.rgb, [](const auto& c) { return greenish(Vec3(c[0], c[1], c[2])); }));
+    return static_cast<int>(
+        std::ranges::count_if(image.rgb, [](const auto& c) { return greenish(Vec3(c[0], c[1], c[2])); }));
   }
 
   // Of a line that is not drawn yet.
@@ -71,7 +73,8 @@ class PeoplePicture : public test::Picture {
 
 // On the sphere's front, at these angles to the right and up.
 Vec3 on_front(double right_rad, double up_rad) {
-  return kRadius_mm * Vec3(std::sin(right_rad) * std::cos(up_rad), -std::cos(right_rad) * std::cos(up_rad), std::sin(up_rad));
+  return kRadius_mm *
+         Vec3(std::sin(right_rad) * std::cos(up_rad), -std::cos(right_rad) * std::cos(up_rad), std::sin(up_rad));
 }
 
 TEST_F(PeoplePicture, ALineIsSeenInItsColourAlongItsPointsAndVanishes) {
@@ -87,7 +90,8 @@ TEST_F(PeoplePicture, ALineIsSeenInItsColourAlongItsPointsAndVanishes) {
 TEST_F(PeoplePicture, WhatLiesBehindTheBoneShowsThroughItALittle) {
   const auto line_at = [](double y) { return mark(1, AnnotationKind::line, {{-5, y, 0}, {5, y, 0}}); };
   const double in_front_mm = -kRadius_mm - 1.0, behind_mm = 40.0;
-  const Vec3 before = at(with({line_at(in_front_mm)}), {0, in_front_mm, 0}), behind = at(with({line_at(behind_mm)}), {0, behind_mm, 0});
+  const Vec3 before = at(with({line_at(in_front_mm)}), {0, in_front_mm, 0}),
+             behind = at(with({line_at(behind_mm)}), {0, behind_mm, 0});
   const Vec3 bone = at(bare_, Vec3::Zero());
   EXPECT_GT((behind - bone).norm(), 10.0);
   EXPECT_LT((behind - bone).norm(), 0.5 * (before - bone).norm());
@@ -139,7 +143,8 @@ TEST_F(PeoplePicture, ALabelSaysItsWordsBesideItsDot) {
 
 TEST_F(PeoplePicture, TwoLabelsAtOnePlaceDoNotCoverEachOther) {
   const Vec3 point = on_front(0.0, 0.2);
-  const Annotation first = mark(2, AnnotationKind::label, {point}, "first"), same = mark(3, AnnotationKind::label, {point}, "first");
+  const Annotation first = mark(2, AnnotationKind::label, {point}, "first"),
+                   same = mark(3, AnnotationKind::label, {point}, "first");
   const int one = green_pixels(with({first})), two = green_pixels(with({first, same}));
   const int other = green_pixels(with({first, mark(3, AnnotationKind::label, {on_front(0.0, -0.6)}, "first")}));
   EXPECT_GT(two, 1.3 * one) << "the second frame is seen too";
@@ -167,7 +172,8 @@ TEST_F(PeoplePicture, WordsStandBelowAndWhatHoldsAbove) {
     std::pair<int, int> rows{kHeight, -1};
     for (int row = 0; row < kHeight; ++row)
       for (int column = 0; column < kWidth; ++column)
-        if (image.at(column, row) != bare_.at(column, row)) rows = {std::min(rows.first, row), std::max(rows.second, row)};
+        if (image.at(column, row) != bare_.at(column, row))
+          rows = {std::min(rows.first, row), std::max(rows.second, row)};
     return rows;
   };
   window_->show_words({"Ada: done", "Dr. Berg: thank you"}, "");

@@ -29,7 +29,9 @@ PersonSeen person(AuthorId author, const std::string& name, Role role = Role::tr
   return one;
 }
 
-PeopleSeen all_three() { return {{person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")}, {}, {}}; }
+PeopleSeen all_three() {
+  return {{person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")}, {}, {}};
+}
 
 // Ada under what was decided about her.
 PeopleSeen about_ada(const Restrictions& supervision) {
@@ -86,7 +88,8 @@ TEST(PeopleView, EveryKindOfDecisionHasItsSentence) {
   EXPECT_EQ(told({}), "Dr. Berg leads your hand no more");
   EXPECT_EQ(told({.force_limit = 850}), "Dr. Berg limits your force to 8.50 N");
   EXPECT_EQ(told({}), "Dr. Berg limits your force no more");
-  EXPECT_EQ(told({.zone = ZoneLimit{{1024, 0, -2048}, 12 * 1024}}), "Dr. Berg lets you cut only within 12.0 mm of a point");
+  EXPECT_EQ(told({.zone = ZoneLimit{{1024, 0, -2048}, 12 * 1024}}),
+            "Dr. Berg lets you cut only within 12.0 mm of a point");
   EXPECT_EQ(view.holding(), "Cut only within 12.0 mm of 1.0 0.0 -2.0");
   EXPECT_EQ(told({}), "Dr. Berg lets you cut everywhere");
   const Tool& drill = builtin_tools()[0];

@@ -256,7 +256,8 @@ TEST_P(ToolMeshes, LiesOnTheToolAndFillsItsBox) {
   const Box box = local_bounds(tool);
   for (int k = 0; k < 3; ++k) {
     EXPECT_NEAR(drawn.min_mm[k], box.min_mm[k], 0.01 * box.size_mm()[k]);
-    EXPECT_NEAR(drawn.max_mm[k], box.max_mm[k], k == 2 ? std::min(1.0, 0.02 * box.size_mm()[k]) : 0.01 * box.size_mm()[k]);
+    EXPECT_NEAR(drawn.max_mm[k], box.max_mm[k],
+                k == 2 ? std::min(1.0, 0.02 * box.size_mm()[k]) : 0.01 * box.size_mm()[k]);
   }
   EXPECT_NEAR(drawn.min_mm.z(), -tool.reach_mm(), 1e-3);
 }
@@ -286,15 +287,17 @@ TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
   const double shank_mm3 = std::numbers::pi * shank * shank * tool.shank_length_mm;
   if (fluted(tool)) {
     // Flutes take away less than half of the solid.
-    const double head_mm3 = tool.kind == ToolKind::drill
-                                ? std::numbers::pi * radius * radius *
-                                      (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
-                                : 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
+    const double head_mm3 =
+        tool.kind == ToolKind::drill
+            ? std::numbers::pi * radius * radius *
+                  (tool.cutting_length_mm - 2.0 / 3.0 * radius / std::tan(0.5 * tool.point_angle_rad))
+            : 4.0 / 3.0 * std::numbers::pi * radius * radius * radius;
     EXPECT_GT(volume_mm3, shank_mm3 + 0.5 * head_mm3);
     EXPECT_LT(volume_mm3, 1.02 * (shank_mm3 + head_mm3));
     return;
   }
-  // Every other tool by counting random places, within three and a half standard deviations and chords of three per cent.
+  // Every other tool by counting random places, within three and a half standard deviations and chords of three per
+  // cent.
   const Implicit solid = tool_solid(tool);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> share(0.0, 1.0);

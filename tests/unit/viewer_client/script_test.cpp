@@ -113,9 +113,9 @@ TEST(Script, ReadsWhatConcernsThePeople) {
   EXPECT_EQ(parsed<Say>("say \"Dr. Berg\" may I?").who, "Dr. Berg");
   EXPECT_EQ(parsed<Say>("say \"Dr. Berg\" may I?").words, "may I?");
   EXPECT_EQ(parsed<Say>("say hello").words, "");
-  for (const char* wrong : {"look as", "follow", "point", "point 1 2", "point 1 2 x", "draw", "draw 1 2 3", "draw 1 2 3 4",
-                            "draw 1 2 3 4 5", "draw 1 2 3 4 5 x", "label 1 2 3", "label 1 2", "wipe", "wipe 0", "wipe x",
-                            "wipe 1 2", "say", "say \"Ada", "wait drawn"}) {
+  for (const char* wrong : {"look as", "follow", "point", "point 1 2", "point 1 2 x", "draw", "draw 1 2 3",
+                            "draw 1 2 3 4", "draw 1 2 3 4 5", "draw 1 2 3 4 5 x", "label 1 2 3", "label 1 2", "wipe",
+                            "wipe 0", "wipe x", "wipe 1 2", "say", "say \"Ada", "wait drawn"}) {
     const auto command = parse_command(wrong);
     ASSERT_FALSE(command) << wrong;
     EXPECT_NE(command.error().message.find('`'), std::string::npos) << command.error().message;
@@ -131,17 +131,61 @@ TEST(Script, SkipsEmptyLinesAndComments) {
 }
 
 TEST(Script, SaysWhatItExpected) {
-  for (const char* line :
-       {"wait", "wait seq", "wait seq -1", "wait seq 1x", "look", "look tool 0", "look tool nan",
-        "look at 1 2 3 from 1 2 3 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 1", "look at 0 0 0 from 0 0 5 up 0 0 0",
-        "tool", "tool maybe", "screenshot", "status ", "quit now", "dance", "wait bodies",
-        "wait items -1", "undo", "undo 0", "undo -1", "undo all", "redo", "redo 1 2", "take-away", "take-away x", "place",
-        "place pin-1 at 0 0 0", "place pin-1 at 0 0 0 along 0 0 0", "place pin-1 at 0 0 x along 0 0 1",
-        "place pin-1 at 0 0 0 along 0 0 1 on", "place pin-1 at 0 0 0 along 0 0 1 in 2", "place pin-1 near", "place pin-1 near 0 0 nan",
-        "place pin-1 near 0 0 0 along 0 0 0", "place pin-1 near 0 0 0 along 0 0 1 across 0 0 2", "place pin-1 near 0 0 0 at 0 0 0",
-        "place pin-1 near 0 0 0 on", "move", "move 1", "move 0 near 0 0 0", "move 1 at 0 0 0", "move 1 near 0 0 0 on 2", "turn 1",
-        "turn 1 2 3", "turn 1 inf", "turn x 1", "seat", "seat 1 0", "seat 1 -2", "seat 1 x", "seat 1 2 3", "remove", "remove 0",
-        "remove 1 2"}) {
+  for (const char* line : {"wait",
+                           "wait seq",
+                           "wait seq -1",
+                           "wait seq 1x",
+                           "look",
+                           "look tool 0",
+                           "look tool nan",
+                           "look at 1 2 3 from 1 2 3 up 0 0 1",
+                           "look at 0 0 0 from 0 0 5 up 0 0 1",
+                           "look at 0 0 0 from 0 0 5 up 0 0 0",
+                           "tool",
+                           "tool maybe",
+                           "screenshot",
+                           "status ",
+                           "quit now",
+                           "dance",
+                           "wait bodies",
+                           "wait items -1",
+                           "undo",
+                           "undo 0",
+                           "undo -1",
+                           "undo all",
+                           "redo",
+                           "redo 1 2",
+                           "take-away",
+                           "take-away x",
+                           "place",
+                           "place pin-1 at 0 0 0",
+                           "place pin-1 at 0 0 0 along 0 0 0",
+                           "place pin-1 at 0 0 x along 0 0 1",
+                           "place pin-1 at 0 0 0 along 0 0 1 on",
+                           "place pin-1 at 0 0 0 along 0 0 1 in 2",
+                           "place pin-1 near",
+                           "place pin-1 near 0 0 nan",
+                           "place pin-1 near 0 0 0 along 0 0 0",
+                           "place pin-1 near 0 0 0 along 0 0 1 across 0 0 2",
+                           "place pin-1 near 0 0 0 at 0 0 0",
+                           "place pin-1 near 0 0 0 on",
+                           "move",
+                           "move 1",
+                           "move 0 near 0 0 0",
+                           "move 1 at 0 0 0",
+                           "move 1 near 0 0 0 on 2",
+                           "turn 1",
+                           "turn 1 2 3",
+                           "turn 1 inf",
+                           "turn x 1",
+                           "seat",
+                           "seat 1 0",
+                           "seat 1 -2",
+                           "seat 1 x",
+                           "seat 1 2 3",
+                           "remove",
+                           "remove 0",
+                           "remove 1 2"}) {
     const auto command = parse_command(line);
     ASSERT_FALSE(command) << line;
     EXPECT_EQ(command.error().code, ErrorCode::invalid_input);

@@ -32,8 +32,8 @@ namespace osteon {
 namespace {
 
 constexpr double kPitch_mm = 0.8, kDeepest_mm = 1.2;
-constexpr double kSmall_mm = 30.0;   // so close that the cracks between cuts fill pixels
-constexpr double kLarge_mm = 75.0;   // room for five levels side by side
+constexpr double kSmall_mm = 30.0;  // so close that the cracks between cuts fill pixels
+constexpr double kLarge_mm = 75.0;  // room for five levels side by side
 constexpr int kEdge_px = 900;
 constexpr double kDistance = 5.0;  // of the eye, in radii
 constexpr double kViewAngle_deg = 24.0;
@@ -45,8 +45,9 @@ constexpr int kSlivers_px = 6;
 // A ball with a groove of each level; all three cross at its north pole.
 struct GroovedBall {
   double radius_mm;
-  CutField field{test::make_bone({Vec3::Constant(-radius_mm - 4), Vec3::Constant(radius_mm + 4)}, kPitch_mm,
-                                 [r = radius_mm](const Vec3& p) { return p.norm() - r; }, [](const Vec3&) { return 1.9; }),
+  CutField field{test::make_bone(
+                     {Vec3::Constant(-radius_mm - 4), Vec3::Constant(radius_mm + 4)}, kPitch_mm,
+                     [r = radius_mm](const Vec3& p) { return p.norm() - r; }, [](const Vec3&) { return 1.9; }),
                  BodyId{}};
   SurfaceBlocks blocks{BodyId{}};
 
@@ -144,7 +145,8 @@ class Silhouette : public testing::Test {
     vtkNew<vtkUnsignedCharArray> pixels;
     window_->GetPixelData(0, 0, kEdge_px - 1, kEdge_px - 1, 1, pixels);
     const double focal_px = 0.5 * kEdge_px / std::tan(kViewAngle_deg * std::numbers::pi / 360.0);
-    const double radius_px = focal_px * std::tan(std::asin((radius_mm - kDeepest_mm) / (kDistance * radius_mm))) - kEroded_px;
+    const double radius_px =
+        focal_px * std::tan(std::asin((radius_mm - kDeepest_mm) / (kDistance * radius_mm))) - kEroded_px;
     Leaks leaks;
     for (int y = 0; y < kEdge_px; ++y)
       for (int x = 0; x < kEdge_px; ++x) {

@@ -31,7 +31,8 @@ TEST(Stroke, ACircleIsPassedWithinTheToleranceAndOnlyAsFinelyAsAllowed) {
   Stroke stroke;
   const double radius_mm = 20.0;
   const auto at = [&](double turn) {
-    return Vec3(radius_mm * std::cos(2 * std::numbers::pi * turn), radius_mm * std::sin(2 * std::numbers::pi * turn), 0);
+    return Vec3(radius_mm * std::cos(2 * std::numbers::pi * turn), radius_mm * std::sin(2 * std::numbers::pi * turn),
+                0);
   };
   for (int i = 0; i < 3000; ++i) stroke.add(at(i / 3000.0));
   const auto fine = stroke.line(1024), coarse = stroke.line(12);

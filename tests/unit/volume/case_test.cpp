@@ -31,7 +31,8 @@ struct Ball {
   // Parts that are all one are named so.
   PartKind fill(const CoordBox& part, PartSamples& to) {
     const Vec3 low = position_mm(part.min, pitch_mm), high = position_mm(part.max, pitch_mm);
-    const double middle = distance_mm(0.5 * (low + high)), reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * pitch_mm;
+    const double middle = distance_mm(0.5 * (low + high)),
+                 reach = 0.5 * (high - low).norm() + (kBandVoxels + 1) * pitch_mm;
     if (middle > reach) return PartKind::outside;
     const PartKind kind = middle < -reach ? PartKind::inside : PartKind::samples;
     std::size_t i = 0;
@@ -81,7 +82,8 @@ TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
     const auto fill = [&](const CoordBox& part, PartSamples& to) { return ball.fill(part, to); };
     const auto built = Case::build(info_of(ball.pitch_mm), ball.box(), fill);
     EXPECT_TRUE(built);
-    EXPECT_NEAR(built->volume_mm3(), 4.0 / 3.0 * std::numbers::pi * std::pow(ball.radius_mm, 3), 0.002 * built->volume_mm3());
+    EXPECT_NEAR(built->volume_mm3(), 4.0 / 3.0 * std::numbers::pi * std::pow(ball.radius_mm, 3),
+                0.002 * built->volume_mm3());
     return static_cast<double>(built->memory_bytes());
   };
   EXPECT_LT(build(large), 5.0 * build(small));

@@ -14,12 +14,15 @@ constexpr double kPitch_mm = 0.5, kRadius_mm = 9.0;
 const Vec3 kCentre{0.13, -0.21, 0.07};
 
 const Case& ball() {
-  static const Case bone = test::make_bone({Vec3::Constant(-10.0), Vec3::Constant(10.0)}, kPitch_mm,
-                                           [](const Vec3& p) { return (p - kCentre).norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; });
+  static const Case bone = test::make_bone(
+      {Vec3::Constant(-10.0), Vec3::Constant(10.0)}, kPitch_mm,
+      [](const Vec3& p) { return (p - kCentre).norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; });
   return bone;
 }
 
-CoordBox whole(int level) { return {{-24 << level, -24 << level, -24 << level}, {24 << level, 24 << level, 24 << level}}; }
+CoordBox whole(int level) {
+  return {{-24 << level, -24 << level, -24 << level}, {24 << level, 24 << level, 24 << level}};
+}
 
 // How far the surface that a query shows lies from the ball's, in pitches: root mean square and largest, along rays.
 struct Error {
@@ -48,10 +51,11 @@ TEST(CellCollision, EachRuleIsAsAccurateAsItCanBe) {
   const BoneCells cells(field, 0, whole(0));
   const BoneDistance distance(field, 0, whole(0));
   const Error nearest = surface_error([&](const Vec3& p) { return cells.inside(p, MixedCell::nearest); }, kPitch_mm);
-  const Error trilinear = surface_error([&](const Vec3& p) { return cells.inside(p, MixedCell::trilinear); }, kPitch_mm);
+  const Error trilinear =
+      surface_error([&](const Vec3& p) { return cells.inside(p, MixedCell::trilinear); }, kPitch_mm);
   const Error by_distance = surface_error([&](const Vec3& p) { return distance.inside(p); }, kPitch_mm);
-  std::printf("error in pitches, rms / largest: nearest %.3f / %.3f, trilinear %.3f / %.3f, distance %.4f / %.4f\n", nearest.rms,
-              nearest.largest, trilinear.rms, trilinear.largest, by_distance.rms, by_distance.largest);
+  std::printf("error in pitches, rms / largest: nearest %.3f / %.3f, trilinear %.3f / %.3f, distance %.4f / %.4f\n",
+              nearest.rms, nearest.largest, trilinear.rms, trilinear.largest, by_distance.rms, by_distance.largest);
   // A sample stands for a cube: half its diagonal is the most that it can be wrong by, and a quarter of an edge the rms
   // of what is evenly spread over half an edge to both sides, at least for faces along the lattice.
   EXPECT_LE(nearest.largest, 0.5 * std::sqrt(3.0) + 0.02);

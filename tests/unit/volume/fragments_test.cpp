@@ -21,7 +21,8 @@ double box_distance(const Box& box, const Vec3& p) {
 }
 
 // Leaves that remove a solid given by its exact distance, as cuts of that level would.
-std::vector<FieldLeaf> leaves_of(const Case& bone, int level, const Box& around, const std::function<double(const Vec3&)>& distance_mm) {
+std::vector<FieldLeaf> leaves_of(const Case& bone, int level, const Box& around,
+                                 const std::function<double(const Vec3&)>& distance_mm) {
   std::vector<FieldLeaf> leaves;
   const double pitch = level_pitch_mm(bone.pitch_mm(), level);
   const std::int32_t band = band_quanta(pitch);
@@ -31,12 +32,16 @@ std::vector<FieldLeaf> leaves_of(const Case& bone, int level, const Box& around,
     for (std::int32_t y = first.y; y <= box.max.y; y += kLeafSize)
       for (std::int32_t z = first.z; z <= box.max.z; z += kLeafSize) {
         FieldLeaf leaf{{}, level, {x, y, z}, {}};
-        if (!bone.has_bone({shift_down(leaf.origin, level), shift_down(leaf.origin + Coord{7, 7, 7}, level) + Coord{1, 1, 1}})) continue;
+        if (!bone.has_bone(
+                {shift_down(leaf.origin, level), shift_down(leaf.origin + Coord{7, 7, 7}, level) + Coord{1, 1, 1}}))
+          continue;
         for (std::int32_t i = 0; i < kLeafVoxels; ++i) {
           const Vec3 p = position_mm(leaf.origin + Coord{i / 64, i / 8 % 8, i % 8}, pitch);
-          leaf.values.push_back(static_cast<std::int16_t>(std::clamp(std::lround(distance_mm(p) * 1024.0), -long{band}, long{band})));
+          leaf.values.push_back(
+              static_cast<std::int16_t>(std::clamp(std::lround(distance_mm(p) * 1024.0), -long{band}, long{band})));
         }
-        if (std::ranges::any_of(leaf.values, [&](std::int16_t v) { return v < band; })) leaves.push_back(std::move(leaf));
+        if (std::ranges::any_of(leaf.values, [&](std::int16_t v) { return v < band; }))
+          leaves.push_back(std::move(leaf));
       }
   return leaves;
 }
@@ -74,7 +79,8 @@ struct Room {
   }
   [[nodiscard]] std::vector<Fragment> pieces() { return finder.take_fragments(field); }
   void rebuild(std::span<const RoomSeq> places, bool undo) {
-    for (const LevelLeaves& l : undo ? history.undo(field, places) : history.redo(field, places)) finder.touch(field, l.level, l.origins);
+    for (const LevelLeaves& l : undo ? history.undo(field, places) : history.redo(field, places))
+      finder.touch(field, l.level, l.origins);
   }
 };
 
@@ -138,8 +144,8 @@ TEST(Fragments, ASawnBlockIsTwoPiecesWithTheirVolumes) {
   EXPECT_TRUE(FragmentFinder(piece).take_fragments(piece).empty());
 }
 
-// What was removed is kerf and piece, although the masks of the piece are of two levels. A sample on an edge of the block
-// counts half where a quarter of it is bone: that much may be too much along the edges of what is gone.
+// What was removed is kerf and piece, although the masks of the piece are of two levels. A sample on an edge of the
+// block counts half where a quarter of it is bone: that much may be too much along the edges of what is gone.
 TEST(Fragments, WhatAPieceTakesAlongCountsAsRemoved) {
   for (const double x0 : {1.06, 4.0, 5.3}) {
     SCOPED_TRACE(x0);
@@ -182,12 +188,14 @@ TEST(Fragments, MasksKeepWhatIsGoneThroughoutAsOneValue) {
 }
 
 // No point is solid in both, and none that was solid is lost or gained: at samples of every level, and anywhere.
-void expect_partition(const CutField& before, const CutField& parent, const CutField& piece, const Box& box, int allowed = 0) {
+void expect_partition(const CutField& before, const CutField& parent, const CutField& piece, const Box& box,
+                      int allowed = 0) {
   for (int level = 0; level < kLevels; ++level) {
     const double pitch = level_pitch_mm(before.bone().pitch_mm(), level);
     const CoordBox samples = covering_samples(box, pitch);
     const Coord d = samples.dims();
-    std::vector<float> f(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z)), a(f.size()), b(f.size());
+    std::vector<float> f(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z)),
+        a(f.size()), b(f.size());
     before.gather_solid(level, samples, f);
     parent.gather_solid(level, samples, a);
     piece.gather_solid(level, samples, b);
@@ -221,8 +229,9 @@ TEST(Fragments, ParentAndPieceArePartsOfWhatWasAndShareNothing) {
     // An oblique kerf, 1 mm at the finest level, wider where the voxels are.
     const double width = level == 2 ? 1.0 : level == 1 ? 1.3 : 2.2;
     const Vec3 normal = Vec3{1.0, 0.35, 0.2}.normalized();
-    room.remove(leaves_of(room.field.bone(), level, {{-10, -10, -10}, {10, 10, 2}},
-                          [&](const Vec3& p) { return std::abs(normal.dot(p - Vec3{1.3, 0.2, 0})) - 0.5 * width; }));
+    room.remove(leaves_of(room.field.bone(), level, {{-10, -10, -10}, {10, 10, 2}}, [&](const Vec3& p) {
+      return std::abs(normal.dot(p - Vec3{1.3, 0.2, 0})) - 0.5 * width;
+    }));
     const CutField before = copy_of(room.field);
     auto pieces = room.pieces();
     ASSERT_EQ(pieces.size(), 1u);
@@ -256,7 +265,8 @@ TEST(Fragments, WhatIsUnderACubicMillimetreIsDebris) {
   Room room(plain_block(16.0, 8.0, 0.5));
   // A corner of 0.8 mm, cut free on its two inner sides and below.
   const Box corner{{7.2, 7.2, -0.8}, {9.0, 9.0, 1.0}};
-  room.remove(leaves_of(room.field.bone(), 2, corner.grown(0.6), [&](const Vec3& p) { return std::abs(box_distance(corner, p) - 0.3) - 0.3; }));
+  room.remove(leaves_of(room.field.bone(), 2, corner.grown(0.6),
+                        [&](const Vec3& p) { return std::abs(box_distance(corner, p) - 0.3) - 0.3; }));
   auto pieces = room.pieces();
   ASSERT_EQ(pieces.size(), 1u);
   EXPECT_TRUE(pieces[0].debris());
@@ -283,8 +293,9 @@ TEST(Fragments, UndoingTheSplitGivesTheBoneBack) {
 TEST(Fragments, BonesThatWereApartStayAndEachCanLosePieces) {
   const auto ball = [](double x, double r) { return [=](const Vec3& p) { return (p - Vec3{x, 0, 0}).norm() - r; }; };
   const auto large = ball(-5.0, 6.0), small = ball(4.0, 2.0);
-  Room room(test::make_bone({{-12, -7, -7}, {7, 7, 7}}, 0.5, [&](const Vec3& p) { return std::min(large(p), small(p)); },
-                            [](const Vec3&) { return 1.9; }));
+  Room room(test::make_bone(
+      {{-12, -7, -7}, {7, 7, 7}}, 0.5, [&](const Vec3& p) { return std::min(large(p), small(p)); },
+      [](const Vec3&) { return 1.9; }));
   EXPECT_TRUE(room.pieces().empty());
   // A cut at one changes cells that both have: still two bones.
   room.remove_box(2, {{0.2, -2, -2}, {2.4, 2, 2}});

@@ -30,17 +30,22 @@ std::vector<Change> random_changes(std::mt19937& random, int count) {
         const int level = static_cast<int>(random() % 3);
         const auto leaf = [&] { return kLeafSize * (static_cast<std::int32_t>(random() % 4) - 2); };
         const Coord origin{leaf(), leaf(), leaf() - 8};
-        if (std::ranges::any_of(change.mask, [&](const FieldLeaf& m) { return m.level == level && m.origin == origin; })) continue;
+        if (std::ranges::any_of(change.mask,
+                                [&](const FieldLeaf& m) { return m.level == level && m.origin == origin; }))
+          continue;
         const std::int32_t band = band_quanta(level_pitch_mm(0.5, level));
         FieldLeaf mask{{}, level, origin, std::vector<std::int16_t>(kLeafVoxels, static_cast<std::int16_t>(-band))};
         if (n != 0)  // the first is all removed
-          for (std::int16_t& v : mask.values) v = static_cast<std::int16_t>(static_cast<std::int32_t>(random() % static_cast<unsigned>(2 * band + 1)) - band);
+          for (std::int16_t& v : mask.values)
+            v = static_cast<std::int16_t>(static_cast<std::int32_t>(random() % static_cast<unsigned>(2 * band + 1)) -
+                                          band);
         change.mask.push_back(mask);
       }
     } else {
       Tool tool = *find_tool(i % 2 ? "drill-3.2" : "burr-round-5");
       const Vec3 from{across(random), across(random), depth(random)};
-      change.cut = straight_cut(tool, from, from + Vec3{tilt(random), tilt(random), tilt(random)} * 3.0, {tilt(random), tilt(random), -1.0});
+      change.cut = straight_cut(tool, from, from + Vec3{tilt(random), tilt(random), tilt(random)} * 3.0,
+                                {tilt(random), tilt(random), -1.0});
       change.cut.level = i % 3;
     }
     changes.push_back(change);
@@ -124,10 +129,13 @@ TEST(CutHistory, AForkGoesItsOwnWay) {
   const Case bone = plain_block(20.0, 8.0, 0.5);
   const Tool burr = *find_tool("burr-round-5");
   std::vector<Cut> cuts;
-  for (int i = 0; i < 4; ++i) cuts.push_back(straight_cut(burr, {-6.0 + 3.0 * i, -2, -1}, {-5.0 + 3.0 * i, 2, -1}, {0, 0, -1}));
+  for (int i = 0; i < 4; ++i)
+    cuts.push_back(straight_cut(burr, {-6.0 + 3.0 * i, -2, -1}, {-5.0 + 3.0 * i, 2, -1}, {0, 0, -1}));
   CutField parent(bone, {}), piece(bone, {});
   CutHistory history;
-  const auto cut = [&](CutField& field, CutHistory& its, std::size_t i) { its.add({i + 1}, cuts[i], field.apply(cuts[i]).reached_leaves); };
+  const auto cut = [&](CutField& field, CutHistory& its, std::size_t i) {
+    its.add({i + 1}, cuts[i], field.apply(cuts[i]).reached_leaves);
+  };
   for (CutField* field : {&parent, &piece}) (void)field->apply(cuts[0]), (void)field->apply(cuts[1]);
   for (std::size_t i = 0; i < 2; ++i) history.add({i + 1}, cuts[i], parent.reach(cuts[i]));
   CutHistory other = history.fork();

@@ -25,7 +25,8 @@ Worst worst_of(Make make, double pitch_mm) {
     worst.volume_percent = std::max(worst.volume_percent, 100.0 * std::abs(accuracy.volume_error));
     worst.mean_percent += 100.0 * std::abs(accuracy.volume_error) / kTrials;
     worst.vertices += accuracy.deviation_pitches.size();
-    for (const double deviation : accuracy.deviation_pitches) worst.deviation_pitches = std::max(worst.deviation_pitches, deviation);
+    for (const double deviation : accuracy.deviation_pitches)
+      worst.deviation_pitches = std::max(worst.deviation_pitches, deviation);
   }
   return worst;
 }

@@ -17,7 +17,8 @@ namespace {
 // An octahedron whose triangles are divided and pushed out to the sphere.
 TriangleMesh sphere_mesh(double radius, const Vec3& centre, int divisions) {
   std::vector<Vec3> points{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
-  std::vector<std::array<std::uint32_t, 3>> triangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4}, {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
+  std::vector<std::array<std::uint32_t, 3>> triangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
+                                                      {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
   for (int i = 0; i < divisions; ++i) {
     std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t> middles;
     const auto middle = [&](std::uint32_t a, std::uint32_t b) {
@@ -112,7 +113,8 @@ TEST(MeshDistance, AToolFromAnStlFileCutsItsShape) {
   const test::TempDir temp;
   const double radius = 2.5;
   ASSERT_TRUE(write_stl(sphere_mesh(radius, {0, 0, -radius}, 5), temp / "ball.stl"));
-  std::ofstream(temp / "ball.yaml") << "name: ball-from-mesh\ntitle: Ball\nkind: mesh\nmesh: ball.stl\nmesh_pitch_mm: 0.25\nspindle_rpm: 1000\nteeth: 4\nfeed_mm_per_rev: 1\ncut_level: 2\n";
+  std::ofstream(temp / "ball.yaml") << "name: ball-from-mesh\ntitle: Ball\nkind: mesh\nmesh: ball.stl\nmesh_pitch_mm: "
+                                       "0.25\nspindle_rpm: 1000\nteeth: 4\nfeed_mm_per_rev: 1\ncut_level: 2\n";
   const auto tool = load_tool_file(temp / "ball.yaml");
   ASSERT_TRUE(tool) << tool.error().message;
   const auto box = builtin_tool_box();
@@ -121,7 +123,8 @@ TEST(MeshDistance, AToolFromAnStlFileCutsItsShape) {
   const Vec3 tip{0.013, 0.027, -4.0};
   field.apply(test::straight_cut(*tool, tip, tip, {0, 0, -1}));
   const double cap = radius - 1.5;
-  const double exact = 4.0 / 3.0 * std::numbers::pi * std::pow(radius, 3) - std::numbers::pi * cap * cap * (3.0 * radius - cap) / 3.0;
+  const double exact =
+      4.0 / 3.0 * std::numbers::pi * std::pow(radius, 3) - std::numbers::pi * cap * cap * (3.0 * radius - cap) / 3.0;
   // The triangles' chords and the lattice of 0.25 mm, trilinear, both make it a little smaller.
   EXPECT_NEAR(field.removed_mm3(), exact, 0.02 * exact);
 }

@@ -14,7 +14,8 @@ std::vector<Cut> strokes(int level) {
   std::vector<Cut> cuts;
   for (int i = 0; i < 8; ++i) {
     const Vec3 from{across(random), across(random), depth(random)};
-    cuts.push_back(test::straight_cut(*find_tool(i % 2 ? "drill-3.2" : "burr-round-5"), from, from + Vec3{2.0, 1.0, -0.5}, {0.2, 0, -1}));
+    cuts.push_back(test::straight_cut(*find_tool(i % 2 ? "drill-3.2" : "burr-round-5"), from,
+                                      from + Vec3{2.0, 1.0, -0.5}, {0.2, 0, -1}));
     cuts.back().level = level;
   }
   return cuts;
@@ -36,7 +37,8 @@ TEST(Refinement, BothMethodsGiveTheSameBone) {
     // The same f at every sample, where something was resampled and where not.
     const CoordBox box{{-40 << level, -37 << level, -22 << level}, {38 << level, 41 << level, 5 << level}};
     const Coord d = box.dims();
-    std::vector<float> a(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z)), b(a.size());
+    std::vector<float> a(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z)),
+        b(a.size());
     whole.gather_solid(box, a);
     local.gather_solid(level, box, b);
     EXPECT_EQ(a, b);

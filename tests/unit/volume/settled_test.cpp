@@ -44,7 +44,7 @@ Cut kerf_at_y(double y, double deep) { return kerf(Vec3::UnitX(), {0, y, 0}, dee
 // some of the crumbs away, or what holds them, sooner or later.
 std::vector<Cut> crossing_cuts(std::size_t count, const std::array<int, 3>& levels) {
   constexpr std::array kTools = {"saw-oscillating-3", "burr-round-3.2", "saw-oscillating-1", "drill-1-8in",
-                                 "saw-reciprocating", "burr-barrel", "saw-oscillating-2", "drill-3.2"};
+                                 "saw-reciprocating", "burr-barrel",    "saw-oscillating-2", "drill-3.2"};
   test::Random random(14);
   std::vector<Cut> cuts;
   for (std::size_t i = 0; i < count; ++i) {
@@ -190,8 +190,10 @@ TEST(Settled, HoldsWhatDistancesAndAFloodSay) {
     settled.bodies[b].gather_solid(2, box, f);
     for (const Coord c : all) {
       if (!(f[index(c)] < 0.0f)) continue;
-      if (solid[index(c)]) in_bodies[static_cast<std::size_t>(part[index(c)])].insert(static_cast<int>(b));
-      else ++differing;
+      if (solid[index(c)])
+        in_bodies[static_cast<std::size_t>(part[index(c)])].insert(static_cast<int>(b));
+      else
+        ++differing;
     }
   }
   EXPECT_EQ(differing, 0u);

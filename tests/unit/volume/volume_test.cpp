@@ -31,7 +31,8 @@ TEST(Case, KnowsDistanceDensityAndClearance) {
   EXPECT_EQ(bone.tissue({0, 0, -16}), Tissue::trabecular);
   EXPECT_EQ(bone.tissue({0, 0, 2}), Tissue::none);
   // Never more than the true distance, and of use far away.
-  for (double height = 0.0; height < 60.0; height += 0.7) EXPECT_LE(bone.clearance_mm({0.3, 0.2, height}), height + 1e-6);
+  for (double height = 0.0; height < 60.0; height += 0.7)
+    EXPECT_LE(bone.clearance_mm({0.3, 0.2, height}), height + 1e-6);
   EXPECT_GT(bone.clearance_mm({0.0, 0.0, 50.0}), 20.0);
 }
 
@@ -177,7 +178,8 @@ TEST(CutField, GathersWhatItIsAtEveryPoint) {
     for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
       for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
         for (std::int32_t z = box.min.z; z <= box.max.z; ++z, ++i)
-          ASSERT_NEAR(static_cast<double>(solid[i]), field.solid_mm(position_mm({x, y, z}, level_pitch_mm(0.5, level))), 1e-4);
+          ASSERT_NEAR(static_cast<double>(solid[i]), field.solid_mm(position_mm({x, y, z}, level_pitch_mm(0.5, level))),
+                      1e-4);
   }
 }
 

@@ -21,9 +21,7 @@ MountLoad some_push(std::uint64_t seq) {
   return {seq, {{1.2345678, -40.0, 0.0004}, {-300.126, 0.0, 19999.5}}, 12.3459, 17};
 }
 
-MountPose some_place(std::uint64_t seq) {
-  return {seq, {{0.25, -3.0, 1e-5}, {0.1, -0.2, 0.0}}, 0.9999, 4, 0.1504};
-}
+MountPose some_place(std::uint64_t seq) { return {seq, {{0.25, -3.0, 1e-5}, {0.1, -0.2, 0.0}}, 0.9999, 4, 0.1504}; }
 
 TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
   const Result<MountLoad> push = wire::from_wire(wire::to_wire(some_push(3)));
@@ -48,7 +46,8 @@ TEST(BoneOnTheWire, RoundsEnergyDown) {
     MountLoad push = some_push(1);
     MountPose seen = some_place(1);
     push.energy_mj = seen.energy_mj = mj;
-    for (const double came : {wire::from_wire(wire::to_wire(push))->energy_mj, wire::from_wire(wire::to_wire(seen))->energy_mj}) {
+    for (const double came :
+         {wire::from_wire(wire::to_wire(push))->energy_mj, wire::from_wire(wire::to_wire(seen))->energy_mj}) {
       EXPECT_LE(came, mj);
       EXPECT_GT(came, mj - 0.0011);
     }
@@ -92,7 +91,8 @@ TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
   }
 }
 
-// Both ends on a line that loses 30 % and reorders: the newest wins, none comes twice, and no more than one each 8 ms goes.
+// Both ends on a line that loses 30 % and reorders: the newest wins, none comes twice, and no more than one each 8 ms
+// goes.
 TEST(BoneOnTheLink, TheNewestWins) {
   Trial trial({.quality = test::hostile(40ms), .long_cuts = 0, .events = 0});
   wire::ClientLink& client = trial.clients[0]->link;

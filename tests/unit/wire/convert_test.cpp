@@ -10,7 +10,12 @@ namespace {
 
 Cut sample_cut() {
   const Tool drill = *find_tool("drill-3.2");
-  return {.author = {7}, .author_seq = 12, .lease_epoch = 3, .body = {2}, .tool = drill.hash(), .level = 2,
+  return {.author = {7},
+          .author_seq = 12,
+          .lease_epoch = 3,
+          .body = {2},
+          .tool = drill.hash(),
+          .level = 2,
           .path = {quantise(pose_along({1, 2, 3}, {0, 0.3, -1})), quantise(pose_along({-100.5, 2, 3}, {0, 0.3, -1}))},
           .spindle_rpm = 1000};
 }
@@ -25,7 +30,8 @@ TEST(Wire, ACutComesBackByteForByte) {
 
 TEST(Wire, ALeafComesBackByteForByte) {
   FieldLeaf leaf{{1}, 2, {-8, 16, 24}, std::vector<std::int16_t>(kLeafVoxels)};
-  for (std::size_t i = 0; i < leaf.values.size(); ++i) leaf.values[i] = static_cast<std::int16_t>(static_cast<int>(i) * 17 - 4096);
+  for (std::size_t i = 0; i < leaf.values.size(); ++i)
+    leaf.values[i] = static_cast<std::int16_t>(static_cast<int>(i) * 17 - 4096);
   const auto back = wire::from_wire(wire::to_wire(leaf));
   ASSERT_TRUE(back);
   EXPECT_EQ(*back, leaf);
@@ -75,8 +81,14 @@ Digest all_of(std::uint8_t byte) {
 }
 
 Restrictions sample_supervision() {
-  return {.stopped = true, .taken_by = {3}, .guide = {4}, .guide_share = 250, .force_limit = 1234,
-          .zone = ZoneLimit{{-5, 6, -7}, 8}, .tools = {all_of(1), all_of(2)}, .words = "f\xc3\xbcnf"};
+  return {.stopped = true,
+          .taken_by = {3},
+          .guide = {4},
+          .guide_share = 250,
+          .force_limit = 1234,
+          .zone = ZoneLimit{{-5, 6, -7}, 8},
+          .tools = {all_of(1), all_of(2)},
+          .words = "f\xc3\xbcnf"};
 }
 
 TEST(Wire, ASupervisionComesBackWhole) {
@@ -111,12 +123,21 @@ TEST(Wire, RefusesBadSupervisionsByTheNameOfTheField) {
   refused([](v1::Restrictions& s) { s.mutable_zone()->clear_radius(); }, "zone.radius");
   refused([](v1::Restrictions& s) { s.mutable_zone()->set_radius(-1); }, "zone.radius");
   refused([](v1::Restrictions& s) { s.add_tools("short"); }, "tools");
-  refused([](v1::Restrictions& s) { for (std::uint8_t n = 3; n < 90; ++n) s.add_tools(wire::to_wire(all_of(n))); }, "tools");
+  refused(
+      [](v1::Restrictions& s) {
+        for (std::uint8_t n = 3; n < 90; ++n) s.add_tools(wire::to_wire(all_of(n)));
+      },
+      "tools");
   refused([](v1::Restrictions& s) { s.set_words(std::string(257, 'x')); }, "words");
 }
 
 Annotation sample_line() {
-  return {.id = 3, .author = {4}, .kind = AnnotationKind::line, .points = {{1, -2, 3}, {4, 5, -6}}, .words = "cut here", .colour = 0xff0001};
+  return {.id = 3,
+          .author = {4},
+          .kind = AnnotationKind::line,
+          .points = {{1, -2, 3}, {4, 5, -6}},
+          .words = "cut here",
+          .colour = 0xff0001};
 }
 
 TEST(Wire, AnAnnotationComesBackWhole) {
@@ -144,8 +165,18 @@ TEST(Wire, RefusesBadAnnotationsByTheNameOfTheField) {
   refused([](v1::Annotation& a) { a.add_points(1); }, "points");
   refused([](v1::Annotation& a) { a.clear_points(); }, "points");
   refused([](v1::Annotation& a) { a.set_kind(v1::ANNOTATION_KIND_POINTER); }, "points");
-  refused([](v1::Annotation& a) { for (int i = 0; i < 3 * 1023; ++i) a.add_points(0); }, "points");
-  refused([](v1::Annotation& a) { a.mutable_points()->Truncate(3); a.set_kind(v1::ANNOTATION_KIND_LABEL); a.clear_words(); }, "words");
+  refused(
+      [](v1::Annotation& a) {
+        for (int i = 0; i < 3 * 1023; ++i) a.add_points(0);
+      },
+      "points");
+  refused(
+      [](v1::Annotation& a) {
+        a.mutable_points()->Truncate(3);
+        a.set_kind(v1::ANNOTATION_KIND_LABEL);
+        a.clear_words();
+      },
+      "words");
   refused([](v1::Annotation& a) { a.set_words(std::string(257, 'x')); }, "words");
   refused([](v1::Annotation& a) { a.set_colour(1 << 24); }, "colour");
 }
@@ -316,10 +347,12 @@ TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
   const Vec3 sight = (look.target_mm - look.eye_mm).normalized();
   refused(up_of(sight.x(), sight.y(), sight.z()), "look.up");
   refused(up_of(-sight.x(), -sight.y(), -sight.z()), "look.up");
-  refused([&](v1::ViewFrustum& l) {
-    *l.mutable_target_mm() = l.eye_mm();
-    up_of(0, 1, 0)(l);
-  }, "look.up");
+  refused(
+      [&](v1::ViewFrustum& l) {
+        *l.mutable_target_mm() = l.eye_mm();
+        up_of(0, 1, 0)(l);
+      },
+      "look.up");
 }
 
 }  // namespace

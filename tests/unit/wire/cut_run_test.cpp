@@ -40,8 +40,10 @@ std::uint64_t any(Random& random) {
 
 QuantisedPose any_pose(Random& random) {
   QuantisedPose pose;
-  for (auto& p : pose.position) p = static_cast<std::int32_t>(static_cast<std::uint32_t>(any(random) ^ (0 - random.index(2))));
-  for (auto& r : pose.rotation) r = static_cast<std::int16_t>(static_cast<std::uint16_t>(any(random) ^ (0 - random.index(2))));
+  for (auto& p : pose.position)
+    p = static_cast<std::int32_t>(static_cast<std::uint32_t>(any(random) ^ (0 - random.index(2))));
+  for (auto& r : pose.rotation)
+    r = static_cast<std::int16_t>(static_cast<std::uint16_t>(any(random) ^ (0 - random.index(2))));
   if (random.unit() < 0.2) pose.position[0] = std::numeric_limits<std::int32_t>::min();
   if (random.unit() < 0.2) pose.rotation[3] = std::numeric_limits<std::int16_t>::min();
   return pose;
@@ -69,7 +71,8 @@ Cut any_cut(Random& random, const Cut& before, bool wild) {
   return cut;
 }
 
-std::vector<Cut> any_cuts(Random& random, std::size_t count, bool wild, AuthorId author = {7}, std::uint64_t first = 1) {
+std::vector<Cut> any_cuts(Random& random, std::size_t count, bool wild, AuthorId author = {7},
+                          std::uint64_t first = 1) {
   Cut before;
   before.author = author;
   before.author_seq = first - 1;
@@ -81,11 +84,15 @@ std::vector<Cut> any_cuts(Random& random, std::size_t count, bool wild, AuthorId
 }
 
 Restrictions any_supervision(Random& random, std::size_t most_tools) {
-  Restrictions one{.stopped = random.unit() < 0.5, .taken_by = {random.index(3)}, .guide = {any(random)},
-                  .guide_share = static_cast<int>(random.index(kWholeShare + 1)),
-                  .force_limit = static_cast<int>(random.index(kMostForceLimit + 1))};
-  if (random.unit() < 0.5) one.zone = ZoneLimit{any_pose(random).position, 1 + static_cast<std::int32_t>(random.index(1 << 20))};
-  for (std::size_t tools = random.index(most_tools + 1); tools > 0; --tools) one.tools.push_back(digest(static_cast<std::uint8_t>(20 - tools)));
+  Restrictions one{.stopped = random.unit() < 0.5,
+                   .taken_by = {random.index(3)},
+                   .guide = {any(random)},
+                   .guide_share = static_cast<int>(random.index(kWholeShare + 1)),
+                   .force_limit = static_cast<int>(random.index(kMostForceLimit + 1))};
+  if (random.unit() < 0.5)
+    one.zone = ZoneLimit{any_pose(random).position, 1 + static_cast<std::int32_t>(random.index(1 << 20))};
+  for (std::size_t tools = random.index(most_tools + 1); tools > 0; --tools)
+    one.tools.push_back(digest(static_cast<std::uint8_t>(20 - tools)));
   one.words = std::string(random.index(kMostSupervisionWords + 1), 'w');
   return one;
 }
@@ -156,7 +163,8 @@ TEST(CutRun, ARunEndsWhereItsHeadChanges) {
     return parsed(filler.take()).cuts_size();
   };
   EXPECT_EQ(runs_of([](Cut&) {}), 1);
-  EXPECT_EQ(runs_of([](Cut& c) { c.path.front().position[1] = 5; }), 1) << "a path that begins elsewhere says so itself";
+  EXPECT_EQ(runs_of([](Cut& c) { c.path.front().position[1] = 5; }), 1)
+      << "a path that begins elsewhere says so itself";
   EXPECT_EQ(runs_of([](Cut& c) { c.path_us = 9000; }), 1);
   EXPECT_EQ(runs_of([](Cut& c) { c.lease_epoch = 9; }), 2);
   EXPECT_EQ(runs_of([](Cut& c) { c.body = {1}; }), 2);
@@ -165,8 +173,8 @@ TEST(CutRun, ARunEndsWhereItsHeadChanges) {
   EXPECT_EQ(runs_of([](Cut& c) { c.spindle_rpm = 1; }), 1) << "a spindle under load has another speed in every cut";
 }
 
-// By hand. Steps of 300, -200 and 100: a byte that says which numbers, and 2 bytes for each; the same step again: that one
-// byte. Before the knots a byte with their number.
+// By hand. Steps of 300, -200 and 100: a byte that says which numbers, and 2 bytes for each; the same step again: that
+// one byte. Before the knots a byte with their number.
 TEST(CutRun, TakesAsFewBytesAsItSays) {
   const wire::ToolNumbers numbers = numbers_1_to_3();
   SendWindow window(kWide);
@@ -236,7 +244,8 @@ TEST(CutRun, IsNeverTwiceAsLongAsThePlainMessage) {
 // Of a speed only the difference goes, and what it leads to must be one.
 TEST(CutRun, SpeedsBeyondWhatANumberHoldsAreNone) {
   const wire::ToolNumbers numbers = numbers_1_to_3();
-  const auto speed_after = [&](std::uint32_t before, std::initializer_list<std::uint8_t> difference) -> std::optional<std::uint32_t> {
+  const auto speed_after = [&](std::uint32_t before,
+                               std::initializer_list<std::uint8_t> difference) -> std::optional<std::uint32_t> {
     v1::CutRun run;
     run.set_author_seq(1);
     run.set_tool_number(1);
@@ -269,7 +278,8 @@ TEST(CutRun, TheLongestCutFitsAPacket) {
   cut.spindle_rpm = cut.path_us = ~0u;
   for (std::size_t k = 0; k < wire::kMostKnotsInPacket; ++k) {
     QuantisedPose pose;
-    pose.position.fill(k % 2 == 0 ? std::numeric_limits<std::int32_t>::min() / 2 : std::numeric_limits<std::int32_t>::max() / 2);
+    pose.position.fill(k % 2 == 0 ? std::numeric_limits<std::int32_t>::min() / 2
+                                  : std::numeric_limits<std::int32_t>::max() / 2);
     pose.rotation.fill(k % 3 == 0 ? std::int16_t{-16000} : std::int16_t{16000});
     cut.path.push_back(pose);
   }
@@ -349,12 +359,19 @@ TEST(CutRun, AFullWindowChangesNothing) {
 
 // The longest supervision that goes in a packet; one of more tools goes over the stream.
 TEST(RowRun, TheLongestSupervisionFitsAPacket) {
-  wire::SessionRow row{.room_seq = {~std::uint64_t{0}}, .kind = wire::SessionRowKind::supervised, .lease_epoch = ~std::uint64_t{0}};
+  wire::SessionRow row{
+      .room_seq = {~std::uint64_t{0}}, .kind = wire::SessionRowKind::supervised, .lease_epoch = ~std::uint64_t{0}};
   constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min();
-  row.supervision = {.stopped = true, .taken_by = {~std::uint64_t{0}}, .guide = {~std::uint64_t{0}}, .guide_share = kWholeShare,
-                     .force_limit = kMostForceLimit, .zone = ZoneLimit{{kLow, kLow, kLow}, 1 << 30}, .tools = {},
+  row.supervision = {.stopped = true,
+                     .taken_by = {~std::uint64_t{0}},
+                     .guide = {~std::uint64_t{0}},
+                     .guide_share = kWholeShare,
+                     .force_limit = kMostForceLimit,
+                     .zone = ZoneLimit{{kLow, kLow, kLow}, 1 << 30},
+                     .tools = {},
                      .words = std::string(kMostSupervisionWords, 'w')};
-  for (std::size_t n = 0; n < wire::kMostToolsInPacket; ++n) row.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
+  for (std::size_t n = 0; n < wire::kMostToolsInPacket; ++n)
+    row.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
   row.by = {AuthorId{~std::uint64_t{0}}, std::string(wire::kMostNameInPacket, 'n')};
   ASSERT_TRUE(check(row.supervision));
   ASSERT_TRUE(wire::fits_a_packet(row));
@@ -382,8 +399,8 @@ TEST(RowRun, ASupervisionThatNobodyDecidesSpoilsItsPacket) {
   EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
 }
 
-// Rows of three authors, rejections, supervisions and events of the stream, in packets that are lost, repeated and overtaken and may come
-// before the tools' numbers do: the session's order comes out.
+// Rows of three authors, rejections, supervisions and events of the stream, in packets that are lost, repeated and
+// overtaken and may come before the tools' numbers do: the session's order comes out.
 TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
   const wire::ToolNumbers numbers = numbers_1_to_3(), none;
   std::size_t rows_seen = 0, packets = 0, left_out = 0;
@@ -523,7 +540,8 @@ Bytes bytes_of(const std::vector<Cut>& cuts) {
 }
 
 TEST(CutRun, BytesOfRealCuts) {
-  const auto recording = test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
+  const auto recording =
+      test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
   ASSERT_TRUE(recording) << recording.error().message;
   std::vector<Cut> cuts = recording->cuts;
   for (Cut& cut : cuts) cut.path_us = 7000;
@@ -543,23 +561,26 @@ TEST(CutRun, BytesOfRealCuts) {
       const double t = i * 0.008 + k * 0.004;
       const Vec3 tip(10 * std::cos(3 * t), 8 * std::sin(3 * t), -1);
       Pose pose = pose_along(tip + random.in_cube(0.05), {0.3 * std::sin(t), 0.2, -1});
-      pose.rotation = pose.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(random.between(-0.0035, 0.0035), random.direction()));
+      pose.rotation =
+          pose.rotation * Eigen::Quaterniond(Eigen::AngleAxisd(random.between(-0.0035, 0.0035), random.direction()));
       cut.path.push_back(quantise(pose));
     }
     free_hand.push_back(cut);
   }
   const Bytes wild = bytes_of(free_hand);
-  std::printf("recorded: %zu cuts, %.1f B a cut in a run, %.1f B a head, %.1f B as plain messages\n", cuts.size(), recorded.a_cut,
-              recorded.head, recorded.plain);
-  std::printf("free hand: %.1f B a cut in a run, %.1f B a head, %.1f B as plain messages\n", wild.a_cut, wild.head, wild.plain);
+  std::printf("recorded: %zu cuts, %.1f B a cut in a run, %.1f B a head, %.1f B as plain messages\n", cuts.size(),
+              recorded.a_cut, recorded.head, recorded.plain);
+  std::printf("free hand: %.1f B a cut in a run, %.1f B a head, %.1f B as plain messages\n", wild.a_cut, wild.head,
+              wild.plain);
   EXPECT_LE(recorded.a_cut, 20.0);
   EXPECT_LE(wild.a_cut, 40.0);
 }
 
-// A surgeon drills and burrs as recorded for 8 s, then holds the tool still for 8 s: what the way up takes, headers and seal
-// included, with the pose in every packet while it moves and the effort 30 times a second.
+// A surgeon drills and burrs as recorded for 8 s, then holds the tool still for 8 s: what the way up takes, headers and
+// seal included, with the pose in every packet while it moves and the effort 30 times a second.
 TEST(PacketFiller, BytesOfTheWayUp) {
-  const auto recording = test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
+  const auto recording =
+      test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
   ASSERT_TRUE(recording) << recording.error().message;
   for (const double loss : {0.0, 0.3}) {
     Random random(1);
@@ -623,8 +644,8 @@ TEST(PacketFiller, BytesOfTheWayUp) {
       if (in.acknowledged() > said_answer) answers.emplace_back(t + 80ms, said_answer = in.acknowledged());
     }
     const double cutting_kbit = bytes[0] * 8 / 8000.0, idle_kbit = bytes[1] * 8 / 8000.0;
-    std::printf("loss %2.0f %%: %.0f kbit/s in %.0f B packets while cutting, %.1f kbit/s idle (%.1f %% less)\n", 100 * loss,
-                cutting_kbit, bytes[0] / packets[0], idle_kbit, 100 * (1 - idle_kbit / cutting_kbit));
+    std::printf("loss %2.0f %%: %.0f kbit/s in %.0f B packets while cutting, %.1f kbit/s idle (%.1f %% less)\n",
+                100 * loss, cutting_kbit, bytes[0] / packets[0], idle_kbit, 100 * (1 - idle_kbit / cutting_kbit));
     EXPECT_TRUE(window.empty());
     EXPECT_LE(cutting_kbit, 300.0);
     EXPECT_LE(idle_kbit, 0.2 * cutting_kbit);

@@ -60,7 +60,8 @@ class ServerEnd {
   Sent send(Time now) {
     Sent sent;
     DatagramBuffer buffer;
-    while (const auto out = link.send(now, buffer)) sent.emplace_back(out->to, Bytes(out->bytes.begin(), out->bytes.end()));
+    while (const auto out = link.send(now, buffer))
+      sent.emplace_back(out->to, Bytes(out->bytes.begin(), out->bytes.end()));
     return sent;
   }
 
@@ -72,8 +73,8 @@ class ServerEnd {
   wire::ServerLink link;
 };
 
-// What a server does with each datagram before anything of it reaches a room. Every session is there twice: the twins hear the
-// clients and nobody else.
+// What a server does with each datagram before anything of it reaches a room. Every session is there twice: the twins
+// hear the clients and nobody else.
 class Server {
  public:
   explicit Server(const std::vector<SessionKeys>& sessions) {
@@ -104,13 +105,15 @@ class Server {
     report.malformed += after.malformed - before.malformed;
     report.replayed += after.replayed - before.replayed;
     report.forged += after.forged - before.forged;
-    const bool same = after.opened == before.opened && link.address() == twin.address() && link.moves() == twin.moves() &&
-                      link.alive(now) == twin.alive(now) && link.next(now) == twin.next(now) &&
-                      link.acknowledged() == twin.acknowledged() && link.loss() == twin.loss();
+    const bool same = after.opened == before.opened && link.address() == twin.address() &&
+                      link.moves() == twin.moves() && link.alive(now) == twin.alive(now) &&
+                      link.next(now) == twin.next(now) && link.acknowledged() == twin.acknowledged() &&
+                      link.loss() == twin.loss();
     report.accepted += same && found->second->end.take(false) == 0 ? 0 : 1;
   }
 
-  // What is due, of all sessions; the twins' is not for anybody. After every datagram: an answer may come at once, or later.
+  // What is due, of all sessions; the twins' is not for anybody. After every datagram: an answer may come at once, or
+  // later.
   void send(Time now, ForgeryReport& report) {
     for (auto& [number, session] : sessions_) send(*session, now, report);
   }
@@ -155,10 +158,10 @@ struct Peer {
   }
   wire::ClientLink link;
   Endpoint address;
-  Cut cut;               // its newest
+  Cut cut;  // its newest
   CuttingState state;
   Time between_cuts, next_cut{};
-  Bytes last;            // that it sent, and the server has
+  Bytes last;  // that it sent, and the server has
   std::uint64_t sent = 0;
 
   // What is due; empty: nothing.
@@ -187,8 +190,8 @@ struct Peer {
 };
 
 // Never equal to a datagram of a client that is still on its way.
-Bytes forged(Forgery kind, const Bytes& on_its_way, const Bytes& replayed, const Bytes& of_another, const Bytes& reflected,
-             std::mt19937_64& random) {
+Bytes forged(Forgery kind, const Bytes& on_its_way, const Bytes& replayed, const Bytes& of_another,
+             const Bytes& reflected, std::mt19937_64& random) {
   Bytes bytes = on_its_way;
   const auto noise = [&](std::size_t from) {
     for (std::size_t i = from; i < bytes.size(); ++i) bytes[i] = static_cast<std::uint8_t>(random());
@@ -206,22 +209,28 @@ Bytes forged(Forgery kind, const Bytes& on_its_way, const Bytes& replayed, const
       for (std::uint64_t flips = 1 + 2 * (random() % 2); flips > 0; --flips)  // an odd number never undoes itself
         bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1 << random() % 8);
       break;
-    case Forgery::cut_short: bytes.resize(random() % bytes.size()); break;
+    case Forgery::cut_short:
+      bytes.resize(random() % bytes.size());
+      break;
     case Forgery::extended: {
       const std::size_t size = bytes.size();
       bytes.resize(size + 1 + random() % 900);
       if (random() % 2 == 0) noise(size);
       break;
     }
-    case Forgery::other_generation: bytes[4] = static_cast<std::uint8_t>(bytes[4] + 1 + random() % 255); break;
+    case Forgery::other_generation:
+      bytes[4] = static_cast<std::uint8_t>(bytes[4] + 1 + random() % 255);
+      break;
     case Forgery::spliced: {
       // The header of one client's datagram on the body of another's.
       bytes = of_another;
       std::copy_n(on_its_way.begin(), 13, bytes.begin());
       break;
     }
-    case Forgery::replayed: return replayed;
-    case Forgery::reflected: return reflected;
+    case Forgery::replayed:
+      return replayed;
+    case Forgery::reflected:
+      return reflected;
   }
   return bytes;
 }
@@ -281,7 +290,8 @@ ForgeryReport forge(std::uint64_t count, std::uint64_t seed) {
       const Bytes bytes = forged(kind, on_its_way, replayed, of_another, reflected, random);
       // From the client's own address, from another's, or from anywhere.
       Endpoint from = peer.address;
-      if (random() % 2 == 0) from = random() % 2 == 0 ? peers[random() % kPeers]->address : Endpoint{random(), random(), 7};
+      if (random() % 2 == 0)
+        from = random() % 2 == 0 ? peers[random() % kPeers]->address : Endpoint{random(), random(), 7};
       server.take_forged(from, bytes, now, report);
       server.send(now, report);
       ++report.sent[static_cast<std::size_t>(kind)];

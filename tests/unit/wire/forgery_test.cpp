@@ -8,8 +8,8 @@
 namespace osteon {
 namespace {
 
-// Nothing of it is opened, nothing is sent on its account, and the clients' own datagrams go through meanwhile, over moves to
-// other addresses. perf/forgery.cpp does the same 10 million times.
+// Nothing of it is opened, nothing is sent on its account, and the clients' own datagrams go through meanwhile, over
+// moves to other addresses. perf/forgery.cpp does the same 10 million times.
 TEST(Forgery, IsNeitherAcceptedNorAnswered) {
   constexpr std::uint64_t kCount = 100'000;
   const test::ForgeryReport report = test::forge(kCount, 3);

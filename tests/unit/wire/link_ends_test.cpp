@@ -42,8 +42,10 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
     if (seed % 4 != 0) {
       const Time from(static_cast<std::int64_t>(random.between(0.2e9, 2.2e9)));
       const Time until = from + Time(static_cast<std::int64_t>(random.between(0.3e9, seed % 4 == 1 ? 3e9 : 0.8e9)));
-      if (seed % 4 == 3) trial.partition(from, until);
-      else trial.block(from, until);
+      if (seed % 4 == 3)
+        trial.partition(from, until);
+      else
+        trial.block(from, until);
     }
     trial.time.run_until(400ms);
     trial.cut(true);
@@ -61,17 +63,19 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
         words += row.row.kind == wire::SessionRowKind::supervised;
         long_words += row.row.kind == wire::SessionRowKind::supervised && !wire::fits_a_packet(row.row);
       }
-      forged += trial.sessions[c]->link.half().open_counts().forged + trial.clients[c]->link.half().open_counts().forged;
+      forged +=
+          trial.sessions[c]->link.half().open_counts().forged + trial.clients[c]->link.half().open_counts().forged;
       most_waiting = std::max(most_waiting, trial.clients[c]->most_waiting);
       EXPECT_EQ(trial.sessions[c]->link.half().counts().malformed, 0u);
       EXPECT_EQ(trial.clients[c]->link.half().counts().malformed, 0u);
     }
     corrupted += trial.network.counts().paths.corrupted;
   }
-  std::printf("200 seeds: %zu cuts, %zu rows taken, %zu of them by stream; %llu datagrams corrupted, %llu seen as forged; "
-              "without partition settled after p50 %.0f, most %.0f ms\n",
-              cuts, rows, by_stream, static_cast<unsigned long long>(corrupted), static_cast<unsigned long long>(forged),
-              share_of(settled_ms, 0.5), share_of(settled_ms, 1.0));
+  std::printf(
+      "200 seeds: %zu cuts, %zu rows taken, %zu of them by stream; %llu datagrams corrupted, %llu seen as forged; "
+      "without partition settled after p50 %.0f, most %.0f ms\n",
+      cuts, rows, by_stream, static_cast<unsigned long long>(corrupted), static_cast<unsigned long long>(forged),
+      share_of(settled_ms, 0.5), share_of(settled_ms, 1.0));
   EXPECT_GT(words, 100u);
   EXPECT_GT(long_words, 20u);
   EXPECT_GT(words - long_words, long_words / 2);
@@ -100,15 +104,16 @@ TEST(LinkEnds, DelayUntilAPartnerHasACut) {
       for (const auto& client : trial.clients) felt.insert(felt.end(), client->felt_ms.begin(), client->felt_ms.end());
     }
     std::printf("%s: p50 %.1f p90 %.1f p99 %.1f p99.9 %.1f max %.1f ms; %.0f kbit/s up, %.0f down\n",
-                bad ? "40 +- 10 ms, 30 % lost" : "no impairment", share_of(felt, 0.5), share_of(felt, 0.9), share_of(felt, 0.99),
-                share_of(felt, 0.999), share_of(felt, 1), up, down);
+                bad ? "40 +- 10 ms, 30 % lost" : "no impairment", share_of(felt, 0.5), share_of(felt, 0.9),
+                share_of(felt, 0.99), share_of(felt, 0.999), share_of(felt, 1), up, down);
     EXPECT_LE(share_of(felt, 0.99), bad ? 135.0 : 25.0);
   }
 }
 
 // Drilling and burring as recorded at 125 cuts a second for 8 s, then a hand that holds the tool still for 8 s.
 TEST(LinkEnds, BytesOfTheWayUp) {
-  const auto recording = test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
+  const auto recording =
+      test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
   ASSERT_TRUE(recording) << recording.error().message;
   for (const double loss : {0.0, 0.3}) {
     PathQuality quality;
@@ -139,8 +144,9 @@ TEST(LinkEnds, BytesOfTheWayUp) {
     read(idle);
     const auto kbit = [](std::uint64_t bytes) { return static_cast<double>(bytes) * 8.0 / 8000.0; };
     const double up = kbit(cutting[0] - before[0]), up_idle = kbit(idle[0] - rest[0]);
-    std::printf("loss %2.0f %%: up %.0f kbit/s while cutting, %.1f idle (%.1f %% less); down %.0f with two tools, %.1f idle\n",
-                100 * loss, up, up_idle, 100 * (1 - up_idle / up), kbit(cutting[1] - before[1]), kbit(idle[1] - rest[1]));
+    std::printf(
+        "loss %2.0f %%: up %.0f kbit/s while cutting, %.1f idle (%.1f %% less); down %.0f with two tools, %.1f idle\n",
+        100 * loss, up, up_idle, 100 * (1 - up_idle / up), kbit(cutting[1] - before[1]), kbit(idle[1] - rest[1]));
     EXPECT_LE(up, 300.0);
     EXPECT_LE(up_idle, 0.2 * up);
     EXPECT_TRUE(trial.clients[0]->link.alive(trial.time.now()) && trial.sessions[0]->link.alive(trial.time.now()));
@@ -297,7 +303,10 @@ TEST(LinkEnds, BackAndForthBetweenDatagramsAndStream) {
 // Both ends in one place, without a network: what each says can be read, changed or lost.
 struct Pair {
   explicit Pair(const wire::LinkOptions& up = {}, const wire::LinkOptions& down = wire::server_link_options())
-      : client(keys, 1, 1, up), server(keys, {7}, test::seeded(2), 1, 1, down), reads_up(3, keys.up), reads_down(3, keys.down) {}
+      : client(keys, 1, 1, up),
+        server(keys, {7}, test::seeded(2), 1, 1, down),
+        reads_up(3, keys.up),
+        reads_down(3, keys.down) {}
 
   // For so long, what is sent arriving at once, where `lost` lets it.
   void run(Time span) {
@@ -326,19 +335,22 @@ struct Pair {
     cut.author = {7};
     cut.author_seq = number;
     cut.path.resize(1 + knots);
-    for (std::size_t k = 0; k < cut.path.size(); ++k) cut.path[k].position[0] = static_cast<std::int32_t>(10 * (number + k));
+    for (std::size_t k = 0; k < cut.path.size(); ++k)
+      cut.path[k].position[0] = static_cast<std::int32_t>(10 * (number + k));
     return cut;
   }
   // A packet of the client's that its program would never make.
   void say(const v1::UpPacket& packet) {
     DatagramBuffer buffer;
     const std::string plain = packet.SerializeAsString();
-    server.receive(node(2), liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer), now);
+    server.receive(node(2),
+                   liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer), now);
   }
   void say(const v1::DownPacket& packet) {
     DatagramBuffer buffer;
     const std::string plain = packet.SerializeAsString();
-    client.receive(liar_down.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer), now);
+    client.receive(liar_down.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer),
+                   now);
   }
 
   SessionKeys keys = make_session_keys(3, test::seeded(1));
@@ -361,7 +373,8 @@ TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
   const auto sealed = [&](const v1::UpPacket& packet) {
     DatagramBuffer buffer;
     const std::string plain = packet.SerializeAsString();
-    const auto bytes = pair.liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, pair.now, buffer);
+    const auto bytes =
+        pair.liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, pair.now, buffer);
     return std::vector(bytes.begin(), bytes.end());
   };
   const auto token_sent_to = [&](const Endpoint& to) {
@@ -483,7 +496,10 @@ TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
 TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   Pair pair;
   pair.run(300ms);
-  wire::SessionRow word{.room_seq = {5}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 6, .supervision = {.taken_by = {3}},
+  wire::SessionRow word{.room_seq = {5},
+                        .kind = wire::SessionRowKind::supervised,
+                        .lease_epoch = 6,
+                        .supervision = {.taken_by = {3}},
                         .by = {AuthorId{3}, "Dr. Weber"}};
   EXPECT_TRUE(pair.server.tell(1, word));
   pair.run(100ms);
@@ -741,11 +757,13 @@ TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
       const auto partners = pair.client.partners(pair.now);
       EXPECT_EQ(partners.size(), 1u);
       for (const auto& partner : partners)
-        worst_mm = std::max(worst_mm, (partner.state.pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm());
+        worst_mm =
+            std::max(worst_mm, (partner.state.pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm());
     }
     std::printf("tremor %.3f mm, %.0f mm/s: %zu packets in 4 s, partner's picture off by %.3f mm at most\n", tremor_mm,
                 speed_mm_per_s, pair.ups.size() - before, worst_mm);
-    // Within the deadband and a quantum at rest; else what it goes in two intervals up, two down, and what the test waits.
+    // Within the deadband and a quantum at rest; else what it goes in two intervals up, two down, and what the test
+    // waits.
     EXPECT_LE(worst_mm, 0.02 + 0.002 + speed_mm_per_s * 0.064);
     return pair.ups.size() - before;
   };
@@ -762,8 +780,10 @@ TEST(LinkEnds, FreezeAndEpochGetThroughAtOnce) {
     trial.time.run_until(2s);
     wire::ServerLink& server = trial.sessions[0]->link;
     const wire::ClientLink& client = trial.clients[0]->link;
-    if (seed % 2 == 0) server.set_frozen(true);
-    else server.set_lease_epoch(5);
+    if (seed % 2 == 0)
+      server.set_frozen(true);
+    else
+      server.set_lease_epoch(5);
     const Time at = trial.time.now();
     while (!client.frozen() && client.lease_epoch() != 5 && trial.time.now() < at + 2s)
       trial.time.run_until(trial.time.now() + 1ms);

@@ -32,7 +32,8 @@ void Trial::move_client(std::size_t c, const Endpoint& to) {
 
 bool Trial::settled() const {
   for (std::size_t c = 0; c < kClients; ++c) {
-    if (sessions[c]->cuts.size() != clients[c]->cuts.size() || sessions[c]->kept != clients[c]->cuts.size()) return false;
+    if (sessions[c]->cuts.size() != clients[c]->cuts.size() || sessions[c]->kept != clients[c]->cuts.size())
+      return false;
     if (clients[c]->rows.size() != sessions[c]->rows.size()) return false;
     if (clients[c]->link.acknowledged() != sessions[c]->kept) return false;
   }
@@ -138,7 +139,8 @@ void Trial::turn(std::size_t c) {
     client.rows.push_back(std::move(*row));
   }
   if (!client.link.alive(now)) {
-    for (std::uint64_t n = std::max(client.link.acknowledged(), client.streamed_cuts) + 1; n <= client.cuts.size(); ++n) {
+    for (std::uint64_t n = std::max(client.link.acknowledged(), client.streamed_cuts) + 1; n <= client.cuts.size();
+         ++n) {
       stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.offer(cut); });
       client.streamed_cuts = n;
     }
@@ -207,7 +209,8 @@ void Trial::tick() {
       sessions[1 - c]->link.set_partners(partners);
     }
     if (!session.link.alive(time.now())) {
-      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_rows) + 1; i <= session.rows.size(); ++i)
+      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_rows) + 1; i <= session.rows.size();
+           ++i)
         stream_row(c, session.streamed_rows = i);
       if (session.said_kept != session.kept) {
         session.said_kept = session.kept;
@@ -221,7 +224,8 @@ void Trial::tick() {
 // An instructor's word on one of the clients; every third is too long for a packet.
 wire::SessionRow Trial::supervised(RoomSeq seq) {
   wire::SessionRow row{.room_seq = seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = seq.value + 1};
-  row.supervision = {.stopped = seq.value % 2 == 0, .force_limit = static_cast<int>(seq.value % 1000), .words = "as agreed"};
+  row.supervision = {
+      .stopped = seq.value % 2 == 0, .force_limit = static_cast<int>(seq.value % 1000), .words = "as agreed"};
   row.by = {AuthorId{1 + seq.value % 5}, seq.value % 5 == 0 ? "" : "Dr. Weber"};
   for (std::uint64_t tool = 1; tool <= seq.value % 9 * 2; ++tool) row.supervision.tools.push_back(tool_of(tool));
   return row;
@@ -231,7 +235,10 @@ void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool e
   for (const auto& [author, cut] : decided) {
     const RoomSeq seq{++room_seq_};
     if (options_.reject_each != 0 && cut.author_seq % options_.reject_each == 0) {
-      tell(author, {.room_seq = seq, .kind = wire::SessionRowKind::rejected, .author_seq = cut.author_seq, .reason = 3,
+      tell(author, {.room_seq = seq,
+                    .kind = wire::SessionRowKind::rejected,
+                    .author_seq = cut.author_seq,
+                    .reason = 3,
                     .lease_epoch = 1 + cut.author_seq / 300});
     } else {
       for (std::size_t c = 0; c < kClients; ++c)
@@ -241,7 +248,8 @@ void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool e
   }
   if (event) {
     const RoomSeq seq{++room_seq_};
-    for (std::size_t c = 0; c < kClients; ++c) tell(c, seq.value % 3 == c ? supervised(seq) : wire::SessionRow{.room_seq = seq});
+    for (std::size_t c = 0; c < kClients; ++c)
+      tell(c, seq.value % 3 == c ? supervised(seq) : wire::SessionRow{.room_seq = seq});
   }
   for (std::size_t c = 0; c < kClients; ++c) {
     sessions[c]->link.decided(sessions[c]->kept);

@@ -1,6 +1,6 @@
-// Two haptic clients and a room, joined by ClientLink and ServerLink over a simulated network, with a stream beside it: the
-// owners' side of both ends, as simple as can be. The room decides cuts 120 times a second, keeps them 2 ms later, and tells
-// everyone.
+// Two haptic clients and a room, joined by ClientLink and ServerLink over a simulated network, with a stream beside it:
+// the owners' side of both ends, as simple as can be. The room decides cuts 120 times a second, keeps them 2 ms later,
+// and tells everyone.
 #pragma once
 #include <array>
 #include <deque>
@@ -23,9 +23,9 @@ struct TrialOptions {
   std::uint64_t seed = 1;
   PathQuality quality;
   wire::LinkOptions up{}, down = wire::server_link_options();
-  Time stream_delay = 100ms;     // one way
-  double long_cuts = 0.02;       // too long for a packet
-  double events = 0.01;          // of ticks: something that only the stream tells
+  Time stream_delay = 100ms;  // one way
+  double long_cuts = 0.02;    // too long for a packet
+  double events = 0.01;       // of ticks: something that only the stream tells
   std::uint64_t reject_each = 40;
   std::function<Cut(std::size_t client, std::uint64_t number)> cut{};  // none: a made-up drilling
 };
@@ -49,15 +49,15 @@ class Trial {
     SessionKeys keys;
     wire::ClientLink link;
     std::unique_ptr<SimPort> port;
-    std::vector<Cut> cuts;             // all that were made, by author_seq - 1
+    std::vector<Cut> cuts;  // all that were made, by author_seq - 1
     std::vector<Time> made_at;
-    std::uint64_t streamed_cuts = 0;   // up to here they went over the stream
+    std::uint64_t streamed_cuts = 0;     // up to here they went over the stream
     std::vector<wire::IndexedRow> rows;  // all that were taken
-    std::vector<double> felt_ms;       // from a partner's cut until its row was here
-    std::uint64_t said_rows = 0;       // over the stream
-    std::uint64_t uplink_bytes = 0;    // with 28 of headers each
+    std::vector<double> felt_ms;         // from a partner's cut until its row was here
+    std::uint64_t said_rows = 0;         // over the stream
+    std::uint64_t uplink_bytes = 0;      // with 28 of headers each
     std::uint64_t rows_by_stream = 0, refused = 0;
-    std::size_t most_waiting = 0;      // bytes unacknowledged
+    std::size_t most_waiting = 0;  // bytes unacknowledged
     std::optional<Time> wakes_at;
     bool cutting = false;
     CuttingState state;

@@ -19,7 +19,9 @@ TEST(Version, TheServerTakesItsOwnAndTheOneBefore) {
     const std::string& why = checked.error().message;
     EXPECT_NE(why.find("version " + std::to_string(other) + " "), std::string::npos) << why;
     EXPECT_NE(why.find("version 4, or 3"), std::string::npos) << why;
-    EXPECT_NE(why.find("install a newer Osteon where the " + std::string(other < 3 ? "client" : "server") + " runs"), std::string::npos) << why;
+    EXPECT_NE(why.find("install a newer Osteon where the " + std::string(other < 3 ? "client" : "server") + " runs"),
+              std::string::npos)
+        << why;
     EXPECT_EQ(why.find('\n'), std::string::npos);
   }
 }

@@ -1,5 +1,5 @@
-// One hand leads another's: the pull begins and ends anywhere without a jump, brings the hands together however late states
-// come, and gives no energy that the leading hand's motion has not paid.
+// One hand leads another's: the pull begins and ends anywhere without a jump, brings the hands together however late
+// states come, and gives no energy that the leading hand's motion has not paid.
 #include "haptic_client/control/guidance_spring.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,8 @@ constexpr double kT = 1e-3, kSlew_n = 0.5, kBudget_mj = 0.01;
 // States of a leading hand as a bad line brings them: now and then, late, some lost, some out of order.
 class BadLine {
  public:
-  BadLine(int delay_ms, double jitter_ms, double loss, double hz) : delay_ms_(delay_ms), jitter_ms_(jitter_ms), loss_(loss), hz_(hz) {}
+  BadLine(int delay_ms, double jitter_ms, double loss, double hz)
+      : delay_ms_(delay_ms), jitter_ms_(jitter_ms), loss_(loss), hz_(hz) {}
   GuideSeen tick(const Vec3& place_mm) {
     ++now_;
     if (std::fmod(now_ * kT * hz_, 1.0) < kT * hz_) {
@@ -65,12 +66,14 @@ struct Led {
     const Vec3 before_n = force_n;
     const double far_mm_per_s = 60.0 + std::min(400.0, (pull.smoothed_mm() - smoothed_mm).norm() / kT);
     smoothed_mm = pull.smoothed_mm();
-    force_n = pull.step({.handle_mm = handle_mm, .guide_mm = smoothed_mm, .share = share, .room_n = 60.0, .slew_n = kSlew_n});
+    force_n =
+        pull.step({.handle_mm = handle_mm, .guide_mm = smoothed_mm, .share = share, .room_n = 60.0, .slew_n = kSlew_n});
     // The far end goes no faster than the other's hand and what it makes up; no more than this can it put in.
     paid_mj += std::max(force_n.norm(), before_n.norm()) * far_mm_per_s * kT;
     over_mj = std::max(over_mj, given_mj - paid_mj);
     const double square = before_n.squaredNorm();
-    const Vec3 kept_n = square > 0.0 ? Vec3(std::clamp(force_n.dot(before_n) / square, 0.0, 1.0) * before_n) : Vec3(Vec3::Zero());
+    const Vec3 kept_n =
+        square > 0.0 ? Vec3(std::clamp(force_n.dot(before_n) / square, 0.0, 1.0) * before_n) : Vec3(Vec3::Zero());
     step_n = std::max(step_n, (force_n - kept_n).norm());
     most_n = std::max(most_n, force_n.norm());
     return force_n;
@@ -99,8 +102,9 @@ TEST_P(GuideOverLine, BringsTheHandAlongWithoutAJump) {
     if (i > 10'000) rested_mm = std::min(rested_mm, (led.handle_mm - place(i)).norm());
   }
   // On its way it is as far behind as the states are late, and some tens of milliseconds, at 10 mm/s.
-  std::printf("  %d ms late: %.2f mm behind, %.3f mm off at rest, %.2f N at most, step %.3f N, over %.4f mJ, worst %.5f mJ\n",
-              GetParam(), far_mm, rested_mm, led.most_n, led.step_n, led.over_mj, led.pull.energy().worst_mj);
+  std::printf(
+      "  %d ms late: %.2f mm behind, %.3f mm off at rest, %.2f N at most, step %.3f N, over %.4f mJ, worst %.5f mJ\n",
+      GetParam(), far_mm, rested_mm, led.most_n, led.step_n, led.over_mj, led.pull.energy().worst_mj);
   EXPECT_LT(far_mm, 10.0 * (1e-3 * GetParam() + 0.2) + 0.2);
   EXPECT_LT(rested_mm, 0.2);
   // Silence: within a quarter of a second it begins to fade, and within another it is gone.
@@ -163,7 +167,8 @@ TEST(GuidanceSpring, AHandleThatIsThrownAboutGetsNothingForNothing) {
     given_mj += force.dot(v * kT);
     moved_mm += (v * kT).norm();
     pull.see(seen);
-    force = pull.step({.handle_mm = x, .guide_mm = pull.smoothed_mm(), .share = 1.0, .room_n = 60.0, .slew_n = kSlew_n});
+    force =
+        pull.step({.handle_mm = x, .guide_mm = pull.smoothed_mm(), .share = 1.0, .room_n = 60.0, .slew_n = kSlew_n});
     paid_mj += force.norm() * 60.0 * kT;
     over_mj = std::max(over_mj, given_mj - paid_mj);
   }
@@ -172,9 +177,9 @@ TEST(GuidanceSpring, AHandleThatIsThrownAboutGetsNothingForNothing) {
   EXPECT_LE(pull.energy().worst_mj, kBudget_mj);
 }
 
-// The same where contact comes and goes at once beside the pull, which makes up for that (slew.hpp) in whatever direction. The
-// handle stays so near that the far end stands where the guide does: work that the hand gets is all the spring's, whose store was
-// empty.
+// The same where contact comes and goes at once beside the pull, which makes up for that (slew.hpp) in whatever
+// direction. The handle stays so near that the far end stands where the guide does: work that the hand gets is all the
+// spring's, whose store was empty.
 TEST(GuidanceSpring, MakesUpForContactOutOfWhatTheHandHasPaid) {
   Random random(9);
   GuidanceSpring pull;
@@ -207,10 +212,12 @@ TEST(GuidanceSpring, MakesUpForContactOutOfWhatTheHandHasPaid) {
   ASSERT_LT(far_mm, 5.0);
   EXPECT_GT(aside_n, 2.0) << "it makes up for contact";
   EXPECT_LE(most_mj, kBudget_mj);
-  std::printf("  %.2f mm away, %.5f mJ given at most, %.2f mJ in the end; %.2f N aside\n", far_mm, most_mj, given_mj, aside_n);
+  std::printf("  %.2f mm away, %.5f mJ given at most, %.2f mJ in the end; %.2f N aside\n", far_mm, most_mj, given_mj,
+              aside_n);
 }
 
-// A device that is gone, a clutch, a loop that comes late: no force at once, and the pull begins anew from where the handle is.
+// A device that is gone, a clutch, a loop that comes late: no force at once, and the pull begins anew from where the
+// handle is.
 TEST(GuidanceSpring, BeginsAnewAfterASafetyZero) {
   Led led(0.02);
   GuideSeen seen{true, 1, {30, 0, 0}};
@@ -219,8 +226,15 @@ TEST(GuidanceSpring, BeginsAnewAfterASafetyZero) {
     led.tick(seen);
   }
   ASSERT_GT(led.force_n.norm(), 1.0);
-  EXPECT_EQ(led.pull.step({.handle_mm = led.handle_mm, .guide_mm = led.smoothed_mm, .share = 1.0, .room_n = 60.0, .slew_n = kSlew_n,
-                           .safe = false}).norm(), 0.0);
+  EXPECT_EQ(led.pull
+                .step({.handle_mm = led.handle_mm,
+                       .guide_mm = led.smoothed_mm,
+                       .share = 1.0,
+                       .room_n = 60.0,
+                       .slew_n = kSlew_n,
+                       .safe = false})
+                .norm(),
+            0.0);
   led.force_n.setZero();
   led.step_n = 0.0;
   EXPECT_LT(led.tick(seen).norm(), 0.01);
@@ -231,8 +245,8 @@ TEST(GuidanceSpring, BeginsAnewAfterASafetyZero) {
   EXPECT_LE(led.step_n, kSlew_n + 1e-9);
 }
 
-// In the loop: a hand that works in the bone is led aside while it is stopped, and let go again; with the contact together no
-// step is above the limit, and no force above the device's or the instructor's.
+// In the loop: a hand that works in the bone is led aside while it is stopped, and let go again; with the contact
+// together no step is above the limit, and no force above the device's or the instructor's.
 class LedAtTheBone : public ::testing::TestWithParam<std::tuple<int, bool>> {};
 TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
   const auto [delay_ms, weak] = GetParam();
@@ -258,12 +272,17 @@ TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
     const LoopReport now = hand.tick();
     led += (now.events & kHandGuided) != 0;
     ASSERT_LE(now.force_device_n.norm(), hand.loop().params().peak_n + 1e-9);
-    if (i > 7200 + delay_ms && i < 11'000) { ASSERT_LE(now.force_device_n.norm(), 10.0 * s + 1e-9) << i; }
-    if (i > 11'600 + delay_ms) { ASSERT_EQ(now.guide_device_n.norm(), 0.0) << i; }
+    if (i > 7200 + delay_ms && i < 11'000) {
+      ASSERT_LE(now.force_device_n.norm(), 10.0 * s + 1e-9) << i;
+    }
+    if (i > 11'600 + delay_ms) {
+      ASSERT_EQ(now.guide_device_n.norm(), 0.0) << i;
+    }
   }
   const osteon::test::Crossed& crossed = hand.crossed();
-  std::printf("  %d ms, %s: step over slew %.3f, contact %.5f mJ, pull %.5f mJ, led %lld ms\n", delay_ms, weak ? "weak" : "strong",
-              crossed.step_over_slew, crossed.worst_mj, crossed.led_mj, static_cast<long long>(led));
+  std::printf("  %d ms, %s: step over slew %.3f, contact %.5f mJ, pull %.5f mJ, led %lld ms\n", delay_ms,
+              weak ? "weak" : "strong", crossed.step_over_slew, crossed.worst_mj, crossed.led_mj,
+              static_cast<long long>(led));
   EXPECT_GT(led, 6000);
   EXPECT_GT(crossed.cutting, 500);
   EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
@@ -305,8 +324,8 @@ TEST(LimitOfForce, LetsNeitherContactNorPullGoAtOnce) {
   EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
 }
 
-// Another's bur beside the own one pushes it aside, within the same limit together with all else; who leads the hand, or has its
-// tool, by whatever program and with whatever hand, is where it is and pushes nothing.
+// Another's bur beside the own one pushes it aside, within the same limit together with all else; who leads the hand,
+// or has its tool, by whatever program and with whatever hand, is where it is and pushes nothing.
 TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
   for (const bool weak : {false, true}) {
     OverseenHand hand({.weak = weak});
@@ -326,7 +345,9 @@ TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
       if (i == 7500) hand.decide({.taken_by = AuthorId{77}});  // a console: of the person whose hand is 2
       const LoopReport now = hand.tick();
       most_n = std::max(most_n, now.partner_device_n.norm());
-      if (i > 6001) { ASSERT_EQ(now.partner_device_n.norm(), 0.0) << i; }
+      if (i > 6001) {
+        ASSERT_EQ(now.partner_device_n.norm(), 0.0) << i;
+      }
     }
     std::printf("  %s: %.2f N of the partner's tool, step over slew %.3f\n", weak ? "weak" : "strong", most_n,
                 hand.crossed().step_over_slew);

@@ -9,9 +9,15 @@ namespace {
 TEST(OversightWords, SayAllThatHolds) {
   EXPECT_EQ(in_words({}), "");
   EXPECT_EQ(in_words({.stopped = true, .words = "look here"}), "stopped");
-  EXPECT_EQ(in_words({.stopped = true, .taken_by = AuthorId{4}, .guide = AuthorId{5}, .guide_share = 250, .force_limit = 300,
-                      .zone = ZoneLimit{{1, 2, 3}, 4}, .tools = {Digest{{1}}, Digest{{2}}}}),
-            "stopped, tool taken by 4, led by 5 with a share of 250, no more than 300 hundredths of a newton, within a ball only, "
+  EXPECT_EQ(in_words({.stopped = true,
+                      .taken_by = AuthorId{4},
+                      .guide = AuthorId{5},
+                      .guide_share = 250,
+                      .force_limit = 300,
+                      .zone = ZoneLimit{{1, 2, 3}, 4},
+                      .tools = {Digest{{1}}, Digest{{2}}}}),
+            "stopped, tool taken by 4, led by 5 with a share of 250, no more than 300 hundredths of a newton, within a "
+            "ball only, "
             "with 2 tools only");
 }
 

@@ -18,7 +18,8 @@ using osteon::test::OverseenRun;
 constexpr double kBudget_mj = 0.01;  // of one contact
 
 ZoneLimit ball(const Vec3& centre_mm, double radius_mm) {
-  return {quantise({centre_mm, Eigen::Quaterniond::Identity()}).position, static_cast<std::int32_t>(radius_mm / kQuantum_mm)};
+  return {quantise({centre_mm, Eigen::Quaterniond::Identity()}).position,
+          static_cast<std::int32_t>(radius_mm / kQuantum_mm)};
 }
 
 TEST(SupervisionGuard, ADatagramsWordHoldsUntilANewerRow) {
@@ -34,7 +35,8 @@ TEST(SupervisionGuard, ADatagramsWordHoldsUntilANewerRow) {
   row.stopped = true;
   overseer.set(row);
   EXPECT_TRUE(overseer.stopped());
-  // A rejection raises the epoch while the hand is stopped; where the way of datagrams then ends, the flag stays as it was.
+  // A rejection raises the epoch while the hand is stopped; where the way of datagrams then ends, the flag stays as it
+  // was.
   overseer.set(StopFlag{9, true});
   row.lease_epoch = 10;
   row.stopped = false;
@@ -59,7 +61,9 @@ TEST(SupervisionGuard, ForceComesDownToItsLimitAndUpAgainNoFasterThanItMay) {
   double before_n = 20.0;
   for (int i = 0; i < 30; ++i) {
     const double now_n = overseer.limit_n(60.0, 0.0, 0.5);
-    if (i == 0) { before_n = now_n; }
+    if (i == 0) {
+      before_n = now_n;
+    }
     EXPECT_GE(now_n, before_n - 0.5 - 1e-12);
     before_n = now_n;
   }
@@ -77,7 +81,8 @@ TEST(SupervisionGuard, ForceComesDownToItsLimitAndUpAgainNoFasterThanItMay) {
 
 // What the loop keeps to is what the room judges by.
 TEST(SupervisionGuard, KeepsToWhatTheRoomWouldRefuse) {
-  const std::vector<ToolModel> tools{ToolModel(*find_tool("burr-round-5"), 0.5), ToolModel(*find_tool("drill-3.2"), 0.5)};
+  const std::vector<ToolModel> tools{ToolModel(*find_tool("burr-round-5"), 0.5),
+                                     ToolModel(*find_tool("drill-3.2"), 0.5)};
   Restrictions said;
   said.zone = ball({1, 2, 3}, 4.0);
   said.tools = {tools[1].tool.hash()};
@@ -90,7 +95,9 @@ TEST(SupervisionGuard, KeepsToWhatTheRoomWouldRefuse) {
       cut.path = {quantise({Vec3(x, 2, 3), Eigen::Quaterniond::Identity()})};
       const Rejection word = breach(said, cut);
       EXPECT_EQ(word == Rejection::none, tool == 1 && overseer.takes({x, 2, 3})) << x;
-      if (overseer.may_cut(tool, {x, 2, 3})) { EXPECT_EQ(word, Rejection::none) << x; }
+      if (overseer.may_cut(tool, {x, 2, 3})) {
+        EXPECT_EQ(word, Rejection::none) << x;
+      }
     }
   EXPECT_TRUE(overseer.may_cut(1, {1, 2, 3}));
 }
@@ -140,11 +147,13 @@ class Pressed {
 
 class Overseen : public ::testing::TestWithParam<std::tuple<const char*, int, bool>> {
  protected:
-  Overseen() : run_{.tool = std::get<0>(GetParam()), .delay_ms = std::get<1>(GetParam()), .weak = std::get<2>(GetParam())} {}
+  Overseen()
+      : run_{.tool = std::get<0>(GetParam()), .delay_ms = std::get<1>(GetParam()), .weak = std::get<2>(GetParam())} {}
   void check(const char* what, const Crossed& crossed) {
-    std::printf("  %s, %s, %d ms: step over slew %.3f, worst %.5f mJ, falls %.2f N, cut in %lld of %lld touching ticks\n", what,
-                run_.tool, run_.delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.fall_n,
-                static_cast<long long>(crossed.cutting), static_cast<long long>(crossed.touching));
+    std::printf(
+        "  %s, %s, %d ms: step over slew %.3f, worst %.5f mJ, falls %.2f N, cut in %lld of %lld touching ticks\n", what,
+        run_.tool, run_.delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.fall_n,
+        static_cast<long long>(crossed.cutting), static_cast<long long>(crossed.touching));
     EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
     EXPECT_LE(crossed.worst_mj, kBudget_mj);
     EXPECT_EQ(crossed.allocations, 0);
@@ -153,8 +162,8 @@ class Overseen : public ::testing::TestWithParam<std::tuple<const char*, int, bo
   OverseenRun run_;
 };
 
-// From the tick on in which the hand hears of it nothing is cut, and the bone stays as hard as it was; what went up meanwhile
-// is refused and comes back. Given back, it cuts on.
+// From the tick on in which the hand hears of it nothing is cut, and the bone stays as hard as it was; what went up
+// meanwhile is refused and comes back. Given back, it cuts on.
 TEST_P(Overseen, StopsInTheBoneAndGoesOn) {
   Pressed pressed(run_);
   OverseenHand& hand = pressed.hand;
@@ -172,7 +181,9 @@ TEST_P(Overseen, StopsInTheBoneAndGoesOn) {
     EXPECT_TRUE(hand.last().events & kForbidden);
     EXPECT_EQ(hand.replica().unconfirmed(), 0u);
     // Where none of what it had cut was taken back it feels the bone that it stopped in.
-    if (run_.delay_ms == 0) { EXPECT_GT(pressed.force_n, 0.3 * (run_.weak ? 0.11 : 1.0)) << "bone stays hard"; }
+    if (run_.delay_ms == 0) {
+      EXPECT_GT(pressed.force_n, 0.3 * (run_.weak ? 0.11 : 1.0)) << "bone stays hard";
+    }
     hand.decide({});
     pressed.work(run_.delay_ms);
     if (run_.delay_ms > 0) pressed.lift();
@@ -243,8 +254,9 @@ INSTANTIATE_TEST_SUITE_P(Tools, Overseen,
                                            Case("burr-round-5", 150, false), Case("drill-3.2", 0, true),
                                            Case("drill-3.2", 50, false), Case("drill-3.2", 150, true)));
 
-// The bone yields on its mount under this hand and another user, who pushes it as suddenly as a push can be told, while the hand
-// is stopped, led, loses its tool and gets it back, and what it cut comes back round it, all with the tool on the bone.
+// The bone yields on its mount under this hand and another user, who pushes it as suddenly as a push can be told, while
+// the hand is stopped, led, loses its tool and gets it back, and what it cut comes back round it, all with the tool on
+// the bone.
 class OnAMount : public ::testing::TestWithParam<std::tuple<const char*, int, bool>> {};
 
 TEST_P(OnAMount, IsOverruledAsGentlyAsOnBoneThatStands) {
@@ -279,10 +291,11 @@ TEST_P(OnAMount, IsOverruledAsGentlyAsOnBoneThatStands) {
   }
   const Crossed& crossed = hand.crossed();
   const osteon::test::InContact& held = crossed.in_contact;
-  std::printf("  %s, %d ms: step over slew %.3f, worst %.5f mJ, led %.5f mJ, made %.4f mJ, bone %.1f mm, cutting %lld; in "
-              "contact: stopped %d, taken %d, back %d, led %d, undone %d\n",
-              tool, delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.led_mj, crossed.made_mj, crossed.carried_mm,
-              static_cast<long long>(crossed.cutting), held.stopped, held.taken, held.given_back, held.led, held.undone);
+  std::printf(
+      "  %s, %d ms: step over slew %.3f, worst %.5f mJ, led %.5f mJ, made %.4f mJ, bone %.1f mm, cutting %lld; in "
+      "contact: stopped %d, taken %d, back %d, led %d, undone %d\n",
+      tool, delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.led_mj, crossed.made_mj, crossed.carried_mm,
+      static_cast<long long>(crossed.cutting), held.stopped, held.taken, held.given_back, held.led, held.undone);
   EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
   EXPECT_LE(crossed.worst_mj, kBudget_mj);
   EXPECT_LE(crossed.led_mj, kBudget_mj);
@@ -298,7 +311,8 @@ INSTANTIATE_TEST_SUITE_P(Tools, OnAMount,
                                            Case("burr-round-5", 150, true), Case("drill-3.2", 0, false),
                                            Case("drill-3.2", 50, true), Case("drill-3.2", 150, false)));
 
-// What is found to be within the limit is so because the loop keeps to it: one that lets force grow ten times as fast is seen.
+// What is found to be within the limit is so because the loop keeps to it: one that lets force grow ten times as fast
+// is seen.
 TEST(OverseenHand, SeesAStepThatIsTooLarge) {
   double most = 0.0;
   for (const char* tool : {"burr-round-5", "drill-3.2"}) {
@@ -319,7 +333,8 @@ TEST(OverseenHand, SeesAStepThatIsTooLarge) {
   EXPECT_GT(most, 1.5);
 }
 
-// A bur that is led to and fro across the edge of where it may cut: no path leaves that, and beyond it the bone is whole.
+// A bur that is led to and fro across the edge of where it may cut: no path leaves that, and beyond it the bone is
+// whole.
 TEST(Zone, NothingIsCutBeyondItsEdge) {
   OverseenHand hand({});
   Restrictions zoned;
@@ -334,7 +349,9 @@ TEST(Zone, NothingIsCutBeyondItsEdge) {
     const double out_mm = now.pose_bone_proxy.position_mm.norm();
     if (i > 1000 && out_mm > 8.0) least_rpm = std::min(least_rpm, now.spindle_rpm);
     if (out_mm < 2.5) most_rpm = std::max(most_rpm, now.spindle_rpm);
-    if (now.phase == CuttingPhase::cutting) { EXPECT_LT(out_mm, 4.0); }
+    if (now.phase == CuttingPhase::cutting) {
+      EXPECT_LT(out_mm, 4.0);
+    }
   }
   EXPECT_LT(least_rpm, 1.0);
   EXPECT_GT(most_rpm, 1000.0);
