@@ -28,7 +28,7 @@ bool has_news(const HeardState& said, const HeardState& now, const PoseDeadband&
 
 ClientLink::ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq, std::uint64_t first_index,
                        const LinkOptions& options)
-    : half_(keys.session, keys.up, keys.down, first_author_seq, options), rows_(first_index, options.most_ahead) {}
+    : half_(keys.session, keys.up, keys.down, first_author_seq, options), entries_(first_index, options.most_ahead) {}
 
 bool ClientLink::push(const Cut& cut) {
   if (half_.begin(cut.author_seq) && fits_a_packet(cut)) {
@@ -57,10 +57,10 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   const std::string& token = packet.path_challenge();
   if (!token.empty() && token.size() != echo_.size()) return half_.malformed();
   std::size_t left_out = 0;
-  const auto rows = rows_of(packet, tools_, &left_out);
-  if (!rows) return half_.malformed();
-  if (std::ranges::any_of(*rows, [](const IndexedRow& one) {
-        return one.row.kind != SessionRowKind::streamed && !fits_a_packet(one.row);
+  const auto entries = entries_of(packet, tools_, &left_out);
+  if (!entries) return half_.malformed();
+  if (std::ranges::any_of(*entries, [](const IndexedEntry& one) {
+        return one.entry.kind != SessionEntryKind::streamed && !fits_a_packet(one.entry);
       }))
     return half_.malformed();
   std::vector<HeardState> states;
@@ -94,9 +94,9 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     lease_epoch_ = packet.lease_epoch();
     frozen_ = packet.frozen();
   }
-  for (const IndexedRow& row : *rows)
-    if (row.row.kind != SessionRowKind::streamed) rows_.offer(row.index, row.row);
-  if (!rows->empty() || left_out > 0) half_.answer();
+  for (const IndexedEntry& entry : *entries)
+    if (entry.entry.kind != SessionEntryKind::streamed) entries_.offer(entry.index, entry.entry);
+  if (!entries->empty() || left_out > 0) half_.answer();
   for (HeardState& state : states) keep_partner(std::move(state), now);
   if (bone && bone->seen_seq > bone_seq_) {
     bone_ = bone;
@@ -118,10 +118,10 @@ std::vector<HeardState> ClientLink::partners(Time now) const {
   return heard;
 }
 
-std::optional<IndexedRow> ClientLink::take_row() {
-  auto row = rows_.take();
-  if (!row) return {};
-  return IndexedRow{rows_.acknowledged(), std::move(*row)};
+std::optional<IndexedEntry> ClientLink::take_entry() {
+  auto entry = entries_.take();
+  if (!entry) return {};
+  return IndexedEntry{entries_.acknowledged(), std::move(*entry)};
 }
 
 // When the state itself asks for a packet.
@@ -154,8 +154,8 @@ Time ClientLink::next(Time now) const { return half_.next(now, std::min(state_du
 std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t> into) {
   if (next(now) > now) return {};
   PacketFiller<v1::UpPacket> filler(half_.room(now));
-  const std::uint64_t taken = rows_.acknowledged();
-  auto head = half_.head<v1::UpPacket>(now, taken, rows_.beyond(taken));
+  const std::uint64_t taken = entries_.acknowledged();
+  auto head = half_.head<v1::UpPacket>(now, taken, entries_.beyond(taken));
   if (echoes_left_ > 0) {
     --echoes_left_;
     head.set_path_echo(echo_.data(), echo_.size());

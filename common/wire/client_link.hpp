@@ -25,7 +25,7 @@ class ClientLink {
   using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
-  // The first cut to be pushed has `first_author_seq`, and the first row to come `first_index`.
+  // The first cut to be pushed has `first_author_seq`, and the first entry to come `first_index`.
   ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq = 1, std::uint64_t first_index = 1,
              const LinkOptions& options = {});
 
@@ -46,12 +46,12 @@ class ClientLink {
 
   // Anything may come.
   void receive(std::span<const std::uint8_t> datagram, Time now);
-  // The stream's copy of a row. False: it has come before, or is too far ahead of what was taken.
-  bool offer(const IndexedRow& row) { return rows_.offer(row.index, row.row); }
-  // The stream has brought this row, and before it all that had not been taken here: none of them comes out any more.
-  void heard(std::uint64_t index) { rows_.skip(index); }
-  // Rows in order of their index, each once. A row of kind streamed comes only after its copy was offered.
-  [[nodiscard]] std::optional<IndexedRow> take_row();
+  // The stream's copy of a entry. False: it has come before, or is too far ahead of what was taken.
+  bool offer(const IndexedEntry& entry) { return entries_.offer(entry.index, entry.entry); }
+  // The stream has brought this entry, and before it all that had not been taken here: none of them comes out any more.
+  void heard(std::uint64_t index) { entries_.skip(index); }
+  // Rows in order of their index, each once. A entry of kind streamed comes only after its copy was offered.
+  [[nodiscard]] std::optional<IndexedEntry> take_entry();
 
   // When send() has something, at `now` or later; to be asked anew after any other call.
   [[nodiscard]] Time next(Time now) const;
@@ -66,7 +66,7 @@ class ClientLink {
   // Cuts up to this one are decided and kept.
   [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
   // Rows up to this one have come, and were taken.
-  [[nodiscard]] std::uint64_t rows_taken() const { return rows_.acknowledged(); }
+  [[nodiscard]] std::uint64_t entries_taken() const { return entries_.acknowledged(); }
   // As of the newest packet; 0 before the first.
   [[nodiscard]] std::uint64_t lease_epoch() const { return lease_epoch_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
@@ -95,7 +95,7 @@ class ClientLink {
   std::optional<CutSender>
       sender_;               // codes each cut against the one before it; a new one where that is not in the window
   std::uint64_t coded_ = 0;  // the last cut that it coded
-  ReceiveWindow<SessionRow> rows_;
+  ReceiveWindow<SessionEntry> entries_;
   std::map<std::uint64_t, Partner> partners_;  // by author
   std::uint64_t lease_epoch_ = 0;
   bool frozen_ = false;

@@ -218,38 +218,38 @@ Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNum
   return state;
 }
 
-// The item of a row that is no cut is a piece of a packet by itself.
-SendItem piece_of(const SessionRow& row, std::uint64_t index) {
+// The item of a entry that is no cut is a piece of a packet by itself.
+SendItem piece_of(const SessionEntry& entry, std::uint64_t index) {
   v1::DownPacket packet;
-  if (row.kind == SessionRowKind::rejected) {
-    v1::RejectedRow& out = *packet.add_rejected();
+  if (entry.kind == SessionEntryKind::rejected) {
+    v1::RejectedEntry& out = *packet.add_rejected();
     out.set_index(index);
-    out.set_room_seq(row.room_seq.value);
-    out.set_author_seq(row.author_seq);
-    out.set_reason(row.reason);
-    out.set_lease_epoch(row.lease_epoch);
-  } else if (row.kind == SessionRowKind::supervised) {
-    v1::SupervisedRow& out = *packet.add_supervised();
+    out.set_room_seq(entry.room_seq.value);
+    out.set_author_seq(entry.author_seq);
+    out.set_reason(entry.reason);
+    out.set_lease_epoch(entry.lease_epoch);
+  } else if (entry.kind == SessionEntryKind::supervised) {
+    v1::SupervisedEntry& out = *packet.add_supervised();
     out.set_index(index);
-    out.set_room_seq(row.room_seq.value);
-    *out.mutable_supervision() = to_wire(row.supervision);
-    out.set_lease_epoch(row.lease_epoch);
-    out.set_decided_by(row.by.author.value);
-    out.set_decided_by_name(row.by.name);
+    out.set_room_seq(entry.room_seq.value);
+    *out.mutable_supervision() = to_wire(entry.supervision);
+    out.set_lease_epoch(entry.lease_epoch);
+    out.set_decided_by(entry.by.author.value);
+    out.set_decided_by_name(entry.by.name);
   } else {
-    v1::StreamedRow& out = *packet.add_streamed();
+    v1::StreamedEntry& out = *packet.add_streamed();
     out.set_index(index);
-    out.set_room_seq(row.room_seq.value);
+    out.set_room_seq(entry.room_seq.value);
   }
   return {packet.SerializeAsString(), {}, 0};
 }
 
-Result<void> rows_of_run(const v1::RowRun& run, const ToolNumbers& tools, std::vector<IndexedRow>& rows) {
+Result<void> entries_of_run(const v1::EntryRun& run, const ToolNumbers& tools, std::vector<IndexedEntry>& entries) {
   auto state = state_of(run.head(), AuthorId{run.author()}, tools);
   if (!state) return tl::unexpected(state.error());
   std::uint64_t index = run.index(), room_seq = run.room_seq();
-  Reader in{run.rows()};
-  if (in.rest.empty()) return bad("rows", "has none");
+  Reader in{run.entries()};
+  if (in.rest.empty()) return bad("entries", "has none");
   for (bool first = true; !in.rest.empty(); first = false) {
     const std::uint64_t what = in.varint();
     const std::uint64_t index_step = (what >> 1) + 1;
@@ -264,9 +264,9 @@ Result<void> rows_of_run(const v1::RowRun& run, const ToolNumbers& tools, std::v
       state->last.author_seq += author_step;
     }
     Cut cut = state->last;
-    if (!get_cut(in, cut, state->pose)) return bad("rows", "is no row of cuts");
+    if (!get_cut(in, cut, state->pose)) return bad("entries", "is no entry of cuts");
     state = state_after(cut, *state);
-    rows.push_back({index, {.room_seq = {room_seq}, .kind = SessionRowKind::committed, .cut = std::move(cut)}});
+    entries.push_back({index, {.room_seq = {room_seq}, .kind = SessionEntryKind::committed, .cut = std::move(cut)}});
   }
   return {};
 }
@@ -300,10 +300,10 @@ bool CutSender::push(const Cut& cut) {
   return true;
 }
 
-bool RowSender::push(const SessionRow& row) {
+bool EntrySender::push(const SessionEntry& entry) {
   const std::uint64_t index = window_.next();
-  if (row.kind != SessionRowKind::committed) return window_.push(piece_of(row, index)).has_value();
-  const Cut& cut = row.cut;
+  if (entry.kind != SessionEntryKind::committed) return window_.push(piece_of(entry, index)).has_value();
+  const Cut& cut = entry.cut;
   OSTEON_CHECK(cut.level >= 0 && cut.level < kLevels && fits_a_packet(cut));
   const auto known = states_.find(cut.author);
   const RunState before = known != states_.end() ? known->second.run : state_before(cut);
@@ -312,7 +312,7 @@ bool RowSender::push(const SessionRow& row) {
   if (follows) {
     item.follows = known->second.index;
     const std::uint64_t index_step = index - known->second.index, author_step = cut.author_seq - before.last.author_seq;
-    const auto beside = static_cast<std::int64_t>(row.room_seq.value - known->second.room_seq.value - index_step);
+    const auto beside = static_cast<std::int64_t>(entry.room_seq.value - known->second.room_seq.value - index_step);
     const bool more = beside != 0 || author_step != 1;
     put_varint(item.bytes, (index_step - 1) << 1 | (more ? 1u : 0u));
     if (more) {
@@ -323,14 +323,14 @@ bool RowSender::push(const SessionRow& row) {
     put_varint(item.bytes, 0);
   }
   put_cut(item.bytes, cut, before.pose, before.last);
-  v1::RowRun head;
+  v1::EntryRun head;
   head.set_author(cut.author.value);
   head.set_index(index);
-  head.set_room_seq(row.room_seq.value);
+  head.set_room_seq(entry.room_seq.value);
   *head.mutable_head() = head_of(cut, before, tools_);
   item.head = head.SerializeAsString();
   if (!window_.push(std::move(item))) return false;
-  states_[cut.author] = {state_after(cut, before), index, row.room_seq};
+  states_[cut.author] = {state_after(cut, before), index, entry.room_seq};
   return true;
 }
 
@@ -343,42 +343,42 @@ Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const T
   while (!in.rest.empty()) {
     Cut cut = state->last;
     cut.author_seq = run.author_seq() + cuts.size();
-    if (!get_cut(in, cut, state->pose)) return bad("cuts", "is no row of cuts");
+    if (!get_cut(in, cut, state->pose)) return bad("cuts", "is no entry of cuts");
     state = state_after(cut, *state);
     cuts.push_back(std::move(cut));
   }
   return cuts;
 }
 
-Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const ToolNumbers& tools, std::size_t* left_out) {
-  std::vector<IndexedRow> rows;
-  for (const v1::RowRun& run : packet.rows()) {
-    const auto read = rows_of_run(run, tools, rows);
+Result<std::vector<IndexedEntry>> entries_of(const v1::DownPacket& packet, const ToolNumbers& tools, std::size_t* left_out) {
+  std::vector<IndexedEntry> entries;
+  for (const v1::EntryRun& run : packet.entries()) {
+    const auto read = entries_of_run(run, tools, entries);
     if (read) continue;
     if (read.error().code != ErrorCode::not_found) return tl::unexpected(read.error());
     if (left_out != nullptr) ++*left_out;
   }
-  for (const v1::RejectedRow& row : packet.rejected()) {
-    rows.push_back({row.index(),
-                    {.room_seq = {row.room_seq()},
-                     .kind = SessionRowKind::rejected,
-                     .author_seq = row.author_seq(),
-                     .reason = row.reason(),
-                     .lease_epoch = row.lease_epoch()}});
+  for (const v1::RejectedEntry& entry : packet.rejected()) {
+    entries.push_back({entry.index(),
+                    {.room_seq = {entry.room_seq()},
+                     .kind = SessionEntryKind::rejected,
+                     .author_seq = entry.author_seq(),
+                     .reason = entry.reason(),
+                     .lease_epoch = entry.lease_epoch()}});
   }
-  for (const v1::SupervisedRow& row : packet.supervised()) {
-    Result<Restrictions> supervision = from_wire(row.supervision());
+  for (const v1::SupervisedEntry& entry : packet.supervised()) {
+    Result<Restrictions> supervision = from_wire(entry.supervision());
     if (!supervision) return tl::unexpected(supervision.error());
-    rows.push_back({row.index(),
-                    {.room_seq = {row.room_seq()},
-                     .kind = SessionRowKind::supervised,
-                     .lease_epoch = row.lease_epoch(),
+    entries.push_back({entry.index(),
+                    {.room_seq = {entry.room_seq()},
+                     .kind = SessionEntryKind::supervised,
+                     .lease_epoch = entry.lease_epoch(),
                      .supervision = std::move(*supervision),
-                     .by = {AuthorId{row.decided_by()}, row.decided_by_name()}}});
+                     .by = {AuthorId{entry.decided_by()}, entry.decided_by_name()}}});
   }
-  for (const v1::StreamedRow& row : packet.streamed()) rows.push_back({row.index(), {.room_seq = {row.room_seq()}}});
-  std::ranges::sort(rows, {}, &IndexedRow::index);
-  return rows;
+  for (const v1::StreamedEntry& entry : packet.streamed()) entries.push_back({entry.index(), {.room_seq = {entry.room_seq()}}});
+  std::ranges::sort(entries, {}, &IndexedEntry::index);
+  return entries;
 }
 
 }  // namespace osteon::wire

@@ -9,9 +9,9 @@
 //
 //   cut:   knots << 3 | speed differs << 2 | own first << 1 | time differs, [path_us], [difference of spindle_rpm],
 //          knots x (second order << 7 | which of x y z qx qy qz qw, ...)
-//   row:   (index step - 1) << 1 | more, [room_seq step - index step, author_seq step - 1], cut
+//   entry:   (index step - 1) << 1 | more, [room_seq step - index step, author_seq step - 1], cut
 //
-// The steps of a run's first row are passed over, since its head says where it is. Every cut comes back as it was,
+// The steps of a run's first entry are passed over, since its head says where it is. Every cut comes back as it was,
 // whatever its numbers; whether they make sense is for the room to judge.
 #pragma once
 #include <cstdint>
@@ -68,33 +68,33 @@ class CutSender {
 };
 
 // What a session is told, in its own order, which numbers these from 1.
-enum class SessionRowKind : std::uint8_t { committed, rejected, streamed, supervised };
-struct SessionRow {
+enum class SessionEntryKind : std::uint8_t { committed, rejected, streamed, supervised };
+struct SessionEntry {
   RoomSeq room_seq;
-  SessionRowKind kind = SessionRowKind::streamed;  // what it was comes over the stream
+  SessionEntryKind kind = SessionEntryKind::streamed;  // what it was comes over the stream
   Cut cut{};                                       // committed
   std::uint64_t author_seq = 0;                    // rejected: of the session's own cut
   std::uint32_t reason = 0;                        // rejected: as the room numbers its reasons
   std::uint64_t lease_epoch = 0;                   // rejected, supervised: of the session, from now on
   Restrictions supervision{};                      // supervised: of the session's own hand, from now on
   Decider by{};                                    // supervised: whose decision
-  friend bool operator==(const SessionRow&, const SessionRow&) = default;
+  friend bool operator==(const SessionEntry&, const SessionEntry&) = default;
 };
 
-// The same of a row of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream
+// The same of a entry of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream
 // too.
 inline constexpr std::size_t kMostToolsInPacket = 8, kMostNameInPacket = 64;
-[[nodiscard]] inline bool fits_a_packet(const SessionRow& row) {
-  return row.kind != SessionRowKind::streamed && fits_a_packet(row.cut) &&
-         row.supervision.tools.size() <= kMostToolsInPacket && row.by.name.size() <= kMostNameInPacket;
+[[nodiscard]] inline bool fits_a_packet(const SessionEntry& entry) {
+  return entry.kind != SessionEntryKind::streamed && fits_a_packet(entry.cut) &&
+         entry.supervision.tools.size() <= kMostToolsInPacket && entry.by.name.size() <= kMostNameInPacket;
 }
 
-// Codes the rows of one session, as items whose numbers are their index.
-class RowSender {
+// Codes the entries of one session, as items whose numbers are their index.
+class EntrySender {
  public:
-  RowSender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
+  EntrySender(SendWindow& window, const ToolNumbers& tools) : window_(window), tools_(tools) {}
   // False, and nothing has changed, when the window is full. A cut that does not fit a packet must be told as streamed.
-  [[nodiscard]] bool push(const SessionRow& row);
+  [[nodiscard]] bool push(const SessionEntry& entry);
   // An author who has left: nothing of them comes any more.
   void forget(AuthorId author) { states_.erase(author); }
 
@@ -113,13 +113,13 @@ class RowSender {
 // not_found (a tool number that is not known yet).
 [[nodiscard]] Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const ToolNumbers& tools);
 
-struct IndexedRow {
+struct IndexedEntry {
   std::uint64_t index = 0;
-  SessionRow row;
+  SessionEntry entry;
 };
-// All rows of a packet in order of their index. Runs whose tool is not known yet are left out; `left_out` counts them
+// All entries of a packet in order of their index. Runs whose tool is not known yet are left out; `left_out` counts them
 // where it is given. Error invalid_input as above; then nothing of the packet is to be believed.
-[[nodiscard]] Result<std::vector<IndexedRow>> rows_of(const v1::DownPacket& packet, const ToolNumbers& tools,
+[[nodiscard]] Result<std::vector<IndexedEntry>> entries_of(const v1::DownPacket& packet, const ToolNumbers& tools,
                                                       std::size_t* left_out = nullptr);
 
 }  // namespace osteon::wire

@@ -28,7 +28,7 @@ struct Fields<v1::UpPacket> {
 };
 template <>
 struct Fields<v1::DownPacket> {
-  static constexpr int kRuns = v1::DownPacket::kRowsFieldNumber, kItems = v1::RowRun::kRowsFieldNumber;
+  static constexpr int kRuns = v1::DownPacket::kEntriesFieldNumber, kItems = v1::EntryRun::kEntriesFieldNumber;
 };
 
 }  // namespace

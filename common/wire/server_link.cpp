@@ -90,23 +90,23 @@ std::optional<HeardState> ServerLink::take_state() {
   return state_;
 }
 
-bool ServerLink::push(const IndexedRow& row) {
-  if (half_.begin(row.index) && fits_a_packet(row.row) && sender_.push(row.row)) return true;
+bool ServerLink::push(const IndexedEntry& entry) {
+  if (half_.begin(entry.index) && fits_a_packet(entry.entry) && sender_.push(entry.entry)) return true;
   half_.goes_over_stream();
   return false;
 }
 
-bool ServerLink::tell(std::uint64_t index, const SessionRow& row) {
-  if (row.kind == SessionRowKind::committed && row.cut.author == author_) decided(row.cut.author_seq);
-  if (row.kind == SessionRowKind::rejected) {
-    decided(row.author_seq);
-    set_lease_epoch(row.lease_epoch);
+bool ServerLink::tell(std::uint64_t index, const SessionEntry& entry) {
+  if (entry.kind == SessionEntryKind::committed && entry.cut.author == author_) decided(entry.cut.author_seq);
+  if (entry.kind == SessionEntryKind::rejected) {
+    decided(entry.author_seq);
+    set_lease_epoch(entry.lease_epoch);
   }
-  if (row.kind == SessionRowKind::supervised) {
-    set_lease_epoch(row.lease_epoch);
-    set_frozen(!row.supervision.may_cut());
+  if (entry.kind == SessionEntryKind::supervised) {
+    set_lease_epoch(entry.lease_epoch);
+    set_frozen(!entry.supervision.may_cut());
   }
-  return index != 0 && push({index, row});
+  return index != 0 && push({index, entry});
 }
 
 void ServerLink::set_partners(std::span<const HeardState> partners) {
@@ -168,7 +168,7 @@ std::optional<ServerLink::Out> ServerLink::send(Time now, std::span<std::uint8_t
     bone_.reset();
     bone_at_ = now;
   }
-  // Tools may take half of the room before rows, which are repeated as far as it goes, and then what is left.
+  // Tools may take half of the room before entries, which are repeated as far as it goes, and then what is left.
   add_partners(filler, now, std::max(filler.room() / 2, half_.window().least_room(now)));
   half_.add_items(filler, now);
   add_partners(filler, now, 0);

@@ -22,7 +22,7 @@ class ServerLink {
   using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
-  // The first cut to come has `first_author_seq`, and the first row to be pushed `first_index`. `random`: for the
+  // The first cut to come has `first_author_seq`, and the first entry to be pushed `first_index`. `random`: for the
   // tokens of challenges.
   ServerLink(const SessionKeys& keys, AuthorId author, FillRandom random, std::uint64_t first_author_seq = 1,
              std::uint64_t first_index = 1, const LinkOptions& options = server_link_options());
@@ -44,15 +44,15 @@ class ServerLink {
   // Newest push on the bone, once.
   [[nodiscard]] std::optional<MountLoad> take_push() { return std::exchange(push_, std::nullopt); }
 
-  // Every row of the session, in order of its index. False: the client gets it over the stream only, since it is of
+  // Every entry of the session, in order of its index. False: the client gets it over the stream only, since it is of
   // kind streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every
-  // row above acknowledged() goes over the stream too.
-  [[nodiscard]] bool push(const IndexedRow& row);
-  // A row that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which
+  // entry above acknowledged() goes over the stream too.
+  [[nodiscard]] bool push(const IndexedEntry& entry);
+  // A entry that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which
   // raises the lease too. It is pushed, unless `index` is 0: it has no number, having been among what the client was
   // sent first.
-  bool tell(std::uint64_t index, const SessionRow& row);
-  // The session's word over the stream: it has taken the rows up to here.
+  bool tell(std::uint64_t index, const SessionEntry& entry);
+  // The session's word over the stream: it has taken the entries up to here.
   void acknowledge(std::uint64_t index) { half_.acknowledge(index); }
   // The author has left: their cuts come no more.
   void forget(AuthorId author) { sender_.forget(author); }
@@ -77,7 +77,7 @@ class ServerLink {
   [[nodiscard]] bool alive(Time now) const { return half_.alive(now); }
   [[nodiscard]] const Endpoint& address() const { return path_.address(); }
   [[nodiscard]] std::uint64_t moves() const { return path_.moves(); }
-  // The session has taken the rows up to this one.
+  // The session has taken the entries up to this one.
   [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
   // The client's clock as seen from here, and the round trip.
   [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
@@ -108,7 +108,7 @@ class ServerLink {
   std::optional<MountPose> bone_;  // newest that has not gone
   Time bone_at_ = -std::chrono::hours(1);
 
-  RowSender sender_;
+  EntrySender sender_;
   std::map<std::uint64_t, Partner> partners_;  // by author
   std::uint64_t lease_epoch_ = 0;
   bool frozen_ = false;

@@ -11,7 +11,7 @@ namespace {
 using Time = std::chrono::nanoseconds;
 using namespace std::chrono_literals;
 
-constexpr int kMostInARow = 64;  // datagrams received before one is sent
+constexpr int kMostInAEntry = 64;  // datagrams received before one is sent
 constexpr Time kLongestWait = 100ms;
 
 // The clock of all links of this process.
@@ -127,7 +127,7 @@ void FastPath::take_partners(Time now, std::vector<CuttingState>& newer) {
 
 void FastPath::run() {
   DatagramBuffer buffer;
-  std::vector<wire::IndexedRow> rows;
+  std::vector<wire::IndexedEntry> entries;
   std::vector<CuttingState> partners;
   bool was_alive = false, was_frozen = false;
   std::uint64_t was_epoch = 0;
@@ -139,7 +139,7 @@ void FastPath::run() {
     {
       const std::lock_guard lock(mutex_);
       if (end_) return;
-      for (int i = 0; i < kMostInARow; ++i) {
+      for (int i = 0; i < kMostInAEntry; ++i) {
         const std::optional<Datagram> datagram = port_->receive(buffer);
         if (!datagram) break;
         link_.receive(datagram->bytes, now_of_links());
@@ -149,7 +149,7 @@ void FastPath::run() {
       epoch = link_.lease_epoch();
       bone = link_.take_bone();
       if (came && events_.partner) take_partners(now_of_links(), partners);
-      while (std::optional<wire::IndexedRow> row = link_.take_row()) rows.push_back(std::move(*row));
+      while (std::optional<wire::IndexedEntry> entry = link_.take_entry()) entries.push_back(std::move(*entry));
       const Time now = now_of_links();
       if (const auto bytes = link_.send(now, buffer); !bytes.empty()) port_->send(server_, bytes);
       wait = std::clamp(link_.next(now) - now, Time{0}, kLongestWait);
@@ -161,8 +161,8 @@ void FastPath::run() {
     was_frozen = frozen;
     was_epoch = epoch;
     if (bone && events_.bone) events_.bone(*bone);
-    for (wire::IndexedRow& row : rows) events_.row(std::move(row));
-    rows.clear();
+    for (wire::IndexedEntry& entry : entries) events_.entry(std::move(entry));
+    entries.clear();
     for (const CuttingState& partner : partners) events_.partner(partner);
     partners.clear();
     if (died) events_.dead();

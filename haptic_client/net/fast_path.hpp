@@ -21,7 +21,7 @@ namespace osteon {
 
 // What a fast path calls, on its own thread.
 struct FastPathEvents {
-  std::function<void(wire::IndexedRow)> row;  // of the session, in order
+  std::function<void(wire::IndexedEntry)> entry;  // of the session, in order
   // Datagrams do not get through any more, so that what went only in them has to go over the stream.
   std::function<void()> dead;
   std::function<void(const CuttingState&)> partner{};  // a newer state of another's tool
@@ -47,7 +47,7 @@ class FastPath {
   [[nodiscard]] bool send(const Cut& cut);
   [[nodiscard]] bool send(const CuttingState& state);
   [[nodiscard]] bool send(const MountLoad& push);
-  // What came over the stream: a row, and the newest own cut that is decided.
+  // What came over the stream: a entry, and the newest own cut that is decided.
   void heard(std::uint64_t index);
   void decided(std::uint64_t author_seq);
   void know_tool(std::uint32_t number, const Digest& tool);

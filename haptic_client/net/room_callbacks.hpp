@@ -75,8 +75,8 @@ struct RoomCallbacks {
   std::function<void(const HandSupervised& decided)> supervised{};
   std::function<void(const WordsSaid& said)> said{};
   std::function<void(const CuttingState& partner)> partner{};  // newest state of another's tool; outside the order
-  // The newest datagram's word on whether the caller's hand is stopped, where it has changed; its row may come later.
-  // Of one that is older than the newest row (by its lease's epoch) nothing holds. Called from another thread, at any
+  // The newest datagram's word on whether the caller's hand is stopped, where it has changed; its entry may come later.
+  // Of one that is older than the newest entry (by its lease's epoch) nothing holds. Called from another thread, at any
   // time until close(): it may not wait.
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
   // Where the bone stands on its mount, of a room that has one: newest, outside the order, from another thread, one at

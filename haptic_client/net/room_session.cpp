@@ -259,7 +259,7 @@ void RoomSession::Impl::write(Line& open) {
       if (written = open.stream->Write(request); !written) break;
     }
     const std::shared_ptr<FastPath> path = fast_path();
-    // Datagrams say themselves which rows have come.
+    // Datagrams say themselves which entries have come.
     if (const auto now = std::chrono::steady_clock::now(); now >= tell_at) {
       tell_at = now + kTellHeard;
       const bool leaves = heard_leaves.exchange(false);
@@ -311,10 +311,10 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                                 : static_cast<std::uint32_t>(std::strtoul(at.c_str() + at.rfind(':') + 1, nullptr, 10));
   Result<std::unique_ptr<FastPath>> opened =
       FastPath::open(host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
-                     {.row =
-                          [this](wire::IndexedRow row) {
+                     {.entry =
+                          [this](wire::IndexedEntry entry) {
                             const std::lock_guard lock(read_mutex);
-                            (void)reader->take(std::move(row));
+                            (void)reader->take(std::move(entry));
                             heard = reader->place().value;
                           },
                       .dead =
@@ -372,7 +372,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       if (over) break;
     }
     const Result<void> delivered = [&] {
-      // As one, so that no row of a datagram comes between: it may name a tool that only its path knows yet, or follow
+      // As one, so that no entry of a datagram comes between: it may name a tool that only its path knows yet, or follow
       // leaves that are not all there.
       const std::lock_guard lock(read_mutex);
       follow(response);

@@ -28,7 +28,7 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomC
       complete_(std::move(complete)) {}
 
 void SessionReader::begin() {
-  rows_ = ReceiveWindow<Row>();
+  entries_ = ReceiveWindow<Entry>();
   place_ = {};
   supervised_ = false;
   partners_.clear();
@@ -42,21 +42,21 @@ Result<void> SessionReader::take(v1::SessionResponse response) {
     return decided_(response.rejected().author_seq()), Result<void>{};
   if (response.index() == 0) return deliver(response);
   const std::uint64_t index = response.index();
-  rows_.offer(index, std::move(response));
+  entries_.offer(index, std::move(response));
   return pass_on();
 }
 
-Result<void> SessionReader::take(wire::IndexedRow row) {
+Result<void> SessionReader::take(wire::IndexedEntry entry) {
   // What it stands for comes over the stream; and a tool that is not known yet, too.
-  if (row.row.kind == wire::SessionRowKind::streamed) return {};
-  if (row.row.kind == wire::SessionRowKind::committed && !cuts(row.row.cut)) return {};
-  rows_.offer(row.index, std::move(row.row));
+  if (entry.entry.kind == wire::SessionEntryKind::streamed) return {};
+  if (entry.entry.kind == wire::SessionEntryKind::committed && !cuts(entry.entry.cut)) return {};
+  entries_.offer(entry.index, std::move(entry.entry));
   return pass_on();
 }
 
 Result<void> SessionReader::pass_on() {
-  while (const std::optional<Row> row = rows_.take())
-    if (Result<void> delivered = std::visit([&](const auto& one) { return deliver(one); }, *row); !delivered)
+  while (const std::optional<Entry> entry = entries_.take())
+    if (Result<void> delivered = std::visit([&](const auto& one) { return deliver(one); }, *entry); !delivered)
       return delivered;
   return {};
 }
@@ -93,13 +93,13 @@ void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint6
   if (events_.rejected) events_.rejected(place, author_seq, lease_epoch, reason);
 }
 
-Result<void> SessionReader::deliver(const wire::SessionRow& row) {
-  if (row.kind == wire::SessionRowKind::committed)
-    committed(row.room_seq, row.cut);
-  else if (row.kind == wire::SessionRowKind::supervised)
-    supervised({row.room_seq, row.supervision, row.lease_epoch, row.by});
+Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
+  if (entry.kind == wire::SessionEntryKind::committed)
+    committed(entry.room_seq, entry.cut);
+  else if (entry.kind == wire::SessionEntryKind::supervised)
+    supervised({entry.room_seq, entry.supervision, entry.lease_epoch, entry.by});
   else
-    rejected(row.room_seq, row.author_seq, row.lease_epoch, std::string(sentence(static_cast<Rejection>(row.reason))));
+    rejected(entry.room_seq, entry.author_seq, entry.lease_epoch, std::string(sentence(static_cast<Rejection>(entry.reason))));
   return {};
 }
 
@@ -112,14 +112,14 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     }
     case v1::SessionResponse::kComplete: {
-      const v1::FieldComplete& row = response.complete();
-      complete_(row.decided_author_seq());
-      RoomAtJoin room{RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), row.decided_author_seq()};
-      for (const std::uint64_t place : row.decided_room_seqs()) room.decided_places.push_back(RoomSeq{place});
+      const v1::FieldComplete& entry = response.complete();
+      complete_(entry.decided_author_seq());
+      RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(), entry.decided_author_seq()};
+      for (const std::uint64_t place : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{place});
       if (events_.complete) events_.complete(room);
-      place_ = std::max(place_, RoomSeq{row.room_seq()});
+      place_ = std::max(place_, RoomSeq{entry.room_seq()});
       // Nothing was said of this hand: what held over an earlier stream is over.
-      if (!supervised_) supervised({RoomSeq{}, {}, row.lease_epoch(), {}});
+      if (!supervised_) supervised({RoomSeq{}, {}, entry.lease_epoch(), {}});
       return {};
     }
     case v1::SessionResponse::kTool: {
@@ -131,9 +131,9 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     }
     case v1::SessionResponse::kChange: {
-      const v1::BoneChange& row = response.change();
-      BonePart part{RoomSeq{row.room_seq()}, bodies_of(row.bodies()), row.lease_epoch(), {}, row.last()};
-      for (const v1::FieldLeaf& wire_leaf : row.leaves()) {
+      const v1::BoneChange& entry = response.change();
+      BonePart part{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(), {}, entry.last()};
+      for (const v1::FieldLeaf& wire_leaf : entry.leaves()) {
         Result<FieldLeaf> leaf = wire::from_wire(wire_leaf);
         if (!leaf) return tl::unexpected(leaf.error());
         if (std::ranges::find(part.bodies, leaf->body) == part.bodies.end())
@@ -166,8 +166,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       return {};
     }
     case v1::SessionResponse::kRejected: {
-      const v1::RejectedCut& row = response.rejected();
-      rejected(RoomSeq{row.room_seq()}, row.author_seq(), row.lease_epoch(), row.reason());
+      const v1::RejectedCut& entry = response.rejected();
+      rejected(RoomSeq{entry.room_seq()}, entry.author_seq(), entry.lease_epoch(), entry.reason());
       return {};
     }
     case v1::SessionResponse::kKept: {
@@ -183,19 +183,19 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       if (events_.noted) events_.noted(RoomSeq{response.noted().room_seq()});
       return {};
     case v1::SessionResponse::kSupervised: {
-      const v1::Supervised& row = response.supervised();
-      const Result<Restrictions> supervision = wire::from_wire(row.supervision());
+      const v1::Supervised& entry = response.supervised();
+      const Result<Restrictions> supervision = wire::from_wire(entry.supervision());
       if (!supervision) return tl::unexpected(supervision.error());
-      supervised({RoomSeq{row.room_seq()},
+      supervised({RoomSeq{entry.room_seq()},
                   *supervision,
-                  row.lease_epoch(),
-                  {AuthorId{row.decided_by()}, row.decided_by_name()}});
+                  entry.lease_epoch(),
+                  {AuthorId{entry.decided_by()}, entry.decided_by_name()}});
       return {};
     }
     case v1::SessionResponse::kSaid: {
-      const v1::Said& row = response.said();
-      place_ = std::max(place_, RoomSeq{row.room_seq()});
-      if (events_.said) events_.said({RoomSeq{row.room_seq()}, AuthorId{row.from()}, AuthorId{row.to()}, row.words()});
+      const v1::Said& entry = response.said();
+      place_ = std::max(place_, RoomSeq{entry.room_seq()});
+      if (events_.said) events_.said({RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()});
       return {};
     }
     case v1::SessionResponse::kPartner: {

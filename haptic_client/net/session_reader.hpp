@@ -16,7 +16,7 @@
 
 namespace osteon {
 
-// Every row after the leaves comes over the stream; rejections, supervision and cuts of anyone may come sooner over the
+// Every entry after the leaves comes over the stream; rejections, supervision and cuts of anyone may come sooner over the
 // fast path. Whichever is first counts. Not synchronised.
 class SessionReader {
  public:
@@ -25,15 +25,15 @@ class SessionReader {
   SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
                 std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete);
 
-  // A stream begins: its leaves and rows count anew, and so does place(), as the server may have lost the end of what
+  // A stream begins: its leaves and entries count anew, and so does place(), as the server may have lost the end of what
   // an earlier one told. What was said to be kept stays: it is what shows such a loss.
   void begin();
   // Error: the server sent what no correct server sends; nothing more of the stream is to be taken.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
-  // A row of the fast path that belongs to the present stream.
-  [[nodiscard]] Result<void> take(wire::IndexedRow row);
-  // Every row up to this one was passed on.
-  [[nodiscard]] std::uint64_t taken() const { return rows_.acknowledged(); }
+  // A entry of the fast path that belongs to the present stream.
+  [[nodiscard]] Result<void> take(wire::IndexedEntry entry);
+  // Every entry up to this one was passed on.
+  [[nodiscard]] std::uint64_t taken() const { return entries_.acknowledged(); }
   // Another's tool, heard of over the fast path.
   void take(const CuttingState& partner);
   // The newest event of the present stream that was passed on, or that its leaves contain once all of them have come.
@@ -42,10 +42,10 @@ class SessionReader {
   [[nodiscard]] const std::optional<wire::DurableSeq>& kept() const { return kept_; }
 
  private:
-  using Row = std::variant<v1::SessionResponse, wire::SessionRow>;
+  using Entry = std::variant<v1::SessionResponse, wire::SessionEntry>;
   [[nodiscard]] Result<void> pass_on();
   [[nodiscard]] Result<void> deliver(const v1::SessionResponse& response);
-  [[nodiscard]] Result<void> deliver(const wire::SessionRow& row);
+  [[nodiscard]] Result<void> deliver(const wire::SessionEntry& entry);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
   void committed(RoomSeq place, const Cut& cut);
   void supervised(const HandSupervised& decided);
@@ -55,7 +55,7 @@ class SessionReader {
   const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
   const RoomCallbacks events_;
   const std::function<void(std::uint64_t)> decided_, complete_;
-  ReceiveWindow<Row> rows_;
+  ReceiveWindow<Entry> entries_;
   std::optional<wire::DurableSeq> kept_;
   RoomSeq place_;
   bool supervised_ = false;                     // of the present stream, before its leaves are complete

@@ -28,7 +28,7 @@
 #include "server/journal/maintenance.hpp"
 #include "server/journal/signing.hpp"
 #include "server/net/forgetting.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "server/net/room_files.hpp"
 
 namespace osteon {
@@ -183,10 +183,10 @@ Result<Room> replayed(const Arguments& given) {
     if (!room) return room;
     Progress progress("replay");
     Result<void> outcome;
-    const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalRow& one) {
+    const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& one) {
       if (one.place > *last) return false;
-      const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-      outcome = row ? room->replay(*row) : Result<void>(tl::unexpected(row.error()));
+      const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+      outcome = entry ? room->replay(*entry) : Result<void>(tl::unexpected(entry.error()));
       progress.update(static_cast<double>(one.place.value) / static_cast<double>(last->value));
       return outcome.has_value();
     });
@@ -196,7 +196,7 @@ Result<Room> replayed(const Arguments& given) {
   });
 }
 
-std::string rows_text(RoomSeq from, RoomSeq to) {
+std::string entries_text(RoomSeq from, RoomSeq to) {
   return std::to_string(from.value) + " to " + std::to_string(to.value);
 }
 
@@ -206,13 +206,13 @@ Result<void> check_signatures(const VerifyReport& report, const Arguments& given
   const auto by = [&](const PublicKey& who) {
     return "by " + to_hex(who).substr(0, 16) + (who == key ? "" : ", an earlier or later key of this server");
   };
-  for (const SignedRange& one : vouched.rows) say("signed", rows_text(one.from, one.to) + " " + by(one.key));
+  for (const SignedRange& one : vouched.entries) say("signed", entries_text(one.from, one.to) + " " + by(one.key));
   for (const SignedRange& one : vouched.by_others)
-    say("not signed", rows_text(one.from, one.to) + " by this key, but by " + to_hex(one.key));
-  for (const auto& [from, to] : vouched.by_nobody) say("not signed", rows_text(from, to) + " by anybody");
+    say("not signed", entries_text(one.from, one.to) + " by this key, but by " + to_hex(one.key));
+  for (const auto& [from, to] : vouched.by_nobody) say("not signed", entries_text(from, to) + " by anybody");
   for (const std::string& entry : vouched.other_entries) say("not signed", entry + " by this server");
   if (vouched.all()) return {};
-  if (vouched.rows.empty() && vouched.entries == 0) say("not signed", "anything by this server");
+  if (vouched.entries.empty() && vouched.entries == 0) say("not signed", "anything by this server");
   return failure(ErrorCode::invalid_input,
                  given.file.string() + " fits together, but the key " + to_hex(key).substr(0, 16) +
                      " does not vouch for all of it; give the key of the server that wrote it, or "
@@ -355,16 +355,16 @@ Result<void> write_out(const Arguments& given) {
       ++events;
       if (!out->write(line)) outcome = tl::unexpected(out->failed());
     };
-    const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalRow& row) {
-      if (row.place > *last) return false;
+    const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& entry) {
+      if (entry.place > *last) return false;
       if (of_person) {
-        const Result<std::optional<std::string>> line = of_person->of(row);
+        const Result<std::optional<std::string>> line = of_person->of(entry);
         if (!line)
           outcome = tl::unexpected(line.error());
         else if (*line)
           put(**line);
       } else {
-        const Result<std::string> line = row_as_json(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+        const Result<std::string> line = entry_as_json(entry.place, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
         if (!line)
           outcome = tl::unexpected(line.error());
         else
@@ -424,11 +424,11 @@ Result<void> forget(const Arguments& given) {
     const Result<Forgotten> forgotten = forget_people(journal, came_before, given.person);
     if (!forgotten) return tl::unexpected(forgotten.error());
     if (const Result<void> gone = forget_owner(given.file, *forgotten); !gone) return gone;
-    if (given.person != 0 && forgotten->people == 0 && forgotten->rows == 0)
+    if (given.person != 0 && forgotten->people == 0 && forgotten->entries == 0)
       return failure(ErrorCode::not_found, "nobody in " + given.file.string() + " has the number " +
                                                std::to_string(given.person) + "; \"people\" lists those it knows");
     say("forgotten", std::to_string(forgotten->people) + " (what they did stays, under a number)");
-    say("erased", "the words of " + std::to_string(forgotten->rows) + " events");
+    say("erased", "the words of " + std::to_string(forgotten->entries) + " events");
     say("not erased", "backups and branches made before: they have names and words, or words");
     if (given.person != 0) names = forgotten->names;
     return {};

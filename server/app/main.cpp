@@ -53,7 +53,7 @@ void log_health(const std::string& room, const RuntimeHealth& health) {
                        {"sessions", health.sessions},
                        {"mesh_streams", health.mesh_streams},
                        {"cutting_streams", health.cutting_streams},
-                       {"waiting_rows", health.waiting_rows},
+                       {"waiting_entries", health.waiting_entries},
                        {"commit_p99_us", health.commit.percentile_us(99)}});
 }
 

@@ -165,18 +165,18 @@ const std::vector<Field>& limit_fields() {
 
 // Letters to insert, remove or replace until one is the other.
 std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0u);
+  std::vector<std::size_t> entry(b.size() + 1);
+  std::iota(entry.begin(), entry.end(), 0u);
   for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = row[0];
-    row[0] = i + 1;
+    std::size_t diagonal = entry[0];
+    entry[0] = i + 1;
     for (std::size_t j = 0; j < b.size(); ++j) {
       const std::size_t same = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({same, row[j] + 1, diagonal + 1});
+      diagonal = entry[j + 1];
+      entry[j + 1] = std::min({same, entry[j] + 1, diagonal + 1});
     }
   }
-  return row.back();
+  return entry.back();
 }
 
 std::string nearest(std::string_view name, const std::vector<std::string>& known) {

@@ -9,13 +9,13 @@ JournalHead first_head(std::string_view genesis) {
   return {RoomSeq{0}, hasher.finish()};
 }
 
-JournalHead next_head(const JournalHead& before, const JournalRow& row) {
+JournalHead next_head(const JournalHead& before, const JournalEntry& entry) {
   Hasher hasher;
   hasher.bytes(std::as_bytes(std::span(before.chain.bytes)));
-  hasher.integer(row.place.value);
-  hasher.integer(static_cast<std::uint64_t>(row.at_ns));
-  hasher.text(row.bytes);
-  return {row.place, hasher.finish()};
+  hasher.integer(entry.place.value);
+  hasher.integer(static_cast<std::uint64_t>(entry.at_ns));
+  hasher.text(entry.bytes);
+  return {entry.place, hasher.finish()};
 }
 
 }  // namespace osteon

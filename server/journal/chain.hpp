@@ -9,13 +9,13 @@
 
 namespace osteon {
 
-struct JournalRow {
+struct JournalEntry {
   RoomSeq place;           // rises by exactly one; the first is 1
   std::int64_t at_ns = 0;  // when it was decided, since the room was made: for replay
   std::string bytes;       // the room's own encoding
 };
 
-// How far a journal goes, and what it says: equal heads, equal histories. Whoever was told of a row keeps it as a
+// How far a journal goes, and what it says: equal heads, equal histories. Whoever was told of a entry keeps it as a
 // witness.
 struct JournalHead {
   RoomSeq place;
@@ -34,6 +34,6 @@ struct Witness {
 // bytes.
 [[nodiscard]] JournalHead first_head(std::string_view genesis);
 // chain_n = SHA-256(chain_n-1, place, at_ns, text bytes), integers as 8 bytes, little endian.
-[[nodiscard]] JournalHead next_head(const JournalHead& before, const JournalRow& row);
+[[nodiscard]] JournalHead next_head(const JournalHead& before, const JournalEntry& entry);
 
 }  // namespace osteon

@@ -23,7 +23,7 @@ class Statement {
   Statement& integer(int at, std::int64_t value);
   Statement& text(int at, std::string_view value);  // must stay until the next step
   Statement& blob(int at, std::string_view value);  // likewise
-  [[nodiscard]] Result<bool> step();                // true: there is a row
+  [[nodiscard]] Result<bool> step();                // true: there is a entry
   [[nodiscard]] Result<void> run();                 // to its end; ready to run again
   void reset();
 
@@ -42,7 +42,7 @@ class Statement {
 
 struct DatabaseOptions {
   bool create = false;
-  bool durable = true;  // false: SQLite waits for no write; for tests that must see rows lost
+  bool durable = true;  // false: SQLite waits for no write; for tests that must see entries lost
   int page_bytes = 4096;
   bool peek = false;  // reads the file as it lies there, without its log and beside whoever has it open
   std::filesystem::path shown_as = {};  // what errors name, where the file is a copy; empty: the file
@@ -59,8 +59,8 @@ class Database {
   Database& operator=(Database&&) noexcept = default;
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
-  [[nodiscard]] Result<void> run(const std::string& sql);            // statements without rows that matter
-  [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first row; 0 without one
+  [[nodiscard]] Result<void> run(const std::string& sql);            // statements without entries that matter
+  [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first entry; 0 without one
   [[nodiscard]] Result<std::string> text(std::string_view sql);
   // What is changed between the two is in memory until the second, which returns when SQLite's log has it durably.
   [[nodiscard]] Result<void> begin();

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kEntryBytes = 8 + 2 * sizeof(Digest::bytes);
 
-Digest digest_of_row(std::string_view bytes) {
+Digest digest_of_entry(std::string_view bytes) {
   Hasher hasher;
   hasher.text(bytes);
   return hasher.finish();
@@ -19,71 +19,71 @@ Digest digest_of_row(std::string_view bytes) {
 
 }  // namespace
 
-std::string encode_erased(const ErasedRows& rows) {
+std::string encode_erased(const ErasedEntries& entries) {
   std::string bytes;
-  for (const auto& [place, row] : rows)
-    bytes += encode_number(place) + std::string(as_text(row.chain)) + std::string(as_text(row.bytes));
+  for (const auto& [place, entry] : entries)
+    bytes += encode_number(place) + std::string(as_text(entry.chain)) + std::string(as_text(entry.bytes));
   return bytes;
 }
 
-std::optional<ErasedRows> decode_erased(std::string_view bytes) {
+std::optional<ErasedEntries> decode_erased(std::string_view bytes) {
   if (bytes.size() % kEntryBytes != 0) return std::nullopt;
-  ErasedRows rows;
+  ErasedEntries entries;
   for (; !bytes.empty(); bytes.remove_prefix(kEntryBytes))
-    rows[*decode_number(bytes.substr(0, 8))] = {*digest_of(bytes.substr(8, 32)), *digest_of(bytes.substr(40, 32))};
-  return rows;
+    entries[*decode_number(bytes.substr(0, 8))] = {*digest_of(bytes.substr(8, 32)), *digest_of(bytes.substr(40, 32))};
+  return entries;
 }
 
 Result<void> JournalFile::read_erased() {
   const auto stored = find_register(kErasedRegister);
   if (!stored) return tl::unexpected(stored.error());
   if (!*stored) return {};
-  std::optional<ErasedRows> rows = decode_erased(**stored);
-  if (!rows) return damaged("its register " + std::string(kErasedRegister));
-  erased_ = std::move(*rows);
+  std::optional<ErasedEntries> entries = decode_erased(**stored);
+  if (!entries) return damaged("its register " + std::string(kErasedRegister));
+  erased_ = std::move(*entries);
   return {};
 }
 
-JournalHead JournalFile::next_in_chain(const JournalHead& before, const JournalRow& row) const {
-  const auto erased = erased_.find(row.place.value);
-  if (erased != erased_.end() && erased->second.bytes == digest_of_row(row.bytes))
-    return {row.place, erased->second.chain};
-  return next_head(before, row);
+JournalHead JournalFile::next_in_chain(const JournalHead& before, const JournalEntry& entry) const {
+  const auto erased = erased_.find(entry.place.value);
+  if (erased != erased_.end() && erased->second.bytes == digest_of_entry(entry.bytes))
+    return {entry.place, erased->second.chain};
+  return next_head(before, entry);
 }
 
-Result<void> JournalFile::erase(std::span<const JournalRow> instead) {
-  auto statement = database_.prepare("UPDATE rows SET bytes = ? WHERE place = ?");
+Result<void> JournalFile::erase(std::span<const JournalEntry> instead) {
+  auto statement = database_.prepare("UPDATE entries SET bytes = ? WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
-  for (const JournalRow& row : instead) {
-    const auto chain = chain_at(row.place);
+  for (const JournalEntry& entry : instead) {
+    const auto chain = chain_at(entry.place);
     if (!chain) return tl::unexpected(chain.error());
     OSTEON_CHECK(chain->has_value());
-    if (Result<void> put = statement->blob(0, row.bytes).integer(1, static_cast<std::int64_t>(row.place.value)).run();
+    if (Result<void> put = statement->blob(0, entry.bytes).integer(1, static_cast<std::int64_t>(entry.place.value)).run();
         !put)
       return put;
-    erased_[row.place.value] = {**chain, digest_of_row(row.bytes)};
+    erased_[entry.place.value] = {**chain, digest_of_entry(entry.bytes)};
   }
   return set_register(kErasedRegister, encode_erased(erased_));
 }
 
-Result<std::size_t> Journal::erase_rows(const std::function<std::optional<std::string>(const JournalRow&)>& without) {
+Result<std::size_t> Journal::erase_entries(const std::function<std::optional<std::string>(const JournalEntry&)>& without) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
-  std::vector<JournalRow> instead;
-  const Result<void> read_all = read(RoomSeq{1}, [&](const JournalRow& row) {
-    if (auto bytes = without(row)) instead.push_back({row.place, row.at_ns, std::move(*bytes)});
+  std::vector<JournalEntry> instead;
+  const Result<void> read_all = read(RoomSeq{1}, [&](const JournalEntry& entry) {
+    if (auto bytes = without(entry)) instead.push_back({entry.place, entry.at_ns, std::move(*bytes)});
     return true;
   });
   if (!read_all) return tl::unexpected(read_all.error());
   if (instead.empty()) return 0;
-  const auto signed_rows = state.file.signed_rows();
-  if (!signed_rows) return tl::unexpected(signed_rows.error());
-  if (!signed_rows->empty() && !state.options.keys)
+  const auto signed_range = state.file.signed_range();
+  if (!signed_range) return tl::unexpected(signed_range.error());
+  if (!signed_range->empty() && !state.options.keys)
     return failure(ErrorCode::denied, state.path.string() +
                                           " was signed by its server, which has to sign what is erased too; "
                                           "give its key with --signing-key FILE");
   Database& database = state.file.database();
-  // Pages that the rows once were on may hold copies of them, and so may the log's file behind its end.
+  // Pages that the entries once were on may hold copies of them, and so may the log's file behind its end.
   const Result<void> done = write([&] {
     return state.file.erase(instead)
         .and_then([&] { return keep_signature(); })

@@ -209,10 +209,10 @@ Result<void> Journal::begin_signing() {
   const SigningKeys* keys = state.options.keys.get();
   if (keys == nullptr) return {};
   state.file.sign_with(&keys->key());
-  const auto all = state.file.signed_rows();
+  const auto all = state.file.signed_range();
   if (!all) return tl::unexpected(all.error());
   const auto last =
-      std::find_if(all->rbegin(), all->rend(), [&](const SignedRows& one) { return keys->trusts(one.key); });
+      std::find_if(all->rbegin(), all->rend(), [&](const SignedRange& one) { return keys->trusts(one.key); });
   const RoomSeq head = state.head.place;
   const bool any = last != all->rend();
   const Result<bool> erased = is_vouched_for(kErasedRegister);
@@ -220,7 +220,7 @@ Result<void> Journal::begin_signing() {
   if (any && !*erased)
     return failure(
         ErrorCode::unavailable,
-        state.path.string() + ": somebody without this server's key has replaced rows of it; go on from a backup");
+        state.path.string() + ": somebody without this server's key has replaced entries of it; go on from a backup");
   if (any && last->head.place == head) {
     state.signed_since = last->since;
     return {};
@@ -228,18 +228,18 @@ Result<void> Journal::begin_signing() {
   state.signed_since = RoomSeq{head.value + 1};
   if (head.value == 0) return {};
   const RoomSeq signed_to = any ? last->head.place : RoomSeq{};
-  const std::string rows = "rows " + std::to_string(signed_to.value + 1) + " to " + std::to_string(head.value);
+  const std::string entries = "entries " + std::to_string(signed_to.value + 1) + " to " + std::to_string(head.value);
   // Whoever recovered it with the key has accepted them.
   const Result<bool> accepted = is_vouched_for(kRecoveredRegister);
   if (!accepted) return tl::unexpected(accepted.error());
   if (any && (!*accepted || head > state.recovered_to.value_or(RoomSeq{})))
     return failure(
         ErrorCode::unavailable,
-        state.path.string() + ": this server's key signed the rows up to " + std::to_string(signed_to.value) +
-            ", but not " + rows +
+        state.path.string() + ": this server's key signed the entries up to " + std::to_string(signed_to.value) +
+            ", but not " + entries +
             ": somebody else wrote them; recover the signed ones into a new journal: osteon-server recover " +
             state.path.string() + " NEW --to " + std::to_string(signed_to.value) + " --signing-key KEY");
-  state.notes.push_back(rows + " were not signed by this server's key, which signs those after them");
+  state.notes.push_back(entries + " were not signed by this server's key, which signs those after them");
   return {};
 }
 
@@ -263,10 +263,10 @@ bool Journal::is_vouched_for(const Checkpoint& checkpoint) const {
 
 Result<void> Journal::keep_signature() {
   State& state = *state_;
-  return state.last_signature ? state.file.add_signed_rows(*state.last_signature) : Result<void>{};
+  return state.last_signature ? state.file.add_signed_entries(*state.last_signature) : Result<void>{};
 }
 
-// At every moment either the database or one of the log files has each row: see MirroredLog::begin_mirror().
+// At every moment either the database or one of the log files has each entry: see MirroredLog::begin_mirror().
 Result<void> Journal::carry() {
   State& state = *state_;
   Database& database = state.file.database();
@@ -292,7 +292,7 @@ Result<void> Journal::carry() {
 
 const Error* Journal::closed_because() const { return state_->closed ? &*state_->closed : nullptr; }
 
-void Journal::close_to_rows(Error reason) {
+void Journal::close_to_entries(Error reason) {
   if (!state_->closed) state_->closed = std::move(reason);
 }
 
@@ -310,12 +310,12 @@ Result<void> Journal::write(const std::function<Result<void>()>& work) {
   Result<void> done = check_named();
   if (done) done = work();
   if (done) return done;
-  close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more rows, since a write to it failed: " +
+  close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more entries, since a write to it failed: " +
                                               done.error().message + "; recover it into a new journal"});
   return tl::unexpected(*state.closed);
 }
 
-// Whoever replaces or removes the file while it is open would have the rows written to one that nobody finds.
+// Whoever replaces or removes the file while it is open would have the entries written to one that nobody finds.
 Result<void> Journal::check_named() {
   State& state = *state_;
   const auto now = state.disk->identity(state.path);
@@ -333,41 +333,41 @@ const std::vector<std::string>& Journal::notes() const { return state_->notes; }
 
 void Journal::close_for_good(Error reason) {
   State& state = *state_;
-  close_to_rows(std::move(reason));
+  close_to_entries(std::move(reason));
   if (auto note = DurableFile::begin(*state.disk, failed_of(state.path)); note && note->write(state.closed->message))
     static_cast<void>(note->finish());  // best effort: the disk may take nothing at all
 }
 
-Result<void> Journal::append(std::span<const JournalRow> rows) {
+Result<void> Journal::append(std::span<const JournalEntry> entries) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
-  for (const JournalRow& row : rows)
-    if (row.bytes.size() > state.options.most_row_bytes)
+  for (const JournalEntry& entry : entries)
+    if (entry.bytes.size() > state.options.most_entry_bytes)
       return failure(ErrorCode::invalid_input,
-                     state.path.string() + ": row " + std::to_string(row.place.value) + " has " +
-                         std::to_string(row.bytes.size()) + " bytes, more than the " +
-                         std::to_string(state.options.most_row_bytes) + " that a row may have");
-  if (rows.empty()) return {};
+                     state.path.string() + ": entry " + std::to_string(entry.place.value) + " has " +
+                         std::to_string(entry.bytes.size()) + " bytes, more than the " +
+                         std::to_string(state.options.most_entry_bytes) + " that a entry may have");
+  if (entries.empty()) return {};
   JournalHead head = state.head;
   // Into the transaction, which is in memory, and into the log, which makes them safe.
   const Result<void> done = write([&] {
-    return state.file.add_rows(rows, head).and_then([&] {
+    return state.file.add_entries(entries, head).and_then([&] {
       std::optional<Signature> signature;
       if (state.signed_since) {
-        state.last_signature = sign_rows(state.options.keys->key(), *state.signed_since, head);
+        state.last_signature = sign_entries(state.options.keys->key(), *state.signed_since, head);
         signature = state.last_signature->signature;
       }
-      return state.log->append(rows, head, signature);
+      return state.log->append(entries, head, signature);
     });
   });
   if (!done) return done;
   state.head = head;
-  // The rows are safe whatever becomes of this.
+  // The entries are safe whatever becomes of this.
   if (state.log->is_full()) static_cast<void>(write([&] { return carry(); }));
   return {};
 }
 
-Result<void> Journal::read(RoomSeq from, const std::function<bool(const JournalRow&)>& take) {
+Result<void> Journal::read(RoomSeq from, const std::function<bool(const JournalEntry&)>& take) {
   State& state = *state_;
   OSTEON_CHECK(from.value >= 1);
   if (from > state.head.place) return {};
@@ -375,7 +375,7 @@ Result<void> Journal::read(RoomSeq from, const std::function<bool(const JournalR
   const auto chain = state.file.chain_at(before);
   if (!chain) return tl::unexpected(chain.error());
   const Walk walked = state.file.walk({before, chain->value_or(Digest{})}, state.head.place,
-                                      [&](const JournalRow& row, const JournalHead&) { return take(row); });
+                                      [&](const JournalEntry& entry, const JournalHead&) { return take(entry); });
   if (walked.stopped) return tl::unexpected(*walked.stopped);
   return {};
 }
@@ -384,18 +384,18 @@ Result<JournalHead> Journal::head_at(RoomSeq place) {
   const auto chain = state_->file.chain_at(place);
   if (!chain) return tl::unexpected(chain.error());
   if (*chain) return JournalHead{place, **chain};
-  return failure(ErrorCode::invalid_input, state_->path.string() + " has no row " + std::to_string(place.value) +
+  return failure(ErrorCode::invalid_input, state_->path.string() + " has no entry " + std::to_string(place.value) +
                                                ", its last is " + std::to_string(state_->head.place.value));
 }
 
-JournalSlice Journal::read_slice(const JournalHead& after, RoomSeq last, std::size_t most_rows) {
+JournalSlice Journal::read_slice(const JournalHead& after, RoomSeq last, std::size_t most_entries) {
   JournalSlice slice;
   std::size_t bytes = 0;
   Walk walked =
-      state_->file.walk(after, std::min(last, state_->head.place), [&](const JournalRow& row, const JournalHead&) {
-        slice.rows.push_back(row);
-        bytes += row.bytes.size();
-        return slice.rows.size() < most_rows && bytes < kSliceBytes;
+      state_->file.walk(after, std::min(last, state_->head.place), [&](const JournalEntry& entry, const JournalHead&) {
+        slice.entries.push_back(entry);
+        bytes += entry.bytes.size();
+        return slice.entries.size() < most_entries && bytes < kSliceBytes;
       });
   slice.head = walked.head;
   slice.stopped = std::move(walked.stopped);
@@ -414,7 +414,7 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
     close_for_good({ErrorCode::unavailable,
                     file + " goes to place " + std::to_string(state.head.place.value) +
                         ", but a client was told that place " + place +
-                        " is safe: rows were lost; recover it into a new journal, or go on from a backup"});
+                        " is safe: entries were lost; recover it into a new journal, or go on from a backup"});
     return tl::unexpected(*state.closed);
   }
   const auto chain = state.file.chain_at(witness.place);
@@ -481,7 +481,7 @@ Result<std::string> Journal::read_checkpoint(const Checkpoint& checkpoint) {
   if (!read) return tl::unexpected(read.error());
   if (read->size == checkpoint.size && read->digest == checkpoint.digest) return bytes;
   return failure(ErrorCode::invalid_input,
-                 file.string() + " is not what was written; take the checkpoint before it, or all rows");
+                 file.string() + " is not what was written; take the checkpoint before it, or all entries");
 }
 
 Result<void> Journal::set_register(std::string_view name, std::string_view value) {
@@ -517,7 +517,7 @@ Result<void> Journal::set_person(const Person& person) { return set_beside({}, {
 
 Result<std::vector<Person>> Journal::people() { return state_->file.people(); }
 
-// A row that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So
+// A entry that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So
 // the whole table is emptied, which overwrites every page that it ever had, and those who stay are written anew.
 // SQLite's log, which has the pages as they were, is cut to nothing whenever the journal's is carried.
 Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)>& kept) {

@@ -18,12 +18,12 @@ namespace fs = std::filesystem;
 constexpr std::int64_t kApplication = 0x4f73744a;  // "OstJ"
 constexpr std::string_view kRemedy = "; recover it into a new journal";
 
-// The tables of each version, and how its rows read as those of today. A new version gets an entry of its own, and the
+// The tables of each version, and how its entries read as those of today. A new version gets an entry of its own, and the
 // older ones columns for what they did not have.
 struct Version {
   int number;
   std::string tables;
-  const char* rows;
+  const char* entries;
 };
 
 #define OSTEON_OTHER_TABLES                                                                                        \
@@ -35,28 +35,28 @@ struct Version {
   " seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"
 
 constexpr const char* kTimedTables =
-    "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
+    "CREATE TABLE entries(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
     " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES;
 constexpr const char* kSignatureTable =
     "CREATE TABLE signatures(place INTEGER PRIMARY KEY, since INTEGER NOT NULL, chain BLOB NOT NULL, key BLOB NOT NULL,"
     " signature BLOB NOT NULL) STRICT;";
 constexpr int kVersionWithSignatures = 4;
-constexpr const char* kTimedRows =
-    "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place";
+constexpr const char* kTimedEntries =
+    "SELECT place, at_ns, bytes, chain FROM entries WHERE place > ? AND place <= ? ORDER BY place";
 
 const std::array kVersions{
     Version{1,
-            "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
+            "CREATE TABLE entries(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
             "STRICT;" OSTEON_OTHER_TABLES,
-            "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
-    Version{2, kTimedTables, kTimedRows}, Version{3, kTimedTables, kTimedRows},
-    Version{kJournalVersion, std::string(kTimedTables) + kSignatureTable, kTimedRows}};
+            "SELECT place, 0, bytes, chain FROM entries WHERE place > ? AND place <= ? ORDER BY place"},
+    Version{2, kTimedTables, kTimedEntries}, Version{3, kTimedTables, kTimedEntries},
+    Version{kJournalVersion, std::string(kTimedTables) + kSignatureTable, kTimedEntries}};
 
 const Version& version_of(int number) {
   return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
 }
 
-constexpr const char* kInsertRow = "INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
+constexpr const char* kInsertEntry = "INSERT INTO entries(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
 
 Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
   std::unique_ptr<DiskFile> copy;
@@ -72,7 +72,7 @@ Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
       .map([](const WrittenFile&) {});
 }
 
-// What stands beside the chain is confirmed row by row.
+// What stands beside the chain is confirmed entry by entry.
 Digest seal_of(const Checkpoint& checkpoint) {
   Hasher hasher;
   hasher.text("checkpoint");
@@ -138,7 +138,7 @@ bool is_partial_of(const fs::path& journal, std::string_view name) {
 Result<void> check_is_journal(const fs::path& file, Disk& disk) {
   constexpr std::size_t kSmallestPage = 512, kLooked = std::size_t{64} << 10, kApplicationAt = 68;
   constexpr std::string_view kMagic("SQLite format 3\0", 16), kOwn("OstJ"),
-      kRows("CREATE TABLE rows(place INTEGER PRIMARY KEY");
+      kEntries("CREATE TABLE entries(place INTEGER PRIMARY KEY");
   const auto size = disk.size(file);
   if (!size) return tl::unexpected(size.error());
   if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
@@ -151,7 +151,7 @@ Result<void> check_is_journal(const fs::path& file, Disk& disk) {
   const bool of_sqlite = page.starts_with(kMagic) || kMagic.starts_with(page);
   if (of_sqlite && page.size() < kSmallestPage)
     return is_not(" has been cut to " + std::to_string(page.size()) + " bytes, less than a page; go on from a backup");
-  if (page.find(kRows) != page.npos || (of_sqlite && page.substr(kApplicationAt, kOwn.size()) == kOwn)) return {};
+  if (page.find(kEntries) != page.npos || (of_sqlite && page.substr(kApplicationAt, kOwn.size()) == kOwn)) return {};
   if (of_sqlite) return is_not(" is a database of another program, no journal; name a journal");
   const auto wal = disk.size(wal_of(file));
   if (!wal) return tl::unexpected(wal.error());
@@ -256,7 +256,7 @@ Result<JournalFile> JournalFile::of_database(const fs::path& file, Disk& disk, D
   if (!genesis) return tl::unexpected(genesis.error());
   if (!*genesis)
     return failure(ErrorCode::invalid_input,
-                   file.string() + " has lost its register genesis, so no row of it can be confirmed");
+                   file.string() + " has lost its register genesis, so no entry of it can be confirmed");
   opened.genesis_ = **genesis;
   const auto generation = opened.find_register(kGenerationRegister), footer = opened.find_register(kFooterRegister);
   const auto id = opened.find_register(kIdRegister);
@@ -287,18 +287,18 @@ Result<void> JournalFile::make_id() {
 }
 
 Result<JournalHead> JournalFile::stored_head() {
-  auto statement = database_.prepare("SELECT place, chain FROM rows ORDER BY place DESC LIMIT 1");
+  auto statement = database_.prepare("SELECT place, chain FROM entries ORDER BY place DESC LIMIT 1");
   if (!statement) return tl::unexpected(statement.error());
-  const Result<bool> row = statement->step();
-  if (!row) return tl::unexpected(row.error());
-  if (!*row) return first_head(genesis_);
+  const Result<bool> entry = statement->step();
+  if (!entry) return tl::unexpected(entry.error());
+  if (!*entry) return first_head(genesis_);
   return JournalHead{RoomSeq{static_cast<std::uint64_t>(statement->integer(0))},
                      digest_of(statement->bytes(1)).value_or(Digest{})};
 }
 
 Result<void> JournalFile::take_log() {
   const auto stored = stored_head();
-  if (!stored) {  // inspect() says what is wrong with the rows
+  if (!stored) {  // inspect() says what is wrong with the entries
     log_.faults.push_back(stored.error().message);
     return {};
   }
@@ -313,9 +313,9 @@ Result<void> JournalFile::take_log() {
     log_.faults.push_back(path.string() + " goes on from another history than " + file_.string() + " has");
     needs_log_ = true;
   }
-  if (log_.rows.empty() || version_ == 1) return {};
+  if (log_.entries.empty() || version_ == 1) return {};
   JournalHead head = *stored;
-  const Result<void> added = add_rows(log_.rows, head);
+  const Result<void> added = add_entries(log_.entries, head);
   if (added) return {};
   // The tables are damaged. What can be read of them is all that there is.
   log_.faults.push_back(added.error().message);
@@ -376,47 +376,47 @@ Result<void> JournalFile::check_tables(bool peek) {
 }
 
 Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
-                       const std::function<bool(const JournalRow&, const JournalHead&)>& take) {
+                       const std::function<bool(const JournalEntry&, const JournalHead&)>& take) {
   Walk walked{before, std::nullopt};
-  auto statement = database_.prepare(version_of(version_).rows);
+  auto statement = database_.prepare(version_of(version_).entries);
   if (!statement) {
     walked.stopped = statement.error();
     return walked;
   }
   statement->integer(0, static_cast<std::int64_t>(before.place.value))
       .integer(1, static_cast<std::int64_t>(last.value));
-  JournalRow row;
+  JournalEntry entry;
   while (walked.head.place < last) {
     const Result<bool> more = statement->step();
     if (!more) {
       walked.stopped = more.error();
-      walked.stopped->message = "after row " + std::to_string(walked.head.place.value) + ": " + more.error().message;
+      walked.stopped->message = "after entry " + std::to_string(walked.head.place.value) + ": " + more.error().message;
       return walked;
     }
     if (!*more) return walked;
-    row.place.value = static_cast<std::uint64_t>(statement->integer(0));
-    row.at_ns = statement->integer(1);
-    row.bytes = statement->bytes(2);
-    const JournalHead next = next_in_chain(walked.head, row);
-    if (row.place.value != walked.head.place.value + 1 || statement->bytes(3) != as_text(next.chain)) {
+    entry.place.value = static_cast<std::uint64_t>(statement->integer(0));
+    entry.at_ns = statement->integer(1);
+    entry.bytes = statement->bytes(2);
+    const JournalHead next = next_in_chain(walked.head, entry);
+    if (entry.place.value != walked.head.place.value + 1 || statement->bytes(3) != as_text(next.chain)) {
       walked.stopped =
-          Error{ErrorCode::invalid_input, file_.string() + ": row " + std::to_string(walked.head.place.value + 1) +
+          Error{ErrorCode::invalid_input, file_.string() + ": entry " + std::to_string(walked.head.place.value + 1) +
                                               " does not fit the chain of hashes" + std::string(kRemedy)};
       return walked;
     }
     walked.head = next;
-    if (!take(row, next)) return walked;
+    if (!take(entry, next)) return walked;
   }
   return walked;
 }
 
 Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
   if (place.value == 0) return first_head(genesis_).chain;
-  auto statement = database_.prepare("SELECT chain FROM rows WHERE place = ?");
+  auto statement = database_.prepare("SELECT chain FROM entries WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
-  const Result<bool> row = statement->integer(0, static_cast<std::int64_t>(place.value)).step();
-  if (!row) return tl::unexpected(row.error());
-  if (!*row) return std::nullopt;
+  const Result<bool> entry = statement->integer(0, static_cast<std::int64_t>(place.value)).step();
+  if (!entry) return tl::unexpected(entry.error());
+  if (!*entry) return std::nullopt;
   return digest_of(statement->bytes(0));
 }
 
@@ -482,9 +482,9 @@ Result<std::optional<std::string>> JournalFile::find_register(std::string_view n
 Result<std::optional<SealedRegister>> JournalFile::find_sealed(std::string_view name) {
   auto statement = database_.prepare("SELECT value, seal FROM registers WHERE name = ?");
   if (!statement) return tl::unexpected(statement.error());
-  const Result<bool> row = statement->text(0, name).step();
-  if (!row) return tl::unexpected(row.error());
-  if (!*row) return std::nullopt;
+  const Result<bool> entry = statement->text(0, name).step();
+  if (!entry) return tl::unexpected(entry.error());
+  if (!*entry) return std::nullopt;
   SealedRegister found{std::string(name), std::string(statement->bytes(0)), std::string(statement->bytes(1))};
   // The genesis is what all others are held against, and bound by the chain itself.
   const Digest entry = seal_of(name, found.value), genesis = first_head(genesis_).chain;
@@ -502,8 +502,8 @@ std::optional<PublicKey> JournalFile::signer_of(const Checkpoint& found) const {
   return check_seal(found.seal, seal_of(found), first_head(genesis_).chain).value_or(Seal{}).key;
 }
 
-Result<std::vector<SignedRows>> JournalFile::signed_rows() {
-  std::vector<SignedRows> all;
+Result<std::vector<SignedRange>> JournalFile::signed_range() {
+  std::vector<SignedRange> all;
   if (version_ >= kVersionWithSignatures) {
     auto statement = database_.prepare("SELECT place, since, chain, key, signature FROM signatures ORDER BY place");
     if (!statement) return tl::unexpected(statement.error());
@@ -511,7 +511,7 @@ Result<std::vector<SignedRows>> JournalFile::signed_rows() {
       const Result<bool> more = statement->step();
       if (!more) return tl::unexpected(more.error());
       if (!*more) break;
-      SignedRows& one = all.emplace_back();
+      SignedRange& one = all.emplace_back();
       one.head.place.value = static_cast<std::uint64_t>(statement->integer(0));
       one.since.value = static_cast<std::uint64_t>(statement->integer(1));
       const auto chain = digest_of(statement->bytes(2));
@@ -527,29 +527,29 @@ Result<std::vector<SignedRows>> JournalFile::signed_rows() {
   return all;
 }
 
-Result<void> JournalFile::add_signed_rows(const SignedRows& rows) {
+Result<void> JournalFile::add_signed_entries(const SignedRange& entries) {
   auto statement =
       database_.prepare("INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
   const auto text_of = [](const auto& bytes) {
     return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   };
-  return statement->integer(0, static_cast<std::int64_t>(rows.head.place.value))
-      .integer(1, static_cast<std::int64_t>(rows.since.value))
-      .blob(2, as_text(rows.head.chain))
-      .blob(3, text_of(rows.key.bytes))
-      .blob(4, text_of(rows.signature.bytes))
+  return statement->integer(0, static_cast<std::int64_t>(entries.head.place.value))
+      .integer(1, static_cast<std::int64_t>(entries.since.value))
+      .blob(2, as_text(entries.head.chain))
+      .blob(3, text_of(entries.key.bytes))
+      .blob(4, text_of(entries.signature.bytes))
       .run();
 }
 
 // Whose key it is, only who asks can judge.
 void JournalFile::inspect_signatures(Inspection& found) {
-  const auto all = signed_rows();
+  const auto all = signed_range();
   if (!all) {
     found.faults.push_back(all.error().message);
     return;
   }
-  for (const SignedRows& one : *all) {
+  for (const SignedRange& one : *all) {
     const std::string what = "the signature at place " + std::to_string(one.head.place.value);
     if (!fits(one))
       found.faults.push_back(damaged(what).value().message);
@@ -564,7 +564,7 @@ void JournalFile::check_witness(const JournalHead& witness, const std::string& w
     const std::uint64_t missing = witness.place.value - found.head.place.value;
     found.faults.push_back(file_.string() + " goes to place " + std::to_string(found.head.place.value) + ", but " +
                            what + " vouches for place " + std::to_string(witness.place.value) + ": " +
-                           std::to_string(missing) + (missing == 1 ? " row is missing" : " rows are missing") +
+                           std::to_string(missing) + (missing == 1 ? " entry is missing" : " entries are missing") +
                            std::string(kRemedy));
     return;
   }
@@ -581,7 +581,7 @@ Inspection JournalFile::inspect(bool files) {
   Inspection found;
   const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
 
-  // Pages first: the rows may all be there and the tree above them be damaged, which the next append would make worse.
+  // Pages first: the entries may all be there and the tree above them be damaged, which the next append would make worse.
   const Result<std::string> pages = database_.text("PRAGMA quick_check(1)");
   if (!pages)
     note(pages.error());
@@ -589,15 +589,15 @@ Inspection JournalFile::inspect(bool files) {
     found.faults.push_back(file_.string() + " is damaged (" + *pages + ")" + std::string(kRemedy));
 
   const Walk walked =
-      walk(first_head(genesis_), RoomSeq{INT64_MAX}, [](const JournalRow&, const JournalHead&) { return true; });
+      walk(first_head(genesis_), RoomSeq{INT64_MAX}, [](const JournalEntry&, const JournalHead&) { return true; });
   found.head = walked.head;
   if (walked.stopped) {
     found.first_bad = RoomSeq{walked.head.place.value + 1};
     note(*walked.stopped);
-  } else if (const Result<std::int64_t> rows = database_.integer("SELECT count(*) FROM rows"); !rows) {
-    note(rows.error());
-  } else if (static_cast<std::uint64_t>(*rows) != found.head.place.value) {  // some have places below 1
-    found.faults.push_back(file_.string() + " has rows that are in no place of the order" + std::string(kRemedy));
+  } else if (const Result<std::int64_t> entries = database_.integer("SELECT count(*) FROM entries"); !entries) {
+    note(entries.error());
+  } else if (static_cast<std::uint64_t>(*entries) != found.head.place.value) {  // some have places below 1
+    found.faults.push_back(file_.string() + " has entries that are in no place of the order" + std::string(kRemedy));
   }
   inspect_beside(files, found);
   return found;
@@ -610,7 +610,7 @@ void JournalFile::inspect_log(Inspection& found) {
   for (const std::string& foreign : log_.foreign)
     found.faults.push_back(foreign + "; put the files of one moment together again, or recover it into a new journal");
   if (!needs_log_) return;
-  const std::string untold = "how many rows are missing after place " + std::to_string(found.head.place.value) +
+  const std::string untold = "how many entries are missing after place " + std::to_string(found.head.place.value) +
                              " cannot be told" + std::string(kRemedy);
   for (const std::string& fault : log_.faults) found.faults.push_back(fault + std::string(kRemedy));
   if (!log_.faults.empty()) found.faults.push_back(file_.string() + ": " + untold);
@@ -628,7 +628,7 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   inspect_signatures(found);
   if (!erased_.empty())
     found.notes.push_back("words were erased from " + std::to_string(erased_.size()) +
-                          " rows; the chain keeps what their hash was");
+                          " entries; the chain keeps what their hash was");
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {
@@ -658,7 +658,7 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
     }
   }
 
-  // A checkpoint is written only of rows that are safe: its name alone vouches for them.
+  // A checkpoint is written only of entries that are safe: its name alone vouches for them.
   if (const auto names = disk_->list(folder_of(file_)); !names) {
     note(names.error());
   } else {
@@ -687,18 +687,18 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   }
 }
 
-Result<void> JournalFile::add_rows(std::span<const JournalRow> rows, JournalHead& head) {
+Result<void> JournalFile::add_entries(std::span<const JournalEntry> entries, JournalHead& head) {
   if (!insert_) {
-    auto prepared = database_.prepare(kInsertRow);
+    auto prepared = database_.prepare(kInsertEntry);
     if (!prepared) return tl::unexpected(prepared.error());
     insert_ = std::move(*prepared);
   }
-  for (const JournalRow& row : rows) {
-    OSTEON_CHECK(row.place.value == head.place.value + 1);
-    head = next_in_chain(head, row);
-    const Result<void> put = insert_->integer(0, static_cast<std::int64_t>(row.place.value))
-                                 .integer(1, row.at_ns)
-                                 .blob(2, row.bytes)
+  for (const JournalEntry& entry : entries) {
+    OSTEON_CHECK(entry.place.value == head.place.value + 1);
+    head = next_in_chain(head, entry);
+    const Result<void> put = insert_->integer(0, static_cast<std::int64_t>(entry.place.value))
+                                 .integer(1, entry.at_ns)
+                                 .blob(2, entry.bytes)
                                  .blob(3, as_text(head.chain))
                                  .run();
     if (!put) return put;
@@ -714,10 +714,10 @@ Result<void> JournalFile::keep_log() {
       .and_then([&] { return database_.carry_log(); })
       .and_then([&] { return database_.begin(); })
       .and_then([&] { return upgrade(); })
-      .and_then([&] { return add_rows(std::exchange(log_.rows, {}), head); })
+      .and_then([&] { return add_entries(std::exchange(log_.entries, {}), head); })
       .and_then([&] {
         const auto signature = std::exchange(log_.signature, std::nullopt);
-        return signature ? add_signed_rows(*signature) : Result<void>{};
+        return signature ? add_signed_entries(*signature) : Result<void>{};
       })
       // Until the next generation begins it needs no log.
       .and_then([&] {

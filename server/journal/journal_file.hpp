@@ -26,7 +26,7 @@ namespace osteon {
 // Files beside the journal's own, besides log_of() and mirror_of().
 [[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);         // SQLite's write-ahead log
 [[nodiscard]] std::filesystem::path owner_file_of(const std::filesystem::path& journal);  // names who made it
-[[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more rows
+[[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more entries
 // Its name is a witness: of the place and the chain there.
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& journal, const JournalHead& at);
 [[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal,
@@ -44,9 +44,9 @@ namespace osteon {
 
 // What a file says of itself.
 struct Inspection {
-  JournalHead head;                  // of the last row that the chain confirms
+  JournalHead head;                  // of the last entry that the chain confirms
   std::vector<std::string> faults;   // one sentence each; none: sound
-  std::optional<RoomSeq> first_bad;  // row
+  std::optional<RoomSeq> first_bad;  // entry
   bool closed_cleanly = false;
   RoomSeq witnessed;               // the furthest place that its log, a footer or a checkpoint vouches for
   std::vector<std::string> notes;  // of its log: what one file lacks and the other has, a write that is not whole
@@ -57,17 +57,17 @@ struct SealedRegister {
   std::string name, value, seal;
 };
 
-// A row of which something was erased.
-struct ErasedRow {
-  Digest chain;  // at the row, as it was written
+// A entry of which something was erased.
+struct ErasedEntry {
+  Digest chain;  // at the entry, as it was written
   Digest bytes;  // of what stands in its place
 };
-using ErasedRows = std::map<std::uint64_t, ErasedRow>;  // by place
-[[nodiscard]] std::string encode_erased(const ErasedRows& rows);
-[[nodiscard]] std::optional<ErasedRows> decode_erased(std::string_view bytes);
+using ErasedEntries = std::map<std::uint64_t, ErasedEntry>;  // by place
+[[nodiscard]] std::string encode_erased(const ErasedEntries& entries);
+[[nodiscard]] std::optional<ErasedEntries> decode_erased(std::string_view bytes);
 
 struct Walk {
-  JournalHead head;              // of the last row that fitted
+  JournalHead head;              // of the last entry that fitted
   std::optional<Error> stopped;  // why the next one does not
 };
 
@@ -76,7 +76,7 @@ class JournalFile {
   // Makes the tables in a file of that name. Nothing else may be there.
   [[nodiscard]] static Result<void> make(const std::filesystem::path& file, std::string_view genesis, Disk& disk,
                                          const DatabaseOptions& options);
-  // Any version that this program reads. The rows of its log are taken into a transaction, which stays open. Error
+  // Any version that this program reads. The entries of its log are taken into a transaction, which stays open. Error
   // invalid_input: no journal, or damaged beyond reading.
   [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk,
                                                 const DatabaseOptions& options);
@@ -101,13 +101,13 @@ class JournalFile {
   [[nodiscard]] std::uint64_t generation() const { return std::max(generation_, log_.generation); }
 
   // Rows of which something was erased, as a register of the journal says. The chain goes on over them.
-  [[nodiscard]] const ErasedRows& erased() const { return erased_; }
+  [[nodiscard]] const ErasedEntries& erased() const { return erased_; }
   // Of the journal that this is a growing copy of.
-  void take_erased(const ErasedRows& rows) { erased_ = rows; }
+  void take_erased(const ErasedEntries& entries) { erased_ = entries; }
 
   // Rows after `before` up to `last`, each held against the chain, as long as `take` returns true.
   [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
-                          const std::function<bool(const JournalRow&, const JournalHead&)>& take);
+                          const std::function<bool(const JournalEntry&, const JournalHead&)>& take);
   [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
   [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
   [[nodiscard]] Result<std::vector<Person>> people(std::vector<std::optional<PublicKey>>* signers = nullptr);
@@ -117,29 +117,29 @@ class JournalFile {
   // Who signed an entry that was read from here. None: nobody.
   [[nodiscard]] std::optional<PublicKey> signer_of(const SealedRegister& found) const;
   [[nodiscard]] std::optional<PublicKey> signer_of(const Checkpoint& found) const;
-  // In order of their places, that of its log last. inspect() holds them against their keys and against the rows.
-  [[nodiscard]] Result<std::vector<SignedRows>> signed_rows();
+  // In order of their places, that of its log last. inspect() holds them against their keys and against the entries.
+  [[nodiscard]] Result<std::vector<SignedRange>> signed_range();
   // The whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
   [[nodiscard]] Inspection inspect(bool files);
-  // All but pages and rows, of which `found` has the head: what vouches for them, and what is kept beside them.
+  // All but pages and entries, of which `found` has the head: what vouches for them, and what is kept beside them.
   void inspect_beside(bool files, Inspection& found);
 
-  // Commits the rows of the log, so that the log is needed no more. Of one that was opened to be written to.
+  // Commits the entries of the log, so that the log is needed no more. Of one that was opened to be written to.
   [[nodiscard]] Result<void> keep_log();
 
   // Entries that are written from now on are signed with it. Null: with none. It must outlive this.
   void sign_with(const SigningKey* key) { key_ = key; }
 
   // Within a transaction. Rows go on from `head`, which goes on with them.
-  [[nodiscard]] Result<void> add_rows(std::span<const JournalRow> rows, JournalHead& head);
+  [[nodiscard]] Result<void> add_entries(std::span<const JournalEntry> entries, JournalHead& head);
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
   [[nodiscard]] Result<void> add_register(const SealedRegister& copied);
-  [[nodiscard]] Result<void> add_signed_rows(const SignedRows& rows);
+  [[nodiscard]] Result<void> add_signed_entries(const SignedRange& entries);
   [[nodiscard]] Result<void> note_generation(const LogStart& start);  // which ends what a footer said
   [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
   [[nodiscard]] Result<void> add_person(const Person& person);
-  // Puts these bytes in place of those that the rows have.
-  [[nodiscard]] Result<void> erase(std::span<const JournalRow> instead);
+  // Puts these bytes in place of those that the entries have.
+  [[nodiscard]] Result<void> erase(std::span<const JournalEntry> instead);
 
  private:
   JournalFile(std::filesystem::path file, Disk& disk, Database database)
@@ -150,11 +150,11 @@ class JournalFile {
   [[nodiscard]] Result<void> read_version();
   [[nodiscard]] Result<void> check_tables(bool peek);
   [[nodiscard]] Result<JournalHead> stored_head();
-  // Inserts the rows that its log has beyond its last one.
+  // Inserts the entries that its log has beyond its last one.
   [[nodiscard]] Result<void> take_log();
   [[nodiscard]] Result<void> read_erased();
-  // As next_head(), and of an erased row what its chain was.
-  [[nodiscard]] JournalHead next_in_chain(const JournalHead& before, const JournalRow& row) const;
+  // As next_head(), and of an erased entry what its chain was.
+  [[nodiscard]] JournalHead next_in_chain(const JournalHead& before, const JournalEntry& entry) const;
   // To the tables of the current version, within a transaction.
   [[nodiscard]] Result<void> upgrade();
   void inspect_signatures(Inspection& found);
@@ -166,22 +166,22 @@ class JournalFile {
   Disk* disk_;
   std::unique_ptr<ScratchFolder> scratch_;  // where the database is a copy; outlives it
   Database database_;
-  std::optional<Statement> insert_;  // of a row
+  std::optional<Statement> insert_;  // of a entry
   const SigningKey* key_ = nullptr;
   int version_ = 0;
   std::string genesis_;
   std::string id_;
   std::uint64_t generation_ = 0;
   bool needs_log_ = false;  // it was not closed cleanly since the generation began
-  ErasedRows erased_;
+  ErasedEntries erased_;
   LogContents log_;
-  JournalHead stored_head_;  // of the rows without those of the log
+  JournalHead stored_head_;  // of the entries without those of the log
 };
 
 inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer",
                                   kEpochRegister = "server_epoch", kRecoveredRegister = "recovered",
                                   kGenerationRegister = "log generation", kIdRegister = "journal id",
-                                  kKeysRegister = "signing keys", kErasedRegister = "erased rows";
+                                  kKeysRegister = "signing keys", kErasedRegister = "erased entries";
 
 // A head that is kept as a register, with a mark.
 struct Footer {

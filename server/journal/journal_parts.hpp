@@ -1,4 +1,4 @@
-// What a journal keeps beside its rows.
+// What a journal keeps beside its entries.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -13,10 +13,10 @@ namespace osteon {
 
 struct JournalOptions {
   Disk* disk = nullptr;  // null: the computer's; must outlive the journal
-  std::size_t most_row_bytes = std::size_t{64} << 20;
+  std::size_t most_entry_bytes = std::size_t{64} << 20;
   std::uint64_t log_bytes = std::uint64_t{1} << 20;   // of each log file; what is beyond it goes into the database
   int page_bytes = 4096;                              // of a new journal; not below the disk's sectors
-  bool durable = true;                                // false, for tests only: no row is waited for
+  bool durable = true;                                // false, for tests only: no entry is waited for
   std::shared_ptr<const SigningKeys> keys = nullptr;  // that vouch for what is written; null: nobody does
 };
 
@@ -29,7 +29,7 @@ struct Checkpoint {
   std::string seal = {};  // of the four above; empty: it is made when the checkpoint is added
 };
 
-// Who a pseudonym of the rows is. Apart from the chain, so that a person can be forgotten and the rows still be
+// Who a pseudonym of the entries is. Apart from the chain, so that a person can be forgotten and the entries still be
 // confirmed.
 struct Person {
   std::string pseudonym;

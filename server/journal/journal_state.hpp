@@ -20,19 +20,19 @@ struct Journal::State {
   JournalFile file;
   FileIdentity identity;  // of the file
   JournalHead head = {};
-  std::optional<MirroredLog> log = {};  // nothing: closed to rows since it was opened
+  std::optional<MirroredLog> log = {};  // nothing: closed to entries since it was opened
   std::uint64_t generation = 0;         // of the log
   std::optional<RoomSeq> recovered_to = {};
   std::optional<Error> closed = {};
   std::vector<std::string> notes = {};            // of when it was opened
   std::optional<RoomSeq> signed_since = {};       // none: nothing is signed
-  std::optional<SignedRows> last_signature = {};  // of the newest rows, until the database has it
+  std::optional<SignedRange> last_signature = {};  // of the newest entries, until the database has it
   bool only_read = false;
 };
 
 struct JournalInside {
   static Journal::State& of(Journal& journal) { return *journal.state_; }
-  // So that all of it can be read from the disk. Error: of one that takes no rows, why.
+  // So that all of it can be read from the disk. Error: of one that takes no entries, why.
   static Result<void> carry(Journal& journal) {
     return journal.write([&] { return journal.carry(); });
   }

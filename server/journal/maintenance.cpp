@@ -52,11 +52,11 @@ VerifyReport report_of(JournalFile& file) {
                       .faults = std::move(found.faults),
                       .notes = std::move(found.notes)};
   if (!report.sound()) return report;  // nobody vouches for what is damaged
-  const auto rows = file.signed_rows();
+  const auto entries = file.signed_range();
   const auto checkpoints = file.checkpoints();
   const auto keys = file.find_register(kKeysRegister);
-  if (rows)
-    for (const SignedRows& one : *rows) report.signed_rows.push_back({one.since, one.head.place, one.key});
+  if (entries)
+    for (const SignedRange& one : *entries) report.signed_range.push_back({one.since, one.head.place, one.key});
   if (keys && *keys) report.successions = decode_successions(**keys).value_or(std::vector<Succession>{});
   if (checkpoints)
     for (const Checkpoint& one : *checkpoints)
@@ -89,13 +89,13 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
   Vouched vouched;
   // Rows between two of these places are all signed by the same keys.
   std::set<std::uint64_t> ends{report.head.place.value};
-  for (const SignedRange& range : report.signed_rows) ends.insert({range.from.value - 1, range.to.value});
+  for (const SignedRange& range : report.signed_range) ends.insert({range.from.value - 1, range.to.value});
   RoomSeq from{1};
   for (const std::uint64_t end : ends) {
     const RoomSeq to{end};
     if (to < from || to > report.head.place) continue;
     const SignedRange* by = nullptr;
-    for (const SignedRange& range : report.signed_rows)
+    for (const SignedRange& range : report.signed_range)
       if (range.from <= from && to <= range.to && (by == nullptr || own.contains(range.key))) by = &range;
     if (by == nullptr) {
       auto& none = vouched.by_nobody;
@@ -104,7 +104,7 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
       else
         none.emplace_back(from, to);
     } else {
-      auto& some = own.contains(by->key) ? vouched.rows : vouched.by_others;
+      auto& some = own.contains(by->key) ? vouched.entries : vouched.by_others;
       if (!some.empty() && some.back().key == by->key && some.back().to.value + 1 == from.value)
         some.back().to = to;
       else
@@ -151,12 +151,12 @@ struct JournalCopy::State {
   bool damaged = false;                               // what cannot be read is left out
   std::optional<std::uint64_t> epochs = {};           // recovered: openings that the lost part cannot have counted
   std::shared_ptr<const SigningKeys> keys = {};       // sign what is not copied as it is
-  bool signs_rows = false;                            // those of a branch, which has another chain
+  bool signs_entries = false;                            // those of a branch, which has another chain
   std::optional<Journal> target = {};
   // Taken from the source and not yet put into the target.
-  std::vector<JournalRow> rows = {};
+  std::vector<JournalEntry> entries = {};
   std::vector<SealedRegister> registers = {};
-  std::vector<SignedRows> signed_rows = {};
+  std::vector<SignedRange> signed_range = {};
   std::vector<Person> people = {};
   std::vector<Checkpoint> checkpoints = {};
   std::optional<Error> no_checkpoint = {};  // why the last of them could not be copied
@@ -180,10 +180,10 @@ struct JournalCopying {
     state.begun = true;
     if (Result<void> cleared = clear_growing(state); !cleared) return cleared;
     auto target = Journal::create(state.growing, state.genesis,
-                                  {.disk = state.disk, .keys = state.signs_rows ? state.keys : nullptr});
+                                  {.disk = state.disk, .keys = state.signs_entries ? state.keys : nullptr});
     if (!target) return tl::unexpected(target.error());
     state.target = std::move(*target);
-    // Their chain is that of the rows as they were. A branch has another chain, of what stands there now.
+    // Their chain is that of the entries as they were. A branch has another chain, of what stands there now.
     if (!state.only) JournalInside::of(*state.target).file.take_erased(state.source->erased());
     return {};
   }
@@ -203,12 +203,12 @@ struct JournalCopying {
     return tl::unexpected(error);
   }
 
-  static Result<void> take_rows(JournalCopy::State& state, std::size_t most_rows) {
+  static Result<void> take_entries(JournalCopy::State& state, std::size_t most_entries) {
     std::size_t bytes = 0;
-    const Walk walked = state.source->walk(state.copied, state.last, [&](const JournalRow& row, const JournalHead&) {
-      state.rows.push_back(row);
-      bytes += row.bytes.size();
-      return state.rows.size() < most_rows && bytes < kSliceBytes;
+    const Walk walked = state.source->walk(state.copied, state.last, [&](const JournalEntry& entry, const JournalHead&) {
+      state.entries.push_back(entry);
+      bytes += entry.bytes.size();
+      return state.entries.size() < most_entries && bytes < kSliceBytes;
     });
     if (walked.stopped && !state.damaged) return tl::unexpected(*walked.stopped);
     if (walked.stopped) state.last = walked.head.place;
@@ -230,14 +230,14 @@ struct JournalCopying {
       }
     }
     if (!state.only) {
-      const auto signatures = state.source->signed_rows();
+      const auto signatures = state.source->signed_range();
       if (!signatures) {
         if (Result<void> on = left_out(state, signatures.error()); !on) return on;
       } else {
-        for (const SignedRows& one : *signatures)
+        for (const SignedRange& one : *signatures)
           if (const auto chain = state.source->chain_at(one.head.place);
               one.head.place <= state.copied.place && fits(one) && chain && *chain == one.head.chain)
-            state.signed_rows.push_back(one);
+            state.signed_range.push_back(one);
       }
       auto people = state.source->people();
       if (people)
@@ -263,10 +263,10 @@ struct JournalCopying {
     return {};
   }
 
-  static Result<void> take(JournalCopy::State& state, std::size_t most_rows) {
+  static Result<void> take(JournalCopy::State& state, std::size_t most_entries) {
     if (state.no_checkpoint) return pass_over(state);
     if (state.all_taken) return {};
-    if (Result<void> taken = take_rows(state, most_rows); !taken) return taken;
+    if (Result<void> taken = take_entries(state, most_entries); !taken) return taken;
     if (state.copied.place < state.last) return {};
     state.all_taken = true;
     return take_beside(state);
@@ -275,8 +275,8 @@ struct JournalCopying {
   static Result<bool> put(JournalCopy::State& state) {
     if (!state.target)
       if (Result<void> begun = begin_target(state); !begun) return tl::unexpected(begun.error());
-    if (const auto rows = std::exchange(state.rows, {}); !rows.empty())
-      if (Result<void> put = state.target->append(rows); !put) return tl::unexpected(put.error());
+    if (const auto entries = std::exchange(state.entries, {}); !entries.empty())
+      if (Result<void> put = state.target->append(entries); !put) return tl::unexpected(put.error());
     state.head = state.target->head();
     if (!state.all_taken) return false;
     if (!std::exchange(state.put_beside, true))
@@ -298,8 +298,8 @@ struct JournalCopying {
       // Another genesis needs other seals.
       for (const SealedRegister& one : state.registers)
         if (done) done = state.only ? file.set_register(one.name, one.value) : file.add_register(one);
-      for (const SignedRows& one : state.signed_rows)
-        if (done) done = file.add_signed_rows(one);
+      for (const SignedRange& one : state.signed_range)
+        if (done) done = file.add_signed_entries(one);
       for (const Person& person : state.people)
         if (done) done = file.add_person(person);
       if (done && state.epochs)
@@ -311,7 +311,7 @@ struct JournalCopying {
   }
 
   static Result<void> copy_checkpoint(JournalCopy::State& state, const Checkpoint& checkpoint) {
-    // A branch has the same rows under a chain of its own.
+    // A branch has the same entries under a chain of its own.
     JournalHead at = checkpoint.at;
     if (state.only) {
       const auto head = state.target->head_at(at.place);
@@ -355,7 +355,7 @@ JournalCopy::~JournalCopy() {
 
 Result<JournalCopy> JournalCopy::begin(Journal& source, const fs::path& to) {
   auto& state = JournalInside::of(source);
-  // The newest rows' signature goes to where the copy takes it from. Where that fails, the copy has an earlier one.
+  // The newest entries' signature goes to where the copy takes it from. Where that fails, the copy has an earlier one.
   if (state.signed_since) static_cast<void>(JournalInside::carry(source));
   auto copy = JournalCopying::begin(state.path, state.file, state.head.place, to, *state.disk);
   if (copy) copy->state_->keys = state.options.keys;
@@ -371,15 +371,15 @@ Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& t
   copy->state_->genesis = std::move(genesis);
   copy->state_->only = std::move(registers);
   copy->state_->keys = state.options.keys;
-  copy->state_->signs_rows = state.signed_since == RoomSeq{1};  // the server vouches for all that it copies
+  copy->state_->signs_entries = state.signed_since == RoomSeq{1};  // the server vouches for all that it copies
   return copy;
 }
 
-Result<void> JournalCopy::take(std::size_t most_rows) { return JournalCopying::take(*state_, most_rows); }
+Result<void> JournalCopy::take(std::size_t most_entries) { return JournalCopying::take(*state_, most_entries); }
 Result<bool> JournalCopy::put() { return JournalCopying::put(*state_); }
 
-Result<bool> JournalCopy::step(std::size_t most_rows) {
-  return take(most_rows).and_then([&] { return put(); });
+Result<bool> JournalCopy::step(std::size_t most_entries) {
+  return take(most_entries).and_then([&] { return put(); });
 }
 
 const JournalHead& JournalCopy::head() const { return state_->head; }
@@ -431,7 +431,7 @@ Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk)
   auto source = Source::open(file, or_system(disk));
   if (source) return (*source)->chain_at(head.place).map([&](const auto& chain) { return chain == head.chain; });
   if (source.error().code != ErrorCode::exists) return tl::unexpected(source.error());
-  // What is read beside a write may be half of one: only a row that fits the one before it counts.
+  // What is read beside a write may be half of one: only a entry that fits the one before it counts.
   auto peeked = JournalFile::peek(file, or_system(disk));
   if (!peeked) return tl::unexpected(source.error());
   if (!head.place) return first_head(peeked->genesis()) == head;
@@ -439,7 +439,7 @@ Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk)
   const auto chain = peeked->chain_at(before);
   if (!chain || !*chain) return tl::unexpected(source.error());
   const Walk walked =
-      peeked->walk({before, **chain}, head.place, [](const JournalRow&, const JournalHead&) { return true; });
+      peeked->walk({before, **chain}, head.place, [](const JournalEntry&, const JournalHead&) { return true; });
   if (walked.stopped || walked.head.place != head.place) return tl::unexpected(source.error());
   return walked.head == head;
 }

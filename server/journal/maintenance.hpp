@@ -20,13 +20,13 @@ struct SignedRange {
 
 struct VerifyReport {
   int version = 0;
-  JournalHead head;                  // of the last row that the chain confirms
-  std::optional<RoomSeq> first_bad;  // row
+  JournalHead head;                  // of the last entry that the chain confirms
+  std::optional<RoomSeq> first_bad;  // entry
   RoomSeq witnessed;                 // the furthest place that a footer or checkpoint vouches for
   bool closed_cleanly = false;
   std::vector<std::string> faults;  // one sentence each
   std::vector<std::string> notes;   // of its log: what one file lacks and the other has, a write that is not whole
-  std::vector<SignedRange> signed_rows = {};  // in order of their ends; they may overlap
+  std::vector<SignedRange> signed_range = {};  // in order of their ends; they may overlap
   // Checkpoints, registers, people and the footer of a journal that was closed, and who signed each. Not what the
   // journal notes for itself.
   std::vector<std::pair<std::string, std::optional<PublicKey>>> entries = {};
@@ -36,13 +36,13 @@ struct VerifyReport {
 
 // What a server vouches for in a report that is sound: with a key, and the keys that it had before and after it.
 struct Vouched {
-  std::vector<SignedRange> rows;                       // one after the other
-  std::vector<SignedRange> by_others;                  // rows that another key signed, and none of this server
+  std::vector<SignedRange> entries;                       // one after the other
+  std::vector<SignedRange> by_others;                  // entries that another key signed, and none of this server
   std::vector<std::pair<RoomSeq, RoomSeq>> by_nobody;  // both ends included
   std::size_t entries = 0;                             // of VerifyReport::entries, signed by this server
   std::vector<std::string> other_entries;              // not signed by this server
   [[nodiscard]] bool all() const {
-    return (!rows.empty() || entries > 0) && by_others.empty() && by_nobody.empty() && other_entries.empty();
+    return (!entries.empty() || entries > 0) && by_others.empty() && by_nobody.empty() && other_entries.empty();
   }
 };
 [[nodiscard]] Vouched vouched_by(const PublicKey& key, const VerifyReport& report);
@@ -53,18 +53,18 @@ struct Vouched {
 // Of one in use, as the disk has it. It takes as long as reading the whole file.
 [[nodiscard]] Result<VerifyReport> verify_journal(Journal& journal);
 
-// Of one in use, without its pages, its rows and the bytes of its checkpoints, which are read bit by bit: what vouches
-// for places, and what is kept beside the rows. A few milliseconds. One sentence for each fault. From here on rows,
+// Of one in use, without its pages, its entries and the bytes of its checkpoints, which are read bit by bit: what vouches
+// for places, and what is kept beside the entries. A few milliseconds. One sentence for each fault. From here on entries,
 // too, are read from the disk and not from SQLite's memory.
 [[nodiscard]] std::vector<std::string> verify_beside(Journal& journal);
 
-// A copy of a journal in use up to its head at begin(), made in slices so that rows can be appended between them. The
+// A copy of a journal in use up to its head at begin(), made in slices so that entries can be appended between them. The
 // copy has the same genesis, chain, people, registers and checkpoints. Dropped unfinished, it leaves nothing.
 class JournalCopy {
  public:
   // Error exists: something is there. `source` must outlive the copy.
   [[nodiscard]] static Result<JournalCopy> begin(Journal& source, const std::filesystem::path& to);
-  // Another journal, of another genesis, that begins with the rows up to `last` and their checkpoints; of the registers
+  // Another journal, of another genesis, that begins with the entries up to `last` and their checkpoints; of the registers
   // it has these, and it has no people.
   [[nodiscard]] static Result<JournalCopy> begin_branch(Journal& source, const std::filesystem::path& to, RoomSeq last,
                                                         std::string genesis, std::vector<std::string> registers);
@@ -72,12 +72,12 @@ class JournalCopy {
   JournalCopy& operator=(JournalCopy&&) = delete;
   ~JournalCopy();
 
-  // Copies some more rows, or a checkpoint. True: all is copied, checked and synced.
-  [[nodiscard]] Result<bool> step(std::size_t most_rows = 1000);
+  // Copies some more entries, or a checkpoint. True: all is copied, checked and synced.
+  [[nodiscard]] Result<bool> step(std::size_t most_entries = 1000);
   // The two halves of a step: only take() uses the source, only put() waits for the copy to be written.
-  [[nodiscard]] Result<void> take(std::size_t most_rows);
+  [[nodiscard]] Result<void> take(std::size_t most_entries);
   [[nodiscard]] Result<bool> put();
-  [[nodiscard]] double fraction() const;          // of the rows
+  [[nodiscard]] double fraction() const;          // of the entries
   [[nodiscard]] const JournalHead& head() const;  // of the copy so far
 
  private:
@@ -113,9 +113,9 @@ struct RecoverReport {
   std::vector<std::string> faults;  // of the old one
   [[nodiscard]] std::uint64_t lost() const { return witnessed > head.place ? witnessed.value - head.place.value : 0; }
 };
-// Every row up to the last that the chain confirms, in a new journal that takes rows. `known`: what clients say they
-// were told, to count as witnesses. `last`: no row after it; null: all. `keys` sign that it was recovered: else a
-// server with keys takes no rows behind those that it did not sign. Error invalid_input: not even its genesis can be
+// Every entry up to the last that the chain confirms, in a new journal that takes entries. `known`: what clients say they
+// were told, to count as witnesses. `last`: no entry after it; null: all. `keys` sign that it was recovered: else a
+// server with keys takes no entries behind those that it did not sign. Error invalid_input: not even its genesis can be
 // read.
 [[nodiscard]] Result<RecoverReport> recover_journal(const std::filesystem::path& file, const std::filesystem::path& to,
                                                     Disk* disk = nullptr, const std::vector<JournalHead>& known = {},

@@ -15,17 +15,17 @@ namespace fs = std::filesystem;
 
 // A file is a first sector, which says what it belongs to, and entries one after the other. An entry is as long as it
 // needs to be: a torn write may spoil the sector in which the last one ends, and then the other file has that one.
-// Where the generation has a signer, a signature stands behind the rows of each entry. Journals of version 3 have logs
+// Where the generation has a signer, a signature stands behind the entries of each entry. Journals of version 3 have logs
 // without length and signer.
 constexpr std::string_view kMagic = "OsteonL2", kMagicOfVersion3 = "OsteonL1";
 constexpr std::size_t kFirstSector = 4096, kSaltBytes = 16, kChainBytes = 32, kChecksumBytes = 16;
 constexpr std::size_t kSaltEnd = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes;
-constexpr std::size_t kStartBytes = kSaltEnd + 8 + sizeof(PublicKey) + 8;  // length, key, first signed row
+constexpr std::size_t kStartBytes = kSaltEnd + 8 + sizeof(PublicKey) + 8;  // length, key, first signed entry
 constexpr std::size_t kSignatureBytes = sizeof(Signature);
-// No log gets as long: it is carried into the database once it is full, and a commit has few rows.
+// No log gets as long: it is carried into the database once it is full, and a commit has few entries.
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
 constexpr const char* kForeign = "belongs to another journal";
-constexpr std::size_t kEntryHead = kSaltBytes + 3 * 8 + kChainBytes;  // salt, bytes of rows, count, first place, chain
+constexpr std::size_t kEntryHead = kSaltBytes + 3 * 8 + kChainBytes;  // salt, bytes of entries, count, first place, chain
 
 std::string checksum(std::string_view bytes) {
   Hasher hasher;
@@ -53,18 +53,18 @@ std::string encode_start(const LogStart& start, std::string_view salt, std::uint
   return bytes + checksum(bytes);
 }
 
-std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& head,
+std::string encode_entry(std::span<const JournalEntry> entries, const JournalHead& head,
                          const std::optional<Signature>& signature, std::string_view salt) {
   std::string body;
-  for (const JournalRow& row : rows) {
-    put_integer(body, static_cast<std::uint64_t>(row.at_ns));
-    put_integer(body, row.bytes.size());
-    body += row.bytes;
+  for (const JournalEntry& entry : entries) {
+    put_integer(body, static_cast<std::uint64_t>(entry.at_ns));
+    put_integer(body, entry.bytes.size());
+    body += entry.bytes;
   }
   std::string bytes(salt);
   put_integer(bytes, body.size());
-  put_integer(bytes, rows.size());
-  put_integer(bytes, rows.front().place.value);
+  put_integer(bytes, entries.size());
+  put_integer(bytes, entries.front().place.value);
   bytes += as_text(head.chain);
   bytes += body;
   if (signature) bytes += text_of(signature->bytes);
@@ -74,7 +74,7 @@ std::string encode_entry(std::span<const JournalRow> rows, const JournalHead& he
 struct Entry {
   std::uint64_t first = 0;  // place
   JournalHead head;         // after it
-  std::vector<JournalRow> rows;
+  std::vector<JournalEntry> entries;
   std::optional<Signature> signature;
 };
 
@@ -95,7 +95,7 @@ std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes
   for (std::uint64_t i = 0; i < count; ++i) {
     if (left.size() < 16 || integer_at(left, 8) > left.size() - 16) return std::nullopt;
     const std::uint64_t length = integer_at(left, 8);
-    entry.rows.push_back({RoomSeq{entry.first + i}, static_cast<std::int64_t>(integer_at(left, 0)),
+    entry.entries.push_back({RoomSeq{entry.first + i}, static_cast<std::int64_t>(integer_at(left, 0)),
                           std::string(left.substr(16, length))});
     left.remove_prefix(16 + length);
   }
@@ -183,16 +183,16 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
   return file;
 }
 
-// The rows of an entry that follow `head`, if they lead to where the entry says. Nothing: it is of another history.
-std::optional<std::vector<JournalRow>> rows_after(const Entry& entry, JournalHead head) {
-  std::vector<JournalRow> rows;
-  for (const JournalRow& row : entry.rows) {
-    if (row.place <= head.place) continue;
-    head = next_head(head, row);
-    rows.push_back(row);
+// The entries of an entry that follow `head`, if they lead to where the entry says. Nothing: it is of another history.
+std::optional<std::vector<JournalEntry>> entries_after(const Entry& entry, JournalHead head) {
+  std::vector<JournalEntry> entries;
+  for (const JournalEntry& entry : entry.entries) {
+    if (entry.place <= head.place) continue;
+    head = next_head(head, entry);
+    entries.push_back(entry);
   }
   if (head != entry.head) return std::nullopt;
-  return rows;
+  return entries;
 }
 
 // The entry of a file that goes on from `head`, or nothing.
@@ -215,9 +215,9 @@ void find_older_copy(FoundFile& log, FoundFile& mirror) {
 // What of one file the other makes good, and a write that is not whole.
 void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents& found) {
   const auto note = [&](const FoundFile& bad, const FoundFile& good, const std::string& what) {
-    found.notes.push_back(bad.path.string() + " " + what + "; its rows were read from " + good.path.string());
+    found.notes.push_back(bad.path.string() + " " + what + "; its entries were read from " + good.path.string());
   };
-  const auto lacks_rows = [&](const FoundFile& one, const FoundFile& other) {
+  const auto lacks_entries = [&](const FoundFile& one, const FoundFile& other) {
     return std::ranges::any_of(other.entries, [&](const Entry& entry) {
       return entry.head.place <= one.last() && entry.first > one.start.base.place.value &&
              std::ranges::none_of(one.entries, [&](const Entry& own) { return own.head == entry.head; });
@@ -232,9 +232,9 @@ void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents
   for (const FoundFile* file : {&log, &mirror})
     if (file->ends_in_part) found.notes.push_back(file->path.string() + " ends in a write that is not whole");
   if (mirror.start.generation > log.start.generation) return;
-  if (log.damaged || log.last() < mirror.last() || lacks_rows(log, mirror)) note(log, mirror, "is damaged");
+  if (log.damaged || log.last() < mirror.last() || lacks_entries(log, mirror)) note(log, mirror, "is damaged");
   const bool one_behind = !log.entries.empty() && mirror.last().value + 1 == log.entries.back().first;
-  if (mirror.damaged || (mirror.last() < log.last() && !one_behind) || lacks_rows(mirror, log))
+  if (mirror.damaged || (mirror.last() < log.last() && !one_behind) || lacks_entries(mirror, log))
     note(mirror, log, "is damaged");
 }
 
@@ -266,13 +266,13 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
     for (const FoundFile& file : members) {
       const Entry* next = file.unreadable.empty() ? find_next(file, found.head) : nullptr;
       if (next == nullptr) continue;
-      const auto rows = rows_after(*next, found.head);
-      if (!rows) continue;
-      found.rows.insert(found.rows.end(), rows->begin(), rows->end());
+      const auto entries = entries_after(*next, found.head);
+      if (!entries) continue;
+      found.entries.insert(found.entries.end(), entries->begin(), entries->end());
       found.head = next->head;
       found.signature.reset();
       if (next->signature)
-        found.signature = SignedRows{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
+        found.signature = SignedRange{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
       more = true;
       break;
     }
@@ -344,7 +344,7 @@ Result<void> MirroredLog::check_named(const Member& member) {
 }
 
 Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
-  // Nobody can put something into a row that is taken for an entry.
+  // Nobody can put something into a entry that is taken for an entry.
   std::array<std::uint8_t, kSaltBytes> salt{};
   system_random()(salt);
   member.salt.assign(salt.begin(), salt.end());
@@ -359,13 +359,13 @@ Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
 Result<void> MirroredLog::begin_mirror(const LogStart& start) { return begin(mirror_, start); }
 Result<void> MirroredLog::begin_log(const LogStart& start) { return begin(log_, start); }
 
-Result<void> MirroredLog::append(std::span<const JournalRow> rows, const JournalHead& head,
+Result<void> MirroredLog::append(std::span<const JournalEntry> entries, const JournalHead& head,
                                  const std::optional<Signature>& signature) {
-  OSTEON_CHECK(!rows.empty() && log_.end != 0 && mirror_.end != 0);
+  OSTEON_CHECK(!entries.empty() && log_.end != 0 && mirror_.end != 0);
   // One after the other: a write that the power cuts short spoils one file at most.
   for (Member* member : {&log_, &mirror_}) {
     OSTEON_CHECK(signature.has_value() == member->is_signed);
-    const std::string entry = encode_entry(rows, head, signature, member->salt);
+    const std::string entry = encode_entry(entries, head, signature, member->salt);
     if (Result<void> named = check_named(*member); !named) return named;
     const Result<void> put =
         durable_ ? member->file->write_durably(member->end, entry) : member->file->write_at(member->end, entry);

@@ -1,5 +1,5 @@
-// The newest rows of a journal, before its database has them: a write-ahead log in two files with the same entries. A
-// row is durable in both before anybody is told of it, so each file says how far the other must go. What is damaged in
+// The newest entries of a journal, before its database has them: a write-ahead log in two files with the same entries. A
+// entry is durable in both before anybody is told of it, so each file says how far the other must go. What is damaged in
 // one is read from the other.
 #pragma once
 #include <cstdint>
@@ -24,8 +24,8 @@ namespace osteon {
 struct LogStart {
   Digest journal;                // which journal it belongs to: the chain of its genesis
   std::uint64_t generation = 0;  // rises by one each time that the log begins anew
-  JournalHead base;              // the last row that the database had then
-  // Who signs each entry, and from which row on. None: nobody does.
+  JournalHead base;              // the last entry that the database had then
+  // Who signs each entry, and from which entry on. None: nobody does.
   struct Signer {
     PublicKey key;
     RoomSeq since;
@@ -36,9 +36,9 @@ struct LogStart {
 // What both files together hold.
 struct LogContents {
   std::uint64_t generation = 0;         // the newest that either file is of; 0: neither can be read
-  std::vector<JournalRow> rows;         // after the head that was asked for
+  std::vector<JournalEntry> entries;         // after the head that was asked for
   JournalHead head;                     // of the last of them
-  std::optional<SignedRows> signature;  // of the entry that leads to head; may be anything
+  std::optional<SignedRange> signature;  // of the entry that leads to head; may be anything
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // what each file goes on from
   RoomSeq witnessed;                                                 // the furthest place that either file knows
   std::vector<std::string>
@@ -62,18 +62,18 @@ class MirroredLog {
  public:
   // Opens both files, or makes them, with room for `capacity` bytes each, so that a commit needs no change of the file
   // system's own. What they hold stays until begin_mirror() and begin_log().
-  // `durable`: false only for tests, which must see rows lost when no sync is waited for.
+  // `durable`: false only for tests, which must see entries lost when no sync is waited for.
   [[nodiscard]] static Result<MirroredLog> open(const std::filesystem::path& journal, std::uint64_t capacity,
                                                 Disk& disk, bool durable = true);
 
   // Begins the next generation, first in the mirror, then in the log. Between the two calls the database notes the
-  // generation: at every moment one file has all rows that the database may lack.
+  // generation: at every moment one file has all entries that the database may lack.
   [[nodiscard]] Result<void> begin_mirror(const LogStart& start);
   [[nodiscard]] Result<void> begin_log(const LogStart& start);
 
   // Rows that go on from the last ones. Durable in both files when it returns. `head`: after them. `signature`: there
   // if the generation has a signer. Error internal: a write failed, or a name no longer stands for the open file.
-  [[nodiscard]] Result<void> append(std::span<const JournalRow> rows, const JournalHead& head,
+  [[nodiscard]] Result<void> append(std::span<const JournalEntry> entries, const JournalHead& head,
                                     const std::optional<Signature>& signature = {});
 
   // Zeros behind the entries of both files: earlier generations may have left theirs there.

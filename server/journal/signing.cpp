@@ -56,7 +56,7 @@ Digest message_of(const PublicKey& before, const PublicKey& after) {
 
 Digest message_of(RoomSeq since, const JournalHead& head) {
   Hasher hasher;
-  hasher.text("osteon journal rows");
+  hasher.text("osteon journal entries");
   hasher.integer(since.value);
   hasher.integer(head.place.value);
   hasher.text(as_text(head.chain));
@@ -296,13 +296,13 @@ Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const fs::path& f
   return load_signing_keys(file);
 }
 
-SignedRows sign_rows(const SigningKey& key, RoomSeq since, const JournalHead& head) {
+SignedRange sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head) {
   return {since, head, key.public_key(), key.sign(message_of(since, head))};
 }
 
-bool fits(const SignedRows& rows) {
-  return rows.since && rows.since <= rows.head.place &&
-         verifies(rows.key, message_of(rows.since, rows.head), rows.signature);
+bool fits(const SignedRange& entries) {
+  return entries.since && entries.since <= entries.head.place &&
+         verifies(entries.key, message_of(entries.since, entries.head), entries.signature);
 }
 
 std::string make_seal(const Digest& entry, const Digest& genesis, const SigningKey* key) {

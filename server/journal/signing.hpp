@@ -1,5 +1,5 @@
 // Ed25519 signatures (RFC 8032) with which a server vouches for what it wrote into a journal. The chain of hashes shows
-// that rows fit together; anybody can compute it. Only who has the secret key can sign.
+// that entries fit together; anybody can compute it. Only who has the secret key can sign.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -87,17 +87,17 @@ inline constexpr const char* kSigningKeyFile = "signing.key";
 // Whoever has loaded the file signs with the old key until it loads it again.
 [[nodiscard]] Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const std::filesystem::path& file);
 
-// A key says: I decided the rows from `since` on, and they lead to `head`. Through the chain this holds for what those
-// rows are.
-struct SignedRows {
+// A key says: I decided the entries from `since` on, and they lead to `head`. Through the chain this holds for what those
+// entries are.
+struct SignedRange {
   RoomSeq since;
   JournalHead head;
   PublicKey key;
   Signature signature;
 };
-[[nodiscard]] SignedRows sign_rows(const SigningKey& key, RoomSeq since, const JournalHead& head);
-// Whether the key made the signature, and of rows that can be.
-[[nodiscard]] bool fits(const SignedRows& rows);
+[[nodiscard]] SignedRange sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head);
+// Whether the key made the signature, and of entries that can be.
+[[nodiscard]] bool fits(const SignedRange& entries);
 
 // What stands beside each entry that the chain does not confirm: its hash, or the key that signed the hash and its
 // signature. `genesis`: chain_0 of the journal, so that it counts in no other.

@@ -79,14 +79,14 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
 // of their calls, and a test holds the protocol to it.
 template <class Request>
 std::string_view method_of() {
-  static const CallRow* const row = [] {
+  static const CallRow* const entry = [] {
     const std::string_view request = Request::descriptor()->name();
     const std::string end = "/" + std::string(request.substr(0, request.size() - std::string_view("Request").size()));
-    const auto found = std::ranges::find_if(call_rows(), [&](const CallRow& one) { return one.method.ends_with(end); });
-    OSTEON_CHECK(found != call_rows().end());
+    const auto found = std::ranges::find_if(call_entries(), [&](const CallRow& one) { return one.method.ends_with(end); });
+    OSTEON_CHECK(found != call_entries().end());
     return &*found;
   }();
-  return row->method;
+  return entry->method;
 }
 
 // The same for the call of that request.

@@ -20,24 +20,24 @@ Committer::~Committer() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Committer::commit(std::vector<RoomRow> rows, std::vector<Tell> tells) {
-  if (rows.empty() && tells.empty()) return;
-  if (!write_) return keep(rows, tells);
+void Committer::commit(std::vector<LogEntry> entries, std::vector<Tell> tells) {
+  if (entries.empty() && tells.empty()) return;
+  if (!write_) return keep(entries, tells);
   const std::lock_guard lock(mutex_);
-  std::ranges::move(rows, std::back_inserter(rows_));
+  std::ranges::move(entries, std::back_inserter(entries_));
   std::ranges::move(tells, std::back_inserter(tells_));
   wake_.notify_all();
 }
 
 void Committer::drain() {
-  if (!thread_.joinable()) return keep(std::exchange(rows_, {}), std::exchange(tells_, {}));
+  if (!thread_.joinable()) return keep(std::exchange(entries_, {}), std::exchange(tells_, {}));
   std::unique_lock lock(mutex_);
-  wake_.wait(lock, [&] { return !busy_ && rows_.empty() && tells_.empty(); });
+  wake_.wait(lock, [&] { return !busy_ && entries_.empty() && tells_.empty(); });
 }
 
 std::size_t Committer::waiting() const {
   const std::lock_guard lock(mutex_);
-  return rows_.size() + writing_;
+  return entries_.size() + writing_;
 }
 
 DurationHistogram Committer::commit_times() const {
@@ -50,12 +50,12 @@ std::optional<Error> Committer::failure() const {
   return failure_;
 }
 
-void Committer::keep(const std::vector<RoomRow>& rows, const std::vector<Tell>& tells) {
+void Committer::keep(const std::vector<LogEntry>& entries, const std::vector<Tell>& tells) {
   Result<void> durable;
   if (const std::optional<Error> failed = failure()) durable = tl::unexpected(*failed);
-  if (write_ && durable && !rows.empty()) {
+  if (write_ && durable && !entries.empty()) {
     const auto begun = std::chrono::steady_clock::now();
-    durable = write_(rows);
+    durable = write_(entries);
     {
       const std::lock_guard lock(mutex_);
       times_.record(std::chrono::steady_clock::now() - begun);
@@ -69,14 +69,14 @@ void Committer::keep(const std::vector<RoomRow>& rows, const std::vector<Tell>& 
 void Committer::run() {
   std::unique_lock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [&] { return end_ || !rows_.empty() || !tells_.empty(); });
-    if (rows_.empty() && tells_.empty()) return;
-    const std::vector<RoomRow> rows = std::exchange(rows_, {});
+    wake_.wait(lock, [&] { return end_ || !entries_.empty() || !tells_.empty(); });
+    if (entries_.empty() && tells_.empty()) return;
+    const std::vector<LogEntry> entries = std::exchange(entries_, {});
     const std::vector<Tell> tells = std::exchange(tells_, {});
-    writing_ = rows.size();
+    writing_ = entries.size();
     busy_ = true;
     lock.unlock();
-    keep(rows, tells);
+    keep(entries, tells);
     lock.lock();
     writing_ = 0;
     busy_ = false;

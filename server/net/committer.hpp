@@ -1,4 +1,4 @@
-// Makes what a room has decided durable before anyone is told of it: one transaction for all rows of a tick, on a
+// Makes what a room has decided durable before anyone is told of it: one transaction for all entries of a tick, on a
 // thread of its own, while the room goes on.
 #pragma once
 #include <condition_variable>
@@ -12,14 +12,14 @@
 
 #include "common/core/result.hpp"
 #include "common/runtime/tick_stats.hpp"
-#include "server/room/room_row.hpp"
+#include "server/room/room_entry.hpp"
 
 namespace osteon {
 
 class Committer {
  public:
-  // Returns when the rows will survive whatever comes; blocks. After an error it is not called again.
-  using Write = std::function<Result<void>(std::span<const RoomRow>)>;
+  // Returns when the entries will survive whatever comes; blocks. After an error it is not called again.
+  using Write = std::function<Result<void>(std::span<const LogEntry>)>;
   // What is to be said of a decision once it is durable; with an error where it never will be.
   using Tell = std::function<void(const Result<void>& durable)>;
 
@@ -30,27 +30,27 @@ class Committer {
   Committer(const Committer&) = delete;
   Committer& operator=(const Committer&) = delete;
 
-  // [tick] In the order of the calls: the rows, then what tells of them. Either may be empty.
-  void commit(std::vector<RoomRow> rows, std::vector<Tell> tells);
+  // [tick] In the order of the calls: the entries, then what tells of them. Either may be empty.
+  void commit(std::vector<LogEntry> entries, std::vector<Tell> tells);
   // Returns when all that was handed over is durable and told.
   void drain();
 
-  [[nodiscard]] std::size_t waiting() const;             // rows
+  [[nodiscard]] std::size_t waiting() const;             // entries
   [[nodiscard]] DurationHistogram commit_times() const;  // of the transactions
   [[nodiscard]] std::optional<Error> failure() const;    // why nothing more is kept
 
  private:
   void run();
   // Writes and tells, without the mutex.
-  void keep(const std::vector<RoomRow>& rows, const std::vector<Tell>& tells);
+  void keep(const std::vector<LogEntry>& entries, const std::vector<Tell>& tells);
 
   const Write write_;
   const std::function<void(const Error&)> failed_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
-  std::vector<RoomRow> rows_;
+  std::vector<LogEntry> entries_;
   std::vector<Tell> tells_;
-  std::size_t writing_ = 0;  // rows in the transaction under way
+  std::size_t writing_ = 0;  // entries in the transaction under way
   bool busy_ = false, end_ = false;
   DurationHistogram times_;
   std::optional<Error> failure_;

@@ -86,22 +86,22 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
   // Decided before its session was open.
-  void hold(const wire::SessionRow& supervised) override {
+  void hold(const wire::SessionEntry& supervised) override {
     const std::lock_guard lock(mutex_);
     stopped_ = !supervised.supervision.may_cut();
   }
   void offer(RoomSeq, const Bytes&) override {}
-  void offer(RoomSeq, const Bytes&, const wire::SessionRow& row) override {
+  void offer(RoomSeq, const Bytes&, const wire::SessionEntry& entry) override {
     const std::lock_guard lock(mutex_);
-    if (row.kind == wire::SessionRowKind::supervised) {
-      lease_ = row.lease_epoch;
-      stopped_ = !row.supervision.may_cut();
-    } else if (row.kind == wire::SessionRowKind::committed && row.cut.author == author_) {
+    if (entry.kind == wire::SessionEntryKind::supervised) {
+      lease_ = entry.lease_epoch;
+      stopped_ = !entry.supervision.may_cut();
+    } else if (entry.kind == wire::SessionEntryKind::committed && entry.cut.author == author_) {
       undecided_.pop_front();
-    } else if (row.kind == wire::SessionRowKind::rejected) {
-      lease_ = row.lease_epoch;
+    } else if (entry.kind == wire::SessionEntryKind::rejected) {
+      lease_ = entry.lease_epoch;
       // What fell with the lease is made again under the new one; what is wrong in itself is left out.
-      const auto reason = static_cast<Rejection>(row.reason);
+      const auto reason = static_cast<Rejection>(entry.reason);
       if (reason == Rejection::lease || reason == Rejection::frozen || reason == Rejection::taken)
         again_.push_back(undecided_.front());
       undecided_.pop_front();
@@ -237,14 +237,14 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
   std::set<RoomSeq> undone;
   std::map<Digest, Tool> tools;
   bool too_many = false;
-  const auto take = [&](const RoomRow& row) {
-    if (const auto* cut = std::get_if<CutRow>(&row.what)) {
-      if (row.place >= what.from && (!what.of || cut->cut.author == what.of)) cuts[row.place] = {cut->cut, row.at};
-    } else if (const auto* undo = std::get_if<UndoRow>(&row.what)) {
+  const auto take = [&](const LogEntry& entry) {
+    if (const auto* cut = std::get_if<CutEntry>(&entry.what)) {
+      if (entry.place >= what.from && (!what.of || cut->cut.author == what.of)) cuts[entry.place] = {cut->cut, entry.at};
+    } else if (const auto* undo = std::get_if<UndoEntry>(&entry.what)) {
       undone.insert(undo->places.begin(), undo->places.end());
-    } else if (const auto* redo = std::get_if<RedoRow>(&row.what)) {
+    } else if (const auto* redo = std::get_if<RedoEntry>(&entry.what)) {
       for (const RoomSeq place : redo->places) undone.erase(place);
-    } else if (const auto* added = std::get_if<ToolRow>(&row.what)) {
+    } else if (const auto* added = std::get_if<ToolEntry>(&entry.what)) {
       tools.emplace(added->tool.hash(), added->tool);
     }
     too_many = cuts.size() > Demonstrations::kMostCuts;

@@ -6,7 +6,7 @@
 #include <utility>
 #include <variant>
 
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "server/net/room_owners.hpp"
 
 namespace osteon {
@@ -37,12 +37,12 @@ std::uint32_t number_of(const Person& person) {
   return number;
 }
 
-// The words of a row, where it has some.
-std::string* words_in(RoomRow& row) {
-  if (auto* mark = std::get_if<MarkRow>(&row.what)) return &mark->label;
-  if (auto* said = std::get_if<WordsRow>(&row.what)) return &said->words;
-  if (auto* one = std::get_if<SuperviseRow>(&row.what)) return &one->supervision.words;
-  if (auto* one = std::get_if<AnnotationRow>(&row.what); one != nullptr && one->drawn) return &one->drawn->words;
+// The words of a entry, where it has some.
+std::string* words_in(LogEntry& entry) {
+  if (auto* mark = std::get_if<MarkEntry>(&entry.what)) return &mark->label;
+  if (auto* said = std::get_if<WordsEntry>(&entry.what)) return &said->words;
+  if (auto* one = std::get_if<SuperviseEntry>(&entry.what)) return &one->supervision.words;
+  if (auto* one = std::get_if<AnnotationEntry>(&entry.what); one != nullptr && one->drawn) return &one->drawn->words;
   return nullptr;
 }
 
@@ -54,17 +54,17 @@ bool WordEraser::names_one(std::string_view words) const {
                              [&](const std::string& name) { return !name.empty() && has_word(low, lower(name)); });
 }
 
-std::optional<std::string> WordEraser::operator()(const JournalRow& row) {
-  Result<RoomRow> read = row_from_bytes(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+std::optional<std::string> WordEraser::operator()(const JournalEntry& entry) {
+  Result<LogEntry> read = entry_from_bytes(entry.place, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
   if (!read) return std::nullopt;
-  if (const auto* join = std::get_if<JoinRow>(&read->what); join != nullptr && people_.contains(join->person))
+  if (const auto* join = std::get_if<JoinEntry>(&read->what); join != nullptr && people_.contains(join->person))
     authors_.insert(join->author);
   std::string* words = words_in(*read);
   if (words == nullptr || words->empty() || *words == kErasedWords) return std::nullopt;
   bool theirs = is_of(read->author) || names_one(*words);
-  if (const auto* said = std::get_if<WordsRow>(&read->what)) theirs = theirs || is_of(said->to);
-  if (const auto* one = std::get_if<SuperviseRow>(&read->what)) theirs = theirs || is_of(one->subject);
-  if (const auto* one = std::get_if<AnnotationRow>(&read->what)) theirs = theirs || is_of(one->drawn->author);
+  if (const auto* said = std::get_if<WordsEntry>(&read->what)) theirs = theirs || is_of(said->to);
+  if (const auto* one = std::get_if<SuperviseEntry>(&read->what)) theirs = theirs || is_of(one->subject);
+  if (const auto* one = std::get_if<AnnotationEntry>(&read->what)) theirs = theirs || is_of(one->drawn->author);
   if (!theirs) return std::nullopt;
   *words = kErasedWords;
   return to_bytes(*read);
@@ -84,9 +84,9 @@ Result<Forgotten> forget_people(Journal& journal, const std::function<bool(const
     }
   if (number != 0) people.insert(number);  // whose name may be forgotten already
   if (people.empty()) return Forgotten{};
-  const Result<std::size_t> rows = journal.erase_rows(WordEraser(std::move(people), names));
-  if (!rows) return tl::unexpected(rows.error());
-  Forgotten forgotten{0, *rows, names};
+  const Result<std::size_t> entries = journal.erase_entries(WordEraser(std::move(people), names));
+  if (!entries) return tl::unexpected(entries.error());
+  Forgotten forgotten{0, *entries, names};
   if (pseudonyms.empty()) return forgotten;
   const Result<std::size_t> gone = journal.forget_people_if(
       [&](const Person& person) { return std::ranges::find(pseudonyms, person.pseudonym) != pseudonyms.end(); });

@@ -11,7 +11,7 @@ namespace {
 using Time = std::chrono::nanoseconds;
 using namespace std::chrono_literals;
 
-constexpr int kMostInARow = 256;  // datagrams received before others are sent: there are floods
+constexpr int kMostInAEntry = 256;  // datagrams received before others are sent: there are floods
 constexpr Time kLongestWait = 100ms;
 
 // The clock of all links of this process.
@@ -56,11 +56,11 @@ void SessionLink::offer(const Cut& cut) {
   say(std::move(next));
 }
 
-bool SessionLink::tell(std::uint64_t index, const wire::SessionRow& row) {
+bool SessionLink::tell(std::uint64_t index, const wire::SessionEntry& entry) {
   bool goes = false;
   {
     const std::lock_guard lock(mutex_);
-    goes = link_.tell(index, row);
+    goes = link_.tell(index, entry);
   }
   if (server_) server_->wake();
   return goes;
@@ -166,7 +166,7 @@ LinkServerHealth LinkServer::health() const {
 
 void LinkServer::receive_some(Time now) {
   DatagramBuffer buffer;
-  for (int i = 0; i < kMostInARow; ++i) {
+  for (int i = 0; i < kMostInAEntry; ++i) {
     const std::optional<Datagram> datagram = port_->receive(buffer);
     if (!datagram) return;
     const std::optional<std::uint32_t> session = session_of(datagram->bytes);

@@ -30,7 +30,7 @@ class SessionLink {
     virtual void take(Cut cut) = 0;
     virtual void take(CuttingState state) = 0;
     virtual void pushed(const MountLoad& /*push*/) {}  // on the bone on its mount, the newest
-    // The client has rows up to this one.
+    // The client has entries up to this one.
     virtual void arrived(std::uint64_t index) = 0;
   };
 
@@ -39,9 +39,9 @@ class SessionLink {
 
   // A cut that came over the stream; the sink hears of it in its turn, within this call or later.
   void offer(const Cut& cut);
-  // Every row of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False:
+  // Every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False:
   // this one goes over the stream alone.
-  bool tell(std::uint64_t index, const wire::SessionRow& row);
+  bool tell(std::uint64_t index, const wire::SessionEntry& entry);
   void know_tool(std::uint32_t number, const Digest& tool);
   // Newest states of others' tools. False: nothing gets through now, so they are for the stream to tell.
   bool set_partners(std::span<const CuttingState> partners);

@@ -113,9 +113,9 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
     page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
 
   const char* queue =
-      "What waits: cuts for a tick, rows for the disk, blocks for the surface, the slowest reader's rows or blocks.";
+      "What waits: cuts for a tick, entries for the disk, blocks for the surface, the slowest reader's entries or blocks.";
   page.gauge("osteon_queue_length", queue, with("queue", "cuts"), static_cast<double>(health.queued_cuts));
-  page.gauge("osteon_queue_length", queue, with("queue", "rows"), static_cast<double>(health.waiting_rows));
+  page.gauge("osteon_queue_length", queue, with("queue", "entries"), static_cast<double>(health.waiting_entries));
   page.gauge("osteon_queue_length", queue, with("queue", "blocks"), static_cast<double>(health.stale_blocks));
   page.gauge("osteon_queue_length", queue, with("queue", "reader"), static_cast<double>(health.furthest_behind));
   page.gauge("osteon_sessions", "Haptic clients with an open session.", with(), static_cast<double>(health.sessions));

@@ -143,7 +143,7 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!room) return reactor;
     const auto fill = [response](const RoomEvent& event) {
       response->set_room_seq(event.room_seq.value);
-      response->set_annotation(std::get<AnnotationRow>(event.people).id);
+      response->set_annotation(std::get<AnnotationEntry>(event.people).id);
     };
     if (request->has_drawn()) {
       const Result<Annotation> drawn = wire::from_wire(request->drawn());
@@ -232,7 +232,7 @@ class PeopleServiceImpl final : public PeopleBase {
           if (!decided) return reactor->Finish(status_of(decided.error()));
           if (!decided->room_seq) return reactor->Finish(Status::OK);
           response->set_room_seq(decided->room_seq.value);
-          response->set_annotation(std::get<AnnotationRow>(decided->people).id);
+          response->set_annotation(std::get<AnnotationEntry>(decided->people).id);
           wipe_next(room, by, reactor, response);
         });
   }

@@ -2,7 +2,7 @@
 
 namespace osteon {
 
-std::optional<RoomRow> Player::take(Time now) {
+std::optional<LogEntry> Player::take(Time now) {
   // From the first call on, so that nothing has happened before anyone could watch.
   if (!began_) began_ = now;
   if (playback_.speed <= 0) return {};

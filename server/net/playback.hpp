@@ -1,4 +1,4 @@
-// What happened in one room happening again in another: which rows are due, and where their tools are seen.
+// What happened in one room happening again in another: which entries are due, and where their tools are seen.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -10,13 +10,13 @@
 
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/tool_box.hpp"
-#include "server/room/room_row.hpp"
+#include "server/room/room_entry.hpp"
 
 namespace osteon {
 
 // Rows of another room that happen again in this one, which decides nothing itself.
 struct Playback {
-  std::function<std::optional<RoomRow>()> next;  // [tick] nothing: the last one was given
+  std::function<std::optional<LogEntry>()> next;  // [tick] nothing: the last one was given
   double speed = 1.0;                            // times as fast as it happened; 0: nothing happens
 };
 
@@ -28,9 +28,9 @@ class Player {
   // `from`: the time of the room that is shown at which it begins, with the first call of take().
   Player(Playback playback, Time from) : playback_(std::move(playback)), from_(from) {}
 
-  // The next row, once its time has come.
-  [[nodiscard]] std::optional<RoomRow> take(Time now);
-  // No row comes any more, neither one that is being waited for.
+  // The next entry, once its time has come.
+  [[nodiscard]] std::optional<LogEntry> take(Time now);
+  // No entry comes any more, neither one that is being waited for.
   void stop() {
     playback_.next = nullptr;
     upcoming_.reset();
@@ -52,7 +52,7 @@ class Player {
   Playback playback_;
   const Time from_;
   std::optional<Time> began_;
-  std::optional<RoomRow> upcoming_;
+  std::optional<LogEntry> upcoming_;
   std::map<AuthorId, Seen> seen_;
   std::uint64_t states_ = 0;
 };

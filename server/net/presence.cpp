@@ -58,19 +58,19 @@ void Presence::went(AuthorId author) {
 
 void Presence::take(const RoomEvent& event) {
   const std::lock_guard lock(mutex_);
-  if (const auto* decided = std::get_if<SuperviseRow>(&event.people)) {
+  if (const auto* decided = std::get_if<SuperviseEntry>(&event.people)) {
     if (Entry* entry = change(decided->subject)) {
       entry->supervision = decided->supervision;
       entry->decided = event.room_seq;
       entry->decided_by = event.author;
     }
-  } else if (const auto* drawn = std::get_if<AnnotationRow>(&event.people)) {
+  } else if (const auto* drawn = std::get_if<AnnotationEntry>(&event.people)) {
     ++revision_;
     if (drawn->drawn)
       annotations_[drawn->id] = {revision_, *drawn->drawn};
     else
       annotations_.erase(drawn->id);
-  } else if (const auto* said = std::get_if<WordsRow>(&event.people)) {
+  } else if (const auto* said = std::get_if<WordsEntry>(&event.people)) {
     ++revision_;
     words_.push_back({++words_said_, event.room_seq, event.author, said->to, said->words});
     if (words_.size() > kMostWords) words_.pop_front();

@@ -9,7 +9,7 @@
 
 #include "server/journal/journal.hpp"
 #include "server/journal/maintenance.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 
 namespace osteon {
 
@@ -30,10 +30,10 @@ struct MaintenanceCalls {
 // journal, or what it began as cannot be read before it is opened), unsupported.
 [[nodiscard]] Result<RoomGenesis> peek_genesis(const std::filesystem::path& file, Disk* disk = nullptr);
 
-// A room of its own, in `to`, that begins with all that another one was up to a place, null for all of it: rows and
+// A room of its own, in `to`, that begins with all that another one was up to a place, null for all of it: entries and
 // checkpoints. It knows numbers of people, not who they are. The journal must not be in use: else RoomStore::branch.
 // Errors: not_found; exists (in use, or there is something in `to`); invalid_input (no such place, damaged);
-// unavailable (all of it, and it is closed to rows); cancelled.
+// unavailable (all of it, and it is closed to entries); cancelled.
 [[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
                                                  RoomSeq place, const std::string& name,
                                                  const MaintenanceCalls& calls = {}, Disk* disk = nullptr);
@@ -65,7 +65,7 @@ struct RoomFile {
 [[nodiscard]] Result<void> check_room_name(Journal& journal, const std::filesystem::path& file,
                                            const std::string& name);
 
-// Error: the journal is closed to rows, so that nobody can say that these are all it had. `option` is how a place is
+// Error: the journal is closed to entries, so that nobody can say that these are all it had. `option` is how a place is
 // asked for instead, up to which it is confirmed.
 [[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);
 

@@ -11,26 +11,26 @@
 namespace osteon {
 namespace {
 
-constexpr std::size_t kSliceRows = 256;  // read and hashed in a millisecond or two, which a commit may wait
+constexpr std::size_t kSliceEntries = 256;  // read and hashed in a millisecond or two, which a commit may wait
 
 }  // namespace
 
-Result<void> RoomStore::each_row(JournalHead& at, RoomSeq last, const std::function<bool(const JournalRow&)>& take) {
+Result<void> RoomStore::each_entry(JournalHead& at, RoomSeq last, const std::function<bool(const JournalEntry&)>& take) {
   while (at.place < last) {
     Result<JournalSlice> slice = with_journal(
-        [&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceRows); });
+        [&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceEntries); });
     if (!slice) return tl::unexpected(slice.error());
     at = slice->head;
-    for (const JournalRow& row : slice->rows)
-      if (!take(row)) return {};
+    for (const JournalEntry& entry : slice->entries)
+      if (!take(entry)) return {};
     if (slice->stopped) return tl::unexpected(*slice->stopped);
-    if (slice->rows.empty())
-      return failure(ErrorCode::invalid_input, file_.string() + " has no row " + std::to_string(at.place.value + 1));
+    if (slice->entries.empty())
+      return failure(ErrorCode::invalid_input, file_.string() + " has no entry " + std::to_string(at.place.value + 1));
   }
   return {};
 }
 
-Result<void> RoomStore::read(RoomSeq from, RoomSeq to, const std::function<bool(const RoomRow&)>& take) {
+Result<void> RoomStore::read(RoomSeq from, RoomSeq to, const std::function<bool(const LogEntry&)>& take) {
   Result<JournalHead> at = with_journal([&](Journal& journal) -> Result<JournalHead> {
     to = std::min(to, journal.head().place);
     if (from > to) return JournalHead{to, {}};
@@ -38,10 +38,10 @@ Result<void> RoomStore::read(RoomSeq from, RoomSeq to, const std::function<bool(
   });
   if (!at) return tl::unexpected(at.error());
   Result<void> outcome;
-  const Result<void> read = each_row(*at, to, [&](const JournalRow& one) {
-    const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    if (!row) outcome = tl::unexpected(row.error());
-    return row && take(*row);
+  const Result<void> read = each_entry(*at, to, [&](const JournalEntry& one) {
+    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    if (!entry) outcome = tl::unexpected(entry.error());
+    return entry && take(*entry);
   });
   return outcome ? read : outcome;
 }
@@ -50,7 +50,7 @@ Result<void> RoomStore::run(JournalCopy& copy, const MaintenanceCalls& calls) {
   for (Result<bool> done = false; !*done;) {
     if (closing_) return is_closed();
     if (calls.stop && calls.stop()) return given_up("the copy of " + file_.string());
-    const Result<void> taken = with_journal([&](Journal&) { return copy.take(kSliceRows); });
+    const Result<void> taken = with_journal([&](Journal&) { return copy.take(kSliceEntries); });
     if (!taken) return taken;
     done = copy.put();
     if (!done) return tl::unexpected(done.error());
@@ -100,21 +100,21 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   // Rows, and what they make.
   bool stopped = false;
   Result<void> outcome;
-  const Result<void> read = each_row(report.head, last, [&](const JournalRow& one) {
+  const Result<void> read = each_entry(report.head, last, [&](const JournalEntry& one) {
     stopped = calls.stop && calls.stop();
     if (stopped) return false;
     if (calls.progress && one.place.value % 64 == 0)
       calls.progress(static_cast<double>(one.place.value) / static_cast<double>(last.value));
     if (!outcome) return true;  // what follows is still held against the chain
-    const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    if (!row) outcome = tl::unexpected(row.error());
-    if (!row || !room || one.place > replayed_to) return true;
-    outcome = room->replay(*row);
+    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    if (!entry) outcome = tl::unexpected(entry.error());
+    if (!entry || !room || one.place > replayed_to) return true;
+    outcome = room->replay(*entry);
     (void)room->take_changes();
     for (const Checkpoint& point : *checkpoints)
       if (point.at.place == one.place && to_hex(field_hash(room->all_leaves(), pitch_mm_)) != point.meta)
         report.faults.push_back("the checkpoint at place " + std::to_string(one.place.value) + " of " + file_.string() +
-                                " is not what its rows make; remove it");
+                                " is not what its entries make; remove it");
     return true;
   });
   if (stopped) return given_up("the check of the room " + genesis_.room);
@@ -127,7 +127,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   if (room && outcome && room->room_seq() == live->place) {
     report.replayed = {live->place, room->field_hash()};
     if (report.replayed.field_hash != live->field_hash)
-      report.faults.push_back("the rows of the room " + genesis_.room + " up to " + std::to_string(live->place.value) +
+      report.faults.push_back("the entries of the room " + genesis_.room + " up to " + std::to_string(live->place.value) +
                               " make another bone than the one that is being cut; close the room and open it again");
   }
 
@@ -176,7 +176,7 @@ Result<bool> RoomStore::forget(std::uint32_t person) {
                journal, [](const Person&) { return false; }, person);
          })
       .and_then([&](const Forgotten& forgotten) {
-        return forget_owner(file_, forgotten).map([&] { return forgotten.people + forgotten.rows > 0; });
+        return forget_owner(file_, forgotten).map([&] { return forgotten.people + forgotten.entries > 0; });
       });
 }
 
@@ -204,8 +204,8 @@ Result<void> RoomStore::export_person(std::uint32_t person, const std::function<
   if (const auto& who = lines.who(); who && !take(*who)) return {};
   Result<void> outcome;
   bool any = lines.who().has_value();
-  const Result<void> read = each_row(at, last, [&](const JournalRow& row) {
-    const Result<std::optional<std::string>> line = lines.of(row);
+  const Result<void> read = each_entry(at, last, [&](const JournalEntry& entry) {
+    const Result<std::optional<std::string>> line = lines.of(entry);
     if (!line) outcome = tl::unexpected(line.error());
     any = any || (line && *line);
     return line && (!*line || take(**line));

@@ -16,7 +16,7 @@ namespace {
 using Clock = RoomRuntime::Clock;
 
 // Rows that happen again in one tick at most: so the surface and the health of a fast playback are told as they go.
-constexpr int kRowsPlayedPerTick = 256;
+constexpr int kEntriesPlayedPerTick = 256;
 
 }  // namespace
 
@@ -33,13 +33,13 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
   batch.clear();
   // A commit that fails says so itself. What else closes a journal: damage that was found when it was opened, a
   // witness, a name or a checkpoint that could not be written.
-  if (store && store->closed_to_rows() && !closing_told) {
+  if (store && store->closed_to_entries() && !closing_told) {
     closing_told = true;
     later([this](const Result<void>&) {
-      if (!committer.failure()) close_room(*store->closed_to_rows());
+      if (!committer.failure()) close_room(*store->closed_to_entries());
     });
   }
-  committer.commit(room.take_rows(), std::exchange(tells, {}));
+  committer.commit(room.take_entries(), std::exchange(tells, {}));
   board.publish(RoomSeq{room_seq});
   people.publish(RoomSeq{room_seq}, Clock::time_point(std::chrono::duration_cast<Clock::duration>(now)));
   return decided;
@@ -47,7 +47,7 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
 
 void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
   if (!mount->step(now)) return;
-  // A tick does not wait for those who come, go or are told of rows: the next place is as good.
+  // A tick does not wait for those who come, go or are told of entries: the next place is as good.
   const std::unique_lock lock(sessions_mutex, std::try_to_lock);
   if (lock) sessions.each([this](SessionSubscriber& sink) { sink.show_bone(mount->seen(sink.author())); });
 }
@@ -55,14 +55,14 @@ void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
 // Whether anything happened.
 bool RoomRuntime::Impl::play(std::chrono::nanoseconds now) {
   int played = 0;
-  for (; played < kRowsPlayedPerTick; ++played) {
-    const std::optional<RoomRow> row = player->take(now);
-    if (!row) break;
-    const CutRow* cut = std::get_if<CutRow>(&row->what);
+  for (; played < kEntriesPlayedPerTick; ++played) {
+    const std::optional<LogEntry> entry = player->take(now);
+    if (!entry) break;
+    const CutEntry* cut = std::get_if<CutEntry>(&entry->what);
     {
       const std::unique_lock lock(room_mutex);
-      if (const Result<void> happened = room.replay(*row); !happened) {
-        log::error("playback ended", {{"place", row->place.value}, {"reason", happened.error().message}});
+      if (const Result<void> happened = room.replay(*entry); !happened) {
+        log::error("playback ended", {{"place", entry->place.value}, {"reason", happened.error().message}});
         player->stop();
         break;
       }
@@ -115,7 +115,7 @@ void RoomRuntime::Impl::close_room(const Error& why) {
 
 std::optional<Error> RoomRuntime::Impl::closed() const {
   std::optional<Error> why = committer.failure();
-  if (!why && store && store->closed_to_rows()) why = *store->closed_to_rows();
+  if (!why && store && store->closed_to_entries()) why = *store->closed_to_entries();
   if (why) *why = {ErrorCode::unavailable, "the room takes no more cuts: " + why->message};
   return why;
 }
@@ -176,7 +176,7 @@ RuntimeHealth RoomRuntime::health() const {
   health.surface_bytes = mesh.surface_bytes;
   health.furthest_behind = std::max(health.furthest_behind, mesh.furthest_behind);
   health.cutting_streams = impl_->board.streams();
-  health.waiting_rows = impl_->committer.waiting();
+  health.waiting_entries = impl_->committer.waiting();
   health.commit = impl_->committer.commit_times();
   {
     const std::shared_lock lock(impl_->room_mutex);
@@ -256,7 +256,7 @@ void RoomRuntime::stop() {
       }
     impl_->room_seq = impl_->room.room_seq().value;
     impl_->mesh.update(false);
-    impl_->committer.commit(impl_->room.take_rows(), {});
+    impl_->committer.commit(impl_->room.take_entries(), {});
     impl_->committer.drain();
   }
 }

@@ -30,15 +30,15 @@ namespace osteon {
 class SessionSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
-  // Of the leaves; rows come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the
+  // Of the leaves; entries come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the
   // one that ends them.
   virtual void begin(RoomSeq contained, MessageParts before, Bytes complete) = 0;
-  // Once, after begin() and perhaps after rows. Those apply to these leaves: what one of them contains already is no
-  // change when its row is applied again.
+  // Once, after begin() and perhaps after entries. Those apply to these leaves: what one of them contains already is no
+  // change when its entry is applied again.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
-  virtual void offer(RoomSeq place, const Bytes& row) = 0;  // a whole SessionResponse
+  virtual void offer(RoomSeq place, const Bytes& entry) = 0;  // a whole SessionResponse
   // The same, with what goes in few bytes of it.
-  virtual void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& /*fast*/) { offer(place, row); }
+  virtual void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& /*fast*/) { offer(place, entry); }
   // [thread of the tools' states] All tools' newest states. True: some of it is owed, and wants to be told again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
   // Whether it pushes the bone on its mount and is pushed by it: whoever is not takes nothing of what others put into
@@ -46,11 +46,11 @@ class SessionSubscriber : public Subscriber {
   [[nodiscard]] virtual bool feels_bone() const { return true; }
   // [tick] Where the bone stands on its mount, to this one.
   virtual void show_bone(const MountPose& /*seen*/) {}
-  // What holds for the hand from the beginning, as a row that has no number: after begin().
-  virtual void hold(const wire::SessionRow& /*supervised*/) {}
-  // A tool's number in few bytes: after begin() for those of the room, and before the row that adds another.
+  // What holds for the hand from the beginning, as a entry that has no number: after begin().
+  virtual void hold(const wire::SessionEntry& /*supervised*/) {}
+  // A tool's number in few bytes: after begin() for those of the room, and before the entry that adds another.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
-  virtual void answer(const Bytes& row) = 0;  // the same, outside the room's order
+  virtual void answer(const Bytes& entry) = 0;  // the same, outside the room's order
   virtual void refuse(const Error& why) = 0;  // a breach of the protocol: the stream ends
   // Another stream of its author was opened. That may be one that was given up and came late, so the author may come
   // again.
@@ -81,9 +81,9 @@ struct RuntimeHealth {
   bool serving = false;          // takes cuts
   std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
   std::size_t queued_cuts = 0, stale_blocks = 0;
-  std::size_t waiting_rows = 0;     // decided and not yet kept
+  std::size_t waiting_entries = 0;     // decided and not yet kept
   DurationHistogram commit;         // of the journal's transactions
-  std::size_t furthest_behind = 0;  // rows or blocks that wait for the slowest reader
+  std::size_t furthest_behind = 0;  // entries or blocks that wait for the slowest reader
   std::size_t blocks = 0;
   std::size_t surface_bytes = 0;  // of the newest blocks: what a viewer that joins is sent
 };
@@ -102,8 +102,8 @@ class RoomRuntime {
   using Clock = std::chrono::steady_clock;
 
   // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  // `store` makes rows durable before any hand hears of them, and outlives the runtime; without it nothing is kept.
-  // `playback`: rows after those of `room` happen at their times; whoever joins may watch and nothing else.
+  // `store` makes entries durable before any hand hears of them, and outlives the runtime; without it nothing is kept.
+  // `playback`: entries after those of `room` happen at their times; whoever joins may watch and nothing else.
   RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress,
               Detail detail = Detail::automatic, RoomStore* store = nullptr, std::optional<Playback> playback = {});
   ~RoomRuntime();
@@ -151,7 +151,7 @@ class RoomRuntime {
   [[nodiscard]] Leaves leaves_now();
   void find_pieces();  // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
-  // The sink hears every row after those of its leaves. With the digest of the author's secret it takes the place of an
+  // The sink hears every entry after those of its leaves. With the digest of the author's secret it takes the place of an
   // earlier session of his. Error: invalid_input (the author may not cut, or has an open session).
   [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& sink, const Digest& secret = {});
   // From where its author looks at first; without a look it is sent the bone in full.

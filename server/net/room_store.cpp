@@ -32,9 +32,9 @@ std::int32_t computers_day() {
 }
 
 // Whether a replay has work with it.
-bool changes_bone(const RoomRow& row) {
-  return std::holds_alternative<CutRow>(row.what) || std::holds_alternative<SplitRow>(row.what) ||
-         std::holds_alternative<UndoRow>(row.what) || std::holds_alternative<RedoRow>(row.what);
+bool changes_bone(const LogEntry& entry) {
+  return std::holds_alternative<CutEntry>(entry.what) || std::holds_alternative<SplitEntry>(entry.what) ||
+         std::holds_alternative<UndoEntry>(entry.what) || std::holds_alternative<RedoEntry>(entry.what);
 }
 
 // A piece of a checkpoint: its length, then a JournalFields.
@@ -91,9 +91,9 @@ tl::unexpected<Error> RoomStore::is_closed() const {
 
 void RoomStore::note_closing() {
   const Error* why = journal_ ? journal_->closed_because() : nullptr;
-  if (why == nullptr || closed_to_rows_ != nullptr) return;
-  why_closed_to_rows_ = *why;
-  closed_to_rows_ = &*why_closed_to_rows_;
+  if (why == nullptr || closed_to_entries_ != nullptr) return;
+  why_closed_to_entries_ = *why;
+  closed_to_entries_ = &*why_closed_to_entries_;
 }
 
 Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const Case& bone, const Options& options,
@@ -120,7 +120,7 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
   for (const std::string& note : store->journal_->notes())
     log::warn("journal", {{"file", file.string()}, {"note", note}});
   if (const Error* closed = store->journal_->closed_because())
-    log::warn("journal takes no rows", {{"file", file.string()}, {"reason", closed->message}});
+    log::warn("journal takes no entries", {{"file", file.string()}, {"reason", closed->message}});
   else if (Result<std::uint64_t> epoch = store->journal_->next_server_epoch(); epoch)
     store->server_epoch_ = *epoch;
   else
@@ -163,16 +163,16 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
                                const std::function<void(double)>& progress) {
   Result<Room> room = begin_room(bone, genesis_, limits);
   if (!room) return room;
-  const std::uint64_t rows = journal_->head().place.value;
+  const std::uint64_t entries = journal_->head().place.value;
   Result<void> replayed;
-  const auto take = [&](const JournalRow& one) {
-    Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    replayed = row ? room->replay(*row, one.place <= fields.place ? Room::Fields::leave : Room::Fields::evaluate)
-                   : Result<void>(tl::unexpected(row.error()));
+  const auto take = [&](const JournalEntry& one) {
+    Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    replayed = entry ? room->replay(*entry, one.place <= fields.place ? Room::Fields::leave : Room::Fields::evaluate)
+                   : Result<void>(tl::unexpected(entry.error()));
     if (replayed && one.place == fields.place) replayed = room->set_fields(fields.leaves);
-    if (replayed && one.place > fields.place && changes_bone(*row)) changes_.push_back(one.place);
+    if (replayed && one.place > fields.place && changes_bone(*entry)) changes_.push_back(one.place);
     if (progress && one.place.value % 64 == 0)
-      progress(static_cast<double>(one.place.value) / static_cast<double>(rows));
+      progress(static_cast<double>(one.place.value) / static_cast<double>(entries));
     return replayed.has_value();
   };
   if (Result<void> read = journal_->read(RoomSeq{1}, take); !read) return tl::unexpected(read.error());
@@ -182,14 +182,14 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
   return room;
 }
 
-Result<void> RoomStore::write(std::span<const RoomRow> rows) {
-  std::vector<JournalRow> out;
-  out.reserve(rows.size());
-  for (const RoomRow& row : rows) out.push_back({row.place, row.at.count(), to_bytes(row)});
+Result<void> RoomStore::write(std::span<const LogEntry> entries) {
+  std::vector<JournalEntry> out;
+  out.reserve(entries.size());
+  for (const LogEntry& entry : entries) out.push_back({entry.place, entry.at.count(), to_bytes(entry)});
   return with_journal([&](Journal& journal) {
     const Result<void> kept = journal.append(out);
-    for (const RoomRow& row : rows)
-      if (kept && changes_bone(row)) changes_.push_back(row.place);
+    for (const LogEntry& entry : entries)
+      if (kept && changes_bone(entry)) changes_.push_back(entry.place);
     return kept;
   });
 }

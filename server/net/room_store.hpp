@@ -19,7 +19,7 @@
 #include "common/link/random_bytes.hpp"
 #include "server/journal/journal.hpp"
 #include "server/journal/maintenance.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "server/net/room_files.hpp"
 #include "server/room/room.hpp"
 
@@ -40,7 +40,7 @@ class InTurn {
   std::uint64_t asked_ = 0, served_ = 0;
 };
 
-// The bone when so many rows had been applied to it: Room::room_seq() and Room::field_hash().
+// The bone when so many entries had been applied to it: Room::room_seq() and Room::field_hash().
 struct BoneAt {
   RoomSeq place;
   Digest field_hash{};
@@ -59,10 +59,10 @@ struct CheckpointPolicy {
 
 // What a live verify found.
 struct RoomReport {
-  JournalHead head;                  // of the last row that the chain confirms: as many rows
-  std::optional<RoomSeq> first_bad;  // row
+  JournalHead head;                  // of the last entry that the chain confirms: as many entries
+  std::optional<RoomSeq> first_bad;  // entry
   std::size_t checkpoints = 0;       // whose bytes and fields were confirmed
-  BoneAt replayed;                   // made again from the rows alone; place 0: nobody asked for it
+  BoneAt replayed;                   // made again from the entries alone; place 0: nobody asked for it
   std::vector<std::string> faults;   // one sentence each
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
@@ -73,7 +73,7 @@ struct RoomReport {
 inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::seconds(4);
 [[nodiscard]] std::chrono::nanoseconds reopened_time(const Room& room);
 
-// Any thread. What takes long holds the journal for a slice of rows at a time, between which rows are written. After
+// Any thread. What takes long holds the journal for a slice of entries at a time, between which entries are written. After
 // close() every function returns the error unavailable.
 class RoomStore {
  public:
@@ -86,20 +86,20 @@ class RoomStore {
     std::function<std::int32_t()> today;  // days since 1970-01-01; null: the computer's
     FillRandom random;                    // for the key of its witnesses; null: the system's
   };
-  // Goes on with the journal's room, up to the last row that anyone was told of, or makes a new one where there is no
-  // such file. `progress` hears the fraction of the rows replayed. Errors: those of Journal::open; unsupported (of
-  // another case, kernel or release); invalid_input (rows that cannot be: then recover). A journal that is closed to
-  // rows still gives its room, which takes none.
+  // Goes on with the journal's room, up to the last entry that anyone was told of, or makes a new one where there is no
+  // such file. `progress` hears the fraction of the entries replayed. Errors: those of Journal::open; unsupported (of
+  // another case, kernel or release); invalid_input (entries that cannot be: then recover). A journal that is closed to
+  // entries still gives its room, which takes none.
   [[nodiscard]] static Result<PersistedRoom> open(const std::filesystem::path& file, const Case& bone,
                                                   const Options& options,
                                                   const std::function<void(double)>& progress = {});
 
-  // Returns when the rows are safe on the disk: for a Committer. Places go on from the last one.
-  [[nodiscard]] Result<void> write(std::span<const RoomRow> rows);
+  // Returns when the entries are safe on the disk: for a Committer. Places go on from the last one.
+  [[nodiscard]] Result<void> write(std::span<const LogEntry> entries);
   [[nodiscard]] JournalHead head() const;  // once closed: the last one
-  // Why its journal takes no more rows, for good: damage, a write that failed, a witness that knows more. Null: it
-  // takes rows. Never waits.
-  [[nodiscard]] const Error* closed_to_rows() const { return closed_to_rows_; }
+  // Why its journal takes no more entries, for good: damage, a write that failed, a witness that knows more. Null: it
+  // takes entries. Never waits.
+  [[nodiscard]] const Error* closed_to_entries() const { return closed_to_entries_; }
   // Rises with every opening.
   [[nodiscard]] std::uint64_t server_epoch() const { return server_epoch_; }
   // Rows that were evaluated again when it was opened.
@@ -113,7 +113,7 @@ class RoomStore {
   // many events the room has lost, or that it begins anew, and what to do. Error invalid_input: also without a seal.
   [[nodiscard]] Result<void> check_witness(const Witness& witness);
 
-  // The pseudonym under which rows know this person; the same for the same label, until it is forgotten.
+  // The pseudonym under which entries know this person; the same for the same label, until it is forgotten.
   [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
   [[nodiscard]] Result<std::vector<Person>> people();
   // Forgets who a person is, here and not in copies; what it did stays, under its number. False: nobody has that
@@ -126,11 +126,11 @@ class RoomStore {
   [[nodiscard]] Result<void> export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take);
 
   // Rows from one place to another, both included, or to the head as it is now, each held against the chain, until
-  // `take` returns false. `take` may wait: a live room can be replayed beside its cutting. Errors: of the first row
+  // `take` returns false. `take` may wait: a live room can be replayed beside its cutting. Errors: of the first entry
   // that does not fit.
-  [[nodiscard]] Result<void> read(RoomSeq from, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
-  // Every row up to the head as it is now against the chain; the bytes of every checkpoint against their digest, and
-  // its fields against their hash; what else vouches for places. `live`, of a place that is kept: the rows are also
+  [[nodiscard]] Result<void> read(RoomSeq from, RoomSeq to, const std::function<bool(const LogEntry&)>& take);
+  // Every entry up to the head as it is now against the chain; the bytes of every checkpoint against their digest, and
+  // its fields against their hash; what else vouches for places. `live`, of a place that is kept: the entries are also
   // replayed into a fresh room of this case up to there, which takes as long as all its cuts, and the bones compared.
   // What is damaged is told in the report. Errors: unavailable (`live` is beyond the head), cancelled, unsupported (of
   // another case).
@@ -146,14 +146,14 @@ class RoomStore {
   // Whether this head is of its history: for branches_of().
   [[nodiscard]] Result<bool> has_head(const JournalHead& head);
 
-  // All leaves of the room as it was at `place`, while rows may have gone on, so that the next opening need not
+  // All leaves of the room as it was at `place`, while entries may have gone on, so that the next opening need not
   // evaluate every cut again: written and synced in pieces, noted in a transaction of its own. Nothing happens where
-  // the rows up to there are not kept yet, or a checkpoint goes as far. Error cancelled.
+  // the entries up to there are not kept yet, or a checkpoint goes as far. Error cancelled.
   [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves,
                                         const MaintenanceCalls& calls = {});
   // Rows since the newest checkpoint that the next opening would have to evaluate: for CheckpointPolicy.
   [[nodiscard]] std::uint64_t changes_since_checkpoint() const;
-  // Carries the journal's log into its file where no row has come since this was asked the last time: for every few
+  // Carries the journal's log into its file where no entry has come since this was asked the last time: for every few
   // seconds.
   [[nodiscard]] Result<void> tidy_if_idle();
   // Clean; what takes long is given up, and a checkpoint that is being written waited for.
@@ -185,10 +185,10 @@ class RoomStore {
   // The register is made by the first opening that finds none.
   [[nodiscard]] Result<void> find_witness_key(const Options& options);
   [[nodiscard]] Digest seal_of(const JournalHead& head) const;
-  // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the row after `at` does not fit the
+  // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the entry after `at` does not fit the
   // chain.
-  [[nodiscard]] Result<void> each_row(JournalHead& at, RoomSeq last,
-                                      const std::function<bool(const JournalRow&)>& take);
+  [[nodiscard]] Result<void> each_entry(JournalHead& at, RoomSeq last,
+                                      const std::function<bool(const JournalEntry&)>& take);
   [[nodiscard]] Result<void> run(JournalCopy& copy, const MaintenanceCalls& calls);
   // What is wrong with a checkpoint's bytes; nothing also where it has been replaced by a newer one meanwhile.
   [[nodiscard]] Result<void> check_bytes(const Checkpoint& one, RoomReport& report);
@@ -198,8 +198,8 @@ class RoomStore {
   mutable InTurn turn_;
   std::optional<Journal> journal_;           // nothing: closed
   JournalHead last_;                         // its head then
-  std::optional<Error> why_closed_to_rows_;  // set once, before the next, which points to it
-  std::atomic<const Error*> closed_to_rows_ = nullptr;
+  std::optional<Error> why_closed_to_entries_;  // set once, before the next, which points to it
+  std::atomic<const Error*> closed_to_entries_ = nullptr;
   const std::filesystem::path file_;
   const RoomGenesis genesis_;
   const double pitch_mm_;

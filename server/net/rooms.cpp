@@ -13,7 +13,7 @@
 #include "common/runtime/log.hpp"
 #include "common/wire/version.hpp"
 #include "server/net/authorizer.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "server/net/room_files.hpp"
 #include "server/net/room_owners.hpp"
 
@@ -27,7 +27,7 @@ constexpr const char* kBackupEnding = ".backup";
 constexpr const char* kOpenList = "open-rooms";  // in the folder: the names of those that are open, a line each
 constexpr std::chrono::seconds kUpkeepEvery{5};
 // Rows that a playback reads ahead.
-constexpr std::uint64_t kRowsAhead = 256;
+constexpr std::uint64_t kEntriesAhead = 256;
 
 bool is_name(const std::string& name) {
   const auto fits = [](char c) {
@@ -87,30 +87,30 @@ std::vector<std::string> lines_of(const std::string& text) {
 }
 
 // Reads ahead in a room's journal. The room stays in memory as long as it is shown.
-class RowsAgain {
+class EntryReader {
  public:
-  RowsAgain(std::shared_ptr<OpenRoom> room, RoomSeq from, RoomSeq to) : room_(std::move(room)), next_(from), to_(to) {}
-  std::optional<RoomRow> operator()() {
+  EntryReader(std::shared_ptr<OpenRoom> room, RoomSeq from, RoomSeq to) : room_(std::move(room)), next_(from), to_(to) {}
+  std::optional<LogEntry> operator()() {
     if (ahead_.empty() && next_ <= to_) {
-      const RoomSeq last{std::min(to_.value, next_.value + kRowsAhead - 1)};
-      const Result<void> read = room_->store()->read(next_, last, [&](const RoomRow& row) {
-        ahead_.push_back(row);
+      const RoomSeq last{std::min(to_.value, next_.value + kEntriesAhead - 1)};
+      const Result<void> read = room_->store()->read(next_, last, [&](const LogEntry& entry) {
+        ahead_.push_back(entry);
         return true;
       });
-      if (!read) log::error("a room's rows cannot be shown", {{"room", room_->name}, {"reason", read.error().message}});
+      if (!read) log::error("a room's entries cannot be shown", {{"room", room_->name}, {"reason", read.error().message}});
       next_ = read ? RoomSeq{last.value + 1} : RoomSeq{to_.value + 1};
     }
     if (ahead_.empty()) return std::nullopt;
-    RoomRow row = std::move(ahead_.front());
+    LogEntry entry = std::move(ahead_.front());
     ahead_.pop_front();
-    return row;
+    return entry;
   }
 
  private:
   std::shared_ptr<OpenRoom> room_;
   RoomSeq next_;
   const RoomSeq to_;
-  std::deque<RoomRow> ahead_;
+  std::deque<LogEntry> ahead_;
 };
 
 }  // namespace
@@ -174,7 +174,7 @@ RoomSummary OpenRoom::close() {
 }
 
 void OpenRoom::maintain(const std::function<bool()>& stop) {
-  if (!store_ || store_->closed_to_rows()) return;
+  if (!store_ || store_->closed_to_entries()) return;
   if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
     forgotten_ = Clock::now();
     if (const Result<std::size_t> gone = store_->forget_old(); !gone)
@@ -460,7 +460,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
   const std::lock_guard changing(changing_);
   if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
     const RoomStore* store = (*already)->store();
-    if (const Error* why = store ? store->closed_to_rows() : nullptr)
+    if (const Error* why = store ? store->closed_to_entries() : nullptr)
       return failure(ErrorCode::unavailable, "the room " + name + " is there and takes no more cuts: " + why->message);
     return already;
   }
@@ -550,14 +550,14 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   Result<Room> room = begin_room(*of.bone, store->genesis(), options_.limits);
   if (!room) return tl::unexpected(room.error());
   Result<void> happened;
-  const Result<void> read = !from ? Result<void>{} : store->read(RoomSeq{1}, from, [&](const RoomRow& row) {
-    happened = room->replay(row);
+  const Result<void> read = !from ? Result<void>{} : store->read(RoomSeq{1}, from, [&](const LogEntry& entry) {
+    happened = room->replay(entry);
     return happened.has_value();
   });
   if (!happened) return tl::unexpected(happened.error());
   if (!read) return tl::unexpected(read.error());
   (void)room->take_changes();
-  Playback playback{RowsAgain(*source, RoomSeq{from.value + 1}, last), speed};
+  Playback playback{EntryReader(*source, RoomSeq{from.value + 1}, last), speed};
   auto shown = std::make_shared<OpenRoom>(new_name, of, std::move(*room), options_, std::function<void(double)>{},
                                           nullptr, std::move(playback));
   shown->shows = {name, last};
@@ -565,7 +565,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   return take_in(std::move(shown));
 }
 
-Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take) {
+Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::function<bool(const LogEntry&)>& take) {
   if (const Result<std::shared_ptr<OpenRoom>> room = find(name)) {
     RoomStore* store = (*room)->store();
     if (!store) return tl::unexpected(not_kept(name));
@@ -582,9 +582,9 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
   if (!journal) return tl::unexpected(journal.error());
   Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
   Result<void> sound;
-  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& row) {
-    if (to && row.place > to) return false;
-    const Result<RoomRow> one = row_from_bytes(row.place, std::chrono::nanoseconds(row.at_ns), row.bytes);
+  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalEntry& entry) {
+    if (to && entry.place > to) return false;
+    const Result<LogEntry> one = entry_from_bytes(entry.place, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
     if (!one) sound = tl::unexpected(one.error());
     return one && take(*one);
   });

@@ -162,9 +162,9 @@ class Rooms {
   // where that room is closed meanwhile.
   Result<std::shared_ptr<OpenRoom>> replay(const std::string& name, const std::string& new_name, RoomSeq from,
                                            RoomSeq to, double speed, const Requester& by = {});
-  // The rows of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what
+  // The entries of a kept room, open or closed, from its first to `to`, null for all, until `take` returns false; and what
   // it began as.
-  Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const RoomRow&)>& take);
+  Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const LogEntry&)>& take);
   // Who made a room or, where the name has its ending, a backup; empty: nobody knows.
   [[nodiscard]] std::string owner(const std::string& name) const;
   // Removes a room, or a backup by its file's name. The names of those that are gone. `may` is asked of it and of each

@@ -18,7 +18,7 @@
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/presence.hpp"
-#include "server/net/room_rows.hpp"
+#include "server/net/room_entries.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/runtime_parts.hpp"
 #include "server/net/state_publisher.hpp"
@@ -27,7 +27,7 @@ namespace osteon {
 
 [[nodiscard]] Error only_to_be_watched();
 
-// Who watches a playback is no row of it, so their numbers must not be those of the room that is shown.
+// Who watches a playback is no entry of it, so their numbers must not be those of the room that is shown.
 inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
 // Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's
@@ -44,7 +44,7 @@ struct RoomRuntime::Impl {
         people(room, names_of(k)),
         mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
         committer(
-            k ? [k](std::span<const RoomRow> rows) { return k->write(rows); } : Committer::Write{},
+            k ? [k](std::span<const LogEntry> entries) { return k->write(entries); } : Committer::Write{},
             [this](const Error& why) { close_room(why); }, !driven()) {
     authors = room.authors();
     if (rates_.mount && !p) mount.emplace(MountServerParams{.mount = mount_about(room.bone().bounds().centre_mm())});
@@ -54,7 +54,7 @@ struct RoomRuntime::Impl {
   [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomStore* store);
 
   [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
-  // Of a playback they are among its rows.
+  // Of a playback they are among its entries.
   [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !player; }
   void run_ticks();
   // Whether anything was decided.
@@ -64,15 +64,15 @@ struct RoomRuntime::Impl {
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
   void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
-  [[nodiscard]] MessageParts rows_of(const RoomEvent& event);
-  // What goes to some of the sessions in place of the row that the others get.
+  [[nodiscard]] MessageParts entries_of(const RoomEvent& event);
+  // What goes to some of the sessions in place of the entry that the others get.
   struct Personal {
     AuthorId to;  // null: to all
-    Bytes row;    // null: there is none
-    wire::SessionRow fast;
-    [[nodiscard]] bool is_for(AuthorId author) const { return row && (!to || to == author); }
+    Bytes entry;    // null: there is none
+    wire::SessionEntry fast;
+    [[nodiscard]] bool is_for(AuthorId author) const { return entry && (!to || to == author); }
   };
-  [[nodiscard]] Personal personal_row(const RoomEvent& event);
+  [[nodiscard]] Personal personal_message(const RoomEvent& event);
   // [tick] In a room that nobody keeps; 0: without a name.
   [[nodiscard]] std::uint32_t person_of(const std::string& name) {
     return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
@@ -80,7 +80,7 @@ struct RoomRuntime::Impl {
   // What sessions hear of one event.
   struct Said {
     RoomSeq place;
-    MessageParts rows;
+    MessageParts entries;
     Personal personal;
   };
   // Whether any hand still lacks some of it.
@@ -158,7 +158,7 @@ struct RoomRuntime::Impl {
   std::map<std::string, std::uint32_t> persons;  // of the tick thread: by name, where no journal numbers them
   std::vector<Queued> batch;                     // of the tick thread
   std::vector<Committer::Tell> tells;            // of the tick thread
-  bool closing_told = false;             // of the tick thread: sessions are told that the journal is closed to rows
+  bool closing_told = false;             // of the tick thread: sessions are told that the journal is closed to entries
   std::chrono::nanoseconds next_kept{};  // of the tick thread: when it is next said how much is kept
   Committer committer;                   // the last member with a thread: it tells the others
 

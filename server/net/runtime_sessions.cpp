@@ -57,20 +57,20 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
   const bool newly = outcome->committed() && !outcome->repeated;
   if (newly) figures.committed(queued.arrived, taken, done);
   if (!outcome->committed() && !outcome->repeated) figures.rejected(outcome->rejection);
-  const Bytes row = outcome->committed() ? cut_row(outcome->room_seq, queued.cut)
-                                         : rejection_row(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
+  const Bytes entry = outcome->committed() ? cut_message(outcome->room_seq, queued.cut)
+                                         : rejection_message(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
                                                          outcome->rejection);
   tell_kept(room.time());
-  wire::SessionRow fast{.room_seq = outcome->room_seq, .kind = wire::SessionRowKind::committed};
+  wire::SessionEntry fast{.room_seq = outcome->room_seq, .kind = wire::SessionEntryKind::committed};
   if (outcome->committed()) {
     fast.cut = queued.cut;
   } else {
-    fast.kind = wire::SessionRowKind::rejected;
+    fast.kind = wire::SessionEntryKind::rejected;
     fast.author_seq = queued.cut.author_seq;
     fast.reason = static_cast<std::uint32_t>(outcome->rejection);
     fast.lease_epoch = outcome->lease_epoch;
   }
-  later([this, sink = queued.sink, row, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
+  later([this, sink = queued.sink, entry, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
          to_all = outcome->committed(), newly, done](const Result<void>& durable) {
     const Clock::time_point kept = Clock::now();
     if (durable) {
@@ -78,9 +78,9 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(sink->author());
       if (!repeated && to_all)
-        sessions.each([&](SessionSubscriber& one) { one.offer(place, row, fast); });
+        sessions.each([&](SessionSubscriber& one) { one.offer(place, entry, fast); });
       else if (author != open_authors.end())
-        repeated ? author->second->answer(row) : author->second->offer(place, row, fast);
+        repeated ? author->second->answer(entry) : author->second->offer(place, entry, fast);
     }
     if (durable && newly) figures.told(done, kept, Clock::now());
     if (durable && newly) people.took_cut(sink->author());
@@ -99,9 +99,9 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
   }();
   std::vector<Said> said;
   if (event && event->room_seq) {
-    said.push_back({event->room_seq, rows_of(*event), personal_row(*event)});
+    said.push_back({event->room_seq, entries_of(*event), personal_message(*event)});
     event->leaves.clear();
-    for (const RoomEvent& one : event->further) said.push_back({one.room_seq, rows_of(one), personal_row(one)});
+    for (const RoomEvent& one : event->further) said.push_back({one.room_seq, entries_of(one), personal_message(one)});
     if (event->scene || event->bone) show_scene();
     if (event->bone) note_changed(queued.arrived);
   }
@@ -119,12 +119,12 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
         sessions.each([&](SessionSubscriber& sink) { sink.know_tool(number, event->tool->hash); });
       }
       for (const Said& one : said)
-        for (const Bytes& row : one.rows)
+        for (const Bytes& entry : one.entries)
           sessions.each([&](SessionSubscriber& sink) {
             if (one.personal.is_for(sink.author()))
-              sink.offer(one.place, one.personal.row, one.personal.fast);
+              sink.offer(one.place, one.personal.entry, one.personal.fast);
             else
-              sink.offer(one.place, row, {.room_seq = one.place, .kind = wire::SessionRowKind::streamed});
+              sink.offer(one.place, entry, {.room_seq = one.place, .kind = wire::SessionEntryKind::streamed});
           });
     }
     answer(event);
@@ -137,9 +137,9 @@ void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
   next_kept = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
     if (!durable) return;
-    const Bytes row = kept_row(store->witness());
+    const Bytes entry = kept_message(store->witness());
     const std::lock_guard lock(sessions_mutex);
-    sessions.each([&](SessionSubscriber& sink) { sink.answer(row); });
+    sessions.each([&](SessionSubscriber& sink) { sink.answer(entry); });
   });
 }
 
@@ -150,28 +150,28 @@ std::uint32_t RoomRuntime::Impl::number_of(const Digest& tool) {
 }
 
 // [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
-MessageParts RoomRuntime::Impl::rows_of(const RoomEvent& event) {
-  MessageParts rows;
-  if (event.tool) rows.push_back(tool_row(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
-  if (event.bone) rows = change_rows(event);
-  if (event.scene) rows.push_back(scene_row(event.room_seq, room.items()));
-  if (rows.empty()) rows.push_back(noted_row(event.room_seq, event.mark));  // so that the order has no gap
-  return rows;
+MessageParts RoomRuntime::Impl::entries_of(const RoomEvent& event) {
+  MessageParts entries;
+  if (event.tool) entries.push_back(tool_message(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
+  if (event.bone) entries = change_entries(event);
+  if (event.scene) entries.push_back(scene_message(event.room_seq, room.items()));
+  if (entries.empty()) entries.push_back(noted_entry(event.room_seq, event.mark));  // so that the order has no gap
+  return entries;
 }
 
-RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_row(const RoomEvent& event) {
-  if (const auto* decided = std::get_if<SuperviseRow>(&event.people)) {
+RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_message(const RoomEvent& event) {
+  if (const auto* decided = std::get_if<SuperviseEntry>(&event.people)) {
     const Decider by{event.author, people.name_of(event.author)};
     return {decided->subject,
-            supervised_row(event.room_seq, decided->supervision, event.lease_epoch, by),
+            supervised_message(event.room_seq, decided->supervision, event.lease_epoch, by),
             {.room_seq = event.room_seq,
-             .kind = wire::SessionRowKind::supervised,
+             .kind = wire::SessionEntryKind::supervised,
              .lease_epoch = event.lease_epoch,
              .supervision = decided->supervision,
              .by = by}};
   }
-  if (const auto* said = std::get_if<WordsRow>(&event.people))
-    return {said->to, said_row(event.room_seq, event.author, *said), {.room_seq = event.room_seq}};
+  if (const auto* said = std::get_if<WordsEntry>(&event.people))
+    return {said->to, said_message(event.room_seq, event.author, *said), {.room_seq = event.room_seq}};
   return {};
 }
 
@@ -254,7 +254,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
   MessageParts before;
   bool again = false;
   {
-    // Held until the sink is listed: every row after `contained` is committed, and so offered, later.
+    // Held until the sink is listed: every entry after `contained` is committed, and so offered, later.
     const std::shared_lock room_lock(impl_->room_mutex);
     if (!impl_->room.may_cut(sink->author()))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
@@ -263,13 +263,13 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
       std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
     const std::vector<const ToolBox::Entry*> tools = impl_->room.tools()->entries();
     for (const ToolBox::Entry* entry : tools)
-      before.push_back(tool_row(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
-    before.push_back(scene_row(impl_->room.room_seq(), impl_->room.items()));
+      before.push_back(tool_message(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
+    before.push_back(scene_message(impl_->room.room_seq(), impl_->room.items()));
     // Whatever holds for the hand, it knows before it could cut; also that nothing does any more.
     const People::Supervised& held = impl_->room.people().supervised(sink->author());
     const std::uint64_t lease_epoch = impl_->room.lease_epoch(sink->author());
     const Decider by{held.by, impl_->people.name_of(held.by)};
-    if (held.place) before.push_back(supervised_row(RoomSeq{}, held.supervision, lease_epoch, by));
+    if (held.place) before.push_back(supervised_message(RoomSeq{}, held.supervision, lease_epoch, by));
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(lease_epoch);
@@ -295,7 +295,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
       sink->hold({.room_seq = {},
-                  .kind = wire::SessionRowKind::supervised,
+                  .kind = wire::SessionEntryKind::supervised,
                   .lease_epoch = lease_epoch,
                   .supervision = held.supervision,
                   .by = by});
@@ -360,7 +360,7 @@ void RoomRuntime::leave(SessionSubscriber& sink) {
 
 void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
   const std::lock_guard lock(impl_->sessions_mutex);
-  impl_->redial = redial_row(after, why);
+  impl_->redial = redial_message(after, why);
   impl_->sessions.each([&](SessionSubscriber& sink) { sink.answer(impl_->redial); });
 }
 

@@ -71,23 +71,23 @@ void SessionSendQueue::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_known_ = true;
 }
 
-bool SessionSendQueue::add(RoomSeq place, Bytes row) {
+bool SessionSendQueue::add(RoomSeq place, Bytes entry) {
   if (!takes(place)) return true;
-  if (rows_.size() >= kMaxRows) return false;
-  rows_.push_back({++index_, std::move(row)});
+  if (entries_.size() >= kMaxEntries) return false;
+  entries_.push_back({++index_, std::move(entry)});
   places_.emplace_back(index_, place);
-  if (places_.size() > kMaxRows) places_.pop_front();
+  if (places_.size() > kMaxEntries) places_.pop_front();
   return true;
 }
 
-bool SessionSendQueue::add_answer(Bytes row) {
-  if (rows_.size() >= kMaxRows) return false;
-  rows_.push_back({0, std::move(row)});
+bool SessionSendQueue::add_answer(Bytes entry) {
+  if (entries_.size() >= kMaxEntries) return false;
+  entries_.push_back({0, std::move(entry)});
   return true;
 }
 
 RoomSeq SessionSendQueue::arrived(std::uint64_t index) {
-  std::erase_if(rows_, [&](const Row& row) { return row.index != 0 && row.index <= index; });
+  std::erase_if(entries_, [&](const Entry& entry) { return entry.index != 0 && entry.index <= index; });
   RoomSeq newest;
   for (; !places_.empty() && places_.front().first <= index; places_.pop_front()) newest = places_.front().second;
   return newest;
@@ -113,14 +113,14 @@ MessageParts SessionSendQueue::take() {
     return {serialised(response)};
   }
   if (complete_) return {std::exchange(complete_, nullptr)};
-  if (rows_.empty()) return {};
-  const Row row = std::move(rows_.front());
-  rows_.pop_front();
-  if (row.index == 0) return {row.bytes};
-  // The row itself is shared by all streams: its number goes behind it, as protobuf merges.
+  if (entries_.empty()) return {};
+  const Entry entry = std::move(entries_.front());
+  entries_.pop_front();
+  if (entry.index == 0) return {entry.bytes};
+  // The entry itself is shared by all streams: its number goes behind it, as protobuf merges.
   v1::SessionResponse number;
-  number.set_index(row.index);
-  return {row.bytes, serialised(number)};
+  number.set_index(entry.index);
+  return {entry.bytes, serialised(number)};
 }
 
 void PartnerSendQueue::offer(const std::vector<CuttingState>& all, bool by_stream) {

@@ -60,34 +60,34 @@ class MeshSendQueue {
   bool news_ = true;      // newest_ was not said yet
 };
 
-// What a session sends: the tools, scene and field as they were on joining, then rows in room_seq order. Nothing of it
+// What a session sends: the tools, scene and field as they were on joining, then entries in room_seq order. Nothing of it
 // before the leaves are given, which is when all that it tells of is kept. Rows cannot be skipped, so a reader that
 // falls too far behind is given up instead.
 class SessionSendQueue {
  public:
-  static constexpr std::size_t kMaxRows = 8192;
+  static constexpr std::size_t kMaxEntries = 8192;
 
   // `before`: sent before the leaves, once they are given; `complete` after them.
   void begin(RoomSeq contained, MessageParts before, Bytes complete);
-  // Copied while rows may have come already: every leaf contains at least the order up to `contained`. What it contains
-  // beyond that changes nothing when its row is applied again, since a cut field is a minimum over its cuts and all
-  // other rows set leaves as they are at their place.
+  // Copied while entries may have come already: every leaf contains at least the order up to `contained`. What it contains
+  // beyond that changes nothing when its entry is applied again, since a cut field is a minimum over its cuts and all
+  // other entries set leaves as they are at their place.
   void set_leaves(std::vector<FieldLeaf> leaves);
-  // A row of the room's order; one up to `contained` is skipped. False when kMaxRows wait already; the row is then
+  // A entry of the room's order; one up to `contained` is skipped. False when kMaxEntries wait already; the entry is then
   // not taken. Rows that are taken count from 1 on, and carry their number.
-  [[nodiscard]] bool add(RoomSeq place, Bytes row);
+  [[nodiscard]] bool add(RoomSeq place, Bytes entry);
   [[nodiscard]] bool takes(RoomSeq place) const { return place > contained_; }
-  // Of the newest row that was taken.
+  // Of the newest entry that was taken.
   [[nodiscard]] std::uint64_t index() const { return index_; }
-  // The reader has rows up to this number by another way: those that still wait need not be sent. Gives the place of
-  // the newest row that it is known to have; null: nobody knows.
+  // The reader has entries up to this number by another way: those that still wait need not be sent. Gives the place of
+  // the newest entry that it is known to have; null: nobody knows.
   RoomSeq arrived(std::uint64_t index);
-  // All that goes before the rows has been taken.
+  // All that goes before the entries has been taken.
   [[nodiscard]] bool begun() const { return leaves_known_ && !complete_; }
   // An answer outside the order: the first outcome of a cut that was sent again.
-  [[nodiscard]] bool add_answer(Bytes row);
+  [[nodiscard]] bool add_answer(Bytes entry);
   [[nodiscard]] MessageParts take();
-  [[nodiscard]] std::size_t waiting() const { return rows_.size(); }
+  [[nodiscard]] std::size_t waiting() const { return entries_.size(); }
 
  private:
   std::vector<FieldLeaf> leaves_;
@@ -96,12 +96,12 @@ class SessionSendQueue {
   bool leaves_known_ = false;
   std::deque<Bytes> before_;
   Bytes complete_;  // null: said
-  struct Row {
+  struct Entry {
     std::uint64_t index = 0;  // 0: an answer outside the order
     Bytes bytes;
   };
-  std::deque<Row> rows_;
-  std::deque<std::pair<std::uint64_t, RoomSeq>> places_;  // of rows that the reader is not known to have
+  std::deque<Entry> entries_;
+  std::deque<std::pair<std::uint64_t, RoomSeq>> places_;  // of entries that the reader is not known to have
   std::uint64_t index_ = 0;
 };
 

@@ -16,7 +16,7 @@
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "server/net/called_room.inl"
 #include "server/net/link_server.hpp"
-#include "server/net/room_rows.hpp"
+#include "server/net/room_entries.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {
@@ -50,9 +50,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       std::shared_ptr<SessionLink> link = links_->add(author_, decided + 1, *this);
       const std::lock_guard lock(mutex_);
       link_ = std::move(link);
-      before.insert(before.begin(), link_row(link_->keys(), links_->port()));
+      before.insert(before.begin(), link_message(link_->keys(), links_->port()));
     }
-    for (Bytes& row : before) row = in_its_version(row_for_role(RoomSeq{}, row));
+    for (Bytes& entry : before) entry = in_its_version(entry_for_role(RoomSeq{}, entry));
     std::erase(before, nullptr);
     const std::lock_guard lock(mutex_);
     taken_ = decided;
@@ -68,28 +68,28 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     pump();
   }
   void offer(RoomSeq place, const Bytes& any) override {
-    const Bytes row = in_its_version(row_for_role(place, any));
+    const Bytes entry = in_its_version(entry_for_role(place, any));
     const std::lock_guard lock(mutex_);
-    if (row && !closing()) send_or_give_up(send_queue_.add(place, row));
+    if (entry && !closing()) send_or_give_up(send_queue_.add(place, entry));
   }
   // [committing thread]
-  void offer(RoomSeq place, const Bytes& any, const wire::SessionRow& fast) override {
-    const Bytes row = in_its_version(row_for_role(place, any));
-    if (!row) return;
+  void offer(RoomSeq place, const Bytes& any, const wire::SessionEntry& fast) override {
+    const Bytes entry = in_its_version(entry_for_role(place, any));
+    if (!entry) return;
     std::uint64_t index = 0;
     {
       const std::lock_guard lock(mutex_);
       if (closing()) return;
       const std::uint64_t before = send_queue_.index();
-      send_or_give_up(send_queue_.add(place, row));
+      send_or_give_up(send_queue_.add(place, entry));
       if (send_queue_.index() > before) index = send_queue_.index();
     }
     // Beside the stream, which carries all.
-    const bool goes = row == any && may_carry(content_of(fast));
+    const bool goes = entry == any && may_carry(content_of(fast));
     if (link_)
-      link_->tell(index, goes ? fast : wire::SessionRow{.room_seq = place, .kind = wire::SessionRowKind::streamed});
+      link_->tell(index, goes ? fast : wire::SessionEntry{.room_seq = place, .kind = wire::SessionEntryKind::streamed});
   }
-  void hold(const wire::SessionRow& supervised) override {
+  void hold(const wire::SessionEntry& supervised) override {
     if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
   }
   bool show_partners(const std::vector<CuttingState>& states) override {
@@ -118,9 +118,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (link_) link_->know_tool(number, tool);
   }
   void answer(const Bytes& any) override {
-    const Bytes row = in_its_version(any);
+    const Bytes entry = in_its_version(any);
     const std::lock_guard lock(mutex_);
-    if (row && !closing()) send_or_give_up(send_queue_.add_answer(row));
+    if (entry && !closing()) send_or_give_up(send_queue_.add_answer(entry));
   }
   void refuse(const Error& why) override { close(invalid(why.message)); }
   void decided() override {
@@ -258,16 +258,16 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     read_on();
   }
 
-  // A row that is streamed is told of without what it says.
-  [[nodiscard]] DatagramContent content_of(const wire::SessionRow& row) const {
-    if (row.kind == wire::SessionRowKind::supervised) return DatagramContent::supervision;
-    const bool others = row.kind == wire::SessionRowKind::committed && row.cut.author != author_;
+  // A entry that is streamed is told of without what it says.
+  [[nodiscard]] DatagramContent content_of(const wire::SessionEntry& entry) const {
+    if (entry.kind == wire::SessionEntryKind::supervised) return DatagramContent::supervision;
+    const bool others = entry.kind == wire::SessionEntryKind::committed && entry.cut.author != author_;
     return others ? DatagramContent::committed_cuts : DatagramContent::acknowledgements;
   }
 
-  // What a row of the order tells, of what not every role is told.
-  [[nodiscard]] static std::optional<StreamContent> content_of(const v1::SessionResponse& row) {
-    switch (row.message_case()) {
+  // What a entry of the order tells, of what not every role is told.
+  [[nodiscard]] static std::optional<StreamContent> content_of(const v1::SessionResponse& entry) {
+    switch (entry.message_case()) {
       case v1::SessionResponse::kLeaf:
       case v1::SessionResponse::kCommitted:
       case v1::SessionResponse::kChange:
@@ -282,26 +282,26 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
         return {};
     }
   }
-  // A row as the reader may be told it: without what is not for them it says only that there was something.
-  [[nodiscard]] Bytes row_for_role(RoomSeq place, const Bytes& row) const {
+  // A entry as the reader may be told it: without what is not for them it says only that there was something.
+  [[nodiscard]] Bytes entry_for_role(RoomSeq place, const Bytes& entry) const {
     constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision,
                               StreamContent::own_words};
-    if (std::ranges::all_of(kAll, [&](StreamContent content) { return may_receive(content); })) return row;
+    if (std::ranges::all_of(kAll, [&](StreamContent content) { return may_receive(content); })) return entry;
     v1::SessionResponse said;
-    (void)said.ParseFromString(*row);
+    (void)said.ParseFromString(*entry);
     const std::optional<StreamContent> content = content_of(said);
-    if (!content || may_receive(*content)) return row;
-    return place ? noted_row(place, {}) : nullptr;
+    if (!content || may_receive(*content)) return entry;
+    return place ? noted_entry(place, {}) : nullptr;
   }
   // The same as this client's version of the protocol has it; null where it has none.
-  [[nodiscard]] Bytes in_its_version(const Bytes& row) const {
-    if (!row) return nullptr;
-    if (version_ == wire::kProtocolVersion) return row;
+  [[nodiscard]] Bytes in_its_version(const Bytes& entry) const {
+    if (!entry) return nullptr;
+    if (version_ == wire::kProtocolVersion) return entry;
     v1::SessionResponse said;
-    (void)said.ParseFromString(*row);
-    const std::optional<v1::SessionResponse> older = wire::row_in(version_, said);
+    (void)said.ParseFromString(*entry);
+    const std::optional<v1::SessionResponse> older = wire::entry_in(version_, said);
     if (!older) return nullptr;
-    return older->message_case() == said.message_case() ? row : serialised(*older);
+    return older->message_case() == said.message_case() ? entry : serialised(*older);
   }
 
   [[nodiscard]] static Status too_many_cuts() {
@@ -327,7 +327,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       pump();
     else
       close_locked({StatusCode::RESOURCE_EXHAUSTED, "the reader is more than " +
-                                                        std::to_string(SessionSendQueue::kMaxRows) +
+                                                        std::to_string(SessionSendQueue::kMaxEntries) +
                                                         " events behind the room; join again"});
   }
   [[nodiscard]] bool is_closing() const {
@@ -342,14 +342,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   bool take(ByteBuffer& message) override {
     MessageParts parts = send_queue_.take();
     if (parts.empty() && send_queue_.begun() && bone_) {
-      if (const Bytes row = in_its_version(bone_row(*bone_))) parts = {row};
+      if (const Bytes entry = in_its_version(bone_entry(*bone_))) parts = {entry};
       bone_.reset();
     }
-    // Where others' tools are only after all rows: no row is held up.
+    // Where others' tools are only after all entries: no entry is held up.
     while (parts.empty() && send_queue_.begun()) {
       const std::optional<CuttingState> partner = partners_.take(PartnerSendQueue::Clock::now());
       if (!partner) break;
-      if (const Bytes row = in_its_version(partner_row(*partner))) parts = {row};
+      if (const Bytes entry = in_its_version(partner_entry(*partner))) parts = {entry};
     }
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
@@ -370,7 +370,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   LinkServer* const links_;
   Authorizer* const authorizer_;  // null: plain text
   const Caller caller_;
-  std::shared_ptr<SessionLink> link_;  // with the link server; set before the runtime tells of rows
+  std::shared_ptr<SessionLink> link_;  // with the link server; set before the runtime tells of entries
   ByteBuffer request_;
   AuthorId author_;  // set before the runtime knows the stream, as the next
   std::uint32_t version_ = wire::kProtocolVersion;

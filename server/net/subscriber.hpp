@@ -14,7 +14,7 @@ class Subscriber {
  public:
   virtual ~Subscriber() = default;
   virtual void end(const std::string& why) = 0;           // the server stops
-  [[nodiscard]] virtual std::size_t waiting() const = 0;  // rows or blocks that the reader is behind
+  [[nodiscard]] virtual std::size_t waiting() const = 0;  // entries or blocks that the reader is behind
 };
 
 // When something may be done that is done so far apart on average, the first time and after a pause at once.

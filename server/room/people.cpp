@@ -7,12 +7,12 @@
 
 namespace osteon {
 
-void People::draw(const AnnotationRow& row) {
-  last_annotation_ = std::max(last_annotation_, row.id);
-  if (row.drawn)
-    annotations_[row.id] = *row.drawn;
+void People::draw(const AnnotationEntry& entry) {
+  last_annotation_ = std::max(last_annotation_, entry.id);
+  if (entry.drawn)
+    annotations_[entry.id] = *entry.drawn;
   else
-    annotations_.erase(row.id);
+    annotations_.erase(entry.id);
 }
 
 Role People::role(AuthorId author) const {

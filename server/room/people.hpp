@@ -1,4 +1,4 @@
-// The people of a room as its rows have made them: what they may do, what was decided about them, what they have drawn.
+// The people of a room as its entries have made them: what they may do, what was decided about them, what they have drawn.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,7 +10,7 @@
 #include "common/core/digest.hpp"
 #include "common/field/restrictions.hpp"
 #include "common/tools/annotation.hpp"
-#include "server/room/room_row.hpp"
+#include "server/room/room_entry.hpp"
 
 namespace osteon {
 
@@ -20,15 +20,15 @@ class People {
  public:
   struct Supervised {
     Restrictions supervision;
-    RoomSeq place;  // of the row that set it
+    RoomSeq place;  // of the entry that set it
     AuthorId by;    // who did
   };
 
   void join(AuthorId author, Role role, std::uint32_t person, bool hand) { members_[author] = {role, person, hand}; }
-  void supervise(RoomSeq place, AuthorId by, const SuperviseRow& row) {
-    supervised_[row.subject] = {row.supervision, place, by};
+  void supervise(RoomSeq place, AuthorId by, const SuperviseEntry& entry) {
+    supervised_[entry.subject] = {entry.supervision, place, by};
   }
-  void draw(const AnnotationRow& row);
+  void draw(const AnnotationEntry& entry);
 
   [[nodiscard]] Role role(AuthorId author) const;
   [[nodiscard]] std::uint32_t person(AuthorId author) const;  // a pseudonym, 0: unnamed

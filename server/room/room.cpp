@@ -68,23 +68,23 @@ Room::Room(Case bone, CutLimits limits, std::shared_ptr<ToolBox> tools)
                   Body{CutField(bone_, BodyId{0}, tools_), {}, SurfaceBlocks(BodyId{0}), bone_.bounds_samples()});
 }
 
-RoomRow Room::next_row(AuthorId by, decltype(RoomRow::what) what) {
+LogEntry Room::next_entry(AuthorId by, decltype(LogEntry::what) what) {
   return {RoomSeq{room_seq_.value + 1}, now_, by, std::move(what)};
 }
 
-RoomEvent Room::decide(AuthorId by, decltype(RoomRow::what) what) {
-  RoomRow row = next_row(by, std::move(what));
-  RoomEvent event = apply(row);
-  rows_.push_back(std::move(row));
+RoomEvent Room::decide(AuthorId by, decltype(LogEntry::what) what) {
+  LogEntry entry = next_entry(by, std::move(what));
+  RoomEvent event = apply(entry);
+  entries_.push_back(std::move(entry));
   return event;
 }
 
 RoomEvent Room::admit(MemberKind kind, std::uint32_t person, const Digest& secret, Role role) {
   const AuthorId author{authors_ + 1};
   const People::Supervised before = people_.supervised(people_.newest_hand(person));
-  RoomEvent event = decide(author, JoinRow{author, kind, person, secret, role});
+  RoomEvent event = decide(author, JoinEntry{author, kind, person, secret, role});
   if (kind == MemberKind::surgeon && secret != Digest{} && before.supervision != Restrictions{})
-    event.further.push_back(decide(before.by, SuperviseRow{author, before.supervision}));
+    event.further.push_back(decide(before.by, SuperviseEntry{author, before.supervision}));
   return event;
 }
 
@@ -127,25 +127,25 @@ Result<Outcome> Room::submit(const Cut& cut) {
   const auto surgeon = surgeons_.find(cut.author);
   if (surgeon == surgeons_.end())
     return refuse("cut.author " + std::to_string(cut.author.value) + " has not joined this room to cut");
-  const std::vector<Decided>& rows = surgeon->second.decided;
-  const std::uint64_t next = rows.size() + 1;
+  const std::vector<Decided>& entries = surgeon->second.decided;
+  const std::uint64_t next = entries.size() + 1;
   if (cut.author_seq == 0 || cut.author_seq > next)
     return refuse("cut.author_seq is " + std::to_string(cut.author_seq) + " where " + std::to_string(next) +
                   " comes next");
 
   // What was decided stays decided, so a cut may be sent again after a lost answer.
   if (cut.author_seq < next) {
-    const Decided& row = rows[cut.author_seq - 1];
-    if (row.bytes != cut_digest(cut))
+    const Decided& entry = entries[cut.author_seq - 1];
+    if (entry.bytes != cut_digest(cut))
       return refuse("cut.author_seq " + std::to_string(cut.author_seq) + " was used before for another cut");
     ++counts_.repeated;
-    return Outcome{row.room_seq, row.rejection, true, surgeon->second.epoch, {}};
+    return Outcome{entry.room_seq, entry.rejection, true, surgeon->second.epoch, {}};
   }
 
   const Rejection rejection = judge(cut);
   RoomEvent event = rejection == Rejection::none
-                        ? decide(cut.author, CutRow{cut})
-                        : decide(cut.author, RejectionRow{cut.author, cut.author_seq, cut_digest(cut), rejection});
+                        ? decide(cut.author, CutEntry{cut})
+                        : decide(cut.author, RejectionEntry{cut.author, cut.author_seq, cut_digest(cut), rejection});
   return Outcome{event.room_seq, rejection, false, surgeon->second.epoch, std::move(event.cut)};
 }
 

@@ -1,6 +1,6 @@
 // The room: owns the bone and the scene, puts cuts and all other events in one order, judges them, applies them. A
 // function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time. What it
-// decides are rows (room_row.hpp): applied to a room as it began, in order, they make the same room again.
+// decides are entries (room_entry.hpp): applied to a room as it began, in order, they make the same room again.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -26,7 +26,7 @@
 #include "server/room/cut_energy.hpp"
 #include "server/room/people.hpp"
 #include "server/room/room_event.hpp"
-#include "server/room/room_row.hpp"
+#include "server/room/room_entry.hpp"
 #include "server/room/separation.hpp"
 
 namespace osteon {
@@ -78,7 +78,7 @@ class Room {
   [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
 
   // A new identity, never given twice: the event's author. What holds for the person's newest hand holds for the new
-  // one, by a row of its own (RoomEvent::further), unless the server itself joins, which has no secret.
+  // one, by a entry of its own (RoomEvent::further), unless the server itself joins, which has no secret.
   RoomEvent admit(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   [[nodiscard]] bool knows(AuthorId author) const;
@@ -133,12 +133,12 @@ class Room {
   [[nodiscard]] BodyId next_body() const { return BodyId{last_body_ + 1}; }
 
   // What was decided since the last call, in order: for the journal, before anyone is told.
-  [[nodiscard]] std::vector<RoomRow> take_rows() { return std::exchange(rows_, {}); }
-  // The next row of a room that began as this one did. Judges nothing; take_rows() does not give it again. `fields`
+  [[nodiscard]] std::vector<LogEntry> take_entries() { return std::exchange(entries_, {}); }
+  // The next entry of a room that began as this one did. Judges nothing; take_entries() does not give it again. `fields`
   // leave: cuts are noted but not evaluated, until set_fields() brings what they have made. Error invalid_input: not
-  // the next row, or one that cannot follow what is here.
+  // the next entry, or one that cannot follow what is here.
   enum class Fields : bool { evaluate, leave };
-  Result<void> replay(const RoomRow& row, Fields fields = Fields::evaluate);
+  Result<void> replay(const LogEntry& entry, Fields fields = Fields::evaluate);
   // The leaves of all bodies, those that were taken away too, as they were at room_seq(): what all_leaves() gave.
   Result<void> set_fields(std::span<const FieldLeaf> leaves);
   [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;
@@ -188,7 +188,7 @@ class Room {
     std::chrono::nanoseconds granted{}, claimed{};  // when, and tool time of its cuts since
     double swept_voxels = 0;                        // spent of the bound, at `spent`
     std::chrono::nanoseconds spent{};
-    std::vector<Decided> decided;  // row author_seq − 1
+    std::vector<Decided> decided;  // entry author_seq − 1
   };
   struct Body {
     CutField field;
@@ -227,24 +227,24 @@ class Room {
   [[nodiscard]] bool exists(BodyId body) const;
   [[nodiscard]] std::vector<Standing> with_tools(const std::vector<SceneItem>& items) const;
   [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> places) const;
-  // Deciding: a row with the next place. Applying it is the same for one just decided and for one of a journal.
-  RoomRow next_row(AuthorId by, decltype(RoomRow::what) what);
-  RoomEvent decide(AuthorId by, decltype(RoomRow::what) what);
-  [[nodiscard]] Result<void> can_follow(const RoomRow& row) const;
-  RoomEvent apply(const RoomRow& row);
-  void apply(const RoomRow& row, const JoinRow& join, RoomEvent& event);
-  void apply(const RoomRow& row, const CutRow& cut, RoomEvent& event);
-  void apply(const RoomRow& row, const RejectionRow& rejection, RoomEvent& event);
-  void apply(const RoomRow& row, const SplitRow& split, RoomEvent& event);
-  void apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event);
-  void apply(const RoomRow& row, const RedoRow& redo, RoomEvent& event);
-  void apply(const RoomRow& row, const RemoveBodyRow& removal, RoomEvent& event);
-  void apply(const RoomRow& row, const ItemRow& item, RoomEvent& event);
-  void apply(const RoomRow& row, const ToolRow& tool, RoomEvent& event);
-  void apply(const RoomRow& row, const MarkRow& mark, RoomEvent& event);
-  void apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& event);
-  void apply(const RoomRow& row, const AnnotationRow& annotation, RoomEvent& event);
-  void apply(const RoomRow& row, const WordsRow& words, RoomEvent& event);
+  // Deciding: a entry with the next place. Applying it is the same for one just decided and for one of a journal.
+  LogEntry next_entry(AuthorId by, decltype(LogEntry::what) what);
+  RoomEvent decide(AuthorId by, decltype(LogEntry::what) what);
+  [[nodiscard]] Result<void> can_follow(const LogEntry& entry) const;
+  RoomEvent apply(const LogEntry& entry);
+  void apply(const LogEntry& entry, const JoinEntry& join, RoomEvent& event);
+  void apply(const LogEntry& entry, const CutEntry& cut, RoomEvent& event);
+  void apply(const LogEntry& entry, const RejectionEntry& rejection, RoomEvent& event);
+  void apply(const LogEntry& entry, const SplitEntry& split, RoomEvent& event);
+  void apply(const LogEntry& entry, const UndoEntry& undo, RoomEvent& event);
+  void apply(const LogEntry& entry, const RedoEntry& redo, RoomEvent& event);
+  void apply(const LogEntry& entry, const RemoveBodyEntry& removal, RoomEvent& event);
+  void apply(const LogEntry& entry, const ItemEntry& item, RoomEvent& event);
+  void apply(const LogEntry& entry, const ToolEntry& tool, RoomEvent& event);
+  void apply(const LogEntry& entry, const MarkEntry& mark, RoomEvent& event);
+  void apply(const LogEntry& entry, const SuperviseEntry& supervise, RoomEvent& event);
+  void apply(const LogEntry& entry, const AnnotationEntry& annotation, RoomEvent& event);
+  void apply(const LogEntry& entry, const WordsEntry& words, RoomEvent& event);
   // The bone or the scene, otherwise than by a cut: whoever has joined and is neither stopped nor without their tool.
   [[nodiscard]] Result<void> may_change(AuthorId by) const;
   // Whether cuts that come again are such as `by` may make now, and those whose they are, unless `by` oversees them.
@@ -258,7 +258,7 @@ class Room {
   [[nodiscard]] Result<void> may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const;
   void bone_came_back(RoomEvent& event);
   void grant(Surgeon& surgeon);
-  Event& add_event(const RoomRow& row, EventKind kind);
+  Event& add_event(const LogEntry& entry, EventKind kind);
   void finish_event(RoomEvent& event) const;  // says what exists after it
   void note_decided(AuthorId author, const Digest& bytes, RoomSeq place, Rejection rejection);
   void note_changed(BodyId body, const std::vector<LevelLeaves>& changed, RoomEvent* event);
@@ -267,7 +267,7 @@ class Room {
   [[nodiscard]] std::set<BlockKey> focused(Body& body) const;  // what its focus makes stale
   [[nodiscard]] CutField made_piece(const Body& parent, const SplitPiece& piece) const;
   void catch_up(const Body& parent, CutField& field) const;
-  void cut_apart(RoomSeq place, Event& row, RoomEvent& event);
+  void cut_apart(RoomSeq place, Event& entry, RoomEvent& event);
   void list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const;
   [[nodiscard]] Result<void> know(const Tool& tool) const;
   [[nodiscard]] bool can_be_undone(RoomSeq place) const;
@@ -278,7 +278,7 @@ class Room {
   std::shared_ptr<ToolBox> tools_;  // shared with the fields and, beyond the room, with those that list tools
   std::map<BodyId, Body> bodies_;
   std::uint32_t last_body_ = 0, last_item_ = 0;
-  std::map<std::uint32_t, std::vector<ItemState>> items_;  // rows in order
+  std::map<std::uint32_t, std::vector<ItemState>> items_;  // entries in order
   std::map<RoomSeq, Event> events_;                        // committed ones, tombstones included
   std::vector<Focus> focuses_;
   std::set<BlockKey> stale_;
@@ -291,7 +291,7 @@ class Room {
   People people_;
   RoomCounts counts_;
   Digest genesis_;
-  std::vector<RoomRow> rows_;  // decided since take_rows()
+  std::vector<LogEntry> entries_;  // decided since take_entries()
   Fields fields_ = Fields::evaluate;
   CutEnergy energy_;
   std::map<AuthorId, double> owed_j_;

@@ -1,4 +1,4 @@
-// What a room's rows do to it: the same for one that was just decided and for one of a journal, years later.
+// What a room's entries do to it: the same for one that was just decided and for one of a journal, years later.
 #include <algorithm>
 #include <chrono>
 #include <functional>
@@ -17,8 +17,8 @@ constexpr std::uint64_t kLeftOfSplit = std::uint64_t{1} << 63;
 // No room lives longer; far from where times overflow.
 constexpr std::chrono::nanoseconds kLongest = std::chrono::hours(24 * 365 * 100);
 
-tl::unexpected<Error> impossible(const RoomRow& row, const std::string& why) {
-  return failure(ErrorCode::invalid_input, "row " + std::to_string(row.place.value) + " cannot follow: " + why);
+tl::unexpected<Error> impossible(const LogEntry& entry, const std::string& why) {
+  return failure(ErrorCode::invalid_input, "entry " + std::to_string(entry.place.value) + " cannot follow: " + why);
 }
 
 CoordBox level_0_box(int level, Coord origin) {
@@ -53,48 +53,48 @@ void add(Hasher& hasher, const Digest& digest) { hasher.bytes(std::as_bytes(std:
 
 }  // namespace
 
-Result<void> Room::replay(const RoomRow& row, Fields fields) {
-  if (Result<void> possible = can_follow(row); !possible) return possible;
-  set_time(row.at);
+Result<void> Room::replay(const LogEntry& entry, Fields fields) {
+  if (Result<void> possible = can_follow(entry); !possible) return possible;
+  set_time(entry.at);
   fields_ = fields;
-  apply(row);
+  apply(entry);
   fields_ = Fields::evaluate;
   return {};
 }
 
 // Not whether it would be decided so again, but whether it can have been: what a damaged or forged journal names may
 // not exist.
-Result<void> Room::can_follow(const RoomRow& row) const {
+Result<void> Room::can_follow(const LogEntry& entry) const {
   const auto possible = [&](bool holds, const char* why) -> Result<void> {
-    return holds ? Result<void>{} : Result<void>(impossible(row, why));
+    return holds ? Result<void>{} : Result<void>(impossible(entry, why));
   };
-  if (row.place.value != room_seq_.value + 1)
-    return impossible(row, "row " + std::to_string(room_seq_.value + 1) + " comes next");
-  if (row.at < now_ || row.at > kLongest) return impossible(row, "its time does not follow that of the row before it");
+  if (entry.place.value != room_seq_.value + 1)
+    return impossible(entry, "entry " + std::to_string(room_seq_.value + 1) + " comes next");
+  if (entry.at < now_ || entry.at > kLongest) return impossible(entry, "its time does not follow that of the entry before it");
   struct Judge {
     const Room& room;
-    const RoomRow& row;
+    const LogEntry& entry;
     const decltype(possible)& require;
 
     Result<void> next_of(AuthorId author, std::uint64_t author_seq) const {
       if (!room.surgeons_.contains(author)) return require(false, "its author may not cut");
       return require(author_seq == room.decided(author) + 1, "it is not its author's next cut");
     }
-    Result<void> operator()(const JoinRow& join) const {
+    Result<void> operator()(const JoinEntry& join) const {
       return require(join.author.value == room.authors_ + 1 && join.kind <= MemberKind::watcher &&
                          static_cast<int>(join.role) < kRoles,
                      "an author was given twice");
     }
-    Result<void> operator()(const CutRow& cut) const {
+    Result<void> operator()(const CutEntry& cut) const {
       if (Result<void> next = next_of(cut.cut.author, cut.cut.author_seq); !next) return next;
       return require(room.exists(cut.cut.body) && room.judge_form(cut.cut) == Rejection::none,
                      "no room would take this cut");
     }
-    Result<void> operator()(const RejectionRow& one) const {
+    Result<void> operator()(const RejectionEntry& one) const {
       if (Result<void> next = next_of(one.author, one.author_seq); !next) return next;
       return require(one.reason > Rejection::none && static_cast<int>(one.reason) < kRejections, "its reason is none");
     }
-    Result<void> operator()(const SplitRow& split) const {
+    Result<void> operator()(const SplitEntry& split) const {
       const CoordBox place = about(room.bone());
       bool whole = room.exists(split.parent) && is_mask(split.taken, place);
       std::uint32_t next = room.last_body_;
@@ -103,12 +103,12 @@ Result<void> Room::can_follow(const RoomRow& row) const {
                 place.contains(piece.reach.max);
       return require(whole && room.bodies().size() + split.pieces.size() <= kMostBodies, "the split is incomplete");
     }
-    Result<void> operator()(const UndoRow& undo) const {
+    Result<void> operator()(const UndoEntry& undo) const {
       bool all = !undo.places.empty() && std::ranges::is_sorted(undo.places, std::less_equal{});
       for (const RoomSeq place : undo.places) all = all && room.can_be_undone(place) && !room.events_.at(place).undone;
       return require(all, "it takes back what does not stand");
     }
-    Result<void> operator()(const RedoRow& redo) const {
+    Result<void> operator()(const RedoEntry& redo) const {
       const auto stands = [&](RoomSeq place) {
         const auto found = room.events_.find(place);
         return found != room.events_.end() && found->second.kind == EventKind::undo && !found->second.undone;
@@ -120,27 +120,27 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       for (const RoomSeq place : redo.places) all = all && room.can_be_undone(place) && room.events_.at(place).undone;
       return require(all, "it does again what was not undone");
     }
-    Result<void> operator()(const RemoveBodyRow& removal) const {
+    Result<void> operator()(const RemoveBodyEntry& removal) const {
       return require(room.exists(removal.body) && room.bodies().size() > 1, "the body cannot go");
     }
-    Result<void> operator()(const ItemRow& item) const {
+    Result<void> operator()(const ItemEntry& item) const {
       const bool known = room.items_.contains(item.item);
       if (!item.set) return require(known, "there is no such item");
       const bool room_for_it = known || (item.item == room.last_item_ + 1 && room.items_.size() < kMostItems);
-      return require(room_for_it && item.set->id == item.item && item.set->set_at == row.place.value &&
+      return require(room_for_it && item.set->id == item.item && item.set->set_at == entry.place.value &&
                          room.exists(item.set->body) && room.tools_->find(item.set->tool),
                      "the item cannot stand there");
     }
-    Result<void> operator()(const ToolRow& tool) const {
+    Result<void> operator()(const ToolEntry& tool) const {
       if (room.tools_->find(tool.tool.hash())) return require(false, "the tool was known before");
       if (Result<void> room_for_it = room.know(tool.tool); !room_for_it)
-        return impossible(row, room_for_it.error().message);
+        return impossible(entry, room_for_it.error().message);
       return {};
     }
-    Result<void> operator()(const MarkRow& mark) const {
+    Result<void> operator()(const MarkEntry& mark) const {
       return require(!mark.label.empty() && mark.label.size() <= kMostLabelBytes, "the mark has no label");
     }
-    Result<void> operator()(const SuperviseRow& one) const {
+    Result<void> operator()(const SuperviseEntry& one) const {
       const Restrictions& set = one.supervision;
       bool all = room.surgeons_.contains(one.subject) && check(set).has_value();
       for (const AuthorId named : {set.taken_by, set.guide})
@@ -148,7 +148,7 @@ Result<void> Room::can_follow(const RoomRow& row) const {
       for (const Digest& tool : set.tools) all = all && room.tools_->find(tool);
       return require(all, "it oversees what is not there");
     }
-    Result<void> operator()(const AnnotationRow& one) const {
+    Result<void> operator()(const AnnotationEntry& one) const {
       const auto& drawn = room.people_.annotations();
       if (!one.drawn) return require(drawn.contains(one.id), "there is no such annotation");
       const bool room_for_it =
@@ -157,63 +157,63 @@ Result<void> Room::can_follow(const RoomRow& row) const {
           room_for_it && one.drawn->id == one.id && room.knows(one.drawn->author) && check(*one.drawn).has_value(),
           "the annotation cannot be there");
     }
-    Result<void> operator()(const WordsRow& said) const {
+    Result<void> operator()(const WordsEntry& said) const {
       return require(!said.words.empty() && said.words.size() <= kMostWordsBytes && (!said.to || room.knows(said.to)),
                      "nobody can have said it");
     }
   };
-  return std::visit(Judge{*this, row, possible}, row.what);
+  return std::visit(Judge{*this, entry, possible}, entry.what);
 }
 
-RoomEvent Room::apply(const RoomRow& row) {
-  room_seq_ = row.place;
+RoomEvent Room::apply(const LogEntry& entry) {
+  room_seq_ = entry.place;
   RoomEvent event;
-  event.room_seq = row.place;
-  event.author = row.author;
-  std::visit([&](const auto& what) { apply(row, what, event); }, row.what);
+  event.room_seq = entry.place;
+  event.author = entry.author;
+  std::visit([&](const auto& what) { apply(entry, what, event); }, entry.what);
   finish_event(event);
   return event;
 }
 
 void Room::finish_event(RoomEvent& event) const { event.bodies = bodies(); }
 
-Room::Event& Room::add_event(const RoomRow& row, EventKind kind) {
-  Event& event = events_[row.place];
+Room::Event& Room::add_event(const LogEntry& entry, EventKind kind) {
+  Event& event = events_[entry.place];
   event.kind = kind;
-  event.author = row.author;
-  event.at = row.at;
+  event.author = entry.author;
+  event.at = entry.at;
   return event;
 }
 
-void Room::apply(const RoomRow& row, const JoinRow& join, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const JoinEntry& join, RoomEvent& event) {
   event.kind = EventKind::join;
   event.author = join.author;
   authors_ = join.author.value;
   secrets_[join.author] = join.secret;
   people_.join(join.author, join.role, join.person, join.kind == MemberKind::surgeon);
-  if (join.kind == MemberKind::surgeon) surgeons_[join.author].granted = row.at;
+  if (join.kind == MemberKind::surgeon) surgeons_[join.author].granted = entry.at;
 }
 
-void Room::apply(const RoomRow& row, const CutRow& what, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) {
   const Cut& cut = what.cut;
   event.kind = EventKind::cut;
-  add_event(row, EventKind::cut);
+  add_event(entry, EventKind::cut);
   ++counts_.committed;
-  note_decided(cut.author, cut_digest(cut), row.place, Rejection::none);
+  note_decided(cut.author, cut_digest(cut), entry.place, Rejection::none);
   Surgeon& surgeon = surgeons_.at(cut.author);
   surgeon.claimed += std::chrono::microseconds(cut.path_us);
   surgeon.swept_voxels = voxels_spent(surgeon) + swept_voxels(cut);
-  surgeon.spent = row.at;
+  surgeon.spent = entry.at;
 
   event.cut.level = cut.level;
   for (auto& [id, body] : bodies_) {
     if (fields_ == Fields::leave) {
       if (const std::vector<Coord> reach = body.field.reach(cut); !reach.empty())
-        body.history.add(row.place, cut, reach);
+        body.history.add(entry.place, cut, reach);
       continue;
     }
     CutReport part = body.field.apply(cut);
-    if (!part.reached_leaves.empty()) body.history.add(row.place, cut, part.reached_leaves);
+    if (!part.reached_leaves.empty()) body.history.add(entry.place, cut, part.reached_leaves);
     if (!body.present) continue;  // nobody sees it, but it may come back
     event.cut.visited += part.visited;
     event.cut.computed += part.computed;
@@ -222,16 +222,16 @@ void Room::apply(const RoomRow& row, const CutRow& what, RoomEvent& event) {
                                     part.changed_leaves.end());
     if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
   }
-  if (std::ranges::none_of(bodies_, [&](const auto& body) { return body.second.history.contains(row.place); }))
-    events_.at(row.place).missed = std::make_shared<const Cut>(cut);
+  if (std::ranges::none_of(bodies_, [&](const auto& body) { return body.second.history.contains(entry.place); }))
+    events_.at(entry.place).missed = std::make_shared<const Cut>(cut);
 }
 
 // What its author has predicted on top of a cut that fell, falls too; but a stale cut says that he does not know yet,
 // and to raise the epoch for it would make the next ones stale as well.
-void Room::apply(const RoomRow& row, const RejectionRow& rejection, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const RejectionEntry& rejection, RoomEvent& event) {
   event.kind = EventKind::cut;
   ++counts_.rejected;
-  note_decided(rejection.author, rejection.bytes, row.place, rejection.reason);
+  note_decided(rejection.author, rejection.bytes, entry.place, rejection.reason);
   if (rejection.reason == Rejection::lease) return;
   grant(surgeons_.at(rejection.author));
 }
@@ -250,10 +250,10 @@ void Room::bone_came_back(RoomEvent& event) {
   event.lease_epoch = room_seq_.value + 1;
 }
 
-void Room::apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const UndoEntry& undo, RoomEvent& event) {
   event.kind = EventKind::undo;
-  const bool all_of_others = takes_all_of_others(row.author, {undo.places.begin(), undo.places.end()});
-  Event& added = add_event(row, EventKind::undo);
+  const bool all_of_others = takes_all_of_others(entry.author, {undo.places.begin(), undo.places.end()});
+  Event& added = add_event(entry, EventKind::undo);
   added.places = undo.places;
   added.all_of_others = all_of_others;
   event.places = undo.places;
@@ -286,9 +286,9 @@ void Room::apply(const RoomRow& row, const UndoRow& undo, RoomEvent& event) {
   if (event.bone) bone_came_back(event);
 }
 
-void Room::apply(const RoomRow& row, const RedoRow& redo, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const RedoEntry& redo, RoomEvent& event) {
   event.kind = EventKind::redo;
-  add_event(row, EventKind::redo);
+  add_event(entry, EventKind::redo);
   for (const RoomSeq undo : redo.undos) events_.at(undo).undone = true;
   // Cuts first: a piece is made from its parent as it is with all of them.
   std::vector<RoomSeq> cuts;
@@ -318,45 +318,45 @@ void Room::apply(const RoomRow& row, const RedoRow& redo, RoomEvent& event) {
   std::erase_if(event.leaves, [&](const FieldLeaf& leaf) { return !exists(leaf.body); });
 }
 
-void Room::apply(const RoomRow& row, const RemoveBodyRow& removal, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const RemoveBodyEntry& removal, RoomEvent& event) {
   event.kind = EventKind::remove_body;
-  add_event(row, EventKind::remove_body).body = removal.body;
+  add_event(entry, EventKind::remove_body).body = removal.body;
   bodies_.at(removal.body).present = false;
   ++bone_changes_;
   event.bone = event.scene = true;
 }
 
-void Room::apply(const RoomRow& row, const SplitRow& split, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const SplitEntry& split, RoomEvent& event) {
   event.kind = EventKind::split;
-  Event& one = add_event(row, EventKind::split);
+  Event& one = add_event(entry, EventKind::split);
   one.body = split.parent;
   one.taken = split.taken;
   one.pieces = split.pieces;
   if (!split.pieces.empty()) last_body_ = split.pieces.back().body.value;
   for (const SplitPiece& piece : split.pieces) last_body_ = std::max(last_body_, piece.body.value);
-  cut_apart(row.place, one, event);
+  cut_apart(entry.place, one, event);
   event.scene = true;
   ++bone_changes_;
 }
 
-void Room::apply(const RoomRow& row, const ItemRow& item, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const ItemEntry& item, RoomEvent& event) {
   event.kind = EventKind::scene;
-  add_event(row, EventKind::scene).item = item.item;
-  items_[item.item].push_back({row.place, item.set});
+  add_event(entry, EventKind::scene).item = item.item;
+  items_[item.item].push_back({entry.place, item.set});
   last_item_ = std::max(last_item_, item.item);
   event.item = item.item;
   event.scene = true;
 }
 
-void Room::apply(const RoomRow& row, const ToolRow& tool, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const ToolEntry& tool, RoomEvent& event) {
   event.kind = EventKind::tool;
-  add_event(row, EventKind::tool);
+  add_event(entry, EventKind::tool);
   event.tool = &tools_->add(tool.tool);
 }
 
-void Room::apply(const RoomRow& row, const MarkRow& mark, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const MarkEntry& mark, RoomEvent& event) {
   event.kind = EventKind::mark;
-  add_event(row, EventKind::mark).label = mark.label;
+  add_event(entry, EventKind::mark).label = mark.label;
   event.mark = mark.label;
 }
 
@@ -420,12 +420,12 @@ void Room::catch_up(const Body& parent, CutField& field) const {
 }
 
 // The pieces are copies of the parent, each with all but itself gone; then the parent loses them.
-void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
-  Body& parent = bodies_.at(row.body);
+void Room::cut_apart(RoomSeq place, Event& entry, RoomEvent& event) {
+  Body& parent = bodies_.at(entry.body);
   const RoomSeq left_key{kLeftOfSplit | place.value};
-  const bool evaluated = fields_ == Fields::evaluate, ready = ready_.size() == row.pieces.size();
-  for (std::size_t i = 0; i < row.pieces.size(); ++i) {
-    const SplitPiece& piece = row.pieces[i];
+  const bool evaluated = fields_ == Fields::evaluate, ready = ready_.size() == entry.pieces.size();
+  for (std::size_t i = 0; i < entry.pieces.size(); ++i) {
+    const SplitPiece& piece = entry.pieces[i];
     const bool use = ready && ready_[i].body() == piece.body;
     if (use) catch_up(parent, ready_[i]);
     CutField field = use         ? std::move(ready_[i])
@@ -438,10 +438,10 @@ void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
   std::vector<LevelLeaves> changed;
   const RoomSeq again[] = {place};
   if (!parent.history.contains(place)) {
-    parent.history.add_mask(place, row.taken);
+    parent.history.add_mask(place, entry.taken);
     std::map<int, std::vector<Coord>> origins;
     if (evaluated)
-      for (const FieldLeaf& leaf : *row.taken)
+      for (const FieldLeaf& leaf : *entry.taken)
         if (parent.field.merge(leaf)) origins[leaf.level].push_back(leaf.origin);
     for (auto& [level, of_level] : origins) changed.push_back({level, std::move(of_level)});
   } else if (evaluated) {
@@ -449,8 +449,8 @@ void Room::cut_apart(RoomSeq place, Event& row, RoomEvent& event) {
   } else {
     parent.history.note_undone(again, false);
   }
-  note_changed(row.body, changed, &event);
-  for (const SplitPiece& piece : row.pieces) show_whole(piece.body, event);
+  note_changed(entry.body, changed, &event);
+  for (const SplitPiece& piece : entry.pieces) show_whole(piece.body, event);
   event.bone = true;
 }
 
@@ -512,10 +512,10 @@ Digest Room::room_hash() const {
   for (const auto& [author, surgeon] : surgeons_) {
     hasher.integer(author.value);
     hasher.integer(surgeon.epoch);
-    for (const Decided& row : surgeon.decided) {
-      add(hasher, row.bytes);
-      hasher.integer(row.room_seq.value);
-      hasher.integer(static_cast<std::uint64_t>(row.rejection));
+    for (const Decided& entry : surgeon.decided) {
+      add(hasher, entry.bytes);
+      hasher.integer(entry.room_seq.value);
+      hasher.integer(static_cast<std::uint64_t>(entry.rejection));
     }
   }
   people_.add_to(hasher);

@@ -11,7 +11,7 @@
 #include "common/tools/placing.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/cut_field.hpp"
-#include "server/room/room_row.hpp"
+#include "server/room/room_entry.hpp"
 
 namespace osteon {
 
@@ -57,7 +57,7 @@ struct RoomEvent {
   std::vector<RoomSeq> places;           // undo, redo: of the events taken back or done again, oldest first
   CutReport cut;                         // of all bodies together
   std::string mark;                      // its label
-  std::variant<std::monostate, SuperviseRow, AnnotationRow, WordsRow> people;  // what was decided, drawn or said
+  std::variant<std::monostate, SuperviseEntry, AnnotationEntry, WordsEntry> people;  // what was decided, drawn or said
   std::vector<RoomEvent> further;  // decided with it, each at a place of its own after it
 };
 

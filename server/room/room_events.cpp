@@ -140,10 +140,10 @@ Digest Room::field_hash() const {
 
 std::vector<SceneItem> Room::items() const {
   std::vector<SceneItem> standing;
-  for (const auto& [id, rows] : items_) {
+  for (const auto& [id, entries] : items_) {
     const auto newest =
-        std::find_if(rows.rbegin(), rows.rend(), [&](const ItemState& row) { return !events_.at(row.place).undone; });
-    if (newest != rows.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
+        std::find_if(entries.rbegin(), entries.rend(), [&](const ItemState& entry) { return !events_.at(entry.place).undone; });
+    if (newest != entries.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
   // Whether a guide is fixed follows from the pins that stand with it.
   const std::vector<Standing> scene = with_tools(standing);
@@ -174,7 +174,7 @@ Result<RoomEvent> Room::add_tool(AuthorId by, const Tool& tool) {
     return event;
   }
   if (Result<void> room_for_it = know(tool); !room_for_it) return tl::unexpected(room_for_it.error());
-  return decide(by, ToolRow{tool});
+  return decide(by, ToolEntry{tool});
 }
 
 // Whether a tool can be added.
@@ -233,7 +233,7 @@ bool Room::can_be_undone(RoomSeq place) const {
 
 RoomEvent Room::take_back(AuthorId by, std::set<RoomSeq> places) {
   const std::set<RoomSeq> falls = with_what_falls_too(std::move(places));
-  return decide(by, UndoRow{{falls.begin(), falls.end()}});
+  return decide(by, UndoEntry{{falls.begin(), falls.end()}});
 }
 
 Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
@@ -253,9 +253,9 @@ Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
   if (count == 0) return refuse("undo needs a count of at least 1");
   std::set<RoomSeq> places;
   for (auto event = events_.rbegin(); event != events_.rend() && places.size() < count; ++event) {
-    const Event& row = event->second;
-    if (row.undone || (of ? row.author != of : people_.only_own(by) && !people_.same_person(by, row.author))) continue;
-    if (can_be_undone(event->first) && row.kind != EventKind::split) places.insert(event->first);
+    const Event& entry = event->second;
+    if (entry.undone || (of ? entry.author != of : people_.only_own(by) && !people_.same_person(by, entry.author))) continue;
+    if (can_be_undone(event->first) && entry.kind != EventKind::split) places.insert(event->first);
   }
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
   if (Result<void> may = may_take_back(by, places); !may) return tl::unexpected(may.error());
@@ -285,15 +285,15 @@ Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
 Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (count == 0) return refuse("redo needs a count of at least 1");
-  RedoRow row;
-  for (auto event = events_.rbegin(); event != events_.rend() && row.undos.size() < count; ++event)
-    if (event->second.kind == EventKind::undo && !event->second.undone) row.undos.push_back(event->first);
-  if (row.undos.empty()) return failure(ErrorCode::unavailable, "there is nothing to redo");
-  if (Result<void> may = may_do_again(by, {row.undos.begin(), row.undos.end()}); !may)
+  RedoEntry entry;
+  for (auto event = events_.rbegin(); event != events_.rend() && entry.undos.size() < count; ++event)
+    if (event->second.kind == EventKind::undo && !event->second.undone) entry.undos.push_back(event->first);
+  if (entry.undos.empty()) return failure(ErrorCode::unavailable, "there is nothing to redo");
+  if (Result<void> may = may_do_again(by, {entry.undos.begin(), entry.undos.end()}); !may)
     return tl::unexpected(may.error());
 
   std::set<RoomSeq> again;
-  for (const RoomSeq undo : row.undos) {
+  for (const RoomSeq undo : entry.undos) {
     // The same bone may have come off again meanwhile: that split stands, and the earlier one stays undone.
     const auto split_since = [&](BodyId parent) {
       return std::any_of(events_.upper_bound(undo), events_.end(), [&](const auto& later) {
@@ -304,8 +304,8 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
       if (events_.at(place).kind != EventKind::split || !split_since(events_.at(place).body)) again.insert(place);
   }
   if (Result<void> may = may_cut_again(by, again); !may) return tl::unexpected(may.error());
-  row.places.assign(again.begin(), again.end());
-  return decide(by, std::move(row));
+  entry.places.assign(again.begin(), again.end());
+  return decide(by, std::move(entry));
 }
 
 Result<RoomEvent> Room::mark(AuthorId by, std::string label) {
@@ -314,7 +314,7 @@ Result<RoomEvent> Room::mark(AuthorId by, std::string label) {
     return refuse("a mark needs a label of 1 to " + std::to_string(kMostLabelBytes) + " bytes");
   if (marks().size() >= kMostMarks)
     return refuse("the room has " + std::to_string(kMostMarks) + " marks and takes no more");
-  return decide(by, MarkRow{std::move(label)});
+  return decide(by, MarkEntry{std::move(label)});
 }
 
 std::vector<std::pair<RoomSeq, std::string>> Room::marks() const {
@@ -328,14 +328,14 @@ Result<RoomEvent> Room::remove_body(AuthorId by, BodyId body) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (!exists(body)) return refuse("the room has no body " + std::to_string(body.value));
   if (bodies().size() == 1) return refuse("body " + std::to_string(body.value) + " is the last one and stays");
-  return decide(by, RemoveBodyRow{body});
+  return decide(by, RemoveBodyEntry{body});
 }
 
 Result<RoomEvent> Room::split(Separation found) {
   if (found.seen != bone_epoch_ || !exists(found.parent))
     return failure(ErrorCode::unavailable, "bone has come back since these pieces were found");
   if (found.fragments.empty()) return refuse("a split needs a piece");
-  SplitRow row{.parent = found.parent, .taken = {}, .pieces = {}};
+  SplitEntry entry{.parent = found.parent, .taken = {}, .pieces = {}};
   std::vector<FieldLeaf> taken;
   std::uint32_t next = last_body_;
   for (Fragment& fragment : found.fragments) {
@@ -343,13 +343,13 @@ Result<RoomEvent> Room::split(Separation found) {
     if (fragment.debris()) continue;
     const double h = bone().pitch_mm();
     const CoordBox reach = covering_samples(fragment.bounds.grown((kBandVoxels + 1) * h), h);
-    row.pieces.push_back({BodyId{++next}, reach, shared(std::move(fragment.left))});
+    entry.pieces.push_back({BodyId{++next}, reach, shared(std::move(fragment.left))});
   }
-  if (bodies().size() + row.pieces.size() > kMostBodies)
+  if (bodies().size() + entry.pieces.size() > kMostBodies)
     return refuse("the room has " + std::to_string(kMostBodies) + " bodies and makes no more; take some away");
-  row.taken = shared(std::move(taken));
+  entry.taken = shared(std::move(taken));
   ready_ = std::move(found.fields);
-  RoomEvent event = decide(AuthorId{}, std::move(row));
+  RoomEvent event = decide(AuthorId{}, std::move(entry));
   ready_.clear();
   return event;
 }
@@ -379,7 +379,7 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& pla
   item = *ruled;
   if (item.id == 0) item.id = last_item_ + 1;
   item.set_at = room_seq_.value + 1;
-  RoomEvent event = decide(by, ItemRow{item.id, item});
+  RoomEvent event = decide(by, ItemEntry{item.id, item});
   event.set = Placed{item, stands->contact_fraction};
   return event;
 }
@@ -391,7 +391,7 @@ Result<RoomEvent> Room::remove_item(AuthorId by, std::uint32_t item) {
   if (found == standing.end()) return refuse("item " + std::to_string(item) + " does not stand in the scene");
   const Tool& tool = tools_->find(found->tool)->tool;
   if (is_guide(tool) && found->seated) return refuse("\"" + tool.name + "\" is fixed by pins; draw a pin first");
-  return decide(by, ItemRow{item, std::nullopt});
+  return decide(by, ItemEntry{item, std::nullopt});
 }
 
 }  // namespace osteon

@@ -34,8 +34,8 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions su
   const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
   const bool follows = newest && newest != subject && newest != supervision.taken_by && newest != supervision.guide &&
                        people_.supervised(newest).supervision == before && before != supervision;
-  RoomEvent event = decide(by, SuperviseRow{subject, supervision});
-  if (follows) event.further.push_back(decide(by, SuperviseRow{newest, std::move(supervision)}));
+  RoomEvent event = decide(by, SuperviseEntry{subject, supervision});
+  if (follows) event.further.push_back(decide(by, SuperviseEntry{newest, std::move(supervision)}));
   return event;
 }
 
@@ -58,7 +58,7 @@ Result<RoomEvent> Room::annotate(AuthorId by, Annotation drawn) {
       return deny("annotation " + std::to_string(drawn.id) + " is another's; draw a new one");
   }
   const std::uint32_t id = drawn.id;
-  return decide(by, AnnotationRow{id, std::move(drawn)});
+  return decide(by, AnnotationEntry{id, std::move(drawn)});
 }
 
 Result<RoomEvent> Room::wipe_off(AuthorId by, std::uint32_t annotation) {
@@ -68,7 +68,7 @@ Result<RoomEvent> Room::wipe_off(AuthorId by, std::uint32_t annotation) {
     return failure(ErrorCode::not_found, "the room has no annotation " + std::to_string(annotation));
   if (known->second.author != by && !people_.oversees(by))
     return deny("annotation " + std::to_string(annotation) + " is another's, which only an instructor wipes off");
-  return decide(by, AnnotationRow{annotation, std::nullopt});
+  return decide(by, AnnotationEntry{annotation, std::nullopt});
 }
 
 Result<RoomEvent> Room::say(AuthorId by, AuthorId to, std::string words) {
@@ -77,7 +77,7 @@ Result<RoomEvent> Room::say(AuthorId by, AuthorId to, std::string words) {
   if (words.empty() || words.size() > kMostWordsBytes)
     return refuse("words need 1 to " + std::to_string(kMostWordsBytes) + " bytes, these have " +
                   std::to_string(words.size()));
-  return decide(by, WordsRow{to, std::move(words)});
+  return decide(by, WordsEntry{to, std::move(words)});
 }
 
 Result<void> Room::may_change(AuthorId by) const {
@@ -152,24 +152,24 @@ bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) con
 }
 
 // Who stops a hand or takes its tool takes its lease: what it predicted on top falls.
-void Room::apply(const RoomRow& row, const SuperviseRow& supervise, RoomEvent& event) {
+void Room::apply(const LogEntry& entry, const SuperviseEntry& supervise, RoomEvent& event) {
   event.kind = EventKind::supervise;
   event.people = supervise;
   Surgeon& surgeon = surgeons_.at(supervise.subject);
   const Restrictions& before = people_.supervised(supervise.subject).supervision;
   if (before.stopped != supervise.supervision.stopped || before.taken_by != supervise.supervision.taken_by)
     grant(surgeon);
-  people_.supervise(row.place, row.author, supervise);
+  people_.supervise(entry.place, entry.author, supervise);
   event.lease_epoch = surgeon.epoch;
 }
 
-void Room::apply(const RoomRow& /*row*/, const AnnotationRow& annotation, RoomEvent& event) {
+void Room::apply(const LogEntry& /*entry*/, const AnnotationEntry& annotation, RoomEvent& event) {
   event.kind = EventKind::annotation;
   event.people = annotation;
   people_.draw(annotation);
 }
 
-void Room::apply(const RoomRow& /*row*/, const WordsRow& words, RoomEvent& event) {
+void Room::apply(const LogEntry& /*entry*/, const WordsEntry& words, RoomEvent& event) {
   event.kind = EventKind::words;
   event.people = words;
 }

@@ -204,11 +204,11 @@ class Server {
         return call.line->Read(&call.answer, &call);
       case Step::opened: {
         if (!ok) return end(call);
-        v1::SessionResponse row;
-        OSTEON_CHECK(grpc::SerializationTraits<v1::SessionResponse>::Deserialize(&call.answer, &row).ok());
-        if (!row.has_complete()) return call.line->Read(&call.answer, &call);
+        v1::SessionResponse entry;
+        OSTEON_CHECK(grpc::SerializationTraits<v1::SessionResponse>::Deserialize(&call.answer, &entry).ok());
+        if (!entry.has_complete()) return call.line->Read(&call.answer, &call);
         call.step = Step::said;
-        return call.line->WriteLast(buffer_of(as_hand(call, row.complete())), {}, &call);
+        return call.line->WriteLast(buffer_of(as_hand(call, entry.complete())), {}, &call);
       }
       case Step::said:
         call.step = Step::answered;

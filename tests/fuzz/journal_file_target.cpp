@@ -16,24 +16,24 @@ using test::MemoryDisk;
 constexpr const char* kFile = "/room/journal";
 constexpr const char* kRecovered = "/room/recovered";
 constexpr const char* kGenesis = "bone";
-constexpr std::size_t kRows = 9;
+constexpr std::size_t kEntries = 9;
 
-const std::vector<JournalRow>& all_rows() {
-  static const std::vector<JournalRow> made = [] {
-    std::vector<JournalRow> rows;
-    for (std::uint64_t i = 1; i <= kRows; ++i)
-      rows.push_back(
+const std::vector<JournalEntry>& all_entries() {
+  static const std::vector<JournalEntry> made = [] {
+    std::vector<JournalEntry> entries;
+    for (std::uint64_t i = 1; i <= kEntries; ++i)
+      entries.push_back(
           {RoomSeq{i}, static_cast<std::int64_t>(i) * 8'000'000, std::string(7 * i, static_cast<char>('a' + i))});
-    return rows;
+    return entries;
   }();
   return made;
 }
 
 void append(Journal& journal, std::size_t from, std::size_t to) {
-  OSTEON_CHECK(journal.append(std::span(all_rows()).subspan(from, to - from)).has_value());
+  OSTEON_CHECK(journal.append(std::span(all_entries()).subspan(from, to - from)).has_value());
 }
 
-// With a checkpoint; its last rows in SQLite's log where it was not `closed`. Small pages keep it small.
+// With a checkpoint; its last entries in SQLite's log where it was not `closed`. Small pages keep it small.
 MemoryDisk::Image a_journal(bool closed) {
   MemoryDisk disk(1, 512);
   Journal journal =
@@ -45,7 +45,7 @@ MemoryDisk::Image a_journal(bool closed) {
   OSTEON_CHECK(journal.close().has_value());
   journal = std::move(Journal::open(kFile, {.disk = &disk, .log_bytes = 2000}).value());
   append(journal, 6, 8);
-  append(journal, 8, kRows);
+  append(journal, 8, kEntries);
   if (closed) OSTEON_CHECK(journal.close().has_value());
   return disk.image();
 }
@@ -85,16 +85,16 @@ void damage(MemoryDisk::Image& image, std::span<const std::uint8_t> what) {
   }
 }
 
-// What was written, up to some row.
+// What was written, up to some entry.
 void expect_prefix(Journal& journal) {
-  std::size_t rows = 0;
-  const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalRow& row) {
-    OSTEON_CHECK(rows < kRows);
-    const JournalRow& written = all_rows()[rows++];
-    OSTEON_CHECK(row.place == written.place && row.at_ns == written.at_ns && row.bytes == written.bytes);
+  std::size_t entries = 0;
+  const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& entry) {
+    OSTEON_CHECK(entries < kEntries);
+    const JournalEntry& written = all_entries()[entries++];
+    OSTEON_CHECK(entry.place == written.place && entry.at_ns == written.at_ns && entry.bytes == written.bytes);
     return true;
   });
-  OSTEON_CHECK(!read || rows == journal.head().place.value);
+  OSTEON_CHECK(!read || entries == journal.head().place.value);
 }
 
 void open_any_journal(std::span<const std::uint8_t> data) {
@@ -112,7 +112,7 @@ void open_any_journal(std::span<const std::uint8_t> data) {
   OSTEON_CHECK(disk.image() == image);
   const Result<RecoverReport> recovered = recover_journal(kFile, kRecovered, &disk);
   if (recovered) {
-    OSTEON_CHECK(recovered->head.place.value <= kRows && (!is_sound || recovered->lost() == 0));
+    OSTEON_CHECK(recovered->head.place.value <= kEntries && (!is_sound || recovered->lost() == 0));
     const Result<VerifyReport> now = verify_journal(kRecovered, &disk);
     OSTEON_CHECK(now && now->sound());
     Result<Journal> journal = Journal::open(kRecovered, {.disk = &disk, .log_bytes = 2000});

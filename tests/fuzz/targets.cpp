@@ -47,7 +47,7 @@ BlockPayload a_block() {
   return encode_block(sphere, sphere, 0, 0.5);
 }
 
-// Coarser surroundings on several sides and corners; rough, so that rows of solid bits are coded in each of their ways.
+// Coarser surroundings on several sides and corners; rough, so that entries of solid bits are coded in each of their ways.
 BlockPayload a_seamed_block() {
   BlockSamples block;
   block.key = {{}, 2, {}};
@@ -108,7 +108,7 @@ void as_up_packet(std::span<const std::uint8_t> plain) {
   wire::ServerLink link = server_end();
   Cut cut = a_cut();
   for (; cut.author_seq <= 3; ++cut.author_seq)
-    OSTEON_CHECK(link.push({cut.author_seq, {.room_seq = {9}, .kind = wire::SessionRowKind::committed, .cut = cut}}));
+    OSTEON_CHECK(link.push({cut.author_seq, {.room_seq = {9}, .kind = wire::SessionEntryKind::committed, .cut = cut}}));
   Sealer sealer(link_keys().session, link_keys().up);
   DatagramBuffer buffer;
   const Endpoint client{0, 1, 1};
@@ -131,7 +131,7 @@ void as_down_packet(std::span<const std::uint8_t> plain) {
   for (auto now = 1000ms; now < 1040ms; now += 10ms) {
     link.receive(sealer.seal(plain, now, buffer), now);
     OSTEON_CHECK(link.send(now, buffer).size() <= kMostDatagramBytes);
-    while (const auto row = link.take_row()) OSTEON_CHECK(wire::fits_a_packet(row->row.cut));
+    while (const auto entry = link.take_entry()) OSTEON_CHECK(wire::fits_a_packet(entry->entry.cut));
     OSTEON_CHECK(link.partners(now).size() <= wire::ClientLink::kMostPartners);
   }
   OSTEON_CHECK(link.acknowledged() <= 1);
@@ -157,18 +157,18 @@ Bytes an_up_packet() {
 Bytes a_down_packet() {
   SendWindow window;
   const wire::ToolNumbers tools;
-  wire::RowSender sender(window, tools);
-  OSTEON_CHECK(sender.push({.room_seq = {1}, .kind = wire::SessionRowKind::committed, .cut = a_cut()}));
-  OSTEON_CHECK(sender.push({.room_seq = {2}, .kind = wire::SessionRowKind::rejected, .author_seq = 2, .reason = 1}));
+  wire::EntrySender sender(window, tools);
+  OSTEON_CHECK(sender.push({.room_seq = {1}, .kind = wire::SessionEntryKind::committed, .cut = a_cut()}));
+  OSTEON_CHECK(sender.push({.room_seq = {2}, .kind = wire::SessionEntryKind::rejected, .author_seq = 2, .reason = 1}));
   OSTEON_CHECK(sender.push(
-      {.room_seq = {3}, .kind = wire::SessionRowKind::supervised, .lease_epoch = 4, .supervision = a_supervision()}));
+      {.room_seq = {3}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = 4, .supervision = a_supervision()}));
   v1::DownPacket packet;
   OSTEON_CHECK(packet.ParseFromString(window.item(2).bytes + window.item(3).bytes));  // parts merge
   packet.mutable_times()->set_sent_us(1'000'000);
   packet.set_lease_epoch(1);
   *packet.add_partners() = wire::to_tool_state(a_state(), 1, true);
-  packet.add_rows()->ParseFromString(window.item(1).head);
-  packet.mutable_rows(0)->set_rows(window.item(1).bytes);
+  packet.add_entries()->ParseFromString(window.item(1).head);
+  packet.mutable_entries(0)->set_entries(window.item(1).bytes);
   return bytes_of(packet.SerializeAsString());
 }
 
@@ -219,8 +219,8 @@ std::vector<Target> targets() {
       ticket_target(),
       ticket_contents_target(),
       access_list_target(),
-      rows_target(),
-      evaluated_rows_target(),
+      entries_target(),
+      evaluated_entries_target(),
       genesis_target(),
       journal_file_target(),
       {"supervision",

@@ -92,7 +92,7 @@ TEST_F(Annotations, WhatOneDrawsTheOtherSeesUntilItIsWiped) {
   ASSERT_TRUE(drawn.starts_with("ok")) << drawn;
   ASSERT_TRUE(ada.tell("wait drawn 1"));
   const Photo line = photo(ada, "line.png");
-  // 16 mm over the middle of the picture, along its middle row.
+  // 16 mm over the middle of the picture, along its middle entry.
   int along = 0;
   for (int x = line.width / 2 - 30; x <= line.width / 2 + 30; ++x)
     along += difference(line.at(x, line.height / 2), bare.at(x, bare.height / 2)) > 60 ? 1 : 0;

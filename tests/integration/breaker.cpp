@@ -64,7 +64,7 @@ struct Breaker::Parts {
     std::vector<std::string> names;
     for (const auto& [file, bytes] : image) {
       names.push_back(file);
-      if (file.ends_with("-log") || file.ends_with("-mirror")) names.insert(names.end(), 2, file);  // the newest rows
+      if (file.ends_with("-log") || file.ends_with("-mirror")) names.insert(names.end(), 2, file);  // the newest entries
     }
     const std::string name = names[random.index(names.size())];
     const std::string kind = name.ends_with(".checkpoint") ? ".checkpoint" : name.substr(room.size());
@@ -209,7 +209,7 @@ void Breaker::damage(std::uint64_t seed, int damages, int more) {
     const std::string what = parts_->break_one(random, life, image);
     const Trial trial{.folder = parts_->stage.new_folder(),
                       .oracle = &life.oracle,
-                      .most_rows = life.rows,
+                      .most_entries = life.entries,
                       .member = life.member,
                       .only_verify = i >= damages};
     put(image, trial.folder);
@@ -255,7 +255,7 @@ void Breaker::older_copy(std::uint64_t seed) {
       verdict.fault = "a client knows more, and another cuts on";
   BreakerStage::kill(server);
   const Verified after = parts_->stage.verify(file);
-  if (verdict.fault.empty() && (after.sound || !has(after.text, "rows were lost")))
+  if (verdict.fault.empty() && (after.sound || !has(after.text, "entries were lost")))
     verdict.fault = "what a client knew is forgotten: " + after.text;
   parts_->count(seed, what, oracle.acknowledged(), verdict);
   fs::remove_all(folder);
@@ -271,7 +271,7 @@ void Breaker::second_openers(std::uint64_t seed) {
     auto hand = LightHand::come(server.address, "", oracle, seed);
     Verdict verdict;
     std::string what = "second openers";
-    // SQLite's own log has what the database lacks only while rows are carried into it: a kill may hit that.
+    // SQLite's own log has what the database lacks only while entries are carried into it: a kill may hit that.
     bool loses_nothing = true;
     if (const std::string untried = parts_->find_untried(); !untried.empty())
       verdict.fault = "nobody tries the command " + untried;
@@ -303,7 +303,7 @@ void Breaker::second_openers(std::uint64_t seed) {
     if (verdict.fault.empty()) {
       const Trial trial{.folder = folder,
                         .oracle = &oracle,
-                        .most_rows = oracle.most(),
+                        .most_entries = oracle.most(),
                         .member = member,
                         .loses_nothing = loses_nothing};
       verdict = parts_->judge.judge(random, trial);
@@ -358,7 +358,7 @@ void Breaker::write_error(std::uint64_t seed, Random random) {
   hand->reset();
   if (verdict.fault.empty()) {
     Trial trial{
-        .folder = folder, .oracle = &oracle, .most_rows = oracle.most(), .member = member, .loses_nothing = true};
+        .folder = folder, .oracle = &oracle, .most_entries = oracle.most(), .member = member, .loses_nothing = true};
     // What the failure has left may be damaged too.
     if (random.index(3) == 0) {
       Image image = image_of(folder);
@@ -410,7 +410,7 @@ bool Breaker::full_disk(std::uint64_t seed) {
   fs::remove(parts_->stage.seen(folder) / "filler");
   if (verdict.fault.empty()) {
     const Trial trial{
-        .folder = folder, .oracle = &oracle, .most_rows = oracle.most(), .member = member, .loses_nothing = true};
+        .folder = folder, .oracle = &oracle, .most_entries = oracle.most(), .member = member, .loses_nothing = true};
     verdict = parts_->judge.judge(random, trial);
   }
   parts_->count(seed, what, oracle.acknowledged(), verdict);
@@ -422,18 +422,18 @@ bool Breaker::read_only(std::uint64_t seed) {
   parts_->stage.live(seed, BreakerStage::kRoom, life);
   parts_->count(seed, "kill alone", life.oracle.acknowledged(), {.fault = life.fault});
   const auto judge = [&](const fs::path& folder, const std::string& what) {
-    const Trial trial{.folder = folder, .oracle = &life.oracle, .most_rows = life.rows, .member = life.member};
+    const Trial trial{.folder = folder, .oracle = &life.oracle, .most_entries = life.entries, .member = life.member};
     Verdict verdict;
     const Verified found = parts_->stage.verify(trial.file());
-    if (!found.sound || found.events < life.rows) verdict.fault = "verify: " + found.text;
-    if (verdict.fault.empty()) verdict.fault = parts_->stage.check_export(trial.file(), life.oracle, life.rows);
+    if (!found.sound || found.events < life.entries) verdict.fault = "verify: " + found.text;
+    if (verdict.fault.empty()) verdict.fault = parts_->stage.check_export(trial.file(), life.oracle, life.entries);
     const RunResult replayed = parts_->stage.command({"replay", trial.file(), "--case", parts_->stage.bone()});
     if (verdict.fault.empty() && replayed.exit_code != 0) verdict.fault = "replay: " + said(replayed);
     const fs::path to = parts_->stage.new_folder();
     const RunResult copied = parts_->stage.command({"backup", trial.file(), (to / "copy").string()});
     if (verdict.fault.empty() && copied.exit_code != 0) verdict.fault = "backup: " + said(copied);
     if (verdict.fault.empty())
-      verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.rows);
+      verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.entries);
     const RunResult served =
         parts_->stage.command({"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key",
                                parts_->stage.key(), "--audit", parts_->stage.audit()},

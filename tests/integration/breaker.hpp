@@ -12,12 +12,12 @@
 namespace osteon::test {
 
 struct BreakerTally {
-  std::uint64_t trials = 0, acknowledged = 0;  // acknowledged: rows, in all trials
-  std::uint64_t whole = 0;                     // all acknowledged rows are there, and nothing is called damaged
-  std::uint64_t named = 0;                     // what is damaged is said, and no row more is lost than that
+  std::uint64_t trials = 0, acknowledged = 0;  // acknowledged: entries, in all trials
+  std::uint64_t whole = 0;                     // all acknowledged entries are there, and nothing is called damaged
+  std::uint64_t named = 0;                     // what is damaged is said, and no entry more is lost than that
   std::uint64_t refused = 0;                   // nothing of it can be read, or nobody is let in, with a sentence
   std::uint64_t silent = 0;                    // anything else: each is a broken promise
-  std::uint64_t without_number = 0;            // of the named: rows are missing, and how many is not said
+  std::uint64_t without_number = 0;            // of the named: entries are missing, and how many is not said
   std::map<std::string, std::uint64_t> done;   // trials by what was done
   std::vector<std::string> faults;             // of the silent ones, with their seeds
 };

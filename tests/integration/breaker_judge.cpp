@@ -33,13 +33,13 @@ std::string BreakerJudge::unsaid(const std::string& what, const std::string& tex
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with("fault:")) faults += line + "\n";
-  const std::regex missing("([0-9]+) rows? (is|are) missing");
+  const std::regex missing("([0-9]+) entries? (is|are) missing");
   for (std::sregex_iterator one(faults.begin(), faults.end(), missing), end; one != end; ++one)
     lost = std::max<std::uint64_t>(lost, std::stoull((*one)[1]));
   const std::string numbers = what + " goes to " + std::to_string(events) + " and misses " + std::to_string(lost) +
                               ", acknowledged were " + std::to_string(acknowledged) + ": " + text;
-  if (trial.loses_nothing) return "rows are lost: " + numbers;
-  if (events + lost >= acknowledged && events + lost <= trial.most_rows) return {};
+  if (trial.loses_nothing) return "entries are lost: " + numbers;
+  if (events + lost >= acknowledged && events + lost <= trial.most_entries) return {};
   *without_number = true;
   for (const char* named : {"cannot be told", "is damaged", "malformed", "does not fit the chain",
                             "belongs to another journal", "another history"})
@@ -59,7 +59,7 @@ std::string BreakerJudge::try_export(const Trial& trial) const {
   const std::string lines = read_bytes(to);
   fs::remove(to);
   if (result.exit_code != 0) return made ? "export fails and leaves a file" : refusal("export", result, trial.file());
-  const std::string lacks = trial.oracle->lacks(lines, trial.most_rows);
+  const std::string lacks = trial.oracle->lacks(lines, trial.most_entries);
   return lacks.empty() ? "" : "export says nothing: " + lacks;
 }
 
@@ -79,7 +79,7 @@ std::string BreakerJudge::try_copy(const Trial& trial, const std::string& how) c
   std::string fault;
   if (result.exit_code != 0)
     fault = image_of(folder).empty() ? refusal(how, result, trial.file()) : how + " fails and leaves something";
-  else if (fault = stage_->check_export(to, *trial.oracle, trial.most_rows); !fault.empty())
+  else if (fault = stage_->check_export(to, *trial.oracle, trial.most_entries); !fault.empty())
     fault = how + " says nothing: " + fault;
   fs::remove_all(folder);
   return fault;
@@ -131,7 +131,7 @@ std::string BreakerJudge::try_serve(const Trial& trial, const Verified& found, O
     return told ? "" : "a server ends without saying why: " + server.process->err();
   }
   Oracle later(*trial.oracle);
-  auto hand = LightHand::come_again(server.address, trial.member, later, trial.most_rows);
+  auto hand = LightHand::come_again(server.address, trial.member, later, trial.most_entries);
   std::string fault;
   if (!hand) {
     *outcome = Outcome::named;

@@ -12,9 +12,9 @@ namespace osteon::test {
 struct Trial {
   std::filesystem::path folder;
   const Oracle* oracle;
-  std::uint64_t most_rows;  // that there can be
+  std::uint64_t most_entries;  // that there can be
   wire::JoinedRoom member;
-  bool loses_nothing = false;  // whatever is said, every acknowledged row must be there
+  bool loses_nothing = false;  // whatever is said, every acknowledged entry must be there
   bool only_verify = false;    // and export, where that finds nothing
   std::string name = BreakerStage::kRoom;
   [[nodiscard]] std::string file() const { return (folder / (name + ".journal")).string(); }

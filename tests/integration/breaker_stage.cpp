@@ -208,7 +208,7 @@ void BreakerStage::live(std::uint64_t seed, const std::string& name, Life& life)
   life.image = image_of(folder);
   const std::string file = (folder / (name + ".journal")).string();
   const Verified found = verify(file);
-  life.rows = found.events;
+  life.entries = found.events;
   if (!found.sound) life.fault = "a kill alone is called damage: " + found.text;
   if (const std::string lacks = check_export(file, life.oracle, found.events); life.fault.empty()) life.fault = lacks;
   fs::remove_all(folder);

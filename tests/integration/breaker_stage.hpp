@@ -37,7 +37,7 @@ struct Life {
   std::vector<Image> earlier;  // of moments before
   Oracle oracle;
   wire::JoinedRoom member;  // of a client that may come back
-  std::uint64_t rows = 0;   // that the journal has, as the killed server left it
+  std::uint64_t entries = 0;   // that the journal has, as the killed server left it
   std::string fault;        // in what needed no damage
 };
 
@@ -47,7 +47,7 @@ struct Verified {
   bool read = false;  // it says how far the events go
   std::uint64_t events = 0, witnessed = 0;
   std::string text;
-  // A checkpoint may be lost: the one before it, or the rows, then serve instead.
+  // A checkpoint may be lost: the one before it, or the entries, then serve instead.
   [[nodiscard]] bool only_checkpoint() const;
 };
 

@@ -15,7 +15,7 @@ class BreakerTest : public testing::Test {
   static void SetUpTestSuite() { breaker_ = new Breaker(false); }
   static void TearDownTestSuite() {
     const BreakerTally& tally = breaker_->tally();
-    std::printf("%lu trials, %lu rows acknowledged: %lu whole, %lu named, %lu refused, %lu silent\n", tally.trials,
+    std::printf("%lu trials, %lu entries acknowledged: %lu whole, %lu named, %lu refused, %lu silent\n", tally.trials,
                 tally.acknowledged, tally.whole, tally.named, tally.refused, tally.silent);
     delete breaker_;
   }

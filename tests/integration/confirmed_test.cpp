@@ -63,9 +63,9 @@ class Confirmed : public ::testing::Test {
     std::map<std::uint64_t, std::uint64_t> places;
     std::ifstream in(lines);
     for (std::string line; std::getline(in, line);) {
-      const json row = json::parse(line);
-      if (row.at("event").contains("cut"))
-        places[std::stoull(row["event"]["cut"]["author_seq"].get<std::string>())] = row["place"].get<std::uint64_t>();
+      const json entry = json::parse(line);
+      if (entry.at("event").contains("cut"))
+        places[std::stoull(entry["event"]["cut"]["author_seq"].get<std::string>())] = entry["place"].get<std::uint64_t>();
     }
     return places;
   }
@@ -99,9 +99,9 @@ TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
   ASSERT_EQ(stage_.server().terminate(), 0);
   const auto kept = places();
   const Table cuts = read_table(stage_ / "hand-cuts.csv");
-  ASSERT_GT(cuts.rows(), 150u);
+  ASSERT_GT(cuts.entries(), 150u);
   int elsewhere = 0, confirmed = 0;
-  for (std::size_t i = 0; i < cuts.rows(); ++i) {
+  for (std::size_t i = 0; i < cuts.entries(); ++i) {
     if (cuts["confirmed_mono_ns"][i] == 0) continue;
     ++confirmed;
     const auto place = kept.find(static_cast<std::uint64_t>(cuts["author_seq"][i]));

@@ -58,7 +58,7 @@ std::regex pattern_of(const std::string& text) {
   return std::regex(pattern);
 }
 
-// A row of the page's tables.
+// A entry of the page's tables.
 struct Listed {
   std::string sentence, log;  // of the client, whole; of the server: empty: nothing
 };
@@ -67,9 +67,9 @@ std::vector<Listed> listed() {
   std::ifstream in(OSTEON_TROUBLESHOOTING);
   std::vector<Listed> all;
   for (std::string line; std::getline(in, line);) {
-    static const std::regex kRow(R"(\| (.+) \| (.+) \| (.+) \| (.+) \|)");
+    static const std::regex kEntry(R"(\| (.+) \| (.+) \| (.+) \| (.+) \|)");
     std::smatch cells;
-    if (!std::regex_match(line, cells, kRow) || cells[1] == "the client says") continue;
+    if (!std::regex_match(line, cells, kEntry) || cells[1] == "the client says") continue;
     all.push_back({cells[1].str() + "; " + cells[3].str(), cells[4] == "–" ? "" : cells[4].str()});
   }
   return all;
@@ -404,7 +404,7 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
   for (const auto& [what, part] : expected) {
     EXPECT_THAT(said.at(what), testing::HasSubstr(part)) << what;
     EXPECT_EQ(std::ranges::count_if(
-                  page, [&](const Listed& row) { return std::regex_match(said.at(what), pattern_of(row.sentence)); }),
+                  page, [&](const Listed& entry) { return std::regex_match(said.at(what), pattern_of(entry.sentence)); }),
               1)
         << what << ": " << said.at(what);
   }

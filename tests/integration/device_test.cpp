@@ -110,10 +110,10 @@ TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
 
   // Where the clutch was held or the device away, the tip stood still; it began over the place that was named.
   const Table log = read_table(stage / "hand.csv");
-  ASSERT_GT(log.rows(), 5000u);
+  ASSERT_GT(log.entries(), 5000u);
   std::size_t first = 0;
-  while (first < log.rows() && log.texts.at("tip_x_mm")[first] != "2.00000") ++first;
-  ASSERT_LT(first, log.rows());
+  while (first < log.entries() && log.texts.at("tip_x_mm")[first] != "2.00000") ++first;
+  ASSERT_LT(first, log.entries());
   EXPECT_NEAR(log["tip_y_mm"][first], -3.0, 1e-3);
   EXPECT_NEAR(log["tip_z_mm"][first], 10.0, 0.3);
   double deepest = 0.0;

@@ -116,7 +116,7 @@ class DrillingRoom : public testing::Test {
     double sum = 0.0;
     int count = 0;
     double deepest = -1e9;
-    for (std::size_t i = 0; i < hole.log.rows(); ++i) {
+    for (std::size_t i = 0; i < hole.log.entries(); ++i) {
       const double depth = hole.log["depth_mm"][i];
       const bool advancing = depth >= deepest;
       deepest = std::max(deepest, depth);
@@ -185,7 +185,7 @@ TEST_F(DrillingRoom, TheDrillSoundsDifferentInAirCortexAndMedulla) {
   // The middle half second of a stretch of the rig's log, as it sounds.
   const auto heard = [&](double from_mm, double to_mm) {
     std::vector<double> times;
-    for (std::size_t i = 0; i < rig.log.rows(); ++i) {
+    for (std::size_t i = 0; i < rig.log.entries(); ++i) {
       const double depth = rig.log["depth_mm"][i];
       if (depth >= from_mm && depth <= to_mm && rig.log["rpm"][i] > 500.0 && times.size() < 100'000)
         times.push_back(1e-9 * rig.log["mono_ns"][i]);
@@ -222,12 +222,12 @@ TEST_F(DrillingRoom, EveryProgramEndsCleanlyOnSigterm) {
 
 TEST_F(DrillingRoom, AKilledViewerAndAKilledAudioClientDisturbNobody) {
   EXPECT_TRUE(results_->killed_were_running);
-  // Every cut that was made after they were gone was confirmed, and its row came to the others in order.
+  // Every cut that was made after they were gone was confirmed, and its entry came to the others in order.
   const Hole& rig = results_->holes["rig"];
   EXPECT_EQ(rig.summary["rejected"], 0);
-  ASSERT_EQ(rig.cuts.rows(), rig.summary["cuts"].get<std::size_t>());
+  ASSERT_EQ(rig.cuts.entries(), rig.summary["cuts"].get<std::size_t>());
   int after_the_kill = 0;
-  for (std::size_t i = 0; i < rig.cuts.rows(); ++i) {
+  for (std::size_t i = 0; i < rig.cuts.entries(); ++i) {
     EXPECT_GE(rig.cuts["confirmed_mono_ns"][i], rig.cuts["closed_mono_ns"][i]);
     if (i > 0) {
       EXPECT_EQ(rig.cuts["room_seq"][i], rig.cuts["room_seq"][i - 1] + 1.0);

@@ -47,16 +47,16 @@ std::vector<Moment> recorded(const std::filesystem::path& file) {
            "turn = np.array([[1-2*(y*y+z*z), 2*(x*y-w*z), 2*(x*z+w*y)], [2*(x*y+w*z), 1-2*(x*x+z*z), 2*(y*z-w*x)],"
            " [2*(x*z-w*y), 2*(y*z+w*x), 1-2*(x*x+y*y)]])\n"
            "force = (f['drill_force_feedback/wrench'][:n, :3] - f['drill_force_feedback/motor_force'][:n]) @ turn.T\n"
-           "rows = np.column_stack([f['data/mono_ns'][:n] / 1e6, f['high_frequency_poses/device_pose/pose'][:n, :3], "
+           "entries = np.column_stack([f['data/mono_ns'][:n] / 1e6, f['high_frequency_poses/device_pose/pose'][:n, :3], "
            "force[:, :2],"
            " bit('partner touched'), bit('hand guided')])\n"
-           "print(json.dumps(rows[::10].tolist()))\n",
+           "print(json.dumps(entries[::10].tolist()))\n",
            file},
           60s);
   EXPECT_EQ(answer.exit_code, 0) << answer.err;
   std::vector<Moment> moments;
-  for (const json& row : json::parse(answer.out, nullptr, false))
-    moments.push_back({row[0], row[1], row[2], row[3], row[4], row[5], row[6] != 0.0, row[7] != 0.0});
+  for (const json& entry : json::parse(answer.out, nullptr, false))
+    moments.push_back({entry[0], entry[1], entry[2], entry[3], entry[4], entry[5], entry[6] != 0.0, entry[7] != 0.0});
   return moments;
 }
 
@@ -71,11 +71,11 @@ std::vector<Place> cuts_of(const std::filesystem::path& journal, const std::stri
   std::ifstream in(lines);
   std::vector<Place> places;
   for (std::string line; std::getline(in, line);) {
-    const json row = json::parse(line);
-    if (!row.at("event").contains("cut") || row.at("event").at("cut").at("author") != author) continue;
-    const json& at = row.at("event").at("cut").at("path").back().at("position");  // in steps of 2^-10 mm
+    const json entry = json::parse(line);
+    if (!entry.at("event").contains("cut") || entry.at("event").at("cut").at("author") != author) continue;
+    const json& at = entry.at("event").at("cut").at("path").back().at("position");  // in steps of 2^-10 mm
     const auto mm = [&](std::size_t i) { return at.at(i).get<double>() / 1024.0; };
-    places.push_back({1e3 * row.at("at_s").get<double>(), mm(0), mm(1), mm(2)});
+    places.push_back({1e3 * entry.at("at_s").get<double>(), mm(0), mm(1), mm(2)});
   }
   return places;
 }
@@ -197,7 +197,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   EXPECT_EQ(ask("quit"), "ok");
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
 
-  // The expert's own recording and rows tell how far the room's clock is off that of the recordings.
+  // The expert's own recording and entries tell how far the room's clock is off that of the recordings.
   const std::vector<Moment> by_expert = recorded(stage / "expert.h5");
   const std::vector<Place> cut_by_expert = cuts_of(folder / "room.journal", of);
   const std::vector<Place> shown = cuts_of(folder / "room.journal", demonstrator);

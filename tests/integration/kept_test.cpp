@@ -285,13 +285,13 @@ TEST(Kept, InventedEventsAreSignedByNobody) {
   {
     Journal journal = std::move(Journal::open(file).value());
     last = journal.head().place.value;
-    std::vector<JournalRow> rows;
-    ASSERT_TRUE(journal.read(RoomSeq{last}, [&](const JournalRow& row) {
-      rows.assign(100'000, row);
+    std::vector<JournalEntry> entries;
+    ASSERT_TRUE(journal.read(RoomSeq{last}, [&](const JournalEntry& entry) {
+      entries.assign(100'000, entry);
       return true;
     }));
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i].place.value = last + i + 1;
-    ASSERT_TRUE(journal.append(rows) && journal.close());
+    for (std::size_t i = 0; i < entries.size(); ++i) entries[i].place.value = last + i + 1;
+    ASSERT_TRUE(journal.append(entries) && journal.close());
   }
   verified = server({"verify", file.string(), "--key", key});
   EXPECT_NE(verified.exit_code, 0);

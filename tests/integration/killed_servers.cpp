@@ -4,7 +4,7 @@
 #include <thread>
 
 #include "server/journal/journal.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/random.hpp"
@@ -26,11 +26,11 @@ std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_places(const std::file
     report.fault = journal.error().message;
     return places;
   }
-  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& one) {
-    const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    if (!row) report.fault = row.error().message;
-    if (!row) return false;
-    const auto* cut = std::get_if<CutRow>(&row->what);
+  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalEntry& one) {
+    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    if (!entry) report.fault = entry.error().message;
+    if (!entry) return false;
+    const auto* cut = std::get_if<CutEntry>(&entry->what);
     if (cut && !places[cut->cut.author].emplace(cut->cut.author_seq, one.place).second) ++report.twice;
     return true;
   });
@@ -96,8 +96,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
     if (!kept.empty()) report.missing += kept.rbegin()->first - kept.size();
     for (const auto& [author_seq, place] : hand->surgeon().acknowledged()) {
       ++report.acknowledged;
-      const auto row = kept.find(author_seq);
-      report.lost += row == kept.end() || row->second != place;
+      const auto entry = kept.find(author_seq);
+      report.lost += entry == kept.end() || entry->second != place;
     }
   }
   return report;

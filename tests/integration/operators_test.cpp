@@ -12,7 +12,7 @@
 
 #include "common/field/kernel.hpp"
 #include "server/journal/journal.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
@@ -306,13 +306,13 @@ std::map<std::uint64_t, RoomSeq> kept_cuts(const std::filesystem::path& file, Au
   Result<Journal> journal = Journal::open(file);
   EXPECT_TRUE(journal.has_value()) << journal.error().message;
   if (!journal) return places;
-  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalRow& one) {
-    const Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    EXPECT_TRUE(row.has_value());
-    const CutRow* cut = row ? std::get_if<CutRow>(&row->what) : nullptr;
+  const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalEntry& one) {
+    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    EXPECT_TRUE(entry.has_value());
+    const CutEntry* cut = entry ? std::get_if<CutEntry>(&entry->what) : nullptr;
     const bool is_own = cut && cut->cut.author == author;
     EXPECT_TRUE(!is_own || places.emplace(cut->cut.author_seq, one.place).second) << "twice";
-    return row.has_value();
+    return entry.has_value();
   });
   EXPECT_TRUE(read.has_value());
   return places;
@@ -336,9 +336,9 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   const auto kept = kept_cuts(file, surgeon.author());
   EXPECT_GE(acknowledged.size(), 30u);
   for (const auto& [number, place] : acknowledged) {
-    const auto row = kept.find(number);
-    ASSERT_NE(row, kept.end()) << "cut " << number << " was acknowledged and is not kept";
-    EXPECT_EQ(row->second, place);
+    const auto entry = kept.find(number);
+    ASSERT_NE(entry, kept.end()) << "cut " << number << " was acknowledged and is not kept";
+    EXPECT_EQ(entry->second, place);
   }
 
   stage.start_server({"--journal", file, "--listen", stage.address()});

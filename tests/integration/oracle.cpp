@@ -85,18 +85,18 @@ std::string Oracle::lacks(std::string_view lines, std::uint64_t up_to) const {
     ++place;
     constexpr std::string_view kEvent = ",\"event\":";
     const std::size_t event = line.find(kEvent);
-    v1::JournalRow row;
+    v1::JournalEntry entry;
     if (!line.starts_with("{\"place\":" + std::to_string(place) + ",") || event == line.npos ||
         !google::protobuf::util::JsonStringToMessage(
-             std::string(line.substr(event + kEvent.size(), line.size() - event - kEvent.size() - 1)), &row)
+             std::string(line.substr(event + kEvent.size(), line.size() - event - kEvent.size() - 1)), &entry)
              .ok())
       return "line " + std::to_string(place) + " is not that place's event: " + std::string(line.substr(0, 80));
-    if (row.has_join()) joined.insert(row.join().author());
+    if (entry.has_join()) joined.insert(entry.join().author());
     if (const auto cut = cuts_.find(place);
-        cut != cuts_.end() && (!row.has_cut() || row.cut().SerializeAsString() != cut->second))
+        cut != cuts_.end() && (!entry.has_cut() || entry.cut().SerializeAsString() != cut->second))
       return "place " + std::to_string(place) + " is not the cut that was acknowledged";
     if (const auto mark = marks_.find(place);
-        mark != marks_.end() && (!row.has_mark() || row.mark().label() != mark->second))
+        mark != marks_.end() && (!entry.has_mark() || entry.mark().label() != mark->second))
       return "place " + std::to_string(place) + " is not the mark that was acknowledged";
   }
   if (place < std::min(up_to, furthest_))

@@ -23,7 +23,7 @@ class Oracle {
   Oracle(const Oracle& other);
   Oracle& operator=(const Oracle&) = delete;
 
-  void asked();                                      // for something that becomes a row at most
+  void asked();                                      // for something that becomes a entry at most
   void heard(RoomSeq place);                         // of any event
   void heard_cut(RoomSeq place, std::string bytes);  // of a v1::Cut
   void heard_mark(RoomSeq place, std::string label);
@@ -31,7 +31,7 @@ class Oracle {
   void heard_kept(const wire::DurableSeq& kept);
 
   [[nodiscard]] std::uint64_t acknowledged() const;            // the furthest place that anybody heard of
-  [[nodiscard]] std::uint64_t most() const;                    // rows that there can be
+  [[nodiscard]] std::uint64_t most() const;                    // entries that there can be
   [[nodiscard]] std::optional<wire::DurableSeq> kept() const;  // the newest witness
   // What the lines of an export lack or have otherwise, up to a place. Empty: nothing.
   [[nodiscard]] std::string lacks(std::string_view lines, std::uint64_t up_to) const;

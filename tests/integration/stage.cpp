@@ -19,10 +19,10 @@ Table read_table(const std::filesystem::path& file) {
   if (std::getline(in, line))
     for (std::istringstream header(line); std::getline(header, cell, ',');) names.push_back(cell);
   while (std::getline(in, line)) {
-    std::istringstream row(line);
+    std::istringstream entry(line);
     for (const std::string& name : names) {
       cell.clear();
-      std::getline(row, cell, ',');
+      std::getline(entry, cell, ',');
       table.texts[name].push_back(cell);
       char* end = nullptr;
       const double value = std::strtod(cell.c_str(), &end);

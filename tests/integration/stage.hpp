@@ -18,7 +18,7 @@ namespace osteon::test {
 struct Table {
   std::map<std::string, std::vector<double>> columns;
   std::map<std::string, std::vector<std::string>> texts;
-  [[nodiscard]] std::size_t rows() const { return texts.empty() ? 0 : texts.begin()->second.size(); }
+  [[nodiscard]] std::size_t entries() const { return texts.empty() ? 0 : texts.begin()->second.size(); }
   [[nodiscard]] const std::vector<double>& operator[](const std::string& name) const { return columns.at(name); }
 };
 [[nodiscard]] Table read_table(const std::filesystem::path& file);

@@ -253,13 +253,13 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   std::ifstream in(lines);
   std::size_t others = 0, decisions = 0;
   for (std::string line; std::getline(in, line);) {
-    const json row = json::parse(line);
-    const auto place = row.at("place").get<std::uint64_t>();
-    decisions += row.at("event").contains("supervision");
+    const json entry = json::parse(line);
+    const auto place = entry.at("place").get<std::uint64_t>();
+    decisions += entry.at("event").contains("supervision");
     const bool forbidden = (place > frozen_at && place < free_at) || (place > taken_at && place < back_at);
-    if (!forbidden || !row.at("event").contains("cut")) continue;
-    EXPECT_NE(row.at("event").at("cut").at("author"), std::to_string(kFirst)) << line;
-    others += row.at("event").at("cut").at("author") == std::to_string(kSecond);
+    if (!forbidden || !entry.at("event").contains("cut")) continue;
+    EXPECT_NE(entry.at("event").at("cut").at("author"), std::to_string(kFirst)) << line;
+    others += entry.at("event").at("cut").at("author") == std::to_string(kSecond);
   }
   EXPECT_GE(others, 20u);
   EXPECT_GE(decisions, 6u);

@@ -375,9 +375,9 @@ TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
   };
   const auto depth = column("depth_mm"), handle = column("device_depth_mm");
   double most_mm = 0.0;
-  for (std::string row; std::getline(log, row);) {
+  for (std::string entry; std::getline(log, entry);) {
     std::vector<std::string> cells;
-    std::istringstream in(row);
+    std::istringstream in(entry);
     for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
     const auto number = [&](auto i) { return std::stod(cells.at(static_cast<std::size_t>(i))); };
     most_mm = std::max(most_mm, number(handle) - number(depth));

@@ -16,7 +16,7 @@ volatile std::sig_atomic_t stopped = 0;
 
 void show(const osteon::test::BreakerTally& tally, std::uint64_t seed, char end) {
   std::printf(
-      "seed %llu: %llu trials, %llu rows acknowledged: %llu whole, %llu named (%llu without a number), %llu "
+      "seed %llu: %llu trials, %llu entries acknowledged: %llu whole, %llu named (%llu without a number), %llu "
       "refused, %llu SILENT%c",
       static_cast<unsigned long long>(seed), static_cast<unsigned long long>(tally.trials),
       static_cast<unsigned long long>(tally.acknowledged), static_cast<unsigned long long>(tally.whole),

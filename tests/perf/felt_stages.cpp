@@ -103,7 +103,7 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   void begin(RoomSeq, MessageParts, Bytes) override {
     link_ = links_.add(author_, 1, *this);
     auto opened = FastPath::open("127.0.0.1", port_, link_->keys(), 1,
-                                 {.row = [this](wire::IndexedRow row) { hear(std::move(row)); }, .dead = [] {}});
+                                 {.row = [this](wire::IndexedEntry row) { hear(std::move(row)); }, .dead = [] {}});
     OSTEON_CHECK(opened.has_value());
     path_ = std::move(*opened);
   }
@@ -113,8 +113,8 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
   void offer(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"rows come with what goes in few bytes of them"); }
-  void offer(RoomSeq, const Bytes&, const wire::SessionRow& fast) override {
-    const bool committed = fast.kind == wire::SessionRowKind::committed;
+  void offer(RoomSeq, const Bytes&, const wire::SessionEntry& fast) override {
+    const bool committed = fast.kind == wire::SessionEntryKind::committed;
     if (committed && fast.cut.author == author_) times.note(told, fast.cut.author_seq);
     if (!link_->tell(++index_, fast)) path_->heard(index_);  // the stream's copy
   }
@@ -145,8 +145,8 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   void arrived(std::uint64_t) override {}
 
   // --- the client's side
-  void hear(wire::IndexedRow row) {
-    if (row.row.kind != wire::SessionRowKind::committed) return;
+  void hear(wire::IndexedEntry row) {
+    if (row.row.kind != wire::SessionEntryKind::committed) return;
     if (row.row.cut.author == other_->author_) other_->times.note(came, row.row.cut.author_seq);
     const std::lock_guard lock(mutex_);
     rows_.push_back(std::move(row.row));
@@ -154,7 +154,7 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   }
   // As the client's replica thread.
   void follow() {
-    std::deque<wire::SessionRow> rows;
+    std::deque<wire::SessionEntry> rows;
     while (true) {
       Pose tip;
       {
@@ -164,12 +164,12 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
         rows.swap(rows_);
         tip = tip_;
       }
-      for (const wire::SessionRow& row : rows) replica_.commit(row.room_seq, row.cut, row.cut.author == author_);
+      for (const wire::SessionEntry& row : rows) replica_.commit(row.room_seq, row.cut, row.cut.author == author_);
       replica_.settle();
       for (const haptic::ChangedLeaves& change : replica_.take_changes())
         builder_.changed(runtime_.bone().pitch_mm(), change.level, change.origins);
       builder_.build(replica_.bodies(), model_, tip, patch_);
-      for (const wire::SessionRow& row : rows)
+      for (const wire::SessionEntry& row : rows)
         if (row.cut.author == other_->author_) other_->times.note(felt, row.cut.author_seq);
       rows.clear();
     }
@@ -186,7 +186,7 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<wire::SessionRow> rows_;
+  std::deque<wire::SessionEntry> rows_;
   Pose tip_;
   bool over_ = false;
   haptic::Replica replica_;  // of its thread, as all that follows

@@ -27,7 +27,7 @@ osteon::JournalOptions options() {
   return made;
 }
 
-constexpr std::size_t kRowBytes = 150;  // of a cut
+constexpr std::size_t kEntryBytes = 150;  // of a cut
 
 // Bytes that this process handed to the system to be written.
 std::uint64_t written_bytes() {
@@ -44,18 +44,18 @@ std::uint64_t written_bytes() {
 int main(int argc, char** argv) {
   using namespace osteon;
   if (argc != 4) return 2;
-  const std::uint64_t rows = std::strtoull(argv[2], nullptr, 10), per_commit = std::strtoull(argv[3], nullptr, 10);
+  const std::uint64_t entries = std::strtoull(argv[2], nullptr, 10), per_commit = std::strtoull(argv[3], nullptr, 10);
   auto journal = Journal::create(argv[1], "bone", options());
   if (!journal || per_commit == 0) return 1;
   std::mt19937_64 random(1);
   std::vector<double> waits_us;
   const std::uint64_t before = written_bytes();
-  for (std::uint64_t place = 1; place + per_commit <= rows + 1; place += per_commit) {
-    std::vector<JournalRow> batch;
+  for (std::uint64_t place = 1; place + per_commit <= entries + 1; place += per_commit) {
+    std::vector<JournalEntry> batch;
     for (std::uint64_t i = 0; i < per_commit; ++i) {
-      JournalRow row{RoomSeq{place + i}, static_cast<std::int64_t>(place), std::string(kRowBytes, '\0')};
-      for (char& byte : row.bytes) byte = static_cast<char>(random());
-      batch.push_back(std::move(row));
+      JournalEntry entry{RoomSeq{place + i}, static_cast<std::int64_t>(place), std::string(kEntryBytes, '\0')};
+      for (char& byte : entry.bytes) byte = static_cast<char>(random());
+      batch.push_back(std::move(entry));
     }
     const auto begun = std::chrono::steady_clock::now();
     if (!journal->append(batch)) return 1;
@@ -69,7 +69,7 @@ int main(int argc, char** argv) {
     return waits_us[static_cast<std::size_t>(share * static_cast<double>(waits_us.size() - 1))];
   };
   const auto written = static_cast<double>(waits_us.size() * per_commit);
-  std::printf("{\"commits\": %zu, \"p50_us\": %.1f, \"p99_us\": %.1f, \"bytes_per_row\": %.1f, \"with_close\": %.1f}\n",
+  std::printf("{\"commits\": %zu, \"p50_us\": %.1f, \"p99_us\": %.1f, \"bytes_per_entry\": %.1f, \"with_close\": %.1f}\n",
               waits_us.size(), percentile(0.5), percentile(0.99), static_cast<double>(log) / written,
               static_cast<double>(all) / written);
   return 0;

@@ -13,7 +13,7 @@
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
 #include "server/net/fragment_detector.hpp"
-#include "server/net/room_rows.hpp"
+#include "server/net/session_messages.hpp"
 #include "tests/support/scenes/bones.hpp"
 
 namespace osteon::test {

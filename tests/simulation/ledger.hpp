@@ -59,15 +59,15 @@ class Ledger {
   // Where the room has put an author's cut, as it says to whoever comes back; null: it rejected the cut.
   void told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq);
 
-  // Everything that the rows of a journal can be held against.
-  void check_rows(std::span<const RoomRow> rows);
+  // Everything that the entries of a journal can be held against.
+  void check_entries(std::span<const LogEntry> entries);
   // What holds for each hand of whom anything was decided.
-  [[nodiscard]] static std::map<AuthorId, Restrictions> held(std::span<const RoomRow> rows);
+  [[nodiscard]] static std::map<AuthorId, Restrictions> held(std::span<const LogEntry> entries);
   // Cuts that no undo has taken back; nothing when pieces came apart.
-  [[nodiscard]] static std::optional<std::vector<Cut>> standing(std::span<const RoomRow> rows);
+  [[nodiscard]] static std::optional<std::vector<Cut>> standing(std::span<const LogEntry> entries);
 
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
-  [[nodiscard]] std::uint64_t acknowledged() const { return told_.size(); }  // rows
+  [[nodiscard]] std::uint64_t acknowledged() const { return told_.size(); }  // entries
 
  private:
   struct Told {
@@ -82,10 +82,10 @@ class Ledger {
   // What an instructor forbids, in this page's own words: of a cut, made or done again by `by`, and of all else that
   // changes bone or scene.
   struct Hands;
-  void check_held(const RoomRow& row, const Hands& hands);
-  void check_cut(const RoomRow& row, const Hands& hands, AuthorId by, const Cut& cut);
-  void check_carried(std::span<const RoomRow> rows, std::size_t join, Hands& hands);
-  void check_author(const RoomRow& row, AuthorId author, std::uint64_t author_seq, const Digest& bytes,
+  void check_held(const LogEntry& entry, const Hands& hands);
+  void check_cut(const LogEntry& entry, const Hands& hands, AuthorId by, const Cut& cut);
+  void check_carried(std::span<const LogEntry> entries, std::size_t join, Hands& hands);
+  void check_author(const LogEntry& entry, AuthorId author, std::uint64_t author_seq, const Digest& bytes,
                     std::map<AuthorId, std::uint64_t>& newest);
 
   std::map<AuthorId, std::vector<Cut>> made_;

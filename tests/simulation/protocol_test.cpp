@@ -25,7 +25,7 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
     sum.disk_failures += one.disk_failures, sum.breaks += one.breaks, sum.resumed += one.resumed;
     fast_path += one.fast_path ? 1 : 0;
     sum.datagrams.opened += one.datagrams.opened, sum.datagrams.forged += one.datagrams.forged;
-    sum.datagrams.cuts += one.datagrams.cuts, sum.datagrams.rows += one.datagrams.rows;
+    sum.datagrams.cuts += one.datagrams.cuts, sum.datagrams.entries += one.datagrams.entries;
     sum.datagrams.moves += one.datagrams.moves;
   }
   // The trouble was there.
@@ -45,14 +45,14 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
   EXPECT_GT(sum.datagrams.opened, 20'000u);
   EXPECT_GT(sum.datagrams.forged, 500u);
   EXPECT_GT(sum.datagrams.cuts, 500u);
-  EXPECT_GT(sum.datagrams.rows, 300u);
+  EXPECT_GT(sum.datagrams.entries, 300u);
   EXPECT_GT(sum.datagrams.moves, 300u);
 }
 
 TEST(Simulation, IsTheSameForTheSameSeed) {
   for (const std::uint64_t seed : {1u, 2u, 7u, 8u}) {
     const SimulationReport one = simulate_quietly(seed), again = simulate_quietly(seed);
-    EXPECT_EQ(one.rows, again.rows);
+    EXPECT_EQ(one.entries, again.entries);
     EXPECT_EQ(one.cuts, again.cuts);
     EXPECT_EQ(one.acknowledged, again.acknowledged);
     EXPECT_EQ(one.virtual_s, again.virtual_s);
@@ -79,28 +79,28 @@ struct Rows {
     join(1, 7);
     join(2, 8);
   }
-  void add(std::uint64_t by, decltype(RoomRow::what) what) {
-    rows.push_back({RoomSeq{rows.size() + 1}, {}, AuthorId{by}, std::move(what)});
+  void add(std::uint64_t by, decltype(LogEntry::what) what) {
+    entries.push_back({RoomSeq{entries.size() + 1}, {}, AuthorId{by}, std::move(what)});
   }
   void join(std::uint64_t author, std::uint32_t person) {
-    add(author, JoinRow{.author = AuthorId{author}, .kind = MemberKind::surgeon, .person = person});
+    add(author, JoinEntry{.author = AuthorId{author}, .kind = MemberKind::surgeon, .person = person});
   }
-  void hold(std::uint64_t subject, const Restrictions& word) { add(1, SuperviseRow{AuthorId{subject}, word}); }
+  void hold(std::uint64_t subject, const Restrictions& word) { add(1, SuperviseEntry{AuthorId{subject}, word}); }
   void cut(std::uint64_t author, std::uint64_t lease = 1) {
     Cut one = straight_cut(find_tool("burr-round-3.2").value(), {1, 0, 0}, {2, 0, 0}, {0, 0, -1}, ++cuts[author]);
     one.author = AuthorId{author};
     one.lease_epoch = lease;
     ledger.made(one, {});
-    add(author, CutRow{one});
+    add(author, CutEntry{one});
   }
   std::size_t overseen() {
-    ledger.check_rows(rows);
+    ledger.check_entries(entries);
     for (const Fault& fault : ledger.faults()) EXPECT_EQ(fault.invariant, Invariant::overseen) << fault.sentence;
     return ledger.faults().size();
   }
 
   Ledger ledger;
-  std::vector<RoomRow> rows;
+  std::vector<LogEntry> entries;
   std::map<std::uint64_t, std::uint64_t> cuts;
 };
 
@@ -127,12 +127,12 @@ TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
   const auto found = [](std::uint64_t by, const Restrictions& word, bool again) {
     Rows all;
     all.cut(2);
-    if (again) all.add(1, UndoRow{{RoomSeq{3}}});
+    if (again) all.add(1, UndoEntry{{RoomSeq{3}}});
     all.hold(2, word);
     if (again)
-      all.add(by, RedoRow{{RoomSeq{4}}, {RoomSeq{3}}});
+      all.add(by, RedoEntry{{RoomSeq{4}}, {RoomSeq{3}}});
     else
-      all.add(by, UndoRow{{RoomSeq{3}}});
+      all.add(by, UndoEntry{{RoomSeq{3}}});
     return all.overseen();
   };
   EXPECT_EQ(found(2, {}, true), 0u);

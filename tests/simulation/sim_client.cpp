@@ -20,7 +20,7 @@ constexpr std::size_t kWindowBytes = 64 * 1024;        // of HTTP/2
 // What a program may be told that ends it without a fault: its user begins again.
 bool may_be_told(const std::string& why) {
   return why.starts_with("the server stops") || why.starts_with("the room takes no more cuts") ||
-         why.find("takes no more rows") != std::string::npos;  // of the journal
+         why.find("takes no more entries") != std::string::npos;  // of the journal
 }
 
 }  // namespace
@@ -275,7 +275,7 @@ void SimClient::open_fast_path(std::uint64_t decided) {
   fast_ = std::make_unique<SimFastPath>(
       datagrams_, random_.index(1 << 30), node(number_, port_), SessionKeys{offer_->session(), *up, *down}, decided + 1,
       plan_.link, plan_.clock_ahead,
-      SimFastPath::Hears{.row = [this](wire::IndexedRow row) { hear_row(std::move(row)); },
+      SimFastPath::Hears{.entry = [this](wire::IndexedEntry entry) { hear_entry(std::move(entry)); },
                          .dead =
                              [this] {
                                underway_->again();
@@ -284,40 +284,40 @@ void SimClient::open_fast_path(std::uint64_t decided) {
   for (const auto& [number, tool] : numbered_tools_) fast_->know_tool(number, tool);
 }
 
-void SimClient::hear_row(wire::IndexedRow row) {
-  if (row.row.kind != wire::SessionRowKind::streamed) {
-    ++datagrams_.counts().rows;
-    said_.emplace(row.index, row.row);
+void SimClient::hear_entry(wire::IndexedEntry entry) {
+  if (entry.entry.kind != wire::SessionEntryKind::streamed) {
+    ++datagrams_.counts().entries;
+    said_.emplace(entry.index, entry.entry);
   }
   by_datagram_ = true;
-  const Result<void> taken = reader_->take(std::move(row));
+  const Result<void> taken = reader_->take(std::move(entry));
   by_datagram_ = false;
-  ledger_.check(taken.has_value(), Invariant::datagrams, "a row that came in a datagram is not taken");
+  ledger_.check(taken.has_value(), Invariant::datagrams, "a entry that came in a datagram is not taken");
 }
 
 void SimClient::compare(const v1::SessionResponse& response) {
   const auto said = said_.find(response.index());
   if (response.index() == 0 || said == said_.end()) return;
-  const wire::SessionRow& row = said->second;
+  const wire::SessionEntry& entry = said->second;
   const bool same = [&] {
     if (response.has_committed()) {
       const Result<Cut> cut = wire::from_wire(response.committed().cut());
-      return row.kind == wire::SessionRowKind::committed && row.room_seq.value == response.committed().room_seq() &&
-             cut && *cut == row.cut;
+      return entry.kind == wire::SessionEntryKind::committed && entry.room_seq.value == response.committed().room_seq() &&
+             cut && *cut == entry.cut;
     }
     if (response.has_rejected())
-      return row.kind == wire::SessionRowKind::rejected && row.room_seq.value == response.rejected().room_seq() &&
-             row.author_seq == response.rejected().author_seq() && row.lease_epoch == response.rejected().lease_epoch();
+      return entry.kind == wire::SessionEntryKind::rejected && entry.room_seq.value == response.rejected().room_seq() &&
+             entry.author_seq == response.rejected().author_seq() && entry.lease_epoch == response.rejected().lease_epoch();
     if (response.has_supervised()) {
       const Result<Restrictions> decided = wire::from_wire(response.supervised().supervision());
-      return row.kind == wire::SessionRowKind::supervised && row.room_seq.value == response.supervised().room_seq() &&
-             row.lease_epoch == response.supervised().lease_epoch() && decided && *decided == row.supervision &&
-             row.by == Decider{AuthorId{response.supervised().decided_by()}, response.supervised().decided_by_name()};
+      return entry.kind == wire::SessionEntryKind::supervised && entry.room_seq.value == response.supervised().room_seq() &&
+             entry.lease_epoch == response.supervised().lease_epoch() && decided && *decided == entry.supervision &&
+             entry.by == Decider{AuthorId{response.supervised().decided_by()}, response.supervised().decided_by_name()};
     }
     return false;
   }();
   ledger_.check(same, Invariant::datagrams,
-                "the stream says another row " + std::to_string(response.index()) + " than datagrams did");
+                "the stream says another entry " + std::to_string(response.index()) + " than datagrams did");
 }
 
 void SimClient::hear(const std::string& bytes) {

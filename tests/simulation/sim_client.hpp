@@ -116,8 +116,8 @@ class SimClient {
   void follow(const v1::SessionResponse& response);
   void open_fast_path(std::uint64_t decided);
   void set_ways();  // of the present address
-  void hear_row(wire::IndexedRow row);
-  void compare(const v1::SessionResponse& response);  // with what a datagram has said of the same row
+  void hear_entry(wire::IndexedEntry entry);
+  void compare(const v1::SessionResponse& response);  // with what a datagram has said of the same entry
   [[nodiscard]] RoomEvents events();
 
   void pass(FromRoom event);
@@ -167,7 +167,7 @@ class SimClient {
   std::optional<v1::LinkOffer> offer_;  // of the present stream
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools_;
   std::unique_ptr<SimFastPath> fast_;
-  std::map<std::uint64_t, wire::SessionRow> said_;  // by datagrams: rows of the present stream by index
+  std::map<std::uint64_t, wire::SessionEntry> said_;  // by datagrams: entries of the present stream by index
   bool by_datagram_ = false;                        // what is being heard
   std::uint64_t state_seq_ = 0;
   Time requests_there_{}, held_back_until_{};

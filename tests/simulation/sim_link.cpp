@@ -12,7 +12,7 @@ namespace {
 using namespace std::chrono_literals;
 using Time = VirtualTime::Time;
 
-constexpr int kServersMostInARow = 256, kClientsMostInARow = 64;
+constexpr int kServersMostInAEntry = 256, kClientsMostInAEntry = 64;
 constexpr Time kLongestWait = 100ms;
 constexpr auto kWakingTakes_us = 300;  // at most
 
@@ -129,7 +129,7 @@ void SimLinks::remove(const std::shared_ptr<Link>& link) {
 
 void SimLinks::receive_some() {
   DatagramBuffer buffer;
-  for (int i = 0; i < kServersMostInARow; ++i) {
+  for (int i = 0; i < kServersMostInAEntry; ++i) {
     const std::optional<Datagram> datagram = port_->receive(buffer);
     if (!datagram) return;
     const std::optional<std::uint32_t> session = session_of(datagram->bytes);
@@ -190,9 +190,9 @@ void SimLinks::Link::offer(const Cut& cut) {
   say_news();
 }
 
-bool SimLinks::Link::tell(std::uint64_t index, const wire::SessionRow& row) {
+bool SimLinks::Link::tell(std::uint64_t index, const wire::SessionEntry& entry) {
   const Time now = links_.datagrams_.time().now();
-  const bool goes = link_.tell(index, row) && link_.alive(now);
+  const bool goes = link_.tell(index, entry) && link_.alive(now);
   links_.alarm_.set(now + std::chrono::microseconds(static_cast<int>(links_.random_.index(kWakingTakes_us))));
   return goes;
 }
@@ -236,7 +236,7 @@ void SimFastPath::heard(std::uint64_t index) { link_.heard(index); }
 
 void SimFastPath::turn() {
   DatagramBuffer buffer;
-  for (int i = 0; i < kClientsMostInARow; ++i) {
+  for (int i = 0; i < kClientsMostInAEntry; ++i) {
     const std::optional<Datagram> datagram = port_->receive(buffer);
     if (!datagram) break;
     const std::uint64_t before = link_.half().open_counts().opened;
@@ -249,13 +249,13 @@ void SimFastPath::turn() {
     // Times travel in microseconds.
     ledger.check(std::chrono::abs(clock->offset + ahead_) <= clock->error + 2us, Invariant::datagrams,
                  "the server's clock is not where it was measured");
-  std::vector<wire::IndexedRow> rows;
-  while (std::optional<wire::IndexedRow> row = link_.take_row()) rows.push_back(std::move(*row));
+  std::vector<wire::IndexedEntry> entries;
+  while (std::optional<wire::IndexedEntry> entry = link_.take_entry()) entries.push_back(std::move(*entry));
   if (const auto bytes = link_.send(now(), buffer); !bytes.empty())
     datagrams_.send(Datagrams::up, *port_, node(Datagrams::kServer), bytes);
   alarm_.set(datagrams_.time().now() + std::clamp(link_.next(now()) - now(), Time{0}, kLongestWait));
   const bool died = std::exchange(was_alive_, link_.alive(now())) && !was_alive_;
-  for (wire::IndexedRow& row : rows) hears_.row(std::move(row));
+  for (wire::IndexedEntry& entry : entries) hears_.entry(std::move(entry));
   if (died) hears_.dead();
 }
 

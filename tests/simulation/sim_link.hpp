@@ -37,7 +37,7 @@ class Alarm {
 
 struct DatagramCounts {
   std::uint64_t sent = 0, opened = 0, forged = 0;
-  std::uint64_t rows = 0, cuts = 0;  // that datagrams have brought
+  std::uint64_t entries = 0, cuts = 0;  // that datagrams have brought
   std::uint64_t moves = 0;           // addresses that were proven
 };
 
@@ -107,7 +107,7 @@ class SimLinks::Link {
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
   void offer(const Cut& cut);
   // False: it goes over the stream only, since it does not fit or the client cannot be reached.
-  bool tell(std::uint64_t index, const wire::SessionRow& row);
+  bool tell(std::uint64_t index, const wire::SessionEntry& entry);
   void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
 
  private:
@@ -126,7 +126,7 @@ class SimFastPath {
  public:
   using Time = VirtualTime::Time;
   struct Hears {  // neither ends the path
-    std::function<void(wire::IndexedRow)> row;
+    std::function<void(wire::IndexedEntry)> entry;
     std::function<void()> dead;
   };
 

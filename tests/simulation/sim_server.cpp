@@ -6,7 +6,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "server/journal/maintenance.hpp"
-#include "server/net/room_rows.hpp"
+#include "server/net/room_entries.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon::test {
@@ -68,10 +68,10 @@ class SimServer::Session final : public SessionSubscriber,
     v1::SessionResponse said;
     if (server_.links_ && said.ParseFromString(*complete)) {
       link_ = server_.links_->add(author_, said.complete().decided_author_seq() + 1, *this);
-      before.insert(before.begin(), link_row(link_->keys(), node(Datagrams::kServer).port));
+      before.insert(before.begin(), link_entry(link_->keys(), node(Datagrams::kServer).port));
     }
     if (server_.condition_.breakage == Breakage::hasty && !server_.power_is_out())
-      for (const Bytes& row : std::exchange(before, {})) stream_->write(SimStream::server, *row);
+      for (const Bytes& entry : std::exchange(before, {})) stream_->write(SimStream::server, *entry);
     send_queue_.begin(contained, std::move(before), std::move(complete));
     pump();
   }
@@ -79,33 +79,33 @@ class SimServer::Session final : public SessionSubscriber,
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq place, const Bytes& row) override { offer(place, row, {.room_seq = place}); }
-  void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
+  void offer(RoomSeq place, const Bytes& entry) override { offer(place, entry, {.room_seq = place}); }
+  void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& fast) override {
     if (closing_ || done_) return;
     const auto chance = [&] { return send_queue_.takes(place) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
-    if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionRowKind::supervised &&
+    if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionEntryKind::supervised &&
         server_.random_.index(2) == 0)
-      return tell(place, noted_row(place, {}), {.room_seq = place});
+      return tell(place, noted_entry(place, {}), {.room_seq = place});
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
-        held_back_.emplace(HeldBack{place, row, fast});
+        held_back_.emplace(HeldBack{place, entry, fast});
         return;
       }
-      tell(place, row, fast);
-      if (held_back_) tell(held_back_->place, held_back_->row, held_back_->fast);
+      tell(place, entry, fast);
+      if (held_back_) tell(held_back_->place, held_back_->entry, held_back_->fast);
       held_back_.reset();
       return;
     }
-    tell(place, row, fast);
+    tell(place, entry, fast);
   }
-  void hold(const wire::SessionRow& supervised) override {
+  void hold(const wire::SessionEntry& supervised) override {
     if (link_) link_->tell(0, supervised);
   }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
-  void answer(const Bytes& row) override { add(send_queue_.add_answer(row)); }
+  void answer(const Bytes& entry) override { add(send_queue_.add_answer(entry)); }
   void refuse(const Error& why) override { close({true, why.message}); }
   void decided() override {
     --queued_;
@@ -180,13 +180,13 @@ class SimServer::Session final : public SessionSubscriber,
   }
   void arrived(std::uint64_t index) override { send_queue_.arrived(index); }
 
-  void tell(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) {
+  void tell(RoomSeq place, const Bytes& entry, const wire::SessionEntry& fast) {
     const std::uint64_t before = send_queue_.index();
-    const bool taken = send_queue_.add(place, row);
+    const bool taken = send_queue_.add(place, entry);
     tell_fast(fast, send_queue_.index() > before);
     add(taken);
   }
-  void tell_fast(const wire::SessionRow& fast, bool numbered) {
+  void tell_fast(const wire::SessionEntry& fast, bool numbered) {
     if (!link_) return;
     const bool goes = link_->tell(numbered ? send_queue_.index() : 0, fast);
     if (goes && server_.condition_.breakage == Breakage::pruning) send_queue_.arrived(send_queue_.index());
@@ -199,8 +199,8 @@ class SimServer::Session final : public SessionSubscriber,
   void add(bool taken) {
     if (closing_ || done_) return;
     server_.most_behind_ = std::max(server_.most_behind_, send_queue_.waiting());
-    server_.ledger_.check(send_queue_.waiting() <= SessionSendQueue::kMaxRows, Invariant::bounds,
-                          "an send_queue holds too many rows");
+    server_.ledger_.check(send_queue_.waiting() <= SessionSendQueue::kMaxEntries, Invariant::bounds,
+                          "an send_queue holds too many entries");
     if (taken)
       pump();
     else
@@ -240,8 +240,8 @@ class SimServer::Session final : public SessionSubscriber,
   std::shared_ptr<SimLinks::Link> link_;  // with the server's links
   struct HeldBack {
     RoomSeq place;
-    Bytes row;
-    wire::SessionRow fast;
+    Bytes entry;
+    wire::SessionEntry fast;
   };
   std::optional<HeldBack> held_back_;
   std::optional<Ending> closing_;
@@ -283,8 +283,8 @@ void SimServer::boot() {
   ++life_;
   Result<PersistedRoom> kept = RoomStore::open(file_, bone_, options());
   if (kept && kept->store->server_epoch() == 0) {
-    // Closed to rows: that is for the operator.
-    ledger_.check(disk_has_failed_, Invariant::served, "a journal on a sound disk takes no rows");
+    // Closed to entries: that is for the operator.
+    ledger_.check(disk_has_failed_, Invariant::served, "a journal on a sound disk takes no entries");
     kept = failure(ErrorCode::unavailable, "closed");
     disk_.mend();
     recover();
@@ -309,40 +309,40 @@ void SimServer::boot() {
     links_ = std::make_unique<SimLinks>(datagrams_, random_.index(1u << 30), condition_.link,
                                         [this] { return power_is_out(); });
   disk_has_failed_ = false;
-  ledger_.check(opened == replayed(), Invariant::replay, "the room that was opened is not the one of its rows");
+  ledger_.check(opened == replayed(), Invariant::replay, "the room that was opened is not the one of its entries");
   plan_tick();
 }
 
-std::vector<RoomRow> SimServer::rows() {
+std::vector<LogEntry> SimServer::entries() {
   // Of a copy: the journal itself is in use.
   MemoryDisk copy(1, condition_.sector_bytes);
   copy.load(disk_.image());
   JournalOptions journal = options().journal;
   journal.disk = &copy;
-  std::vector<RoomRow> rows;
+  std::vector<LogEntry> entries;
   Result<Journal> opened = Journal::open(file_, journal);
   if (!opened) {
     ledger_.fault(Invariant::replay, "a copy of the journal cannot be opened: " + opened.error().message);
-    return rows;
+    return entries;
   }
-  const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalRow& one) {
-    Result<RoomRow> row = row_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    ledger_.check(row.has_value(), Invariant::replay, row ? "" : row.error().message);
-    if (row) rows.push_back(std::move(*row));
-    return row.has_value();
+  const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalEntry& one) {
+    Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    ledger_.check(entry.has_value(), Invariant::replay, entry ? "" : entry.error().message);
+    if (entry) entries.push_back(std::move(*entry));
+    return entry.has_value();
   });
   ledger_.check(read.has_value(), Invariant::replay, read ? "" : read.error().message);
-  return rows;
+  return entries;
 }
 
 Digest SimServer::replayed() {
-  const std::vector<RoomRow> kept = rows();
-  ledger_.check_rows(kept);
+  const std::vector<LogEntry> kept = entries();
+  ledger_.check_entries(kept);
   Result<Room> room = begin_room(bone_, store_->genesis(), condition_.limits);
   ledger_.check(room.has_value(), Invariant::replay, room ? "" : room.error().message);
   if (!room) return {};
-  for (const RoomRow& row : kept)
-    if (const Result<void> replayed = room->replay(row); !replayed) {
+  for (const LogEntry& entry : kept)
+    if (const Result<void> replayed = room->replay(entry); !replayed) {
       ledger_.fault(Invariant::replay, replayed.error().message);
       return {};
     }
@@ -408,7 +408,7 @@ void SimServer::crash(bool power) {
   if (!power_fails_ && !disk_fails_ && random_.unit() < 0.3) {
     const Digest alive = live();
     ledger_.check(replayed() == alive, Invariant::replay,
-                  "the journal's rows make another room than the one that crashes");
+                  "the journal's entries make another room than the one that crashes");
   }
   ++crashes_;
   down();

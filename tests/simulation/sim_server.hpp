@@ -22,8 +22,8 @@ namespace osteon::test {
 enum class Breakage {
   none,
   dedup,      // a cut that was sent again is taken again
-  ordering,   // now and then two neighbouring rows change places
-  skipping,   // now and then a row is left out
+  ordering,   // now and then two neighbouring entries change places
+  skipping,   // now and then a entry is left out
   replica,    // on coming back a client takes leaves over what it holds, instead of taking on what is held there
   forgetful,  // the journal waits for no disk
   unsaid,     // now and then a hand is not told what was decided about it
@@ -38,7 +38,7 @@ struct ServerCondition {
   CutLimits limits;
   std::size_t sector_bytes = 4096;
   std::chrono::nanoseconds late_most = std::chrono::milliseconds(1);  // of a tick
-  double slow_writes = 0.03;  // share of ticks whose rows take up to 0.4 s to be kept
+  double slow_writes = 0.03;  // share of ticks whose entries take up to 0.4 s to be kept
   double pauses = 0.0005;     // share of ticks that come 0.1 to 3 s late
   bool fast_path = false;     // it offers one
   wire::LinkOptions link = wire::server_link_options();
@@ -85,14 +85,14 @@ class SimServer {
 
   // For checks.
   [[nodiscard]] RoomRuntime& runtime() { return *runtime_; }
-  [[nodiscard]] std::vector<RoomRow> rows();  // as they are on the disk
+  [[nodiscard]] std::vector<LogEntry> entries();  // as they are on the disk
   [[nodiscard]] Digest replayed();            // room_hash of a new room with these
   [[nodiscard]] Digest live();                // room_hash; runs a tick
   // Closed, and opened again: with a checkpoint of its end or without.
   [[nodiscard]] Digest reopened(bool with_checkpoint);
   [[nodiscard]] std::uint64_t crashes() const { return crashes_; }
   [[nodiscard]] std::uint64_t disk_failures() const { return disk_failures_; }
-  [[nodiscard]] std::size_t most_behind() const { return most_behind_; }  // rows that waited for a session
+  [[nodiscard]] std::size_t most_behind() const { return most_behind_; }  // entries that waited for a session
 
  private:
   class Session;

@@ -100,20 +100,20 @@ class Simulation {
       report.denied += client->denied();
       report.programs += client->programs();
     }
-    report.rows = rows_.size();
-    for (std::size_t i = 1; i < rows_.size(); ++i)
-      if (const auto* held = std::get_if<SuperviseRow>(&rows_[i].what))
-        if (const auto* join = std::get_if<JoinRow>(&rows_[i - 1].what))
+    report.entries = entries_.size();
+    for (std::size_t i = 1; i < entries_.size(); ++i)
+      if (const auto* held = std::get_if<SuperviseEntry>(&entries_[i].what))
+        if (const auto* join = std::get_if<JoinEntry>(&entries_[i - 1].what))
           report.carried += held->subject == join->author;
-    for (const RoomRow& row : rows_) {
-      report.committed += std::holds_alternative<CutRow>(row.what);
-      report.rejected += std::holds_alternative<RejectionRow>(row.what);
-      report.undone += std::holds_alternative<UndoRow>(row.what);
-      report.decisions += std::holds_alternative<SuperviseRow>(row.what);
-      const auto* rejection = std::get_if<RejectionRow>(&row.what);
+    for (const LogEntry& entry : entries_) {
+      report.committed += std::holds_alternative<CutEntry>(entry.what);
+      report.rejected += std::holds_alternative<RejectionEntry>(entry.what);
+      report.undone += std::holds_alternative<UndoEntry>(entry.what);
+      report.decisions += std::holds_alternative<SuperviseEntry>(entry.what);
+      const auto* rejection = std::get_if<RejectionEntry>(&entry.what);
       report.forbidden +=
           rejection != nullptr && rejection->reason >= Rejection::frozen && rejection->reason <= Rejection::zone;
-      report.splits += std::holds_alternative<SplitRow>(row.what);
+      report.splits += std::holds_alternative<SplitEntry>(entry.what);
     }
   }
 
@@ -292,17 +292,17 @@ class Simulation {
                     "a client holds another bone than the room at " + place + ": " + client->standing());
     }
     const Digest live = server_.live();
-    rows_ = server_.rows();
-    ledger_.check(rows_.size() == status.room_seq.value, Invariant::replay, "the journal ends elsewhere than the room");
-    ledger_.check(server_.replayed() == live, Invariant::replay, "the journal's rows make another room");
-    const std::map<AuthorId, Restrictions> held = Ledger::held(rows_);
+    entries_ = server_.entries();
+    ledger_.check(entries_.size() == status.room_seq.value, Invariant::replay, "the journal ends elsewhere than the room");
+    ledger_.check(server_.replayed() == live, Invariant::replay, "the journal's entries make another room");
+    const std::map<AuthorId, Restrictions> held = Ledger::held(entries_);
     for (const auto& client : clients_) {
       if (!client->here() || !client->settled()) continue;
       const auto own = held.find(client->author());
       ledger_.check(client->held() == (own == held.end() ? Restrictions{} : own->second), Invariant::overseen,
                     "a hand does not know what holds for it: " + client->standing());
     }
-    if (const auto standing = Ledger::standing(rows_)) check_set(*standing, status.field_hash);
+    if (const auto standing = Ledger::standing(entries_)) check_set(*standing, status.field_hash);
     ledger_.check(server_.reopened(false) == live, Invariant::replay,
                   "the room is another one after it was opened again");
     ledger_.check(server_.reopened(true) == live, Invariant::replay, "a checkpoint makes another room");
@@ -328,7 +328,7 @@ class Simulation {
   SimServer server_;
   std::vector<Way> ways_;  // of the clients
   std::vector<std::unique_ptr<SimClient>> clients_;
-  std::vector<RoomRow> rows_;
+  std::vector<LogEntry> entries_;
   Time trouble_ends_{};
   double settled_s_ = 0, back_s_ = 0;
 };

@@ -18,10 +18,10 @@ struct SimulationReport {
   std::uint64_t seed = 0;
   std::vector<Fault> faults;
   std::uint64_t cuts = 0;                                                       // made
-  std::uint64_t rows = 0, committed = 0, rejected = 0, undone = 0, splits = 0;  // in the journal
+  std::uint64_t entries = 0, committed = 0, rejected = 0, undone = 0, splits = 0;  // in the journal
   std::uint64_t decisions = 0, forbidden = 0;  // about hands, and cuts that were refused for them
   std::uint64_t denied = 0, carried = 0;       // undo and redo that were, and hands that were held when they came again
-  std::uint64_t acknowledged = 0;              // rows that someone was told of
+  std::uint64_t acknowledged = 0;              // entries that someone was told of
   std::uint64_t crashes = 0, disk_failures = 0, breaks = 0, resumed = 0, programs = 0;
   double virtual_s = 0;
   double settled_s = 0;    // from when the trouble is over and everyone on the line until every cut is decided and told

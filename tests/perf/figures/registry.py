@@ -54,8 +54,8 @@ FUZZED = (
     ("down_packet", "datagrams, and packets with the key,", "the client's end of a fast path", 10_000_000),
     ("requests", "requests of all calls together", "the wire", 10_000_000),
     ("calls", "requests of all calls together", "a server with a room", 10_000_000),
-    ("journal_rows", "rows of journals, many in each input,", "a room", 10_000_000),
-    ("journal_rows_evaluated", "rows of journals, many in each input,", "a room with its bone", 1_000_000),
+    ("journal_entries", "rows of journals, many in each input,", "a room", 10_000_000),
+    ("journal_entries_evaluated", "rows of journals, many in each input,", "a room with its bone", 1_000_000),
     ("journal_genesis", "beginnings of rooms", "a room", 10_000_000),
     ("journal_file", "files of journals", "verify, recover and open", 1_000_000),
 )

@@ -19,7 +19,7 @@ constexpr std::size_t kFaultsShown = 5;
 // What the files were at some moments, the last of them when the process was killed.
 struct Life {
   std::vector<MemoryDisk::Image> images;
-  std::vector<JournalRow> acknowledged, asked;  // asked: under way when it was killed
+  std::vector<JournalEntry> acknowledged, asked;  // asked: under way when it was killed
 };
 
 // Writes until the disk fails at the n-th write or sync, as a kill there would leave the files.
@@ -93,9 +93,9 @@ std::string damage(Random& random, const std::string& name, const Life& life, co
   return "nothing";
 }
 
-bool same_rows(const std::vector<JournalRow>& found, const std::vector<JournalRow>& known, std::size_t count) {
+bool same_entries(const std::vector<JournalEntry>& found, const std::vector<JournalEntry>& known, std::size_t count) {
   return std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count), known.begin(),
-                    [](const JournalRow& a, const JournalRow& b) {
+                    [](const JournalEntry& a, const JournalEntry& b) {
                       return a.place == b.place && a.at_ns == b.at_ns && a.bytes == b.bytes;
                     });
 }
@@ -106,7 +106,7 @@ struct Verdict {
 };
 
 // Opens what is on the disk and holds it against what was acknowledged.
-// `foreign`: a file is another journal's, whose rows can be read.
+// `foreign`: a file is another journal's, whose entries can be read.
 Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& disk, bool foreign = false) {
   const auto report = verify_journal(file, &disk);
   auto opened = Journal::open(file, {.disk = &disk, .log_bytes = 8192});
@@ -116,29 +116,29 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
   }
   // Whoever opens it for a room holds its genesis against the room's name.
   if (opened->genesis() != "a genesis") return {Verdict::Kind::refused, ""};
-  std::vector<JournalRow> known = life.acknowledged;
+  std::vector<JournalEntry> known = life.acknowledged;
   known.insert(known.end(), life.asked.begin(), life.asked.end());
-  std::vector<JournalRow> rows;
-  const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalRow& row) {
-    rows.push_back(row);
+  std::vector<JournalEntry> entries;
+  const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalEntry& entry) {
+    entries.push_back(entry);
     return true;
   });
   const bool closed = opened->closed_because() != nullptr;
-  if (!(closed && foreign) && (rows.size() > known.size() || !same_rows(rows, known, rows.size())))
-    return {Verdict::Kind::named, "rows are there that nobody wrote"};
+  if (!(closed && foreign) && (entries.size() > known.size() || !same_entries(entries, known, entries.size())))
+    return {Verdict::Kind::named, "entries are there that nobody wrote"};
   if (!closed) {
-    if (!read || rows.size() < life.acknowledged.size()) return {Verdict::Kind::whole, "rows are missing in silence"};
-    // A checkpoint may be lost: the one before it, or the rows, then serve instead.
+    if (!read || entries.size() < life.acknowledged.size()) return {Verdict::Kind::whole, "entries are missing in silence"};
+    // A checkpoint may be lost: the one before it, or the entries, then serve instead.
     const bool doubted = !report || !std::ranges::all_of(report->faults, [](const std::string& fault) {
       return fault.find(".checkpoint") != fault.npos;
     });
     if (doubted)
       return {Verdict::Kind::whole,
-              "verify finds damage, and it takes rows: " + (report ? report->faults.front() : report.error().message)};
-    const JournalRow next{RoomSeq{rows.size() + 1}, 0, "next"};
-    return {Verdict::Kind::whole, opened->append({&next, 1}) ? "" : "it is whole and takes no rows"};
+              "verify finds damage, and it takes entries: " + (report ? report->faults.front() : report.error().message)};
+    const JournalEntry next{RoomSeq{entries.size() + 1}, 0, "next"};
+    return {Verdict::Kind::whole, opened->append({&next, 1}) ? "" : "it is whole and takes no entries"};
   }
-  if (report && report->sound()) return {Verdict::Kind::named, "verify finds it sound, and it takes no rows"};
+  if (report && report->sound()) return {Verdict::Kind::named, "verify finds it sound, and it takes no entries"};
   const std::string why = opened->closed_because()->message;
   opened = tl::unexpected(Error{});
   // What it says is missing is at least what was acknowledged, and no more than what was asked for.
@@ -152,7 +152,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
            fault.find("belongs to another journal") != fault.npos || fault.find("is missing") != fault.npos;
   });
   if (told || cannot_tell) return {Verdict::Kind::named, ""};
-  return {Verdict::Kind::named, "it says that " + std::to_string(recovered->lost()) + " rows after " +
+  return {Verdict::Kind::named, "it says that " + std::to_string(recovered->lost()) + " entries after " +
                                     std::to_string(recovered->head.place.value) + " are missing, of " +
                                     std::to_string(life.acknowledged.size()) + ": " + why};
 }

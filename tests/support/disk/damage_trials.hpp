@@ -14,11 +14,11 @@ enum class DamagedFiles {
 
 struct DamageTally {
   std::uint64_t trials = 0;
-  std::uint64_t acknowledged = 0;    // rows, in all trials
-  std::uint64_t whole = 0;           // all acknowledged rows are there, and the journal goes on
-  std::uint64_t named = 0;           // opened to be read, with the right number of missing rows, or "cannot be told"
+  std::uint64_t acknowledged = 0;    // entries, in all trials
+  std::uint64_t whole = 0;           // all acknowledged entries are there, and the journal goes on
+  std::uint64_t named = 0;           // opened to be read, with the right number of missing entries, or "cannot be told"
   std::uint64_t refused = 0;         // not opened, with a sentence
-  std::uint64_t silent = 0;          // rows are missing or differ, and nothing says so
+  std::uint64_t silent = 0;          // entries are missing or differ, and nothing says so
   std::uint64_t called_damaged = 0;  // though nothing was done to it
   std::map<std::string, std::uint64_t> done;  // trials by what was done
   std::vector<std::string> faults;            // the first few, with their seeds

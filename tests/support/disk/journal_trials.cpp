@@ -25,7 +25,7 @@ Digest sha256(const std::string& bytes) {
 
 std::string raw(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
 
-bool same(const JournalRow& a, const JournalRow& b) {
+bool same(const JournalEntry& a, const JournalEntry& b) {
   return a.place == b.place && a.at_ns == b.at_ns && a.bytes == b.bytes;
 }
 
@@ -43,13 +43,13 @@ void add(Tally& tally, const JournalWriter& writer, std::uint64_t seed, bool fai
 
 }  // namespace
 
-JournalHead plain_head(const std::string& genesis, const std::vector<JournalRow>& rows) {
+JournalHead plain_head(const std::string& genesis, const std::vector<JournalEntry>& entries) {
   const std::string name = "osteon journal";
   JournalHead head{RoomSeq{0}, sha256(little_endian(name.size()) + name + little_endian(genesis.size()) + genesis)};
-  for (const JournalRow& row : rows)
-    head = {row.place,
-            sha256(raw(head.chain) + little_endian(row.place.value) +
-                   little_endian(static_cast<std::uint64_t>(row.at_ns)) + little_endian(row.bytes.size()) + row.bytes)};
+  for (const JournalEntry& entry : entries)
+    head = {entry.place,
+            sha256(raw(head.chain) + little_endian(entry.place.value) +
+                   little_endian(static_cast<std::uint64_t>(entry.at_ns)) + little_endian(entry.bytes.size()) + entry.bytes)};
   return head;
 }
 
@@ -58,7 +58,7 @@ JournalWriter::JournalWriter(std::uint64_t seed, MemoryDisk& disk, bool durable,
   options_.disk = &disk;
   options_.durable = durable;
   options_.page_bytes = disk.sector_bytes() < 4096 && below(2) == 0 ? 1024 : 4096;
-  options_.log_bytes = 4096 << below(6);  // so that the log is carried into the file every few rows
+  options_.log_bytes = 4096 << below(6);  // so that the log is carried into the file every few entries
   if (seed % 2 == 0)
     options_.keys = std::make_shared<const SigningKeys>(SigningKey::from_seed({static_cast<std::uint8_t>(seed)}));
 }
@@ -162,29 +162,29 @@ bool JournalWriter::work(int count) {
 }
 
 void JournalWriter::check() {
-  std::vector<JournalRow> rows;
-  const Result<void> read = journal_->read(RoomSeq{1}, [&](const JournalRow& row) {
-    rows.push_back(row);
+  std::vector<JournalEntry> entries;
+  const Result<void> read = journal_->read(RoomSeq{1}, [&](const JournalEntry& entry) {
+    entries.push_back(entry);
     return true;
   });
   if (!read) fault("cannot be read: " + read.error().message);
   const std::size_t promised = acknowledged_.size();
-  for (std::size_t i = 0; i < std::min(rows.size(), promised); ++i)
-    if (!same(rows[i], acknowledged_[i])) fault("row " + std::to_string(i + 1) + " differs");
-  if (rows.size() < promised) {
-    lost_ += promised - rows.size();
-    fault("rows " + std::to_string(rows.size() + 1) + " to " + std::to_string(promised) + " are lost");
+  for (std::size_t i = 0; i < std::min(entries.size(), promised); ++i)
+    if (!same(entries[i], acknowledged_[i])) fault("entry " + std::to_string(i + 1) + " differs");
+  if (entries.size() < promised) {
+    lost_ += promised - entries.size();
+    fault("entries " + std::to_string(entries.size() + 1) + " to " + std::to_string(promised) + " are lost");
   }
   // A batch that was not acknowledged is there as a whole or not at all.
-  if (rows.size() > promised) {
-    kept_unasked_ += rows.size() - promised;
-    bool whole = rows.size() == promised + asked_.size();
-    for (std::size_t i = 0; whole && i < asked_.size(); ++i) whole = same(rows[promised + i], asked_[i]);
-    if (!whole) fault("there are rows that nobody asked for, or half of those that were");
+  if (entries.size() > promised) {
+    kept_unasked_ += entries.size() - promised;
+    bool whole = entries.size() == promised + asked_.size();
+    for (std::size_t i = 0; whole && i < asked_.size(); ++i) whole = same(entries[promised + i], asked_[i]);
+    if (!whole) fault("there are entries that nobody asked for, or half of those that were");
   }
   asked_.clear();
-  acknowledged_ = std::move(rows);
-  if (plain_head(genesis_, acknowledged_) != journal_->head()) fault("the chain is another than that of the rows");
+  acknowledged_ = std::move(entries);
+  if (plain_head(genesis_, acknowledged_) != journal_->head()) fault("the chain is another than that of the entries");
 
   const auto people = journal_->people();
   if (!people) return fault(people.error().message);
@@ -213,7 +213,7 @@ void JournalWriter::check() {
 
 void JournalWriter::check_failed() {
   if (!journal_ || journal_->closed_because() == nullptr) return;
-  const JournalRow next{RoomSeq{journal_->head().place.value + 1}, 0, "late"};
+  const JournalEntry next{RoomSeq{journal_->head().place.value + 1}, 0, "late"};
   if (journal_->append({&next, 1}) || journal_->next_server_epoch()) fault("goes on after a write that failed");
 }
 

@@ -14,7 +14,7 @@
 namespace osteon::test {
 
 // The chain of hashes, computed by another road than the journal's.
-[[nodiscard]] JournalHead plain_head(const std::string& genesis, const std::vector<JournalRow>& rows);
+[[nodiscard]] JournalHead plain_head(const std::string& genesis, const std::vector<JournalEntry>& entries);
 
 // Someone who writes to a journal all that can be written, and knows what was promised.
 class JournalWriter {
@@ -36,12 +36,12 @@ class JournalWriter {
   [[nodiscard]] Journal& journal() { return *journal_; }
   [[nodiscard]] bool is_open() const { return journal_.has_value(); }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
-  [[nodiscard]] const std::vector<JournalRow>& acknowledged() const { return acknowledged_; }
-  [[nodiscard]] const std::vector<JournalRow>& asked() const { return asked_; }  // of an append that failed
+  [[nodiscard]] const std::vector<JournalEntry>& acknowledged() const { return acknowledged_; }
+  [[nodiscard]] const std::vector<JournalEntry>& asked() const { return asked_; }  // of an append that failed
   [[nodiscard]] std::uint64_t lost() const { return lost_; }
   [[nodiscard]] std::uint64_t kept_unasked() const {
     return kept_unasked_;
-  }  // rows that were not acknowledged, yet are there
+  }  // entries that were not acknowledged, yet are there
   [[nodiscard]] const std::vector<std::string>& faults() const { return faults_; }
 
  private:
@@ -57,7 +57,7 @@ class JournalWriter {
   std::string genesis_;
   std::optional<Journal> journal_;
   bool made_ = false;
-  std::vector<JournalRow> acknowledged_, asked_;  // asked: the batch in whose midst the disk failed
+  std::vector<JournalEntry> acknowledged_, asked_;  // asked: the batch in whose midst the disk failed
   std::uint64_t epoch_ = 0;
   std::map<std::string, Person> people_;
   std::optional<std::string> person_asked_;  // may be there in either way
@@ -69,13 +69,13 @@ class JournalWriter {
 
 struct Tally {
   std::uint64_t trials = 0;
-  std::uint64_t acknowledged = 0;  // rows
-  std::uint64_t recovered = 0;     // rows found again, those not acknowledged included
+  std::uint64_t acknowledged = 0;  // entries
+  std::uint64_t recovered = 0;     // entries found again, those not acknowledged included
   std::uint64_t kept_unasked = 0;
-  std::uint64_t lost = 0;           // acknowledged rows that were gone
+  std::uint64_t lost = 0;           // acknowledged entries that were gone
   std::uint64_t failed = 0;         // trials in which the disk did fail
-  std::uint64_t closed = 0;         // openings of a journal that said why it takes no more rows
-  std::uint64_t bad_trials = 0;     // with lost rows or anything else that must not be
+  std::uint64_t closed = 0;         // openings of a journal that said why it takes no more entries
+  std::uint64_t bad_trials = 0;     // with lost entries or anything else that must not be
   std::vector<std::string> faults;  // the first few, with their seeds
 };
 

@@ -60,12 +60,12 @@ Names allowed(Role role) {
 TEST(RoleTable, HasARowForEveryCallOfTheProtocolAndNoOther) {
   const Names compiled = compiled_calls();
   ASSERT_GT(compiled.size(), 30u);
-  Names rows;
-  for (const CallRow& row : call_rows())
-    EXPECT_TRUE(rows.insert(std::string(row.method)).second) << row.method << " has two rows";
+  Names entries;
+  for (const CallRow& entry : call_entries())
+    EXPECT_TRUE(entries.insert(std::string(entry.method)).second) << entry.method << " has two entries";
   for (const std::string& call : compiled)
-    EXPECT_TRUE(rows.contains(call)) << call << " has no row in common/access/role_table.cpp";
-  for (const std::string& row : rows) EXPECT_TRUE(compiled.contains(row)) << row << " is no call of the protocol";
+    EXPECT_TRUE(entries.contains(call)) << call << " has no entry in common/access/role_table.cpp";
+  for (const std::string& entry : entries) EXPECT_TRUE(compiled.contains(entry)) << entry << " is no call of the protocol";
 }
 
 TEST(RoleTable, LetsEveryRoleCallWhatItIsFor) {

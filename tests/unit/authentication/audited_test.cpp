@@ -236,9 +236,9 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
 // What only some may do is recorded, but for what is in the room's own journal or says nothing of anybody.
 TEST(AuditedCalls, AreAllThatOnlyInstructorsOrOperatorsMayMake) {
   const std::set<std::string_view> without{"Annotate", "ListRooms", "ListCases"};
-  for (const CallRow& row : call_rows()) {
-    const bool is_everybodys = row.roles.has(Role::trainee);
-    if (!is_everybodys && !without.contains(call_name(row.method))) EXPECT_TRUE(is_audited(row.method)) << row.method;
+  for (const CallRow& entry : call_entries()) {
+    const bool is_everybodys = entry.roles.has(Role::trainee);
+    if (!is_everybodys && !without.contains(call_name(entry.method))) EXPECT_TRUE(is_audited(entry.method)) << entry.method;
   }
 }
 

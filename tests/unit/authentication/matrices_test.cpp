@@ -225,7 +225,7 @@ class Line {
     v1::DownPacket packet;
     ASSERT_TRUE(packet.ParseFromArray(plain.data(), static_cast<int>(plain.size())));
     if (packet.acknowledged() > 0) seen.insert("acknowledgements");
-    for (const v1::RowRun& rows : packet.rows()) seen.insert(rows.author() == me ? "own row" : "committed_cuts");
+    for (const v1::EntryRun& entries : packet.entries()) seen.insert(entries.author() == me ? "own entry" : "committed_cuts");
     if (packet.partners_size() > 0) seen.insert("partners");
     if (packet.supervised_size() > 0) seen.insert("supervision");
     if (packet.has_bone()) seen.insert("bone_seen");
@@ -392,7 +392,7 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
     // Down.
     sue_cuts();
     decide_about(hand.room.author);
-    for (const char* what : {"acknowledgements", "own row", "committed_cuts", "partners", "supervision", "bone_seen"})
+    for (const char* what : {"acknowledgements", "own entry", "committed_cuts", "partners", "supervision", "bone_seen"})
       EXPECT_TRUE(line.drive([&] { return sue_moves(), line.seen.contains(what); }, 10s)) << "does not come: " << what;
 
     // And none of it any more from the moment on when the role is another, though the hand sends on and reads on.

@@ -102,7 +102,7 @@ v1::SessionResponse row(std::uint64_t index, std::uint64_t place, std::uint64_t 
 }
 wire::IndexedRow fast(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
   return {index,
-          {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::committed, .cut = cut_of(author, author_seq)}};
+          {.room_seq = RoomSeq{place}, .kind = wire::SessionEntryKind::committed, .cut = cut_of(author, author_seq)}};
 }
 
 TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
@@ -119,10 +119,10 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   ASSERT_TRUE(heard.reader.take(fast(1, 10, 2, 1)));
   // A change of the scene comes over the stream alone; what the fast path has after it waits.
   ASSERT_TRUE(
-      heard.reader.take(wire::IndexedRow{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionRowKind::streamed}}));
+      heard.reader.take(wire::IndexedRow{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionEntryKind::streamed}}));
   ASSERT_TRUE(heard.reader.take(wire::IndexedRow{4,
                                                  {.room_seq = RoomSeq{13},
-                                                  .kind = wire::SessionRowKind::rejected,
+                                                  .kind = wire::SessionEntryKind::rejected,
                                                   .author_seq = 7,
                                                   .reason = static_cast<std::uint32_t>(Rejection::place),
                                                   .lease_epoch = 14}}));
@@ -161,7 +161,7 @@ TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
 
 wire::IndexedRow word(std::uint64_t index, std::uint64_t place, bool stopped) {
   wire::IndexedRow row{
-      index, {.room_seq = RoomSeq{place}, .kind = wire::SessionRowKind::supervised, .lease_epoch = place + 1}};
+      index, {.room_seq = RoomSeq{place}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = place + 1}};
   row.row.supervision.stopped = stopped;
   return row;
 }

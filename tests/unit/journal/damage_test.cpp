@@ -7,7 +7,7 @@
 #include "server/journal/maintenance.hpp"
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
-#include "tests/unit/journal/rows.hpp"
+#include "tests/unit/journal/entries.hpp"
 
 namespace osteon {
 namespace {
@@ -28,11 +28,11 @@ struct Outcomes {
 
 class DamageTest : public ::testing::TestWithParam<bool> {
  protected:
-  // Small pages keep it small. `closed`: with a footer and without a log; else all but the first rows are in the log.
+  // Small pages keep it small. `closed`: with a footer and without a log; else all but the first entries are in the log.
   void SetUp() override {
     Journal journal =
         std::move(Journal::create(kFile, "bone", {.disk = &disk_, .log_bytes = kLogBytes, .page_bytes = 512}).value());
-    append(journal, rows_, 0, 8);
+    append(journal, entries_, 0, 8);
     ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
     ASSERT_TRUE(journal.next_server_epoch());
     auto file = journal.begin_checkpoint(journal.head(), "meta");
@@ -40,15 +40,15 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
     ASSERT_TRUE(journal.close());
     journal = std::move(Journal::open(kFile, {.disk = &disk_, .log_bytes = kLogBytes}).value());
-    append(journal, rows_, 8, 10);
-    append(journal, rows_, 10, 11);
-    append(journal, rows_, 11, 12);
+    append(journal, entries_, 8, 10);
+    append(journal, entries_, 10, 11);
+    append(journal, entries_, 11, 12);
     if (GetParam()) {
       ASSERT_TRUE(journal.close());
     }
   }
   void TearDown() override {
-    std::printf("%s: %d whole, %d closed to rows, %d refused, %d behind a client; verify found %d\n",
+    std::printf("%s: %d whole, %d closed to entries, %d refused, %d behind a client; verify found %d\n",
                 GetParam() ? "closed" : "killed", outcomes_.whole, outcomes_.closed, outcomes_.refused,
                 outcomes_.behind, outcomes_.found);
     EXPECT_GT(outcomes_.whole, 0);
@@ -73,15 +73,15 @@ class DamageTest : public ::testing::TestWithParam<bool> {
       return;
     }
     // Rows may be missing at the end, never differ.
-    const std::vector<JournalRow> rows = rows_of(*opened);
-    ASSERT_LE(rows.size(), rows_.size());
-    ASSERT_TRUE(equal(rows, {rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(rows.size())}));
+    const std::vector<JournalEntry> entries = entries_of(*opened);
+    ASSERT_LE(entries.size(), entries_.size());
+    ASSERT_TRUE(equal(entries, {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(entries.size())}));
     if (opened->closed_because() != nullptr) {
       ++outcomes_.closed;
       ASSERT_FALSE(report && report->sound());
       return;
     }
-    if (rows.size() < rows_.size()) {
+    if (entries.size() < entries_.size()) {
       ++outcomes_.behind;
       ASSERT_EQ(opened->check_witness(head_).error().code, ErrorCode::unavailable);
       ASSERT_NE(opened->closed_because(), nullptr);
@@ -93,20 +93,20 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     ASSERT_EQ(opened->people().value(), (std::vector<Person>{{"p1", "Anna", 20000}}));
     const std::vector<Checkpoint> checkpoints = opened->checkpoints().value();
     for (const Checkpoint& checkpoint : checkpoints) {
-      ASSERT_EQ(checkpoint.at, plain_head("bone", {rows_.begin(), rows_.begin() + 8}));
+      ASSERT_EQ(checkpoint.at, plain_head("bone", {entries_.begin(), entries_.begin() + 8}));
       ASSERT_EQ(checkpoint.meta, "meta");
       if (const auto bytes = opened->read_checkpoint(checkpoint)) {
         ASSERT_EQ(*bytes, "the room at place 8");
       }
     }
     ASSERT_EQ(opened->next_server_epoch().value(), 2u);
-    const JournalRow next{RoomSeq{13}, 0, "next"};
+    const JournalEntry next{RoomSeq{13}, 0, "next"};
     ASSERT_TRUE(opened->append({&next, 1}));
   }
 
   MemoryDisk disk_{1, 512};
-  std::vector<JournalRow> rows_ = some_rows(20, 12, 60);
-  JournalHead head_ = plain_head("bone", rows_);
+  std::vector<JournalEntry> entries_ = some_entries(20, 12, 60);
+  JournalHead head_ = plain_head("bone", entries_);
   Outcomes outcomes_;
 };
 

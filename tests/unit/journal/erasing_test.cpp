@@ -1,11 +1,11 @@
-// Rows of which something was erased: the chain and its signatures still hold, and nobody else can replace a row.
+// Rows of which something was erased: the chain and its signatures still hold, and nobody else can replace a entry.
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
 #include "server/journal/journal_file.hpp"
 #include "server/journal/maintenance.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/journal/rows.hpp"
+#include "tests/unit/journal/entries.hpp"
 
 namespace osteon {
 namespace {
@@ -24,11 +24,11 @@ class ErasingTest : public ::testing::Test {
   void make(std::shared_ptr<const SigningKeys> keys) const {
     auto journal = Journal::create(file_, "genesis", {.keys = std::move(keys)});
     ASSERT_TRUE(journal) << journal.error().message;
-    append(*journal, rows_, 0, rows_.size());
+    append(*journal, entries_, 0, entries_.size());
     ASSERT_TRUE(journal->close());
   }
-  static std::optional<std::string> every_third(const JournalRow& row) {
-    return row.place.value % 3 == 0 ? std::optional<std::string>("-") : std::nullopt;
+  static std::optional<std::string> every_third(const JournalEntry& entry) {
+    return entry.place.value % 3 == 0 ? std::optional<std::string>("-") : std::nullopt;
   }
   void sql(const std::string& what) const {
     sqlite3* database = nullptr;
@@ -39,7 +39,7 @@ class ErasingTest : public ::testing::Test {
 
   const test::TempDir temp_;
   const fs::path file_ = temp_ / "room.journal";
-  const std::vector<JournalRow> rows_ = some_rows(1, 90);
+  const std::vector<JournalEntry> entries_ = some_entries(1, 90);
   const std::shared_ptr<const SigningKeys> keys_ = std::make_shared<const SigningKeys>(SigningKey::make());
 };
 
@@ -47,7 +47,7 @@ TEST_F(ErasingTest, TheChainAndItsSignaturesHold) {
   make(keys_);
   Journal journal = open(keys_);
   const JournalHead head = journal.head();
-  EXPECT_EQ(journal.erase_rows(every_third).value(), 30u);
+  EXPECT_EQ(journal.erase_entries(every_third).value(), 30u);
   EXPECT_EQ(journal.head(), head);
   ASSERT_TRUE(journal.close());
   const auto report = verify_journal(file_);
@@ -56,15 +56,15 @@ TEST_F(ErasingTest, TheChainAndItsSignaturesHold) {
   EXPECT_TRUE(vouched_by(keys_->key().public_key(), *report).all());
   Journal again = open(keys_);
   EXPECT_EQ(again.closed_because(), nullptr);
-  EXPECT_EQ(rows_of(again)[2].bytes, "-");
-  EXPECT_EQ(rows_of(again)[3].bytes, rows_[3].bytes);
+  EXPECT_EQ(entries_of(again)[2].bytes, "-");
+  EXPECT_EQ(entries_of(again)[3].bytes, entries_[3].bytes);
 }
 
 TEST_F(ErasingTest, WithoutTheKeyNothingIsErased) {
   make(keys_);
   {
     Journal journal = open(nullptr);
-    const auto erased = journal.erase_rows(every_third);
+    const auto erased = journal.erase_entries(every_third);
     ASSERT_FALSE(erased);
     EXPECT_EQ(erased.error().code, ErrorCode::denied);
     EXPECT_THAT(erased.error().message, HasSubstr("--signing-key"));
@@ -72,16 +72,16 @@ TEST_F(ErasingTest, WithoutTheKeyNothingIsErased) {
   }
   auto journal = Journal::open_to_read(file_);
   ASSERT_TRUE(journal);
-  EXPECT_TRUE(equal(rows_of(*journal), rows_));
+  EXPECT_TRUE(equal(entries_of(*journal), entries_));
 }
 
-// Whoever can write the file puts something in place of a row, and says itself that it was erased.
+// Whoever can write the file puts something in place of a entry, and says itself that it was erased.
 TEST_F(ErasingTest, AServerTakesNoRowsThatSomebodyElseReplaced) {
   make(keys_);
   {
     auto file = JournalFile::open(file_, system_disk(), {});
     ASSERT_TRUE(file) << file.error().message;
-    const std::vector<JournalRow> other{{RoomSeq{3}, rows_[2].at_ns, "other"}};
+    const std::vector<JournalEntry> other{{RoomSeq{3}, entries_[2].at_ns, "other"}};
     ASSERT_TRUE(file->erase(other));
     ASSERT_TRUE(file->database().commit());
     ASSERT_TRUE(file->database().carry_log());
@@ -89,7 +89,7 @@ TEST_F(ErasingTest, AServerTakesNoRowsThatSomebodyElseReplaced) {
   EXPECT_FALSE(vouched_by(keys_->key().public_key(), *verify_journal(file_)).all());
   Journal journal = open(keys_);
   ASSERT_NE(journal.closed_because(), nullptr);
-  EXPECT_THAT(journal.closed_because()->message, HasSubstr("replaced rows"));
+  EXPECT_THAT(journal.closed_because()->message, HasSubstr("replaced entries"));
 }
 
 // Also not within what the server has erased itself.
@@ -97,15 +97,15 @@ TEST_F(ErasingTest, WhatStandsInPlaceOfARowIsSealed) {
   make(keys_);
   {
     Journal journal = open(keys_);
-    ASSERT_EQ(journal.erase_rows(every_third).value(), 30u);
+    ASSERT_EQ(journal.erase_entries(every_third).value(), 30u);
     ASSERT_TRUE(journal.close());
   }
-  sql("UPDATE rows SET bytes = CAST('other' AS BLOB) WHERE place = 3");
+  sql("UPDATE entries SET bytes = CAST('other' AS BLOB) WHERE place = 3");
   const auto report = verify_journal(file_);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{3});
-  sql("UPDATE rows SET bytes = CAST('-' AS BLOB) WHERE place = 3; UPDATE registers SET value = CAST('' AS BLOB) WHERE "
-      "name = 'erased rows'");
+  sql("UPDATE entries SET bytes = CAST('-' AS BLOB) WHERE place = 3; UPDATE registers SET value = CAST('' AS BLOB) WHERE "
+      "name = 'erased entries'");
   EXPECT_FALSE(verify_journal(file_)->sound());
 }
 

@@ -14,7 +14,7 @@
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/privileges.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/journal/rows.hpp"
+#include "tests/unit/journal/entries.hpp"
 
 namespace osteon {
 namespace {
@@ -48,26 +48,26 @@ TEST(JournalChain, IsTheOneThatIsWrittenDown) {
 }
 
 TEST_F(JournalTest, GivesBackWhatItWasGivenAfterItsProcessWasKilledAndAfterItWasClosed) {
-  const std::vector<JournalRow> rows = some_rows(1, 40);
+  const std::vector<JournalEntry> entries = some_entries(1, 40);
   {
     Journal journal = create();
-    append(journal, rows, 0, 20);
+    append(journal, entries, 0, 20);
   }
   {
     Journal journal = reopen();
     EXPECT_EQ(journal.closed_because(), nullptr);
     EXPECT_EQ(journal.genesis(), "bone");
-    EXPECT_EQ(journal.head(), plain_head("bone", {rows.begin(), rows.begin() + 20}));
-    append(journal, rows, 20, 40);
+    EXPECT_EQ(journal.head(), plain_head("bone", {entries.begin(), entries.begin() + 20}));
+    append(journal, entries, 20, 40);
     ASSERT_TRUE(journal.close());
   }
   EXPECT_THAT(disk_.image(), SizeIs(1)) << "closed, it is one file";
   Journal journal = reopen();
-  EXPECT_EQ(journal.head(), plain_head("bone", rows));
-  EXPECT_TRUE(equal(rows_of(journal), rows));
-  EXPECT_TRUE(equal(rows_of(journal, 33), {rows.begin() + 32, rows.end()}));
+  EXPECT_EQ(journal.head(), plain_head("bone", entries));
+  EXPECT_TRUE(equal(entries_of(journal), entries));
+  EXPECT_TRUE(equal(entries_of(journal, 33), {entries.begin() + 32, entries.end()}));
   int taken = 0;
-  ASSERT_TRUE(journal.read(RoomSeq{5}, [&](const JournalRow&) { return ++taken < 3; }));
+  ASSERT_TRUE(journal.read(RoomSeq{5}, [&](const JournalEntry&) { return ++taken < 3; }));
   EXPECT_EQ(taken, 3);
 }
 
@@ -92,33 +92,33 @@ TEST_F(JournalTest, IsMadeOnceAndOpenedOnlyWhereItIs) {
 
 TEST_F(JournalTest, TakesNoRowAboveTheLimitAndGoesOn) {
   JournalOptions small = options();
-  small.most_row_bytes = 100;
+  small.most_entry_bytes = 100;
   Journal journal = std::move(Journal::create(kFile, "bone", small).value());
-  const std::vector<JournalRow> rows{{RoomSeq{1}, 0, std::string(100, 'a')}, {RoomSeq{2}, 0, std::string(101, 'b')}};
-  const Result<void> refused = journal.append(rows);
+  const std::vector<JournalEntry> entries{{RoomSeq{1}, 0, std::string(100, 'a')}, {RoomSeq{2}, 0, std::string(101, 'b')}};
+  const Result<void> refused = journal.append(entries);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
-  EXPECT_THAT(refused.error().message, HasSubstr("row 2 has 101 bytes"));
+  EXPECT_THAT(refused.error().message, HasSubstr("entry 2 has 101 bytes"));
   EXPECT_EQ(journal.head().place, RoomSeq{0});
   EXPECT_EQ(journal.closed_because(), nullptr);
-  EXPECT_TRUE(journal.append({rows.data(), 1}));
+  EXPECT_TRUE(journal.append({entries.data(), 1}));
 }
 
 TEST_F(JournalTest, AbortsOnAPlaceThatDoesNotGoOn) {
   Journal journal = create();
-  const JournalRow skipping{RoomSeq{2}, 0, ""};
+  const JournalEntry skipping{RoomSeq{2}, 0, ""};
   EXPECT_DEATH(static_cast<void>(journal.append({&skipping, 1})), "broken promise");
 }
 
 TEST_F(JournalTest, HoldsWitnessesAgainstItsHistory) {
-  const std::vector<JournalRow> rows = some_rows(2, 5);
+  const std::vector<JournalEntry> entries = some_entries(2, 5);
   Journal journal = create();
-  append(journal, rows, 0, 5);
-  for (std::size_t n = 0; n <= rows.size(); ++n)
+  append(journal, entries, 0, 5);
+  for (std::size_t n = 0; n <= entries.size(); ++n)
     EXPECT_TRUE(
-        journal.check_witness(plain_head("bone", {rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(n)})));
+        journal.check_witness(plain_head("bone", {entries.begin(), entries.begin() + static_cast<std::ptrdiff_t>(n)})));
 
-  const Result<void> other = journal.check_witness(plain_head("other bone", {rows.begin(), rows.begin() + 3}));
+  const Result<void> other = journal.check_witness(plain_head("other bone", {entries.begin(), entries.begin() + 3}));
   ASSERT_FALSE(other);
   EXPECT_EQ(other.error().code, ErrorCode::invalid_input);
   EXPECT_EQ(journal.closed_because(), nullptr) << "one client's mistake closes no room";
@@ -128,19 +128,19 @@ TEST_F(JournalTest, HoldsWitnessesAgainstItsHistory) {
   EXPECT_EQ(ahead.error().code, ErrorCode::unavailable);
   EXPECT_THAT(ahead.error().message, HasSubstr("goes to place 5, but a client was told that place 6 is safe"));
   ASSERT_NE(journal.closed_because(), nullptr);
-  const JournalRow next{RoomSeq{6}, 0, ""};
+  const JournalEntry next{RoomSeq{6}, 0, ""};
   EXPECT_FALSE(journal.append({&next, 1}));
   EXPECT_FALSE(journal.next_server_epoch());
-  EXPECT_TRUE(equal(rows_of(journal), rows)) << "it can still be read";
+  EXPECT_TRUE(equal(entries_of(journal), entries)) << "it can still be read";
 }
 
 TEST_F(JournalTest, KeepsTheNewestTwoCheckpoints) {
-  const std::vector<JournalRow> rows = some_rows(3, 4);
+  const std::vector<JournalEntry> entries = some_entries(3, 4);
   std::vector<JournalHead> heads;
   {
     Journal journal = create();
-    for (std::size_t n = 0; n < rows.size(); ++n) {
-      append(journal, rows, n, n + 1);
+    for (std::size_t n = 0; n < entries.size(); ++n) {
+      append(journal, entries, n, n + 1);
       heads.push_back(journal.head());
       auto file = journal.begin_checkpoint(journal.head(), "meta " + std::to_string(n));
       ASSERT_TRUE(file);
@@ -177,15 +177,15 @@ TEST_F(JournalTest, KeepsTheNewestTwoCheckpoints) {
 
 // The file of an earlier day, and a checkpoint that knows more: the log with what was between them is lost.
 TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
-  const std::vector<JournalRow> rows = some_rows(4, 9);
+  const std::vector<JournalEntry> entries = some_entries(4, 9);
   MemoryDisk::Image earlier;
   {
     Journal journal = create();
-    append(journal, rows, 0, 5);
+    append(journal, entries, 0, 5);
     ASSERT_TRUE(journal.close());
     earlier = disk_.image();
     Journal later = reopen();
-    append(later, rows, 5, 9);
+    append(later, entries, 5, 9);
     auto file = later.begin_checkpoint(later.head(), "");
     ASSERT_TRUE(file && file->finish() && later.add_checkpoint(std::move(*file)));
     ASSERT_TRUE(later.close());
@@ -196,9 +196,9 @@ TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
     ASSERT_NE(journal.closed_because(), nullptr);
     EXPECT_EQ(journal.closed_because()->code, ErrorCode::unavailable);
     EXPECT_THAT(journal.closed_because()->message, HasSubstr("goes to place 5"));
-    EXPECT_THAT(journal.closed_because()->message, HasSubstr("vouches for place 9: 4 rows are missing"));
-    EXPECT_TRUE(equal(rows_of(journal), {rows.begin(), rows.begin() + 5}));
-    EXPECT_FALSE(journal.append({&rows[5], 1}));
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("vouches for place 9: 4 entries are missing"));
+    EXPECT_TRUE(equal(entries_of(journal), {entries.begin(), entries.begin() + 5}));
+    EXPECT_FALSE(journal.append({&entries[5], 1}));
   }
   const auto report = recover_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(report) << report.error().message;
@@ -207,9 +207,9 @@ TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
   Journal journal = std::move(Journal::open("/room/new", options()).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
   EXPECT_EQ(journal.recovered_to(), RoomSeq{5});
-  EXPECT_EQ(journal.check_witness(plain_head("bone", rows)).error().code, ErrorCode::unavailable);
+  EXPECT_EQ(journal.check_witness(plain_head("bone", entries)).error().code, ErrorCode::unavailable);
   EXPECT_EQ(journal.closed_because(), nullptr) << "the loss is known and was accepted";
-  append(journal, rows, 5, 6);
+  append(journal, entries, 5, 6);
 }
 
 TEST_F(JournalTest, NeverGivesAServerEpochTwice) {
@@ -232,18 +232,18 @@ TEST_F(JournalTest, NeverGivesAServerEpochTwice) {
 }
 
 TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
-  const std::vector<JournalRow> rows = some_rows(5, 4);
+  const std::vector<JournalEntry> entries = some_entries(5, 4);
   {
     Journal journal = create();
-    append(journal, rows, 0, 2);
+    append(journal, entries, 0, 2);
     disk_.fail_sync_at(1, EIO);
-    const Result<void> failed = journal.append({&rows[2], 1});
+    const Result<void> failed = journal.append({&entries[2], 1});
     ASSERT_FALSE(failed);
     EXPECT_EQ(failed.error().code, ErrorCode::unavailable);
     EXPECT_THAT(failed.error().message, HasSubstr("cannot sync /room/journal-log: Input/output error"));
-    EXPECT_EQ(journal.append({&rows[2], 1}).error().message, failed.error().message);
+    EXPECT_EQ(journal.append({&entries[2], 1}).error().message, failed.error().message);
     EXPECT_EQ(journal.head().place, RoomSeq{2});
-    EXPECT_TRUE(equal(rows_of(journal), {rows.begin(), rows.begin() + 2}));
+    EXPECT_TRUE(equal(entries_of(journal), {entries.begin(), entries.begin() + 2}));
   }
   {
     Journal journal = reopen();
@@ -258,7 +258,7 @@ TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
 
 // Linux shows pages as written whose write has failed; a page that is read again then is as it was, or empty.
 TEST(JournalAfterAFailedWrite, BlamesItselfAndNoClientForWhatItsFileShows) {
-  const std::vector<JournalRow> rows = some_rows(8, 60);
+  const std::vector<JournalEntry> entries = some_entries(8, 60);
   int failed = 0, shown_otherwise = 0;
   for (std::uint64_t seed = 1; seed <= 40; ++seed) {
     MemoryDisk disk(seed, 512);
@@ -266,12 +266,12 @@ TEST(JournalAfterAFailedWrite, BlamesItselfAndNoClientForWhatItsFileShows) {
         std::move(Journal::create(kFile, "bone", {.disk = &disk, .log_bytes = 8 << 10, .page_bytes = 1024}).value());
     disk.fail_at(10 + 5 * seed, EIO);
     std::size_t safe = 0;
-    while (safe < rows.size() && journal.append({&rows[safe], 1})) ++safe;
+    while (safe < entries.size() && journal.append({&entries[safe], 1})) ++safe;
     if (journal.closed_because() == nullptr) continue;
     ++failed;
     for (std::size_t n = 1; n <= safe; ++n) {
-      const auto end = rows.begin() + static_cast<std::ptrdiff_t>(n);
-      const Result<void> known = journal.check_witness(plain_head("bone", {rows.begin(), end}));
+      const auto end = entries.begin() + static_cast<std::ptrdiff_t>(n);
+      const Result<void> known = journal.check_witness(plain_head("bone", {entries.begin(), end}));
       if (known) continue;
       ++shown_otherwise;
       ASSERT_EQ(known.error().message, journal.closed_because()->message) << "seed " << seed << ", place " << n;
@@ -284,8 +284,8 @@ TEST(JournalAfterAFailedWrite, BlamesItselfAndNoClientForWhatItsFileShows) {
 TEST_F(JournalTest, SaysThatTheDiskIsFull) {
   Journal journal = create();
   disk_.fail_write_at(1, ENOSPC, MemoryDisk::Lasting::from_then_on);
-  const JournalRow row{RoomSeq{1}, 0, "x"};
-  const Result<void> failed = journal.append({&row, 1});
+  const JournalEntry entry{RoomSeq{1}, 0, "x"};
+  const Result<void> failed = journal.append({&entry, 1});
   ASSERT_FALSE(failed);
   EXPECT_THAT(failed.error().message, HasSubstr("No space left on device"));
   EXPECT_THAT(failed.error().message, HasSubstr("make room on the disk"));
@@ -295,9 +295,9 @@ TEST_F(JournalTest, KeepsItsLogShort) {
   JournalOptions short_log = options();
   short_log.log_bytes = 64 << 10;
   Journal journal = std::move(Journal::create(kFile, "bone", short_log).value());
-  const std::vector<JournalRow> rows = some_rows(6, 600);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    append(journal, rows, i, i + 1);
+  const std::vector<JournalEntry> entries = some_entries(6, 600);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    append(journal, entries, i, i + 1);
     for (const char* name : {"/room/journal-log", "/room/journal-mirror"}) {
       EXPECT_GE(disk_.size(name).value().value(), 4096u + (64 << 10)) << "made as long as it gets";
       EXPECT_LT(disk_.size(name).value().value(), 4096u + (64 << 10) + 500) << "and one append";
@@ -307,38 +307,38 @@ TEST_F(JournalTest, KeepsItsLogShort) {
 }
 
 TEST_F(JournalTest, CutsItsLogWhenItIsTidied) {
-  const std::vector<JournalRow> rows = some_rows(9, 300, 10'000);
+  const std::vector<JournalEntry> entries = some_entries(9, 300, 10'000);
   {
     Journal journal = create();
-    const auto in_database = [&](std::size_t row) {
-      return disk_.image().at(kFile).find(rows[row].bytes.substr(0, 64)) != std::string::npos;
+    const auto in_database = [&](std::size_t entry) {
+      return disk_.image().at(kFile).find(entries[entry].bytes.substr(0, 64)) != std::string::npos;
     };
-    append(journal, rows, 0, 4);
+    append(journal, entries, 0, 4);
     ASSERT_TRUE(journal.tidy());
-    EXPECT_FALSE(in_database(3)) << "a few rows can wait";
-    append(journal, rows, 4, 40);
+    EXPECT_FALSE(in_database(3)) << "a few entries can wait";
+    append(journal, entries, 4, 40);
     ASSERT_TRUE(journal.tidy());
     EXPECT_TRUE(in_database(39));
-    append(journal, rows, 40, 300);
-    EXPECT_TRUE(equal(rows_of(journal), rows));
+    append(journal, entries, 40, 300);
+    EXPECT_TRUE(equal(entries_of(journal), entries));
   }
   Journal journal = reopen();
   EXPECT_EQ(journal.closed_because(), nullptr);
-  EXPECT_TRUE(equal(rows_of(journal), rows));
+  EXPECT_TRUE(equal(entries_of(journal), entries));
 }
 
-// Of a journal whose rows SQLite has in memory.
+// Of a journal whose entries SQLite has in memory.
 TEST_F(JournalTest, AVerifyOfOneInUseReadsTheDisk) {
-  const std::vector<JournalRow> rows = some_rows(11, 30);
+  const std::vector<JournalEntry> entries = some_entries(11, 30);
   {
     Journal journal = create();
-    append(journal, rows, 0, 30);
+    append(journal, entries, 0, 30);
     ASSERT_TRUE(journal.close());
   }
   Journal journal = reopen();
   ASSERT_TRUE(verify_journal(journal)->sound());
-  ASSERT_GT(rows[19].bytes.size(), 8u);
-  const std::size_t at = disk_.image().at(kFile).find(rows[19].bytes);
+  ASSERT_GT(entries[19].bytes.size(), 8u);
+  const std::size_t at = disk_.image().at(kFile).find(entries[19].bytes);
   ASSERT_NE(at, std::string::npos);
   disk_.flip_bit(kFile, 8 * at + 3);
   const auto report = verify_journal(journal);
@@ -356,8 +356,8 @@ void forget(Journal& journal, int people, const std::function<std::size_t(std::s
     ASSERT_TRUE(journal.set_person(person));
   }
   ASSERT_TRUE(journal.set_person({"p0", name + " renamed", 101}));
-  const std::vector<JournalRow> rows = some_rows(7, 50);
-  append(journal, rows, 0, 50);
+  const std::vector<JournalEntry> entries = some_entries(7, 50);
+  append(journal, entries, 0, 50);
   EXPECT_GT(found(name), 0u);
   EXPECT_EQ(journal.forget_people_before(101).value(), static_cast<std::size_t>(people / 2 - 1));
   EXPECT_EQ(found(name + std::to_string(2)), 0u);
@@ -366,7 +366,7 @@ void forget(Journal& journal, int people, const std::function<std::size_t(std::s
   EXPECT_EQ(journal.forget_person("p0").value(), 0u);
   EXPECT_EQ(found(name), 0u);
   EXPECT_THAT(journal.people().value(), SizeIs(people / 2));
-  EXPECT_TRUE(equal(rows_of(journal), rows));
+  EXPECT_TRUE(equal(entries_of(journal), entries));
   EXPECT_TRUE(verify_journal(journal).value().sound());
 }
 
@@ -380,7 +380,7 @@ TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
   });
 }
 
-// Where the tree of a large table moves rows from page to page it leaves copies behind, a few in thousands of rows.
+// Where the tree of a large table moves entries from page to page it leaves copies behind, a few in thousands of entries.
 TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     std::mt19937_64 random(seed);
@@ -422,10 +422,10 @@ TEST(JournalOnDisk, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
 TEST(JournalOnDisk, WorksWithNamesThatAreNoWords) {
   const test::TempDir folder;
   const std::filesystem::path file = folder / "a room? 100%#1 'x' ü";
-  const std::vector<JournalRow> rows = some_rows(8, 30);
+  const std::vector<JournalEntry> entries = some_entries(8, 30);
   {
     Journal journal = std::move(Journal::create(file, "bone").value());
-    append(journal, rows, 0, 30);
+    append(journal, entries, 0, 30);
     auto checkpoint = journal.begin_checkpoint(journal.head(), "m");
     ASSERT_TRUE(checkpoint && checkpoint->write("bytes") && checkpoint->finish());
     ASSERT_TRUE(journal.add_checkpoint(std::move(*checkpoint)));
@@ -433,7 +433,7 @@ TEST(JournalOnDisk, WorksWithNamesThatAreNoWords) {
   EXPECT_TRUE(std::filesystem::exists(file));
   Journal journal = std::move(Journal::open(file).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
-  EXPECT_EQ(journal.head(), plain_head("bone", rows));
+  EXPECT_EQ(journal.head(), plain_head("bone", entries));
   EXPECT_EQ(journal.read_checkpoint(journal.checkpoints().value().front()).value(), "bytes");
 }
 

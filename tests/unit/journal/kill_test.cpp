@@ -13,7 +13,7 @@
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/journal/kill_rows.hpp"
+#include "tests/unit/journal/kill_entries.hpp"
 
 namespace osteon {
 namespace {
@@ -57,27 +57,27 @@ TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
       auto journal = Journal::open(file);
       ASSERT_TRUE(journal) << journal.error().message;
       ASSERT_EQ(journal->closed_because(), nullptr) << journal->closed_because()->message;
-      std::vector<JournalRow> rows;
-      ASSERT_TRUE(journal->read(RoomSeq{1}, [&](const JournalRow& row) {
-        rows.push_back(row);
+      std::vector<JournalEntry> entries;
+      ASSERT_TRUE(journal->read(RoomSeq{1}, [&](const JournalEntry& entry) {
+        entries.push_back(entry);
         return true;
       }));
-      ASSERT_GE(rows.size(), told);
-      ASSERT_LE(rows.size(), told + 4) << "more than the batch that was under way";
-      for (std::size_t i = 0; i < rows.size(); ++i) {
-        const JournalRow expected = kill_row(i + 1);
-        ASSERT_EQ(rows[i].place, expected.place);
-        ASSERT_EQ(rows[i].at_ns, expected.at_ns);
-        ASSERT_EQ(rows[i].bytes, expected.bytes);
+      ASSERT_GE(entries.size(), told);
+      ASSERT_LE(entries.size(), told + 4) << "more than the batch that was under way";
+      for (std::size_t i = 0; i < entries.size(); ++i) {
+        const JournalEntry expected = kill_entry(i + 1);
+        ASSERT_EQ(entries[i].place, expected.place);
+        ASSERT_EQ(entries[i].at_ns, expected.at_ns);
+        ASSERT_EQ(entries[i].bytes, expected.bytes);
       }
-      ASSERT_EQ(journal->head(), test::plain_head("bone", rows));
+      ASSERT_EQ(journal->head(), test::plain_head("bone", entries));
       for (const Checkpoint& checkpoint : journal->checkpoints().value_or(std::vector<Checkpoint>{}))
         ASSERT_TRUE(journal->read_checkpoint(checkpoint));
-      kept += rows.size() - told;
-      before = rows.size();
+      kept += entries.size() - told;
+      before = entries.size();
     }
   }
-  std::printf("%d kills, %lu rows acknowledged, %lu found, 0 lost\n", kKills, acknowledged, acknowledged + kept);
+  std::printf("%d kills, %lu entries acknowledged, %lu found, 0 lost\n", kKills, acknowledged, acknowledged + kept);
   EXPECT_GT(acknowledged, 5u * kKills);
 }
 

@@ -1,5 +1,5 @@
-// Appends rows to a journal until it is killed, and prints the place of each as soon as it is acknowledged:
-// journal_kill_writer FILE SEED. Each row is made from its place alone, so that whoever killed it knows what to find.
+// Appends entries to a journal until it is killed, and prints the place of each as soon as it is acknowledged:
+// journal_kill_writer FILE SEED. Each entry is made from its place alone, so that whoever killed it knows what to find.
 #include <unistd.h>
 
 #include <cstdio>
@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "server/journal/journal.hpp"
-#include "tests/unit/journal/kill_rows.hpp"
+#include "tests/unit/journal/kill_entries.hpp"
 
 int main(int argc, char** argv) {
   using namespace osteon;
@@ -25,9 +25,9 @@ int main(int argc, char** argv) {
   std::uint64_t place = journal->head().place.value;
   for (;;) {
     random = random * 6364136223846793005u + 1442695040888963407u;
-    std::vector<JournalRow> rows;
-    for (std::uint64_t i = 0; i <= (random >> 33) % 4; ++i) rows.push_back(kill_row(++place));
-    if (const auto done = journal->append(rows); !done) {
+    std::vector<JournalEntry> entries;
+    for (std::uint64_t i = 0; i <= (random >> 33) % 4; ++i) entries.push_back(kill_entry(++place));
+    if (const auto done = journal->append(entries); !done) {
       std::fprintf(stderr, "%s\n", done.error().message.c_str());
       return 1;
     }

@@ -1,4 +1,4 @@
-// The newest rows of a journal: what a breaker does to their files, and to the journal while it is open.
+// The newest entries of a journal: what a breaker does to their files, and to the journal while it is open.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -10,7 +10,7 @@
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/journal/old_journals.hpp"
-#include "tests/unit/journal/rows.hpp"
+#include "tests/unit/journal/entries.hpp"
 
 namespace osteon {
 namespace {
@@ -30,46 +30,46 @@ constexpr const char *kFile = "/room/journal", *kLog = "/room/journal-log", *kMi
 class LogTest : public ::testing::Test {
  protected:
   JournalOptions options() { return {.disk = &disk_, .log_bytes = 32 << 10}; }
-  // A journal whose process was killed: some rows in the database, the others in its log.
+  // A journal whose process was killed: some entries in the database, the others in its log.
   void make_killed() {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
-    append(journal, rows_, 0, 40);
+    append(journal, entries_, 0, 40);
     ASSERT_TRUE(journal.next_server_epoch());
     before_ = disk_.image();
-    for (std::size_t i = 40; i < rows_.size(); i += 2) append(journal, rows_, i, i + 2);
+    for (std::size_t i = 40; i < entries_.size(); i += 2) append(journal, entries_, i, i + 2);
   }
-  // Opens it and expects all rows. Gives what was repaired.
+  // Opens it and expects all entries. Gives what was repaired.
   std::vector<std::string> expect_whole() {
     const auto report = verify_journal(kFile, &disk_);
     EXPECT_TRUE(report && report->sound()) << (report ? report->faults.front() : report.error().message);
     Journal journal = std::move(Journal::open(kFile, options()).value());
     EXPECT_EQ(journal.closed_because(), nullptr) << journal.closed_because()->message;
-    EXPECT_TRUE(equal(rows_of(journal), rows_));
+    EXPECT_TRUE(equal(entries_of(journal), entries_));
     EXPECT_EQ(report->notes, journal.notes());
     return journal.notes();
   }
-  // Opens it and expects that it takes no rows. Gives why.
-  std::string expect_closed(std::size_t rows) {
+  // Opens it and expects that it takes no entries. Gives why.
+  std::string expect_closed(std::size_t entries) {
     const auto report = verify_journal(kFile, &disk_);
     EXPECT_TRUE(report && !report->sound());
     EXPECT_EQ(backup_journal(kFile, "/backup/journal", &disk_).error().code, ErrorCode::invalid_input);
     Journal journal = std::move(Journal::open(kFile, options()).value());
-    EXPECT_NE(journal.closed_because(), nullptr) << "it takes rows";
+    EXPECT_NE(journal.closed_because(), nullptr) << "it takes entries";
     if (journal.closed_because() == nullptr) return {};
     EXPECT_FALSE(journal.next_server_epoch()) << "an epoch could come twice";
-    EXPECT_TRUE(equal(rows_of(journal), {rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(rows)}));
+    EXPECT_TRUE(equal(entries_of(journal), {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(entries)}));
     return journal.closed_because()->message;
   }
-  void flip(const char* file, std::size_t row) {
-    const std::size_t at = disk_.image().at(file).find(rows_[row].bytes);
+  void flip(const char* file, std::size_t entry) {
+    const std::size_t at = disk_.image().at(file).find(entries_[entry].bytes);
     ASSERT_NE(at, std::string::npos);
     disk_.flip_bit(file, 8 * at + 3);
   }
   MemoryDisk disk_{1};
-  std::vector<JournalRow> rows_ = [] {
-    std::vector<JournalRow> rows = some_rows(5, 60);
-    for (JournalRow& row : rows) row.bytes += "a row is as long as this at least";
-    return rows;
+  std::vector<JournalEntry> entries_ = [] {
+    std::vector<JournalEntry> entries = some_entries(5, 60);
+    for (JournalEntry& entry : entries) entry.bytes += "a entry is as long as this at least";
+    return entries;
   }();
   MemoryDisk::Image before_;
 };
@@ -77,7 +77,7 @@ class LogTest : public ::testing::Test {
 TEST_F(LogTest, HasTheNewestRowsTwiceAndNothingElseHasThem) {
   make_killed();
   for (const auto& [name, bytes] : disk_.image()) {
-    const bool has = bytes.find(rows_[59].bytes) != std::string::npos;
+    const bool has = bytes.find(entries_[59].bytes) != std::string::npos;
     EXPECT_EQ(has, name == kLog || name == kMirror) << name;
   }
   EXPECT_THAT(expect_whole(), IsEmpty());
@@ -90,13 +90,13 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
     const char* other = file == kLog ? kMirror : kLog;
     SCOPED_TRACE(file);
     const auto with = [&](const std::string& what) {
-      return std::string(file) + " " + what + "; its rows were read from " + other;
+      return std::string(file) + " " + what + "; its entries were read from " + other;
     };
     disk_.load(killed);
     flip(file, 50);
     EXPECT_THAT(expect_whole(), ElementsAre(with("is damaged")));
     disk_.load(killed);
-    disk_.cut(file, killed.at(file).find(rows_[56].bytes));
+    disk_.cut(file, killed.at(file).find(entries_[56].bytes));
     EXPECT_THAT(expect_whole(), ElementsAre(with("was cut")));
     disk_.load(killed);
     disk_.cut(file, 0);
@@ -113,7 +113,7 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
 TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
   make_killed();
   for (const char* file : {kLog, kMirror}) flip(file, 50);
-  EXPECT_THAT(expect_closed(50), HasSubstr("goes to place 50, but its log vouches for place 60: 10 rows are missing"));
+  EXPECT_THAT(expect_closed(50), HasSubstr("goes to place 50, but its log vouches for place 60: 10 entries are missing"));
   const auto recovered = recover_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->head.place, RoomSeq{50});
@@ -127,30 +127,30 @@ TEST_F(LogTest, ItsLossIsNamed) {
   const MemoryDisk::Image killed = disk_.image();
   for (const char* file : {kLog, kMirror}) ASSERT_TRUE(disk_.remove(file));
   EXPECT_THAT(expect_closed(40),
-              HasSubstr("its log is missing: how many rows are missing after place 40 cannot be told"));
+              HasSubstr("its log is missing: how many entries are missing after place 40 cannot be told"));
   disk_.load(killed);
   for (const char* file : {kLog, kMirror}) disk_.cut(file, 0);
   EXPECT_THAT(expect_closed(40), HasSubstr("is damaged"));
   EXPECT_THAT(verify_journal(kFile, &disk_)->faults, Contains(HasSubstr("after place 40 cannot be told")));
-  // Behind the first sector, and where an entry ends: what is left looks like a log with fewer rows.
-  for (const std::size_t row : {40, 50}) {
+  // Behind the first sector, and where an entry ends: what is left looks like a log with fewer entries.
+  for (const std::size_t entry : {40, 50}) {
     disk_.load(killed);
     for (const char* file : {kLog, kMirror})
-      disk_.cut(file, row == 40 ? 4096 : killed.at(file).find(rows_[row - 1].bytes) + rows_[row - 1].bytes.size() + 16);
-    EXPECT_THAT(expect_closed(row), HasSubstr("was cut"));
+      disk_.cut(file, entry == 40 ? 4096 : killed.at(file).find(entries_[entry - 1].bytes) + entries_[entry - 1].bytes.size() + 16);
+    EXPECT_THAT(expect_closed(entry), HasSubstr("was cut"));
     EXPECT_THAT(verify_journal(kFile, &disk_)->faults,
-                Contains(HasSubstr("after place " + std::to_string(row) + " cannot be told")));
+                Contains(HasSubstr("after place " + std::to_string(entry) + " cannot be told")));
   }
 }
 
 TEST_F(LogTest, IsNotReadWhereItIsLongerThanAnyLog) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
-  ASSERT_TRUE(Journal::create(file, "bone")->append(std::span(rows_).first(5)));
+  ASSERT_TRUE(Journal::create(file, "bone")->append(std::span(entries_).first(5)));
   fs::resize_file(log_of(file), std::uintmax_t{8} << 40);
   const auto report = verify_journal(file);
   ASSERT_TRUE(report && report->sound());
-  EXPECT_THAT(report->notes, ElementsAre(HasSubstr("journal-log is longer than any log; its rows were read from")));
+  EXPECT_THAT(report->notes, ElementsAre(HasSubstr("journal-log is longer than any log; its entries were read from")));
 }
 
 // Their first sector said neither how long they are nor who signs.
@@ -173,15 +173,15 @@ TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
   MemoryDisk::Image earlier;
   {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
-    append(journal, rows_, 0, 20);
+    append(journal, entries_, 0, 20);
     ASSERT_TRUE(journal.next_server_epoch());
     earlier = disk_.image();
-    append(journal, rows_, 20, 40);
+    append(journal, entries_, 20, 40);
     ASSERT_TRUE(journal.next_server_epoch());
-    append(journal, rows_, 40, 60);
+    append(journal, entries_, 40, 60);
   }
   disk_.put(kFile, earlier.at(kFile));
-  EXPECT_THAT(expect_closed(20), HasSubstr("goes to place 20, but its log vouches for place 60: 40 rows are missing"));
+  EXPECT_THAT(expect_closed(20), HasSubstr("goes to place 20, but its log vouches for place 60: 40 entries are missing"));
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
   EXPECT_EQ(Journal::open(kFile, options())->head().place, RoomSeq{20})
       << "an older copy of all files: only witnesses know more";
@@ -191,14 +191,14 @@ TEST_F(LogTest, AnOlderLogBesideANewerDatabaseIsNamed) {
   MemoryDisk::Image earlier;
   {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
-    append(journal, rows_, 0, 20);
+    append(journal, entries_, 0, 20);
     earlier = disk_.image();
     ASSERT_TRUE(journal.next_server_epoch());
-    append(journal, rows_, 20, 60);
+    append(journal, entries_, 20, 60);
   }
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
   EXPECT_THAT(expect_closed(20),
-              HasSubstr("its log is an older copy: how many rows are missing after place 20 cannot be told"));
+              HasSubstr("its log is an older copy: how many entries are missing after place 20 cannot be told"));
 }
 
 TEST_F(LogTest, IsNotTakenFromAnotherJournalThatBeganAlike) {
@@ -217,31 +217,31 @@ TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
     for (const auto& [what, said] : damages) {
       disk_.load({});
       Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
-      append(journal, rows_, 0, 40);
+      append(journal, entries_, 0, 40);
       const MemoryDisk::Image now = disk_.image();
       if (std::string_view(what) == "removed") {
         ASSERT_TRUE(disk_.remove(file));
       }
       if (std::string_view(what) == "replaced") disk_.put(file, now.at(file));
       if (std::string_view(what) == "cut") disk_.cut(file, now.at(file).size() - 1);
-      const Result<void> done = journal.append({&rows_[40], 1});
+      const Result<void> done = journal.append({&entries_[40], 1});
       ASSERT_FALSE(done) << file << " " << what;
       EXPECT_THAT(done.error().message, HasSubstr(said)) << file;
       EXPECT_NE(journal.closed_because(), nullptr);
     }
 }
 
-// A row is as large as it may be, and has in it what looks like the entry of a log.
+// A entry is as large as it may be, and has in it what looks like the entry of a log.
 TEST_F(LogTest, TakesARowThatIsLargerThanItself) {
   {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
-    append(journal, rows_, 0, 59);
-    rows_[59].bytes = disk_.image().at(kLog) + disk_.image().at(kMirror);
-    append(journal, rows_, 59, 60);
-    EXPECT_EQ(journal.head(), plain_head("bone", rows_));
+    append(journal, entries_, 0, 59);
+    entries_[59].bytes = disk_.image().at(kLog) + disk_.image().at(kMirror);
+    append(journal, entries_, 59, 60);
+    EXPECT_EQ(journal.head(), plain_head("bone", entries_));
   }
   EXPECT_THAT(expect_whole(), IsEmpty());
-  EXPECT_LT(disk_.size(kLog).value().value(), 200u << 10) << "the row went into the database";
+  EXPECT_LT(disk_.size(kLog).value().value(), 200u << 10) << "the entry went into the database";
 }
 
 std::map<std::string, std::string> contents_of(const fs::path& folder) {
@@ -258,9 +258,9 @@ std::map<std::string, std::string> contents_of(const fs::path& folder) {
 TEST(JournalSecondOpener, IsRefusedAndChangesNoByte) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
-  const std::vector<JournalRow> rows = some_rows(3, 20);
+  const std::vector<JournalEntry> entries = some_entries(3, 20);
   Journal journal = std::move(Journal::create(file, "bone").value());
-  append(journal, rows, 0, 10);
+  append(journal, entries, 0, 10);
   for (const char* end : {".lock", "-wal"}) fs::remove(file.string() + end);
   const auto before = contents_of(folder.path());
   const std::string in_use = file.string() + " is in use by another process; close the room there first";
@@ -273,19 +273,19 @@ TEST(JournalSecondOpener, IsRefusedAndChangesNoByte) {
   EXPECT_EQ(recover_journal(file, folder / "copy").error().message, in_use);
   EXPECT_EQ(delete_journals({file}).error().message, in_use);
   EXPECT_EQ(contents_of(folder.path()), before);
-  append(journal, rows, 10, 20);
-  EXPECT_TRUE(equal(rows_of(journal), rows));
+  append(journal, entries, 10, 20);
+  EXPECT_TRUE(equal(entries_of(journal), entries));
 }
 
 TEST(JournalReaders, WriteNothingAndMayBeMany) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
-  const std::vector<JournalRow> rows = some_rows(4, 30);
+  const std::vector<JournalEntry> entries = some_entries(4, 30);
   for (const bool closed : {false, true}) {
     fs::remove(file);
     {
       Journal journal = std::move(Journal::create(file, "bone").value());
-      append(journal, rows, 0, 30);
+      append(journal, entries, 0, 30);
       if (closed) {
         ASSERT_TRUE(journal.close());
       }
@@ -296,9 +296,9 @@ TEST(JournalReaders, WriteNothingAndMayBeMany) {
       Journal two = std::move(Journal::open_to_read(file).value());
       EXPECT_EQ(Journal::open(file).error().code, ErrorCode::exists);
       EXPECT_TRUE(verify_journal(file)->sound());
-      EXPECT_TRUE(equal(rows_of(one), rows));
-      EXPECT_TRUE(equal(rows_of(two), rows));
-      const JournalRow next{RoomSeq{31}, 0, "next"};
+      EXPECT_TRUE(equal(entries_of(one), entries));
+      EXPECT_TRUE(equal(entries_of(two), entries));
+      const JournalEntry next{RoomSeq{31}, 0, "next"};
       EXPECT_THAT(one.append({&next, 1}).error().message, HasSubstr("was opened only to be read"));
       EXPECT_EQ(one.closed_because(), nullptr);
     }
@@ -315,8 +315,8 @@ INSTANTIATE_TEST_SUITE_P(Migration, EarlierVersion, ::testing::Values(2, 3));
 TEST_P(EarlierVersion, OpensAsItIs) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
-  const std::vector<JournalRow> rows = some_rows(12, 31);
-  ASSERT_NO_FATAL_FAILURE(make_old_journal(file, GetParam(), {rows.begin(), rows.begin() + 30}, RowsIn::sqlites_log));
+  const std::vector<JournalEntry> entries = some_entries(12, 31);
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(file, GetParam(), {entries.begin(), entries.begin() + 30}, RowsIn::sqlites_log));
   const auto before = contents_of(folder.path());
   const auto verified = verify_journal(file);
   ASSERT_TRUE(verified) << verified.error().message;
@@ -327,11 +327,11 @@ TEST_P(EarlierVersion, OpensAsItIs) {
   {
     Journal journal = std::move(Journal::open(file).value());
     EXPECT_EQ(journal.closed_because(), nullptr);
-    append(journal, rows, 30, 31);
+    append(journal, entries, 30, 31);
   }
   EXPECT_EQ(verify_journal(file)->version, 4);
   Journal journal = std::move(Journal::open(file).value());
-  EXPECT_TRUE(equal(rows_of(journal), rows));
+  EXPECT_TRUE(equal(entries_of(journal), entries));
 }
 
 }  // namespace

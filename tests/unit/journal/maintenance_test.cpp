@@ -8,7 +8,7 @@
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/journal/old_journals.hpp"
-#include "tests/unit/journal/rows.hpp"
+#include "tests/unit/journal/entries.hpp"
 
 namespace osteon {
 namespace {
@@ -27,12 +27,12 @@ class UpkeepTest : public ::testing::Test {
   // With something of everything.
   void make(bool closed) {
     Journal journal = std::move(Journal::create(kFile, "bone", {.disk = &disk_}).value());
-    for (std::size_t i = 0; i < rows_.size(); i += 5) append(journal, rows_, i, i + 5);
+    for (std::size_t i = 0; i < entries_.size(); i += 5) append(journal, entries_, i, i + 5);
     ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
     ASSERT_TRUE(journal.set_register("retention_days", "30"));
     ASSERT_TRUE(journal.next_server_epoch());
     for (const std::size_t place : {10, 25}) {
-      const JournalHead at = plain_head("bone", {rows_.begin(), rows_.begin() + static_cast<std::ptrdiff_t>(place)});
+      const JournalHead at = plain_head("bone", {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(place)});
       auto file = journal.begin_checkpoint(at, "meta");
       ASSERT_TRUE(file && file->write("room at " + std::to_string(place)) && file->finish());
       ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
@@ -44,8 +44,8 @@ class UpkeepTest : public ::testing::Test {
   Journal open(const char* file) { return std::move(Journal::open(file, {.disk = &disk_}).value()); }
   void expect_copied(Journal& journal) {
     EXPECT_EQ(journal.closed_because(), nullptr);
-    EXPECT_EQ(journal.head(), plain_head("bone", rows_));
-    EXPECT_TRUE(equal(rows_of(journal), rows_));
+    EXPECT_EQ(journal.head(), plain_head("bone", entries_));
+    EXPECT_TRUE(equal(entries_of(journal), entries_));
     EXPECT_THAT(journal.people().value(), ElementsAre(Person{"p1", "Anna", 20000}));
     EXPECT_EQ(journal.find_register("retention_days").value(), "30");
     const auto checkpoints = journal.checkpoints().value();
@@ -54,7 +54,7 @@ class UpkeepTest : public ::testing::Test {
     EXPECT_EQ(journal.read_checkpoint(checkpoints[1]).value(), "room at 10");
   }
   MemoryDisk disk_{1};
-  std::vector<JournalRow> rows_ = some_rows(10, 40);
+  std::vector<JournalEntry> entries_ = some_entries(10, 40);
 };
 
 TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
@@ -66,7 +66,7 @@ TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
     ASSERT_TRUE(report) << report.error().message;
     EXPECT_THAT(report->faults, IsEmpty());
     EXPECT_EQ(report->version, 4);
-    EXPECT_EQ(report->head, plain_head("bone", rows_));
+    EXPECT_EQ(report->head, plain_head("bone", entries_));
     EXPECT_EQ(report->witnessed, RoomSeq{40});
     EXPECT_EQ(report->closed_cleanly, closed);
     EXPECT_EQ(disk_.image(), before);
@@ -76,14 +76,14 @@ TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
 TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
   make(true);
   const std::string bytes = disk_.image().at(kFile);
-  const std::size_t at = bytes.find(rows_[17].bytes);
+  const std::size_t at = bytes.find(entries_[17].bytes);
   ASSERT_NE(at, std::string::npos);
   disk_.flip_bit(kFile, 8 * at + 3);
   const auto report = verify_journal(kFile, &disk_);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{18});
-  EXPECT_THAT(report->faults.front(), HasSubstr("row 18 does not fit the chain of hashes"));
-  EXPECT_EQ(report->head, plain_head("bone", {rows_.begin(), rows_.begin() + 17}));
+  EXPECT_THAT(report->faults.front(), HasSubstr("entry 18 does not fit the chain of hashes"));
+  EXPECT_EQ(report->head, plain_head("bone", {entries_.begin(), entries_.begin() + 17}));
 
   const MemoryDisk::Image before = disk_.image();
   EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::invalid_input);
@@ -94,13 +94,13 @@ TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
   for (const auto& [name, content] : before) EXPECT_EQ(disk_.image().at(name), content) << name;
   Journal journal = open(kTo);
   EXPECT_EQ(journal.closed_because(), nullptr);
-  EXPECT_TRUE(equal(rows_of(journal), {rows_.begin(), rows_.begin() + 17}));
+  EXPECT_TRUE(equal(entries_of(journal), {entries_.begin(), entries_.begin() + 17}));
   EXPECT_THAT(journal.people().value(), ElementsAre(Person{"p1", "Anna", 20000}));
   const auto checkpoints = journal.checkpoints().value();
   ASSERT_THAT(checkpoints, SizeIs(1)) << "the one behind the damage is not of this history";
   EXPECT_EQ(journal.read_checkpoint(checkpoints[0]).value(), "room at 10");
   EXPECT_GT(journal.next_server_epoch().value(), 1000u) << "far from what the lost part may have given";
-  append(journal, rows_, 17, 20);
+  append(journal, entries_, 17, 20);
 }
 
 TEST_F(UpkeepTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
@@ -118,7 +118,7 @@ TEST_F(UpkeepTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
   EXPECT_EQ(recovered->lost(), 0u);
   Journal journal = open(kTo);
   EXPECT_THAT(journal.checkpoints().value(), SizeIs(1));
-  EXPECT_TRUE(equal(rows_of(journal), rows_));
+  EXPECT_TRUE(equal(entries_of(journal), entries_));
 }
 
 TEST_F(UpkeepTest, ABackupIsTheJournalAgain) {
@@ -144,7 +144,7 @@ TEST_F(UpkeepTest, ABackupInSlicesLetsRowsBeAppendedBetween) {
   Journal journal = open(kFile);
   auto copy = JournalCopy::begin(journal, kTo);
   ASSERT_TRUE(copy) << copy.error().message;
-  const std::vector<JournalRow> all = some_rows(10, 60);
+  const std::vector<JournalEntry> all = some_entries(10, 60);
   std::size_t steps = 0, next = 40;
   for (Result<bool> done = false;; ++steps) {
     done = copy->step(7);
@@ -153,7 +153,7 @@ TEST_F(UpkeepTest, ABackupInSlicesLetsRowsBeAppendedBetween) {
     append(journal, all, next, next + 1);
     ++next;
   }
-  EXPECT_EQ(steps, 7u) << "40 rows by 7, two checkpoints";
+  EXPECT_EQ(steps, 7u) << "40 entries by 7, two checkpoints";
   EXPECT_EQ(journal.head(), plain_head("bone", {all.begin(), all.begin() + 47}));
   Journal backup = open(kTo);
   expect_copied(backup);
@@ -183,7 +183,7 @@ TEST_F(UpkeepTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
     }
     Journal source = open(kFile);
     EXPECT_EQ(source.closed_because(), nullptr);
-    ASSERT_TRUE(equal(rows_of(source), rows_));
+    ASSERT_TRUE(equal(entries_of(source), entries_));
     MemoryDisk::Image kept = disk_.image();
     std::erase_if(kept, [](const auto& file) { return file.first.starts_with("/backup/"); });
     { const Journal dropped = std::move(source); }
@@ -201,9 +201,9 @@ TEST_F(UpkeepTest, WhatClientsKnowCountsAsLost) {
 TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   const test::TempDir folder;
   const std::filesystem::path old = folder / "old", now = folder / "new";
-  std::vector<JournalRow> rows = some_rows(11, 30);
-  for (JournalRow& row : rows) row.at_ns = 0;  // it kept no times
-  ASSERT_NO_FATAL_FAILURE(make_old_journal(old, 1, rows, RowsIn::file));
+  std::vector<JournalEntry> entries = some_entries(11, 30);
+  for (JournalEntry& entry : entries) entry.at_ns = 0;  // it kept no times
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(old, 1, entries, RowsIn::file));
 
   const auto opened = Journal::open(old);
   ASSERT_FALSE(opened);
@@ -220,9 +220,9 @@ TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   EXPECT_EQ(verify_journal(now)->version, 4);
   Journal journal = std::move(Journal::open(now).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
-  EXPECT_TRUE(equal(rows_of(journal), rows));
-  EXPECT_TRUE(journal.check_witness(plain_head("bone", rows))) << "what clients were told still holds";
-  const JournalRow next{RoomSeq{31}, 12345, "next"};
+  EXPECT_TRUE(equal(entries_of(journal), entries));
+  EXPECT_TRUE(journal.check_witness(plain_head("bone", entries))) << "what clients were told still holds";
+  const JournalEntry next{RoomSeq{31}, 12345, "next"};
   EXPECT_TRUE(journal.append({&next, 1}));
   ASSERT_TRUE(journal.close());
   EXPECT_EQ(migrate_journal(now, folder / "newer").error().code, ErrorCode::exists);
@@ -250,7 +250,7 @@ TEST(Migration, RefusesTablesThatAreNotThoseOfTheVersion) {
   const test::TempDir folder;
   { ASSERT_TRUE(Journal::create(folder / "journal", "bone")->close()); }
   change(folder / "journal",
-         "CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows WHERE place = new.place; END");
+         "CREATE TRIGGER t AFTER INSERT ON entries BEGIN DELETE FROM entries WHERE place = new.place; END");
   const auto opened = Journal::open(folder / "journal");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);

@@ -24,7 +24,7 @@ std::string hex(const auto& bytes) {
 
 }  // namespace
 
-void make_old_journal(const std::filesystem::path& file, int version, const std::vector<JournalRow>& rows,
+void make_old_journal(const std::filesystem::path& file, int version, const std::vector<JournalEntry>& entries,
                       RowsIn where) {
   const bool timed = version > 1;
   sqlite3* database = nullptr;
@@ -34,7 +34,7 @@ void make_old_journal(const std::filesystem::path& file, int version, const std:
     ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &why), SQLITE_OK) << why << " in " << sql;
   };
   run("PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=0");
-  run(std::string("CREATE TABLE rows(place INTEGER PRIMARY KEY, ") + (timed ? "at_ns INTEGER NOT NULL, " : "") +
+  run(std::string("CREATE TABLE entries(place INTEGER PRIMARY KEY, ") + (timed ? "at_ns INTEGER NOT NULL, " : "") +
       "bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT");
   run("CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
   run("CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT"
@@ -48,11 +48,11 @@ void make_old_journal(const std::filesystem::path& file, int version, const std:
   seal.text("bone");
   run("INSERT INTO registers VALUES('genesis', " + hex(std::string("bone")) + ", " + hex(seal.finish().bytes) + ")");
   run("PRAGMA wal_checkpoint(TRUNCATE)");
-  std::vector<JournalRow> so_far;
-  for (const JournalRow& row : rows) {
-    so_far.push_back(row);
-    run("INSERT INTO rows VALUES(" + std::to_string(row.place.value) + ", " +
-        (timed ? std::to_string(row.at_ns) + ", " : "") + hex(row.bytes) + ", " +
+  std::vector<JournalEntry> so_far;
+  for (const JournalEntry& entry : entries) {
+    so_far.push_back(entry);
+    run("INSERT INTO entries VALUES(" + std::to_string(entry.place.value) + ", " +
+        (timed ? std::to_string(entry.at_ns) + ", " : "") + hex(entry.bytes) + ", " +
         hex(test::plain_head("bone", so_far).chain.bytes) + ")");
   }
   if (where == RowsIn::sqlites_log) sqlite3_db_config(database, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);

@@ -13,7 +13,7 @@
 #include "server/journal/maintenance.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/journal/old_journals.hpp"
-#include "tests/unit/journal/rows.hpp"
+#include "tests/unit/journal/entries.hpp"
 
 namespace osteon {
 namespace {
@@ -134,7 +134,7 @@ TEST(JournalFiles, AreForTheirOwnerAlone) {
   const auto before = ::umask(0);
   {
     Journal journal = std::move(Journal::create(folder / "journal", "bone").value());
-    append(journal, some_rows(1, 5), 0, 5);
+    append(journal, some_entries(1, 5), 0, 5);
     auto file = journal.begin_checkpoint(journal.head(), "meta");
     EXPECT_TRUE(file && file->finish() && journal.add_checkpoint(std::move(*file)));
     EXPECT_TRUE(load_or_make_signing_keys(folder / "signing.key"));
@@ -169,7 +169,7 @@ class SignedJournal : public ::testing::Test {
   void write(const std::shared_ptr<const SigningKeys>& keys, std::size_t from, std::size_t to, bool close) {
     Journal journal =
         fs::exists(file_) ? open(keys) : std::move(Journal::create(file_, "bone", {.keys = keys}).value());
-    for (std::size_t i = from; i < to; ++i) append(journal, rows_, i, i + 1);
+    for (std::size_t i = from; i < to; ++i) append(journal, entries_, i, i + 1);
     if (close) {
       ASSERT_TRUE(journal.close());
     }
@@ -202,7 +202,7 @@ class SignedJournal : public ::testing::Test {
 
   test::TempDir folder_;
   fs::path file_ = folder_ / "journal";
-  std::vector<JournalRow> rows_ = some_rows(17, 60);
+  std::vector<JournalEntry> entries_ = some_entries(17, 60);
   std::shared_ptr<const SigningKeys> keys_ = new_keys();
   PublicKey key_ = keys_->key().public_key();
 };
@@ -215,9 +215,9 @@ TEST_F(SignedJournal, IsVouchedForToItsEndHoweverItsServerEnded) {
     write(keys_, 20, 45, !close);
     const Vouched found = vouched(key_);
     EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
-    EXPECT_THAT(text_of(found.rows), ElementsAre("1-45"));
+    EXPECT_THAT(text_of(found.entries), ElementsAre("1-45"));
     const Vouched by_another = vouched(SigningKey::make().public_key());
-    EXPECT_THAT(by_another.rows, IsEmpty());
+    EXPECT_THAT(by_another.entries, IsEmpty());
     EXPECT_THAT(text_of(by_another.by_others), ElementsAre("1-45"));
   }
 }
@@ -228,7 +228,7 @@ TEST_F(SignedJournal, IsVouchedForByNobodyWithoutAKey) {
   // A server with a key vouches for what it adds, not for what it found.
   write(keys_, 20, 30, false);
   const Vouched found = vouched(key_);
-  EXPECT_THAT(text_of(found.rows), ElementsAre("21-30"));
+  EXPECT_THAT(text_of(found.entries), ElementsAre("21-30"));
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-20"));
   EXPECT_THAT(open(keys_).notes(), IsEmpty()) << "the second time it knows them";
 }
@@ -238,26 +238,26 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
   write(keys_, 0, 20, true);
   write(nullptr, 20, 50, true);
   const Vouched found = vouched(key_);
-  EXPECT_THAT(text_of(found.rows), ElementsAre("1-20"));
+  EXPECT_THAT(text_of(found.entries), ElementsAre("1-20"));
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("21-50"));
   {
     Journal journal = open(keys_);
-    ASSERT_NE(journal.closed_because(), nullptr) << "it takes rows behind invented ones";
-    EXPECT_THAT(journal.closed_because()->message, HasSubstr("signed the rows up to 20, but not rows 21 to 50"));
+    ASSERT_NE(journal.closed_because(), nullptr) << "it takes entries behind invented ones";
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("signed the entries up to 20, but not entries 21 to 50"));
   }
   // Without the key nobody makes the server take them.
   ASSERT_TRUE(recover_journal(file_, folder_ / "by a script"));
   EXPECT_NE(std::move(Journal::open(folder_ / "by a script", {.keys = keys_}).value()).closed_because(), nullptr);
   EXPECT_THAT(vouched(key_, folder_ / "by a script").other_entries, Contains("the register \"recovered\""));
-  // Only the signed rows.
+  // Only the signed entries.
   ASSERT_TRUE(recover_journal(file_, folder_ / "signed", nullptr, {}, RoomSeq{20}, keys_));
   EXPECT_TRUE(vouched(key_, folder_ / "signed").all());
-  // All rows, on purpose: they still are not vouched for.
+  // All entries, on purpose: they still are not vouched for.
   ASSERT_TRUE(recover_journal(file_, folder_ / "all", nullptr, {}, {}, keys_));
   file_ = folder_ / "all";
   write(keys_, 50, 60, true);
   const Vouched recovered = vouched(key_);
-  EXPECT_THAT(text_of(recovered.rows), ElementsAre("1-20", "51-60"));
+  EXPECT_THAT(text_of(recovered.entries), ElementsAre("1-20", "51-60"));
   EXPECT_THAT(text_of(recovered.by_nobody), ElementsAre("21-50"));
   EXPECT_THAT(recovered.other_entries, IsEmpty());
 }
@@ -267,7 +267,7 @@ TEST_F(SignedJournal, NamesAFooterThatAScriptWrote) {
   write(keys_, 0, 20, true);
   write(keys_, 20, 30, true);
   run_sql(
-      "DELETE FROM rows WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
+      "DELETE FROM entries WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
       "DELETE FROM registers WHERE name IN ('footer', 'log generation')");
   write(nullptr, 0, 0, true);
   EXPECT_THAT(vouched(key_).other_entries, Contains("the footer"));
@@ -295,11 +295,11 @@ TEST_F(SignedJournal, NamesAPersonWhoWasExchanged) {
   EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the name of person 1"));
 }
 
-// A signature of the attacker's own key, for rows that there are not.
+// A signature of the attacker's own key, for entries that there are not.
 TEST_F(SignedJournal, IsRecoveredWithoutSignaturesThatDoNotFit) {
   write(keys_, 0, 20, true);
   const SigningKey theirs = SigningKey::make();
-  const SignedRows bogus = sign_rows(theirs, RoomSeq{1}, {RoomSeq{10}, Digest{}});
+  const SignedRange bogus = sign_entries(theirs, RoomSeq{1}, {RoomSeq{10}, Digest{}});
   const auto hex = [](const auto& bytes) {
     std::string text;
     for (const std::uint8_t byte : bytes) {
@@ -321,10 +321,10 @@ TEST_F(SignedJournal, NamesRowsThatAnotherKeySigned) {
   const auto others = new_keys();
   write(others, 20, 50, true);
   const Vouched found = vouched(key_);
-  EXPECT_THAT(text_of(found.rows), ElementsAre("1-20"));
+  EXPECT_THAT(text_of(found.entries), ElementsAre("1-20"));
   EXPECT_THAT(text_of(found.by_others), ElementsAre("21-50"));
   EXPECT_FALSE(found.all());
-  EXPECT_THAT(text_of(vouched(others->key().public_key()).rows), ElementsAre("21-50"));
+  EXPECT_THAT(text_of(vouched(others->key().public_key()).entries), ElementsAre("21-50"));
 }
 
 TEST_F(SignedJournal, KnowsTheLineOfItsServersKeys) {
@@ -346,34 +346,34 @@ TEST_F(SignedJournal, KeepsItsSignaturesInABackup) {
     auto file = journal.begin_checkpoint(journal.head(), "meta");
     ASSERT_TRUE(file && file->write("bytes") && file->finish() && journal.add_checkpoint(std::move(*file)));
     ASSERT_TRUE(journal.set_register("room name", "hip"));
-    append(journal, rows_, 20, 30);
+    append(journal, entries_, 20, 30);
   }
   ASSERT_TRUE(backup_journal(file_, folder_ / "without key"));
   EXPECT_THAT(vouched(key_, folder_ / "without key").other_entries, ElementsAre("the footer"));
   ASSERT_TRUE(backup_journal(file_, folder_ / "backup", nullptr, keys_));
   const Vouched found = vouched(key_, folder_ / "backup");
   EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
-  EXPECT_THAT(text_of(found.rows), ElementsAre("1-30"));
+  EXPECT_THAT(text_of(found.entries), ElementsAre("1-30"));
 }
 
 TEST_F(SignedJournal, KeepsItsSignaturesInACopyThatItsServerMakes) {
   write(keys_, 0, 20, false);
   Journal journal = open(keys_);
-  append(journal, rows_, 20, 30);
+  append(journal, entries_, 20, 30);
   auto copy = JournalCopy::begin(journal, folder_ / "copy");
   ASSERT_TRUE(copy);
   while (!copy->step().value()) {
   }
   const Vouched found = vouched(key_, folder_ / "copy");
   EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
-  EXPECT_THAT(text_of(found.rows), ElementsAre("1-30"));
+  EXPECT_THAT(text_of(found.entries), ElementsAre("1-30"));
 }
 
-// A branch would turn rows of nobody into rows of the server.
+// A branch would turn entries of nobody into entries of the server.
 TEST_F(SignedJournal, SignsNoBranchOfRowsThatItFound) {
   write(nullptr, 0, 20, true);
   Journal journal = open(keys_);
-  append(journal, rows_, 20, 30);
+  append(journal, entries_, 20, 30);
   auto copy = JournalCopy::begin_branch(journal, folder_ / "branch", RoomSeq{30}, "another bone", {});
   ASSERT_TRUE(copy);
   while (!copy->step().value()) {
@@ -388,15 +388,15 @@ TEST_F(SignedJournal, SignsABranchThatItsServerMakes) {
   ASSERT_TRUE(copy);
   while (!copy->step().value()) {
   }
-  EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").rows), ElementsAre("1-10"));
+  EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").entries), ElementsAre("1-10"));
 }
 
 TEST_F(SignedJournal, TakesTheSignatureOfEarlierRowsForNoOther) {
   write(keys_, 0, 20, true);
   const fs::path first = std::exchange(file_, folder_ / "other");
-  rows_ = some_rows(18, 60);
+  entries_ = some_entries(18, 60);
   write(keys_, 0, 20, true);
-  // The other journal's rows with the first one's signatures.
+  // The other journal's entries with the first one's signatures.
   run_sql("ATTACH '" + first.string() +
           "' AS first; DELETE FROM signatures; INSERT INTO signatures SELECT * FROM first.signatures");
   const auto report = verify_journal(file_);
@@ -452,12 +452,12 @@ TEST_F(SignedJournal, TakesNoRegisterOfAnotherJournal) {
 }
 
 TEST_F(SignedJournal, GoesOnFromOneOfAnOldVersion) {
-  ASSERT_NO_FATAL_FAILURE(make_old_journal(file_, 2, {rows_.begin(), rows_.begin() + 30}, RowsIn::sqlites_log));
-  EXPECT_THAT(open(keys_).notes(), Contains(HasSubstr("rows 1 to 30 were not signed by this server's key")));
+  ASSERT_NO_FATAL_FAILURE(make_old_journal(file_, 2, {entries_.begin(), entries_.begin() + 30}, RowsIn::sqlites_log));
+  EXPECT_THAT(open(keys_).notes(), Contains(HasSubstr("entries 1 to 30 were not signed by this server's key")));
   write(keys_, 30, 40, false);
   const Vouched found = vouched(key_);
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-30"));
-  EXPECT_THAT(text_of(found.rows), ElementsAre("31-40"));
+  EXPECT_THAT(text_of(found.entries), ElementsAre("31-40"));
 }
 
 }  // namespace

@@ -11,9 +11,9 @@ namespace osteon::test {
 namespace {
 
 void show(const char* what, const Tally& tally) {
-  std::printf("%s: %lu trials, %lu rows acknowledged, %lu recovered, of them %lu not acknowledged, %lu lost, ", what,
+  std::printf("%s: %lu trials, %lu entries acknowledged, %lu recovered, of them %lu not acknowledged, %lu lost, ", what,
               tally.trials, tally.acknowledged, tally.recovered, tally.kept_unasked, tally.lost);
-  std::printf("%lu closed to rows, %lu bad trials\n", tally.closed, tally.bad_trials);
+  std::printf("%lu closed to entries, %lu bad trials\n", tally.closed, tally.bad_trials);
 }
 
 void expect_nothing_lost(const Tally& tally) {
@@ -26,14 +26,14 @@ TEST(JournalTrials, LosesNothingAcknowledgedWhenThePowerFails) {
   const Tally tally = power_loss_trials(1, 2000);
   show("power loss", tally);
   expect_nothing_lost(tally);
-  EXPECT_EQ(tally.closed, 0u) << "lost power alone is no reason to refuse rows";
+  EXPECT_EQ(tally.closed, 0u) << "lost power alone is no reason to refuse entries";
   // The trials are hard: the disk fails in them, and often with a batch under way.
   EXPECT_GT(tally.failed, tally.trials * 9 / 10);
   EXPECT_GT(tally.acknowledged, 10 * tally.trials);
   EXPECT_GT(tally.kept_unasked, 100u);
 }
 
-// The same trials must find it when rows are reported that were not waited for.
+// The same trials must find it when entries are reported that were not waited for.
 TEST(JournalTrials, FindsRowsLostWhenNobodyWaitsForTheDisk) {
   const Tally tally = power_loss_trials(1, 100, false);
   show("power loss, synchronous=OFF", tally);
@@ -67,7 +67,7 @@ TEST(JournalTrials, LosesNothingAcknowledgedWhereAFailedSyncWasForgotten) {
 }
 
 void show(const char* what, const DamageTally& tally) {
-  std::printf("%s: %lu trials, %lu rows acknowledged; %lu whole, %lu damage named, %lu refused, %lu silent, ", what,
+  std::printf("%s: %lu trials, %lu entries acknowledged; %lu whole, %lu damage named, %lu refused, %lu silent, ", what,
               tally.trials, tally.acknowledged, tally.whole, tally.named, tally.refused, tally.silent);
   std::printf("%lu called damaged\n", tally.called_damaged);
   for (const std::string& fault : tally.faults) std::printf("  %s\n", fault.c_str());

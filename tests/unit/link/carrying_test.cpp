@@ -19,7 +19,7 @@ using namespace std::chrono_literals;
 using Time = VirtualTime::Time;
 
 struct Outcome {
-  bool each_once_in_order = true;  // the server has each author's cuts 1, 2, 3, ... and every author the server's rows
+  bool each_once_in_order = true;  // the server has each author's cuts 1, 2, 3, ... and every author the server's entries
   bool complete = false;           // and all of them, within the quiet time
   std::size_t cuts = 0, refused = 0;
   Time quiet_until_complete{};
@@ -43,11 +43,11 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
     int author;
     std::uint64_t number;
   };
-  std::vector<Row> rows;                    // the server's order
-  std::array<std::uint64_t, 2> last_row{};  // in both down windows, of each author
+  std::vector<Row> entries;                    // the server's order
+  std::array<std::uint64_t, 2> last_entry{};  // in both down windows, of each author
   std::array<std::vector<Time>, 2> made;    // by number - 1
   std::array<std::uint64_t, 2> taken{};     // cuts that the server has of each
-  std::array<std::size_t, 2> known{};       // rows that each author has
+  std::array<std::size_t, 2> known{};       // entries that each author has
   std::array<bool, 2> pausing{};
 
   const std::array<std::unique_ptr<SimPort>, 2> server_ports{network.open(node(1, 1)), network.open(node(1, 2))};
@@ -60,23 +60,23 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
         std::make_unique<Peer<Receive>>(*server_ports[a], ports[a]->local(), down, [&, a](const std::string& cut) {
           const std::uint64_t number = std::stoull(cut);
           if (number != ++taken[a]) outcome.each_once_in_order = false;
-          rows.push_back({static_cast<int>(a), number});
+          entries.push_back({static_cast<int>(a), number});
           std::string text = std::to_string(a) + " " + std::to_string(number);
           text.resize(12, ' ');
           for (const auto& server : servers) {
-            // A row is joined to the author's last one where that is the row before; a real packet joins it over others
+            // A entry is joined to the author's last one where that is the entry before; a real packet joins it over others
             // too.
-            const bool follows = last_row[a] != 0 && last_row[a] + 1 == rows.size();
+            const bool follows = last_entry[a] != 0 && last_entry[a] + 1 == entries.size();
             if (!server->say(text, std::string(40, 'h'), follows)) outcome.each_once_in_order = false;
           }
-          last_row[a] = rows.size();
+          last_entry[a] = entries.size();
         });
     authors[a] =
-        std::make_unique<Peer<Receive>>(*ports[a], server_ports[a]->local(), up, [&, a](const std::string& row) {
-          const int author = row[0] - '0';
-          const std::uint64_t number = std::stoull(row.substr(2));
+        std::make_unique<Peer<Receive>>(*ports[a], server_ports[a]->local(), up, [&, a](const std::string& entry) {
+          const int author = entry[0] - '0';
+          const std::uint64_t number = std::stoull(entry.substr(2));
           const std::size_t at = known[a]++;
-          if (at >= rows.size() || rows[at].author != author || rows[at].number != number)
+          if (at >= entries.size() || entries[at].author != author || entries[at].number != number)
             outcome.each_once_in_order = false;
           else if (author != static_cast<int>(a)) {
             const Time since = made[static_cast<std::size_t>(author)][number - 1];
@@ -108,7 +108,7 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
       }
     }
     const std::size_t cuts = made[0].size() + made[1].size();
-    if (t >= input_ends && known[0] == cuts && known[1] == cuts && rows.size() == cuts) {
+    if (t >= input_ends && known[0] == cuts && known[1] == cuts && entries.size() == cuts) {
       outcome.complete = true;
       outcome.quiet_until_complete = t - input_ends;
       break;

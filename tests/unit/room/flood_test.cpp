@@ -61,7 +61,7 @@ class FloodTest : public ::testing::Test {
       if (std::chrono::steady_clock::now() - begin > kPatience) return false;
       while (next < cuts.size() && link_->push(cuts[next])) ++next;
       while (const std::optional<Datagram> datagram = port_->receive(buffer)) link_->receive(datagram->bytes, now());
-      while (link_->take_row()) {
+      while (link_->take_entry()) {
       }
       if (const auto bytes = link_->send(now(), buffer); !bytes.empty()) port_->send(*at_, bytes);
       port_->wait(200us);
@@ -104,8 +104,8 @@ class FloodTest : public ::testing::Test {
     ASSERT_TRUE(said.has_complete());
     ASSERT_TRUE(link_.has_value());
     reader_ = std::thread([this] {
-      v1::SessionResponse row;
-      while (stream_->Read(&row)) {
+      v1::SessionResponse entry;
+      while (stream_->Read(&entry)) {
       }
       status_ = stream_->Finish();
       over_ = true;

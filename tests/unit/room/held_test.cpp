@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "osteon/v1/people.pb.h"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/room_store.hpp"
 #include "server/room/room.hpp"
@@ -119,26 +119,26 @@ TEST(CarriedOver, ItsRowsReplay) {
   (void)all.again(kBen, Role::trainee);
   all.decide(all.ben, {});
   Room replayed(test_block());
-  for (const RoomRow& row : all.room.take_rows()) {
-    const Result<RoomRow> read = row_from_bytes(row.place, row.at, to_bytes(row));
+  for (const LogEntry& entry : all.room.take_entries()) {
+    const Result<LogEntry> read = entry_from_bytes(entry.place, entry.at, to_bytes(entry));
     ASSERT_TRUE(read) << read.error().message;
     ASSERT_TRUE(replayed.replay(*read));
   }
   EXPECT_EQ(replayed.room_hash(), all.room.room_hash());
 }
 
-// A journal of a server that did not carry anything over: its rows decide.
+// A journal of a server that did not carry anything over: its entries decide.
 TEST(CarriedOver, NothingInAReplay) {
   Held all;
   all.decide(all.ben, {.stopped = true});
   Room replayed(test_block());
-  for (const RoomRow& row : all.room.take_rows()) ASSERT_TRUE(replayed.replay(row));
+  for (const LogEntry& entry : all.room.take_entries()) ASSERT_TRUE(replayed.replay(entry));
   const AuthorId next{replayed.authors() + 1};
   ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next,
-                               JoinRow{next, MemberKind::surgeon, kBen, kSecret, Role::trainee}}));
+                               JoinEntry{next, MemberKind::surgeon, kBen, kSecret, Role::trainee}}));
   EXPECT_EQ(replayed.people().supervised(next).place, RoomSeq{});
   Cut cut = strokes(next, 1, 5).front();
-  ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next, CutRow{cut}}));
+  ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next, CutEntry{cut}}));
 }
 
 SceneItem guide() {
@@ -257,11 +257,11 @@ class Placed final : public SessionSubscriber {
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
   void offer(RoomSeq place, const Bytes&) override { places.push_back(place.value); }
-  void offer(RoomSeq place, const Bytes&, const wire::SessionRow& fast) override {
+  void offer(RoomSeq place, const Bytes&, const wire::SessionEntry& fast) override {
     places.push_back(place.value);
-    if (fast.kind == wire::SessionRowKind::supervised) told.push_back(fast.supervision);
+    if (fast.kind == wire::SessionEntryKind::supervised) told.push_back(fast.supervision);
   }
-  void hold(const wire::SessionRow& supervised) override { held = supervised.supervision; }
+  void hold(const wire::SessionEntry& supervised) override { held = supervised.supervision; }
   void answer(const Bytes&) override {}
   void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
   void decided() override {}

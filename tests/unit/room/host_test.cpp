@@ -32,9 +32,9 @@ class FakeSession final : public SessionSubscriber {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void offer(RoomSeq place, const Bytes& row) override {
+  void offer(RoomSeq place, const Bytes& entry) override {
     const std::lock_guard lock(mutex_);
-    ASSERT_TRUE(send_queue_.add(place, row));
+    ASSERT_TRUE(send_queue_.add(place, entry));
     read();
   }
   void answer(const Bytes&) override {}
@@ -61,7 +61,7 @@ class FakeSession final : public SessionSubscriber {
       if (response.has_change()) take(response.change());
       if (response.has_scene()) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
       if (!response.has_committed()) continue;
-      EXPECT_GT(response.committed().room_seq(), seq_.value) << "every row once and in order";
+      EXPECT_GT(response.committed().room_seq(), seq_.value) << "every entry once and in order";
       replica_.commit(RoomSeq{response.committed().room_seq()}, wire::from_wire(response.committed().cut()).value(),
                       false);
       seq_ = RoomSeq{response.committed().room_seq()};

@@ -19,9 +19,9 @@ namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using test::KeptCuts;
 using test::MemoryDisk;
-using test::plain_rows;
+using test::plain_entries;
 using test::replay_of;
-using test::rows_of;
+using test::entries_of;
 using test::test_block;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -32,7 +32,7 @@ constexpr const char *kFile = "/rooms/femur", *kTo = "/else/copy";
 
 class KeeperTest : public ::testing::Test {
  protected:
-  // Writes a row whenever it is called: where the journal were held meanwhile, for ever.
+  // Writes a entry whenever it is called: where the journal were held meanwhile, for ever.
   MaintenanceCalls writing(KeptCuts& kept, int& written) {
     return {[&kept, &written](double) {
               kept.cut(1);
@@ -61,14 +61,14 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
     ASSERT_FALSE(result);
     errors.push_back(result.error());
   };
-  note(store.write(plain_rows(head.place, 1)));
+  note(store.write(plain_entries(head.place, 1)));
   note(store.person("Anna"));
   note(store.people());
   note(store.forget(1));
   note(store.forget_old());
   note(store.check_witness(store.witness()));
   note(store.has_head(head));
-  note(store.read(RoomSeq{1}, head.place, [](const RoomRow&) { return true; }));
+  note(store.read(RoomSeq{1}, head.place, [](const LogEntry&) { return true; }));
   note(store.export_person(1, [](const std::string&) { return true; }));
   note(store.verify(test_block(), std::nullopt));
   note(store.backup(kTo));
@@ -122,10 +122,10 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
               HasSubstr("the room femur has lost " + std::to_string(less) + " of the " + std::to_string(told) +
                         " events that you were told are kept, and takes no more cuts"));
   EXPECT_EQ(kept.store->check_witness(late).error().message, lost.error().message) << "so does the next";
-  EXPECT_FALSE(kept.store->write(plain_rows(kept.store->head().place, 1))) << "rows were lost: it takes no more";
+  EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 1))) << "entries were lost: it takes no more";
   kept.store.reset();
   kept.open(kFile);
-  EXPECT_FALSE(kept.store->write(plain_rows(kept.store->head().place, 1))) << "nor when it is opened again";
+  EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 1))) << "nor when it is opened again";
 }
 
 // Whatever has become of the journal: the sentence names it, and what is lost.
@@ -169,11 +169,11 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   copy.cut(20);
   EXPECT_THAT(copy.store->check_witness(late).error().message,
               HasSubstr("the room femur has lost some" + of_all + ": an older copy of its journal has gone on"));
-  EXPECT_EQ(copy.store->closed_to_rows(), nullptr) << "what stands in it now may go on";
+  EXPECT_EQ(copy.store->closed_to_entries(), nullptr) << "what stands in it now may go on";
 }
 
 TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
-  // What a hand may have done since the last row: cuts until it hears nothing for so long, or leaves so many
+  // What a hand may have done since the last entry: cuts until it hears nothing for so long, or leaves so many
   // unconfirmed.
   constexpr double kTick_s = 0.001, kAway_s = std::chrono::duration<double>(kTimeAway).count();
   static_assert(kAway_s > haptic::RoomWatch::kSilence_s);
@@ -195,9 +195,9 @@ TEST_F(KeeperTest, IsReadWhileItIsWritten) {
   const Digest hash = kept.room->room_hash();
   Room replayed(test_block());
   int written = 0;
-  const Result<void> read = kept.store->read(RoomSeq{1}, RoomSeq{1'000'000}, [&](const RoomRow& row) {
-    EXPECT_TRUE(replayed.replay(row));
-    if (row.place.value % 20 == 0 && ++written) kept.cut(1);
+  const Result<void> read = kept.store->read(RoomSeq{1}, RoomSeq{1'000'000}, [&](const LogEntry& entry) {
+    EXPECT_TRUE(replayed.replay(entry));
+    if (entry.place.value % 20 == 0 && ++written) kept.cut(1);
     return true;
   });
   ASSERT_TRUE(read) << read.error().message;
@@ -207,8 +207,8 @@ TEST_F(KeeperTest, IsReadWhileItIsWritten) {
   EXPECT_GT(kept.store->head().place, bone.place);
 
   std::vector<std::uint64_t> places;
-  const auto note = [&](const RoomRow& row) {
-    places.push_back(row.place.value);
+  const auto note = [&](const LogEntry& entry) {
+    places.push_back(entry.place.value);
     return places.size() < 4;
   };
   ASSERT_TRUE(kept.store->read(RoomSeq{257}, RoomSeq{259}, note));
@@ -244,11 +244,11 @@ TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
   EXPECT_GT(written, 1);
   EXPECT_GT(kept.store->head().place, head.place);
 
-  const Result<RoomReport> rows_only = kept.store->verify(test_block(), std::nullopt);
-  ASSERT_TRUE(rows_only);
-  EXPECT_TRUE(rows_only->sound());
-  EXPECT_EQ(rows_only->replayed.place, RoomSeq{});
-  EXPECT_EQ(rows_only->head, kept.store->head());
+  const Result<RoomReport> entries_only = kept.store->verify(test_block(), std::nullopt);
+  ASSERT_TRUE(entries_only);
+  EXPECT_TRUE(entries_only->sound());
+  EXPECT_EQ(entries_only->replayed.place, RoomSeq{});
+  EXPECT_EQ(entries_only->head, kept.store->head());
 
   BoneAt other = live;
   other.field_hash.bytes[0] ^= 1;
@@ -282,7 +282,7 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults[0],
               AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
-                    HasSubstr("is not what its rows make")));
+                    HasSubstr("is not what its entries make")));
   EXPECT_EQ(report->checkpoints, 2u) << "its bytes are those that were written";
 
   for (const auto& [name, bytes] : disk_.image())
@@ -319,7 +319,7 @@ TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
 TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
-  ASSERT_TRUE(kept.store->write(plain_rows(kept.store->head().place, 600, 20'000)));
+  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().place, 600, 20'000)));
   const JournalHead head = kept.store->head();
   const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find("100." + std::string(50, 'x'));
@@ -330,9 +330,9 @@ TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   EXPECT_EQ(report->first_bad, RoomSeq{100});
   EXPECT_EQ(report->head.place, RoomSeq{99});
   ASSERT_FALSE(report->sound());
-  EXPECT_THAT(report->faults[0], HasSubstr("row 100 does not fit the chain of hashes"));
+  EXPECT_THAT(report->faults[0], HasSubstr("entry 100 does not fit the chain of hashes"));
   std::size_t seen = 0;
-  const Result<void> read = kept.store->read(RoomSeq{1}, head.place, [&](const RoomRow&) { return ++seen > 0; });
+  const Result<void> read = kept.store->read(RoomSeq{1}, head.place, [&](const LogEntry&) { return ++seen > 0; });
   EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
   EXPECT_EQ(seen, 99u);
   EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::invalid_input);
@@ -341,15 +341,15 @@ TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   EXPECT_TRUE(kept.store->branch(kTo, RoomSeq{99}, "b")) << "which the damage does not reach";
 }
 
-// Also where SQLite has the rows in memory, from when they were written.
+// Also where SQLite has the entries in memory, from when they were written.
 TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(3);
   const RoomSeq before = kept.store->head().place;
-  ASSERT_TRUE(kept.store->write(plain_rows(before, 20)));
+  ASSERT_TRUE(kept.store->write(plain_entries(before, 20)));
   ASSERT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
-  const std::string row = std::to_string(before.value + 7) + "." + std::string(20, 'x');
-  const std::size_t at = disk_.image().at(kFile).rfind(row);
+  const std::string entry = std::to_string(before.value + 7) + "." + std::string(20, 'x');
+  const std::size_t at = disk_.image().at(kFile).rfind(entry);
   ASSERT_NE(at, std::string::npos) << "a check carries the log into the database";
   disk_.flip_bit(kFile, 8 * (at + 10) + 1);
   const Result<RoomReport> report = kept.store->verify(test_block(), std::nullopt);
@@ -364,36 +364,36 @@ TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   const auto file_bytes = [&] { return disk_.size(kFile).value().value(); };
   ASSERT_TRUE(kept.store->tidy_if_idle());
   const std::uint64_t before = file_bytes();
-  ASSERT_TRUE(kept.store->write(plain_rows(kept.store->head().place, 20, 20'000)));
+  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().place, 20, 20'000)));
   ASSERT_TRUE(kept.store->tidy_if_idle());
-  EXPECT_EQ(file_bytes(), before) << "rows have come since it was asked";
+  EXPECT_EQ(file_bytes(), before) << "entries have come since it was asked";
   ASSERT_TRUE(kept.store->tidy_if_idle());
   EXPECT_GT(file_bytes(), before + 20u * 20'000);
-  ASSERT_TRUE(kept.store->write(plain_rows(kept.store->head().place, 3)));
+  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().place, 3)));
   EXPECT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
 
-  // One that takes no rows is left alone, and nobody is told of that every few seconds.
+  // One that takes no entries is left alone, and nobody is told of that every few seconds.
   disk_.fail_write_at(1, EIO);
-  ASSERT_FALSE(kept.store->write(plain_rows(kept.store->head().place, 200, 20'000)));
+  ASSERT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 200, 20'000)));
   const MemoryDisk::Image failed = disk_.image();
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(kept.store->tidy_if_idle());
   EXPECT_EQ(disk_.image(), failed);
 }
 
-// On the computer's disk, and each waits for the other: so rows get through between any two slices of a check or a
+// On the computer's disk, and each waits for the other: so entries get through between any two slices of a check or a
 // copy.
 TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   const test::TempDir folder;
   KeptCuts kept(folder.path() / "room", nullptr, "room");
   kept.keep();
   RoomStore& store = *kept.store;
-  ASSERT_TRUE(store.write(plain_rows(store.head().place, 20'000)));
+  ASSERT_TRUE(store.write(plain_entries(store.head().place, 20'000)));
   std::atomic<bool> end = false;
   std::atomic<std::uint64_t> written = 0;
   std::thread writer([&] {
-    for (RoomSeq at = store.head().place; !end; ++at.value, ++written) ASSERT_TRUE(store.write(plain_rows(at, 1)));
+    for (RoomSeq at = store.head().place; !end; ++at.value, ++written) ASSERT_TRUE(store.write(plain_entries(at, 1)));
   });
-  const auto wait_for_a_row = [&](double) {
+  const auto wait_for_a_entry = [&](double) {
     for (const std::uint64_t before = written; written == before;) std::this_thread::yield();
   };
   for (const bool copied : {false, true}) {
@@ -401,7 +401,7 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
     const JournalHead head = store.head();
     int waits = 0;
     const MaintenanceCalls calls{[&](double fraction) {
-                                   if (++waits % 20 == 0) wait_for_a_row(fraction);
+                                   if (++waits % 20 == 0) wait_for_a_entry(fraction);
                                  },
                                  {}};
     if (copied) {
@@ -417,14 +417,14 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
       EXPECT_GE(report->head.place, head.place);
     }
     EXPECT_GE(written - before, static_cast<std::uint64_t>(waits / 20));
-    std::printf("%s of %llu rows: %llu rows written meanwhile, %d waited for\n", copied ? "a copy" : "a check",
+    std::printf("%s of %llu entries: %llu entries written meanwhile, %d waited for\n", copied ? "a copy" : "a check",
                 static_cast<unsigned long long>(head.place.value), static_cast<unsigned long long>(written - before),
                 waits / 20);
   }
   // Without any waiting: how often is the scheduler's to say.
   const std::uint64_t before = written;
   ASSERT_TRUE(store.verify(test_block(), std::nullopt));
-  std::printf("a check that waits for nobody: %llu rows written meanwhile\n",
+  std::printf("a check that waits for nobody: %llu entries written meanwhile\n",
               static_cast<unsigned long long>(written - before));
   end = true;
   writer.join();
@@ -618,7 +618,7 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
   kept.checkpoint();
   kept.cut(10);
   const RoomSeq place{1 + 440 + 5};
-  const std::vector<RoomRow> before = rows_of(*kept.store, place);
+  const std::vector<LogEntry> before = entries_of(*kept.store, place);
   const Room expected = replay_of(before);
   int written = 0;
   const Result<JournalHead> live = kept.store->branch("/else/live", place, "second try", writing(kept, written));
@@ -651,7 +651,7 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
     EXPECT_EQ(branch->store->evaluated(), 5u) << "its parent's checkpoint serves";
     EXPECT_EQ(branch->store->server_epoch(), 1u);
     EXPECT_THAT(branch->store->people().value(), IsEmpty());
-    EXPECT_EQ(branch->store->person("Cora").value(), 3u) << "1 and 2 are others in its rows";
+    EXPECT_EQ(branch->store->person("Cora").value(), 3u) << "1 and 2 are others in its entries";
   }
   const Result<JournalHead> whole = branch_journal(kFile, "/else/whole", {}, "all", {}, &disk_);
   ASSERT_TRUE(whole);

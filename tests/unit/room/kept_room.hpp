@@ -51,7 +51,7 @@ struct KeptCuts {
     keep();
   }
   void keep() {
-    const Result<void> kept = store->write(room->take_rows());
+    const Result<void> kept = store->write(room->take_entries());
     ASSERT_TRUE(kept) << kept.error().message;
   }
   void checkpoint() {
@@ -68,35 +68,35 @@ struct KeptCuts {
 };
 
 // Rows that nobody has judged, of `bytes` each: what only a chain has to do with.
-inline std::vector<RoomRow> plain_rows(RoomSeq after, std::size_t count, std::size_t bytes = 20) {
-  std::vector<RoomRow> rows;
+inline std::vector<LogEntry> plain_entries(RoomSeq after, std::size_t count, std::size_t bytes = 20) {
+  std::vector<LogEntry> entries;
   for (std::size_t i = 1; i <= count; ++i) {
     const RoomSeq place{after.value + i};
     std::string label = std::to_string(place.value) + ".";
-    rows.push_back(
-        {place, std::chrono::nanoseconds(place.value), AuthorId{1}, MarkRow{label + std::string(bytes, 'x')}});
+    entries.push_back(
+        {place, std::chrono::nanoseconds(place.value), AuthorId{1}, MarkEntry{label + std::string(bytes, 'x')}});
   }
-  return rows;
+  return entries;
 }
 
-// The room of these rows, through nothing but a replay.
-inline Room replay_of(const std::vector<RoomRow>& rows) {
+// The room of these entries, through nothing but a replay.
+inline Room replay_of(const std::vector<LogEntry>& entries) {
   Room room(test_block());
-  for (const RoomRow& row : rows) {
-    const Result<void> followed = room.replay(row);
+  for (const LogEntry& entry : entries) {
+    const Result<void> followed = room.replay(entry);
     EXPECT_TRUE(followed) << followed.error().message;
   }
   return room;
 }
 
-inline std::vector<RoomRow> rows_of(RoomStore& store, RoomSeq to) {
-  std::vector<RoomRow> rows;
-  const Result<void> read = store.read(RoomSeq{1}, to, [&](const RoomRow& row) {
-    rows.push_back(row);
+inline std::vector<LogEntry> entries_of(RoomStore& store, RoomSeq to) {
+  std::vector<LogEntry> entries;
+  const Result<void> read = store.read(RoomSeq{1}, to, [&](const LogEntry& entry) {
+    entries.push_back(entry);
     return true;
   });
   EXPECT_TRUE(read) << read.error().message;
-  return rows;
+  return entries;
 }
 
 }  // namespace osteon::test

@@ -159,7 +159,7 @@ class Hand final : public SessionSubscriber {
   std::string ended_;
 };
 
-// Of a journal that takes no row nothing is known to be safe that is decided now, however it came to that.
+// Of a journal that takes no entry nothing is known to be safe that is decided now, however it came to that.
 TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   TempDir dir;
   MemoryDisk disk{1};

@@ -43,7 +43,7 @@ TEST(RoomMetal, RejectsWhatWouldTakeMetalAway) {
   EXPECT_TRUE(all.cut({0, 0, -4}, {4, 0, -4.5}).committed()) << "beside it";
 }
 
-// The rows make the same room again, the rejections among them.
+// The entries make the same room again, the rejections among them.
 TEST(RoomMetal, ReplaysFromItsRows) {
   MetalRoom all;
   (void)all.cut({0, 0, 1}, {0, 0, -4});
@@ -51,9 +51,9 @@ TEST(RoomMetal, ReplaysFromItsRows) {
   (void)all.cut({3, 0, 1}, {3, 0, -4});
   Room again(plate_block());
   int metal = 0;
-  for (const RoomRow& row : all.room.take_rows()) {
-    if (const auto* rejection = std::get_if<RejectionRow>(&row.what)) metal += rejection->reason == Rejection::metal;
-    ASSERT_TRUE(again.replay(row));
+  for (const LogEntry& entry : all.room.take_entries()) {
+    if (const auto* rejection = std::get_if<RejectionEntry>(&entry.what)) metal += rejection->reason == Rejection::metal;
+    ASSERT_TRUE(again.replay(entry));
   }
   EXPECT_EQ(metal, 1);
   EXPECT_EQ(again.field_hash(), all.room.field_hash());

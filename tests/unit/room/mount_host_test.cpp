@@ -123,7 +123,7 @@ TEST(MountInARoom, WhoLeavesPushesNoMore) {
   EXPECT_EQ(room.sessions[0]->seen_.front().seen_seq, 1u);
 }
 
-// The bone's motion is nothing that a room keeps: rows, field and hash are as without.
+// The bone's motion is nothing that a room keeps: entries, field and hash are as without.
 TEST(MountInARoom, IsNoEvent) {
   Pair room(true), other(false);
   for (int i = 0; i < 100; ++i) {

@@ -31,18 +31,18 @@ class HeardSession final : public SessionSubscriber {
     complete_ = parsed(complete);
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq place, const Bytes& row) override {
+  void offer(RoomSeq place, const Bytes& entry) override {
     const std::lock_guard lock(mutex_);
-    take(row, rows_);
+    take(entry, entries_);
     places_.push_back(place);
     fast_.push_back({});
   }
-  void offer(RoomSeq place, const Bytes& row, const wire::SessionRow& fast) override {
-    offer(place, row);
+  void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& fast) override {
+    offer(place, entry);
     const std::lock_guard lock(mutex_);
     fast_.back() = fast;
   }
-  void hold(const wire::SessionRow& supervised) override { held_ = supervised; }
+  void hold(const wire::SessionEntry& supervised) override { held_ = supervised; }
   bool show_partners(const std::vector<CuttingState>& states) override {
     const std::lock_guard lock(mutex_);
     partners_ = states;
@@ -56,12 +56,12 @@ class HeardSession final : public SessionSubscriber {
 
   std::vector<v1::SessionResponse> before_;
   v1::SessionResponse complete_;
-  std::optional<wire::SessionRow> held_;
-  std::vector<v1::SessionResponse> rows() const {
+  std::optional<wire::SessionEntry> held_;
+  std::vector<v1::SessionResponse> entries() const {
     const std::lock_guard lock(mutex_);
-    return rows_;
+    return entries_;
   }
-  std::vector<wire::SessionRow> fast() const {
+  std::vector<wire::SessionEntry> fast() const {
     const std::lock_guard lock(mutex_);
     return fast_;
   }
@@ -84,8 +84,8 @@ class HeardSession final : public SessionSubscriber {
 
   const AuthorId author_;
   mutable std::mutex mutex_;
-  std::vector<v1::SessionResponse> rows_;
-  std::vector<wire::SessionRow> fast_;
+  std::vector<v1::SessionResponse> entries_;
+  std::vector<wire::SessionEntry> fast_;
   std::vector<RoomSeq> places_;
   std::vector<CuttingState> partners_;
 };
@@ -153,7 +153,7 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   Lesson lesson;
   const auto frozen = lesson.supervise(lesson.trainee, {.stopped = true, .words = "stop"});
   ASSERT_TRUE(frozen);
-  const auto own = lesson.sessions[lesson.trainee]->rows(), others = lesson.sessions[lesson.other]->rows();
+  const auto own = lesson.sessions[lesson.trainee]->entries(), others = lesson.sessions[lesson.other]->entries();
   ASSERT_EQ(own.size(), 1u);
   ASSERT_EQ(others.size(), 1u);
   ASSERT_TRUE(own.back().has_supervised());
@@ -162,8 +162,8 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   EXPECT_EQ(own.back().supervised().lease_epoch(), lesson.runtime.lease_epoch(lesson.trainee));
   EXPECT_EQ(own.back().supervised().decided_by(), lesson.instructor.value);
   EXPECT_EQ(own.back().supervised().decided_by_name(), "Ada");
-  const wire::SessionRow fast = lesson.sessions[lesson.trainee]->fast().back();
-  EXPECT_EQ(fast.kind, wire::SessionRowKind::supervised);
+  const wire::SessionEntry fast = lesson.sessions[lesson.trainee]->fast().back();
+  EXPECT_EQ(fast.kind, wire::SessionEntryKind::supervised);
   EXPECT_TRUE(fast.supervision.stopped);
   EXPECT_EQ(fast.lease_epoch, lesson.runtime.lease_epoch(lesson.trainee));
   EXPECT_EQ(fast.by, (Decider{lesson.instructor, "Ada"})) << "as the stream says it";
@@ -171,15 +171,15 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   EXPECT_EQ(others.back().noted().room_seq(), frozen->room_seq.value);
 
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, lesson.other, "go on"); }));
-  EXPECT_TRUE(lesson.sessions[lesson.trainee]->rows().back().has_noted());
-  ASSERT_TRUE(lesson.sessions[lesson.other]->rows().back().has_said());
-  EXPECT_EQ(lesson.sessions[lesson.other]->rows().back().said().words(), "go on");
+  EXPECT_TRUE(lesson.sessions[lesson.trainee]->entries().back().has_noted());
+  ASSERT_TRUE(lesson.sessions[lesson.other]->entries().back().has_said());
+  EXPECT_EQ(lesson.sessions[lesson.other]->entries().back().said().words(), "go on");
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, "all"); }));
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.annotate(lesson.instructor, {.points = {{1, 2, 3}}}); }));
   for (const auto& [author, session] : lesson.sessions) {
-    const auto rows = session->rows();
-    EXPECT_EQ(rows[rows.size() - 2].said().words(), "all");
-    EXPECT_TRUE(rows.back().has_noted()) << "a drawing";
+    const auto entries = session->entries();
+    EXPECT_EQ(entries[entries.size() - 2].said().words(), "all");
+    EXPECT_TRUE(entries.back().has_noted()) << "a drawing";
     const auto places = session->places();
     for (std::size_t i = 1; i < places.size(); ++i) EXPECT_EQ(places[i].value, places[i - 1].value + 1) << "no gap";
   }
@@ -195,7 +195,7 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
     return session;
   };
   const auto first = comes();
-  const auto told = std::ranges::find_if(first->before_, [](const auto& row) { return row.has_supervised(); });
+  const auto told = std::ranges::find_if(first->before_, [](const auto& entry) { return entry.has_supervised(); });
   ASSERT_NE(told, first->before_.end());
   EXPECT_EQ(told->supervised().room_seq(), 0u);
   EXPECT_EQ(told->supervised().supervision().taken_by(), lesson.instructor.value);
@@ -212,7 +212,7 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   ASSERT_TRUE(second->held_);
   EXPECT_TRUE(second->held_->supervision.may_cut());
   EXPECT_EQ(std::ranges::count_if(lesson.sessions[lesson.trainee]->before_,
-                                  [](const auto& row) { return row.has_supervised(); }),
+                                  [](const auto& entry) { return entry.has_supervised(); }),
             0)
       << "of whom nobody has decided anything";
 }

@@ -1,4 +1,4 @@
-// What people decide about each other in a room, draw and say: who may, what it does to cuts, and that its rows make
+// What people decide about each other in a room, draw and say: who may, what it does to cuts, and that its entries make
 // the same room again.
 #include "server/room/people.hpp"
 
@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "server/room/room.hpp"
 #include "tests/unit/room/cuts.hpp"
 
@@ -282,7 +282,7 @@ TEST(Words, HaveAPlaceAndALength) {
   const auto said = all.room.say(all.instructor, all.trainee, "slower");
   ASSERT_TRUE(said);
   EXPECT_EQ(said->kind, EventKind::words);
-  EXPECT_EQ(std::get<WordsRow>(said->people).words, "slower");
+  EXPECT_EQ(std::get<WordsEntry>(said->people).words, "slower");
   EXPECT_TRUE(all.room.say(all.trainee, {}, std::string(kMostWordsBytes, 'x')));
   EXPECT_EQ(all.refused(all.room.say(all.trainee, {}, std::string(kMostWordsBytes + 1, 'x'))),
             ErrorCode::invalid_input);
@@ -291,13 +291,13 @@ TEST(Words, HaveAPlaceAndALength) {
   EXPECT_EQ(all.refused(all.room.say(AuthorId{99}, {}, "me")), ErrorCode::invalid_input);
 }
 
-RoomRow through_bytes(const RoomRow& row) {
-  Result<RoomRow> read = row_from_bytes(row.place, row.at, to_bytes(row));
+LogEntry through_bytes(const LogEntry& entry) {
+  Result<LogEntry> read = entry_from_bytes(entry.place, entry.at, to_bytes(entry));
   EXPECT_TRUE(read) << read.error().message;
   return std::move(*read);
 }
 
-// Whatever they do: through the journal's bytes, the rows make the same room again.
+// Whatever they do: through the journal's bytes, the entries make the same room again.
 TEST(PeopleRows, ReplayedMakeTheSameRoom) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     Class all;
@@ -335,11 +335,11 @@ TEST(PeopleRows, ReplayedMakeTheSameRoom) {
         default:
           (void)all.cut(by);
       }
-      for (const RoomRow& row : all.room.take_rows()) {
-        kinds.insert(row.what.index());
-        const Result<void> followed = replayed.replay(through_bytes(row));
+      for (const LogEntry& entry : all.room.take_entries()) {
+        kinds.insert(entry.what.index());
+        const Result<void> followed = replayed.replay(through_bytes(entry));
         ASSERT_TRUE(followed) << followed.error().message;
-        ASSERT_EQ(to_bytes(through_bytes(row)), to_bytes(row));
+        ASSERT_EQ(to_bytes(through_bytes(entry)), to_bytes(entry));
       }
       ASSERT_EQ(replayed.room_hash(), all.room.room_hash()) << "seed " << seed << " event " << i;
     }
@@ -380,26 +380,26 @@ TEST(PeopleRows, EveryOneOfThemIsInTheHash) {
   changed("a line");
 }
 
-// What no room would have decided is no row of one.
+// What no room would have decided is no entry of one.
 TEST(PeopleRows, ThatCannotBeAreRefused) {
   Class all;
-  const auto refused = [&](decltype(RoomRow::what) what) {
-    const RoomRow row{RoomSeq{all.room.room_seq().value + 1}, all.room.time(), all.instructor, std::move(what)};
-    EXPECT_FALSE(all.room.replay(row));
+  const auto refused = [&](decltype(LogEntry::what) what) {
+    const LogEntry entry{RoomSeq{all.room.room_seq().value + 1}, all.room.time(), all.instructor, std::move(what)};
+    EXPECT_FALSE(all.room.replay(entry));
   };
-  refused(SuperviseRow{all.observer, {}});
-  refused(SuperviseRow{AuthorId{99}, {}});
-  refused(SuperviseRow{all.trainee, {.taken_by = AuthorId{99}}});
-  refused(SuperviseRow{all.trainee, {.tools = {Digest{{1}}}}});
-  refused(SuperviseRow{all.trainee, {.guide_share = 5000}});
-  refused(AnnotationRow{1, std::nullopt});
-  refused(AnnotationRow{2, line(2)});
+  refused(SuperviseEntry{all.observer, {}});
+  refused(SuperviseEntry{AuthorId{99}, {}});
+  refused(SuperviseEntry{all.trainee, {.taken_by = AuthorId{99}}});
+  refused(SuperviseEntry{all.trainee, {.tools = {Digest{{1}}}}});
+  refused(SuperviseEntry{all.trainee, {.guide_share = 5000}});
+  refused(AnnotationEntry{1, std::nullopt});
+  refused(AnnotationEntry{2, line(2)});
   Annotation one = line(1);
   one.id = 1;
   one.author = all.trainee;
-  refused(AnnotationRow{1, one});
-  refused(WordsRow{{}, ""});
-  refused(WordsRow{AuthorId{99}, "x"});
+  refused(AnnotationEntry{1, one});
+  refused(WordsEntry{{}, ""});
+  refused(WordsEntry{AuthorId{99}, "x"});
   EXPECT_EQ(all.room.room_seq().value, 5u);
 }
 

@@ -13,11 +13,11 @@ using namespace std::chrono_literals;
 
 Playback of(std::deque<std::chrono::nanoseconds> times, double speed) {
   std::uint64_t place = 0;
-  return {[times, place]() mutable -> std::optional<RoomRow> {
+  return {[times, place]() mutable -> std::optional<LogEntry> {
             if (times.empty()) return {};
-            RoomRow row{.place = RoomSeq{++place}, .at = times.front(), .author = {}, .what = MarkRow{"now"}};
+            LogEntry entry{.place = RoomSeq{++place}, .at = times.front(), .author = {}, .what = MarkEntry{"now"}};
             times.pop_front();
-            return row;
+            return entry;
           },
           speed};
 }
@@ -47,7 +47,7 @@ TEST(Player, StandsStillAndStops) {
   Player stopped(of({1s, 2s}, 1.0), 0s);
   (void)stopped.take(0s);
   ASSERT_TRUE(stopped.take(1500ms));
-  ASSERT_FALSE(stopped.take(1600ms)) << "the row of 2 s is waited for";
+  ASSERT_FALSE(stopped.take(1600ms)) << "the entry of 2 s is waited for";
   stopped.stop();
   EXPECT_FALSE(stopped.take(20s));
 }

@@ -195,7 +195,7 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   EXPECT_EQ(kept.store->head(), head);
   EXPECT_FALSE(kept.store->forget(1).value()) << "nothing is left to forget";
 
-  // The room goes on, and what it was is made again from its rows.
+  // The room goes on, and what it was is made again from its entries.
   kept.cut(2);
   const Digest later = room.field_hash();
   ASSERT_TRUE(kept.store->close());
@@ -206,7 +206,7 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   EXPECT_THAT(report->notes, ElementsAre(HasSubstr("words were erased from")));
   kept.open(kFile);
   EXPECT_EQ(kept.room->field_hash(), later);
-  EXPECT_EQ(test::replay_of(test::rows_of(*kept.store, head.place)).field_hash(), bone);
+  EXPECT_EQ(test::replay_of(test::entries_of(*kept.store, head.place)).field_hash(), bone);
   EXPECT_FALSE(anywhere("Zwetschge"));
 }
 
@@ -284,9 +284,9 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
   EXPECT_FALSE(has_head(kFile, {RoomSeq{5}, {}}, &disk_).value());
   EXPECT_FALSE(has_head(kFile, {RoomSeq{5000}, {}}, &disk_).value());
 
-  // In use, with rows that are only in the log.
+  // In use, with entries that are only in the log.
   KeptCuts live(kFile, &disk_, "femur");
-  EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "of rows that are in its file";
+  EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "of entries that are in its file";
   live.cut(2);
   const RoomSeq newest = live.store->head().place;
   ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
@@ -333,7 +333,7 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   {
     KeptCuts kept(kFile, &disk_, "femur");
     kept.keep();
-    ASSERT_TRUE(kept.store->write(test::plain_rows(kept.store->head().place, 40)));
+    ASSERT_TRUE(kept.store->write(test::plain_entries(kept.store->head().place, 40)));
     last = kept.store->head().place;
     ASSERT_TRUE(kept.store->close());
   }
@@ -343,7 +343,7 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   const auto all = branch_journal(kFile, "/rooms/b", {}, "b", {}, &disk_);
   ASSERT_FALSE(all);
   EXPECT_EQ(all.error().code, ErrorCode::unavailable);
-  EXPECT_THAT(all.error().message, AllOf(HasSubstr("row 30 does not fit the chain"), HasSubstr("--at 29 takes these")));
+  EXPECT_THAT(all.error().message, AllOf(HasSubstr("entry 30 does not fit the chain"), HasSubstr("--at 29 takes these")));
   EXPECT_EQ(branch_journal(kFile, "/rooms/b", last, "b", {}, &disk_).error().code, ErrorCode::invalid_input);
   EXPECT_FALSE(disk_.size("/rooms/b").value());
   const auto confirmed = branch_journal(kFile, "/rooms/b", RoomSeq{29}, "b", {}, &disk_);
@@ -351,7 +351,7 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   EXPECT_EQ(confirmed->place, RoomSeq{29});
 }
 
-// Not closed, so that its last rows are only in its log; the power fails at every write and sync of the deletion in
+// Not closed, so that its last entries are only in its log; the power fails at every write and sync of the deletion in
 // turn.
 TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   RoomSeq head;

@@ -43,10 +43,10 @@ TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
 TEST(Room, LeavesTheSameBoneForEveryInterleaving) {
   const auto hash_of = [](const std::vector<int>& turns) {
     Room room(test_block());
-    std::vector<std::vector<Cut>> rows{strokes(room.join(MemberKind::surgeon), 4, 3),
+    std::vector<std::vector<Cut>> entries{strokes(room.join(MemberKind::surgeon), 4, 3),
                                        strokes(room.join(MemberKind::surgeon), 4, 4)};
     std::size_t next[2] = {0, 0};
-    for (const int who : turns) commit(room, rows[static_cast<std::size_t>(who)][next[who]++]);
+    for (const int who : turns) commit(room, entries[static_cast<std::size_t>(who)][next[who]++]);
     return room.field_hash();
   };
   const Digest first = hash_of({0, 0, 0, 0, 1, 1, 1, 1});

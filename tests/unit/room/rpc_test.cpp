@@ -31,7 +31,7 @@ class RoomRpc : public ServedRoom {
   std::optional<wire::JoinedRoom> watcher_;
 };
 
-// Twelve cuts in two rows, of which no crumb comes off.
+// Twelve cuts in two entries, of which no crumb comes off.
 std::vector<Cut> dimples(AuthorId author, double y_mm) {
   std::vector<Cut> cuts;
   for (int i = 0; i < 12; ++i) {
@@ -78,7 +78,7 @@ TEST_F(RoomRpc, AWordAboutAllIsARowForThoseAloneWhomItChanges) {
   EXPECT_EQ(tell(absent.value, false), before + 3);
   EXPECT_EQ(tell(0, true), before + 4);
   EXPECT_EQ(head(), before + 4) << "the one who was freed alone";
-  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a word about one is a row";
+  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a word about one is a entry";
 }
 
 TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
@@ -88,7 +88,7 @@ TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
   MeshReader viewer(address());
   ASSERT_TRUE(wait_until([&] { return first->own() == 12 && second->own() == 12 && first->seq() == second->seq(); },
                          kPatience));
-  // Who watches may have come after the last cut, which is a row as well.
+  // Who watches may have come after the last cut, which is a entry as well.
   const RoomSeq last_cut = std::max(first->acknowledged().at(12), second->acknowledged().at(12));
   ASSERT_TRUE(viewer.read_to(last_cut));
   const auto surface = viewer.hashes();

@@ -170,7 +170,7 @@ Bytes tool() {
   return std::make_shared<const std::string>(response.SerializeAsString());
 }
 
-Bytes row(std::uint64_t seq) {
+Bytes entry(std::uint64_t seq) {
   v1::SessionResponse response;
   response.mutable_committed()->set_room_seq(seq);
   return std::make_shared<const std::string>(response.SerializeAsString());
@@ -190,9 +190,9 @@ TEST(SessionSendQueue, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
   std::vector<FieldLeaf> leaves(2);
   for (FieldLeaf& leaf : leaves) leaf.values.assign(kLeafVoxels, 5);
   leaves[1].origin = {8, 0, 0};
-  // The publisher may still bring the row that the leaves already contain.
-  EXPECT_TRUE(send_queue.add(RoomSeq{4}, row(4)));
-  EXPECT_TRUE(send_queue.add(RoomSeq{5}, row(5)));
+  // The publisher may still bring the entry that the leaves already contain.
+  EXPECT_TRUE(send_queue.add(RoomSeq{4}, entry(4)));
+  EXPECT_TRUE(send_queue.add(RoomSeq{5}, entry(5)));
   EXPECT_TRUE(send_queue.take().empty()) << "nothing before the leaves are known";
   send_queue.set_leaves(leaves);
   EXPECT_TRUE(parsed(send_queue.take()).has_tool()) << "tools go before the leaves";
@@ -203,7 +203,7 @@ TEST(SessionSendQueue, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
   EXPECT_EQ(first.committed().room_seq(), 5u);
   EXPECT_EQ(first.index(), 1u) << "the first after the leaves";
   EXPECT_TRUE(send_queue.take().empty());
-  EXPECT_TRUE(send_queue.add_answer(row(2))) << "an old outcome told again";
+  EXPECT_TRUE(send_queue.add_answer(entry(2))) << "an old outcome told again";
   const v1::SessionResponse again = parsed(send_queue.take());
   EXPECT_EQ(again.committed().room_seq(), 2u);
   EXPECT_EQ(again.index(), 0u) << "it has no place in the order of this session";
@@ -215,14 +215,14 @@ TEST(SessionSendQueue, LeavesOutWhatHasArrived) {
   send_queue.begin(RoomSeq{0}, {}, complete(0));
   send_queue.set_leaves({});
   (void)send_queue.take();
-  for (std::uint64_t seq = 1; seq <= 5; ++seq) EXPECT_TRUE(send_queue.add(RoomSeq{seq}, row(seq)));
-  EXPECT_TRUE(send_queue.add_answer(row(1)));
+  for (std::uint64_t seq = 1; seq <= 5; ++seq) EXPECT_TRUE(send_queue.add(RoomSeq{seq}, entry(seq)));
+  EXPECT_TRUE(send_queue.add_answer(entry(1)));
   send_queue.arrived(3);
   EXPECT_EQ(send_queue.waiting(), 3u);
   EXPECT_EQ(send_queue.index(), 5u);
   EXPECT_EQ(parsed(send_queue.take()).index(), 4u);
   EXPECT_EQ(parsed(send_queue.take()).index(), 5u);
-  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not a row of the order";
+  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not a entry of the order";
 }
 
 TEST(SessionSendQueue, GivesUpAReaderThatIsTooFarBehind) {
@@ -230,9 +230,9 @@ TEST(SessionSendQueue, GivesUpAReaderThatIsTooFarBehind) {
   send_queue.begin(RoomSeq{0}, {}, complete(0));
   send_queue.set_leaves({});
   std::uint64_t seq = 0;
-  while (send_queue.add(RoomSeq{seq + 1}, row(seq + 1))) ++seq;
-  EXPECT_EQ(seq, SessionSendQueue::kMaxRows);
-  EXPECT_EQ(send_queue.waiting(), SessionSendQueue::kMaxRows);
+  while (send_queue.add(RoomSeq{seq + 1}, entry(seq + 1))) ++seq;
+  EXPECT_EQ(seq, SessionSendQueue::kMaxEntries);
+  EXPECT_EQ(send_queue.waiting(), SessionSendQueue::kMaxEntries);
 }
 
 }  // namespace

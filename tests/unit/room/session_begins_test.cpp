@@ -37,12 +37,12 @@ class Told final : public SessionSubscriber {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void offer(RoomSeq place, const Bytes& row) override {
-    ASSERT_TRUE(send_queue_.add(place, row));
+  void offer(RoomSeq place, const Bytes& entry) override {
+    ASSERT_TRUE(send_queue_.add(place, entry));
     read();
   }
-  void answer(const Bytes& row) override {
-    ASSERT_TRUE(send_queue_.add_answer(row));
+  void answer(const Bytes& entry) override {
+    ASSERT_TRUE(send_queue_.add_answer(entry));
     read();
   }
   void refuse(const Error& why) override { ADD_FAILURE() << why.message; }

@@ -48,7 +48,7 @@ TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
   cutting = false;
   for (std::thread& person : people) person.join();
   readers.push_back(std::make_unique<MeshReader>(address()));
-  // Nobody comes any more: the rows that are left are those that the hand hears of.
+  // Nobody comes any more: the entries that are left are those that the hand hears of.
   send(*hand, {cuts.end() - kLast, cuts.end()});
   ASSERT_TRUE(wait_until([&] { return hand->own() == kCuts; }, kPatience));
   // Crumbs may still come off, each an event of its own.

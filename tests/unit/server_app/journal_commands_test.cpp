@@ -43,7 +43,7 @@ class JournalCommands : public ::testing::Test {
     ASSERT_TRUE(kept.store->close());
     whole_ = bytes_of(file_);
   }
-  // One bit of the row 10 places before the last.
+  // One bit of the entry 10 places before the last.
   void damage() {
     bad_ = last_ - 10;
     std::string bytes = whole_;
@@ -139,7 +139,7 @@ TEST_F(JournalCommands, AReplayReplacesOnlyFields) {
 
 TEST_F(JournalCommands, ADamagedJournalIsSaidToBeOneAndGivesWhatIsConfirmed) {
   damage();
-  const std::string fault = "row " + std::to_string(bad_) + " does not fit the chain of hashes",
+  const std::string fault = "entry " + std::to_string(bad_) + " does not fit the chain of hashes",
                     bone = (dir_ / "case").string();
   const std::string confirmed = std::to_string(bad_ - 1), beyond = std::to_string(bad_);
   const auto file = [&](const std::string& name) { return (dir_ / name).string(); };

@@ -97,8 +97,8 @@ Restrictions any_supervision(Random& random, std::size_t most_tools) {
   return one;
 }
 
-wire::SessionRow committed(const Cut& cut) {
-  return {.room_seq = {cut.author_seq}, .kind = wire::SessionRowKind::committed, .cut = cut};
+wire::SessionEntry committed(const Cut& cut) {
+  return {.room_seq = {cut.author_seq}, .kind = wire::SessionEntryKind::committed, .cut = cut};
 }
 
 v1::UpPacket parsed(const std::string& bytes) {
@@ -296,14 +296,14 @@ TEST(CutRun, TheLongestCutFitsAPacket) {
     ASSERT_TRUE(window.acknowledge(before.author_seq));
     ASSERT_TRUE(push(cut));
   };
-  SendWindow window(kWide, before.author_seq), row_window(kWide, before.author_seq);
+  SendWindow window(kWide, before.author_seq), entry_window(kWide, before.author_seq);
   wire::CutSender sender(window, none);
-  wire::RowSender row_sender(row_window, none);
+  wire::EntrySender entry_sender(entry_window, none);
   after_it(window, [&](const Cut& one) { return sender.push(one); });
-  after_it(row_window, [&](const Cut& one) { return row_sender.push(committed(one)); });
-  std::printf("%zu B up, %zu B down\n", window.least_room(0s), row_window.least_room(0s));
+  after_it(entry_window, [&](const Cut& one) { return entry_sender.push(committed(one)); });
+  std::printf("%zu B up, %zu B down\n", window.least_room(0s), entry_window.least_room(0s));
   EXPECT_LE(window.least_room(0s), kMostPlainBytes - 100);
-  EXPECT_LE(row_window.least_room(0s), kMostPlainBytes - 100);
+  EXPECT_LE(entry_window.least_room(0s), kMostPlainBytes - 100);
   cut.path.resize(wire::kMostKnotsInPacket + 1);
   EXPECT_FALSE(wire::fits_a_packet(cut));
 }
@@ -358,11 +358,11 @@ TEST(CutRun, AFullWindowChangesNothing) {
 }
 
 // The longest supervision that goes in a packet; one of more tools goes over the stream.
-TEST(RowRun, TheLongestSupervisionFitsAPacket) {
-  wire::SessionRow row{
-      .room_seq = {~std::uint64_t{0}}, .kind = wire::SessionRowKind::supervised, .lease_epoch = ~std::uint64_t{0}};
+TEST(EntryRun, TheLongestSupervisionFitsAPacket) {
+  wire::SessionEntry entry{
+      .room_seq = {~std::uint64_t{0}}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = ~std::uint64_t{0}};
   constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min();
-  row.supervision = {.stopped = true,
+  entry.supervision = {.stopped = true,
                      .taken_by = {~std::uint64_t{0}},
                      .guide = {~std::uint64_t{0}},
                      .guide_share = kWholeShare,
@@ -371,39 +371,39 @@ TEST(RowRun, TheLongestSupervisionFitsAPacket) {
                      .tools = {},
                      .words = std::string(kMostSupervisionWords, 'w')};
   for (std::size_t n = 0; n < wire::kMostToolsInPacket; ++n)
-    row.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
-  row.by = {AuthorId{~std::uint64_t{0}}, std::string(wire::kMostNameInPacket, 'n')};
-  ASSERT_TRUE(check(row.supervision));
-  ASSERT_TRUE(wire::fits_a_packet(row));
+    entry.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
+  entry.by = {AuthorId{~std::uint64_t{0}}, std::string(wire::kMostNameInPacket, 'n')};
+  ASSERT_TRUE(check(entry.supervision));
+  ASSERT_TRUE(wire::fits_a_packet(entry));
   SendWindow window(kWide);
   const wire::ToolNumbers none;
-  wire::RowSender sender(window, none);
-  ASSERT_TRUE(sender.push(row));
+  wire::EntrySender sender(window, none);
+  ASSERT_TRUE(sender.push(entry));
   EXPECT_LE(window.least_room(0s), kMostPlainBytes - 100);
-  row.by.name += 'n';
-  EXPECT_FALSE(wire::fits_a_packet(row)) << "no name is cut off";
-  row.by.name.clear();
-  EXPECT_TRUE(wire::fits_a_packet(row));
-  row.supervision.tools.push_back(digest(99));
-  EXPECT_FALSE(wire::fits_a_packet(row));
+  entry.by.name += 'n';
+  EXPECT_FALSE(wire::fits_a_packet(entry)) << "no name is cut off";
+  entry.by.name.clear();
+  EXPECT_TRUE(wire::fits_a_packet(entry));
+  entry.supervision.tools.push_back(digest(99));
+  EXPECT_FALSE(wire::fits_a_packet(entry));
 }
 
-TEST(RowRun, ASupervisionThatNobodyDecidesSpoilsItsPacket) {
+TEST(EntryRun, ASupervisionThatNobodyDecidesSpoilsItsPacket) {
   v1::DownPacket packet;
-  v1::SupervisedRow& row = *packet.add_supervised();
-  row.set_index(1);
-  EXPECT_TRUE(wire::rows_of(packet, {})) << "one that frees";
-  row.mutable_supervision()->set_guide_share(1001);
-  const auto read = wire::rows_of(packet, {});
+  v1::SupervisedEntry& entry = *packet.add_supervised();
+  entry.set_index(1);
+  EXPECT_TRUE(wire::entries_of(packet, {})) << "one that frees";
+  entry.mutable_supervision()->set_guide_share(1001);
+  const auto read = wire::entries_of(packet, {});
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
 }
 
 // Rows of three authors, rejections, supervisions and events of the stream, in packets that are lost, repeated and
 // overtaken and may come before the tools' numbers do: the session's order comes out.
-TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
+TEST(EntryRun, AnyRowsComeBackInTheSessionsOrder) {
   const wire::ToolNumbers numbers = numbers_1_to_3(), none;
-  std::size_t rows_seen = 0, packets = 0, left_out = 0;
+  std::size_t entries_seen = 0, packets = 0, left_out = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     Random random(seed);
     std::array<Cut, 3> last;
@@ -412,38 +412,38 @@ TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
       last[a].tool = digest(1);
     }
     SendWindow window(kWide);
-    wire::RowSender sender(window, numbers);
-    std::vector<wire::SessionRow> rows;
+    wire::EntrySender sender(window, numbers);
+    std::vector<wire::SessionEntry> entries;
     RoomSeq place{random.index(1000)};
     for (std::size_t i = 0; i < 60; ++i) {
       place.value += random.unit() < 0.8 ? 1 : random.index(1000);
       const double kind = random.unit();
-      wire::SessionRow row{.room_seq = place};
+      wire::SessionEntry entry{.room_seq = place};
       if (kind < 0.05) {
-        row.kind = wire::SessionRowKind::rejected;
-        row.author_seq = any(random);
-        row.reason = static_cast<std::uint32_t>(random.index(13));
-        row.lease_epoch = any(random);
+        entry.kind = wire::SessionEntryKind::rejected;
+        entry.author_seq = any(random);
+        entry.reason = static_cast<std::uint32_t>(random.index(13));
+        entry.lease_epoch = any(random);
       } else if (kind < 0.08) {
-        row.kind = wire::SessionRowKind::supervised;
-        row.lease_epoch = any(random);
-        row.supervision = any_supervision(random, wire::kMostToolsInPacket);
-        row.by = {AuthorId{random.index(4)}, std::string(random.index(wire::kMostNameInPacket + 1), 'n')};
+        entry.kind = wire::SessionEntryKind::supervised;
+        entry.lease_epoch = any(random);
+        entry.supervision = any_supervision(random, wire::kMostToolsInPacket);
+        entry.by = {AuthorId{random.index(4)}, std::string(random.index(wire::kMostNameInPacket + 1), 'n')};
       } else if (kind > 0.1) {
         Cut& cut = last[random.index(3)];
         cut = any_cut(random, cut, random.unit() < 0.1);
         if (random.unit() < 0.05) cut.author_seq += random.index(1000);  // some of them were rejected
-        row.kind = wire::SessionRowKind::committed;
-        row.cut = cut;
+        entry.kind = wire::SessionEntryKind::committed;
+        entry.cut = cut;
       }
-      rows.push_back(row);
-      ASSERT_TRUE(sender.push(rows.back()));
+      entries.push_back(entry);
+      ASSERT_TRUE(sender.push(entries.back()));
       if (random.unit() < 0.05) sender.forget(last[random.index(3)].author);
     }
-    ReceiveWindow<wire::SessionRow> in;
-    std::vector<wire::SessionRow> back;
+    ReceiveWindow<wire::SessionEntry> in;
+    std::vector<wire::SessionEntry> back;
     std::vector<std::string> flying;
-    for (int turn = 0; back.size() < rows.size(); ++turn) {
+    for (int turn = 0; back.size() < entries.size(); ++turn) {
       ASSERT_LT(turn, 20000);
       wire::PacketFiller<v1::DownPacket> filler(100 + random.index(kMostPlainBytes - 100));
       filler.add_items(window, turn * 8ms, 5);
@@ -455,16 +455,16 @@ TEST(RowRun, AnyRowsComeBackInTheSessionsOrder) {
       v1::DownPacket packet;
       ASSERT_TRUE(packet.ParseFromString(flying[which]));
       if (random.unit() < 0.9) flying.erase(flying.begin() + static_cast<std::ptrdiff_t>(which));
-      const auto read = wire::rows_of(packet, turn < 5 ? none : numbers, &left_out);
+      const auto read = wire::entries_of(packet, turn < 5 ? none : numbers, &left_out);
       ASSERT_TRUE(read) << read.error().message;
-      for (const wire::IndexedRow& row : *read) in.offer(row.index, row.row);
-      while (auto row = in.take()) back.push_back(std::move(*row));
+      for (const wire::IndexedEntry& entry : *read) in.offer(entry.index, entry.entry);
+      while (auto entry = in.take()) back.push_back(std::move(*entry));
       window.acknowledge(in.acknowledged(), in.beyond(in.acknowledged()));
     }
-    for (std::size_t i = 0; i < rows.size(); ++i) ASSERT_EQ(back[i], rows[i]) << "seed " << seed << " row " << i;
-    rows_seen += rows.size();
+    for (std::size_t i = 0; i < entries.size(); ++i) ASSERT_EQ(back[i], entries[i]) << "seed " << seed << " entry " << i;
+    entries_seen += entries.size();
   }
-  std::printf("%zu rows in %zu packets, %zu runs left out for their tools\n", rows_seen, packets, left_out);
+  std::printf("%zu entries in %zu packets, %zu runs left out for their tools\n", entries_seen, packets, left_out);
   EXPECT_GT(left_out, 0u);
 }
 
@@ -476,10 +476,10 @@ TEST(CutRun, DamagedBytesDoNoHarm) {
     Random random(seed);
     SendWindow up(kWide), down(kWide);
     wire::CutSender cuts(up, numbers);
-    wire::RowSender rows(down, numbers);
+    wire::EntrySender entries(down, numbers);
     for (const Cut& cut : any_cuts(random, 8, true)) {
       ASSERT_TRUE(cuts.push(cut));
-      ASSERT_TRUE(rows.push(committed(cut)));
+      ASSERT_TRUE(entries.push(committed(cut)));
     }
     wire::PacketFiller<v1::UpPacket> up_filler(kMostPlainBytes);
     wire::PacketFiller<v1::DownPacket> down_filler(kMostPlainBytes);
@@ -495,7 +495,7 @@ TEST(CutRun, DamagedBytesDoNoHarm) {
     if (up_packet.ParseFromString(up_bytes))
       for (const v1::CutRun& run : up_packet.cuts()) ++(wire::cuts_of(run, {7}, numbers) ? read_so : refused);
     v1::DownPacket down_packet;
-    if (down_packet.ParseFromString(down_bytes)) ++(wire::rows_of(down_packet, numbers) ? read_so : refused);
+    if (down_packet.ParseFromString(down_bytes)) ++(wire::entries_of(down_packet, numbers) ? read_so : refused);
   }
   std::printf("%zu refused, %zu read otherwise or unharmed\n", refused, read_so);
   EXPECT_GT(refused, 100u);
@@ -658,7 +658,7 @@ TEST(PacketFiller, FillsUpToItsBudgetAndLeavesOutWhatDoesNotFit) {
   for (int i = 0; i < 2000; ++i) {
     const std::size_t budget = random.index(kMostPlainBytes + 1);
     SendWindow window(kWide);
-    wire::RowSender sender(window, numbers);
+    wire::EntrySender sender(window, numbers);
     for (const Cut& cut : any_cuts(random, random.index(100), false)) ASSERT_TRUE(sender.push(committed(cut)));
     wire::PacketFiller<v1::DownPacket> filler(budget);
     v1::DownPacket head;
@@ -684,10 +684,10 @@ TEST(PacketFiller, FillsUpToItsBudgetAndLeavesOutWhatDoesNotFit) {
     if (has_head) {
       ASSERT_EQ(packet.acknowledged(), head.acknowledged());
     }
-    const auto rows = wire::rows_of(packet, numbers);
-    ASSERT_TRUE(rows);
-    ASSERT_EQ(rows->size(), picked.numbers.size());
-    for (std::size_t r = 0; r < rows->size(); ++r) ASSERT_EQ((*rows)[r].index, picked.numbers[r]);
+    const auto entries = wire::entries_of(packet, numbers);
+    ASSERT_TRUE(entries);
+    ASSERT_EQ(entries->size(), picked.numbers.size());
+    for (std::size_t r = 0; r < entries->size(); ++r) ASSERT_EQ((*entries)[r].index, picked.numbers[r]);
   }
 }
 

@@ -52,8 +52,8 @@ class ServerEnd {
       ++taken;
       OSTEON_CHECK(cut->author == author_);
       if (!decide) continue;
-      ++rows_;
-      (void)link.tell(rows_, {.room_seq = {rows_}, .kind = wire::SessionRowKind::committed, .cut = *cut});
+      ++entries_;
+      (void)link.tell(entries_, {.room_seq = {entries_}, .kind = wire::SessionEntryKind::committed, .cut = *cut});
     }
     return taken;
   }
@@ -67,7 +67,7 @@ class ServerEnd {
 
  private:
   const AuthorId author_;
-  std::uint64_t rows_ = 0;
+  std::uint64_t entries_ = 0;
 
  public:
   wire::ServerLink link;
@@ -185,7 +185,7 @@ struct Peer {
     const std::uint64_t before = link.half().open_counts().opened;
     link.receive(bytes, now);
     report.genuine_answered += link.half().open_counts().opened - before;
-    while (const auto row = link.take_row()) ++report.cuts_told;
+    while (const auto entry = link.take_entry()) ++report.cuts_told;
   }
 };
 

@@ -35,7 +35,7 @@ struct ForgeryReport {
   std::uint64_t strangers = 0, malformed = 0, replayed = 0, forged = 0;
   // The clients' own, in between; they also move to other addresses and change keys.
   std::uint64_t genuine = 0, genuine_accepted = 0, genuine_answered = 0;
-  std::uint64_t cuts = 0, cuts_told = 0;  // that clients made, and rows of them that came back
+  std::uint64_t cuts = 0, cuts_told = 0;  // that clients made, and entries of them that came back
   std::uint64_t moves = 0, moves_noticed = 0;
   std::uint64_t generations = 0;  // keys used by the busiest client
 };

@@ -32,7 +32,7 @@ double share_of(std::vector<double>& values, double share) {
 }
 
 TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
-  std::size_t cuts = 0, by_stream = 0, rows = 0;
+  std::size_t cuts = 0, by_stream = 0, entries = 0;
   std::vector<double> settled_ms;
   std::uint64_t corrupted = 0, forged = 0;
   std::size_t most_waiting = 0, words = 0, long_words = 0;
@@ -57,11 +57,11 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
     if (seed % 4 == 0) settled_ms.push_back(ms(took));
     for (std::size_t c = 0; c < Trial::kClients; ++c) {
       cuts += trial.clients[c]->cuts.size();
-      rows += trial.clients[c]->rows.size();
-      by_stream += trial.clients[c]->rows_by_stream;
-      for (const wire::IndexedRow& row : trial.clients[c]->rows) {
-        words += row.row.kind == wire::SessionRowKind::supervised;
-        long_words += row.row.kind == wire::SessionRowKind::supervised && !wire::fits_a_packet(row.row);
+      entries += trial.clients[c]->entries.size();
+      by_stream += trial.clients[c]->entries_by_stream;
+      for (const wire::IndexedEntry& entry : trial.clients[c]->entries) {
+        words += entry.entry.kind == wire::SessionEntryKind::supervised;
+        long_words += entry.entry.kind == wire::SessionEntryKind::supervised && !wire::fits_a_packet(entry.entry);
       }
       forged +=
           trial.sessions[c]->link.half().open_counts().forged + trial.clients[c]->link.half().open_counts().forged;
@@ -72,9 +72,9 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
     corrupted += trial.network.counts().paths.corrupted;
   }
   std::printf(
-      "200 seeds: %zu cuts, %zu rows taken, %zu of them by stream; %llu datagrams corrupted, %llu seen as forged; "
+      "200 seeds: %zu cuts, %zu entries taken, %zu of them by stream; %llu datagrams corrupted, %llu seen as forged; "
       "without partition settled after p50 %.0f, most %.0f ms\n",
-      cuts, rows, by_stream, static_cast<unsigned long long>(corrupted), static_cast<unsigned long long>(forged),
+      cuts, entries, by_stream, static_cast<unsigned long long>(corrupted), static_cast<unsigned long long>(forged),
       share_of(settled_ms, 0.5), share_of(settled_ms, 1.0));
   EXPECT_GT(words, 100u);
   EXPECT_GT(long_words, 20u);
@@ -154,7 +154,7 @@ TEST(LinkEnds, BytesOfTheWayUp) {
 }
 
 TEST(LinkEnds, NewKeysWhilePacketsAreInFlight) {
-  std::size_t rows = 0, by_stream = 0;
+  std::size_t entries = 0, by_stream = 0;
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     TrialOptions options{.seed = seed, .quality = hostile()};
     options.up.seal.rekey_packets = options.down.seal.rekey_packets = 40;
@@ -168,13 +168,13 @@ TEST(LinkEnds, NewKeysWhilePacketsAreInFlight) {
     ASSERT_TRUE(trial.exact() && trial.settled()) << "seed " << seed;
     for (std::size_t c = 0; c < Trial::kClients; ++c) {
       EXPECT_GT(trial.clients[c]->link.half().counts().packets_sent / 40, 3u) << "keys";
-      rows += trial.clients[c]->rows.size();
-      by_stream += trial.clients[c]->rows_by_stream;
+      entries += trial.clients[c]->entries.size();
+      by_stream += trial.clients[c]->entries_by_stream;
     }
   }
   // Beside the beginning and cuts too long for a packet all went the fast way.
-  std::printf("%zu rows, %zu by stream\n", rows, by_stream);
-  EXPECT_LT(by_stream, rows / 5);
+  std::printf("%zu entries, %zu by stream\n", entries, by_stream);
+  EXPECT_LT(by_stream, entries / 5);
 }
 
 TEST(LinkEnds, AClientThatMovesIsFoundWithinASecond) {
@@ -264,8 +264,8 @@ TEST(LinkEnds, WithoutDatagramsAllGoesOverTheStream) {
     EXPECT_LE(took, 500ms);
     EXPECT_FALSE(trial.clients[0]->link.alive(trial.time.now()) || trial.sessions[0]->link.alive(trial.time.now()));
     for (std::size_t c = 0; c < Trial::kClients; ++c) {
-      EXPECT_EQ(trial.clients[c]->rows.size(), trial.sessions[c]->rows.size());
-      EXPECT_GT(trial.clients[c]->rows.size(), 4000u);
+      EXPECT_EQ(trial.clients[c]->entries.size(), trial.sessions[c]->entries.size());
+      EXPECT_GT(trial.clients[c]->entries.size(), 4000u);
       EXPECT_LE(trial.clients[c]->most_waiting, 16u * 1024);
       // Asking now and then whether anybody is there takes little.
       EXPECT_LT(static_cast<double>(trial.clients[c]->uplink_bytes) * 8 / 20e3, 100.0);
@@ -283,16 +283,16 @@ TEST(LinkEnds, BackAndForthBetweenDatagramsAndStream) {
     trial.time.run_until(400ms);
     trial.cut(true);
     trial.time.run_until(16s);
-    std::array<std::uint64_t, 2> by_stream{}, rows{};
+    std::array<std::uint64_t, 2> by_stream{}, entries{};
     for (std::size_t c = 0; c < 2; ++c) {
       EXPECT_TRUE(trial.clients[c]->link.alive(trial.time.now()) && trial.sessions[c]->link.alive(trial.time.now()));
-      by_stream[c] = trial.clients[c]->rows_by_stream;
-      rows[c] = trial.clients[c]->rows.size();
+      by_stream[c] = trial.clients[c]->entries_by_stream;
+      entries[c] = trial.clients[c]->entries.size();
     }
     // After the last change it is the fast way again, beside what is too long for it.
     trial.time.run_until(20s);
     for (std::size_t c = 0; c < 2; ++c)
-      EXPECT_LT(trial.clients[c]->rows_by_stream - by_stream[c], (trial.clients[c]->rows.size() - rows[c]) / 8)
+      EXPECT_LT(trial.clients[c]->entries_by_stream - by_stream[c], (trial.clients[c]->entries.size() - entries[c]) / 8)
           << "seed " << seed;
     trial.cut(false);
     trial.settle(5s);
@@ -474,30 +474,30 @@ TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
   };
   Cut of_another = pair.cut(2);
   of_another.author = AuthorId{pair.cut(2).author.value + 1};
-  EXPECT_TRUE(pair.server.tell(1, {.room_seq = {1}, .kind = wire::SessionRowKind::committed, .cut = of_another}));
+  EXPECT_TRUE(pair.server.tell(1, {.room_seq = {1}, .kind = wire::SessionEntryKind::committed, .cut = of_another}));
   EXPECT_EQ(acknowledged(), 0u) << "another's cut";
-  EXPECT_TRUE(pair.server.tell(2, {.room_seq = {2}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(1)}));
+  EXPECT_TRUE(pair.server.tell(2, {.room_seq = {2}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(1)}));
   EXPECT_EQ(acknowledged(), 1u);
-  EXPECT_FALSE(pair.server.tell(0, {.room_seq = {2}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(2)}))
+  EXPECT_FALSE(pair.server.tell(0, {.room_seq = {2}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(2)}))
       << "it has no number";
   EXPECT_EQ(acknowledged(), 2u);
-  wire::SessionRow rejection{.room_seq = {3}, .kind = wire::SessionRowKind::rejected};
+  wire::SessionEntry rejection{.room_seq = {3}, .kind = wire::SessionEntryKind::rejected};
   rejection.author_seq = 3;
   rejection.lease_epoch = 4;
   EXPECT_TRUE(pair.server.tell(3, rejection));
   EXPECT_EQ(acknowledged(), 3u);
   EXPECT_EQ(pair.client.lease_epoch(), 4u);
   std::vector<std::uint64_t> heard;
-  while (const auto row = pair.client.take_row()) heard.push_back(row->index);
+  while (const auto entry = pair.client.take_entry()) heard.push_back(entry->index);
   EXPECT_EQ(heard, (std::vector<std::uint64_t>{1, 2, 3})) << "the one without a number is not said";
 }
 
-// Whoever is stopped knows it by the packet itself, before the row has its turn.
+// Whoever is stopped knows it by the packet itself, before the entry has its turn.
 TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   Pair pair;
   pair.run(300ms);
-  wire::SessionRow word{.room_seq = {5},
-                        .kind = wire::SessionRowKind::supervised,
+  wire::SessionEntry word{.room_seq = {5},
+                        .kind = wire::SessionEntryKind::supervised,
                         .lease_epoch = 6,
                         .supervision = {.taken_by = {3}},
                         .by = {AuthorId{3}, "Dr. Weber"}};
@@ -508,42 +508,42 @@ TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   word.lease_epoch = 8;
   word.supervision = {};
   for (std::uint8_t n = 0; n <= wire::kMostToolsInPacket; ++n) word.supervision.tools.push_back(Digest{{n}});
-  EXPECT_FALSE(pair.server.tell(2, word)) << "too long: its row goes over the stream, what matters at once does not";
+  EXPECT_FALSE(pair.server.tell(2, word)) << "too long: its entry goes over the stream, what matters at once does not";
   pair.run(100ms);
   EXPECT_FALSE(pair.client.frozen());
   EXPECT_EQ(pair.client.lease_epoch(), 8u);
-  const auto first = pair.client.take_row();
+  const auto first = pair.client.take_entry();
   ASSERT_TRUE(first);
-  EXPECT_EQ(first->row.supervision, (Restrictions{.taken_by = {3}}));
-  EXPECT_EQ(first->row.by, (Decider{AuthorId{3}, "Dr. Weber"}));
-  EXPECT_FALSE(pair.client.take_row());
+  EXPECT_EQ(first->entry.supervision, (Restrictions{.taken_by = {3}}));
+  EXPECT_EQ(first->entry.by, (Decider{AuthorId{3}, "Dr. Weber"}));
+  EXPECT_FALSE(pair.client.take_entry());
   EXPECT_TRUE(pair.client.offer({2, word}));
-  const auto second = pair.client.take_row();
+  const auto second = pair.client.take_entry();
   ASSERT_TRUE(second);
-  EXPECT_EQ(second->row, word);
+  EXPECT_EQ(second->entry, word);
 }
 
-// After a long stop the stream brings thousands of rows in a moment.
+// After a long stop the stream brings thousands of entries in a moment.
 TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
-  constexpr std::uint64_t kRows = 5000;
+  constexpr std::uint64_t kEntries = 5000;
   Pair pair;
   pair.run(300ms);
-  const auto row = [&](std::uint64_t n) {
-    return wire::IndexedRow{n, {.room_seq = {n}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(n)}};
+  const auto entry = [&](std::uint64_t n) {
+    return wire::IndexedEntry{n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}};
   };
-  for (std::uint64_t n = 1; n <= kRows; ++n) {
-    (void)pair.server.push(row(n));
+  for (std::uint64_t n = 1; n <= kEntries; ++n) {
+    (void)pair.server.push(entry(n));
     pair.client.heard(n);
   }
-  EXPECT_FALSE(pair.client.take_row());
+  EXPECT_FALSE(pair.client.take_entry());
   pair.run(500ms);
-  EXPECT_EQ(pair.server.acknowledged(), kRows);
-  EXPECT_TRUE(pair.server.push(row(kRows + 1)));
+  EXPECT_EQ(pair.server.acknowledged(), kEntries);
+  EXPECT_TRUE(pair.server.push(entry(kEntries + 1)));
   pair.run(100ms);
-  const auto taken = pair.client.take_row();
+  const auto taken = pair.client.take_entry();
   ASSERT_TRUE(taken);
-  EXPECT_EQ(taken->index, kRows + 1);
-  EXPECT_EQ(taken->row.cut, pair.cut(kRows + 1));
+  EXPECT_EQ(taken->index, kEntries + 1);
+  EXPECT_EQ(taken->entry.cut, pair.cut(kEntries + 1));
 }
 
 // What is known to have come ahead of its turn is not sent again.
@@ -553,7 +553,7 @@ TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
   Pair pair(up, down);
   pair.run(300ms);
   ASSERT_TRUE(pair.client.alive(pair.now) && pair.server.alive(pair.now));
-  std::array<int, 21> cuts{}, rows{};
+  std::array<int, 21> cuts{}, entries{};
   const auto count = [](auto& counts, std::uint64_t number) { return ++counts.at(number); };
   pair.lost = [&](const v1::UpPacket& packet) {
     bool first = false;
@@ -566,29 +566,29 @@ TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
   };
   pair.lost_down = [&](const v1::DownPacket& packet) {
     bool first = false;
-    const auto read = wire::rows_of(packet, pair.client.tools());
-    for (const wire::IndexedRow& row : *read)
-      if (count(rows, row.index) == 1 && row.index == 1) first = true;
+    const auto read = wire::entries_of(packet, pair.client.tools());
+    for (const wire::IndexedEntry& entry : *read)
+      if (count(entries, entry.index) == 1 && entry.index == 1) first = true;
     return first;
   };
   for (std::uint64_t n = 1; n <= 20; ++n) {
     ASSERT_TRUE(pair.client.push(pair.cut(n)));
-    ASSERT_TRUE(pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(n)}}));
+    ASSERT_TRUE(pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}}));
     pair.run(8ms);
   }
   pair.run(200ms);
   for (std::size_t n = 2; n <= 20; ++n) {
     EXPECT_EQ(cuts[n], 1) << n;
-    EXPECT_EQ(rows[n], 1) << n;
+    EXPECT_EQ(entries[n], 1) << n;
   }
   EXPECT_GE(cuts[1], 2);
-  EXPECT_GE(rows[1], 2);
+  EXPECT_GE(entries[1], 2);
   for (std::uint64_t n = 1; n <= 20; ++n) {
     EXPECT_EQ(pair.server.take_cut(), pair.cut(n));
-    const auto row = pair.client.take_row();
-    ASSERT_TRUE(row);
-    EXPECT_EQ(row->index, n);
-    EXPECT_EQ(row->row.cut, pair.cut(n));
+    const auto entry = pair.client.take_entry();
+    ASSERT_TRUE(entry);
+    EXPECT_EQ(entry->index, n);
+    EXPECT_EQ(entry->entry.cut, pair.cut(n));
   }
   // Come is not kept: only what was decided is acknowledged.
   EXPECT_EQ(pair.client.acknowledged(), 0u);
@@ -640,7 +640,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   pair.run(300ms);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     ASSERT_TRUE(pair.client.push(pair.cut(n)));
-    ASSERT_TRUE(pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionRowKind::committed, .cut = pair.cut(n)}}));
+    ASSERT_TRUE(pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}}));
   }
   v1::UpPacket up;
   up.set_acknowledged(4);
@@ -706,15 +706,15 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   bad_down.add_partners()->set_state_seq(1);
   malformed_down(bad_down);
   bad_down.Clear();
-  bad_down.add_rows();
+  bad_down.add_entries();
   malformed_down(bad_down);
-  // A row whose content is not here yet does not come out before the stream's copy of it.
+  // A entry whose content is not here yet does not come out before the stream's copy of it.
   v1::DownPacket marker;
   marker.add_streamed()->set_index(1);
   pair.say(marker);
-  EXPECT_FALSE(pair.client.take_row());
+  EXPECT_FALSE(pair.client.take_entry());
   EXPECT_TRUE(pair.client.offer({1, {.room_seq = {1}}}));
-  EXPECT_EQ(pair.client.take_row()->index, 1u);
+  EXPECT_EQ(pair.client.take_entry()->index, 1u);
   // Partners without end: the latest are kept.
   CuttingState state;
   state.phase = CuttingPhase::free;

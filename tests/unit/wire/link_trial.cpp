@@ -34,7 +34,7 @@ bool Trial::settled() const {
   for (std::size_t c = 0; c < kClients; ++c) {
     if (sessions[c]->cuts.size() != clients[c]->cuts.size() || sessions[c]->kept != clients[c]->cuts.size())
       return false;
-    if (clients[c]->rows.size() != sessions[c]->rows.size()) return false;
+    if (clients[c]->entries.size() != sessions[c]->entries.size()) return false;
     if (clients[c]->link.acknowledged() != sessions[c]->kept) return false;
   }
   return true;
@@ -50,10 +50,10 @@ bool Trial::exact() const {
   for (std::size_t c = 0; c < kClients; ++c) {
     const auto &came = sessions[c]->cuts, &made = clients[c]->cuts;
     if (came.size() > made.size() || !std::equal(came.begin(), came.end(), made.begin())) return false;
-    const auto &taken = clients[c]->rows, &told = sessions[c]->rows;
+    const auto &taken = clients[c]->entries, &told = sessions[c]->entries;
     if (taken.size() > told.size()) return false;
     for (std::size_t i = 0; i < taken.size(); ++i)
-      if (taken[i].index != i + 1 || taken[i].row != told[i].row) return false;
+      if (taken[i].index != i + 1 || taken[i].entry != told[i].entry) return false;
     if (clients[c]->link.acknowledged() > sessions[c]->kept) return false;
   }
   return true;
@@ -129,14 +129,14 @@ void Trial::turn(std::size_t c) {
   const Time now = time.now();
   DatagramBuffer buffer;
   while (const auto got = client.port->receive(buffer)) client.link.receive(got->bytes, now);
-  while (auto row = client.link.take_row()) {
-    const bool of_other = row->row.kind == wire::SessionRowKind::committed && row->row.cut.author != client.author;
+  while (auto entry = client.link.take_entry()) {
+    const bool of_other = entry->entry.kind == wire::SessionEntryKind::committed && entry->entry.cut.author != client.author;
     if (of_other) {
-      const Client& other = *clients[row->row.cut.author.value - 10];
-      const Time since = other.made_at.at(row->row.cut.author_seq - 1);
+      const Client& other = *clients[entry->entry.cut.author.value - 10];
+      const Time since = other.made_at.at(entry->entry.cut.author_seq - 1);
       client.felt_ms.push_back(std::chrono::duration<double, std::milli>(now - since).count());
     }
-    client.rows.push_back(std::move(*row));
+    client.entries.push_back(std::move(*entry));
   }
   if (!client.link.alive(now)) {
     for (std::uint64_t n = std::max(client.link.acknowledged(), client.streamed_cuts) + 1; n <= client.cuts.size();
@@ -144,9 +144,9 @@ void Trial::turn(std::size_t c) {
       stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.offer(cut); });
       client.streamed_cuts = n;
     }
-    if (client.said_rows != client.link.rows_taken()) {
-      client.said_rows = client.link.rows_taken();
-      stream([this, c, upto = client.said_rows] { sessions[c]->link.acknowledge(upto); });
+    if (client.said_entries != client.link.entries_taken()) {
+      client.said_entries = client.link.entries_taken();
+      stream([this, c, upto = client.said_entries] { sessions[c]->link.acknowledge(upto); });
     }
   }
   for (;;) {
@@ -178,15 +178,15 @@ void Trial::server_turn(std::size_t c) {
   wake(session.wakes_at, session.link.next(time.now()), [this, c] { server_turn(c); });
 }
 
-void Trial::tell(std::size_t c, wire::SessionRow row) {
+void Trial::tell(std::size_t c, wire::SessionEntry entry) {
   Session& session = *sessions[c];
-  session.rows.push_back({session.rows.size() + 1, std::move(row)});
-  if (!session.link.push(session.rows.back())) stream_row(c, session.rows.size());
+  session.entries.push_back({session.entries.size() + 1, std::move(entry)});
+  if (!session.link.push(session.entries.back())) stream_entry(c, session.entries.size());
 }
 
-void Trial::stream_row(std::size_t c, std::uint64_t index) {
-  stream([this, c, row = sessions[c]->rows[index - 1]] {
-    if (clients[c]->link.offer(row)) ++clients[c]->rows_by_stream;
+void Trial::stream_entry(std::size_t c, std::uint64_t index) {
+  stream([this, c, entry = sessions[c]->entries[index - 1]] {
+    if (clients[c]->link.offer(entry)) ++clients[c]->entries_by_stream;
     turn(c);
   });
 }
@@ -209,9 +209,9 @@ void Trial::tick() {
       sessions[1 - c]->link.set_partners(partners);
     }
     if (!session.link.alive(time.now())) {
-      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_rows) + 1; i <= session.rows.size();
+      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_entries) + 1; i <= session.entries.size();
            ++i)
-        stream_row(c, session.streamed_rows = i);
+        stream_entry(c, session.streamed_entries = i);
       if (session.said_kept != session.kept) {
         session.said_kept = session.kept;
         stream([this, c, upto = session.kept] { clients[c]->link.acknowledge(upto); });
@@ -222,13 +222,13 @@ void Trial::tick() {
 }
 
 // An instructor's word on one of the clients; every third is too long for a packet.
-wire::SessionRow Trial::supervised(RoomSeq seq) {
-  wire::SessionRow row{.room_seq = seq, .kind = wire::SessionRowKind::supervised, .lease_epoch = seq.value + 1};
-  row.supervision = {
+wire::SessionEntry Trial::supervised(RoomSeq seq) {
+  wire::SessionEntry entry{.room_seq = seq, .kind = wire::SessionEntryKind::supervised, .lease_epoch = seq.value + 1};
+  entry.supervision = {
       .stopped = seq.value % 2 == 0, .force_limit = static_cast<int>(seq.value % 1000), .words = "as agreed"};
-  row.by = {AuthorId{1 + seq.value % 5}, seq.value % 5 == 0 ? "" : "Dr. Weber"};
-  for (std::uint64_t tool = 1; tool <= seq.value % 9 * 2; ++tool) row.supervision.tools.push_back(tool_of(tool));
-  return row;
+  entry.by = {AuthorId{1 + seq.value % 5}, seq.value % 5 == 0 ? "" : "Dr. Weber"};
+  for (std::uint64_t tool = 1; tool <= seq.value % 9 * 2; ++tool) entry.supervision.tools.push_back(tool_of(tool));
+  return entry;
 }
 
 void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event) {
@@ -236,20 +236,20 @@ void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool e
     const RoomSeq seq{++room_seq_};
     if (options_.reject_each != 0 && cut.author_seq % options_.reject_each == 0) {
       tell(author, {.room_seq = seq,
-                    .kind = wire::SessionRowKind::rejected,
+                    .kind = wire::SessionEntryKind::rejected,
                     .author_seq = cut.author_seq,
                     .reason = 3,
                     .lease_epoch = 1 + cut.author_seq / 300});
     } else {
       for (std::size_t c = 0; c < kClients; ++c)
-        tell(c, {.room_seq = seq, .kind = wire::SessionRowKind::committed, .cut = cut});
+        tell(c, {.room_seq = seq, .kind = wire::SessionEntryKind::committed, .cut = cut});
     }
     sessions[author]->kept = cut.author_seq;
   }
   if (event) {
     const RoomSeq seq{++room_seq_};
     for (std::size_t c = 0; c < kClients; ++c)
-      tell(c, seq.value % 3 == c ? supervised(seq) : wire::SessionRow{.room_seq = seq});
+      tell(c, seq.value % 3 == c ? supervised(seq) : wire::SessionEntry{.room_seq = seq});
   }
   for (std::size_t c = 0; c < kClients; ++c) {
     sessions[c]->link.decided(sessions[c]->kept);

@@ -52,11 +52,11 @@ class Trial {
     std::vector<Cut> cuts;  // all that were made, by author_seq - 1
     std::vector<Time> made_at;
     std::uint64_t streamed_cuts = 0;     // up to here they went over the stream
-    std::vector<wire::IndexedRow> rows;  // all that were taken
-    std::vector<double> felt_ms;         // from a partner's cut until its row was here
-    std::uint64_t said_rows = 0;         // over the stream
+    std::vector<wire::IndexedEntry> entries;  // all that were taken
+    std::vector<double> felt_ms;         // from a partner's cut until its entry was here
+    std::uint64_t said_entries = 0;         // over the stream
     std::uint64_t uplink_bytes = 0;      // with 28 of headers each
-    std::uint64_t rows_by_stream = 0, refused = 0;
+    std::uint64_t entries_by_stream = 0, refused = 0;
     std::size_t most_waiting = 0;  // bytes unacknowledged
     std::optional<Time> wakes_at;
     bool cutting = false;
@@ -67,8 +67,8 @@ class Trial {
         : link(keys, {10 + which}, seeded(options.seed * 7 + which), 1, 1, options.down) {}
     wire::ServerLink link;
     std::vector<Cut> cuts;               // as they came
-    std::vector<wire::IndexedRow> rows;  // as they were told
-    std::uint64_t streamed_rows = 0;     // up to here they went over the stream
+    std::vector<wire::IndexedEntry> entries;  // as they were told
+    std::uint64_t streamed_entries = 0;     // up to here they went over the stream
     std::uint64_t kept = 0, said_kept = 0;
     std::uint64_t downlink_bytes = 0;
     std::optional<Time> wakes_at;
@@ -113,7 +113,7 @@ class Trial {
 
   void make_cuts(std::size_t c);
   static Digest tool_of(std::uint64_t number);
-  static wire::SessionRow supervised(RoomSeq seq);
+  static wire::SessionEntry supervised(RoomSeq seq);
   Cut drilling(const Client& client, std::uint64_t number);
 
   void turn(std::size_t c);
@@ -121,8 +121,8 @@ class Trial {
   void hear_server();
   void server_turn(std::size_t c);
 
-  void tell(std::size_t c, wire::SessionRow row);
-  void stream_row(std::size_t c, std::uint64_t index);
+  void tell(std::size_t c, wire::SessionEntry entry);
+  void stream_entry(std::size_t c, std::uint64_t index);
 
   void tick();
   void keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event);

@@ -1,4 +1,4 @@
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 
 #include <google/protobuf/util/json_util.h>
 
@@ -74,97 +74,97 @@ std::string json_text(std::string_view text) {
 }
 
 struct Writer {
-  v1::JournalRow& out;
+  v1::JournalEntry& out;
 
-  void operator()(const JoinRow& join) const {
-    v1::JournalJoin& row = *out.mutable_join();
-    row.set_author(join.author.value);
-    row.set_kind(static_cast<std::uint32_t>(join.kind));
-    row.set_person(join.person);
-    row.set_secret(wire::to_wire(join.secret));
-    row.set_role(static_cast<std::uint32_t>(join.role));
+  void operator()(const JoinEntry& join) const {
+    v1::JournalJoin& entry = *out.mutable_join();
+    entry.set_author(join.author.value);
+    entry.set_kind(static_cast<std::uint32_t>(join.kind));
+    entry.set_person(join.person);
+    entry.set_secret(wire::to_wire(join.secret));
+    entry.set_role(static_cast<std::uint32_t>(join.role));
   }
-  void operator()(const CutRow& cut) const { *out.mutable_cut() = wire::to_wire(cut.cut); }
-  void operator()(const RejectionRow& rejection) const {
-    v1::JournalRejection& row = *out.mutable_rejection();
-    row.set_author(rejection.author.value);
-    row.set_author_seq(rejection.author_seq);
-    row.set_digest(wire::to_wire(rejection.bytes));
-    row.set_reason(static_cast<std::uint32_t>(rejection.reason));
+  void operator()(const CutEntry& cut) const { *out.mutable_cut() = wire::to_wire(cut.cut); }
+  void operator()(const RejectionEntry& rejection) const {
+    v1::JournalRejection& entry = *out.mutable_rejection();
+    entry.set_author(rejection.author.value);
+    entry.set_author_seq(rejection.author_seq);
+    entry.set_digest(wire::to_wire(rejection.bytes));
+    entry.set_reason(static_cast<std::uint32_t>(rejection.reason));
   }
-  void operator()(const SplitRow& split) const {
-    v1::JournalSplit& row = *out.mutable_split();
-    row.set_parent(split.parent.value);
-    put(split.taken, *row.mutable_taken());
+  void operator()(const SplitEntry& split) const {
+    v1::JournalSplit& entry = *out.mutable_split();
+    entry.set_parent(split.parent.value);
+    put(split.taken, *entry.mutable_taken());
     for (const SplitPiece& piece : split.pieces) {
-      v1::JournalPiece& one = *row.add_pieces();
+      v1::JournalPiece& one = *entry.add_pieces();
       one.set_body(piece.body.value);
       *one.mutable_reach_min() = wire::to_wire(piece.reach.min);
       *one.mutable_reach_max() = wire::to_wire(piece.reach.max);
       put(piece.left, *one.mutable_left());
     }
   }
-  void operator()(const UndoRow& undo) const { put(undo.places, *out.mutable_undo()->mutable_places()); }
-  void operator()(const RedoRow& redo) const {
+  void operator()(const UndoEntry& undo) const { put(undo.places, *out.mutable_undo()->mutable_places()); }
+  void operator()(const RedoEntry& redo) const {
     put(redo.undos, *out.mutable_redo()->mutable_undos());
     put(redo.places, *out.mutable_redo()->mutable_places());
   }
-  void operator()(const RemoveBodyRow& removal) const { out.mutable_removal()->set_body(removal.body.value); }
-  void operator()(const ItemRow& item) const {
-    v1::JournalItem& row = *out.mutable_item();
-    row.set_item(item.item);
+  void operator()(const RemoveBodyEntry& removal) const { out.mutable_removal()->set_body(removal.body.value); }
+  void operator()(const ItemEntry& item) const {
+    v1::JournalItem& entry = *out.mutable_item();
+    entry.set_item(item.item);
     if (!item.set) return;
-    *row.mutable_set() = wire::to_wire(*item.set);
-    row.mutable_set()->clear_pose_bone_item();
-    put(item.set->pose_bone_item, *row.mutable_pose_bone_item());
+    *entry.mutable_set() = wire::to_wire(*item.set);
+    entry.mutable_set()->clear_pose_bone_item();
+    put(item.set->pose_bone_item, *entry.mutable_pose_bone_item());
   }
-  void operator()(const ToolRow& tool) const { *out.mutable_tool() = wire::to_wire(tool.tool); }
-  void operator()(const MarkRow& mark) const { out.mutable_mark()->set_label(mark.label); }
-  void operator()(const SuperviseRow& one) const {
+  void operator()(const ToolEntry& tool) const { *out.mutable_tool() = wire::to_wire(tool.tool); }
+  void operator()(const MarkEntry& mark) const { out.mutable_mark()->set_label(mark.label); }
+  void operator()(const SuperviseEntry& one) const {
     out.mutable_supervision()->set_subject(one.subject.value);
     *out.mutable_supervision()->mutable_supervision() = wire::to_wire(one.supervision);
   }
-  void operator()(const AnnotationRow& one) const {
+  void operator()(const AnnotationEntry& one) const {
     out.mutable_annotation()->set_annotation(one.id);
     if (one.drawn) *out.mutable_annotation()->mutable_drawn() = wire::to_wire(*one.drawn);
   }
-  void operator()(const WordsRow& said) const {
+  void operator()(const WordsEntry& said) const {
     out.mutable_words()->set_to(said.to.value);
     out.mutable_words()->set_words(said.words);
   }
 };
 
-using What = decltype(RoomRow::what);
+using What = decltype(LogEntry::what);
 
-Result<What> read(const v1::JournalJoin& row) {
-  if (row.kind() > static_cast<std::uint32_t>(MemberKind::watcher)) return bad("join.kind is not known");
-  const Result<Digest> secret = wire::digest_from_wire(row.secret());
+Result<What> read(const v1::JournalJoin& entry) {
+  if (entry.kind() > static_cast<std::uint32_t>(MemberKind::watcher)) return bad("join.kind is not known");
+  const Result<Digest> secret = wire::digest_from_wire(entry.secret());
   if (!secret) return bad("join.secret: " + secret.error().message);
-  if (row.role() >= static_cast<std::uint32_t>(kRoles)) return bad("join.role is not known");
-  return JoinRow{AuthorId{row.author()}, static_cast<MemberKind>(row.kind()), row.person(), *secret,
-                 static_cast<Role>(row.role())};
+  if (entry.role() >= static_cast<std::uint32_t>(kRoles)) return bad("join.role is not known");
+  return JoinEntry{AuthorId{entry.author()}, static_cast<MemberKind>(entry.kind()), entry.person(), *secret,
+                 static_cast<Role>(entry.role())};
 }
 
-Result<What> read(const v1::Cut& row) {
-  Result<Cut> cut = wire::from_wire(row);
+Result<What> read(const v1::Cut& entry) {
+  Result<Cut> cut = wire::from_wire(entry);
   if (!cut) return tl::unexpected(cut.error());
-  return CutRow{std::move(*cut)};
+  return CutEntry{std::move(*cut)};
 }
 
-Result<What> read(const v1::JournalRejection& row) {
-  const Result<Digest> bytes = wire::digest_from_wire(row.digest());
+Result<What> read(const v1::JournalRejection& entry) {
+  const Result<Digest> bytes = wire::digest_from_wire(entry.digest());
   if (!bytes) return bad("rejection.digest: " + bytes.error().message);
-  if (row.reason() >= static_cast<std::uint32_t>(kRejections)) return bad("rejection.reason is not known");
-  return RejectionRow{AuthorId{row.author()}, row.author_seq(), *bytes, static_cast<Rejection>(row.reason())};
+  if (entry.reason() >= static_cast<std::uint32_t>(kRejections)) return bad("rejection.reason is not known");
+  return RejectionEntry{AuthorId{entry.author()}, entry.author_seq(), *bytes, static_cast<Rejection>(entry.reason())};
 }
 
-Result<What> read(const v1::JournalSplit& row) {
-  SplitRow split;
-  split.parent = BodyId{row.parent()};
-  Result<Mask> taken = mask_of(row.taken());
+Result<What> read(const v1::JournalSplit& entry) {
+  SplitEntry split;
+  split.parent = BodyId{entry.parent()};
+  Result<Mask> taken = mask_of(entry.taken());
   if (!taken) return bad("split.taken: " + taken.error().message);
   split.taken = std::move(*taken);
-  for (const v1::JournalPiece& one : row.pieces()) {
+  for (const v1::JournalPiece& one : entry.pieces()) {
     Result<Mask> left = mask_of(one.left());
     if (!left) return bad("split.pieces.left: " + left.error().message);
     const CoordBox reach{wire::from_wire(one.reach_min()), wire::from_wire(one.reach_max())};
@@ -173,66 +173,66 @@ Result<What> read(const v1::JournalSplit& row) {
   return split;
 }
 
-Result<What> read(const v1::JournalItem& row) {
-  if (!row.has_set()) return ItemRow{row.item(), std::nullopt};
-  const Result<Pose> pose = pose_of(row.pose_bone_item());
+Result<What> read(const v1::JournalItem& entry) {
+  if (!entry.has_set()) return ItemEntry{entry.item(), std::nullopt};
+  const Result<Pose> pose = pose_of(entry.pose_bone_item());
   if (!pose) return tl::unexpected(pose.error());
-  v1::SceneItem set = row.set();
+  v1::SceneItem set = entry.set();
   *set.mutable_pose_bone_item() = wire::to_wire(Pose{});
   Result<SceneItem> item = wire::from_wire(set);
   if (!item) return tl::unexpected(item.error());
   item->pose_bone_item = *pose;
-  return ItemRow{row.item(), std::move(*item)};
+  return ItemEntry{entry.item(), std::move(*item)};
 }
 
-Result<What> read(const v1::ToolDefinition& row) {
-  Result<Tool> tool = wire::from_wire(row);
+Result<What> read(const v1::ToolDefinition& entry) {
+  Result<Tool> tool = wire::from_wire(entry);
   if (!tool) return tl::unexpected(tool.error());
-  return ToolRow{std::move(*tool)};
+  return ToolEntry{std::move(*tool)};
 }
 
-Result<What> read(const v1::JournalSupervision& row) {
-  Result<Restrictions> set = wire::from_wire(row.supervision());
+Result<What> read(const v1::JournalSupervision& entry) {
+  Result<Restrictions> set = wire::from_wire(entry.supervision());
   if (!set) return tl::unexpected(set.error());
-  return SuperviseRow{AuthorId{row.subject()}, std::move(*set)};
+  return SuperviseEntry{AuthorId{entry.subject()}, std::move(*set)};
 }
 
-Result<What> read(const v1::JournalAnnotation& row) {
-  if (!row.has_drawn()) return AnnotationRow{row.annotation(), std::nullopt};
-  Result<Annotation> drawn = wire::from_wire(row.drawn());
+Result<What> read(const v1::JournalAnnotation& entry) {
+  if (!entry.has_drawn()) return AnnotationEntry{entry.annotation(), std::nullopt};
+  Result<Annotation> drawn = wire::from_wire(entry.drawn());
   if (!drawn) return tl::unexpected(drawn.error());
-  return AnnotationRow{row.annotation(), std::move(*drawn)};
+  return AnnotationEntry{entry.annotation(), std::move(*drawn)};
 }
 
-Result<What> read(const v1::JournalRow& row) {
-  switch (row.what_case()) {
-    case v1::JournalRow::kJoin:
-      return read(row.join());
-    case v1::JournalRow::kCut:
-      return read(row.cut());
-    case v1::JournalRow::kRejection:
-      return read(row.rejection());
-    case v1::JournalRow::kSplit:
-      return read(row.split());
-    case v1::JournalRow::kUndo:
-      return UndoRow{places_of(row.undo().places())};
-    case v1::JournalRow::kRedo:
-      return RedoRow{places_of(row.redo().undos()), places_of(row.redo().places())};
-    case v1::JournalRow::kRemoval:
-      return RemoveBodyRow{BodyId{row.removal().body()}};
-    case v1::JournalRow::kItem:
-      return read(row.item());
-    case v1::JournalRow::kTool:
-      return read(row.tool());
-    case v1::JournalRow::kMark:
-      return MarkRow{row.mark().label()};
-    case v1::JournalRow::kSupervision:
-      return read(row.supervision());
-    case v1::JournalRow::kAnnotation:
-      return read(row.annotation());
-    case v1::JournalRow::kWords:
-      return WordsRow{AuthorId{row.words().to()}, row.words().words()};
-    case v1::JournalRow::WHAT_NOT_SET:
+Result<What> read(const v1::JournalEntry& entry) {
+  switch (entry.what_case()) {
+    case v1::JournalEntry::kJoin:
+      return read(entry.join());
+    case v1::JournalEntry::kCut:
+      return read(entry.cut());
+    case v1::JournalEntry::kRejection:
+      return read(entry.rejection());
+    case v1::JournalEntry::kSplit:
+      return read(entry.split());
+    case v1::JournalEntry::kUndo:
+      return UndoEntry{places_of(entry.undo().places())};
+    case v1::JournalEntry::kRedo:
+      return RedoEntry{places_of(entry.redo().undos()), places_of(entry.redo().places())};
+    case v1::JournalEntry::kRemoval:
+      return RemoveBodyEntry{BodyId{entry.removal().body()}};
+    case v1::JournalEntry::kItem:
+      return read(entry.item());
+    case v1::JournalEntry::kTool:
+      return read(entry.tool());
+    case v1::JournalEntry::kMark:
+      return MarkEntry{entry.mark().label()};
+    case v1::JournalEntry::kSupervision:
+      return read(entry.supervision());
+    case v1::JournalEntry::kAnnotation:
+      return read(entry.annotation());
+    case v1::JournalEntry::kWords:
+      return WordsEntry{AuthorId{entry.words().to()}, entry.words().words()};
+    case v1::JournalEntry::WHAT_NOT_SET:
       break;
   }
   return failure(ErrorCode::unsupported, "its event is of a kind that this release does not know");
@@ -306,33 +306,33 @@ Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutL
   return room;
 }
 
-std::string to_bytes(const RoomRow& row) {
-  v1::JournalRow out;
-  out.set_author(row.author.value);
-  std::visit(Writer{out}, row.what);
+std::string to_bytes(const LogEntry& entry) {
+  v1::JournalEntry out;
+  out.set_author(entry.author.value);
+  std::visit(Writer{out}, entry.what);
   return out.SerializeAsString();
 }
 
-Result<RoomRow> row_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
-  const auto in_row = [&](const Error& error) {
-    return failure(error.code, "row " + std::to_string(place.value) + ": " + error.message);
+Result<LogEntry> entry_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
+  const auto in_entry = [&](const Error& error) {
+    return failure(error.code, "entry " + std::to_string(place.value) + ": " + error.message);
   };
-  v1::JournalRow in;
+  v1::JournalEntry in;
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-    return in_row({ErrorCode::invalid_input, "it is no row of a room"});
+    return in_entry({ErrorCode::invalid_input, "it is no entry of a room"});
   Result<What> what = read(in);
-  if (!what) return in_row(what.error());
-  return RoomRow{place, at, AuthorId{in.author()}, std::move(*what)};
+  if (!what) return in_entry(what.error());
+  return LogEntry{place, at, AuthorId{in.author()}, std::move(*what)};
 }
 
-Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
-  v1::JournalRow in;
+Result<std::string> entry_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
+  v1::JournalEntry in;
   std::string event;
   google::protobuf::util::JsonPrintOptions names;
   names.preserve_proto_field_names = true;
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
       !google::protobuf::util::MessageToJsonString(in, &event, names).ok())
-    return bad("row " + std::to_string(place.value) + ": it is no row of a room");
+    return bad("entry " + std::to_string(place.value) + ": it is no entry of a room");
   return "{\"place\":" + std::to_string(place.value) +
          ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) + ",\"event\":" + event + "}";
 }
@@ -345,20 +345,20 @@ PersonExport::PersonExport(std::uint32_t person, const std::vector<Person>& peop
              ",\"joined_day\":" + std::to_string(one.joined_day) + "}";
 }
 
-Result<std::optional<std::string>> PersonExport::of(const JournalRow& row) {
-  const std::chrono::nanoseconds at(row.at_ns);
-  const Result<RoomRow> read = row_from_bytes(row.place, at, row.bytes);
+Result<std::optional<std::string>> PersonExport::of(const JournalEntry& entry) {
+  const std::chrono::nanoseconds at(entry.at_ns);
+  const Result<LogEntry> read = entry_from_bytes(entry.place, at, entry.bytes);
   if (!read) return tl::unexpected(read.error());
-  const auto* join = std::get_if<JoinRow>(&read->what);
+  const auto* join = std::get_if<JoinEntry>(&read->what);
   if (join != nullptr && join->person == person_) authors_.insert(join->author);
-  const auto* cut = std::get_if<CutRow>(&read->what);
-  const auto* rejection = std::get_if<RejectionRow>(&read->what);
+  const auto* cut = std::get_if<CutEntry>(&read->what);
+  const auto* rejection = std::get_if<RejectionEntry>(&read->what);
   const AuthorId whose = join != nullptr        ? join->author
                          : cut != nullptr       ? cut->cut.author
                          : rejection != nullptr ? rejection->author
                                                 : read->author;
   if (!authors_.contains(whose)) return std::nullopt;
-  return row_as_json(row.place, at, row.bytes).map([](std::string line) { return std::optional(std::move(line)); });
+  return entry_as_json(entry.place, at, entry.bytes).map([](std::string line) { return std::optional(std::move(line)); });
 }
 
 tl::unexpected<Error> PersonExport::nobody() const {

@@ -23,18 +23,18 @@ namespace osteon {
 // What a client may do in a room: only a surgeon's cuts are taken.
 enum class MemberKind : std::uint8_t { surgeon, watcher };
 
-struct JoinRow {
+struct JoinEntry {
   AuthorId author;  // given here, never again
   MemberKind kind = MemberKind::watcher;
   std::uint32_t person = 0;  // a pseudonym: who it is, is written elsewhere and can be forgotten; 0: unnamed
   Digest secret{};           // SHA-256 of what proves that a later connection is the same author's
   Role role = Role::none;    // none: in a room from before there were roles, or of the server itself
 };
-struct CutRow {
+struct CutEntry {
   Cut cut;
 };
 // It has a place in the order, so that its author hears of it in order and never twice.
-struct RejectionRow {
+struct RejectionEntry {
   AuthorId author;
   std::uint64_t author_seq = 0;
   Digest bytes{};  // of the cut: cut_digest()
@@ -46,54 +46,54 @@ struct SplitPiece {
   CoordBox reach;  // samples of level 0 that its bone is in
   Mask left;       // min(R, left) leaves the piece of its parent
 };
-struct SplitRow {
+struct SplitEntry {
   BodyId parent;
   Mask taken;  // min(R, taken) takes the pieces from their parent
   std::vector<SplitPiece> pieces;
 };
-struct UndoRow {
+struct UndoEntry {
   std::vector<RoomSeq> places;  // tombstones from now on, oldest first: what was asked for and what fell with it
 };
-struct RedoRow {
+struct RedoEntry {
   std::vector<RoomSeq> undos;   // that are undone themselves, newest first
   std::vector<RoomSeq> places;  // what comes again, oldest first
 };
-struct RemoveBodyRow {
+struct RemoveBodyEntry {
   BodyId body;
 };
-struct ItemRow {
+struct ItemEntry {
   std::uint32_t item = 0;
   std::optional<SceneItem> set;  // nothing: taken out
 };
-struct ToolRow {
+struct ToolEntry {
   Tool tool;
 };
 // A place in the order that a person wants to find again.
-struct MarkRow {
+struct MarkEntry {
   std::string label;
 };
 
 // What holds for a hand from now on. Who stops a hand or frees it, takes its tool or gives it back, ends its lease.
-struct SuperviseRow {
+struct SuperviseEntry {
   AuthorId subject;
   Restrictions supervision;
 };
 // An annotation as it is from now on.
-struct AnnotationRow {
+struct AnnotationEntry {
   std::uint32_t id = 0;
   std::optional<Annotation> drawn;  // nothing: wiped off
 };
-struct WordsRow {
+struct WordsEntry {
   AuthorId to;  // null: to all
   std::string words;
 };
 
-struct RoomRow {
+struct LogEntry {
   RoomSeq place;
   std::chrono::nanoseconds at{};  // since the room was made, by the clock of the server that decided
   AuthorId author;                // who asked for it; null: the room itself
-  std::variant<JoinRow, CutRow, RejectionRow, SplitRow, UndoRow, RedoRow, RemoveBodyRow, ItemRow, ToolRow, MarkRow,
-               SuperviseRow, AnnotationRow, WordsRow>
+  std::variant<JoinEntry, CutEntry, RejectionEntry, SplitEntry, UndoEntry, RedoEntry, RemoveBodyEntry, ItemEntry, ToolEntry, MarkEntry,
+               SuperviseEntry, AnnotationEntry, WordsEntry>
       what;
 };
 

@@ -1,4 +1,4 @@
-// The rows of a program that is killed, each known from its place.
+// The entries of a program that is killed, each known from its place.
 #pragma once
 #include <string>
 #include <utility>
@@ -7,7 +7,7 @@
 
 namespace osteon {
 
-inline JournalRow kill_row(std::uint64_t place) {
+inline JournalEntry kill_entry(std::uint64_t place) {
   std::string bytes(1 + place * 7919 % 1500, static_cast<char>(place));
   return {RoomSeq{place}, static_cast<std::int64_t>(place * 8'000'000), std::move(bytes)};
 }

@@ -1,4 +1,4 @@
-#include "server/net/room_rows.hpp"
+#include "server/net/room_entries.hpp"
 
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
@@ -38,24 +38,24 @@ Bytes block_message(const BlockKey& key, const StoredBlock& block) {
   return serialised(response);
 }
 
-Bytes cut_row(RoomSeq place, const Cut& cut) {
+Bytes cut_message(RoomSeq place, const Cut& cut) {
   v1::SessionResponse response;
   response.mutable_committed()->set_room_seq(place.value);
   *response.mutable_committed()->mutable_cut() = wire::to_wire(cut);
   return serialised(response);
 }
 
-Bytes rejection_row(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
+Bytes rejection_message(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
   v1::SessionResponse response;
-  v1::RejectedCut& row = *response.mutable_rejected();
-  row.set_room_seq(place.value);
-  row.set_author_seq(author_seq);
-  row.set_lease_epoch(lease_epoch);
-  row.set_reason(std::string(sentence(reason)));
+  v1::RejectedCut& entry = *response.mutable_rejected();
+  entry.set_room_seq(place.value);
+  entry.set_author_seq(author_seq);
+  entry.set_lease_epoch(lease_epoch);
+  entry.set_reason(std::string(sentence(reason)));
   return serialised(response);
 }
 
-Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port) {
+Bytes link_message(const SessionKeys& keys, std::uint16_t udp_port) {
   v1::SessionResponse response;
   v1::LinkOffer& offer = *response.mutable_link();
   offer.set_session(keys.session);
@@ -65,7 +65,7 @@ Bytes link_row(const SessionKeys& keys, std::uint16_t udp_port) {
   return serialised(response);
 }
 
-Bytes kept_row(const Witness& witness) {
+Bytes kept_message(const Witness& witness) {
   v1::SessionResponse response;
   response.mutable_kept()->set_room_seq(witness.head.place.value);
   response.mutable_kept()->set_chain(wire::to_wire(witness.head.chain));
@@ -73,14 +73,14 @@ Bytes kept_row(const Witness& witness) {
   return serialised(response);
 }
 
-Bytes redial_row(std::chrono::milliseconds after, const std::string& why) {
+Bytes redial_message(std::chrono::milliseconds after, const std::string& why) {
   v1::SessionResponse response;
   response.mutable_redial()->set_after_ms(static_cast<std::uint32_t>(after.count()));
   response.mutable_redial()->set_why(why);
   return serialised(response);
 }
 
-Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number) {
+Bytes tool_message(RoomSeq place, const Tool& tool, std::uint32_t number) {
   v1::SessionResponse response;
   response.mutable_tool()->set_room_seq(place.value);
   *response.mutable_tool()->mutable_tool() = wire::to_wire(tool);
@@ -88,14 +88,14 @@ Bytes tool_row(RoomSeq place, const Tool& tool, std::uint32_t number) {
   return serialised(response);
 }
 
-Bytes scene_row(RoomSeq place, const std::vector<SceneItem>& items) {
+Bytes scene_message(RoomSeq place, const std::vector<SceneItem>& items) {
   v1::SessionResponse response;
   response.mutable_scene()->set_room_seq(place.value);
   for (const SceneItem& item : items) *response.mutable_scene()->add_items() = wire::to_wire(item);
   return serialised(response);
 }
 
-Bytes supervised_row(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by) {
+Bytes supervised_message(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by) {
   v1::SessionResponse response;
   response.mutable_supervised()->set_room_seq(place.value);
   *response.mutable_supervised()->mutable_supervision() = wire::to_wire(supervision);
@@ -105,7 +105,7 @@ Bytes supervised_row(RoomSeq place, const Restrictions& supervision, std::uint64
   return serialised(response);
 }
 
-Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words) {
+Bytes said_message(RoomSeq place, AuthorId from, const WordsEntry& words) {
   v1::SessionResponse response;
   response.mutable_said()->set_room_seq(place.value);
   response.mutable_said()->set_from(from.value);
@@ -114,27 +114,27 @@ Bytes said_row(RoomSeq place, AuthorId from, const WordsRow& words) {
   return serialised(response);
 }
 
-Bytes partner_row(const CuttingState& state) {
+Bytes partner_entry(const CuttingState& state) {
   v1::SessionResponse response;
   *response.mutable_partner() = wire::to_wire(state);
   return serialised(response);
 }
 
-Bytes bone_row(const MountPose& seen) {
-  v1::SessionResponse row;
-  *row.mutable_bone() = wire::to_wire(seen);
-  return serialised(row);
+Bytes bone_entry(const MountPose& seen) {
+  v1::SessionResponse entry;
+  *entry.mutable_bone() = wire::to_wire(seen);
+  return serialised(entry);
 }
 
-Bytes noted_row(RoomSeq place, const std::string& mark) {
+Bytes noted_entry(RoomSeq place, const std::string& mark) {
   v1::SessionResponse response;
   response.mutable_noted()->set_room_seq(place.value);
   response.mutable_noted()->set_mark(mark);
   return serialised(response);
 }
 
-MessageParts change_rows(const RoomEvent& event) {
-  MessageParts rows;
+MessageParts change_entries(const RoomEvent& event) {
+  MessageParts entries;
   std::size_t next = 0;
   do {
     v1::SessionResponse response;
@@ -150,9 +150,9 @@ MessageParts change_rows(const RoomEvent& event) {
       size += leaf.values().size() + 24;
     }
     change.set_last(next == event.leaves.size());
-    rows.push_back(serialised(response));
+    entries.push_back(serialised(response));
   } while (next < event.leaves.size());
-  return rows;
+  return entries;
 }
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// A room's rows as bytes of its journal, and back.
+// A room's entries as bytes of its journal, and back.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -41,12 +41,12 @@ struct RoomGenesis {
 [[nodiscard]] Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutLimits& limits);
 
 // Without place and time, which a journal keeps beside them.
-[[nodiscard]] std::string to_bytes(const RoomRow& row);
-// Error invalid_input, naming the row and the field.
-[[nodiscard]] Result<RoomRow> row_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+[[nodiscard]] std::string to_bytes(const LogEntry& entry);
+// Error invalid_input, naming the entry and the field.
+[[nodiscard]] Result<LogEntry> entry_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
 
 // {"place": 12, "at_s": 3.25, "event": {...}}, on one line.
-[[nodiscard]] Result<std::string> row_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+[[nodiscard]] Result<std::string> entry_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
 
 // All that a journal has of one person, as lines of JSON.
 class PersonExport {
@@ -54,9 +54,9 @@ class PersonExport {
   PersonExport(std::uint32_t person, const std::vector<Person>& people);
   // {"person": 3, "label": "...", "joined_day": 20778}; nothing: it was forgotten, or there is no such.
   [[nodiscard]] const std::optional<std::string>& who() const { return who_; }
-  // As row_as_json(), of the next row where it is this person's: its coming, and what it asked for as whoever it then
+  // As entry_as_json(), of the next entry where it is this person's: its coming, and what it asked for as whoever it then
   // was.
-  [[nodiscard]] Result<std::optional<std::string>> of(const JournalRow& row);
+  [[nodiscard]] Result<std::optional<std::string>> of(const JournalEntry& entry);
   [[nodiscard]] tl::unexpected<Error> nobody() const;  // error not_found
 
  private:

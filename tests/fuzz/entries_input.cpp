@@ -1,4 +1,4 @@
-#include "tests/fuzz/rows_input.hpp"
+#include "tests/fuzz/entries_input.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -107,7 +107,7 @@ class Changes {
     }
   }
 
-  void change(JoinRow& join) {
+  void change(JoinEntry& join) {
     if (below(2))
       number(join.author.value);
     else if (below(2))
@@ -115,8 +115,8 @@ class Changes {
     else
       join.kind = static_cast<MemberKind>(below(3));
   }
-  void change(CutRow& row) {
-    Cut& cut = row.cut;
+  void change(CutEntry& entry) {
+    Cut& cut = entry.cut;
     switch (below(9)) {
       case 0:
         number(cut.author.value);
@@ -143,30 +143,30 @@ class Changes {
         one_of(cut.path);
     }
   }
-  void change(RejectionRow& row) {
+  void change(RejectionEntry& entry) {
     if (below(3) == 0)
-      number(row.author.value);
+      number(entry.author.value);
     else if (below(2))
-      number(row.author_seq);
+      number(entry.author_seq);
     else
-      row.reason = static_cast<Rejection>(below(static_cast<std::size_t>(kRejections) + 1));
+      entry.reason = static_cast<Rejection>(below(static_cast<std::size_t>(kRejections) + 1));
   }
-  void change(SplitRow& row) {
+  void change(SplitEntry& entry) {
     if (below(4) == 0)
-      number(row.parent.value);
+      number(entry.parent.value);
     else if (below(2))
-      change(row.taken);
+      change(entry.taken);
     else
-      one_of(row.pieces);
-    for (SplitPiece& piece : row.pieces)
+      one_of(entry.pieces);
+    for (SplitPiece& piece : entry.pieces)
       if (!piece.left) piece.left = std::make_shared<const std::vector<FieldLeaf>>();
   }
-  void change(UndoRow& row) { one_of(row.places); }
-  void change(RedoRow& row) { one_of(below(2) ? row.undos : row.places); }
-  void change(RemoveBodyRow& row) { number(row.body.value); }
-  void change(ItemRow& row) {
-    if (!row.set || below(4) == 0) return number(row.item);
-    SceneItem& item = *row.set;
+  void change(UndoEntry& entry) { one_of(entry.places); }
+  void change(RedoEntry& entry) { one_of(below(2) ? entry.undos : entry.places); }
+  void change(RemoveBodyEntry& entry) { number(entry.body.value); }
+  void change(ItemEntry& entry) {
+    if (!entry.set || below(4) == 0) return number(entry.item);
+    SceneItem& item = *entry.set;
     switch (below(7)) {
       case 0:
         number(item.id);
@@ -190,18 +190,18 @@ class Changes {
         number(item.pose_bone_item.position_mm[static_cast<int>(below(3))]);
     }
   }
-  void change(ToolRow& row) {
-    Tool& tool = row.tool;
+  void change(ToolEntry& entry) {
+    Tool& tool = entry.tool;
     if (below(3) == 0) tool.name.push_back(static_cast<char>('a' + below(26)));
     const std::array<double*, 4> sizes{&tool.diameter_mm, &tool.cutting_length_mm, &tool.shank_length_mm,
                                        &tool.spindle_rpm};
     number(*sizes[below(sizes.size())]);
   }
-  void change(MarkRow& row) {
+  void change(MarkEntry& entry) {
     if (below(2))
-      row.label.resize(below(300), static_cast<char>('a' + below(26)));
+      entry.label.resize(below(300), static_cast<char>('a' + below(26)));
     else
-      row.label.clear();
+      entry.label.clear();
   }
   void change(std::string& words) {
     if (below(2))
@@ -209,11 +209,11 @@ class Changes {
     else
       words.clear();
   }
-  void change(SuperviseRow& row) {
-    Restrictions& set = row.supervision;
+  void change(SuperviseEntry& entry) {
+    Restrictions& set = entry.supervision;
     switch (below(9)) {
       case 0:
-        number(row.subject.value);
+        number(entry.subject.value);
         break;
       case 1:
         set.stopped = !set.stopped;
@@ -241,9 +241,9 @@ class Changes {
         change(set.words);
     }
   }
-  void change(AnnotationRow& row) {
-    if (!row.drawn || below(4) == 0) return number(row.id);
-    Annotation& drawn = *row.drawn;
+  void change(AnnotationEntry& entry) {
+    if (!entry.drawn || below(4) == 0) return number(entry.id);
+    Annotation& drawn = *entry.drawn;
     switch (below(6)) {
       case 0:
         number(drawn.id);
@@ -267,11 +267,11 @@ class Changes {
           number(drawn.points[below(drawn.points.size())][below(3)]);
     }
   }
-  void change(WordsRow& row) {
+  void change(WordsEntry& entry) {
     if (below(2))
-      number(row.to.value);
+      number(entry.to.value);
     else
-      change(row.words);
+      change(entry.words);
   }
 
  private:
@@ -279,19 +279,19 @@ class Changes {
 };
 
 void change_field(std::string& bytes, Changes& changes) {
-  Result<RoomRow> row = row_from_bytes(RoomSeq{1}, {}, bytes);
-  if (!row) {
+  Result<LogEntry> entry = entry_from_bytes(RoomSeq{1}, {}, bytes);
+  if (!entry) {
     if (!bytes.empty()) changes.number(bytes[changes.below(bytes.size())]);
     return;
   }
-  std::visit([&](auto& what) { changes.change(what); }, row->what);
-  bytes = to_bytes(*row);
+  std::visit([&](auto& what) { changes.change(what); }, entry->what);
+  bytes = to_bytes(*entry);
 }
 
 }  // namespace
 
-RowsInput rows_input(std::span<const std::uint8_t> data) {
-  RowsInput input;
+EntriesInput entries_input(std::span<const std::uint8_t> data) {
+  EntriesInput input;
   if (data.size() < 2) return input;
   input.how = data[0], input.checkpoint = data[1];
   data = data.subspan(2);
@@ -305,7 +305,7 @@ RowsInput rows_input(std::span<const std::uint8_t> data) {
   return input;
 }
 
-Bytes to_bytes(const RowsInput& input) {
+Bytes to_bytes(const EntriesInput& input) {
   Bytes out{input.how, input.checkpoint};
   for (const Record& record : input.records) {
     const std::size_t size = std::min<std::size_t>(record.bytes.size(), 0xffff);
@@ -323,8 +323,8 @@ std::chrono::nanoseconds time_of(const Record& record, std::chrono::nanoseconds 
   return before + record.later * kStep;
 }
 
-void change_rows(Bytes& data, std::mt19937& random) {
-  RowsInput input = rows_input(data);
+void change_entries(Bytes& data, std::mt19937& random) {
+  EntriesInput input = entries_input(data);
   std::vector<Record>& records = input.records;
   if (records.empty()) return;
   Changes changes(random);

@@ -1,4 +1,4 @@
-// What a room decides as rows: replayed, through their bytes, they make the same room again, from the beginning or from
+// What a room decides as entries: replayed, through their bytes, they make the same room again, from the beginning or from
 // any place on.
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/parts.hpp"
 
@@ -101,8 +101,8 @@ Room begun_like(const Room& room) {
 }
 
 // As a journal keeps it.
-RoomRow through_bytes(const RoomRow& row) {
-  Result<RoomRow> read = row_from_bytes(row.place, row.at, to_bytes(row));
+LogEntry through_bytes(const LogEntry& entry) {
+  Result<LogEntry> read = entry_from_bytes(entry.place, entry.at, to_bytes(entry));
   EXPECT_TRUE(read) << read.error().message;
   return std::move(*read);
 }
@@ -124,68 +124,68 @@ void expect_same(Room& one, Room& other) {
   }
 }
 
-class RoomRows : public ::testing::TestWithParam<unsigned> {};
+class LogEntries : public ::testing::TestWithParam<unsigned> {};
 
-TEST_P(RoomRows, ReplayedMakeTheSameRoom) {
+TEST_P(LogEntries, ReplayedMakeTheSameRoom) {
   BusyRoom busy(GetParam());
   Room replayed = begun_like(busy.room);
-  std::size_t rows = 0;
+  std::size_t entries = 0;
   for (int i = 0; i < 60; ++i) {
     busy.act();
-    for (const RoomRow& row : busy.room.take_rows()) {
-      const Result<void> followed = replayed.replay(through_bytes(row));
+    for (const LogEntry& entry : busy.room.take_entries()) {
+      const Result<void> followed = replayed.replay(through_bytes(entry));
       ASSERT_TRUE(followed) << followed.error().message;
-      ++rows;
+      ++entries;
     }
-    ASSERT_EQ(replayed.room_hash(), busy.room.room_hash()) << "event " << i << ", row " << rows;
+    ASSERT_EQ(replayed.room_hash(), busy.room.room_hash()) << "event " << i << ", entry " << entries;
     ASSERT_EQ(replayed.room_seq(), busy.room.room_seq());
   }
-  EXPECT_EQ(rows, busy.room.room_seq().value) << "every place of the order is a row";
-  EXPECT_TRUE(replayed.take_rows().empty()) << "what was decided elsewhere is not decided again";
+  EXPECT_EQ(entries, busy.room.room_seq().value) << "every place of the order is a entry";
+  EXPECT_TRUE(replayed.take_entries().empty()) << "what was decided elsewhere is not decided again";
   expect_same(busy.room, replayed);
 }
 
-// Fields of any place and the rows before it, which are not evaluated again, then the rows after it.
-TEST_P(RoomRows, GoOnFromACheckpoint) {
+// Fields of any place and the entries before it, which are not evaluated again, then the entries after it.
+TEST_P(LogEntries, GoOnFromACheckpoint) {
   BusyRoom busy(GetParam());
-  std::vector<RoomRow> before, after;
+  std::vector<LogEntry> before, after;
   std::vector<FieldLeaf> fields;
   for (int i = 0; i < 60; ++i) {
     busy.act();
-    std::ranges::move(busy.room.take_rows(), std::back_inserter(i < 40 ? before : after));
+    std::ranges::move(busy.room.take_entries(), std::back_inserter(i < 40 ? before : after));
     if (i == 39) fields = busy.room.all_leaves();
   }
   Room recovered = begun_like(busy.room);
-  for (const RoomRow& row : before) ASSERT_TRUE(recovered.replay(through_bytes(row), Room::Fields::leave));
+  for (const LogEntry& entry : before) ASSERT_TRUE(recovered.replay(through_bytes(entry), Room::Fields::leave));
   ASSERT_TRUE(recovered.set_fields(fields));
-  for (const RoomRow& row : after) {
-    const Result<void> followed = recovered.replay(through_bytes(row));
+  for (const LogEntry& entry : after) {
+    const Result<void> followed = recovered.replay(through_bytes(entry));
     ASSERT_TRUE(followed) << followed.error().message;
   }
   expect_same(busy.room, recovered);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, RoomRows, ::testing::Range(1u, 9u));
+INSTANTIATE_TEST_SUITE_P(Seeds, LogEntries, ::testing::Range(1u, 9u));
 
 TEST(RoomReplay, TakesOnlyTheRowThatComesNext) {
   BusyRoom busy(3);
   for (int i = 0; i < 20; ++i) busy.act();
-  const std::vector<RoomRow> rows = busy.room.take_rows();
+  const std::vector<LogEntry> entries = busy.room.take_entries();
   Room replayed = begun_like(busy.room);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+  for (std::size_t i = 0; i < entries.size(); ++i) {
     const Digest before = replayed.room_hash();
-    if (i + 1 < rows.size()) {
-      EXPECT_FALSE(replayed.replay(rows[i + 1])) << "a gap";
+    if (i + 1 < entries.size()) {
+      EXPECT_FALSE(replayed.replay(entries[i + 1])) << "a gap";
     }
     if (i > 0) {
-      EXPECT_FALSE(replayed.replay(rows[i - 1])) << "again";
+      EXPECT_FALSE(replayed.replay(entries[i - 1])) << "again";
     }
     EXPECT_EQ(replayed.room_hash(), before);
-    ASSERT_TRUE(replayed.replay(rows[i]));
+    ASSERT_TRUE(replayed.replay(entries[i]));
   }
 }
 
-// A journal may have been damaged or forged where its chain still holds: no row may name what is not there.
+// A journal may have been damaged or forged where its chain still holds: no entry may name what is not there.
 TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
   Room room(test_block());
   const AuthorId hand = room.join(MemberKind::surgeon);
@@ -213,62 +213,62 @@ TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
   };
   constexpr std::int32_t kFurthest = std::numeric_limits<std::int32_t>::max() - 7;
   const CoordBox everywhere{{INT32_MIN, INT32_MIN, INT32_MIN}, {INT32_MAX, INT32_MAX, INT32_MAX}};
-  const decltype(RoomRow::what) impossible[] = {
-      CutRow{of_nobody},
-      CutRow{of_no_tool},
-      CutRow{of_no_body},
-      CutRow{too_early},
-      CutRow{far},
-      JoinRow{hand, MemberKind::surgeon, 0, {}},
-      JoinRow{AuthorId{7}, MemberKind::watcher, 0, {}},
-      RejectionRow{hand, 3, {}, Rejection::place},
-      RejectionRow{hand, 2, {}, Rejection::none},
-      RejectionRow{hand, 2, {}, static_cast<Rejection>(kRejections)},
-      SplitRow{BodyId{3}, whole, {}},
-      SplitRow{BodyId{0}, torn, {}},
-      SplitRow{BodyId{0}, nullptr, {}},
-      SplitRow{BodyId{0}, whole, {{BodyId{5}, {}, whole}}},
-      SplitRow{BodyId{0}, mask_at(0, {kFurthest, 0, 0}), {}},
-      SplitRow{BodyId{0}, mask_at(2, {0, -4096, 0}), {}},
-      SplitRow{BodyId{0}, whole, {{BodyId{1}, {}, mask_at(1, {0, 0, kFurthest})}}},
-      SplitRow{BodyId{0}, whole, {{BodyId{1}, everywhere, whole}}},
-      UndoRow{{}},
-      UndoRow{{RoomSeq{1}}},
-      UndoRow{{RoomSeq{9}}},
-      UndoRow{{RoomSeq{2}, RoomSeq{2}}},
-      RedoRow{{}, {}},
-      RedoRow{{RoomSeq{2}}, {}},
-      RedoRow{{RoomSeq{8}}, {}},
-      RemoveBodyRow{BodyId{0}},
-      RemoveBodyRow{BodyId{6}},
-      ItemRow{1, std::nullopt},
-      ItemRow{2, item},
-      ItemRow{1, of_gone_body},
-      ItemRow{1, of_another_number},
-      ItemRow{1, of_another_place},
-      ToolRow{tool_named("guide-1")},
-      MarkRow{""},
-      MarkRow{std::string(kMostLabelBytes + 1, 'x')}};
+  const decltype(LogEntry::what) impossible[] = {
+      CutEntry{of_nobody},
+      CutEntry{of_no_tool},
+      CutEntry{of_no_body},
+      CutEntry{too_early},
+      CutEntry{far},
+      JoinEntry{hand, MemberKind::surgeon, 0, {}},
+      JoinEntry{AuthorId{7}, MemberKind::watcher, 0, {}},
+      RejectionEntry{hand, 3, {}, Rejection::place},
+      RejectionEntry{hand, 2, {}, Rejection::none},
+      RejectionEntry{hand, 2, {}, static_cast<Rejection>(kRejections)},
+      SplitEntry{BodyId{3}, whole, {}},
+      SplitEntry{BodyId{0}, torn, {}},
+      SplitEntry{BodyId{0}, nullptr, {}},
+      SplitEntry{BodyId{0}, whole, {{BodyId{5}, {}, whole}}},
+      SplitEntry{BodyId{0}, mask_at(0, {kFurthest, 0, 0}), {}},
+      SplitEntry{BodyId{0}, mask_at(2, {0, -4096, 0}), {}},
+      SplitEntry{BodyId{0}, whole, {{BodyId{1}, {}, mask_at(1, {0, 0, kFurthest})}}},
+      SplitEntry{BodyId{0}, whole, {{BodyId{1}, everywhere, whole}}},
+      UndoEntry{{}},
+      UndoEntry{{RoomSeq{1}}},
+      UndoEntry{{RoomSeq{9}}},
+      UndoEntry{{RoomSeq{2}, RoomSeq{2}}},
+      RedoEntry{{}, {}},
+      RedoEntry{{RoomSeq{2}}, {}},
+      RedoEntry{{RoomSeq{8}}, {}},
+      RemoveBodyEntry{BodyId{0}},
+      RemoveBodyEntry{BodyId{6}},
+      ItemEntry{1, std::nullopt},
+      ItemEntry{2, item},
+      ItemEntry{1, of_gone_body},
+      ItemEntry{1, of_another_number},
+      ItemEntry{1, of_another_place},
+      ToolEntry{tool_named("guide-1")},
+      MarkEntry{""},
+      MarkEntry{std::string(kMostLabelBytes + 1, 'x')}};
   for (std::size_t i = 0; i < std::size(impossible); ++i) {
-    EXPECT_FALSE(room.replay({RoomSeq{3}, 1s, hand, impossible[i]})) << "row " << i;
-    EXPECT_EQ(room.room_hash(), before) << "row " << i;
+    EXPECT_FALSE(room.replay({RoomSeq{3}, 1s, hand, impossible[i]})) << "entry " << i;
+    EXPECT_EQ(room.room_hash(), before) << "entry " << i;
   }
-  EXPECT_TRUE(room.replay({RoomSeq{3}, 1s, hand, CutRow{cuts[1]}}));
+  EXPECT_TRUE(room.replay({RoomSeq{3}, 1s, hand, CutEntry{cuts[1]}}));
 }
 
 // Not only where the sum of two times would overflow.
 TEST(RoomReplay, RefusesATimeBeforeTheLastRowsOrBeyondAnyRooms) {
   Room room(test_block());
   const AuthorId hand = room.join(MemberKind::surgeon);
-  ASSERT_TRUE(room.replay({RoomSeq{2}, 2s, hand, MarkRow{"here"}}));
+  ASSERT_TRUE(room.replay({RoomSeq{2}, 2s, hand, MarkEntry{"here"}}));
   const Digest before = room.room_hash();
   for (const std::chrono::nanoseconds at : {std::chrono::nanoseconds::min(), std::chrono::nanoseconds(-1s),
                                             std::chrono::nanoseconds(1999ms), std::chrono::nanoseconds::max()}) {
-    EXPECT_FALSE(room.replay({RoomSeq{3}, at, hand, MarkRow{"there"}})) << at.count();
+    EXPECT_FALSE(room.replay({RoomSeq{3}, at, hand, MarkEntry{"there"}})) << at.count();
     EXPECT_EQ(room.room_hash(), before);
     EXPECT_EQ(room.time(), 2s);
   }
-  EXPECT_TRUE(room.replay({RoomSeq{3}, 2s, hand, MarkRow{"there"}})) << "two rows of one moment";
+  EXPECT_TRUE(room.replay({RoomSeq{3}, 2s, hand, MarkEntry{"there"}})) << "two entries of one moment";
 }
 
 TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
@@ -279,12 +279,12 @@ TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
   ASSERT_TRUE(room.undo_last(hand, 1, {}) && room.undo_last(hand, 1, {}));
   const RoomSeq first{2}, second{3}, undo{4}, next_undo{5};
   const Digest before = room.room_hash();
-  for (const RedoRow& redo : {RedoRow{{undo, undo}, {second}}, RedoRow{{undo, next_undo}, {first, second}},
-                              RedoRow{{undo}, {second, second}}, RedoRow{{next_undo, undo}, {second, first}}}) {
+  for (const RedoEntry& redo : {RedoEntry{{undo, undo}, {second}}, RedoEntry{{undo, next_undo}, {first, second}},
+                              RedoEntry{{undo}, {second, second}}, RedoEntry{{next_undo, undo}, {second, first}}}) {
     EXPECT_FALSE(room.replay({RoomSeq{6}, 1s, hand, redo}));
     EXPECT_EQ(room.room_hash(), before);
   }
-  EXPECT_TRUE(room.replay({RoomSeq{6}, 1s, hand, RedoRow{{next_undo, undo}, {first, second}}}));
+  EXPECT_TRUE(room.replay({RoomSeq{6}, 1s, hand, RedoEntry{{next_undo, undo}, {first, second}}}));
 }
 
 TEST(RoomReplay, RefusesFieldsThatAreNoneOfTheBones) {
@@ -305,12 +305,12 @@ TEST(RoomReplay, TakesNoMoreItemsThanTheRoomGives) {
   item.tool = tool_named("guide-1").hash();
   for (item.id = 1; item.id <= kMostItems; ++item.id) {
     item.set_at = item.id;
-    ASSERT_TRUE(room.replay({RoomSeq{item.id}, 1s, {}, ItemRow{item.id, item}})) << item.id;
+    ASSERT_TRUE(room.replay({RoomSeq{item.id}, 1s, {}, ItemEntry{item.id, item}})) << item.id;
   }
   item.set_at = item.id;
-  EXPECT_FALSE(room.replay({RoomSeq{item.id}, 1s, {}, ItemRow{item.id, item}}));
+  EXPECT_FALSE(room.replay({RoomSeq{item.id}, 1s, {}, ItemEntry{item.id, item}}));
   --item.id;
-  EXPECT_TRUE(room.replay({RoomSeq{kMostItems + 1}, 1s, {}, ItemRow{item.id, item}})) << "one that is there moves";
+  EXPECT_TRUE(room.replay({RoomSeq{kMostItems + 1}, 1s, {}, ItemEntry{item.id, item}})) << "one that is there moves";
 }
 
 TEST(RoomLease, FallsWithARejectionForItsAuthorAlone) {
@@ -348,7 +348,7 @@ TEST(RoomLease, TakesNoMoreToolTimeThanHasPassed) {
 
 // 1 mm of way a cut; what the kernel would look at is bounded by the box of the tool and its way.
 TEST(RoomLimits, BoundWhatIsSweptOverTime) {
-  const auto taken_in_a_row = [](double voxels_per_s) {
+  const auto taken_in_a_entry = [](double voxels_per_s) {
     Room room(test_block(), {.swept_voxels_per_s = voxels_per_s});
     const AuthorId hand = room.join(MemberKind::surgeon);
     const Tool burr = tool_named("burr-round-5");
@@ -367,7 +367,7 @@ TEST(RoomLimits, BoundWhatIsSweptOverTime) {
     EXPECT_TRUE(room.submit(cut)->committed()) << "time gives it back";
     return taken;
   };
-  const std::size_t few = taken_in_a_row(1e5), more = taken_in_a_row(2e5);
+  const std::size_t few = taken_in_a_entry(1e5), more = taken_in_a_entry(2e5);
   EXPECT_GT(few, 0u);
   EXPECT_LT(more, 100u);
   EXPECT_NEAR(static_cast<double>(more), 2.0 * static_cast<double>(few), 2.0);
@@ -437,8 +437,8 @@ TEST(RoomMark, IsFoundAgainAndUndoneTo) {
 }
 
 TEST(JournalRows, AreRefusedWhereTheyAreNone) {
-  EXPECT_FALSE(row_from_bytes(RoomSeq{1}, 0s, "\xff\xff"));
-  EXPECT_EQ(row_from_bytes(RoomSeq{1}, 0s, "").error().code, ErrorCode::unsupported);
+  EXPECT_FALSE(entry_from_bytes(RoomSeq{1}, 0s, "\xff\xff"));
+  EXPECT_EQ(entry_from_bytes(RoomSeq{1}, 0s, "").error().code, ErrorCode::unsupported);
   EXPECT_FALSE(genesis_from_bytes("\xff\xff"));
   RoomGenesis genesis = genesis_of(Room(test_block()), "a");
   genesis.case_hash.bytes[0] ^= 1;

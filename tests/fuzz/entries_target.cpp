@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "common/core/check.hpp"
-#include "server/net/journal_rows.hpp"
+#include "server/net/journal_entries.hpp"
 #include "tests/fuzz/journal_target.hpp"
-#include "tests/fuzz/rows_input.hpp"
+#include "tests/fuzz/entries_input.hpp"
 #include "tests/support/scenes/bones.hpp"
 
 namespace osteon::fuzz {
@@ -64,7 +64,7 @@ void expect_same(const Room& one, const Room& other) {
   OSTEON_CHECK(items.size() <= kMostItems && std::ranges::is_sorted(items, std::less_equal{}, &SceneItem::id));
 }
 
-// As the surface's thread asks it after any event: the work is bounded by the bone, whatever the rows said.
+// As the surface's thread asks it after any event: the work is bounded by the bone, whatever the entries said.
 void draw(Room& room) {
   const std::vector<BlockKey> blocks = room.bone_blocks();
   OSTEON_CHECK(blocks.size() <= 1000 * kMostBodies);
@@ -80,10 +80,10 @@ void go_on(Room& one, Room& other) {
   expect_same(one, other);
 }
 
-// `room` is given every row, `other` what was taken, through its bytes once more: so that a refused row that changed
+// `room` is given every entry, `other` what was taken, through its bytes once more: so that a refused entry that changed
 // anything shows in the end.
-void replay_any_rows(std::span<const std::uint8_t> data, bool evaluate) {
-  const RowsInput input = rows_input(data);
+void replay_any_entries(std::span<const std::uint8_t> data, bool evaluate) {
+  const EntriesInput input = entries_input(data);
   const unsigned how = input.how;
   const RoomSeq checkpoint{evaluate && (how & kFromCheckpoint) ? input.checkpoint % 16u : 0u};
   Room room = begun(), other = begun();
@@ -92,23 +92,23 @@ void replay_any_rows(std::span<const std::uint8_t> data, bool evaluate) {
   for (const Record& record : input.records) {
     const RoomSeq place{room.room_seq().value + 1 + static_cast<std::uint64_t>(record.off)};
     const std::chrono::nanoseconds when = time_of(record, at);
-    const Result<RoomRow> row = row_from_bytes(place, when, record.bytes);
+    const Result<LogEntry> entry = entry_from_bytes(place, when, record.bytes);
     if (how & kAsText) {
-      const Result<std::string> line = row_as_json(place, when, record.bytes);
-      OSTEON_CHECK(line ? line->find('\n') == std::string::npos : !row);
+      const Result<std::string> line = entry_as_json(place, when, record.bytes);
+      OSTEON_CHECK(line ? line->find('\n') == std::string::npos : !entry);
     }
-    if (!row) continue;
-    const std::string written = to_bytes(*row);
-    const Result<RoomRow> read = row_from_bytes(place, when, written);
+    if (!entry) continue;
+    const std::string written = to_bytes(*entry);
+    const Result<LogEntry> read = entry_from_bytes(place, when, written);
     OSTEON_CHECK(read && to_bytes(*read) == written);
-    if (!room.replay(*row, evaluate ? Room::Fields::evaluate : Room::Fields::leave)) continue;
+    if (!room.replay(*entry, evaluate ? Room::Fields::evaluate : Room::Fields::leave)) continue;
     at = room.time();
     const bool evaluate_here = evaluate && place > checkpoint;
     OSTEON_CHECK(other.replay(*read, evaluate_here ? Room::Fields::evaluate : Room::Fields::leave).has_value());
     if (evaluate && place == checkpoint) reach_checkpoint();
   }
   if (evaluate && room.room_seq() < checkpoint) reach_checkpoint();
-  OSTEON_CHECK(room.take_rows().empty() && room.time() == other.time());
+  OSTEON_CHECK(room.take_entries().empty() && room.time() == other.time());
   expect_same(room, other);
   if (!evaluate) return;
   if (how & kDraw) draw(room);
@@ -127,12 +127,12 @@ void begin_any_room(std::span<const std::uint8_t> data) {
 
 // Seeds: what a real room has decided.
 
-RowsInput as_input(Room& room, unsigned how, std::uint8_t checkpoint) {
-  RowsInput input{static_cast<std::uint8_t>(how), checkpoint, {}};
+EntriesInput as_input(Room& room, unsigned how, std::uint8_t checkpoint) {
+  EntriesInput input{static_cast<std::uint8_t>(how), checkpoint, {}};
   std::chrono::nanoseconds at{};
-  for (const RoomRow& row : room.take_rows()) {
-    input.records.push_back({0, static_cast<std::int8_t>((row.at - at) / kStep), to_bytes(row)});
-    at = row.at;
+  for (const LogEntry& entry : room.take_entries()) {
+    input.records.push_back({0, static_cast<std::int8_t>((entry.at - at) / kStep), to_bytes(entry)});
+    at = entry.at;
   }
   return input;
 }
@@ -170,7 +170,7 @@ SceneItem a_guide() {
 
 std::vector<Bytes> rooms() {
   std::vector<Bytes> inputs;
-  {  // every kind of row
+  {  // every kind of entry
     Room room = begun();
     const AuthorId hand = room.join(MemberKind::surgeon, 1, Digest{{1}});
     room.join(MemberKind::watcher, 2);
@@ -198,13 +198,13 @@ std::vector<Bytes> rooms() {
     OSTEON_CHECK(
         room.annotate(teacher, {.kind = AnnotationKind::line, .points = {{1, 2, 3}, {4, 5, 6}}, .words = "here"}));
     OSTEON_CHECK(room.wipe_off(teacher, 1) && room.say(hand, teacher, "why?"));
-    std::array<bool, std::variant_size_v<decltype(RoomRow::what)>> seen{};
-    const RowsInput input = as_input(room, kGoOn, 0);
+    std::array<bool, std::variant_size_v<decltype(LogEntry::what)>> seen{};
+    const EntriesInput input = as_input(room, kGoOn, 0);
     Room again = begun();
     for (const Record& record : input.records) {
-      const auto row = row_from_bytes(RoomSeq{again.room_seq().value + 1}, time_of(record, again.time()), record.bytes);
-      OSTEON_CHECK(row && again.replay(*row));
-      seen[row->what.index()] = true;
+      const auto entry = entry_from_bytes(RoomSeq{again.room_seq().value + 1}, time_of(record, again.time()), record.bytes);
+      OSTEON_CHECK(entry && again.replay(*entry));
+      seen[entry->what.index()] = true;
     }
     OSTEON_CHECK(again.room_hash() == room.room_hash() && std::ranges::all_of(seen, std::identity{}));
     inputs.push_back(to_bytes(input));
@@ -238,14 +238,14 @@ std::vector<Bytes> rooms() {
 
 }  // namespace
 
-Target rows_target() {
-  const auto run = [](std::span<const std::uint8_t> data) { replay_any_rows(data, false); };
-  return {"journal_rows", run, rooms(), 2000, change_rows};
+Target entries_target() {
+  const auto run = [](std::span<const std::uint8_t> data) { replay_any_entries(data, false); };
+  return {"journal_entries", run, rooms(), 2000, change_entries};
 }
 
-Target evaluated_rows_target() {
-  const auto run = [](std::span<const std::uint8_t> data) { replay_any_rows(data, true); };
-  return {"journal_rows_evaluated", run, rooms(), 1000, change_rows};
+Target evaluated_entries_target() {
+  const auto run = [](std::span<const std::uint8_t> data) { replay_any_entries(data, true); };
+  return {"journal_entries_evaluated", run, rooms(), 1000, change_entries};
 }
 
 Target genesis_target() {

@@ -12,30 +12,30 @@
 
 namespace osteon::fuzz {
 
-// One row: how far its place is from the one that comes next, how long after the one before it was decided, its bytes.
+// One entry: how far its place is from the one that comes next, how long after the one before it was decided, its bytes.
 // A time of either end of the range stands for the earliest and the latest that there are.
 struct Record {
   std::int8_t off = 0, later = 1;
   std::string bytes;
 };
 
-// What else is done with the rows: bits of `how`.
+// What else is done with the entries: bits of `how`.
 inline constexpr unsigned kFromCheckpoint = 1, kAsText = 2, kGoOn = 4, kDraw = 8;
 
-// Two bytes, then of each row four and its own.
-struct RowsInput {
+// Two bytes, then of each entry four and its own.
+struct EntriesInput {
   std::uint8_t how = 0;
   std::uint8_t checkpoint = 0;  // its place
   std::vector<Record> records;
 };
 // Any bytes are one; a record that is cut short has what is there.
-[[nodiscard]] RowsInput rows_input(std::span<const std::uint8_t> data);
-[[nodiscard]] Bytes to_bytes(const RowsInput& input);
+[[nodiscard]] EntriesInput entries_input(std::span<const std::uint8_t> data);
+[[nodiscard]] Bytes to_bytes(const EntriesInput& input);
 
 inline constexpr std::chrono::nanoseconds kStep = std::chrono::milliseconds(8);
 [[nodiscard]] std::chrono::nanoseconds time_of(const Record& record, std::chrono::nanoseconds before);
 
-// One change: a row dropped, doubled or moved, or one field of one row set to a number that may hurt.
-void change_rows(Bytes& data, std::mt19937& random);
+// One change: a entry dropped, doubled or moved, or one field of one entry set to a number that may hurt.
+void change_entries(Bytes& data, std::mt19937& random);
 
 }  // namespace osteon::fuzz

@@ -1,0 +1,37 @@
+// What a room's events look like on their way to its members: serialised once, shared by all streams.
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/link/sealed.hpp"
+#include "common/mechanics/compliant_mount.hpp"
+#include "common/mechanics/cutting_state.hpp"
+#include "server/journal/chain.hpp"
+#include "server/net/send_queue.hpp"
+#include "server/room/room.hpp"
+
+namespace osteon {
+
+// A whole WatchMeshResponse.
+[[nodiscard]] Bytes block_message(const BlockKey& key, const StoredBlock& block);
+
+// Whole SessionResponses.
+[[nodiscard]] Bytes cut_message(RoomSeq place, const Cut& cut);
+[[nodiscard]] Bytes rejection_message(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
+[[nodiscard]] Bytes link_message(const SessionKeys& keys, std::uint16_t udp_port);
+[[nodiscard]] Bytes kept_message(const Witness& witness);
+[[nodiscard]] Bytes redial_message(std::chrono::milliseconds after, const std::string& why);
+[[nodiscard]] Bytes tool_message(RoomSeq place, const Tool& tool, std::uint32_t number);
+[[nodiscard]] Bytes scene_message(RoomSeq place, const std::vector<SceneItem>& items);
+// What an instructor has decided; `place` null: what held before. `by`: who, as far as it is known.
+[[nodiscard]] Bytes supervised_message(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch,
+                                   const Decider& by);
+[[nodiscard]] Bytes said_message(RoomSeq place, AuthorId from, const WordsEntry& words);
+[[nodiscard]] Bytes partner_entry(const CuttingState& state);
+[[nodiscard]] Bytes bone_entry(const MountPose& seen);
+[[nodiscard]] Bytes noted_entry(RoomSeq place, const std::string& mark);
+[[nodiscard]] MessageParts change_entries(const RoomEvent& event);  // at least one; each of a bounded size
+
+}  // namespace osteon
