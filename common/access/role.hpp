@@ -12,7 +12,7 @@ enum class Role : std::uint8_t {
   observer = 1,      // watches and listens
   trainee = 2,       // cuts, and takes back what is their own
   collaborator = 3,  // cuts, and takes back what is anyone's
-  instructor = 4,    // oversees the others too
+  instructor = 4,    // supervises the others too
   operator_ = 5,     // makes and deletes rooms
 };
 inline constexpr int kRoles = 6;

@@ -14,11 +14,11 @@ using Time = LinkEndpoint::Time;
 constexpr int kEchoes = 8;
 constexpr Time kPartnerForgotten = 2s;
 
-bool at_the_bone(const HeardState& state) {
+bool at_the_bone(const KnownToolState& state) {
   return state.state.phase == CuttingPhase::cutting || state.state.phase == CuttingPhase::rubbing;
 }
 
-bool has_news(const HeardState& said, const HeardState& now, const PoseDeadband& band) {
+bool has_news(const KnownToolState& said, const KnownToolState& now, const PoseDeadband& band) {
   return has_moved(said.state.pose_bone_tool, now.state.pose_bone_tool, band) ||
          has_moved(said.state.pose_bone_device, now.state.pose_bone_device, band) || said.buttons != now.buttons ||
          said.state.phase != now.state.phase || said.state.on_metal != now.state.on_metal;
@@ -63,10 +63,10 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
         return one.entry.kind != SessionEntryKind::streamed && !fits_a_packet(one.entry);
       }))
     return half_.malformed();
-  std::vector<HeardState> states;
+  std::vector<KnownToolState> states;
   for (const v1::ToolState& sent : packet.partners()) {
     const auto known = partners_.find(sent.author());
-    HeardState state = known == partners_.end() ? HeardState{} : known->second.state;
+    KnownToolState state = known == partners_.end() ? KnownToolState{} : known->second.state;
     const auto newer = take_over(sent, state);
     if (!newer) return half_.malformed();
     if (*newer) states.push_back(std::move(state));
@@ -97,22 +97,22 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   for (const IndexedEntry& entry : *entries)
     if (entry.entry.kind != SessionEntryKind::streamed) entries_.offer(entry.index, entry.entry);
   if (!entries->empty() || left_out > 0) half_.answer();
-  for (HeardState& state : states) keep_partner(std::move(state), now);
+  for (KnownToolState& state : states) keep_partner(std::move(state), now);
   if (bone && bone->seen_seq > bone_seq_) {
     bone_ = bone;
     bone_seq_ = bone->seen_seq;
   }
 }
 
-void ClientLink::keep_partner(HeardState state, Time now) {
+void ClientLink::keep_partner(KnownToolState state, Time now) {
   const std::uint64_t author = state.state.author.value;
   if (partners_.size() == kMostPartners && !partners_.contains(author))
     partners_.erase(std::ranges::min_element(partners_, {}, [](const auto& entry) { return entry.second.heard_at; }));
   partners_[author] = {std::move(state), now};
 }
 
-std::vector<HeardState> ClientLink::partners(Time now) const {
-  std::vector<HeardState> heard;
+std::vector<KnownToolState> ClientLink::partners(Time now) const {
+  std::vector<KnownToolState> heard;
   for (const auto& [author, partner] : partners_)
     if (now - partner.heard_at < kPartnerForgotten) heard.push_back(partner.state);
   return heard;

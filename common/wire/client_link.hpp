@@ -71,7 +71,7 @@ class ClientLink {
   [[nodiscard]] std::uint64_t lease_epoch() const { return lease_epoch_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
   // Tools that were heard of within the last two seconds.
-  [[nodiscard]] std::vector<HeardState> partners(Time now) const;
+  [[nodiscard]] std::vector<KnownToolState> partners(Time now) const;
   // The newest place of the bone on its mount, once; nothing where it stands on none.
   [[nodiscard]] std::optional<MountPose> take_bone() { return std::exchange(bone_, std::nullopt); }
   // The server's clock as seen from here, and the round trip.
@@ -81,10 +81,10 @@ class ClientLink {
 
  private:
   struct Partner {
-    HeardState state;
+    KnownToolState state;
     Time heard_at{};
   };
-  void keep_partner(HeardState state, Time now);
+  void keep_partner(KnownToolState state, Time now);
   [[nodiscard]] Time state_due() const;
   [[nodiscard]] Time push_due() const;
   [[nodiscard]] v1::UpPacket state_part(Time now) const;
@@ -102,7 +102,7 @@ class ClientLink {
   Time arrived_at_ =
       -std::chrono::hours(1);  // when the newest packet went of which the server says that it has arrived
 
-  std::optional<HeardState> state_, said_;  // newest, and last sent
+  std::optional<KnownToolState> state_, said_;  // newest, and last sent
   bool moved_ = false;                      // from the one to the other, by more than the deadband
   Time said_at_ = -std::chrono::hours(1), effort_at_ = said_at_;
   std::optional<MountLoad> push_;  // newest that has not gone

@@ -62,10 +62,10 @@ void LinkEndpoint::heard(const v1::PacketTimes& times, const Opened& opened, Tim
     peer_came_ = now;
   }
   // Nothing of ours had come yet, or it speaks of packets that never went.
-  if (times.heard_counter() == 0 || times.heard_counter() >= sealer_.counter() ||
-      times.heard_packets() > counts_.packets_sent)
+  if (times.received_counter() == 0 || times.received_counter() >= sealer_.counter() ||
+      times.received_packets() > counts_.packets_sent)
     return;
-  rate_.heard(times.heard_counter(), times.heard_packets());
+  rate_.heard(times.received_counter(), times.received_packets());
   const auto sent = from_us(times.echo_sent_us()), peer_received = from_us(times.echo_received_us()),
              peer_sent = from_us(times.sent_us());
   if (!sent || !peer_received || !peer_sent || !clock_.add({*sent, *peer_received, *peer_sent, now})) return;
@@ -107,7 +107,7 @@ Time LinkEndpoint::keep_alive_interval() const {
   // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One
   // more, as delays vary. Before anything is known of the path it is taken for a bad one, so that the first packet soon
   // gets through.
-  const double loss = heard_at_ ? std::clamp(rate_.loss(), 0.01, 0.5) : 0.5;
+  const double loss = received_at_ ? std::clamp(rate_.loss(), 0.01, 0.5) : 0.5;
   const auto packets = static_cast<int>(std::ceil(std::log(1e-4) / std::log(loss))) + 1;
   return options_.alive_for / packets;
 }
@@ -132,8 +132,8 @@ std::size_t LinkEndpoint::room(Time now) const {
 
 void LinkEndpoint::put_times(v1::PacketTimes& times, Time now) const {
   times.set_sent_us(in_us(now));
-  times.set_heard_counter(newest_);
-  times.set_heard_packets(counts_.packets_received);
+  times.set_received_counter(newest_);
+  times.set_received_packets(counts_.packets_received);
   if (!peer_came_) return;
   times.set_echo_sent_us(peer_sent_us_);
   times.set_echo_received_us(in_us(*peer_came_));

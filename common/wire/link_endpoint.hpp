@@ -69,7 +69,7 @@ class LinkEndpoint {
     acknowledge(packet.acknowledged(), packet.acknowledged_beyond());
   }
   // The other end is there, by a packet that shows that it can be reached.
-  void is_alive(Time now) { heard_at_ = now; }
+  void is_alive(Time now) { received_at_ = now; }
   // See SendWindow::acknowledge; `upto` may lie beyond what ever went in packets. False where no such item exists.
   bool acknowledge(std::uint64_t upto, std::uint64_t beyond = 0);
 
@@ -110,7 +110,7 @@ class LinkEndpoint {
   std::span<const std::uint8_t> seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into);
 
   // --- how it fares
-  [[nodiscard]] bool alive(Time now) const { return heard_at_ && now - *heard_at_ < options_.alive_for; }
+  [[nodiscard]] bool alive(Time now) const { return received_at_ && now - *received_at_ < options_.alive_for; }
   [[nodiscard]] std::uint64_t acknowledged() const { return acknowledged_; }
   [[nodiscard]] SendWindow& window() { return window_; }
   [[nodiscard]] const SendWindow& window() const { return window_; }
@@ -140,7 +140,7 @@ class LinkEndpoint {
   // Of the newest packet with times: as it says itself, and when it came.
   std::uint64_t peer_sent_us_ = 0;
   std::optional<Time> peer_came_;
-  std::optional<Time> heard_at_, sent_at_, timed_at_;
+  std::optional<Time> received_at_, sent_at_, timed_at_;
   bool answer_due_ = false;
   int news_left_ = 0;
 };

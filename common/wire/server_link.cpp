@@ -47,7 +47,7 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
       std::ranges::move(*read, std::back_inserter(cuts));
   }
   if (!std::ranges::all_of(cuts, [](const Cut& cut) { return fits_a_packet(cut); })) return half_.malformed();
-  HeardState state = state_;
+  KnownToolState state = state_;
   const auto newer = packet.has_state() ? take_over(packet.state(), state) : false;
   if (!newer) return half_.malformed();
   std::optional<MountLoad> push;
@@ -85,7 +85,7 @@ void ServerLink::decided(std::uint64_t author_seq) {
   half_.answer();
 }
 
-std::optional<HeardState> ServerLink::take_state() {
+std::optional<KnownToolState> ServerLink::take_state() {
   if (!std::exchange(state_is_new_, false)) return {};
   return state_;
 }
@@ -109,9 +109,9 @@ bool ServerLink::tell(std::uint64_t index, const SessionEntry& entry) {
   return index != 0 && push({index, entry});
 }
 
-void ServerLink::set_partners(std::span<const HeardState> partners) {
+void ServerLink::set_partners(std::span<const KnownToolState> partners) {
   std::map<std::uint64_t, Partner> kept;
-  for (const HeardState& state : partners.first(std::min(partners.size(), kMostPartners))) {
+  for (const KnownToolState& state : partners.first(std::min(partners.size(), kMostPartners))) {
     const std::uint64_t author = state.state.author.value;
     const auto known = partners_.find(author);
     Partner& partner = kept[author] = known == partners_.end() ? Partner{} : std::move(known->second);

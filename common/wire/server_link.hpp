@@ -40,7 +40,7 @@ class ServerLink {
   // earlier session of this author, and are decided only now.
   void decided(std::uint64_t author_seq);
   // Newest state of the tool, once.
-  [[nodiscard]] std::optional<HeardState> take_state();
+  [[nodiscard]] std::optional<KnownToolState> take_state();
   // Newest push on the bone, once.
   [[nodiscard]] std::optional<MountLoad> take_push() { return std::exchange(push_, std::nullopt); }
 
@@ -57,7 +57,7 @@ class ServerLink {
   // The author has left: their cuts come no more.
   void forget(AuthorId author) { sender_.forget(author); }
   // Newest states of others' tools; at most kMostPartners count. Who is not among them is not spoken of any more.
-  void set_partners(std::span<const HeardState> partners);
+  void set_partners(std::span<const KnownToolState> partners);
   // Newest place of the bone on its mount: it goes once, soon, where none newer comes before.
   void set_bone(const MountPose& bone) { bone_ = bone; }
   void set_lease_epoch(std::uint64_t epoch);
@@ -86,7 +86,7 @@ class ServerLink {
 
  private:
   struct Partner {
-    HeardState state;
+    KnownToolState state;
     std::uint64_t said_seq = 0;
     Time said_at = -std::chrono::hours(1), effort_at = said_at;
   };
@@ -101,7 +101,7 @@ class ServerLink {
   PathWatch path_;
   ReceiveWindow<Cut> cuts_;
   std::uint64_t decided_;
-  HeardState state_;
+  KnownToolState state_;
   bool state_is_new_ = false;
   std::optional<MountLoad> push_;  // newest that was not taken
   std::uint64_t push_seq_ = 0;

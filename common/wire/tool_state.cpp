@@ -71,7 +71,7 @@ v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bo
   return out;
 }
 
-Result<bool> take_over(const v1::ToolState& sent, HeardState& known) {
+Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
   if (sent.state_seq() <= known.state.state_seq) return false;
   CuttingState next = known.state;
   next.author = {sent.author()};

@@ -11,12 +11,12 @@ namespace osteon::wire {
 // `with_effort`: also force, feed and the like, which are worth their bytes at the rate of gauges and sound only.
 [[nodiscard]] v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bool with_effort);
 
-struct HeardState {
+struct KnownToolState {
   CuttingState state;
   std::uint32_t buttons = 0;
 };
 // Takes a newer state over into what is known of the tool; what is not sent stays as it was. False where it is no
 // newer. Error invalid_input, naming the field, for what a correct peer never sends; then nothing has changed.
-[[nodiscard]] Result<bool> take_over(const v1::ToolState& sent, HeardState& known);
+[[nodiscard]] Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known);
 
 }  // namespace osteon::wire

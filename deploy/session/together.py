@@ -197,7 +197,7 @@ class Together:
         time.sleep(3.0)
 
         console.do("freeze anna Stop there, I will show you")
-        console.do("wait heard anna")
+        console.do("wait acknowledged anna")
         frozen = self._cuts(console, "anna")
         time.sleep(2.0)
         console.do("take anna")
@@ -214,7 +214,7 @@ class Together:
         time.sleep(1.0)
         console.do("give-back anna")
         console.do("free anna")
-        console.do("wait heard anna")
+        console.do("wait acknowledged anna")
         console.do("say anna go on, a little less deep")
         for name in TRAINEES:
             self._wait(f"that {name} is done", lambda hand=hands[name]: hand.exit_code is not None, 240.0)

@@ -108,7 +108,7 @@ GuideSeen guide_among(const Partners& partners, AuthorId guide) {
 }
 
 // Where the bone stands on its mount; lines to the room are counted from 1.
-struct ToldPlace {
+struct MountUpdate {
   std::uint64_t line = 0;
   MountPose seen;
 };
@@ -177,8 +177,8 @@ class Client {
     outcome_.recording =
         recorder_.finish({hash, replica_.room_seq().value, outcome_.rows_dropped, outcome_.lost.has_value()});
     if (const Result<void> written = log_.finish(); !written && !outcome_.lost) outcome_.lost = written.error();
-    outcome_.oversight.insert(outcome_.oversight.end(), loop_notes_.begin(), loop_notes_.end());
-    std::ranges::stable_sort(outcome_.oversight, {}, &OversightNote::mono_ns);
+    outcome_.restrictions.insert(outcome_.restrictions.end(), loop_notes_.begin(), loop_notes_.end());
+    std::ranges::stable_sort(outcome_.restrictions, {}, &OversightNote::mono_ns);
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
@@ -247,7 +247,7 @@ class Client {
           named_tools_.insert(state.tool_name).second)
         pass(ToolNamed{state.tool_name});
     };
-    events.bone = [this](const MountPose& seen) { places_of_bone_.store(ToldPlace{line_, seen}); };
+    events.bone = [this](const MountPose& seen) { places_of_bone_.store(MountUpdate{line_, seen}); };
     events.interrupted = [this, pass](const Error& why) {
       ++line_;
       pass(Interrupted{why.message});
@@ -273,12 +273,12 @@ class Client {
   }
 
   // [haptic] What an instructor has decided and what leads the hand.
-  void oversee() {
+  void supervise() {
     HapticLoop& loop = session_.loop();
-    if (oversights_.refresh()) loop.oversee(oversights_.value());
-    loop.oversee(unpacked(stop_flag_.load(std::memory_order_relaxed)));
+    if (oversights_.refresh()) loop.supervise(oversights_.value());
+    loop.supervise(unpacked(stop_flag_.load(std::memory_order_relaxed)));
     partners_.refresh();
-    loop.see_guide(guide_among(partners_.value(), loop.overseer().now().guide));
+    loop.see_guide(guide_among(partners_.value(), loop.guard().now().guide));
     partner_solids_.refresh();
     const std::int64_t now_ns = ns(Clock::now());
     const double line_s = line_lag_s_.load(std::memory_order_relaxed);
@@ -331,7 +331,7 @@ class Client {
       const bool follows = room_health_.load(std::memory_order_relaxed) == RoomHealth::follows;
       if (!follows) ++outcome_.held_for_room_ticks;
       guides_.refresh();
-      oversee();
+      supervise();
       const RoomLink room = over ? RoomLink::over : follows ? RoomLink::follows : RoomLink::held;
       move_bone();
       const SessionTick now = session_.tick(patches_.value(), room, periods, &guides_.value());
@@ -497,8 +497,8 @@ class Client {
     const std::string what = words.empty() ? "free" : words, by = called(decided.by);
     log::info("an instructor decides",
               {{"room_seq", decided.place.value}, {"what", what}, {"by", by}, {"words", decided.supervision.words}});
-    outcome_.oversight.push_back({ns(Clock::now()), decided.place.value, what, by});
-    overseer_ = words.empty() ? "" : by;
+    outcome_.restrictions.push_back({ns(Clock::now()), decided.place.value, what, by});
+    guard_ = words.empty() ? "" : by;
     if (!decided.supervision.words.empty())
       outcome_.words.push_back({ns(Clock::now()), decided.place.value, 0, decided.supervision.words});
   }
@@ -680,7 +680,7 @@ class Client {
     was_led_ = led;
     outcome_.forbidden_ticks += forbidden;
     if (forbidden || led)
-      outcome_.overseen_step_n = std::max(outcome_.overseen_step_n, row.force_rendered_n - force_before_n_);
+      outcome_.supervised_step_n = std::max(outcome_.supervised_step_n, row.force_rendered_n - force_before_n_);
     force_before_n_ = row.force_rendered_n;
     if (!led) return;
     outcome_.guide_mm = r.guide_distance_mm;
@@ -716,7 +716,7 @@ class Client {
       std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
     const RoomHealth health = room_health_;
     if (r.events & kOnMetal) std::printf(", on metal, which it does not cut");
-    if (r.events & kForbidden) std::printf(", stopped by %s", overseer_.empty() ? "an instructor" : overseer_.c_str());
+    if (r.events & kForbidden) std::printf(", stopped by %s", guard_.empty() ? "an instructor" : guard_.c_str());
     if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guide_distance_mm);
     if (health != RoomHealth::follows)
       std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
@@ -750,7 +750,7 @@ class Client {
   TripleBuffer<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
   TripleBuffer<HapticRestrictions> oversights_;                   // what an instructor has decided, session → haptic
-  TripleBuffer<ToldPlace> places_of_bone_;                        // session → haptic
+  TripleBuffer<MountUpdate> places_of_bone_;                        // session → haptic
   std::atomic<std::uint64_t> line_{1};                            // which one this is
   TripleBuffer<MountLoad> pushes_;                                // haptic → reporter
   std::atomic<std::uint64_t> stop_flag_{0};                       // the newest datagram's word on it, likewise
@@ -792,7 +792,7 @@ class Client {
   std::vector<OversightNote> loop_notes_;
   // Replica thread.
   bool supervised_ = false;    // something was decided about this hand
-  std::string overseer_;       // by whom, as far as the room says it
+  std::string guard_;       // by whom, as far as the room says it
   std::uint64_t lease_epoch_;  // of the room, as far as it was heard
   std::deque<Cut> unsent_;     // as bounded as what is unconfirmed
   Pose built_at_;

@@ -53,13 +53,13 @@ struct ClientOutcome {
   std::size_t unconfirmed = 0;  // own cuts that are not in it, since the room never confirmed them
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
   std::uint64_t held_for_room_ticks = 0;  // in which the spindle was held because the room did not follow
-  std::vector<OversightNote> oversight;   // as they came
+  std::vector<OversightNote> restrictions;   // as they came
   std::vector<WordsNote> words;
   std::int64_t began_ns = 0;          // of these times, the session's first
   std::uint64_t forbidden_ticks = 0;  // in which the tool might not cut
   std::uint64_t cuts_stopped = 0, cuts_taken = 0,
                 cuts_elsewhere = 0;  // refused as stopped; as somebody else's tool; as of place or tool
-  double overseen_step_n = 0;  // largest growth of the force shown in a tick, while anything was decided about the hand
+  double supervised_step_n = 0;  // largest growth of the force shown in a tick, while anything was decided about the hand
   double guide_mm = 0, guide_most_mm = 0;  // from the hand that leads this one: when it did last, and at most
   struct MountReport {
     bool there = false;                // the room's bone stands on one, as far as the hand was told

@@ -100,7 +100,7 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
 json haptic_restrictions(const ClientOutcome& outcome) {
   const auto seconds = [&](std::int64_t mono_ns) { return 1e-9 * static_cast<double>(mono_ns - outcome.began_ns); };
   json notes = json::array(), words = json::array();
-  for (const OversightNote& note : outcome.oversight) {
+  for (const OversightNote& note : outcome.restrictions) {
     notes.push_back({{"at_s", seconds(note.mono_ns)}, {"what", note.what}});
     if (!note.by.empty()) notes.back()["by"] = note.by;
     if (note.room_seq != 0) notes.back()["room_seq"] = note.room_seq;
@@ -108,14 +108,14 @@ json haptic_restrictions(const ClientOutcome& outcome) {
   for (const WordsNote& note : outcome.words)
     words.push_back(
         {{"at_s", seconds(note.mono_ns)}, {"room_seq", note.room_seq}, {"from", note.from}, {"words", note.words}});
-  return {{"oversight", notes},
+  return {{"restrictions", notes},
           {"words", words},
-          {"overseen",
+          {"supervised",
            {{"forbidden_s", 1e-3 * static_cast<double>(outcome.forbidden_ticks)},
             {"cuts_stopped", outcome.cuts_stopped},
             {"cuts_taken", outcome.cuts_taken},
             {"cuts_elsewhere", outcome.cuts_elsewhere},
-            {"force_step_n", outcome.overseen_step_n},
+            {"force_step_n", outcome.supervised_step_n},
             {"guide_mm", outcome.guide_mm},
             {"guide_most_mm", outcome.guide_most_mm}}}};
 }

@@ -72,7 +72,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (input.periods > 3) report.events |= kMissedTicks;
   const bool follows = input.room == RoomLink::follows;
   if (!follows) report.events |= kRoomHeld;
-  const bool may_work = overseer_.may_cut(tool_, proxy_.pose().position_mm);
+  const bool may_work = guard_.may_cut(tool_, proxy_.pose().position_mm);
   if (!may_work) report.events |= kForbidden;
   const bool works = follows && may_work;
 
@@ -124,7 +124,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   const double device_n = (input.device_warm ? params_.continuous_n : params_.peak_n) / s;
   // A limit comes down from all that is felt: from the contact's alone it would leave nothing to the pull at once.
   const double felt_n = shown_.force_n.norm() + guide_pull_.force_n().norm() + partner_n_.norm();
-  const double limit_n = overseer_.limit_n(device_n, felt_n / s, slow_n(input) / s);
+  const double limit_n = guard_.limit_n(device_n, felt_n / s, slow_n(input) / s);
 
   const Pose proxy_before = proxy_.pose();
   double paid_n_per_mm = coupling_n_per_mm_;
@@ -332,7 +332,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   // and have a hand of another number. And whoever leads this hand is where it is.
   std::array<PartnerTool, PartnerContact::kMost> others;
   std::size_t count = 0;
-  const HapticRestrictions& oversight = overseer_.now();
+  const HapticRestrictions& oversight = guard_.now();
   for (const PartnerTool& partner : partners_)
     if (count < others.size() && !oversight.taken_by && partner.author != oversight.guide.value)
       others[count++] = partner;
@@ -347,7 +347,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
 }
 
 void HapticLoop::lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept {
-  const HapticRestrictions& oversight = overseer_.now();
+  const HapticRestrictions& oversight = guard_.now();
   GuideSeen seen = guide_seen_;
   seen.there &= static_cast<bool>(oversight.guide);
   guide_pull_.see(seen);
@@ -390,7 +390,7 @@ void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopRepor
   if (!recorder_.recording()) return;
   // A tool that stands rubs with its points, its faces a little within the bone: that is no cut.
   // Nor is what the room would refuse.
-  const bool taken = step.may_cut && !stands && overseer_.takes(proxy_.cut_pose().position_mm);
+  const bool taken = step.may_cut && !stands && guard_.takes(proxy_.cut_pose().position_mm);
   if (taken) recorder_.add(proxy_.cut_pose());
   quiet_ticks_ = step.near_bone ? 0 : quiet_ticks_ + 1;
 

@@ -124,8 +124,8 @@ class HapticLoop {
   // [haptic] Takes up a tool in free air, with the handle at a place of the device; by the bone as it rests.
   void take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept;
   // [haptic] What holds from the next tick on, until told otherwise.
-  void oversee(const HapticRestrictions& oversight) noexcept { overseer_.set(oversight); }
-  void oversee(const StopFlag& flag) noexcept { overseer_.set(flag); }
+  void supervise(const HapticRestrictions& oversight) noexcept { guard_.set(oversight); }
+  void supervise(const StopFlag& flag) noexcept { guard_.set(flag); }
   void see_guide(const GuideSeen& seen) noexcept { guide_seen_ = seen; }  // of whom the oversight names
   // Where the bone is on its mount, seen from where it rests: there by its own frame. As it rests unless this was
   // called. The mapping is of the place of rest: what follows the bone are contact, forces and poses in reports.
@@ -145,7 +145,7 @@ class HapticLoop {
   [[nodiscard]] const WorkspaceMapping& mapping() const noexcept { return mapping_; }
   [[nodiscard]] std::uint64_t cuts_closed() const noexcept { return cuts_closed_; }
   // [haptic]
-  [[nodiscard]] const SupervisionGuard& overseer() const noexcept { return overseer_; }
+  [[nodiscard]] const SupervisionGuard& guard() const noexcept { return guard_; }
   [[nodiscard]] const EnergyReport& guide_energy() const noexcept { return guide_pull_.energy(); }
   // [haptic] K_c of the tool in hand, physical: where the tool moves m mm for each mm of the handle, the device shows
   // m · s · K_c, which its k limits.
@@ -199,7 +199,7 @@ class HapticLoop {
   Coupling coupling_;
   EnergyLedger ledger_;
   MotorPort motor_;
-  SupervisionGuard overseer_;
+  SupervisionGuard guard_;
   GuidanceSpring guide_pull_;
   GuideSeen guide_seen_;
   std::vector<TouchPoints> touch_points_;  // of each tool; none: partners are not felt

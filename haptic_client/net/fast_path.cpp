@@ -117,7 +117,7 @@ FastPathHealth FastPath::health() const {
 }
 
 void FastPath::take_partners(Time now, std::vector<CuttingState>& newer) {
-  for (const wire::HeardState& heard : link_.partners(now)) {
+  for (const wire::KnownToolState& heard : link_.partners(now)) {
     std::uint64_t& told = partners_[heard.state.author];
     if (heard.state.state_seq <= told) continue;
     told = heard.state.state_seq;

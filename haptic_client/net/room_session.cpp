@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 constexpr auto kCloseTime = 1s;
 constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a wait that a server asks for
 constexpr auto kPushesApart = 33ms;                        // over the stream
-constexpr auto kTellHeard = 250ms;                         // between two words on how far this client has come
+constexpr auto kAcknowledgeEvery = 250ms;                         // between two words on how far this client has come
 constexpr auto kCaseSilence = 60s;                         // a whole case takes no longer on one machine
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
@@ -261,10 +261,10 @@ void RoomSession::Impl::write(Line& open) {
     const std::shared_ptr<FastPath> path = fast_path();
     // Datagrams say themselves which entries have come.
     if (const auto now = std::chrono::steady_clock::now(); now >= tell_at) {
-      tell_at = now + kTellHeard;
+      tell_at = now + kAcknowledgeEvery;
       const bool leaves = heard_leaves.exchange(false);
       if (const std::uint64_t place = heard; place != told && (leaves || !(path && path->health().alive))) {
-        request.mutable_heard()->set_room_seq(told = place);
+        request.mutable_acknowledged()->set_room_seq(told = place);
         if (written = open.stream->Write(request); !written) break;
       }
     }

@@ -65,7 +65,7 @@ void log_health(RoomServer& server) {
                           {"links_alive", links.alive},
                           {"datagrams_in", links.port.received},
                           {"datagrams_out", links.port.sent},
-                          {"strangers", links.strangers}});
+                          {"unauthenticated", links.unauthenticated}});
 }
 
 nlohmann::json durations(const DurationHistogram& histogram) {

@@ -79,7 +79,7 @@ bool AuditTrail::is_counted(const AuditEvent& event) {
     ++seen->second.times;
     return true;
   }
-  if (of.seen.size() >= (known ? kMostOfOne : kMostOfStrangers)) {
+  if (of.seen.size() >= (known ? kMostOfOne : kMostOfUnauthenticated)) {
     ++of.omitted;
     return true;
   }

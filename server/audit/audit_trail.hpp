@@ -47,12 +47,12 @@ class AuditTrail {
   AuditTrail& operator=(const AuditTrail&) = delete;
 
   // Equal refusals of one person are one record, and at the end of the window another with their number. Of each
-  // person kMostOfOne different ones are recorded in a window, of all strangers together kMostOfStrangers; a record
+  // person kMostOfOne different ones are recorded in a window, of all strangers together kMostOfUnauthenticated; a record
   // counts the others.
   void record(AuditEvent event);
   [[nodiscard]] AuditCounts counts() const;
 
-  static constexpr std::size_t kMostOfOne = 32, kMostOfStrangers = 256;
+  static constexpr std::size_t kMostOfOne = 32, kMostOfUnauthenticated = 256;
 
  private:
   AuditTrail(AuditOptions options, AuditLog log);

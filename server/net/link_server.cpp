@@ -22,13 +22,13 @@ Time now_of_links() {
 
 }  // namespace
 
-SessionLink::SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink)
-    : keys_(keys), author_(author), sink_(&sink), link_(keys, author, system_random(), first_author_seq) {}
+SessionLink::SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& subscriber)
+    : keys_(keys), author_(author), subscriber_(&subscriber), link_(keys, author, system_random(), first_author_seq) {}
 
 SessionLink::News SessionLink::news() {
   News news;
   while (std::optional<Cut> cut = link_.take_cut()) news.cuts.push_back(std::move(*cut));
-  if (std::optional<wire::HeardState> state = link_.take_state()) {
+  if (std::optional<wire::KnownToolState> state = link_.take_state()) {
     state->state.author = author_;
     news.state = std::move(state->state);
   }
@@ -38,11 +38,11 @@ SessionLink::News SessionLink::news() {
 }
 
 void SessionLink::say(News news) {
-  if (!sink_) return;
-  for (Cut& cut : news.cuts) sink_->take(std::move(cut));
-  if (news.state) sink_->take(std::move(*news.state));
-  if (news.push) sink_->pushed(*news.push);
-  if (news.arrived > 0) sink_->arrived(news.arrived);
+  if (!subscriber_) return;
+  for (Cut& cut : news.cuts) subscriber_->take(std::move(cut));
+  if (news.state) subscriber_->take(std::move(*news.state));
+  if (news.push) subscriber_->pushed(*news.push);
+  if (news.arrived > 0) subscriber_->arrived(news.arrived);
 }
 
 void SessionLink::offer(const Cut& cut) {
@@ -75,7 +75,7 @@ bool SessionLink::set_partners(std::span<const CuttingState> partners) {
   {
     const std::lock_guard lock(mutex_);
     if (!link_.alive(now_of_links())) return false;
-    std::vector<wire::HeardState> heard;
+    std::vector<wire::KnownToolState> heard;
     for (const CuttingState& state : partners) heard.push_back({state, 0});
     link_.set_partners(heard);
   }
@@ -95,7 +95,7 @@ bool SessionLink::set_bone(const MountPose& seen) {
 
 void SessionLink::close() {
   const std::lock_guard told(told_mutex_);
-  sink_ = nullptr;
+  subscriber_ = nullptr;
 }
 
 Result<std::unique_ptr<LinkServer>> LinkServer::open(const std::string& address, std::uint16_t port) {
@@ -117,7 +117,7 @@ LinkServer::~LinkServer() {
   thread_.join();
 }
 
-std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t first_author_seq, SessionLink::Sink& sink) {
+std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t first_author_seq, SessionLink::Receiver& subscriber) {
   std::shared_ptr<SessionLink> link;
   {
     const std::lock_guard lock(mutex_);
@@ -128,7 +128,7 @@ std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t firs
       session = std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
                 std::uint32_t{bytes[3]} << 24;
     }
-    link = std::make_shared<SessionLink>(make_session_keys(session, random_), author, first_author_seq, sink);
+    link = std::make_shared<SessionLink>(make_session_keys(session, random_), author, first_author_seq, subscriber);
     link->server_ = this;
     links_[session] = link;
   }
@@ -160,7 +160,7 @@ LinkServerHealth LinkServer::health() const {
     health.alive += link->link_.alive(now_of_links());
   }
   const std::lock_guard lock(mutex_);
-  health.strangers = strangers_;
+  health.unauthenticated = unauthenticated_;
   return health;
 }
 
@@ -175,7 +175,7 @@ void LinkServer::receive_some(Time now) {
       const std::lock_guard lock(mutex_);
       const auto found = session ? links_.find(*session) : links_.end();
       if (found == links_.end())
-        ++strangers_;
+        ++unauthenticated_;
       else
         link = found->second;
     }

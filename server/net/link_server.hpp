@@ -19,13 +19,13 @@
 
 namespace osteon {
 
-// One session's link as its owner sees it: any thread, except from within the sink. What the sink is told comes on the
+// One session's link as its owner sees it: any thread, except from within the subscriber. What the subscriber is told comes on the
 // link server's thread.
 class SessionLink {
  public:
-  class Sink {
+  class Receiver {
    public:
-    virtual ~Sink() = default;
+    virtual ~Receiver() = default;
     // Cuts in order of their author_seq, whichever way they came: over the link, or by offer().
     virtual void take(Cut cut) = 0;
     virtual void take(CuttingState state) = 0;
@@ -34,10 +34,10 @@ class SessionLink {
     virtual void arrived(std::uint64_t index) = 0;
   };
 
-  SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink);
+  SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& subscriber);
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
 
-  // A cut that came over the stream; the sink hears of it in its turn, within this call or later.
+  // A cut that came over the stream; the subscriber hears of it in its turn, within this call or later.
   void offer(const Cut& cut);
   // Every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False:
   // this one goes over the stream alone.
@@ -47,12 +47,12 @@ class SessionLink {
   bool set_partners(std::span<const CuttingState> partners);
   // Where the bone stands on its mount. False as above.
   bool set_bone(const MountPose& seen);
-  // Nothing is told to the sink any more once this returns.
+  // Nothing is told to the subscriber any more once this returns.
   void close();
 
  private:
   friend class LinkServer;
-  // What has come for the sink, without the lock.
+  // What has come for the subscriber, without the lock.
   struct News {
     std::vector<Cut> cuts;
     std::optional<CuttingState> state;
@@ -65,8 +65,8 @@ class SessionLink {
   const SessionKeys keys_;
   const AuthorId author_;
   // Order: told_mutex_, then mutex_.
-  std::mutex told_mutex_;  // held while the sink is told, so that what it hears keeps its order
-  Sink* sink_;
+  std::mutex told_mutex_;  // held while the subscriber is told, so that what it hears keeps its order
+  Receiver* subscriber_;
   std::mutex mutex_;
   wire::ServerLink link_;
   std::uint64_t arrived_ = 0;
@@ -76,7 +76,7 @@ class SessionLink {
 struct LinkServerHealth {
   std::size_t links = 0, alive = 0;
   UdpPortCounts port;
-  std::uint64_t strangers = 0;  // datagrams of no session that is open
+  std::uint64_t unauthenticated = 0;  // datagrams of no session that is open
 };
 
 class LinkServer {
@@ -90,7 +90,7 @@ class LinkServer {
   [[nodiscard]] std::uint16_t port() const { return port_->local().port; }
   // A link with keys of its own, heard of until it is removed.
   [[nodiscard]] std::shared_ptr<SessionLink> add(AuthorId author, std::uint64_t first_author_seq,
-                                                 SessionLink::Sink& sink);
+                                                 SessionLink::Receiver& subscriber);
   void remove(const std::shared_ptr<SessionLink>& link);
   void wake() { port_->wake(); }
   [[nodiscard]] LinkServerHealth health() const;
@@ -107,7 +107,7 @@ class LinkServer {
   const FillRandom random_ = system_random();
   mutable std::mutex mutex_;
   std::map<std::uint32_t, std::shared_ptr<SessionLink>> links_;
-  std::uint64_t strangers_ = 0;
+  std::uint64_t unauthenticated_ = 0;
   bool end_ = false;
   std::thread thread_;
 };

@@ -171,7 +171,7 @@ void MeshPublisher::make_stale_blocks(bool due) {
     }
     surface_.room_seq = update.room_seq;
     for (Stream& stream : streams_) {
-      stream.sink->offer(update);
+      stream.subscriber->offer(update);
       stream.owed = true;
     }
     owed_ = !streams_.empty();
@@ -193,26 +193,26 @@ void MeshPublisher::send_owed(Clock::time_point now) {
     }
     stream.owed = false;
     stream.pace.done(now);
-    stream.sink->send();
+    stream.subscriber->send();
   }
 }
 
-void MeshPublisher::watch(MeshSubscriber& sink, const std::optional<ViewFrustum>& look) {
+void MeshPublisher::watch(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look) {
   {
     const std::lock_guard lock(surface_mutex_);
-    streams_.push_back({&sink, Pace(rates_.mesh, streams_.size())});
-    view_interest_.open(sink.author(), look);
+    streams_.push_back({&subscriber, Pace(rates_.mesh, streams_.size())});
+    view_interest_.open(subscriber.author(), look);
     // What is there: the finer blocks that this viewer's look asks for follow.
-    sink.begin(surface_);
-    if (ended_) sink.end(*ended_);
+    subscriber.begin(surface_);
+    if (ended_) subscriber.end(*ended_);
   }
   wake();
 }
 
-void MeshPublisher::leave(MeshSubscriber& sink) {
+void MeshPublisher::leave(MeshSubscriber& subscriber) {
   const std::lock_guard lock(surface_mutex_);
-  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; }) > 0)
-    view_interest_.close(sink.author());
+  if (std::erase_if(streams_, [&](const Stream& stream) { return stream.subscriber == &subscriber; }) > 0)
+    view_interest_.close(subscriber.author());
 }
 
 void MeshPublisher::look(AuthorId viewer, const ViewFrustum& from) {
@@ -222,7 +222,7 @@ void MeshPublisher::look(AuthorId viewer, const ViewFrustum& from) {
 void MeshPublisher::end_streams(const std::string& why) {
   const std::lock_guard lock(surface_mutex_);
   ended_ = why;
-  for (const Stream& stream : streams_) stream.sink->end(why);
+  for (const Stream& stream : streams_) stream.subscriber->end(why);
 }
 
 MeshHealth MeshPublisher::health() const {
@@ -233,7 +233,7 @@ MeshHealth MeshPublisher::health() const {
     health.blocks = surface_.blocks.size();
     for (const auto& [key, message] : surface_.blocks) health.surface_bytes += message->size();
     for (const Stream& stream : streams_)
-      health.furthest_behind = std::max(health.furthest_behind, stream.sink->waiting());
+      health.furthest_behind = std::max(health.furthest_behind, stream.subscriber->waiting());
   }
   const std::lock_guard lock(stats_mutex_);
   health.update = update_;

@@ -73,8 +73,8 @@ class MeshPublisher {
   void wake();                              // there are events to tell of
 
   // From where its author looks at first; without a look it is sent the bone in full.
-  void watch(MeshSubscriber& sink, const std::optional<ViewFrustum>& look);
-  void leave(MeshSubscriber& sink);
+  void watch(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look);
+  void leave(MeshSubscriber& subscriber);
   // The newest of each viewer counts, until its last stream ends. Of one without a stream: nothing.
   void look(AuthorId viewer, const ViewFrustum& from);
   void end_streams(const std::string& why);  // those open now and those that come later
@@ -85,7 +85,7 @@ class MeshPublisher {
 
  private:
   struct Stream {
-    MeshSubscriber* sink;
+    MeshSubscriber* subscriber;
     Pace pace;
     bool owed = false;  // it was offered something that it was not sent
   };

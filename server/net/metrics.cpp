@@ -88,7 +88,7 @@ double bytes_of(const fs::path& journal) {
   return bytes;
 }
 
-void tell_room(Page& page, OpenRoom& room, bool draining) {
+void add_room(Page& page, OpenRoom& room, bool draining) {
   const RuntimeHealth health = room.host().health();
   const auto with = [&](const char* name = nullptr, const std::string& value = {}) {
     Labels labels{{"room", room.name}};
@@ -135,7 +135,7 @@ void tell_room(Page& page, OpenRoom& room, bool draining) {
                  static_cast<double>(health.rejections[i]));
 }
 
-std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certificate) {
+std::vector<MetricFamily> metrics_of(RoomServer& server, const fs::path& certificate) {
   Page page;
   const bool draining = server.rooms().draining().has_value();
   const auto rooms = server.rooms().open_rooms();
@@ -159,9 +159,9 @@ std::vector<MetricFamily> figures_of(RoomServer& server, const fs::path& certifi
   const char* paths = "Fast paths, and those over which datagrams have come lately.";
   page.gauge("osteon_links", paths, {{"state", "open"}}, static_cast<double>(links.links));
   page.gauge("osteon_links", paths, {{"state", "alive"}}, static_cast<double>(links.alive));
-  page.counter("osteon_strange_datagrams_total", "Datagrams that nobody with a key has sent.", {},
-               static_cast<double>(links.strangers));
-  for (const std::shared_ptr<OpenRoom>& room : rooms) tell_room(page, *room, draining);
+  page.counter("osteon_unauthenticated_datagrams_total", "Datagrams that nobody with a key has sent.", {},
+               static_cast<double>(links.unauthenticated));
+  for (const std::shared_ptr<OpenRoom>& room : rooms) add_room(page, *room, draining);
   return page.take();
 }
 
@@ -184,7 +184,7 @@ struct Metrics::Impl {
     const Impl& own = *static_cast<Impl*>(self);
     std::string text = "the figures are at /metrics\n";
     const bool found = std::string_view(url) == "/metrics" && std::string_view(method) == "GET";
-    if (found) text = prometheus::TextSerializer().Serialize(figures_of(own.server, own.certificate));
+    if (found) text = prometheus::TextSerializer().Serialize(metrics_of(own.server, own.certificate));
     MHD_Response* response = MHD_create_response_from_buffer(text.size(), text.data(), MHD_RESPMEM_MUST_COPY);
     if (!response) return MHD_NO;
     MHD_add_response_header(response, MHD_HTTP_HEADER_CONTENT_TYPE, "text/plain; version=0.0.4; charset=utf-8");

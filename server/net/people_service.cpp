@@ -94,7 +94,7 @@ class PeopleServiceImpl final : public PeopleBase {
     const AuthorId by{request->author()};
     std::vector<AuthorId> subjects{AuthorId{request->subject()}};
     if (request->subject() == 0) {
-      subjects = room->runtime().people().hands_overseen();
+      subjects = room->runtime().people().supervised_hands();
       std::erase(subjects, by);
       if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
     }
@@ -113,7 +113,7 @@ class PeopleServiceImpl final : public PeopleBase {
       room->runtime().queue_event(
           [by, subject, word = *word, all, answer](Room& r) -> Result<RoomEvent> {
             const People::Supervised& now = r.people().supervised(subject);
-            const bool holds = all && now.supervision == word && r.people().oversees(by);
+            const bool holds = all && now.supervision == word && r.people().supervises(by);
             if (!holds) return r.supervise(by, subject, word);
             const std::lock_guard lock(answer->mutex);
             answer->place = std::max(answer->place, now.place);

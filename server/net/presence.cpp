@@ -93,7 +93,7 @@ void Presence::looked(AuthorId author, const ViewFrustum& from) {
   if (Entry* entry = change(author)) entry->look = from;
 }
 
-std::vector<AuthorId> Presence::hands_overseen() const {
+std::vector<AuthorId> Presence::supervised_hands() const {
   const std::lock_guard lock(mutex_);
   std::vector<AuthorId> hands;
   for (const auto& [author, entry] : people_)
@@ -101,7 +101,7 @@ std::vector<AuthorId> Presence::hands_overseen() const {
   return hands;
 }
 
-RoomSeq Presence::heard_of(AuthorId author) const {
+RoomSeq Presence::acknowledged_by(AuthorId author) const {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
   return found == people_.end() ? RoomSeq{} : found->second.heard;
@@ -113,27 +113,27 @@ std::string Presence::name_of(AuthorId author) const {
   return found == people_.end() ? std::string() : found->second.name;
 }
 
-void Presence::watch(PresenceSubscriber& sink) {
+void Presence::watch(PresenceSubscriber& subscriber) {
   const std::lock_guard lock(streams_mutex_);
-  sinks_.push_back(&sink);
-  sink.changed();
-  if (ended_) sink.end(*ended_);
+  subscribers_.push_back(&subscriber);
+  subscriber.changed();
+  if (ended_) subscriber.end(*ended_);
 }
 
-void Presence::leave(PresenceSubscriber& sink) {
+void Presence::leave(PresenceSubscriber& subscriber) {
   const std::lock_guard lock(streams_mutex_);
-  std::erase(sinks_, &sink);
+  std::erase(subscribers_, &subscriber);
 }
 
 void Presence::end_streams(const std::string& why) {
   const std::lock_guard lock(streams_mutex_);
   ended_ = why;
-  for (PresenceSubscriber* sink : sinks_) sink->end(why);
+  for (PresenceSubscriber* subscriber : subscribers_) subscriber->end(why);
 }
 
 std::size_t Presence::streams() const {
   const std::lock_guard lock(streams_mutex_);
-  return sinks_.size();
+  return subscribers_.size();
 }
 
 void Presence::publish(RoomSeq room_seq, Clock::time_point now) {
@@ -145,7 +145,7 @@ void Presence::publish(RoomSeq room_seq, Clock::time_point now) {
   }
   next_ = now + kApart;
   const std::lock_guard lock(streams_mutex_);
-  for (PresenceSubscriber* sink : sinks_) sink->changed();
+  for (PresenceSubscriber* subscriber : subscribers_) subscriber->changed();
 }
 
 Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const {
@@ -184,7 +184,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
     if (entry.decided) *person.mutable_supervision() = wire::to_wire(entry.supervision);
     person.set_decided_room_seq(entry.decided.value);
     person.set_decided_by(entry.decided_by.value);
-    person.set_heard_room_seq(entry.heard.value);
+    person.set_acknowledged_room_seq(entry.heard.value);
   }
   std::set<std::uint32_t> drawn;
   for (const auto& [id, one] : annotations_) {

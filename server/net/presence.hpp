@@ -57,14 +57,14 @@ class Presence {
   void heard(AuthorId author, RoomSeq place);
   void looked(AuthorId author, const ViewFrustum& from);
 
-  // Of those who have a hand, here or not, and may be overseen together: instructors are not among them.
-  [[nodiscard]] std::vector<AuthorId> hands_overseen() const;
-  [[nodiscard]] RoomSeq heard_of(AuthorId author) const;
+  // Of those who have a hand, here or not, and may be supervised together: instructors are not among them.
+  [[nodiscard]] std::vector<AuthorId> supervised_hands() const;
+  [[nodiscard]] RoomSeq acknowledged_by(AuthorId author) const;
   [[nodiscard]] std::string name_of(AuthorId author) const;  // empty: nobody's, or not known any more
 
-  // The sink hears of every change until it leaves or all streams end.
-  void watch(PresenceSubscriber& sink);
-  void leave(PresenceSubscriber& sink);
+  // The subscriber hears of every change until it leaves or all streams end.
+  void watch(PresenceSubscriber& subscriber);
+  void leave(PresenceSubscriber& subscriber);
   void end_streams(const std::string& why);  // those open now and those that come later
   [[nodiscard]] std::size_t streams() const;
   // [tick] Readers hear at most every kApart that there is something new.
@@ -101,7 +101,7 @@ class Presence {
   Entry* change(AuthorId author);  // under mutex_; null: nobody is known by that
 
   mutable std::mutex streams_mutex_;
-  std::vector<PresenceSubscriber*> sinks_;
+  std::vector<PresenceSubscriber*> subscribers_;
   std::optional<std::string> ended_;
   Clock::time_point next_{};  // of the tick
 

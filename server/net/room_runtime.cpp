@@ -49,7 +49,7 @@ void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
   if (!mount->step(now)) return;
   // A tick does not wait for those who come, go or are told of entries: the next place is as good.
   const std::unique_lock lock(sessions_mutex, std::try_to_lock);
-  if (lock) sessions.each([this](SessionSubscriber& sink) { sink.show_bone(mount->seen(sink.author())); });
+  if (lock) sessions.each([this](SessionSubscriber& subscriber) { subscriber.show_bone(mount->seen(subscriber.author())); });
 }
 
 // Whether anything happened.
@@ -161,8 +161,8 @@ bool RoomRuntime::knows(AuthorId author) const {
 RuntimeHealth RoomRuntime::health() const {
   RuntimeHealth health;
   health.room_seq = room_seq();
-  const auto look = [&](const Subscriber& sink) {
-    health.furthest_behind = std::max(health.furthest_behind, sink.waiting());
+  const auto look = [&](const Subscriber& subscriber) {
+    health.furthest_behind = std::max(health.furthest_behind, subscriber.waiting());
   };
   {
     const std::lock_guard lock(impl_->sessions_mutex);
@@ -206,15 +206,15 @@ void RoomRuntime::tick(std::chrono::nanoseconds now, bool keep) {
 // A driven runtime's jobs never start.
 void RoomRuntime::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
 
-void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> sink, Cut cut, Clock::time_point arrived) {
+void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut cut, Clock::time_point arrived) {
   {
     const std::lock_guard lock(impl_->queue_mutex);
     if (!impl_->queue_closed) {
-      impl_->queue.emplace_back(std::in_place_type<QueuedCut>, QueuedCut{std::move(sink), std::move(cut), arrived});
+      impl_->queue.emplace_back(std::in_place_type<QueuedCut>, QueuedCut{std::move(subscriber), std::move(cut), arrived});
       return;
     }
   }
-  sink->decided();
+  subscriber->decided();
 }
 
 void RoomRuntime::queue_event(std::function<Result<RoomEvent>(Room&)> change,

@@ -1,6 +1,6 @@
 // Runs a room: one thread that commits events at 120 Hz, one that makes mesh blocks at 30 Hz, one that looks for pieces
 // that have come apart, one for slow requests.
-// Free of gRPC: streams are seen as sinks.
+// Free of gRPC: streams are seen as subscribers.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -151,24 +151,24 @@ class RoomRuntime {
   [[nodiscard]] Leaves leaves_now();
   void find_pieces();  // waits until what was cut so far is looked through, and its pieces are bodies
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
-  // The sink hears every entry after those of its leaves. With the digest of the author's secret it takes the place of an
+  // The subscriber hears every entry after those of its leaves. With the digest of the author's secret it takes the place of an
   // earlier session of his. Error: invalid_input (the author may not cut, or has an open session).
-  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& sink, const Digest& secret = {});
+  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& subscriber, const Digest& secret = {});
   // From where its author looks at first; without a look it is sent the bone in full.
-  void watch_mesh(MeshSubscriber& sink, const std::optional<ViewFrustum>& look = std::nullopt);
+  void watch_mesh(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look = std::nullopt);
   // The newest of each viewer counts, until its last mesh stream ends. Of one without such a stream: nothing.
   void look(AuthorId viewer, const ViewFrustum& from);
   [[nodiscard]] bool draws_near() const;  // what Detail has come to mean here
-  void watch_cutting(StateSubscriber& sink);
+  void watch_cutting(StateSubscriber& subscriber);
   // Whoever watches it, says how far they have heard, or asks who is there.
   [[nodiscard]] Presence& people();
-  // Afterwards the sink hears nothing more. Unknown sinks are none of its business.
-  void leave(SessionSubscriber& sink);
-  void leave(MeshSubscriber& sink);
-  void leave(StateSubscriber& sink);
+  // Afterwards the subscriber hears nothing more. Unknown subscribers are none of its business.
+  void leave(SessionSubscriber& subscriber);
+  void leave(MeshSubscriber& subscriber);
+  void leave(StateSubscriber& subscriber);
 
-  // Queued until the next tick. The sink, kept alive until then, hears the outcome.
-  void queue_cut(std::shared_ptr<SessionSubscriber> sink, Cut cut, Clock::time_point arrived);
+  // Queued until the next tick. The subscriber, kept alive until then, hears the outcome.
+  void queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut cut, Clock::time_point arrived);
   void offer_state(CuttingState state);                    // newest of its author wins
   void push_bone(AuthorId author, const MountLoad& push);  // likewise; of no effect where there is no mount
   // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;

@@ -11,7 +11,7 @@
 namespace osteon {
 
 struct QueuedCut {
-  std::shared_ptr<SessionSubscriber> sink;  // owned by its stream and by its queued cuts
+  std::shared_ptr<SessionSubscriber> subscriber;  // owned by its stream and by its queued cuts
   Cut cut;
   RoomRuntime::Clock::time_point arrived;
 };

@@ -38,7 +38,7 @@ std::map<std::uint32_t, std::string> RoomRuntime::Impl::names_of(RoomStore* stor
 }
 
 void RoomRuntime::Impl::decide(QueuedCut& queued) {
-  if (closed() || player) return later([sink = queued.sink](const Result<void>&) { sink->decided(); });
+  if (closed() || player) return later([subscriber = queued.subscriber](const Result<void>&) { subscriber->decided(); });
   const Clock::time_point taken = Clock::now();
   Result<Outcome> outcome = [&] {
     const std::unique_lock lock(room_mutex);
@@ -48,9 +48,9 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
     return decision;
   }();
   if (!outcome)
-    return later([sink = queued.sink, why = outcome.error()](const Result<void>&) {
-      sink->refuse(why);
-      sink->decided();
+    return later([subscriber = queued.subscriber, why = outcome.error()](const Result<void>&) {
+      subscriber->refuse(why);
+      subscriber->decided();
     });
   if (!outcome->report.changed_leaves.empty()) note_changed(queued.arrived);
   const Clock::time_point done = Clock::now();
@@ -70,21 +70,21 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
     fast.reason = static_cast<std::uint32_t>(outcome->rejection);
     fast.lease_epoch = outcome->lease_epoch;
   }
-  later([this, sink = queued.sink, entry, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
+  later([this, subscriber = queued.subscriber, entry, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
          to_all = outcome->committed(), newly, done](const Result<void>& durable) {
     const Clock::time_point kept = Clock::now();
     if (durable) {
       const std::lock_guard lock(sessions_mutex);
       // The author may have come back on another stream meanwhile.
-      const auto author = open_authors.find(sink->author());
+      const auto author = open_authors.find(subscriber->author());
       if (!repeated && to_all)
         sessions.each([&](SessionSubscriber& one) { one.offer(place, entry, fast); });
       else if (author != open_authors.end())
         repeated ? author->second->answer(entry) : author->second->offer(place, entry, fast);
     }
     if (durable && newly) figures.told(done, kept, Clock::now());
-    if (durable && newly) people.took_cut(sink->author());
-    sink->decided();
+    if (durable && newly) people.took_cut(subscriber->author());
+    subscriber->decided();
   });
 }
 
@@ -116,15 +116,15 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
       const std::lock_guard lock(sessions_mutex);
       if (event && event->tool && event->room_seq) {
         const std::uint32_t number = number_of(event->tool->hash);
-        sessions.each([&](SessionSubscriber& sink) { sink.know_tool(number, event->tool->hash); });
+        sessions.each([&](SessionSubscriber& subscriber) { subscriber.know_tool(number, event->tool->hash); });
       }
       for (const Said& one : said)
         for (const Bytes& entry : one.entries)
-          sessions.each([&](SessionSubscriber& sink) {
-            if (one.personal.is_for(sink.author()))
-              sink.offer(one.place, one.personal.entry, one.personal.fast);
+          sessions.each([&](SessionSubscriber& subscriber) {
+            if (one.personal.is_for(subscriber.author()))
+              subscriber.offer(one.place, one.personal.entry, one.personal.fast);
             else
-              sink.offer(one.place, entry, {.room_seq = one.place, .kind = wire::SessionEntryKind::streamed});
+              subscriber.offer(one.place, entry, {.room_seq = one.place, .kind = wire::SessionEntryKind::streamed});
           });
     }
     answer(event);
@@ -139,7 +139,7 @@ void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
     if (!durable) return;
     const Bytes entry = kept_message(store->witness());
     const std::lock_guard lock(sessions_mutex);
-    sessions.each([&](SessionSubscriber& sink) { sink.answer(entry); });
+    sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(entry); });
   });
 }
 
@@ -179,7 +179,7 @@ RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_message(const RoomEvent&
 bool RoomRuntime::Impl::tell_hands(const std::vector<CuttingState>& states) {
   bool owed = false;
   const std::lock_guard lock(sessions_mutex);
-  sessions.each([&](SessionSubscriber& sink) { owed |= sink.show_partners(states); });
+  sessions.each([&](SessionSubscriber& subscriber) { owed |= subscriber.show_partners(states); });
   return owed;
 }
 
@@ -187,7 +187,7 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   const std::lock_guard lock(sessions_mutex);
   ended = why;
   may_return = to_return;
-  sessions.each([&](SessionSubscriber& sink) { to_return ? sink.replaced(why) : sink.end(why); });
+  sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
 }
 
 Result<void> RoomRuntime::check_kept(const Witness& kept) {
@@ -248,16 +248,16 @@ Result<AuthorId> RoomRuntime::join(MemberKind kind, const std::string& name, con
   return answer.get_future().get();
 }
 
-Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>& sink, const Digest& secret) {
+Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>& subscriber, const Digest& secret) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   std::vector<FieldLeaf> leaves;
   MessageParts before;
   bool again = false;
   {
-    // Held until the sink is listed: every entry after `contained` is committed, and so offered, later.
+    // Held until the subscriber is listed: every entry after `contained` is committed, and so offered, later.
     const std::shared_lock room_lock(impl_->room_mutex);
-    if (!impl_->room.may_cut(sink->author()))
-      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
+    if (!impl_->room.may_cut(subscriber->author()))
+      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
                                                    " has not joined this room as a haptic client; call Join first");
     for (const BodyId body : impl_->room.bodies())
       std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
@@ -266,78 +266,78 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
       before.push_back(tool_message(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
     before.push_back(scene_message(impl_->room.room_seq(), impl_->room.items()));
     // Whatever holds for the hand, it knows before it could cut; also that nothing does any more.
-    const People::Supervised& held = impl_->room.people().supervised(sink->author());
-    const std::uint64_t lease_epoch = impl_->room.lease_epoch(sink->author());
+    const People::Supervised& held = impl_->room.people().supervised(subscriber->author());
+    const std::uint64_t lease_epoch = impl_->room.lease_epoch(subscriber->author());
     const Decider by{held.by, impl_->people.name_of(held.by)};
     if (held.place) before.push_back(supervised_message(RoomSeq{}, held.supervision, lease_epoch, by));
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(lease_epoch);
-    complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(sink->author()));
-    for (const RoomSeq place : impl_->room.decided_places(sink->author(), kMostToldAgain))
+    complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(subscriber->author()));
+    for (const RoomSeq place : impl_->room.decided_places(subscriber->author(), kMostToldAgain))
       complete.mutable_complete()->add_decided_room_seqs(place.value);
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
-    SessionSubscriber*& open = impl_->open_authors[sink->author()];
-    if (open && !impl_->room.proves(sink->author(), secret))
-      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(sink->author().value) +
+    SessionSubscriber*& open = impl_->open_authors[subscriber->author()];
+    if (open && !impl_->room.proves(subscriber->author(), secret))
+      return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
                                                    " has an open session; join again for another");
     if (open) {
       open->replaced("another connection of the same client has taken its place");
       impl_->sessions.remove(*open);
       again = true;
     }
-    open = sink.get();
-    impl_->sessions.add(*sink);
-    if (!again) impl_->people.came(sink->author());  // before it can leave
-    if (impl_->mount && sink->feels_bone()) impl_->mount->join(sink->author());
-    sink->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
-    for (const ToolBox::Entry* entry : tools) sink->know_tool(impl_->number_of(entry->hash), entry->hash);
+    open = subscriber.get();
+    impl_->sessions.add(*subscriber);
+    if (!again) impl_->people.came(subscriber->author());  // before it can leave
+    if (impl_->mount && subscriber->feels_bone()) impl_->mount->join(subscriber->author());
+    subscriber->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
+    for (const ToolBox::Entry* entry : tools) subscriber->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
-      sink->hold({.room_seq = {},
+      subscriber->hold({.room_seq = {},
                   .kind = wire::SessionEntryKind::supervised,
                   .lease_epoch = lease_epoch,
                   .supervision = held.supervision,
                   .by = by});
-    if (impl_->redial) sink->answer(impl_->redial);
-    if (impl_->ended) impl_->may_return ? sink->replaced(*impl_->ended) : sink->end(*impl_->ended);
+    if (impl_->redial) subscriber->answer(impl_->redial);
+    if (impl_->ended) impl_->may_return ? subscriber->replaced(*impl_->ended) : subscriber->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);
   if (!impl_->store) {
-    sink->set_leaves(std::move(leaves));
+    subscriber->set_leaves(std::move(leaves));
     return {};
   }
   // All that the session begins with tells of what may not be kept yet, and `complete` says that it is decided: the
-  // sink sends none of it before it has the leaves, and it has these once it is kept. By datagram nothing is told
+  // subscriber sends none of it before it has the leaves, and it has these once it is kept. By datagram nothing is told
   // sooner either, whose keys are with the rest.
   queue_event([](Room&) { return RoomEvent{}; },
-              [sink, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
-                if (kept) sink->set_leaves(std::move(leaves));
+              [subscriber, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
+                if (kept) subscriber->set_leaves(std::move(leaves));
               });
   return {};
 }
 
-void RoomRuntime::watch_mesh(MeshSubscriber& sink, const std::optional<ViewFrustum>& look) {
-  impl_->people.came(sink.author());
-  if (look) impl_->people.looked(sink.author(), *look);
-  impl_->mesh.watch(sink, look);
+void RoomRuntime::watch_mesh(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look) {
+  impl_->people.came(subscriber.author());
+  if (look) impl_->people.looked(subscriber.author(), *look);
+  impl_->mesh.watch(subscriber, look);
 }
 void RoomRuntime::look(AuthorId viewer, const ViewFrustum& from) {
   impl_->mesh.look(viewer, from);
   impl_->people.looked(viewer, from);
 }
 bool RoomRuntime::draws_near() const { return impl_->mesh.draws_near(); }
-void RoomRuntime::watch_cutting(StateSubscriber& sink) {
-  impl_->people.came(sink.author());
-  impl_->board.watch(sink);
+void RoomRuntime::watch_cutting(StateSubscriber& subscriber) {
+  impl_->people.came(subscriber.author());
+  impl_->board.watch(subscriber);
 }
-void RoomRuntime::leave(MeshSubscriber& sink) {
-  impl_->mesh.leave(sink);
-  impl_->people.went(sink.author());
+void RoomRuntime::leave(MeshSubscriber& subscriber) {
+  impl_->mesh.leave(subscriber);
+  impl_->people.went(subscriber.author());
 }
-void RoomRuntime::leave(StateSubscriber& sink) {
-  impl_->board.leave(sink);
-  impl_->people.went(sink.author());
+void RoomRuntime::leave(StateSubscriber& subscriber) {
+  impl_->board.leave(subscriber);
+  impl_->people.went(subscriber.author());
 }
 Presence& RoomRuntime::people() { return impl_->people; }
 void RoomRuntime::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
@@ -345,23 +345,23 @@ void RoomRuntime::push_bone(AuthorId author, const MountLoad& push) {
   if (impl_->mount) impl_->mount->push(author, push);
 }
 
-void RoomRuntime::leave(SessionSubscriber& sink) {
+void RoomRuntime::leave(SessionSubscriber& subscriber) {
   bool was_open = false;
   {
     const std::lock_guard lock(impl_->sessions_mutex);
-    was_open = impl_->sessions.remove(sink);
-    if (was_open) impl_->open_authors.erase(sink.author());
-    if (was_open && impl_->mount) impl_->mount->leave(sink.author());
+    was_open = impl_->sessions.remove(subscriber);
+    if (was_open) impl_->open_authors.erase(subscriber.author());
+    if (was_open && impl_->mount) impl_->mount->leave(subscriber.author());
   }
   if (!was_open) return;
-  impl_->board.session_over(sink.author());
-  impl_->people.went(sink.author());
+  impl_->board.session_over(subscriber.author());
+  impl_->people.went(subscriber.author());
 }
 
 void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
   const std::lock_guard lock(impl_->sessions_mutex);
   impl_->redial = redial_message(after, why);
-  impl_->sessions.each([&](SessionSubscriber& sink) { sink.answer(impl_->redial); });
+  impl_->sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(impl_->redial); });
 }
 
 void RoomRuntime::send_away(const std::string& why) {

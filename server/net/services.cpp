@@ -310,7 +310,7 @@ class RoomServiceImpl final : public RoomBase {
         *context, reactor, request->author(),
         [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places,
          mark = RoomSeq{request->to_mark()}, newest, all = request->all()](Room& room) -> Result<RoomEvent> {
-          if (all && !room.people().oversees(by))
+          if (all && !room.people().supervises(by))
             return failure(ErrorCode::denied, "only an instructor takes everything back, to the imported bone");
           if (all) return room.undo_to(by, RoomSeq{});
           if (newest.count() > 0) return room.undo_since(by, room.time() - newest);

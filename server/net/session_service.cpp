@@ -25,10 +25,10 @@ namespace {
 // One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
 // faster than the room cuts is slowed down by the network instead of filling memory. Datagrams nobody slows down: who
 // sends more of them than a haptic client does before it has heard of the first is ended.
-class SessionStream final : public OutStream<BidiReactor>, public SessionSubscriber, private SessionLink::Sink {
+class SessionStream final : public OutStream<BidiReactor>, public SessionSubscriber, private SessionLink::Receiver {
  public:
   static constexpr int kMaxQueuedCuts = 256;
-  static constexpr int kMostUnheard = 1024;  // cuts that a haptic client sends before it has heard of the first
+  static constexpr int kMostUnacknowledged = 1024;  // cuts that a haptic client sends before it has heard of the first
   static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
   SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Authorizer* authorizer, Caller caller)
@@ -155,7 +155,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (request->message_case() == v1::SessionRequest::kOpen) return open(request->open());
     if (!opened_) return close(invalid("the first SessionRequest must be open"));
     switch (request->message_case()) {
-      case v1::SessionRequest::kHeard:
+      case v1::SessionRequest::kAcknowledged:
         return hear(RoomSeq{request->heard().room_seq()});
       case v1::SessionRequest::kCut:
         return queue(request->cut());
@@ -183,8 +183,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     const Digest secret = digest_of_secret(request.secret());
     // Reading goes on after the leaves were taken, so that no cut of this author is among them.
     runtime_.run_slowly([this, keep = self(), secret] {
-      const std::shared_ptr<SessionSubscriber> sink(keep, this);
-      if (const Result<void> opened = runtime_.open_session(sink, secret); !opened)
+      const std::shared_ptr<SessionSubscriber> subscriber(keep, this);
+      if (const Result<void> opened = runtime_.open_session(subscriber, secret); !opened)
         return close(invalid(opened.error().message));
       // A reader that went away meanwhile has left the runtime's list before it was on it.
       if (!read_on()) leave();
@@ -215,7 +215,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       if (closing()) return;
       if (!may_carry(DatagramContent::cuts)) return close_locked(not_allowed());
       // Beside those that are new there are, after a line broke, as many again as are read of the stream.
-      if (queued_ >= kMaxQueuedCuts + kMostUnheard) return close_locked(too_many_cuts());
+      if (queued_ >= kMaxQueuedCuts + kMostUnacknowledged) return close_locked(too_many_cuts());
       ++queued_;
       taken_ = std::max(taken_, cut.author_seq);
     }
@@ -305,9 +305,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   }
 
   [[nodiscard]] static Status too_many_cuts() {
-    return {StatusCode::RESOURCE_EXHAUSTED, std::to_string(kMaxQueuedCuts + kMostUnheard) +
+    return {StatusCode::RESOURCE_EXHAUSTED, std::to_string(kMaxQueuedCuts + kMostUnacknowledged) +
                                                 " cuts of this session wait to be decided; send no more than " +
-                                                std::to_string(kMostUnheard) + " before you have heard of the first"};
+                                                std::to_string(kMostUnacknowledged) + " before you have heard of the first"};
   }
   [[nodiscard]] static Status not_allowed() {
     return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"};

@@ -19,26 +19,26 @@ void StatePublisher::stop() {
   if (thread_.joinable()) thread_.join();
 }
 
-void StatePublisher::watch(StateSubscriber& sink) {
+void StatePublisher::watch(StateSubscriber& subscriber) {
   const std::lock_guard lock(streams_mutex_);
-  Stream& stream = streams_.emplace_back(Stream{&sink, Pace(sink.apart(), streams_.size())});
+  Stream& stream = streams_.emplace_back(Stream{&subscriber, Pace(subscriber.apart(), streams_.size())});
   std::unique_lock states_lock(states_mutex_);
   const ShownNow shown = newest_;
   const std::uint64_t number = number_;
   states_lock.unlock();
   if (number > 0) offer(stream, number, shown, Clock::now());
-  if (ended_) sink.end(*ended_);
+  if (ended_) subscriber.end(*ended_);
 }
 
-void StatePublisher::leave(StateSubscriber& sink) {
+void StatePublisher::leave(StateSubscriber& subscriber) {
   const std::lock_guard lock(streams_mutex_);
-  std::erase_if(streams_, [&](const Stream& stream) { return stream.sink == &sink; });
+  std::erase_if(streams_, [&](const Stream& stream) { return stream.subscriber == &subscriber; });
 }
 
 void StatePublisher::end_streams(const std::string& why) {
   const std::lock_guard lock(streams_mutex_);
   ended_ = why;
-  for (const Stream& stream : streams_) stream.sink->end(why);
+  for (const Stream& stream : streams_) stream.subscriber->end(why);
 }
 
 std::size_t StatePublisher::streams() const {
@@ -139,7 +139,7 @@ void StatePublisher::tell(Clock::time_point now) {
 void StatePublisher::offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
   stream.told = number;
   stream.pace.done(now);
-  stream.sink->offer(shown);
+  stream.subscriber->offer(shown);
 }
 
 std::vector<Vec3> StatePublisher::tool_tips_mm() const {

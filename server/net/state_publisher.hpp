@@ -48,9 +48,9 @@ class StatePublisher {
   StatePublisher& operator=(const StatePublisher&) = delete;
   void stop();  // tells what was published, then joins the thread
 
-  // The sink is offered the newest message at once, and later ones until it leaves or all streams end.
-  void watch(StateSubscriber& sink);
-  void leave(StateSubscriber& sink);
+  // The subscriber is offered the newest message at once, and later ones until it leaves or all streams end.
+  void watch(StateSubscriber& subscriber);
+  void leave(StateSubscriber& subscriber);
   void end_streams(const std::string& why);  // those open now and those that come later
   [[nodiscard]] std::size_t streams() const;
 
@@ -72,7 +72,7 @@ class StatePublisher {
     std::uint64_t ticks_over = 0;
   };
   struct Stream {
-    StateSubscriber* sink;
+    StateSubscriber* subscriber;
     Pace pace;
     std::uint64_t told = 0;  // the newest message that it was offered
   };

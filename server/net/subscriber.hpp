@@ -1,4 +1,4 @@
-// Open streams as the parts of a room see them: sinks, free of gRPC.
+// Open streams as the parts of a room see them: subscribers, free of gRPC.
 #pragma once
 #include <array>
 #include <chrono>
@@ -42,20 +42,20 @@ class Pace {
 };
 
 // The open streams of one kind.
-template <class Sink>
+template <class Receiver>
 class Subscribers {
  public:
-  void add(Sink& sink) { sinks_.push_back(&sink); }
+  void add(Receiver& subscriber) { subscribers_.push_back(&subscriber); }
   // False: it was not among them.
-  bool remove(Sink& sink) { return std::erase(sinks_, &sink) > 0; }
+  bool remove(Receiver& subscriber) { return std::erase(subscribers_, &subscriber) > 0; }
   template <class Call>
   void each(Call call) const {
-    for (Sink* sink : sinks_) call(*sink);
+    for (Receiver* subscriber : subscribers_) call(*subscriber);
   }
-  [[nodiscard]] std::size_t size() const { return sinks_.size(); }
+  [[nodiscard]] std::size_t size() const { return subscribers_.size(); }
 
  private:
-  std::vector<Sink*> sinks_;
+  std::vector<Receiver*> subscribers_;
 };
 
 }  // namespace osteon

@@ -25,7 +25,7 @@ std::uint32_t People::person(AuthorId author) const {
   return member == members_.end() ? 0 : member->second.person;
 }
 
-bool People::oversees(AuthorId author) const {
+bool People::supervises(AuthorId author) const {
   const Role of = role(author);
   return of == Role::instructor || of == Role::none;
 }
@@ -43,7 +43,7 @@ AuthorId People::newest_hand(std::uint32_t person) const {
 }
 
 std::array<const Restrictions*, 2> People::binding(AuthorId author) const {
-  const AuthorId hand = oversees(author) ? author : newest_hand(person(author));
+  const AuthorId hand = supervises(author) ? author : newest_hand(person(author));
   return {&supervised(author).supervision, &supervised(hand).supervision};
 }
 

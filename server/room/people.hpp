@@ -34,7 +34,7 @@ class People {
   [[nodiscard]] std::uint32_t person(AuthorId author) const;  // a pseudonym, 0: unnamed
   // An author without a role may do whatever one with any role may: his room is from before there were roles, or his
   // server knows nobody by name.
-  [[nodiscard]] bool oversees(AuthorId author) const;
+  [[nodiscard]] bool supervises(AuthorId author) const;
   [[nodiscard]] bool only_own(AuthorId author) const { return role(author) == Role::trainee; }
   // Whether they may take back all that others did.
   [[nodiscard]] bool may_undo_all(AuthorId author) const;
@@ -47,14 +47,14 @@ class People {
   // What holds for a hand; nothing but the default where nobody has decided anything.
   [[nodiscard]] const Supervised& supervised(AuthorId author) const;
   // What an author keeps to: what holds for it as a hand, then what holds for the newest hand of its person, unless it
-  // may oversee others.
+  // may supervise others.
   [[nodiscard]] std::array<const Restrictions*, 2> binding(AuthorId author) const;
   [[nodiscard]] const std::map<std::uint32_t, Annotation>& annotations() const { return annotations_; }
   [[nodiscard]] std::uint32_t last_annotation() const { return last_annotation_; }
   // The one that a new drawing of this kind takes the place of; 0: none.
   [[nodiscard]] std::uint32_t replaced_by(const Annotation& drawn) const;
 
-  // Adds nothing where nobody has a role, was overseen or has drawn anything: as the hash of a room was before there
+  // Adds nothing where nobody has a role, was supervised or has drawn anything: as the hash of a room was before there
   // were people.
   void add_to(Hasher& hasher) const;
 

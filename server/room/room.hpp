@@ -247,7 +247,7 @@ class Room {
   void apply(const LogEntry& entry, const WordsEntry& words, RoomEvent& event);
   // The bone or the scene, otherwise than by a cut: whoever has joined and is neither stopped nor without their tool.
   [[nodiscard]] Result<void> may_change(AuthorId by) const;
-  // Whether cuts that come again are such as `by` may make now, and those whose they are, unless `by` oversees them.
+  // Whether cuts that come again are such as `by` may make now, and those whose they are, unless `by` supervises them.
   [[nodiscard]] Result<void> may_cut_again(AuthorId by, const std::set<RoomSeq>& places) const;
   // By their role; the same however the events are named.
   [[nodiscard]] Result<void> may_take_back(AuthorId by, const std::set<RoomSeq>& places) const;

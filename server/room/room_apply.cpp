@@ -146,7 +146,7 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
       for (const AuthorId named : {set.taken_by, set.guide})
         all = all && (!named || (room.knows(named) && named != one.subject));
       for (const Digest& tool : set.tools) all = all && room.tools_->find(tool);
-      return require(all, "it oversees what is not there");
+      return require(all, "it supervises what is not there");
     }
     Result<void> operator()(const AnnotationEntry& one) const {
       const auto& drawn = room.people_.annotations();

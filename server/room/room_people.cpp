@@ -16,7 +16,7 @@ std::string author_name(AuthorId author) { return "author " + std::to_string(aut
 
 Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions supervision) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
-  if (!people_.oversees(by)) return deny(author_name(by) + " is no instructor here");
+  if (!people_.supervises(by)) return deny(author_name(by) + " is no instructor here");
   if (!surgeons_.contains(subject))
     return failure(ErrorCode::not_found, author_name(subject) + " has no hand in this room");
   if (Result<void> sound = check(supervision); !sound) return tl::unexpected(sound.error());
@@ -66,7 +66,7 @@ Result<RoomEvent> Room::wipe_off(AuthorId by, std::uint32_t annotation) {
   const auto known = people_.annotations().find(annotation);
   if (known == people_.annotations().end())
     return failure(ErrorCode::not_found, "the room has no annotation " + std::to_string(annotation));
-  if (known->second.author != by && !people_.oversees(by))
+  if (known->second.author != by && !people_.supervises(by))
     return deny("annotation " + std::to_string(annotation) + " is another's, which only an instructor wipes off");
   return decide(by, AnnotationEntry{annotation, std::nullopt});
 }
@@ -106,7 +106,7 @@ Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& places) c
       return {};
     };
     if (Result<void> may = forbidden(by); !may) return may;
-    if (people_.oversees(by)) continue;
+    if (people_.supervises(by)) continue;
     if (Result<void> may = forbidden(event.author); !may) return may;
   }
   return {};

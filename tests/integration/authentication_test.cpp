@@ -136,7 +136,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   EXPECT_THAT(log, HasSubstr("who=ben reason=revoked"));
 }
 
-// An instructor oversees by their console what they see in their window, both with one certificate.
+// An instructor supervises by their console what they see in their window, both with one certificate.
 TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen) << "Xvfb, of Debian's package xvfb, did not start";

@@ -185,7 +185,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
       wait_until([&] { return std::regex_search(ask("people"), std::regex("\"trainee\"[^;]* cuts [1-9]")); }, 60s))
       << trainee.err();
   (void)told("freeze trainee", "^ok at ([0-9]+)");
-  (void)told("wait heard trainee", "^ok at ([0-9]+)");
+  (void)told("wait acknowledged trainee", "^ok at ([0-9]+)");
   const std::string cuts_before = told("people", "\"trainee\"[^;]* cuts ([0-9]+)");
   const std::string demonstrator = told("demonstrate of #" + of + " to " + std::to_string(undone_at - 1) + " speed 0.5",
                                         "^ok demonstrator #([0-9]+) cuts [0-9]{2,}");

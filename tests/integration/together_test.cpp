@@ -96,7 +96,7 @@ class BareHand {
   }
   void say_heard() {
     v1::SessionRequest request;
-    request.mutable_heard()->set_room_seq(contained_.value);
+    request.mutable_acknowledged()->set_room_seq(contained_.value);
     EXPECT_TRUE(stream_->Write(request));
   }
 
@@ -149,7 +149,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
 
   // One is stopped and the other goes on.
   const std::uint64_t frozen_at = console.decide("freeze #2 look at me");
-  EXPECT_TRUE(console.ask("wait heard #2 10").starts_with("ok"));
+  EXPECT_TRUE(console.ask("wait acknowledged #2 10").starts_with("ok"));
   EXPECT_NE(console.person(kFirst).find("frozen words \"look at me\" heard decided by #1"), std::string::npos)
       << console.person(kFirst);
   const std::uint64_t cut_by_first = console.cuts(kFirst), cut_by_second = console.cuts(kSecond);
@@ -160,7 +160,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   const std::uint64_t free_at = console.decide("free #2");
   ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= cut_by_first + 5; }, 60s)) << "it goes on";
   const std::uint64_t taken_at = console.decide("take #2 let me");
-  EXPECT_TRUE(console.ask("wait heard #2 10").starts_with("ok"));
+  EXPECT_TRUE(console.ask("wait acknowledged #2 10").starts_with("ok"));
   EXPECT_NE(console.person(kFirst).find("taken by #1"), std::string::npos);
   const std::uint64_t cut_before = console.cuts(kFirst);
   std::this_thread::sleep_for(500ms);
@@ -181,7 +181,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   ASSERT_TRUE(wait_until([&] { return console.person(away.author().value).find(" away") != std::string::npos; }, 20s));
   (void)console.decide("freeze " + who + " wait for me");
   EXPECT_NE(console.person(away.author().value).find("pending"), std::string::npos);
-  EXPECT_TRUE(console.ask("wait heard " + who + " 0.3").starts_with("error")) << "nobody has told them";
+  EXPECT_TRUE(console.ask("wait acknowledged " + who + " 0.3").starts_with("error")) << "nobody has told them";
   away.come_again();
   ASSERT_TRUE(away.held()) << "the first thing that they hear";
   EXPECT_EQ(away.held()->room_seq(), 0u);
@@ -189,7 +189,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   EXPECT_EQ(away.held()->supervision().words(), "wait for me");
   EXPECT_NE(away.lease(), lease_before);
   away.say_heard();
-  EXPECT_TRUE(console.ask("wait heard " + who + " 10").starts_with("ok"));
+  EXPECT_TRUE(console.ask("wait acknowledged " + who + " 10").starts_with("ok"));
   EXPECT_EQ(away.cut(lease_before), sentence(Rejection::lease)) << "what it had cut meanwhile";
   EXPECT_EQ(away.cut(away.lease()), sentence(Rejection::frozen));
   (void)console.decide("free " + who);
@@ -202,8 +202,8 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
 
   // Everybody stops; the bone of the import, and on it what the second hand did at first, by a demonstrator.
   (void)console.decide("freeze all");
-  EXPECT_TRUE(console.ask("wait heard #2 10").starts_with("ok"));
-  EXPECT_TRUE(console.ask("wait heard #3 10").starts_with("ok"));
+  EXPECT_TRUE(console.ask("wait acknowledged #2 10").starts_with("ok"));
+  EXPECT_TRUE(console.ask("wait acknowledged #3 10").starts_with("ok"));
   EXPECT_TRUE(console.ask("undo all").starts_with("ok"));
   const std::string uncut = console.ask("status");
   EXPECT_NE(uncut.find(" removed 0.000 mm3"), std::string::npos) << uncut;
@@ -234,7 +234,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   // Each hand knows whose word it was.
   for (const json* of : {&of_first, &of_second}) {
     std::size_t told = 0;
-    for (const json& note : of->at("oversight")) {
+    for (const json& note : of->at("restrictions")) {
       if (!note.contains("room_seq")) continue;
       ++told;
       EXPECT_EQ(note.value("by", ""), "Ada Instructor") << note;

@@ -25,7 +25,7 @@
 #include "tests/perf/working_hand.hpp"
 #include "tests/support/relay/impair_process.hpp"
 #include "tests/support/scenes/random.hpp"
-#include "tests/support/stability/overseen_hand.hpp"
+#include "tests/support/stability/supervised_hand.hpp"
 
 namespace osteon::test {
 namespace {
@@ -128,7 +128,7 @@ json run_line(const Line& line, int times) {
           {"after_asking", spread(after_asking)},
           {"cuts", done.cuts.size()},
           {"cuts_stopped", done.cuts_stopped},
-          {"force_step_n", rounded(done.overseen_step_n)},
+          {"force_step_n", rounded(done.supervised_step_n)},
           {"loop_late_p99_ms", rounded(1e-3 * done.ticks.lateness.percentile_us(99))},
           {"round_trip_ms", rounded(path.round_trip_ms)},
           {"lost", done.lost ? json(done.lost->message) : json()}};

@@ -78,8 +78,8 @@ std::string_view name(Invariant invariant) {
       return "served";
     case Invariant::datagrams:
       return "datagrams";
-    case Invariant::overseen:
-      return "overseen";
+    case Invariant::supervised:
+      return "supervised";
     case Invariant::settled:
       return "settled";
   }
@@ -154,7 +154,7 @@ void Ledger::check_held(const LogEntry& entry, const Hands& hands) {
   const bool changes = std::holds_alternative<UndoEntry>(entry.what) || std::holds_alternative<RedoEntry>(entry.what) ||
                        std::holds_alternative<ItemEntry>(entry.what) || std::holds_alternative<RemoveBodyEntry>(entry.what);
   const Restrictions now = hands.of(entry.author);
-  check(!changes || (!now.stopped && now.taken_by == AuthorId{}), Invariant::overseen,
+  check(!changes || (!now.stopped && now.taken_by == AuthorId{}), Invariant::supervised,
         "entry " + number(entry.place) + " is what author " + std::to_string(entry.author.value) + " did while held");
   const auto* redo = std::get_if<RedoEntry>(&entry.what);
   if (redo == nullptr) return;
@@ -166,7 +166,7 @@ void Ledger::check_held(const LogEntry& entry, const Hands& hands) {
 void Ledger::check_cut(const LogEntry& entry, const Hands& hands, AuthorId by, const Cut& cut) {
   const Restrictions now = hands.of(by);
   const auto forbidden = [&](const std::string& why) {
-    fault(Invariant::overseen, "entry " + number(entry.place) + " has " + whose(cut.author, cut.author_seq) +
+    fault(Invariant::supervised, "entry " + number(entry.place) + " has " + whose(cut.author, cut.author_seq) +
                                    ", and author " + std::to_string(by.value) + " " + why);
   };
   if (now.stopped) forbidden("was stopped");
@@ -187,7 +187,7 @@ void Ledger::check_carried(std::span<const LogEntry> entries, std::size_t join, 
   hands.persons[joined.author] = joined.person;
   if (before == Restrictions{}) return;
   const auto* next = join + 1 < entries.size() ? std::get_if<SuperviseEntry>(&entries[join + 1].what) : nullptr;
-  check(next != nullptr && next->subject == joined.author && next->supervision == before, Invariant::overseen,
+  check(next != nullptr && next->subject == joined.author && next->supervision == before, Invariant::supervised,
         "entry " + number(entries[join].place) + " lets a person's new hand go, author " +
             std::to_string(joined.author.value));
 }

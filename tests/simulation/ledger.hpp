@@ -28,7 +28,7 @@ enum class Invariant {
   decided,       // every cut of a client that is there is decided
   served,        // nobody is turned away, and what must work works
   datagrams,     // only what a peer has sealed is taken, once, and it says what the stream says
-  overseen,      // what an instructor forbids is not committed, and after quiet each hand knows what holds for it
+  supervised,      // what an instructor forbids is not committed, and after quiet each hand knows what holds for it
   settled,       // after quiet all is decided and told within two seconds
 };
 [[nodiscard]] std::string_view name(Invariant invariant);

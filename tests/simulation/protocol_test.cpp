@@ -93,9 +93,9 @@ struct Rows {
     ledger.made(one, {});
     add(author, CutEntry{one});
   }
-  std::size_t overseen() {
+  std::size_t supervised() {
     ledger.check_entries(entries);
-    for (const Fault& fault : ledger.faults()) EXPECT_EQ(fault.invariant, Invariant::overseen) << fault.sentence;
+    for (const Fault& fault : ledger.faults()) EXPECT_EQ(fault.invariant, Invariant::supervised) << fault.sentence;
     return ledger.faults().size();
   }
 
@@ -111,7 +111,7 @@ TEST(Ledger, FindsCutsThatWereForbidden) {
     Rows all;
     all.hold(2, word);
     all.cut(2, word.may_cut() ? 1 : 4);
-    return all.overseen();
+    return all.supervised();
   };
   const std::int32_t mm = static_cast<std::int32_t>(1.0 / kQuantum_mm);
   EXPECT_EQ(found({}), 0u);
@@ -133,7 +133,7 @@ TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
       all.add(by, RedoEntry{{RoomSeq{4}}, {RoomSeq{3}}});
     else
       all.add(by, UndoEntry{{RoomSeq{3}}});
-    return all.overseen();
+    return all.supervised();
   };
   EXPECT_EQ(found(2, {}, true), 0u);
   EXPECT_EQ(found(2, {.stopped = true}, false), 1u);
@@ -151,7 +151,7 @@ TEST(Ledger, FindsAHandThatIsLetGoByComingAgain) {
     all.hold(2, {.stopped = true});
     all.join(3, person);
     if (carried) all.hold(3, *carried);
-    return all.overseen();
+    return all.supervised();
   };
   EXPECT_EQ(found(8, {}), 1u);
   EXPECT_EQ(found(8, Restrictions{.stopped = true}), 0u);

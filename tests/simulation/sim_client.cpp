@@ -554,7 +554,7 @@ void SimClient::do_something_else() {
   }
   if (chance(hand_.redo)) return change([count](Room& room, AuthorId by) { return room.redo_last(by, count); });
   if (chance(hand_.mark)) return change([](Room& room, AuthorId by) { return room.mark(by, "here"); });
-  if (chance(hand_.oversee)) return oversee();
+  if (chance(hand_.supervise)) return supervise();
   if (chance(hand_.say)) return change([](Room& room, AuthorId by) { return room.say(by, {}, "well done"); });
   if (chance(hand_.again) && stream_ && underway_->may_go() && stream_->writable(SimStream::client)) {
     // Sent again although it is decided: the answer was lost, for all the server knows.
@@ -567,7 +567,7 @@ void SimClient::do_something_else() {
 }
 
 // Everybody is an instructor here, and nobody heeds what they are told: their cuts go on, for the room to refuse.
-void SimClient::oversee() {
+void SimClient::supervise() {
   Restrictions word;
   const double which = random_.unit();
   word.stopped = which < 0.2;

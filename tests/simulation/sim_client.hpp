@@ -31,7 +31,7 @@ struct HandPlan {
   int run = 8;                                                           // cuts behind each other, at most
   std::chrono::nanoseconds pause_most = std::chrono::milliseconds(800);  // between two runs
   // Between two runs, with these chances:
-  double undo = 0.12, redo = 0.10, mark = 0.05, again = 0.15, beyond = 0.08, oversee = 0.35, say = 0.05;
+  double undo = 0.12, redo = 0.10, mark = 0.05, again = 0.15, beyond = 0.08, supervise = 0.35, say = 0.05;
 };
 
 // How a client's datagrams fare.
@@ -136,7 +136,7 @@ class SimClient {
   void move_hand();
   void cut(int left);
   void do_something_else();
-  void oversee();
+  void supervise();
   void change(std::function<Result<RoomEvent>(Room&, AuthorId)> change);
 
   VirtualTime& time_;

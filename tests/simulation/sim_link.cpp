@@ -113,7 +113,7 @@ SimLinks::SimLinks(Datagrams& datagrams, std::uint64_t seed, const wire::LinkOpt
   port_->on_arrival([this] { alarm_.set(datagrams_.time().now()); });
 }
 
-std::shared_ptr<SimLinks::Link> SimLinks::add(AuthorId author, std::uint64_t first_author_seq, Sink& sink) {
+std::shared_ptr<SimLinks::Link> SimLinks::add(AuthorId author, std::uint64_t first_author_seq, Receiver& sink) {
   std::uint32_t session = 0;
   while (session == 0 || links_.contains(session)) session = static_cast<std::uint32_t>(random_.index(1u << 31));
   const auto link = std::make_shared<Link>(*this, make_session_keys(session, seeded(random_.index(1u << 30))), author,
@@ -163,7 +163,7 @@ void SimLinks::turn() {
 }
 
 SimLinks::Link::Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq,
-                     Sink& sink)
+                     Receiver& sink)
     : links_(links),
       keys_(keys),
       sink_(&sink),
@@ -172,7 +172,7 @@ SimLinks::Link::Link(SimLinks& links, const SessionKeys& keys, AuthorId author, 
 std::size_t SimLinks::Link::say_news() {
   std::vector<Cut> cuts;
   while (std::optional<Cut> cut = link_.take_cut()) cuts.push_back(std::move(*cut));
-  const std::optional<wire::HeardState> state = link_.take_state();
+  const std::optional<wire::KnownToolState> state = link_.take_state();
   if (state) {
     links_.datagrams_.ledger().check(state->state.state_seq > state_seq_, Invariant::datagrams,
                                      "an old state of a tool replaced a new one");

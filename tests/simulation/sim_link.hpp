@@ -79,12 +79,12 @@ class Datagrams {
 class SimLinks {
  public:
   using Time = VirtualTime::Time;
-  using Sink = SessionLink::Sink;
+  using Receiver = SessionLink::Receiver;
   class Link;
 
   // `silent`: the process runs no more, though it is not gone yet.
   SimLinks(Datagrams& datagrams, std::uint64_t seed, const wire::LinkOptions& options, std::function<bool()> silent);
-  [[nodiscard]] std::shared_ptr<Link> add(AuthorId author, std::uint64_t first_author_seq, Sink& sink);
+  [[nodiscard]] std::shared_ptr<Link> add(AuthorId author, std::uint64_t first_author_seq, Receiver& sink);
   void remove(const std::shared_ptr<Link>& link);
 
  private:
@@ -103,7 +103,7 @@ class SimLinks {
 // Of one session.
 class SimLinks::Link {
  public:
-  Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Sink& sink);
+  Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& sink);
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
   void offer(const Cut& cut);
   // False: it goes over the stream only, since it does not fit or the client cannot be reached.
@@ -116,7 +116,7 @@ class SimLinks::Link {
 
   SimLinks& links_;
   const SessionKeys keys_;
-  Sink* sink_;
+  Receiver* sink_;
   wire::ServerLink link_;
   std::uint64_t arrived_ = 0, moves_ = 0, state_seq_ = 0;
 };

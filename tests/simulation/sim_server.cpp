@@ -38,7 +38,7 @@ std::shared_ptr<ToolBox> few_tools() {
 // What SessionStream of server/net/session_service.cpp does between gRPC and the runtime.
 class SimServer::Session final : public SessionSubscriber,
                                  public std::enable_shared_from_this<Session>,
-                                 private SessionLink::Sink {
+                                 private SessionLink::Receiver {
  public:
   static constexpr int kMaxQueuedCuts = 256;
   static constexpr int kMostUndecided = 1024;  // of a client: what may come in datagrams while nothing is decided

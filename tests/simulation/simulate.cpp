@@ -299,7 +299,7 @@ class Simulation {
     for (const auto& client : clients_) {
       if (!client->here() || !client->settled()) continue;
       const auto own = held.find(client->author());
-      ledger_.check(client->held() == (own == held.end() ? Restrictions{} : own->second), Invariant::overseen,
+      ledger_.check(client->held() == (own == held.end() ? Restrictions{} : own->second), Invariant::supervised,
                     "a hand does not know what holds for it: " + client->standing());
     }
     if (const auto standing = Ledger::standing(entries_)) check_set(*standing, status.field_hash);

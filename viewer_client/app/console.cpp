@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::chrono::milliseconds kUntilSaid{5000};  // until what was decided is seen in the list of people
-constexpr double kHeardPatience_s = 30.0;
+constexpr double kAcknowledgePatience_s = 30.0;
 
 tl::unexpected<Error> bad(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
 
@@ -140,7 +140,7 @@ const std::vector<Console::Command>& Console::commands() {
        "what was cut there happens again here, by events A to B"},
       {"end-demonstration", &Console::end_demonstration, "end-demonstration ID",
        "by the number that `demonstrate` said"},
-      {"wait", &Console::wait, "wait heard NAME [SECONDS]", "until they have heard what was decided about them"},
+      {"wait", &Console::wait, "wait acknowledged NAME [SECONDS]", "until they have heard what was decided about them"},
       {"status", &Console::status, "status", "the room's newest event, the hash of its bone, its marks"},
       {"quit", &Console::quit, "quit", "as does the end of the input"},
   };
@@ -599,7 +599,7 @@ Console::Answer Console::end_demonstration(const Words& words) {
 }
 
 Console::Answer Console::wait(const Words& words) {
-  const auto patience_s = words.size() == 4 ? number<double>(words[3]) : std::optional(kHeardPatience_s);
+  const auto patience_s = words.size() == 4 ? number<double>(words[3]) : std::optional(kAcknowledgePatience_s);
   if (words.size() < 3 || words.size() > 4 || words[1] != "heard" || !patience_s || *patience_s < 0 ||
       *patience_s > 1e6)
     return bad("");

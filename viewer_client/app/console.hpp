@@ -1,4 +1,4 @@
-// The instructor's console: a command a line, a line of answer each, so that a person or a script can oversee a room
+// The instructor's console: a command a line, a line of answer each, so that a person or a script can supervise a room
 // without a window.
 #pragma once
 #include <chrono>

@@ -229,7 +229,7 @@ int main(int argc, char** argv) {
   app.add_option("--name", arguments.name, "Who you are, shown to others");
   app.add_option("--supervise-for", arguments.hand,
                  "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
-  app.add_flag("--console", arguments.console, "No window: oversee the room by commands on standard input");
+  app.add_flag("--console", arguments.console, "No window: supervise the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, arguments.credentials);
   app.add_option("--size", arguments.size, "Size of the window in pixels")->capture_default_str();

@@ -109,7 +109,7 @@ bool PeopleView::is_hand(const PersonSeen& person) const {
 }
 
 // Where the room does not say who decided what, and one alone is an instructor, they did.
-std::string PeopleView::overseer(const PersonSeen& person) const {
+std::string PeopleView::guard(const PersonSeen& person) const {
   if (person.decided_by) return name_of(person.decided_by);
   std::set<std::string> names;
   for (const auto& [author, one] : people_)
@@ -122,7 +122,7 @@ void PeopleView::notice_decision(const PersonSeen& person, const Restrictions& w
   if (is == was) return;
   const bool ours = is_hand(person);
   const std::string whom = ours ? "you" : name_of(person.author), whose = ours ? "your" : name_of(person.author) + "'s";
-  const std::string hand = whose + " hand", tool = whose + " tool", by = overseer(person);
+  const std::string hand = whose + " hand", tool = whose + " tool", by = guard(person);
   std::vector<std::string> said;
   if (is.stopped != was.stopped)
     said.push_back(by + (is.stopped ? " has stopped " + hand : " has set " + hand + " free"));

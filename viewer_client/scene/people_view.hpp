@@ -56,7 +56,7 @@ class PeopleView {
     std::string text;
   };
   [[nodiscard]] bool is_hand(const PersonSeen& person) const;
-  [[nodiscard]] std::string overseer(const PersonSeen& person) const;  // who decided last about them
+  [[nodiscard]] std::string guard(const PersonSeen& person) const;  // who decided last about them
   void notice_decision(const PersonSeen& person, const Restrictions& before, Clock::time_point now);
 
   std::string hand_;

@@ -1,4 +1,4 @@
-// The people of a room as somebody who oversees them sees them, and what they may ask of the room: plain data, no gRPC.
+// The people of a room as somebody who supervises them sees them, and what they may ask of the room: plain data, no gRPC.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -75,7 +75,7 @@ class SupervisionClient {
   // Until `done`, which is asked after every news. False: the patience was over, or the program is to stop.
   [[nodiscard]] virtual bool wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const = 0;
 
-  // Place of the event, of the last where there are several. `subject` null: every hand that can be overseen.
+  // Place of the event, of the last where there are several. `subject` null: every hand that can be supervised.
   [[nodiscard]] virtual Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) = 0;
   [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> undo(
       const WhatToUndo& what) = 0;  // and how many events

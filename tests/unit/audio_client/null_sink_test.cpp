@@ -156,14 +156,14 @@ TEST(PulseOutput, DrillIsHeardThroughTheServer) {
   state.state_seq = 9;
   engine.deliver(sound_scene(std::span(&state, 1), Clock::now().time_since_epoch().count()));
   // A second of running is far past the run-up; the sink's own clock is the machine's.
-  constexpr std::size_t kRunUp = 56000, kHeard = 40000;
+  constexpr std::size_t kRunUp = 56000, kAcknowledged = 40000;
   constexpr int kTries = 40;
   std::vector<float> left;
   std::size_t until = monitor.size() + kRunUp;
-  for (int tries = 0; left.empty() || has_gap(std::span(left).last(kHeard)); ++tries) {
+  for (int tries = 0; left.empty() || has_gap(std::span(left).last(kAcknowledged)); ++tries) {
     ASSERT_LT(tries, kTries) << "the machine's sound has gaps all the time";
     const std::uint64_t gaps = (*output)->gaps();
-    until += kHeard;
+    until += kAcknowledged;
     ASSERT_TRUE(test::wait_until([&] { return monitor.size() > until; }, 30s));
     if ((*output)->gaps() == gaps) left = monitor.left();
   }
@@ -174,7 +174,7 @@ TEST(PulseOutput, DrillIsHeardThroughTheServer) {
   EXPECT_EQ(sounded.state_seq, 9U);
   EXPECT_GE(sounded.rendered_ns, sounded.received_ns);
   const double mesh_hz = 48 * 1200 / 60.0;
-  const sound::Tone mesh = sound::find_tone(std::span(left).last(kHeard), 48000, mesh_hz - 20, mesh_hz + 20);
+  const sound::Tone mesh = sound::find_tone(std::span(left).last(kAcknowledged), 48000, mesh_hz - 20, mesh_hz + 20);
   EXPECT_NEAR(mesh.hz, mesh_hz, 1);
   EXPECT_GT(mesh.level_db, -45);
 }

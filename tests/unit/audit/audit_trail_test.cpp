@@ -164,11 +164,11 @@ TEST_F(Trails, BoundDifferentRefusalsOfAPersonAndOfStrangers) {
   }
   trail->record(refusal("ada"));
   trail.reset();
-  EXPECT_EQ(entries("DeleteRoom").size(), AuditTrail::kMostOfOne + AuditTrail::kMostOfStrangers + 1);
+  EXPECT_EQ(entries("DeleteRoom").size(), AuditTrail::kMostOfOne + AuditTrail::kMostOfUnauthenticated + 1);
   EXPECT_EQ(entries("DeleteRoom").back().who.person, "ada");
   const auto omitted = entries("omitted");
   ASSERT_EQ(omitted.size(), 2u);
-  EXPECT_EQ(omitted[0].record.detail, std::to_string(1000 - AuditTrail::kMostOfStrangers) + " further refusals");
+  EXPECT_EQ(omitted[0].record.detail, std::to_string(1000 - AuditTrail::kMostOfUnauthenticated) + " further refusals");
   EXPECT_EQ(omitted[1].who.person, "eve");
 }
 

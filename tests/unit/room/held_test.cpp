@@ -203,7 +203,7 @@ TEST(Held, DoesNothingAgainThatItMayNotCut) {
   all.decide(all.cy, {.zone = ZoneLimit{at, 1 << 20}});
   EXPECT_TRUE(all.room.redo_last(all.cy, 1));
 
-  // Who oversees them does again what they like.
+  // Who supervises them does again what they like.
   ASSERT_TRUE(all.room.undo_last(all.ada, 2, {}));
   all.decide(all.ben, {.stopped = true});
   EXPECT_TRUE(all.room.redo_last(all.ada, 1));
@@ -290,14 +290,14 @@ struct HeldRuntime {
     runtime.tick(now += 8ms);
   }
   std::shared_ptr<Placed> session(AuthorId author) {
-    auto sink = std::make_shared<Placed>(author);
-    EXPECT_TRUE(runtime.open_session(sink, kSecret));
-    sinks.push_back(sink);  // the runtime's until it goes
-    return sink;
+    auto subscriber = std::make_shared<Placed>(author);
+    EXPECT_TRUE(runtime.open_session(subscriber, kSecret));
+    subscribers.push_back(subscriber);  // the runtime's until it goes
+    return subscriber;
   }
   RoomRuntime& runtime;
   std::chrono::nanoseconds now{};
-  std::vector<std::shared_ptr<Placed>> sinks;
+  std::vector<std::shared_ptr<Placed>> subscribers;
 };
 
 constexpr RuntimeRates kDriven{.tick = 0ns, .mesh = 1s, .pieces = 0ns};

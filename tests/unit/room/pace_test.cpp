@@ -112,7 +112,7 @@ CuttingState state(std::uint64_t seq) {
 TEST(StatePublisher, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
   StatePublisher board;
   SlowSink slow, prompt, seldom(20ms);
-  for (SlowSink* sink : {&slow, &prompt, &seldom}) board.watch(*sink);
+  for (SlowSink* subscriber : {&slow, &prompt, &seldom}) board.watch(*subscriber);
   slow.open(false);
   board.offer(state(1));
   board.publish(RoomSeq{1});
@@ -132,7 +132,7 @@ TEST(StatePublisher, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
       },
       20s));
   EXPECT_EQ(slow.messages(), 2) << "the one that it stood in, and the newest";
-  for (SlowSink* sink : {&slow, &prompt, &seldom}) board.leave(*sink);
+  for (SlowSink* subscriber : {&slow, &prompt, &seldom}) board.leave(*subscriber);
 }
 
 TEST(StatePublisher, WhoComesLateIsShownTheNewestAtOnceAndStoppingTellsTheLast) {
@@ -149,9 +149,9 @@ TEST(StatePublisher, WhoComesLateIsShownTheNewestAtOnceAndStoppingTellsTheLast) 
   board.offer(state(1));
   board.publish(RoomSeq{9});
   board.stop();
-  for (SlowSink* sink : {&early, &late}) {
-    EXPECT_EQ(sink->room_seq(), 9u);
-    EXPECT_EQ(sink->messages(), 2);
+  for (SlowSink* subscriber : {&early, &late}) {
+    EXPECT_EQ(subscriber->room_seq(), 9u);
+    EXPECT_EQ(subscriber->messages(), 2);
   }
 }
 

@@ -236,7 +236,7 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   ASSERT_EQ(next.people_size(), 1) << "nobody else has changed";
   EXPECT_EQ(next.people(0).decided_room_seq(), place.value);
   EXPECT_EQ(next.people(0).decided_by(), lesson.instructor.value);
-  EXPECT_LT(next.people(0).heard_room_seq(), place.value);
+  EXPECT_LT(next.people(0).acknowledged_room_seq(), place.value);
   EXPECT_TRUE(next.people(0).supervision().stopped());
   EXPECT_EQ(lesson.runtime.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";
 
@@ -244,7 +244,7 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   lesson.runtime.people().heard(lesson.trainee, RoomSeq{1});
   next = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(next.people_size(), 1);
-  EXPECT_EQ(next.people(0).heard_room_seq(), place.value) << "what was heard later was said earlier";
+  EXPECT_EQ(next.people(0).acknowledged_room_seq(), place.value) << "what was heard later was said earlier";
 
   lesson.runtime.leave(*lesson.sessions[lesson.trainee]);
   next = lesson.news(cursor, lesson.instructor);

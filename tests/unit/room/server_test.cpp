@@ -49,7 +49,7 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
 // Nobody who has come back stays pending until the next event.
 TEST_F(RoomServerTest, AHandSaysThatTheLeavesHaveCome) {
   const auto hand = surgeon();
-  EXPECT_TRUE(wait_until([&] { return runtime().people().heard_of(AuthorId{1}) == runtime().room_seq(); }, kPatience));
+  EXPECT_TRUE(wait_until([&] { return runtime().people().acknowledged_by(AuthorId{1}) == runtime().room_seq(); }, kPatience));
 }
 
 // As one would that was told of more, by a server whose journal has lost its end.
@@ -63,7 +63,7 @@ TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
   request.mutable_open()->set_server_epoch(room.server_epoch);
   request.mutable_open()->set_secret(room.secret);
   ASSERT_TRUE(stream->Write(request));
-  request.mutable_heard()->set_room_seq(runtime().room_seq().value + 1000);
+  request.mutable_acknowledged()->set_room_seq(runtime().room_seq().value + 1000);
   ASSERT_TRUE(stream->Write(request));
   Cut cut = strokes(room.author, 1, 3)[0];
   cut.lease_epoch = room.lease_epoch;
@@ -73,7 +73,7 @@ TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
   while (stream->Read(&response) && !response.has_committed()) {
   }
   EXPECT_TRUE(response.has_committed()) << "its session goes on";
-  const RoomSeq heard = runtime().people().heard_of(room.author);
+  const RoomSeq heard = runtime().people().acknowledged_by(room.author);
   EXPECT_GT(heard, RoomSeq{});
   EXPECT_LE(heard, runtime().room_seq()) << "as far as there is anything";
   context.TryCancel();

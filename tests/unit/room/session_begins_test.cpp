@@ -91,7 +91,7 @@ class BegunSession : public ::testing::Test {
   void kill() {
     runtime.reset();
     store.reset();
-    sinks.clear();
+    subscribers.clear();
   }
   void tick(bool keep) { host->tick(now += 8ms, keep); }
   AuthorId join(MemberKind kind, const std::string& name, Role role) {
@@ -101,9 +101,9 @@ class BegunSession : public ::testing::Test {
     return author;
   }
   std::shared_ptr<Told> session() {
-    auto sink = std::make_shared<Told>(ben);
-    EXPECT_TRUE(host->open_session(sink, kSecret));
-    return sinks.emplace_back(std::move(sink));
+    auto subscriber = std::make_shared<Told>(ben);
+    EXPECT_TRUE(host->open_session(subscriber, kSecret));
+    return subscribers.emplace_back(std::move(subscriber));
   }
   // A mark, a cut and a word about the hand: decided, and on no disk yet.
   void change_all() {
@@ -121,19 +121,19 @@ class BegunSession : public ::testing::Test {
   test::MemoryDisk disk{1};
   std::unique_ptr<RoomStore> store;
   std::unique_ptr<RoomRuntime> runtime;
-  std::vector<std::shared_ptr<Told>> sinks;  // the runtime's until they go
+  std::vector<std::shared_ptr<Told>> subscribers;  // the runtime's until they go
   std::chrono::nanoseconds now{};
   AuthorId ada, ben;
 };
 
-std::size_t count(const Told& sink, v1::SessionResponse::MessageCase kind) {
-  return static_cast<std::size_t>(std::ranges::count(sink.told, kind, &v1::SessionResponse::message_case));
+std::size_t count(const Told& subscriber, v1::SessionResponse::MessageCase kind) {
+  return static_cast<std::size_t>(std::ranges::count(subscriber.told, kind, &v1::SessionResponse::message_case));
 }
 
 // The newest place that it was told that the room stands at.
-std::uint64_t furthest(const Told& sink) {
+std::uint64_t furthest(const Told& subscriber) {
   std::uint64_t place = 0;
-  for (const v1::SessionResponse& one : sink.told)
+  for (const v1::SessionResponse& one : subscriber.told)
     place = std::max({place, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(),
                       one.supervised().room_seq()});
   return place;

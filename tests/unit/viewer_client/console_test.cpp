@@ -131,7 +131,7 @@ TEST_F(ConsoleTest, SaysWhatIsKnownWhereItKnowsNothing) {
                            "label 1 2 3",    "wipe",
                            "wipe 0",         "say",
                            "view",           "wait Ben",
-                           "wait heard",     "quit now",
+                           "wait acknowledged",     "quit now",
                            "demonstrate a b"})
     EXPECT_EQ(say(line).find("error the form is: "), 0u) << line << ": " << say(line);
   EXPECT_TRUE(desk.asked_.empty());
@@ -273,10 +273,10 @@ TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   desk.people_[1].decided = RoomSeq{9};
   desk.people_[1].decided_by = AuthorId{1};
   EXPECT_NE(say("people").find(" pending decided by #1"), std::string::npos) << say("people");
-  EXPECT_EQ(say("wait heard Ben 2"), "error #2 \"Ben\" has not heard of event 9 yet");
+  EXPECT_EQ(say("wait acknowledged Ben 2"), "error #2 \"Ben\" has not heard of event 9 yet");
   EXPECT_EQ(desk.patience_, 2s);
   desk.people_[1].heard = RoomSeq{12};
-  EXPECT_EQ(say("wait heard Ben"), "ok at 12");
+  EXPECT_EQ(say("wait acknowledged Ben"), "ok at 12");
 }
 
 // The answer comes before the list of people has the demonstrator: what is said next may name it all the same.

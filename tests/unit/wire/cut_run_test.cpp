@@ -623,8 +623,8 @@ TEST(PacketFiller, BytesOfTheWayUp) {
       times.set_sent_us(static_cast<std::uint64_t>(1'000'000'000 + t / 1us));
       times.set_echo_sent_us(static_cast<std::uint64_t>(2'000'000'000 + t / 1us));
       times.set_echo_received_us(static_cast<std::uint64_t>(1'000'000'000 + t / 1us));
-      times.set_heard_counter(++counter + 1000);
-      times.set_heard_packets(counter);
+      times.set_received_counter(++counter + 1000);
+      times.set_received_packets(counter);
       head.set_acknowledged(1000 + counter);
       if (cutting) *head.mutable_state() = wire::to_tool_state(state, 1, t - effort_at >= 33ms);
       if (head.state().has_effort()) effort_at = t;
@@ -707,7 +707,7 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   state.depth_mm = -3.5;
   state.phase = CuttingPhase::cutting;
   state.on_metal = true;
-  wire::HeardState known;
+  wire::KnownToolState known;
   const v1::ToolState full = wire::to_tool_state(state, 5, true);
   ASSERT_TRUE(wire::take_over(full, known).value());
   EXPECT_EQ(known.state.author, state.author);
@@ -745,7 +745,7 @@ TEST(ToolState, RefusesBadOnesByTheNameOfTheField) {
     v1::ToolState bad = wire::to_tool_state(state, 0, true);
     bad.set_phase(v1::CUTTING_PHASE_FREE);
     change(bad);
-    wire::HeardState known;
+    wire::KnownToolState known;
     const auto answer = wire::take_over(bad, known);
     ASSERT_FALSE(answer) << field;
     EXPECT_NE(answer.error().message.find(field), std::string::npos) << answer.error().message;

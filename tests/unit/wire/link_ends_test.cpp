@@ -644,8 +644,8 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   }
   v1::UpPacket up;
   up.set_acknowledged(4);
-  up.mutable_times()->set_heard_counter(1'000'000);
-  up.mutable_times()->set_heard_packets(1'000'000);
+  up.mutable_times()->set_received_counter(1'000'000);
+  up.mutable_times()->set_received_packets(1'000'000);
   up.mutable_times()->set_echo_sent_us(~std::uint64_t{0});
   const double loss = pair.server.loss();
   const auto clock = pair.server.clock(pair.now);
@@ -750,7 +750,7 @@ TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
       if (const auto heard = pair.server.take_state()) {
         EXPECT_EQ(heard->state.author, AuthorId{7});
         EXPECT_LE(heard->state.state_seq, state.state_seq);
-        const std::vector<wire::HeardState> partners{*heard};
+        const std::vector<wire::KnownToolState> partners{*heard};
         pair.server.set_partners(partners);
       }
       if (i < 10) continue;

@@ -205,7 +205,7 @@ void Trial::tick() {
   for (std::size_t c = 0; c < kClients; ++c) {
     Session& session = *sessions[c];
     if (auto state = sessions[c]->link.take_state()) {
-      const std::vector<wire::HeardState> partners{*state};
+      const std::vector<wire::KnownToolState> partners{*state};
       sessions[1 - c]->link.set_partners(partners);
     }
     if (!session.link.alive(time.now())) {

@@ -11,7 +11,7 @@
 
 #include "common/mechanics/simulated_hand.hpp"
 #include "tests/support/scenes/random.hpp"
-#include "tests/support/stability/overseen_hand.hpp"
+#include "tests/support/stability/supervised_hand.hpp"
 
 namespace osteon::haptic::test {
 namespace {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/support/stability/overseen_hand.hpp"
+#include "tests/support/stability/supervised_hand.hpp"
 
 namespace osteon::haptic::test {
 namespace {
@@ -23,44 +23,44 @@ ZoneLimit ball(const Vec3& centre_mm, double radius_mm) {
 }
 
 TEST(SupervisionGuard, ADatagramsWordHoldsUntilANewerRow) {
-  SupervisionGuard overseer;
-  EXPECT_TRUE(overseer.may_cut(0, Vec3::Zero()));
-  overseer.set(StopFlag{7, true});
-  EXPECT_TRUE(overseer.stopped());
+  SupervisionGuard guard;
+  EXPECT_TRUE(guard.may_cut(0, Vec3::Zero()));
+  guard.set(StopFlag{7, true});
+  EXPECT_TRUE(guard.stopped());
   HapticRestrictions row;
   row.lease_epoch = 6;  // of before
-  overseer.set(row);
-  EXPECT_TRUE(overseer.stopped());
+  guard.set(row);
+  EXPECT_TRUE(guard.stopped());
   row.lease_epoch = 7;
   row.stopped = true;
-  overseer.set(row);
-  EXPECT_TRUE(overseer.stopped());
+  guard.set(row);
+  EXPECT_TRUE(guard.stopped());
   // A rejection raises the epoch while the hand is stopped; where the way of datagrams then ends, the flag stays as it
   // was.
-  overseer.set(StopFlag{9, true});
+  guard.set(StopFlag{9, true});
   row.lease_epoch = 10;
   row.stopped = false;
-  overseer.set(row);
-  EXPECT_FALSE(overseer.stopped());
+  guard.set(row);
+  EXPECT_FALSE(guard.stopped());
   // What a flag gives back before its row has come is not believed.
   row.stopped = true;
   row.lease_epoch = 11;
-  overseer.set(row);
-  overseer.set(StopFlag{12, false});
-  EXPECT_TRUE(overseer.stopped());
+  guard.set(row);
+  guard.set(StopFlag{12, false});
+  EXPECT_TRUE(guard.stopped());
   EXPECT_EQ(unpacked(packed({12, true})).lease_epoch, 12u);
   EXPECT_TRUE(unpacked(packed({12, true})).frozen);
 }
 
 TEST(SupervisionGuard, ForceComesDownToItsLimitAndUpAgainNoFasterThanItMay) {
-  SupervisionGuard overseer;
-  EXPECT_EQ(overseer.limit_n(60.0, 20.0, 0.5), 60.0);
+  SupervisionGuard guard;
+  EXPECT_EQ(guard.limit_n(60.0, 20.0, 0.5), 60.0);
   HapticRestrictions row;
   row.force_limit_n = 5.0;
-  overseer.set(row);
+  guard.set(row);
   double before_n = 20.0;
   for (int i = 0; i < 30; ++i) {
-    const double now_n = overseer.limit_n(60.0, 0.0, 0.5);
+    const double now_n = guard.limit_n(60.0, 0.0, 0.5);
     if (i == 0) {
       before_n = now_n;
     }
@@ -69,10 +69,10 @@ TEST(SupervisionGuard, ForceComesDownToItsLimitAndUpAgainNoFasterThanItMay) {
   }
   EXPECT_EQ(before_n, 5.0);
   row.force_limit_n = 0.0;
-  overseer.set(row);
+  guard.set(row);
   int ticks = 0;
   for (; before_n < 60.0; ++ticks) {
-    const double now_n = overseer.limit_n(60.0, 5.0, 0.5);
+    const double now_n = guard.limit_n(60.0, 5.0, 0.5);
     EXPECT_LE(now_n, before_n + 0.5 + 1e-12);
     before_n = now_n;
   }
@@ -86,20 +86,20 @@ TEST(SupervisionGuard, KeepsToWhatTheRoomWouldRefuse) {
   Restrictions said;
   said.zone = ball({1, 2, 3}, 4.0);
   said.tools = {tools[1].tool.hash()};
-  SupervisionGuard overseer;
-  overseer.set(haptic_restrictions(said, RoomSeq{5}, 6, tools));
+  SupervisionGuard guard;
+  guard.set(haptic_restrictions(said, RoomSeq{5}, 6, tools));
   Cut cut;
   for (int tool = 0; tool < 2; ++tool)
     for (double x = -4.0; x < 6.0; x += 0.0131) {
       cut.tool = tools[static_cast<std::size_t>(tool)].tool.hash();
       cut.path = {quantise({Vec3(x, 2, 3), Eigen::Quaterniond::Identity()})};
       const Rejection word = breach(said, cut);
-      EXPECT_EQ(word == Rejection::none, tool == 1 && overseer.takes({x, 2, 3})) << x;
-      if (overseer.may_cut(tool, {x, 2, 3})) {
+      EXPECT_EQ(word == Rejection::none, tool == 1 && guard.takes({x, 2, 3})) << x;
+      if (guard.may_cut(tool, {x, 2, 3})) {
         EXPECT_EQ(word, Rejection::none) << x;
       }
     }
-  EXPECT_TRUE(overseer.may_cut(1, {1, 2, 3}));
+  EXPECT_TRUE(guard.may_cut(1, {1, 2, 3}));
 }
 
 // How the hand of these tests is pressed: a bur to and fro on the bone, or a drill straight in.

@@ -1,4 +1,4 @@
-#include "tests/support/stability/overseen_hand.hpp"
+#include "tests/support/stability/supervised_hand.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -80,7 +80,7 @@ void OverseenHand::hear() {
   for (; !decided_.empty() && decided_.front().due <= ticks_; decided_.pop_front()) {
     const ToolModel tools[] = {loop_->tool(0)};
     const Restrictions& now = decided_.front().supervision;
-    loop_->oversee(haptic_restrictions(now, RoomSeq{++decisions_}, decided_.front().epoch, tools));
+    loop_->supervise(haptic_restrictions(now, RoomSeq{++decisions_}, decided_.front().epoch, tools));
     count.stopped += now.stopped && !heard_.stopped;
     count.taken += now.taken_by && !heard_.taken_by;
     count.given_back += (!now.taken_by && heard_.taken_by) || (!now.stopped && heard_.stopped);
