@@ -232,7 +232,7 @@ Result<void> verify(const Arguments& given) {
   for (const std::string& note : report->notes) say("note", note);
   for (const std::string& fault : report->faults) say("fault", fault);
   if (!report->sound())
-    return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server recover " +
+    return failure(ErrorCode::invalid_input, given.file.string() + " is damaged; osteon-server salvage " +
                                                  given.file.string() + " NEW copies what can be confirmed");
   if (!given.case_folder.empty()) {
     const Result<Room> room = replayed(given);
@@ -252,7 +252,7 @@ Result<void> verify(const Arguments& given) {
 Result<void> recover(const Arguments& given) {
   const Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
   if (!keys) return tl::unexpected(keys.error());
-  const Result<RecoverReport> report = recover_journal(given.file, given.to, nullptr, {}, RoomSeq{given.at}, *keys);
+  const Result<RecoverReport> report = salvage_journal(given.file, given.to, nullptr, {}, RoomSeq{given.at}, *keys);
   if (!report) return tl::unexpected(report.error());
   for (const std::string& fault : report->faults) say("fault", fault);
   if (!*keys) say_unsigned();
@@ -492,7 +492,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   check->add_option("--case", given->case_folder, "Folder of the case: makes the room again, too, and says its hashes");
   check->add_option("--key", given->key,
                     "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
-  CLI::App* recovered = copies("recover", "Copies what can be confirmed of a damaged journal into a new one", recover);
+  CLI::App* recovered = copies("salvage", "Copies what can be confirmed of a damaged journal into a new one", recover);
   recovered->add_option("--to", given->at, "room_seq of the last event; all by default");
   signs(recovered);
   signs(copies("backup", "Copies a sound journal", [](const Arguments& a) { return copy(a, backup_journal); }));
@@ -513,7 +513,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   lines->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");
   lines->add_option("--to", given->at, "room_seq of the last event; all by default");
   command("people", "Lists the people whose numbers the events have", list_people);
-  CLI::App* gone = command("forget", "Forgets who people were; what they did stays", forget);
+  CLI::App* gone = command("erase-person", "Forgets who people were; what they did stays", forget);
   gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
   gone->add_option("--older-than", given->days, "All who came more than so many days ago; 0: all who came before today")
       ->check(CLI::Range(0, 36500));

@@ -237,7 +237,7 @@ Result<void> Journal::begin_signing() {
         ErrorCode::unavailable,
         state.path.string() + ": this server's key signed the entries up to " + std::to_string(signed_to.value) +
             ", but not " + entries +
-            ": somebody else wrote them; recover the signed ones into a new journal: osteon-server recover " +
+            ": somebody else wrote them; recover the signed ones into a new journal: osteon-server salvage " +
             state.path.string() + " NEW --to " + std::to_string(signed_to.value) + " --signing-key KEY");
   state.notes.push_back(entries + " were not signed by this server's key, which signs those after them");
   return {};

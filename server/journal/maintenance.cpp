@@ -483,7 +483,7 @@ Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
   return {};
 }
 
-Result<RecoverReport> recover_journal(const fs::path& file, const fs::path& to, Disk* disk,
+Result<RecoverReport> salvage_journal(const fs::path& file, const fs::path& to, Disk* disk,
                                       const std::vector<JournalHead>& known, RoomSeq last,
                                       std::shared_ptr<const SigningKeys> keys) {
   auto source = Source::open(file, or_system(disk));

@@ -117,7 +117,7 @@ struct RecoverReport {
 // were told, to count as witnesses. `last`: no entry after it; null: all. `keys` sign that it was recovered: else a
 // server with keys takes no entries behind those that it did not sign. Error invalid_input: not even its genesis can be
 // read.
-[[nodiscard]] Result<RecoverReport> recover_journal(const std::filesystem::path& file, const std::filesystem::path& to,
+[[nodiscard]] Result<RecoverReport> salvage_journal(const std::filesystem::path& file, const std::filesystem::path& to,
                                                     Disk* disk = nullptr, const std::vector<JournalHead>& known = {},
                                                     RoomSeq last = {},
                                                     std::shared_ptr<const SigningKeys> keys = nullptr);

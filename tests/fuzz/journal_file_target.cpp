@@ -110,7 +110,7 @@ void open_any_journal(std::span<const std::uint8_t> data) {
   const Result<VerifyReport> report = verify_journal(kFile, &disk);
   const bool is_sound = report && report->sound();
   OSTEON_CHECK(disk.image() == image);
-  const Result<RecoverReport> recovered = recover_journal(kFile, kRecovered, &disk);
+  const Result<RecoverReport> recovered = salvage_journal(kFile, kRecovered, &disk);
   if (recovered) {
     OSTEON_CHECK(recovered->head.place.value <= kEntries && (!is_sound || recovered->lost() == 0));
     const Result<VerifyReport> now = verify_journal(kRecovered, &disk);

@@ -89,16 +89,16 @@ std::string BreakerJudge::try_recover(const Trial& trial, const Verified& found,
                                       bool* without_number) const {
   const fs::path folder = stage_->new_folder();
   const std::string to = (folder / (trial.name + ".journal")).string();
-  const RunResult result = stage_->command({"recover", trial.file(), to});
+  const RunResult result = stage_->command({"salvage", trial.file(), to});
   std::string fault;
   if (result.exit_code != 0) {
     fault = found.read ? "verify reads it, and recover does not: " + said(result)
-                       : refusal("recover", result, trial.file());
+                       : refusal("salvage", result, trial.file());
   } else {
     const std::uint64_t events = number_after(result.out, "recovered").value_or(0);
     const std::uint64_t lost = number_after(result.out, "lost").value_or(0);
     if (events < found.events) fault = "recover leaves out what verify confirms: " + said(result);
-    if (fault.empty()) fault = unsaid("recover", said(result), events, lost, trial, without_number);
+    if (fault.empty()) fault = unsaid("salvage", said(result), events, lost, trial, without_number);
     const bool own = !has(result.out, "belongs to another journal") && !has(result.out, "another history");
     if (fault.empty() && own)
       if (const std::string lacks = stage_->check_export(to, *trial.oracle, events); !lacks.empty())
@@ -211,7 +211,7 @@ std::string BreakerJudge::unsaid_failure(Server& server, LightHand& hand, const 
   Oracle later;
   const auto stranger = LightHand::come(server.address, "", later, 1);
   // The client learns the file's name. Where it lies is in the server's log alone.
-  if (!has(why, "the room takes no more cuts") || !has(why, fs::path(file).filename().string()) || !has(why, "recover"))
+  if (!has(why, "the room takes no more cuts") || !has(why, fs::path(file).filename().string()) || !has(why, "salvage"))
     return "a client is told no reason, file or remedy: " + why;
   if (!stranger)
     return has(stranger.error().message, "takes no more") ? "" : "who comes is told: " + stranger.error().message;

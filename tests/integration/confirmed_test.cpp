@@ -190,7 +190,7 @@ TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCu
 
 TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAfterARecovery) {
   const RunResult recovered =
-      run(program("osteon-server"), {"recover", copy_.path() / "copy" / "room.journal", journal()}, 30s);
+      run(program("osteon-server"), {"salvage", copy_.path() / "copy" / "room.journal", journal()}, 30s);
   ASSERT_EQ(recovered.exit_code, 0) << recovered.err;
   EXPECT_THAT(what_the_hand_is_told(),
               HasSubstr("has lost 3 of the 3 events that you were told are kept: its journal was recovered up "

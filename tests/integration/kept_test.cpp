@@ -195,14 +195,14 @@ TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   const std::string bone = (stage / "case").string();
   for (const std::vector<std::string>& command :
        std::vector<std::vector<std::string>>{{"verify", file},
-                                             {"recover", file, to},
+                                             {"salvage", file, to},
                                              {"backup", file, to},
                                              {"migrate", file, to},
                                              {"branch", file, to},
                                              {"replay", file, "--case", bone},
                                              {"export", file, to},
                                              {"people", file},
-                                             {"forget", file, "--older-than", "1"},
+                                             {"erase-person", file, "--older-than", "1"},
                                              {"rename-room", file, "other"},
                                              {"delete", file, "--alone"},
                                              {"--case", bone, "--journal", file}}) {

@@ -466,7 +466,7 @@ void SimServer::rest() {
 
 void SimServer::recover() {
   const std::filesystem::path to = "/room/journal" + std::to_string(++recoveries_);
-  const Result<RecoverReport> report = recover_journal(file_, to, &disk_);
+  const Result<RecoverReport> report = salvage_journal(file_, to, &disk_);
   if (!report) return ledger_.fault(Invariant::served, "the journal cannot be recovered: " + report.error().message);
   file_ = to;
 }

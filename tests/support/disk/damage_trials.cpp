@@ -142,7 +142,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
   const std::string why = opened->closed_because()->message;
   opened = tl::unexpected(Error{});
   // What it says is missing is at least what was acknowledged, and no more than what was asked for.
-  const auto recovered = recover_journal(file, "/room/recovered", &disk);
+  const auto recovered = salvage_journal(file, "/room/recovered", &disk);
   if (!recovered) return {Verdict::Kind::named, ""};
   const std::uint64_t end = recovered->head.place.value + recovered->lost();
   const bool told = foreign || (end >= life.acknowledged.size() && end <= known.size());

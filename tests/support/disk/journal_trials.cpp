@@ -220,7 +220,7 @@ void JournalWriter::check_failed() {
 void JournalWriter::recover() {
   drop();
   const std::filesystem::path to = "/room/journal" + std::to_string(++recoveries_);
-  const auto report = recover_journal(file_, to, &disk_);
+  const auto report = salvage_journal(file_, to, &disk_);
   if (!report) return fault("cannot be recovered: " + report.error().message);
   file_ = to;
 }

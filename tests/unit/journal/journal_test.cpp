@@ -200,7 +200,7 @@ TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
     EXPECT_TRUE(equal(entries_of(journal), {entries.begin(), entries.begin() + 5}));
     EXPECT_FALSE(journal.append({&entries[5], 1}));
   }
-  const auto report = recover_journal(kFile, "/room/new", &disk_);
+  const auto report = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_EQ(report->head.place, RoomSeq{5});
   EXPECT_EQ(report->lost(), 4u);
@@ -250,7 +250,7 @@ TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
     ASSERT_NE(journal.closed_because(), nullptr);
     EXPECT_THAT(journal.closed_because()->message, HasSubstr("recover it into a new journal"));
   }
-  ASSERT_TRUE(recover_journal(kFile, "/room/new", &disk_));
+  ASSERT_TRUE(salvage_journal(kFile, "/room/new", &disk_));
   Journal journal = std::move(Journal::open("/room/new", options()).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
   EXPECT_GE(journal.head().place, RoomSeq{2});

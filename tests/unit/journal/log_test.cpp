@@ -114,7 +114,7 @@ TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
   make_killed();
   for (const char* file : {kLog, kMirror}) flip(file, 50);
   EXPECT_THAT(expect_closed(50), HasSubstr("goes to place 50, but its log vouches for place 60: 10 entries are missing"));
-  const auto recovered = recover_journal(kFile, "/room/new", &disk_);
+  const auto recovered = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->head.place, RoomSeq{50});
   EXPECT_EQ(recovered->lost(), 10u);
@@ -270,7 +270,7 @@ TEST(JournalSecondOpener, IsRefusedAndChangesNoByte) {
   EXPECT_EQ(verify_journal(file).error().message, in_use);
   EXPECT_EQ(backup_journal(file, folder / "copy").error().message, in_use);
   EXPECT_EQ(migrate_journal(file, folder / "copy").error().message, in_use);
-  EXPECT_EQ(recover_journal(file, folder / "copy").error().message, in_use);
+  EXPECT_EQ(salvage_journal(file, folder / "copy").error().message, in_use);
   EXPECT_EQ(delete_journals({file}).error().message, in_use);
   EXPECT_EQ(contents_of(folder.path()), before);
   append(journal, entries, 10, 20);

@@ -87,7 +87,7 @@ TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
 
   const MemoryDisk::Image before = disk_.image();
   EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::invalid_input);
-  const auto recovered = recover_journal(kFile, kTo, &disk_);
+  const auto recovered = salvage_journal(kFile, kTo, &disk_);
   ASSERT_TRUE(recovered) << recovered.error().message;
   EXPECT_EQ(recovered->head.place, RoomSeq{17});
   EXPECT_EQ(recovered->lost(), 23u) << "of the 40 that the footer vouches for";
@@ -113,7 +113,7 @@ TEST_F(UpkeepTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
   EXPECT_THAT(report->faults.front(), HasSubstr(newest + " is not what was written"));
   EXPECT_EQ(report->first_bad, std::nullopt);
   EXPECT_FALSE(backup_journal(kFile, kTo, &disk_));
-  const auto recovered = recover_journal(kFile, kTo, &disk_);
+  const auto recovered = salvage_journal(kFile, kTo, &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->lost(), 0u);
   Journal journal = open(kTo);
@@ -193,7 +193,7 @@ TEST_F(UpkeepTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
 
 TEST_F(UpkeepTest, WhatClientsKnowCountsAsLost) {
   make(true);
-  const auto recovered = recover_journal(kFile, kTo, &disk_, {{RoomSeq{39}, {}}, {RoomSeq{44}, {}}});
+  const auto recovered = salvage_journal(kFile, kTo, &disk_, {{RoomSeq{39}, {}}, {RoomSeq{44}, {}}});
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->lost(), 4u);
 }

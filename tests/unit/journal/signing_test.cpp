@@ -246,14 +246,14 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
     EXPECT_THAT(journal.closed_because()->message, HasSubstr("signed the entries up to 20, but not entries 21 to 50"));
   }
   // Without the key nobody makes the server take them.
-  ASSERT_TRUE(recover_journal(file_, folder_ / "by a script"));
+  ASSERT_TRUE(salvage_journal(file_, folder_ / "by a script"));
   EXPECT_NE(std::move(Journal::open(folder_ / "by a script", {.keys = keys_}).value()).closed_because(), nullptr);
   EXPECT_THAT(vouched(key_, folder_ / "by a script").other_entries, Contains("the register \"recovered\""));
   // Only the signed entries.
-  ASSERT_TRUE(recover_journal(file_, folder_ / "signed", nullptr, {}, RoomSeq{20}, keys_));
+  ASSERT_TRUE(salvage_journal(file_, folder_ / "signed", nullptr, {}, RoomSeq{20}, keys_));
   EXPECT_TRUE(vouched(key_, folder_ / "signed").all());
   // All entries, on purpose: they still are not vouched for.
-  ASSERT_TRUE(recover_journal(file_, folder_ / "all", nullptr, {}, {}, keys_));
+  ASSERT_TRUE(salvage_journal(file_, folder_ / "all", nullptr, {}, {}, keys_));
   file_ = folder_ / "all";
   write(keys_, 50, 60, true);
   const Vouched recovered = vouched(key_);
@@ -312,7 +312,7 @@ TEST_F(SignedJournal, IsRecoveredWithoutSignaturesThatDoNotFit) {
   run_sql("INSERT INTO signatures VALUES(10, 1, " + hex(bogus.head.chain.bytes) + ", " + hex(bogus.key.bytes) + ", " +
           hex(bogus.signature.bytes) + ")");
   EXPECT_FALSE(verify_journal(file_)->sound());
-  ASSERT_TRUE(recover_journal(file_, folder_ / "recovered", nullptr, {}, {}, keys_));
+  ASSERT_TRUE(salvage_journal(file_, folder_ / "recovered", nullptr, {}, {}, keys_));
   EXPECT_TRUE(vouched(key_, folder_ / "recovered").all());
 }
 

@@ -158,7 +158,7 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
 
   disk_.load(image);
   const fs::path aside = "/aside/femur";
-  ASSERT_TRUE(recover_journal(kFile, aside, &disk_));
+  ASSERT_TRUE(salvage_journal(kFile, aside, &disk_));
   const auto recovered = told(aside, disk_);
   const std::string up_to = lost + ": its journal was recovered up to event " + std::to_string(copied.value);
   EXPECT_THAT(recovered.first, HasSubstr(up_to));

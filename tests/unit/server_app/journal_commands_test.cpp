@@ -148,7 +148,7 @@ TEST_F(JournalCommands, ADamagedJournalIsSaidToBeOneAndGivesWhatIsConfirmed) {
   refused("export", {file("lines")}, {fault, "--to " + confirmed});
   refused("people", {}, {fault});
   EXPECT_THAT(server("people", {}).out, HasSubstr("Anna")) << "what can be read is there";
-  refused("forget", {"--person", "1"}, {fault});
+  refused("erase-person", {"--person", "1"}, {fault});
   refused("replay", {"--case", bone, "--to", beyond}, {"--to " + beyond, "that is confirmed"});
   refused("branch", {file("b"), "--at", beyond}, {confirmed});
   refused("export", {file("lines"), "--to", beyond}, {"that is confirmed"});
@@ -177,15 +177,15 @@ TEST_F(JournalCommands, ASoundOneStillVouchesForItsEndAfterwards) {
 }
 
 TEST_F(JournalCommands, NobodyIsForgottenWhomNobodyKnows) {
-  refused("forget", {"--person", "77"}, {"nobody in", "has the number 77"});
+  refused("erase-person", {"--person", "77"}, {"nobody in", "has the number 77"});
   EXPECT_THAT(server("people", {}).out, HasSubstr("Anna"));
-  done("forget", {"--person", "1"});
+  done("erase-person", {"--person", "1"});
   EXPECT_THAT(server("people", {}).out, Not(HasSubstr("Anna")));
-  refused("forget", {"--person", "1"}, {"has the number 1"});
-  done("forget", {"--older-than", "1"});
-  done("forget", {"--older-than", "0"});  // all who came before today: nobody here
-  refused("forget", {}, {"either --person", "or --older-than"});
-  refused("forget", {"--person", "2", "--older-than", "0"}, {"either --person", "or --older-than"});
+  refused("erase-person", {"--person", "1"}, {"has the number 1"});
+  done("erase-person", {"--older-than", "1"});
+  done("erase-person", {"--older-than", "0"});  // all who came before today: nobody here
+  refused("erase-person", {}, {"either --person", "or --older-than"});
+  refused("erase-person", {"--person", "2", "--older-than", "0"}, {"either --person", "or --older-than"});
 }
 
 // No day is a number of days like any other.
@@ -199,9 +199,9 @@ TEST_F(JournalCommands, ForgettingWhoCameBeforeTodayLeavesTheOthers) {
     ASSERT_TRUE(journal->set_person({"8", "Cora", today + 1}));
     ASSERT_TRUE(journal->close());
   }
-  refused("forget", {"--older-than=-3"}, {"--older-than"});
+  refused("erase-person", {"--older-than=-3"}, {"--older-than"});
   EXPECT_THAT(server("people", {}).out, AllOf(HasSubstr("Bert"), HasSubstr("Cora")));
-  done("forget", {"--older-than", "0"});
+  done("erase-person", {"--older-than", "0"});
   EXPECT_THAT(server("people", {}).out, AllOf(Not(HasSubstr("Bert")), HasSubstr("Cora")));
 }
 
@@ -219,13 +219,13 @@ TEST_F(JournalCommands, WhoIsForgottenLeavesNoWords) {
   ASSERT_TRUE(note_owner(file_, "Anna"));
   ASSERT_TRUE(anywhere(mark) && anywhere("Anna"));
 
-  const RunResult forgotten = server("forget", {"--person", "1"});
+  const RunResult forgotten = server("erase-person", {"--person", "1"});
   ASSERT_EQ(forgotten.exit_code, 0) << forgotten.err;
   EXPECT_THAT(forgotten.out, HasSubstr("the words of 44 events"));
   EXPECT_FALSE(anywhere(mark) || anywhere("Anna"));
   done("verify", {});
   EXPECT_EQ(hash_of(server("replay", {"--case", (dir_ / "case").string()}).out), before);
-  for (const std::string& copy : {std::string("backup"), std::string("recover")}) {
+  for (const std::string& copy : {std::string("backup"), std::string("salvage")}) {
     done(copy, {(dir_ / copy).string()});
     EXPECT_EQ(run(program("osteon-server"), {"verify", (dir_ / copy).string()}).exit_code, 0) << copy;
   }
