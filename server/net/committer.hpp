@@ -12,7 +12,7 @@
 
 #include "common/core/result.hpp"
 #include "common/runtime/tick_stats.hpp"
-#include "server/room/room_entry.hpp"
+#include "server/room/log_entry.hpp"
 
 namespace osteon {
 

@@ -12,7 +12,7 @@
 
 #include "common/core/result.hpp"
 #include "server/journal/journal.hpp"
-#include "server/room/room_entry.hpp"
+#include "server/room/log_entry.hpp"
 
 namespace osteon {
 

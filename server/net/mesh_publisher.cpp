@@ -4,7 +4,7 @@
 #include <atomic>
 #include <utility>
 
-#include "server/net/room_entries.hpp"
+#include "server/net/session_messages.hpp"
 
 namespace osteon {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/tool_box.hpp"
-#include "server/room/room_entry.hpp"
+#include "server/room/log_entry.hpp"
 
 namespace osteon {
 

@@ -18,7 +18,7 @@
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/presence.hpp"
-#include "server/net/room_entries.hpp"
+#include "server/net/session_messages.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/runtime_parts.hpp"
 #include "server/net/state_publisher.hpp"

@@ -1,4 +1,4 @@
-#include "server/net/room_entries.hpp"
+#include "server/net/session_messages.hpp"
 
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"

@@ -16,7 +16,7 @@
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "server/net/called_room.inl"
 #include "server/net/link_server.hpp"
-#include "server/net/room_entries.hpp"
+#include "server/net/session_messages.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {

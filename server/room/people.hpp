@@ -10,7 +10,7 @@
 #include "common/core/digest.hpp"
 #include "common/field/restrictions.hpp"
 #include "common/tools/annotation.hpp"
-#include "server/room/room_entry.hpp"
+#include "server/room/log_entry.hpp"
 
 namespace osteon {
 

@@ -1,6 +1,6 @@
 // The room: owns the bone and the scene, puts cuts and all other events in one order, judges them, applies them. A
 // function of what it was given: no clock, thread, log, file or network, so a test runs it on virtual time. What it
-// decides are entries (room_entry.hpp): applied to a room as it began, in order, they make the same room again.
+// decides are entries (log_entry.hpp): applied to a room as it began, in order, they make the same room again.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -26,7 +26,7 @@
 #include "server/room/cut_energy.hpp"
 #include "server/room/people.hpp"
 #include "server/room/room_event.hpp"
-#include "server/room/room_entry.hpp"
+#include "server/room/log_entry.hpp"
 #include "server/room/separation.hpp"
 
 namespace osteon {

@@ -11,7 +11,7 @@
 #include "common/tools/placing.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/cut_field.hpp"
-#include "server/room/room_entry.hpp"
+#include "server/room/log_entry.hpp"
 
 namespace osteon {
 

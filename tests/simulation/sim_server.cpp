@@ -6,7 +6,7 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "server/journal/maintenance.hpp"
-#include "server/net/room_entries.hpp"
+#include "server/net/session_messages.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon::test {
