@@ -47,7 +47,7 @@ class FastPath {
   [[nodiscard]] bool send(const Cut& cut);
   [[nodiscard]] bool send(const CuttingState& state);
   [[nodiscard]] bool send(const MountLoad& push);
-  // What came over the stream: a entry, and the newest own cut that is decided.
+  // What came over the stream: an entry, and the newest own cut that is decided.
   void heard(std::uint64_t index);
   void decided(std::uint64_t author_seq);
   void know_tool(std::uint32_t number, const Digest& tool);

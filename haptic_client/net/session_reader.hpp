@@ -30,7 +30,7 @@ class SessionReader {
   void begin();
   // Error: the server sent what no correct server sends; nothing more of the stream is to be taken.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
-  // A entry of the fast path that belongs to the present stream.
+  // An entry of the fast path that belongs to the present stream.
   [[nodiscard]] Result<void> take(wire::IndexedEntry entry);
   // Every entry up to this one was passed on.
   [[nodiscard]] std::uint64_t taken() const { return entries_.acknowledged(); }

@@ -15,7 +15,7 @@ struct JournalEntry {
   std::string bytes;       // the room's own encoding
 };
 
-// How far a journal goes, and what it says: equal heads, equal histories. Whoever was told of a entry keeps it as a
+// How far a journal goes, and what it says: equal heads, equal histories. Whoever was told of an entry keeps it as a
 // witness.
 struct JournalHead {
   RoomSeq place;

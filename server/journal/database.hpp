@@ -23,7 +23,7 @@ class Statement {
   Statement& integer(int at, std::int64_t value);
   Statement& text(int at, std::string_view value);  // must stay until the next step
   Statement& blob(int at, std::string_view value);  // likewise
-  [[nodiscard]] Result<bool> step();                // true: there is a entry
+  [[nodiscard]] Result<bool> step();                // true: there is an entry
   [[nodiscard]] Result<void> run();                 // to its end; ready to run again
   void reset();
 

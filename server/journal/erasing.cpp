@@ -52,7 +52,7 @@ JournalHead JournalFile::next_in_chain(const JournalHead& before, const JournalE
 }
 
 Result<void> JournalFile::erase(std::span<const JournalEntry> instead) {
-  auto statement = database_.prepare("UPDATE entries SET bytes = ? WHERE place = ?");
+  auto statement = database_.prepare("UPDATE rows SET bytes = ? WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
   for (const JournalEntry& entry : instead) {
     const auto chain = chain_at(entry.place);

@@ -346,7 +346,7 @@ Result<void> Journal::append(std::span<const JournalEntry> entries) {
       return failure(ErrorCode::invalid_input,
                      state.path.string() + ": entry " + std::to_string(entry.place.value) + " has " +
                          std::to_string(entry.bytes.size()) + " bytes, more than the " +
-                         std::to_string(state.options.most_entry_bytes) + " that a entry may have");
+                         std::to_string(state.options.most_entry_bytes) + " that an entry may have");
   if (entries.empty()) return {};
   JournalHead head = state.head;
   // Into the transaction, which is in memory, and into the log, which makes them safe.
@@ -517,7 +517,7 @@ Result<void> Journal::set_person(const Person& person) { return set_beside({}, {
 
 Result<std::vector<Person>> Journal::people() { return state_->file.people(); }
 
-// A entry that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So
+// An entry that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So
 // the whole table is emptied, which overwrites every page that it ever had, and those who stay are written anew.
 // SQLite's log, which has the pages as they were, is cut to nothing whenever the journal's is carried.
 Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)>& kept) {

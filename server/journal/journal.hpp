@@ -67,7 +67,7 @@ class Journal {
   void close_to_entries(Error reason);
 
   // All of them or, after an error, none that was ever reported: safe on the disk when it returns. Places must go on
-  // from head(). Error invalid_input: a entry above most_entry_bytes, and nothing happens; any other closes the journal to
+  // from head(). Error invalid_input: an entry above most_entry_bytes, and nothing happens; any other closes the journal to
   // entries.
   [[nodiscard]] Result<void> append(std::span<const JournalEntry> entries);
   [[nodiscard]] const JournalHead& head() const;
@@ -115,7 +115,7 @@ class Journal {
   [[nodiscard]] Result<std::size_t> forget_people_before(std::int32_t day);  // who joined before it
   [[nodiscard]] Result<std::size_t> forget_people_if(const std::function<bool(const Person&)>& whom);
 
-  // Puts what `without` returns in place of a entry, where it returns something. Asked for all entries in their order. The
+  // Puts what `without` returns in place of an entry, where it returns something. Asked for all entries in their order. The
   // chain, its signatures and what witnesses know stay. No byte of what was there before is left in the journal's
   // files. Error denied: it is signed, and there is no key to sign this. Returns how many entries are others now. Takes as
   // long as reading and writing them.

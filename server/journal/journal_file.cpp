@@ -35,20 +35,20 @@ struct Version {
   " seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"
 
 constexpr const char* kTimedTables =
-    "CREATE TABLE entries(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
+    "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
     " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES;
 constexpr const char* kSignatureTable =
     "CREATE TABLE signatures(place INTEGER PRIMARY KEY, since INTEGER NOT NULL, chain BLOB NOT NULL, key BLOB NOT NULL,"
     " signature BLOB NOT NULL) STRICT;";
 constexpr int kVersionWithSignatures = 4;
 constexpr const char* kTimedEntries =
-    "SELECT place, at_ns, bytes, chain FROM entries WHERE place > ? AND place <= ? ORDER BY place";
+    "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place";
 
 const std::array kVersions{
     Version{1,
-            "CREATE TABLE entries(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
+            "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
             "STRICT;" OSTEON_OTHER_TABLES,
-            "SELECT place, 0, bytes, chain FROM entries WHERE place > ? AND place <= ? ORDER BY place"},
+            "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
     Version{2, kTimedTables, kTimedEntries}, Version{3, kTimedTables, kTimedEntries},
     Version{kJournalVersion, std::string(kTimedTables) + kSignatureTable, kTimedEntries}};
 
@@ -56,7 +56,7 @@ const Version& version_of(int number) {
   return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
 }
 
-constexpr const char* kInsertEntry = "INSERT INTO entries(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
+constexpr const char* kInsertEntry = "INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
 
 Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
   std::unique_ptr<DiskFile> copy;
@@ -138,7 +138,7 @@ bool is_partial_of(const fs::path& journal, std::string_view name) {
 Result<void> check_is_journal(const fs::path& file, Disk& disk) {
   constexpr std::size_t kSmallestPage = 512, kLooked = std::size_t{64} << 10, kApplicationAt = 68;
   constexpr std::string_view kMagic("SQLite format 3\0", 16), kOwn("OstJ"),
-      kEntries("CREATE TABLE entries(place INTEGER PRIMARY KEY");
+      kEntries("CREATE TABLE rows(place INTEGER PRIMARY KEY");
   const auto size = disk.size(file);
   if (!size) return tl::unexpected(size.error());
   if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
@@ -287,7 +287,7 @@ Result<void> JournalFile::make_id() {
 }
 
 Result<JournalHead> JournalFile::stored_head() {
-  auto statement = database_.prepare("SELECT place, chain FROM entries ORDER BY place DESC LIMIT 1");
+  auto statement = database_.prepare("SELECT place, chain FROM rows ORDER BY place DESC LIMIT 1");
   if (!statement) return tl::unexpected(statement.error());
   const Result<bool> entry = statement->step();
   if (!entry) return tl::unexpected(entry.error());
@@ -412,7 +412,7 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
 
 Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
   if (place.value == 0) return first_head(genesis_).chain;
-  auto statement = database_.prepare("SELECT chain FROM entries WHERE place = ?");
+  auto statement = database_.prepare("SELECT chain FROM rows WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
   const Result<bool> entry = statement->integer(0, static_cast<std::int64_t>(place.value)).step();
   if (!entry) return tl::unexpected(entry.error());
@@ -594,7 +594,7 @@ Inspection JournalFile::inspect(bool files) {
   if (walked.stopped) {
     found.first_bad = RoomSeq{walked.head.place.value + 1};
     note(*walked.stopped);
-  } else if (const Result<std::int64_t> entries = database_.integer("SELECT count(*) FROM entries"); !entries) {
+  } else if (const Result<std::int64_t> entries = database_.integer("SELECT count(*) FROM rows"); !entries) {
     note(entries.error());
   } else if (static_cast<std::uint64_t>(*entries) != found.head.place.value) {  // some have places below 1
     found.faults.push_back(file_.string() + " has entries that are in no place of the order" + std::string(kRemedy));

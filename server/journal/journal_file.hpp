@@ -57,7 +57,7 @@ struct SealedRegister {
   std::string name, value, seal;
 };
 
-// A entry of which something was erased.
+// An entry of which something was erased.
 struct ErasedEntry {
   Digest chain;  // at the entry, as it was written
   Digest bytes;  // of what stands in its place
@@ -166,7 +166,7 @@ class JournalFile {
   Disk* disk_;
   std::unique_ptr<ScratchFolder> scratch_;  // where the database is a copy; outlives it
   Database database_;
-  std::optional<Statement> insert_;  // of a entry
+  std::optional<Statement> insert_;  // of an entry
   const SigningKey* key_ = nullptr;
   int version_ = 0;
   std::string genesis_;
@@ -181,7 +181,7 @@ class JournalFile {
 inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer",
                                   kEpochRegister = "server_epoch", kRecoveredRegister = "recovered",
                                   kGenerationRegister = "log generation", kIdRegister = "journal id",
-                                  kKeysRegister = "signing keys", kErasedRegister = "erased entries";
+                                  kKeysRegister = "signing keys", kErasedRegister = "erased rows";
 
 // A head that is kept as a register, with a mark.
 struct Footer {

@@ -431,7 +431,7 @@ Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk)
   auto source = Source::open(file, or_system(disk));
   if (source) return (*source)->chain_at(head.place).map([&](const auto& chain) { return chain == head.chain; });
   if (source.error().code != ErrorCode::exists) return tl::unexpected(source.error());
-  // What is read beside a write may be half of one: only a entry that fits the one before it counts.
+  // What is read beside a write may be half of one: only an entry that fits the one before it counts.
   auto peeked = JournalFile::peek(file, or_system(disk));
   if (!peeked) return tl::unexpected(source.error());
   if (!head.place) return first_head(peeked->genesis()) == head;

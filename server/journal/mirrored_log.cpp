@@ -344,7 +344,7 @@ Result<void> MirroredLog::check_named(const Member& member) {
 }
 
 Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
-  // Nobody can put something into a entry that is taken for an entry.
+  // Nobody can put something into an entry that is taken for an entry.
   std::array<std::uint8_t, kSaltBytes> salt{};
   system_random()(salt);
   member.salt.assign(salt.begin(), salt.end());

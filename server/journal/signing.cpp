@@ -56,7 +56,7 @@ Digest message_of(const PublicKey& before, const PublicKey& after) {
 
 Digest message_of(RoomSeq since, const JournalHead& head) {
   Hasher hasher;
-  hasher.text("osteon journal entries");
+  hasher.text("osteon journal rows");
   hasher.integer(since.value);
   hasher.integer(head.place.value);
   hasher.text(as_text(head.chain));

@@ -78,7 +78,7 @@ class Room {
   [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
 
   // A new identity, never given twice: the event's author. What holds for the person's newest hand holds for the new
-  // one, by a entry of its own (RoomEvent::further), unless the server itself joins, which has no secret.
+  // one, by an entry of its own (RoomEvent::further), unless the server itself joins, which has no secret.
   RoomEvent admit(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   [[nodiscard]] bool knows(AuthorId author) const;
@@ -227,7 +227,7 @@ class Room {
   [[nodiscard]] bool exists(BodyId body) const;
   [[nodiscard]] std::vector<Standing> with_tools(const std::vector<SceneItem>& items) const;
   [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> places) const;
-  // Deciding: a entry with the next place. Applying it is the same for one just decided and for one of a journal.
+  // Deciding: an entry with the next place. Applying it is the same for one just decided and for one of a journal.
   LogEntry next_entry(AuthorId by, decltype(LogEntry::what) what);
   RoomEvent decide(AuthorId by, decltype(LogEntry::what) what);
   [[nodiscard]] Result<void> can_follow(const LogEntry& entry) const;

@@ -292,7 +292,7 @@ void SimClient::hear_entry(wire::IndexedEntry entry) {
   by_datagram_ = true;
   const Result<void> taken = reader_->take(std::move(entry));
   by_datagram_ = false;
-  ledger_.check(taken.has_value(), Invariant::datagrams, "a entry that came in a datagram is not taken");
+  ledger_.check(taken.has_value(), Invariant::datagrams, "an entry that came in a datagram is not taken");
 }
 
 void SimClient::compare(const v1::SessionResponse& response) {

@@ -68,7 +68,7 @@ class LogTest : public ::testing::Test {
   MemoryDisk disk_{1};
   std::vector<JournalEntry> entries_ = [] {
     std::vector<JournalEntry> entries = some_entries(5, 60);
-    for (JournalEntry& entry : entries) entry.bytes += "a entry is as long as this at least";
+    for (JournalEntry& entry : entries) entry.bytes += "an entry is as long as this at least";
     return entries;
   }();
   MemoryDisk::Image before_;
@@ -231,7 +231,7 @@ TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
     }
 }
 
-// A entry is as large as it may be, and has in it what looks like the entry of a log.
+// An entry is as large as it may be, and has in it what looks like the entry of a log.
 TEST_F(LogTest, TakesARowThatIsLargerThanItself) {
   {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());

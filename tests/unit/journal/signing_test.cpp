@@ -267,7 +267,7 @@ TEST_F(SignedJournal, NamesAFooterThatAScriptWrote) {
   write(keys_, 0, 20, true);
   write(keys_, 20, 30, true);
   run_sql(
-      "DELETE FROM entries WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
+      "DELETE FROM rows WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
       "DELETE FROM registers WHERE name IN ('footer', 'log generation')");
   write(nullptr, 0, 0, true);
   EXPECT_THAT(vouched(key_).other_entries, Contains("the footer"));

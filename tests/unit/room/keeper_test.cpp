@@ -32,7 +32,7 @@ constexpr const char *kFile = "/rooms/femur", *kTo = "/else/copy";
 
 class KeeperTest : public ::testing::Test {
  protected:
-  // Writes a entry whenever it is called: where the journal were held meanwhile, for ever.
+  // Writes an entry whenever it is called: where the journal were held meanwhile, for ever.
   MaintenanceCalls writing(KeptCuts& kept, int& written) {
     return {[&kept, &written](double) {
               kept.cut(1);
