@@ -28,7 +28,7 @@ constexpr auto kAgainTime = 1s;                    // for one attempt to come ba
 constexpr int kConnectMs = 3000;
 // A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server
 // allows pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the
-// bone: it waits longer than its RoomWatch does.
+// bone: it waits longer than its ConfirmationMonitor does.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
 // The room that a channel's calls are to: empty, the only one that is open.

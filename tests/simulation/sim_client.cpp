@@ -536,7 +536,7 @@ void SimClient::cut(int left) {
   send();
   replica_->add_own(one);
   felt_[one.author_seq] = one.lease_epoch;
-  ledger_.check(replica_->unconfirmed() <= haptic::RoomWatch::kMostUnconfirmed + 1, Invariant::bounds,
+  ledger_.check(replica_->unconfirmed() <= haptic::ConfirmationMonitor::kMostUnconfirmed + 1, Invariant::bounds,
                 "a replica holds too much unconfirmed");
   later(kCutTime, [this, left] { cut(left - 1); });
 }

@@ -176,8 +176,8 @@ TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
   // What a hand may have done since the last entry: cuts until it hears nothing for so long, or leaves so many
   // unconfirmed.
   constexpr double kTick_s = 0.001, kAway_s = std::chrono::duration<double>(kTimeAway).count();
-  static_assert(kAway_s > haptic::RoomWatch::kSilence_s);
-  static_assert(kAway_s > haptic::RoomWatch::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
+  static_assert(kAway_s > haptic::ConfirmationMonitor::kSilence_s);
+  static_assert(kAway_s > haptic::ConfirmationMonitor::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
   KeptCuts kept(kFile, &disk_, "femur");
   EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "a new one";
   kept.cut(3);
