@@ -47,8 +47,8 @@ EMPTY_LOOP = "the same of an empty 1 kHz loop"
 # million where each
 # input costs a millisecond: the bone is cut, or SQLite opens a file three times and recovers it.
 FUZZED = (
-    ("ticket", "tickets", "the door", 10_000_000),
-    ("upload", "archives", "the upload_validation", 10_000_000),
+    ("ticket", "tickets", "the authorizer", 10_000_000),
+    ("upload", "archives", "the upload validation", 10_000_000),
     ("supervision", "decisions", "the wire", 10_000_000),
     ("annotation", "drawings", "the wire", 10_000_000),
     ("up_packet", "datagrams, and packets with the key,", "the server's end of a fast path", 10_000_000),
