@@ -1,4 +1,4 @@
-// Which calls stand in the audit log, and as what.
+// Says which calls the audit log records, and under which name.
 #pragma once
 #include <memory>
 #include <string_view>
@@ -15,12 +15,13 @@ class Authorizer;
 // "DeleteRoom" of "/osteon.v1.RoomsService/DeleteRoom"; "call" of nothing.
 [[nodiscard]] std::string_view call_name(std::string_view method);
 
-// Whether a call is recorded also where it succeeds: whoever comes in, whatever an operator or instructor alone may do,
-// and what takes data out of the server or brings it in. Cutting and drawing are in the room's journal, and not here.
+// Whether a call is recorded even if it succeeds. This holds for everybody who enters, for everything that only an
+// operator or instructor may do, and for everything that moves data out of or into the server. Cuts and drawings are
+// not recorded here, since the room's journal has them.
 [[nodiscard]] bool is_audited(std::string_view method);
 
-// Records those, and of all other calls those that a handler refuses; the authorizer records what it refuses itself.
-// `authorizer` says whose a call is; null: plain text. Both outlive the server.
+// Records these calls. Of all other calls, records those that a handler refuses; the authorizer records its own
+// refusals. `authorizer` says who makes a call; null: plain text. Both outlive the server.
 [[nodiscard]] std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface> audited_calls(
     AuditTrail& trail, Authorizer* authorizer);
 

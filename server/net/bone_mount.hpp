@@ -1,5 +1,5 @@
-// The bone of a room on its mount, for whoever pushes it: what lines bring on any thread, what time does on the tick's.
-// It lasts as long as the room is open; it is no event of the room and no part of its bone.
+// The compliant mount of a room's bone. Receives loads on any thread and advances the motion on the tick thread. It
+// lasts as long as the room is open. It is neither an event of the room nor part of its bone.
 #pragma once
 #include <chrono>
 #include <mutex>
@@ -13,21 +13,21 @@ class BoneMount {
  public:
   explicit BoneMount(const MountServerParams& params) : bone_(params) {}
 
-  // Of every session that is opened, also where its author had another.
+  // For every session that opens, also if its author had one before.
   void join(AuthorId author);
   void leave(AuthorId author);
-  // Of nobody who joined, or no newer than what came: it is ignored.
+  // Ignored if the author has not joined, or if the load is not newer than the last one.
   void push(AuthorId author, const MountLoad& push);
 
-  // [tick] `now`: since any start, never falls. True: everybody who joined is to be told: at every tick while the bone
-  // is not at rest, and now and then in any case, as a place may be lost and a client knows by them that there is a
-  // mount.
+  // [tick] `now`: time since any start; never decreases. Returns true when the pose is to be sent to everybody who
+  // joined: at every tick while the bone moves, and also now and then at rest. A pose can be lost, and these messages
+  // let a client know that there is a mount.
   [[nodiscard]] bool step(std::chrono::nanoseconds now);
-  // [tick] What this author is told.
+  // [tick] The pose as sent to this author.
   [[nodiscard]] MountPose seen(AuthorId author);
 
  private:
-  std::mutex mutex_;  // never held with another that is taken within
+  std::mutex mutex_;  // never held with another mutex that is taken within
   MountServer bone_;
   std::chrono::nanoseconds stepped_{-1}, told_{};
 };

@@ -1,5 +1,5 @@
-// The cases that rooms can be of. Those that were uploaded are in memory only as long as a room has them, and all
-// together within a limit: what strangers' cases take is decided by whoever runs the server.
+// The cases that rooms can use. Uploaded cases are in memory only while a room uses them, and all cases together stay
+// within a limit. So whoever runs the server decides how much memory the cases of other people may take.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -16,46 +16,46 @@
 
 namespace osteon {
 
-inline constexpr std::uint64_t kMostCaseMemory = std::uint64_t{8} << 30;  // bytes, unless somebody says otherwise
+inline constexpr std::uint64_t kMostCaseMemory = std::uint64_t{8} << 30;  // bytes, default
 
 struct ServedCase {
   Case bone;
-  std::filesystem::path folder;  // that clients are sent
+  std::filesystem::path folder;  // sent to clients
 };
 
-// What is known of a case that may not be in memory.
+// What is known of a case, whether it is in memory or not.
 struct KnownCase {
   Digest hash;
   std::string title;
   std::filesystem::path folder;
-  std::uint64_t memory_bytes = 0;  // that it takes; 0: that shows when it is loaded
+  std::uint64_t memory_bytes = 0;  // memory that it needs; 0: known only after loading
 };
 
-// In memory for as long as somebody has it.
+// A case that stays in memory while somebody holds this.
 struct LoadedCase {
-  std::shared_ptr<const Case> bone;  // shared by the rooms of it
+  std::shared_ptr<const Case> bone;  // shared by the rooms of the case
   std::filesystem::path folder;
 };
 
-// Any thread.
+// Any thread may call it.
 class CaseCache {
  public:
-  // `most_bytes`: of all that are in memory at once.
+  // `most_bytes`: limit of all cases in memory together.
   explicit CaseCache(std::uint64_t most_bytes) : most_bytes_(most_bytes) {}
 
-  void keep(ServedCase served);  // in memory as long as this is
-  void add(KnownCase known);     // one of a hash that is known stays as it is
+  void keep(ServedCase served);  // stays in memory as long as the cache
+  void add(KnownCase known);     // if its hash is known already, nothing changes
   [[nodiscard]] std::optional<KnownCase> find(const Digest& hash) const;
-  [[nodiscard]] std::vector<KnownCase> all() const;  // in the order of their hashes
-  // Reads it from its folder where nobody has it, one at a time. Errors: not_found, exhausted (with it, the cases in
-  // memory would take more than they may), and those of Case::load().
+  [[nodiscard]] std::vector<KnownCase> all() const;  // in order of their hashes
+  // Reads the case from its folder if nobody holds it. One case is read at a time. Errors: not_found; exhausted (the
+  // cases in memory would exceed the limit); and those of Case::load().
   [[nodiscard]] Result<LoadedCase> load(const Digest& hash);
   [[nodiscard]] std::uint64_t loaded_bytes() const;
 
  private:
   struct Entry {
     KnownCase known;
-    std::shared_ptr<const Case> kept;  // shared with its rooms; null: only they have it
+    std::shared_ptr<const Case> kept;  // shared with its rooms; null: only its rooms hold it
     std::weak_ptr<const Case> loaded;
   };
   [[nodiscard]] std::uint64_t loaded_locked() const;                                          // under mutex_

@@ -1,4 +1,4 @@
-// How long a server's certificate is still good, and for whom.
+// Says how long a server's certificate is valid, and for which names.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -8,12 +8,12 @@
 
 namespace osteon {
 
-// Days from now to the notAfter of the first certificate of a PEM file; negative once it is over. Errors: not_found (no
-// file), invalid_input (no certificate in it).
+// Days from now to the notAfter of the first certificate of a PEM file; negative after its end. Errors: not_found (no
+// file), invalid_input (no certificate in the file).
 [[nodiscard]] Result<double> certificate_days_left(const std::filesystem::path& pem);
 
-// Writes into the log by which names clients may come and until when, and a warning where they cannot come at `now`:
-// before it begins, after its end, or without a name. `pem`: with the server's certificate first.
+// Logs the names under which clients may connect, and until when. Logs a warning if clients cannot connect at `now`:
+// the certificate is not yet valid, has expired, or has no name. `pem`: the server's certificate comes first.
 void log_server_certificate(const std::filesystem::path& pem, std::chrono::sys_seconds now);
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// Makes what a room has decided durable before anyone is told of it: one transaction for all entries of a tick, on a
-// thread of its own, while the room goes on.
+// Makes the decisions of a room durable before they are sent to anybody. Writes all entries of a tick in one
+// transaction, on its own thread, while the room goes on.
 #pragma once
 #include <condition_variable>
 #include <cstddef>
@@ -18,30 +18,31 @@ namespace osteon {
 
 class Committer {
  public:
-  // Returns when the entries will survive whatever comes; blocks. After an error it is not called again.
+  // Returns when the entries are durable; blocks. It is not called again after an error.
   using Write = std::function<Result<void>(std::span<const LogEntry>)>;
-  // What is to be said of a decision once it is durable; with an error where it never will be.
+  // Sends a decision once it is durable. Gets an error if it will never be durable.
   using Tell = std::function<void(const Result<void>& durable)>;
 
-  // Without a `write` nothing is kept, and all is told at once on the caller's thread. `failed`: called once, on the
-  // committing thread, before anyone is told of the error. `apart` false: no thread; drain() writes and tells.
+  // Without `write` nothing is written, and everything is sent at once on the caller's thread. `failed` is called once,
+  // on the committing thread, before the error is sent to anybody. `apart` false: there is no thread, and drain()
+  // writes and sends.
   explicit Committer(Write write, std::function<void(const Error&)> failed = {}, bool apart = true);
-  ~Committer();  // commits what was handed over; without a thread it is lost, as when a process is killed
+  ~Committer();  // commits what was handed over; without a thread this is lost, as when a process is killed
   Committer(const Committer&) = delete;
   Committer& operator=(const Committer&) = delete;
 
-  // [tick] In the order of the calls: the entries, then what tells of them. Either may be empty.
+  // [tick] Takes entries and then the functions that send them, in the order of the calls. Either may be empty.
   void commit(std::vector<LogEntry> entries, std::vector<Tell> tells);
-  // Returns when all that was handed over is durable and told.
+  // Returns when everything handed over is durable and sent.
   void drain();
 
   [[nodiscard]] std::size_t waiting() const;             // entries
   [[nodiscard]] DurationHistogram commit_times() const;  // of the transactions
-  [[nodiscard]] std::optional<Error> failure() const;    // why nothing more is kept
+  [[nodiscard]] std::optional<Error> failure() const;    // why nothing more is written
 
  private:
   void run();
-  // Writes and tells, without the mutex.
+  // Writes and sends, without the mutex.
   void keep(const std::vector<LogEntry>& entries, const std::vector<Tell>& tells);
 
   const Write write_;
@@ -50,7 +51,7 @@ class Committer {
   std::condition_variable wake_;
   std::vector<LogEntry> entries_;
   std::vector<Tell> tells_;
-  std::size_t writing_ = 0;  // entries in the transaction under way
+  std::size_t writing_ = 0;  // entries in the current transaction
   bool busy_ = false, end_ = false;
   DurationHistogram times_;
   std::optional<Error> failure_;

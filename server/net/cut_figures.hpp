@@ -1,4 +1,4 @@
-// How long cuts take on their way through a room, stage by stage, and why some are not taken.
+// Measures how long cuts take in each stage of a room, and counts why cuts are rejected.
 #pragma once
 #include <array>
 #include <chrono>
@@ -10,14 +10,14 @@
 
 namespace osteon {
 
-// What a cut that was committed has waited for on its way through a room, one after the other.
+// The times that a committed cut takes in a room, one stage after the other.
 struct StageTimes {
   DurationHistogram wait;    // from its arrival until the tick took it
-  DurationHistogram decide;  // judged and applied
-  DurationHistogram commit;  // until it was durable; short where nothing is kept
-  DurationHistogram tell;    // until every session had been handed it
+  DurationHistogram decide;  // to judge and apply it
+  DurationHistogram commit;  // until it was durable; short if nothing is written
+  DurationHistogram tell;    // until it was handed to every session
 };
-using RejectionCounts = std::array<std::uint64_t, kRejections>;  // by the reason's number
+using RejectionCounts = std::array<std::uint64_t, kRejections>;  // by the number of the reason
 
 class CutFigures {
  public:
@@ -25,7 +25,7 @@ class CutFigures {
   // [tick]
   void committed(Time arrived, Time taken, Time decided);
   void rejected(Rejection reason) { ++own_.rejections.at(static_cast<std::size_t>(reason)); }
-  // [tick] Lets others see it, unless one of them is reading just now; the `last` time in any case.
+  // [tick] Makes the figures visible to readers, unless one is reading at this moment. With `last` it always does.
   void publish(bool last);
   // [committing thread]
   void told(Time decided, Time kept, Time told);

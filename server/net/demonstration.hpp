@@ -1,5 +1,5 @@
-// Cuts of a journal that happen again in a live room: made by a tool of its own, judged like anybody's, seen and heard,
-// so that hands can be guided along it.
+// Repeats cuts of a journal in a live room. A simulated tool makes them; the room judges them like all other cuts.
+// People see and hear it, and their tools can be guided along it.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -19,10 +19,10 @@ class OpenRoom;
 class Rooms;
 
 struct WhatToShow {
-  std::string room;    // whose journal; empty: the room's own
-  AuthorId of;         // whose cuts; null: everyone's
-  RoomSeq from, to;    // both included; null: from its beginning, to its end
-  double speed = 1.0;  // times as fast as it happened
+  std::string room;    // room of the journal; empty: this room's own
+  AuthorId of;         // author of the cuts; null: all authors
+  RoomSeq from, to;    // both included; null: from the beginning, to the end
+  double speed = 1.0;  // times the original speed
 };
 
 struct Shown {
@@ -30,7 +30,7 @@ struct Shown {
   std::size_t cuts = 0;
 };
 
-// Those of one room. Any thread but the room's own. Each has a thread.
+// The demonstrations of one room. Any thread may call it but those of the room. Each demonstration has a thread.
 class Demonstrations {
  public:
   static constexpr std::size_t kMost = 4, kMostCuts = 100'000;
@@ -41,21 +41,22 @@ class Demonstrations {
   Demonstrations(const Demonstrations&) = delete;
   Demonstrations& operator=(const Demonstrations&) = delete;
 
-  // Reads the journal first, which takes a while; given up where all are to end. Cuts that were taken back by `to` are
-  // not shown. While the demonstrator is stopped or without its tool, the tool is seen at rest. Errors: invalid_input
-  // (the speed; another case; more than kMostCuts), not_found (no such room, no cut there), unavailable (that room is
-  // not kept, kMost go on, the room is closed, the server is to stop), denied (`caller` may not any more), and those of
-  // reading. It ends once the caller may not start one any more: who is revoked leaves nothing going on.
+  // Reads the journal first, which takes a while; stops reading when all demonstrations are to end. Cuts that were
+  // undone by `to` are not shown. While the demonstrator is stopped or its tool is not allowed, the tool is shown at
+  // rest. A demonstration ends when the caller loses the right to start one, so nothing continues for a person whose
+  // rights are revoked. Errors: invalid_input (the speed; another case; more than kMostCuts); not_found (no such room,
+  // or no cut in that range); unavailable (that room has no journal, kMost demonstrations are running, the room is
+  // closed, or the server is stopping); denied (`caller` no longer has the right); and those of reading.
   [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller,
                                     const WhatToShow& what);
-  // Error not_found: no demonstration of that author goes on; of one that was ended, why.
+  // Error not_found: that author runs no demonstration. If a demonstration ended, the error says why.
   [[nodiscard]] Result<void> end(AuthorId demonstrator);
-  // For good, also of those that are about to begin: the room is closed, or the server is to stop. They are over when
-  // it returns.
+  // Ends all demonstrations for good, also those that are about to begin. Called when the room closes or the server
+  // stops. All have ended when it returns.
   void end_all();
 
  private:
-  std::mutex mutex_;  // taken before those of the room, the authorizer and a demonstration, within none
+  std::mutex mutex_;  // taken before those of the room, the authorizer and a demonstration; never within one of them
   std::vector<std::shared_ptr<Demonstration>> going_on_;  // shared with the cuts that they have queued
   std::atomic<bool> over_{false};
 };

@@ -1,5 +1,5 @@
-// Finds the pieces that come apart, beside the room: it keeps a copy of every body, so that the room is held still only
-// while a few leaves are copied, and never while pieces are looked for or made.
+// Finds fragments beside the room. Keeps a copy of every body. So the room is locked only while a few leaves are
+// copied, and never while fragments are searched or made.
 #pragma once
 #include <functional>
 #include <map>
@@ -10,18 +10,18 @@
 
 namespace osteon {
 
-// One thread. The copies lack nothing but what Room::take_changes() has yet to tell.
+// One thread. The copies lack only what Room::take_changes() has not yet returned.
 class FragmentDetector {
  public:
-  // Fills the values of leaves, a batch at a time under the room's lock; leaves out those of bodies that are gone.
+  // Fills the values of leaves in batches, under the room's lock. Removes the leaves of bodies that no longer exist.
   using ReadLeaves = std::function<void(std::vector<FieldLeaf>& leaves)>;
   FragmentDetector(Room& room, std::shared_mutex& room_mutex, ReadLeaves read)
       : room_(room), mutex_(room_mutex), read_(std::move(read)) {}
 
-  // Follows the bodies to where they are now, and says what has come apart. The room decides about all of it before the
-  // next call.
+  // Brings the copies up to date and returns the fragments that have come apart. The room must decide about all of them
+  // before the next call.
   [[nodiscard]] std::vector<Separation> look();
-  // Bone came back meanwhile: the body is looked at from the beginning.
+  // Bone came back in the meantime: the body is searched again from the beginning.
   void lose(BodyId body) { bodies_.erase(body); }
 
  private:

@@ -1,5 +1,5 @@
-// Tells grpc.health.v1 how the server and each of its rooms fare: "" is the server, the others are named as their
-// rooms.
+// Reports the state of the server and of each room to grpc.health.v1. The name "" is the server; the other names are
+// those of the rooms.
 #pragma once
 #include <condition_variable>
 #include <map>
@@ -15,14 +15,14 @@ namespace osteon {
 
 class Rooms;
 
-// SERVING while a room takes cuts, and the server lets people in; NOT_SERVING once a room was closed, its journal
-// failed, or all is being drained. Looks several times a second, and at once when asked.
+// SERVING while a room takes cuts and the server admits clients. NOT_SERVING after a room was closed, its journal
+// failed, or the server drains. Checks several times a second, and at once on request.
 class HealthWatch {
  public:
-  // Whoever has a certificate may ask grpc.health.v1, without a ticket. So a server with certificates names no room
-  // there.
+  // Anybody with a certificate may ask grpc.health.v1 without a ticket. So a server with certificates does not name its
+  // rooms there.
   enum class Of { server, server_and_rooms };
-  // Both outlive it.
+  // Both outlive this object.
   HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& service, Of of = Of::server_and_rooms);
   ~HealthWatch();
   HealthWatch(const HealthWatch&) = delete;
@@ -36,7 +36,7 @@ class HealthWatch {
   const Of of_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::map<std::string, bool> told_;  // serving or not, by name
+  std::map<std::string, bool> told_;  // whether serving, by name
   bool end_ = false;
   std::thread thread_;
 };

@@ -1,4 +1,4 @@
-// A thread for what takes long: jobs run one after another, in the order in which they came.
+// A thread for slow jobs. They run one after another, in the order in which they came.
 #pragma once
 #include <condition_variable>
 #include <deque>
@@ -17,9 +17,10 @@ class JobThread {
   JobThread& operator=(const JobThread&) = delete;
 
   void start();
-  // Any thread. Before start() and after stop() the job runs within the call: whoever waits for its answer gets one.
+  // Any thread. Before start() and after stop() the job runs within the call, so that everybody who waits for an answer
+  // gets one.
   void run(Job job);
-  void stop();  // after the jobs that wait; not from within one
+  void stop();  // finishes the waiting jobs first; must not be called from a job
 
  private:
   void work();
