@@ -1,4 +1,4 @@
-// A room's entries as bytes of its journal, and back.
+// Converts a room's log entries to bytes of its journal, and back.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -13,34 +13,34 @@
 
 namespace osteon {
 
-// The register of a journal that has the last number given to a person.
+// The journal register that holds the last number given to a person.
 inline constexpr const char* kPeopleRegister = "people";
-// The one that has the key of what clients are told is safe.
+// The journal register that holds the key of the witnesses sent to clients.
 inline constexpr const char* kWitnessRegister = "witness key";
 
-// The name of the room, where it is no longer the one that it began with.
+// The journal register that holds the name of the room, if it differs from the name at the beginning.
 inline constexpr const char* kNameRegister = "room name";
 
-// What a room began as: enough to make it again beside the case itself.
+// How a room began: enough to make it again, together with the case.
 struct RoomGenesis {
   Digest case_hash;
   std::uint32_t kernel_version = 0;
   std::vector<Tool> tools;
   Digest room_genesis;  // Room::genesis()
-  std::string room;     // its name
-  // A branch: where it comes from.
+  std::string room;     // name of the room
+  // Only of a branch: where it comes from.
   std::string parent;
   RoomSeq parent_room_seq;
   Digest parent_chain;
 };
 [[nodiscard]] RoomGenesis genesis_of(const Room& room, std::string name);
 [[nodiscard]] std::string to_bytes(const RoomGenesis& genesis);
-// Errors: invalid_input (not such bytes), unsupported (of a later version).
+// Errors: invalid_input (not such bytes), unsupported (from a later version).
 [[nodiscard]] Result<RoomGenesis> genesis_from_bytes(std::string_view bytes);
-// The room as it began. Errors: unsupported (of another case or kernel than this), invalid_input.
+// The room as it began. Errors: unsupported (another case or kernel than here), invalid_input.
 [[nodiscard]] Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutLimits& limits);
 
-// Without place and time, which a journal keeps beside them.
+// Without sequence number and time, which a journal stores beside these bytes.
 [[nodiscard]] std::string to_bytes(const LogEntry& entry);
 // Error invalid_input, naming the entry and the field.
 [[nodiscard]] Result<LogEntry> entry_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
@@ -48,14 +48,14 @@ struct RoomGenesis {
 // {"place": 12, "at_s": 3.25, "event": {...}}, on one line.
 [[nodiscard]] Result<std::string> entry_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
 
-// All that a journal has of one person, as lines of JSON.
+// Exports everything that a journal has of one person, as lines of JSON.
 class PersonExport {
  public:
   PersonExport(std::uint32_t person, const std::vector<Person>& people);
-  // {"person": 3, "label": "...", "joined_day": 20778}; nothing: it was forgotten, or there is no such.
+  // {"person": 3, "label": "...", "joined_day": 20778}; nothing if the person was erased or does not exist.
   [[nodiscard]] const std::optional<std::string>& who() const { return who_; }
-  // As entry_as_json(), of the next entry where it is this person's: its coming, and what it asked for as whoever it then
-  // was.
+  // The next entry as in entry_as_json() if it belongs to this person: their join, or what they asked for under any of
+  // their author numbers.
   [[nodiscard]] Result<std::optional<std::string>> of(const JournalEntry& entry);
   [[nodiscard]] tl::unexpected<Error> nobody() const;  // error not_found
 

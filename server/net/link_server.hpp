@@ -1,5 +1,5 @@
-// The room's end of all fast paths: one UDP socket and one thread for every session. What gets through here is heard
-// sooner; the session's stream says all of it as well.
+// The room's end of all fast paths: one UDP socket and one thread for all sessions. Data that gets through here arrives
+// sooner; the session's stream carries all of it too.
 #pragma once
 #include <condition_variable>
 #include <cstdint>
@@ -19,40 +19,40 @@
 
 namespace osteon {
 
-// One session's link as its owner sees it: any thread, except from within the subscriber. What the subscriber is told comes on the
-// link server's thread.
+// One session's link as its owner uses it. Any thread may call it, except from within the subscriber. Calls to the
+// subscriber come on the link server's thread.
 class SessionLink {
  public:
   class Receiver {
    public:
     virtual ~Receiver() = default;
-    // Cuts in order of their author_seq, whichever way they came: over the link, or by offer().
+    // Cuts in order of their author_seq, whether they came over the link or by offer().
     virtual void take(Cut cut) = 0;
     virtual void take(CuttingState state) = 0;
-    virtual void pushed(const MountLoad& /*push*/) {}  // on the bone on its mount, the newest
-    // The client has entries up to this one.
+    virtual void pushed(const MountLoad& /*push*/) {}  // the newest load on the compliant mount
+    // The client has received all entries up to this one.
     virtual void arrived(std::uint64_t index) = 0;
   };
 
   SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& subscriber);
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
 
-  // A cut that came over the stream; the subscriber hears of it in its turn, within this call or later.
+  // A cut that came over the stream. The subscriber gets it in order, within this call or later.
   void offer(const Cut& cut);
-  // Every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::tell. False:
-  // this one goes over the stream alone.
+  // Takes every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::tell.
+  // Returns false if this entry goes over the stream alone.
   bool tell(std::uint64_t index, const wire::SessionEntry& entry);
   void know_tool(std::uint32_t number, const Digest& tool);
-  // Newest states of others' tools. False: nothing gets through now, so they are for the stream to tell.
+  // The newest states of others' tools. Returns false if nothing gets through now, so that the stream must carry them.
   bool set_partners(std::span<const CuttingState> partners);
-  // Where the bone stands on its mount. False as above.
+  // The pose of the bone on its mount. Returns false as above.
   bool set_bone(const MountPose& seen);
-  // Nothing is told to the subscriber any more once this returns.
+  // The subscriber is not called any more once this has returned.
   void close();
 
  private:
   friend class LinkServer;
-  // What has come for the subscriber, without the lock.
+  // What has arrived for the subscriber, to be delivered without the lock.
   struct News {
     std::vector<Cut> cuts;
     std::optional<CuttingState> state;
@@ -65,30 +65,30 @@ class SessionLink {
   const SessionKeys keys_;
   const AuthorId author_;
   // Order: told_mutex_, then mutex_.
-  std::mutex told_mutex_;  // held while the subscriber is told, so that what it hears keeps its order
+  std::mutex told_mutex_;  // held while the subscriber is called, so that its calls keep their order
   Receiver* subscriber_;
   std::mutex mutex_;
   wire::ServerLink link_;
   std::uint64_t arrived_ = 0;
-  class LinkServer* server_ = nullptr;  // to be woken
+  class LinkServer* server_ = nullptr;  // to wake its thread
 };
 
 struct LinkServerHealth {
   std::size_t links = 0, alive = 0;
   UdpPortCounts port;
-  std::uint64_t unauthenticated = 0;  // datagrams of no session that is open
+  std::uint64_t unauthenticated = 0;  // datagrams that belong to no open session
 };
 
 class LinkServer {
  public:
-  // `address`: numeric, as UdpPortOptions; `port` 0: the system chooses. Errors of UdpPort::open.
+  // `address`: numeric, as in UdpPortOptions. `port` 0: the system chooses. Errors: those of UdpPort::open.
   [[nodiscard]] static Result<std::unique_ptr<LinkServer>> open(const std::string& address, std::uint16_t port = 0);
   ~LinkServer();
   LinkServer(const LinkServer&) = delete;
   LinkServer& operator=(const LinkServer&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return port_->local().port; }
-  // A link with keys of its own, heard of until it is removed.
+  // Adds a link with its own keys. It receives datagrams until it is removed.
   [[nodiscard]] std::shared_ptr<SessionLink> add(AuthorId author, std::uint64_t first_author_seq,
                                                  SessionLink::Receiver& subscriber);
   void remove(const std::shared_ptr<SessionLink>& link);
@@ -99,7 +99,7 @@ class LinkServer {
   explicit LinkServer(std::unique_ptr<UdpPort> port);
   void run();
   void receive_some(std::chrono::nanoseconds now);
-  // When the next datagram is due.
+  // Sends what is due. Returns when the next datagram is due.
   [[nodiscard]] std::chrono::nanoseconds send_due(std::chrono::nanoseconds now);
   [[nodiscard]] std::vector<std::shared_ptr<SessionLink>> links() const;
 

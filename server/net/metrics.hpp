@@ -1,4 +1,4 @@
-// Figures of a server and its rooms for Prometheus, as text over HTTP to this machine alone.
+// Serves figures of a server and its rooms to Prometheus, as text over HTTP, to this machine alone.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -10,11 +10,11 @@ namespace osteon {
 
 class RoomServer;
 
-// What is asked for is gathered when it is asked for: between two questions it costs nothing.
+// Gathers figures when they are requested; between two requests this costs nothing.
 class Metrics {
  public:
-  // `listen`: PORT or HOST:PORT, 0 lets the system choose. `certificate`: the server's, empty where it has none.
-  // `server` outlives it. Errors: invalid_input (not HOST:PORT, or not of this machine alone), unavailable (the system
+  // `listen`: PORT or HOST:PORT; 0 lets the system choose. `certificate`: the server's; empty: none. `server` outlives
+  // this object. Errors: invalid_input (not HOST:PORT, or reachable from other machines), unavailable (the system
   // refuses).
   [[nodiscard]] static Result<std::unique_ptr<Metrics>> start(const std::string& listen, RoomServer& server,
                                                               const std::filesystem::path& certificate);

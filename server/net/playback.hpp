@@ -1,4 +1,4 @@
-// What happened in one room happening again in another: which entries are due, and where their tools are seen.
+// Repeats entries of one room in another: says which entries are due, and where their tools are shown.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -14,34 +14,35 @@
 
 namespace osteon {
 
-// Rows of another room that happen again in this one, which decides nothing itself.
+// Entries of another room that are repeated in this one, which decides nothing itself.
 struct Playback {
-  std::function<std::optional<LogEntry>()> next;  // [tick] nothing: the last one was given
-  double speed = 1.0;                            // times as fast as it happened; 0: nothing happens
+  std::function<std::optional<LogEntry>()> next;  // [tick] nothing: there are no more entries
+  double speed = 1.0;                            // times the original speed; 0: nothing happens
 };
 
-// One thread: the tick's, or that of a demonstration. `now`: since any start, never falls.
+// One thread: the tick thread, or that of a demonstration. `now`: time since any start; never decreases.
 class Player {
  public:
   using Time = std::chrono::nanoseconds;
-  static constexpr std::chrono::milliseconds kSeenAfterCut{250};  // so long a tool is seen at work after its newest cut
-  // `from`: the time of the room that is shown at which it begins, with the first call of take().
+  // a tool is shown at work for this long after its newest cut
+  static constexpr std::chrono::milliseconds kSeenAfterCut{250};
+  // `from`: the time in the shown room at which playback begins, with the first call of take().
   Player(Playback playback, Time from) : playback_(std::move(playback)), from_(from) {}
 
   // The next entry, once its time has come.
   [[nodiscard]] std::optional<LogEntry> take(Time now);
-  // No entry comes any more, neither one that is being waited for.
+  // No entry comes after this, not even one whose time is awaited.
   void stop() {
     playback_.next = nullptr;
     upcoming_.reset();
   }
 
-  // A recorded cut says where its tool was: nothing of a tool that nobody knows. Its number rises with every state,
-  // also with those at rest, as readers take only newer ones.
+  // The tool state that follows from a recorded cut; nothing for an unknown tool. The state's number rises with every
+  // state, also with idle ones, since readers take only newer states.
   [[nodiscard]] std::optional<CuttingState> see(const Cut& cut, const ToolBox& tools, Time now);
-  // Idle, once: tools that have not cut for a while. What they did between two cuts is not recorded.
+  // Idle states, once each, of tools that have not cut for a while. What they did between two cuts is not recorded.
   [[nodiscard]] std::vector<CuttingState> at_rest(Time now);
-  // The same at once, of all that are seen at work: they were stopped.
+  // The same at once for all tools that are shown at work: they were stopped.
   [[nodiscard]] std::vector<CuttingState> at_rest() { return at_rest(Time::max()); }
 
  private:

@@ -1,5 +1,5 @@
-// Who is in a room, what was decided about whom, what is drawn and what was said lately: what WatchPeople tells, and
-// each reader as far as their role goes.
+// Knows who is in a room, what was decided about whom, what is drawn, and the latest messages. WatchPeople sends this
+// to each reader, as far as the reader's role allows.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -22,56 +22,57 @@ namespace osteon {
 
 class PresenceSubscriber : public Subscriber {
  public:
-  virtual void changed() = 0;  // there may be news(): it asks for them when it can send
+  virtual void changed() = 0;  // there may be news(): the subscriber asks for them when it can send
 };
 
-// How far a reader has come.
+// How much a reader has received.
 struct PresenceCursor {
   std::uint64_t revision = 0, words = 0;
   std::set<std::uint32_t> annotations;
   bool begun = false;
 };
 
-// What a reader may be told. Own is what concerns anyone of the reader's name: who has come by it is one person.
+// What a reader may receive. "Own" means everything about anyone of the reader's name: several joins by one name are
+// one person.
 struct PeopleRights {
   bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true,
        others_words = true;
 };
 
-// Any thread. Lock order: that of the streams, then a stream's own, then that of the people.
+// Any thread may call it. Lock order: that of the streams, then a stream's own, then that of the people.
 class Presence {
  public:
   using Clock = std::chrono::steady_clock;
-  static constexpr std::size_t kMostWords = 64;    // said last
-  static constexpr std::size_t kMostAbsent = 256;  // people who are not here, those who were here last
+  static constexpr std::size_t kMostWords = 64;    // the latest ones
+  static constexpr std::size_t kMostAbsent = 256;  // people who have left; the latest ones
   static constexpr std::chrono::milliseconds kApart{100};
 
-  // `names`: of people by their pseudonym, as far as they are known.
+  // `names`: names of people by pseudonym, as far as they are known.
   Presence(const Room& room, const std::map<std::uint32_t, std::string>& names);
 
   void joined(AuthorId author, const std::string& name, Role role, bool hand);
-  void came(AuthorId author);  // one more session or stream of theirs; of nobody: nothing
+  void came(AuthorId author);  // one more session or stream of theirs; ignored if the author is unknown
   void went(AuthorId author);
-  void take(const RoomEvent& event);  // supervise, annotation, words; of another kind: nothing
+  void take(const RoomEvent& event);  // supervise, annotation, words; other kinds are ignored
   void took_cut(AuthorId author);
   void heard(AuthorId author, RoomSeq place);
   void looked(AuthorId author, const ViewFrustum& from);
 
-  // Of those who have a hand, here or not, and may be supervised together: instructors are not among them.
+  // People with a tool, present or not, who may be supervised together. Instructors are not among them.
   [[nodiscard]] std::vector<AuthorId> supervised_hands() const;
   [[nodiscard]] RoomSeq acknowledged_by(AuthorId author) const;
-  [[nodiscard]] std::string name_of(AuthorId author) const;  // empty: nobody's, or not known any more
+  [[nodiscard]] std::string name_of(AuthorId author) const;  // empty: unknown author, or name no longer known
 
-  // The subscriber hears of every change until it leaves or all streams end.
+  // The subscriber is notified of every change until it leaves or all streams end.
   void watch(PresenceSubscriber& subscriber);
   void leave(PresenceSubscriber& subscriber);
-  void end_streams(const std::string& why);  // those open now and those that come later
+  void end_streams(const std::string& why);  // those open now and those opened later
   [[nodiscard]] std::size_t streams() const;
-  // [tick] Readers hear at most every kApart that there is something new.
+  // [tick] Notifies readers at most once every kApart.
   void publish(RoomSeq room_seq, Clock::time_point now);
 
-  // A whole WatchPeopleResponse of what the reader lacks; null: nothing. The newest of each person and annotation, and
-  // of words those that are still here.
+  // A whole WatchPeopleResponse with what the reader lacks; null: nothing. Contains the newest state of each person and
+  // annotation, and the messages that are still stored.
   [[nodiscard]] Bytes news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
 
  private:
@@ -98,12 +99,12 @@ class Presence {
     AuthorId from, to;
     std::string words;
   };
-  Entry* change(AuthorId author);  // under mutex_; null: nobody is known by that
+  Entry* change(AuthorId author);  // under mutex_; null: unknown author
 
   mutable std::mutex streams_mutex_;
   std::vector<PresenceSubscriber*> subscribers_;
   std::optional<std::string> ended_;
-  Clock::time_point next_{};  // of the tick
+  Clock::time_point next_{};  // used by the tick thread
 
   mutable std::mutex mutex_;
   std::uint64_t revision_ = 1, told_ = 0;

@@ -1,5 +1,5 @@
-// Which refusals were logged: once for each peer and reason, so that a caller who tries for ever fills no disk. See
-// refusals.hpp.
+// Remembers which refusals were logged: once for each peer and reason, so that endless attempts of one caller cannot
+// fill the disk. See refusals.hpp.
 #pragma once
 #include <cstddef>
 #include <deque>
@@ -10,11 +10,11 @@
 
 namespace osteon {
 
-// Not thread safe. Remembers the newest kMost; an older one that comes again is news again.
+// Not thread safe. Remembers the newest kMost refusals; an older one counts as new again.
 class RefusalLog {
  public:
   static constexpr std::size_t kMost = 1024;
-  // True the first time.
+  // Returns true the first time.
   [[nodiscard]] bool is_new(std::string_view peer, std::string_view reason) {
     std::pair<std::string, std::string> seen(peer.substr(0, kMostChars), reason.substr(0, kMostChars));
     if (!known_.insert(seen).second) return false;

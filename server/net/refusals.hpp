@@ -1,4 +1,4 @@
-// Who and what was refused: counted by reason for the metrics, and logged.
+// Counts refusals by reason for the metrics, and logs them.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -10,8 +10,8 @@
 
 namespace osteon {
 
-// Any thread. A reason is a fixed word such as "version" or "ticket", never a caller's text: memory stays bounded, and
-// what comes after the first kMost different ones counts as "other".
+// Any thread may call it. A reason is a fixed word such as "version" or "ticket", never a caller's text, so memory
+// stays bounded. Reasons after the first kMost different ones count as "other".
 class RefusalCounts {
  public:
   static constexpr std::size_t kMost = 32;
@@ -23,8 +23,8 @@ class RefusalCounts {
     else
       ++counts_[counts_.size() < kMost ? std::string(reason) : "other"];
   }
-  // Counts it, and logs it: once for each `who`, a person or an address, `from` and reason, so that nobody fills the
-  // disk. `from`: the address of a person; empty: it is not known, or `who` is one.
+  // Counts a refusal and logs it once for each `who`, `from` and reason, so that nobody can fill the disk. `who`: a
+  // person or an address. `from`: the address of a person; empty if it is unknown or `who` is an address.
   void note(std::string_view reason, std::string_view who, std::string_view said, std::string_view from = {});
   [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
     const std::lock_guard lock(mutex_);

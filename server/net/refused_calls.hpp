@@ -1,5 +1,5 @@
-// What is refused beside the authorizer: handshakes that fail, which gRPC alone hears of, and calls whose messages make
-// no sense.
+// Notes refusals that do not come from the authorizer: failed handshakes, which only gRPC sees, and calls with invalid
+// messages.
 #pragma once
 #include <memory>
 #include <string>
@@ -17,15 +17,16 @@ namespace osteon {
 
 class AuditTrail;
 
-// While it lives: a handshake that fails before any certificate is seen, as of who has none or speaks plain text, is
-// noted as "tls". gRPC says it in its log alone, for the whole process and without an address; the rest of that log
-// is dropped. The addresses noted are those of all connections of which no call has come. Any thread.
+// While it lives, a handshake that fails before any certificate is seen is noted as "tls", for example of a client
+// without a certificate or with plain text. gRPC reports such failures only in its log, for the whole process and
+// without an address. The rest of that log is dropped. The addresses noted are those of all connections over which no
+// call has come. Any thread may call it.
 class HandshakeWatch {
  public:
-  HandshakeWatch(RefusalCounts& refusals, Connections& connections);  // which outlive it
+  HandshakeWatch(RefusalCounts& refusals, Connections& connections);  // both outlive this object
   ~HandshakeWatch();
   void note(const std::string& who, std::string_view said);
-  // Takes down every one; it outlives this. Before the first connection.
+  // The trail records every one of them. It outlives this object. Call it before the first connection.
   void set_trail(AuditTrail& trail) { trail_ = &trail; }
   HandshakeWatch(const HandshakeWatch&) = delete;
   HandshakeWatch& operator=(const HandshakeWatch&) = delete;
@@ -33,15 +34,15 @@ class HandshakeWatch {
  private:
   RefusalCounts& refusals_;
   Connections& connections_;
-  AuditTrail* trail_ = nullptr;  // null: nothing is taken down
+  AuditTrail* trail_ = nullptr;  // null: nothing is recorded
 };
 
 // The trailing header of a call that the authorizer refused: its reason in one word. The authorizer has noted the call.
 inline constexpr const char* kRefusalTrailer = "osteon-refusal";
 
-// Notes every call that ends since its message was malformed or nonsense ("request"), asked for too much ("quota"), or
-// was not its caller's to make ("denied"), by the caller's address. Join and the authorizer note their own. `refusals`
-// outlives the server.
+// Notes every call that ends because its message was malformed or nonsense ("request"), asked for too much ("quota"),
+// or was not allowed for its caller ("denied"). Notes it under the caller's address. Join and the authorizer note their
+// own refusals. `refusals` outlives the server.
 [[nodiscard]] std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(
     RefusalCounts& refusals);
 
