@@ -1,4 +1,4 @@
-// Asks a server about its rooms as a whole: for the command line.
+// Asks a server about its rooms as a whole, for the command line.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -19,10 +19,10 @@ class Channel;
 
 namespace osteon {
 
-// As proto/osteon/v1/rooms.proto has it.
+// A room as in proto/osteon/v1/rooms.proto.
 struct RoomLine {
   std::string name;
-  bool open = false;  // one that is not, and is at an event, has stopped: it takes no more cuts
+  bool open = false;  // not open, but at an event: it has stopped and takes no more cuts
   bool kept = false, replay = false;
   std::string case_title;
   RoomSeq room_seq;
@@ -32,7 +32,7 @@ struct RoomLine {
 };
 
 // Every call waits for the server's answer, which may take long. Errors: what the server says, in its words;
-// unavailable (it does not answer).
+// unavailable (the server does not answer).
 class RoomAdminClient {
  public:
   [[nodiscard]] static Result<RoomAdminClient> reach(const std::string& address, std::chrono::milliseconds patience,
@@ -63,10 +63,10 @@ class RoomAdminClient {
     Digest hash;
     std::string title;
     std::uint64_t bytes = 0;
-    bool known = false;  // it was there before the upload
+    bool known = false;  // it existed before the upload
   };
   [[nodiscard]] Result<std::vector<CaseLine>> cases();
-  // `archive`: a zip of a case. `progress` hears the fraction that is sent. Errors: also not_found (no such file).
+  // `archive`: a zip of a case. `progress` gets the fraction that is sent. Errors: also not_found (no such file).
   [[nodiscard]] Result<CaseLine> upload_case(const std::filesystem::path& archive,
                                              const std::function<void(double)>& progress);
 

@@ -1,4 +1,4 @@
-// What is done to rooms as files of a folder: looking into one, branching, deleting.
+// Works on rooms as files of a folder: reads what a room is, branches, deletes.
 #pragma once
 #include <cstddef>
 #include <filesystem>
@@ -13,37 +13,38 @@
 
 namespace osteon {
 
-// For what takes long. Both are called between slices, without any lock, and may wait, so that less is asked of the
+// Callbacks of long work. Both are called between slices, without any lock. They may wait, to reduce the load on the
 // disk.
 struct MaintenanceCalls {
-  std::function<void(double)> progress;  // fraction that is done
-  std::function<bool()> stop;            // true: give up, with the error cancelled
+  std::function<void(double)> progress;  // fraction done
+  std::function<bool()> stop;            // true: stop the work, with the error cancelled
 };
 
-// A folder of rooms for one server alone, as long as it holds what this gives: another one would open the rooms that it
-// has closed, and write its list of those that are open. Journals have locks of their own, so that what is done to
-// those that no server has open goes on beside it. Errors: exists (another server has the folder), and those of
+// Locks a folder of rooms for one server, as long as the server holds the result. A second server would open the rooms
+// that the first one has closed, and overwrite its list of open rooms. Journals have their own locks, so other programs
+// may work on journals that no server has open. Errors: exists (another server has the folder), and those of
 // Disk::lock.
 [[nodiscard]] Result<std::unique_ptr<DiskLock>> lock_rooms(const std::filesystem::path& folder, Disk* disk = nullptr);
 
-// What a journal began as, also of one in use: nothing is confirmed but this. Errors: not_found, invalid_input (no
-// journal, or what it began as cannot be read before it is opened), unsupported.
+// Reads how a journal's room began, even if the journal is in use. Nothing else is verified. Errors: not_found,
+// invalid_input (no journal, or its beginning cannot be read before it is opened), unsupported.
 [[nodiscard]] Result<RoomGenesis> peek_genesis(const std::filesystem::path& file, Disk* disk = nullptr);
 
-// A room of its own, in `to`, that begins with all that another one was up to a place, null for all of it: entries and
-// checkpoints. It knows numbers of people, not who they are. The journal must not be in use: else RoomStore::branch.
-// Errors: not_found; exists (in use, or there is something in `to`); invalid_input (no such place, damaged);
-// unavailable (all of it, and it is closed to entries); cancelled.
+// Makes a new room in `to` that begins with everything that another room was up to sequence number `place` (null: all
+// of it): entries and checkpoints. The branch has the numbers of people, not their names. The journal must not be in
+// use; for one in use see RoomStore::branch. Errors: not_found; exists (in use, or something is in `to`); invalid_input
+// (no such sequence number, or damaged); unavailable (all of it was asked for, and the journal is closed to entries);
+// cancelled.
 [[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
                                                  RoomSeq place, const std::string& name,
                                                  const MaintenanceCalls& calls = {}, Disk* disk = nullptr);
 
-// Whether a journal has this head in its history.
+// Whether this head is in the history of a journal.
 using HasHead = std::function<Result<bool>(const std::filesystem::path& file, const JournalHead& head)>;
 
-// The branches of a room among the files of a folder, and the branches of those, each after the one that it was made
-// from: by the name of the room and by its history, which the branch names. `has_head`: for rooms that are in use;
-// null: has_head() of server/journal/maintenance.hpp. Errors: those of it.
+// Finds the branches of a room in a folder, and their branches, each after the one that it was made from. Compares the
+// name of the room and its history, which a branch records. `has_head` is for rooms that are in use; null: has_head()
+// of server/journal/maintenance.hpp. Errors: those of `has_head`.
 struct RoomFile {
   std::filesystem::path file;
   RoomGenesis genesis;
@@ -52,27 +53,27 @@ struct RoomFile {
                                                         const std::filesystem::path& file, const HasHead& has = {},
                                                         Disk* disk = nullptr);
 
-// Removes a room's journal with all that is beside it, and where `branches`, before it the branches in its folder: none
-// of them may be in use. Gives the journals that were there. Backups, and branches elsewhere, stay: nobody can know
-// where they are. Errors: those of delete_journals() and branches_of().
+// Deletes a room's journal with all files beside it. With `branches`, first deletes the branches in its folder. None of
+// them may be in use. Returns the journals that were deleted. Backups, and branches elsewhere, stay, since their places
+// are unknown. Errors: those of delete_journals() and branches_of().
 [[nodiscard]] Result<std::vector<std::filesystem::path>> delete_room(const std::filesystem::path& file, bool branches,
                                                                      Disk* disk = nullptr);
 
-// The name that a journal's room has now. Errors: those of reading it.
+// The current name of a journal's room. Errors: those of reading it.
 [[nodiscard]] Result<std::string> room_name(Journal& journal);
-// Holds the room in a journal against the name that its file has. Error invalid_input: it is another room's, with both
-// names and what to do; or its name was given without the key that the journal was opened with.
+// Checks that the room in a journal has the name of its file. Error invalid_input: it is another room (the message has
+// both names and a remedy), or its name was set without the key that the journal was opened with.
 [[nodiscard]] Result<void> check_room_name(Journal& journal, const std::filesystem::path& file,
                                            const std::string& name);
 
-// Error: the journal is closed to entries, so that nobody can say that these are all it had. `option` is how a place is
-// asked for instead, up to which it is confirmed.
+// Error: the journal is closed to entries, so nobody knows whether its entries are complete. `option` is the
+// command-line option that asks for a sequence number instead; up to that number the journal is confirmed.
 [[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);
 
-// As branch_journal(), of a journal that somebody uses, step by step.
+// As branch_journal(), step by step, of a journal that is in use.
 [[nodiscard]] Result<JournalCopy> begin_branch(Journal& from, const std::filesystem::path& to, RoomSeq place,
                                                const std::string& name);
-// Why something was given up.
+// The error of work that was stopped.
 [[nodiscard]] tl::unexpected<Error> given_up(const std::string& what);
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// Who made a room or a backup: a file beside the journal. So it outlives a restart, is deleted with the journal, and
-// can be forgotten, which the journal's chain of hashes could not.
+// Stores who made a room or a backup, in a file beside the journal. So the note outlives a restart and is deleted with
+// the journal. It can be erased, unlike an entry in the journal's chain of hashes.
 #pragma once
 #include <chrono>
 #include <cstddef>
@@ -13,17 +13,18 @@
 
 namespace osteon {
 
-// The user of a certificate; empty: nobody knows, as of what was made over plain text, or before owners were noted.
+// The user of a certificate. Empty: unknown, as for journals made over plain text or before owners were stored.
 [[nodiscard]] std::string owner_of(const std::filesystem::path& journal);
-// For its owner alone, safe on the disk. Empty `user`: a note that is there is removed. Errors: those of Disk.
+// Writes the note, durable and readable by the file's owner alone. Empty `user`: removes an existing note. Errors:
+// those of Disk.
 [[nodiscard]] Result<void> note_owner(const std::filesystem::path& journal, const std::string& user);
-// The names, without `ending`, of the journals in a folder that have this ending and this owner.
+// The names, without `ending`, of journals in a folder that have this ending and this owner.
 [[nodiscard]] std::set<std::string> owned_by(const std::string& user, const std::filesystem::path& folder,
                                              std::string_view ending);
-// Removes what was noted so many days ago or earlier. Gives how many.
+// Removes notes that are this many days old or older. Returns how many.
 std::size_t forget_owners(const std::filesystem::path& folder, std::chrono::days older_than);
 
-// Makes a journal, and notes first whose it is: so that none is there without. Gives what `make` gives.
+// Makes a journal. Notes its owner first, so that no journal exists without its owner. Returns what `make` returns.
 template <class Make>
 auto make_owned(const std::filesystem::path& journal, const std::string& user, const Make& make) -> decltype(make()) {
   if (const Result<void> noted = note_owner(journal, user); !noted) return tl::unexpected(noted.error());

@@ -1,6 +1,5 @@
-// Runs a room: one thread that commits events at 120 Hz, one that makes mesh blocks at 30 Hz, one that looks for pieces
-// that have come apart, one for slow requests.
-// Free of gRPC: streams are seen as subscribers.
+// Runs a room on several threads. One commits events at 120 Hz, one makes mesh blocks at 30 Hz, one finds fragments,
+// and one handles slow requests. Free of gRPC: streams are seen as subscribers.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -30,45 +29,51 @@ namespace osteon {
 class SessionSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
-  // Of the leaves; entries come from here on. `before`: whole SessionResponses that go before the leaves, `complete` the
-  // one that ends them.
+  // Entries come after this call. `contained`: the sequence number that the leaves contain. `before`: whole
+  // SessionResponses that are sent before the leaves. `complete`: the one that ends the leaves.
   virtual void begin(RoomSeq contained, MessageParts before, Bytes complete) = 0;
-  // Once, after begin() and perhaps after entries. Those apply to these leaves: what one of them contains already is no
-  // change when its entry is applied again.
+  // Called once, after begin() and perhaps after entries. Entries apply to these leaves; applying one again that a leaf
+  // already contains changes nothing.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
   virtual void offer(RoomSeq place, const Bytes& entry) = 0;  // a whole SessionResponse
-  // The same, with what goes in few bytes of it.
+  // The same. `fast`: the entry's short form for the fast path.
   virtual void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& /*fast*/) { offer(place, entry); }
-  // [thread of the tools' states] All tools' newest states. True: some of it is owed, and wants to be told again soon.
+  // [thread of the tools' states] The newest states of all tools. Returns true if some are still to be sent and it
+  // wants to be called again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
-  // Whether it pushes the bone on its mount and is pushed by it: whoever is not takes nothing of what others put into
-  // it.
+  // Whether it feels the bone on its compliant mount and pushes it. If not, it receives nothing of the loads that
+  // others apply.
   [[nodiscard]] virtual bool feels_bone() const { return true; }
-  // [tick] Where the bone stands on its mount, to this one.
+  // [tick] The pose of the bone on its mount, for this subscriber.
   virtual void show_bone(const MountPose& /*seen*/) {}
-  // What holds for the hand from the beginning, as an entry that has no number: after begin().
+  // Restrictions that hold for the person from the beginning, as an entry without a number. Called after begin().
   virtual void hold(const wire::SessionEntry& /*supervised*/) {}
-  // A tool's number in few bytes: after begin() for those of the room, and before the entry that adds another.
+  // A tool's number in short messages. Called after begin() for the room's tools, and before an entry that adds another
+  // tool.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
-  virtual void answer(const Bytes& entry) = 0;  // the same, outside the room's order
-  virtual void refuse(const Error& why) = 0;  // a breach of the protocol: the stream ends
-  // Another stream of its author was opened. That may be one that was given up and came late, so the author may come
-  // again.
+  virtual void answer(const Bytes& entry) = 0;  // likewise, outside the room's order
+  virtual void refuse(const Error& why) = 0;  // a violation of the protocol: the stream ends
+  // Another stream of its author was opened. That stream may have been abandoned and arrived late, so the author may
+  // come again.
   virtual void replaced(const std::string& why) { end(why); }
   virtual void decided() = 0;  // one queued cut has left the queue
 };
 
 struct RuntimeRates {
-  // Zero: driven. The runtime has no thread and no surface; its owner calls tick(), and slow requests are answered at
+  // Zero: driven. The runtime has no thread and no surface. Its owner calls tick(), and slow requests are answered at
   // once.
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
+  // Least time between two updates of the surface for the views and tools.
   std::chrono::nanoseconds looks{
-      250'000'000};  // at most so often the surface follows the looks of viewers and the tools
+      250'000'000};
+  // Least time between two searches for fragments; zero: never.
   std::chrono::nanoseconds pieces{1'000'000'000 /
-                                  8};  // at most so often is looked for what has come apart; zero: never
+                                  8};
+  // The bone stands on a compliant mount, about its middle, and everybody with a session can push it; not in a
+  // playback.
   bool mount =
-      false;  // the bone stands on one, about its middle, and whoever has a session pushes it; not in a playback
+      false;
 };
 
 struct RuntimeHealth {
@@ -81,14 +86,14 @@ struct RuntimeHealth {
   bool serving = false;          // takes cuts
   std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
   std::size_t queued_cuts = 0, stale_blocks = 0;
-  std::size_t waiting_entries = 0;     // decided and not yet kept
+  std::size_t waiting_entries = 0;     // decided and not yet durable
   DurationHistogram commit;         // of the journal's transactions
   std::size_t furthest_behind = 0;  // entries or blocks that wait for the slowest reader
   std::size_t blocks = 0;
-  std::size_t surface_bytes = 0;  // of the newest blocks: what a viewer that joins is sent
+  std::size_t surface_bytes = 0;  // of the newest blocks: what a new viewer is sent
 };
 
-// The bone at one place of the room's order.
+// The bone at one sequence number of the room.
 struct BoneStatus {
   RoomSeq room_seq;
   Digest field_hash;  // of all bodies
@@ -101,9 +106,9 @@ class RoomRuntime {
  public:
   using Clock = std::chrono::steady_clock;
 
-  // Makes the whole surface, then starts the threads. `progress` hears fractions from one thread at a time.
-  // `store` makes entries durable before any hand hears of them, and outlives the runtime; without it nothing is kept.
-  // `playback`: entries after those of `room` happen at their times; whoever joins may watch and nothing else.
+  // Makes the whole surface, then starts the threads. `progress` gets fractions from one thread at a time. `store`
+  // makes entries durable before they are sent to anybody. It outlives the runtime; without it nothing is stored.
+  // `playback`: the entries after those of `room` are repeated at their times; everybody who joins may only watch.
   RoomRuntime(Room room, RuntimeRates rates, const std::function<void(double)>& progress,
               Detail detail = Detail::automatic, RoomStore* store = nullptr, std::optional<Playback> playback = {});
   ~RoomRuntime();
@@ -120,71 +125,73 @@ class RoomRuntime {
   [[nodiscard]] RuntimeHealth health() const;
   [[nodiscard]] Digest surface_hash() const;  // of the newest blocks
 
-  // [owner of a driven runtime] Decides what is queued, keeps it, and tells of it. `now`: since any start, never falls.
-  // `keep` false: that is left to a later tick, as by a slow disk.
+  // [owner of a driven runtime] Decides what is queued, makes it durable and publishes it. `now`: time since any start;
+  // never decreases. `keep` false: writing is left to a later tick, as with a slow disk.
   void tick(std::chrono::nanoseconds now, bool keep = true);
 
-  // Runs `job` on the thread for slow requests, in order; it may call the functions below. Of a stopped runtime: at
-  // once.
+  // Runs `job` on the thread for slow requests, in order. The job may call the functions below. If the runtime has
+  // stopped, the job runs at once.
   void run_slowly(std::function<void()> job);
-  // `answer` is called when it is durable, on the committing thread. Error unavailable: the room has stopped or keeps
-  // nothing any more.
+  // `answer` is called when the join is durable, on the committing thread. Error unavailable: the room has stopped or
+  // stores nothing any more.
   void join(MemberKind kind, const std::string& name, const Digest& secret, Role role,
             std::function<void(const Result<AuthorId>&)> answer);
-  // The same; waits, so not on the tick or the committing thread, nor of a driven runtime.
+  // The same, but waits. So it must not be called on the tick or the committing thread, nor of a driven runtime.
   [[nodiscard]] Result<AuthorId> join(MemberKind kind, const std::string& name = {}, const Digest& secret = {},
                                       Role role = Role::none);
-  // What somebody who comes back was told is safe. It counts whoever says it: after a loss the author's number may be
-  // another's, or nobody's. Errors: those of RoomStore::check_witness; unavailable (nobody keeps the room).
+  // Checks the witness that a returning client was sent. It counts whoever sends it: after a loss, the author number
+  // may belong to another person or to nobody. Errors: those of RoomStore::check_witness; unavailable (the room has no
+  // store).
   [[nodiscard]] Result<void> check_kept(const Witness& kept);
-  // Whether an earlier connection may go on. `kept`: what it was told is safe, if anything. Errors: first those of
-  // check_kept; invalid_input (not the secret of which the author has the digest); denied (`role` is given, and the
-  // author joined with another).
+  // Checks whether an earlier connection may go on. `kept`: the witness that the client was sent, if any. Errors: first
+  // those of check_kept; invalid_input (the secret does not match the author's digest); denied (`role` is given, and
+  // the author joined with another).
   [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept,
                                     std::optional<Role> role = {});
   [[nodiscard]] BoneStatus bone_status();
-  // [thread for slow requests] All bodies' leaves, those that were taken away too, at one place of the order.
+  // [thread for slow requests] The leaves of all bodies at one sequence number, also of bodies that were taken away.
   struct Leaves {
     RoomSeq place;
     std::vector<FieldLeaf> leaves;
   };
   [[nodiscard]] Leaves leaves_now();
-  void find_pieces();  // waits until what was cut so far is looked through, and its pieces are bodies
+  // Waits until everything cut so far has been searched, and its fragments are bodies.
+  void find_pieces();
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
-  // The subscriber hears every entry after those of its leaves. With the digest of the author's secret it takes the place of an
-  // earlier session of his. Error: invalid_input (the author may not cut, or has an open session).
+  // The subscriber gets every entry after those in its leaves. With the digest of the author's secret, it replaces an
+  // earlier session of that author. Error: invalid_input (the author may not cut, or has an open session).
   [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& subscriber, const Digest& secret = {});
-  // From where its author looks at first; without a look it is sent the bone in full.
+  // `look`: the author's first view. Without one, the subscriber is sent the whole bone in full.
   void watch_mesh(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look = std::nullopt);
-  // The newest of each viewer counts, until its last mesh stream ends. Of one without such a stream: nothing.
+  // The newest view of each viewer counts until its last mesh stream ends. Ignored for a viewer without a mesh stream.
   void look(AuthorId viewer, const ViewFrustum& from);
-  [[nodiscard]] bool draws_near() const;  // what Detail has come to mean here
+  [[nodiscard]] bool draws_near() const;  // what Detail means here
   void watch_cutting(StateSubscriber& subscriber);
-  // Whoever watches it, says how far they have heard, or asks who is there.
+  // For people streams, acknowledgements, and questions about who is present.
   [[nodiscard]] Presence& people();
-  // Afterwards the subscriber hears nothing more. Unknown subscribers are none of its business.
+  // The subscriber gets nothing more after this. Unknown subscribers are ignored.
   void leave(SessionSubscriber& subscriber);
   void leave(MeshSubscriber& subscriber);
   void leave(StateSubscriber& subscriber);
 
-  // Queued until the next tick. The subscriber, kept alive until then, hears the outcome.
+  // Queued until the next tick. The subscriber is kept alive until then and gets the result.
   void queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut cut, Clock::time_point arrived);
   void offer_state(CuttingState state);                    // newest of its author wins
-  void push_bone(AuthorId author, const MountLoad& push);  // likewise; of no effect where there is no mount
-  // Queued until the next tick too, behind the cuts that came before. `answer` is called there and must return at once;
-  // by then every session has been told. Error unavailable: the room has stopped.
+  void push_bone(AuthorId author, const MountLoad& push);  // likewise; no effect without a mount
+  // Queued until the next tick, behind the cuts that came before. `answer` is called there and must return at once. By
+  // then the event was sent to every session. Error unavailable: the room has stopped.
   void queue_event(std::function<Result<RoomEvent>(Room&)> change,
                    std::function<void(const Result<RoomEvent>&)> answer);
 
-  [[nodiscard]] bool stopped() const;  // takes no more, also where its store's journal does not
-  // The process is about to stop: sessions, also those that are opened from now on, are told to come again after that
-  // time, and go on until they have.
+  [[nodiscard]] bool stopped() const;  // takes no more cuts, also if its journal takes no more entries
+  // The process is about to stop. Asks all sessions, also those opened later, to connect again after that time. They go
+  // on until they do.
   void ask_to_redial(std::chrono::milliseconds after, const std::string& why);
-  // As end_streams(), but so that sessions come again by themselves.
+  // As end_streams(), but sessions connect again by themselves.
   void send_away(const std::string& why);
-  void end_streams(const std::string& why);                 // those open now and those that come later
-  void stop();                                              // joins the threads; what is queued is decided before
-  [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;  // Room::all_leaves(), of one that has stopped
+  void end_streams(const std::string& why);                 // those open now and those opened later
+  void stop();                                              // decides what is queued, then joins the threads
+  [[nodiscard]] std::vector<FieldLeaf> all_leaves() const;  // Room::all_leaves(), of a stopped room
 
  private:
   struct Impl;

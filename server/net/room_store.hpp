@@ -1,4 +1,5 @@
-// Keeps a room in a journal: writes what it decides, makes it again from that, and looks after it while it is in use.
+// Stores a room in a journal: writes what it decides, makes the room again from the journal, and maintains the journal
+// while it is in use.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -27,8 +28,8 @@ namespace osteon {
 
 struct PersistedRoom;
 
-// A mutex that is given in the order in which it was asked for: so that maintenance, which takes it again and again,
-// lets a commit through after every slice, and is let through itself between commits.
+// A mutex that is given in the order of requests. Maintenance takes it again and again, and lets a commit through after
+// every slice. Commits let maintenance through in the same way.
 class InTurn {
  public:
   void lock();
@@ -40,15 +41,15 @@ class InTurn {
   std::uint64_t asked_ = 0, served_ = 0;
 };
 
-// The bone when so many entries had been applied to it: Room::room_seq() and Room::field_hash().
+// The bone after this many entries were applied to it: Room::room_seq() and Room::field_hash().
 struct BoneAt {
   RoomSeq place;
   Digest field_hash{};
 };
 
-// Whether it is time for the next checkpoint. To evaluate a cut again takes a tenth of a millisecond, with a large tool
-// a whole one or two: the next opening has a few seconds of that at most. And so long is waited that a bone that is cut
-// fast is not written all the time: every checkpoint has all its leaves.
+// Decides when the next checkpoint is due. Evaluating a cut again takes a tenth of a millisecond, with a large tool one
+// or two milliseconds, so the next opening takes a few seconds at most. The least time between checkpoints prevents
+// that a bone that is cut fast is written all the time, as every checkpoint contains all its leaves.
 struct CheckpointPolicy {
   std::uint64_t changes = 2000;
   std::chrono::nanoseconds apart = std::chrono::seconds(60);
@@ -57,121 +58,124 @@ struct CheckpointPolicy {
   }
 };
 
-// What a live verify found.
+// The result of checking an open room's journal.
 struct RoomReport {
-  JournalHead head;                  // of the last entry that the chain confirms: as many entries
-  std::optional<RoomSeq> first_bad;  // entry
-  std::size_t checkpoints = 0;       // whose bytes and fields were confirmed
-  BoneAt replayed;                   // made again from the entries alone; place 0: nobody asked for it
+  JournalHead head;                  // of the last entry that the chain confirms; its sequence number is their count
+  std::optional<RoomSeq> first_bad;  // the first bad entry
+  std::size_t checkpoints = 0;       // their bytes and fields were confirmed
+  BoneAt replayed;                   // computed from the entries alone; sequence number 0: not asked for
   std::vector<std::string> faults;   // one sentence each
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
 
-// When a reopened room's time goes on. Nobody knows how long it was away, and its hands worked on: for two seconds
-// where they heard nothing, up to the most cuts that they leave unconfirmed (3.6 s) where they heard something else.
-// Their cuts come when it is back, and the time that these took must have passed.
+// The time at which a reopened room continues. Nobody knows how long the room was closed, and its clients worked on
+// meanwhile. They work on for two seconds without an answer, or up to the most cuts that they leave unconfirmed (3.6 s)
+// if they received anything else. These cuts arrive when the room is open again, and the time that they took must have
+// passed by then.
 inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::seconds(4);
 [[nodiscard]] std::chrono::nanoseconds reopened_time(const Room& room);
 
-// Any thread. What takes long holds the journal for a slice of entries at a time, between which entries are written. After
-// close() every function returns the error unavailable.
+// Any thread may call it. Long work holds the journal for one slice of entries at a time; entries are written between
+// slices. After close() every function returns the error unavailable.
 class RoomStore {
  public:
   struct Options {
-    std::string name = "room";  // of a new one
+    std::string name = "room";  // of a new room
     CutLimits limits;
-    std::shared_ptr<ToolBox> tools;  // that a new one begins with; null: the built-in ones
+    std::shared_ptr<ToolBox> tools;  // that a new room begins with; null: the built-in ones
     JournalOptions journal;
-    int retention_days = 0;               // who joined more days ago is forgotten; 0: nobody ever
-    std::function<std::int32_t()> today;  // days since 1970-01-01; null: the computer's
+    int retention_days = 0;               // who joined more days ago is erased; 0: nobody is
+    std::function<std::int32_t()> today;  // days since 1970-01-01; null: by the computer's clock
     FillRandom random;                    // for the key of its witnesses; null: the system's
   };
-  // Goes on with the journal's room, up to the last entry that anyone was told of, or makes a new one where there is no
-  // such file. `progress` hears the fraction of the entries replayed. Errors: those of Journal::open; unsupported (of
-  // another case, kernel or release); invalid_input (entries that cannot be: then recover). A journal that is closed to
-  // entries still gives its room, which takes none.
+  // Continues the journal's room up to the last entry that anybody was sent. Makes a new room if the file does not
+  // exist. `progress` gets the fraction of the entries replayed. Errors: those of Journal::open; unsupported (from
+  // another case, kernel or release); invalid_input (impossible entries: use salvage). A journal that is closed to
+  // entries still gives its room, which takes no more entries.
   [[nodiscard]] static Result<PersistedRoom> open(const std::filesystem::path& file, const Case& bone,
                                                   const Options& options,
                                                   const std::function<void(double)>& progress = {});
 
-  // Returns when the entries are safe on the disk: for a Committer. Places go on from the last one.
+  // For a Committer. Returns when the entries are durable. Sequence numbers continue from the last entry.
   [[nodiscard]] Result<void> write(std::span<const LogEntry> entries);
-  [[nodiscard]] JournalHead head() const;  // once closed: the last one
-  // Why its journal takes no more entries, for good: damage, a write that failed, a witness that knows more. Null: it
+  [[nodiscard]] JournalHead head() const;  // after close(): the last one
+  // Why the journal takes no more entries, for good: damage, a failed write, or a witness that knows more. Null: it
   // takes entries. Never waits.
   [[nodiscard]] const Error* closed_to_entries() const { return closed_to_entries_; }
   // Rises with every opening.
   [[nodiscard]] std::uint64_t server_epoch() const { return server_epoch_; }
-  // Rows that were evaluated again when it was opened.
+  // Entries that were evaluated again at opening.
   [[nodiscard]] std::uint64_t evaluated() const { return evaluated_; }
   [[nodiscard]] const RoomGenesis& genesis() const { return genesis_; }
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
-  // What clients are told is safe, now.
+  // The witness of the current head, as it is sent to clients.
   [[nodiscard]] Witness witness() const;
-  // What a client says it was told is safe: see Journal::check_witness. One beyond the journal counts only under its
-  // seal, so that no client can close a room by what it makes up. An error is a sentence for the client's person: how
-  // many events the room has lost, or that it begins anew, and what to do. Error invalid_input: also without a seal.
+  // Checks the witness that a client was sent: see Journal::check_witness. A witness beyond the journal counts only
+  // with the journal's seal, so that no client can close a room with invented numbers. The error is a sentence for the
+  // client's person: how many events the room has lost, or that it begins anew, and what to do. Error invalid_input:
+  // also for a missing seal.
   [[nodiscard]] Result<void> check_witness(const Witness& witness);
 
-  // The pseudonym under which entries know this person; the same for the same label, until it is forgotten.
+  // The pseudonym of this person in entries. The same label gives the same number until the person is erased.
   [[nodiscard]] Result<std::uint32_t> person(const std::string& label);
   [[nodiscard]] Result<std::vector<Person>> people();
-  // Forgets who a person is, here and not in copies; what it did stays, under its number. False: nobody has that
-  // number.
+  // Erases who a person is, here and not in copies. What the person did stays, under the number. Returns false if
+  // nobody has that number.
   [[nodiscard]] Result<bool> forget(std::uint32_t person);
-  // Whoever joined too long ago by Options::retention_days, as open() does; for once a day. Gives how many.
+  // Erases everybody who joined too long ago for Options::retention_days, as open() does. Call it once a day. Returns
+  // how many.
   [[nodiscard]] Result<std::size_t> forget_old();
-  // All that there is of a person: a line of JSON that says who it is, then one for each event of its, until `take`
-  // returns false. Error not_found: no event and no name is of that number.
+  // Exports everything about a person: a line of JSON that says who it is, then a line for each of the person's events,
+  // until `take` returns false. Error not_found: no event and no name has that number.
   [[nodiscard]] Result<void> export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take);
 
-  // Rows from one place to another, both included, or to the head as it is now, each held against the chain, until
-  // `take` returns false. `take` may wait: a live room can be replayed beside its cutting. Errors: of the first entry
-  // that does not fit.
+  // Reads entries from `from` to `to`, both included, or to the current head, until `take` returns false. Each entry is
+  // checked against the chain. `take` may wait, so an open room can be replayed while it is cut. Errors: those of the
+  // first entry that does not fit.
   [[nodiscard]] Result<void> read(RoomSeq from, RoomSeq to, const std::function<bool(const LogEntry&)>& take);
-  // Every entry up to the head as it is now against the chain; the bytes of every checkpoint against their digest, and
-  // its fields against their hash; what else vouches for places. `live`, of a place that is kept: the entries are also
-  // replayed into a fresh room of this case up to there, which takes as long as all its cuts, and the bones compared.
-  // What is damaged is told in the report. Errors: unavailable (`live` is beyond the head), cancelled, unsupported (of
-  // another case).
+  // Checks every entry up to the current head against the chain, the bytes of every checkpoint against their digest,
+  // its fields against their hash, and all other witnesses. `live` is a durable sequence number with its bone. With it,
+  // the entries are also replayed into a fresh room of this case up to there, and the bones are compared; this takes as
+  // long as all its cuts. Damage is described in the report. Errors: unavailable (`live` is beyond the head),
+  // cancelled, unsupported (another case).
   [[nodiscard]] Result<RoomReport> verify(const Case& bone, const std::optional<BoneAt>& live,
                                           const MaintenanceCalls& calls = {});
-  // A copy of the journal as it is now, with its people and checkpoints: there whole or not at all. Gives its head.
-  // Errors: exists (something is in `to`), invalid_input (damaged: nothing is copied), cancelled.
+  // Copies the journal as it is now, with its people and checkpoints. The copy is complete or does not exist. Returns
+  // its head. Errors: exists (something is in `to`), invalid_input (damaged: nothing is copied), cancelled.
   [[nodiscard]] Result<JournalHead> backup(const std::filesystem::path& to, const MaintenanceCalls& calls = {});
   // As branch_journal().
   [[nodiscard]] Result<JournalHead> branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
                                            const MaintenanceCalls& calls = {});
 
-  // Whether this head is of its history: for branches_of().
+  // Whether this head is in the journal's history. For branches_of().
   [[nodiscard]] Result<bool> has_head(const JournalHead& head);
 
-  // All leaves of the room as it was at `place`, while entries may have gone on, so that the next opening need not
-  // evaluate every cut again: written and synced in pieces, noted in a transaction of its own. Nothing happens where
-  // the entries up to there are not kept yet, or a checkpoint goes as far. Error cancelled.
+  // Writes all leaves of the room as they were at `place`, so that the next opening need not evaluate every cut again.
+  // Entries may have come since. The leaves are written and synced in parts, and noted in their own transaction. Does
+  // nothing if the entries up to there are not durable yet, or if a checkpoint already reaches that far. Error
+  // cancelled.
   [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves,
                                         const MaintenanceCalls& calls = {});
-  // Rows since the newest checkpoint that the next opening would have to evaluate: for CheckpointPolicy.
+  // Entries since the newest checkpoint that the next opening would evaluate. For CheckpointPolicy.
   [[nodiscard]] std::uint64_t changes_since_checkpoint() const;
-  // Carries the journal's log into its file where no entry has come since this was asked the last time: for every few
-  // seconds.
+  // Moves the journal's log into its file if no entry has come since the last call. Call it every few seconds.
   [[nodiscard]] Result<void> tidy_if_idle();
-  // Clean; what takes long is given up, and a checkpoint that is being written waited for.
+  // Closes the journal cleanly. Stops long work, but waits for a checkpoint that is being written.
   [[nodiscard]] Result<void> close();
 
  private:
   RoomStore(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk);
-  // Of the newest checkpoint that can be read; nothing where there is none.
+  // Fields of the newest readable checkpoint; empty if there is none.
   struct Fields {
     RoomSeq place;
     std::vector<FieldLeaf> leaves;
   };
-  // Leaves and their hash, of a checkpoint's bytes. Error invalid_input.
+  // Reads leaves and their hash from a checkpoint's bytes. Error invalid_input.
   [[nodiscard]] Result<std::vector<FieldLeaf>> fields_of(const Checkpoint& one, std::string_view bytes) const;
   [[nodiscard]] Fields newest_fields();
   [[nodiscard]] Result<Room> replay(const Case& bone, const CutLimits& limits, const Fields& fields,
                                     const std::function<void(double)>& progress);
-  // Does something with the journal, in turn. Error unavailable: it is closed.
+  // Uses the journal in turn. Error unavailable: the journal is closed.
   template <class Do>
   auto with_journal(const Do& what) -> decltype(what(std::declval<Journal&>())) {
     const std::lock_guard in_turn(turn_);
@@ -182,23 +186,23 @@ class RoomStore {
   }
   void note_closing();  // [in turn]
   [[nodiscard]] tl::unexpected<Error> is_closed() const;
-  // The register is made by the first opening that finds none.
+  // The first opening that finds no such register makes it.
   [[nodiscard]] Result<void> find_witness_key(const Options& options);
   [[nodiscard]] Digest seal_of(const JournalHead& head) const;
-  // Rows after `at`, which goes on with them, up to `last`. Error invalid_input: the entry after `at` does not fit the
-  // chain.
+  // Entries after `at` up to `last`; `at` moves on with them. Error invalid_input: the entry after `at` does not fit
+  // the chain.
   [[nodiscard]] Result<void> each_entry(JournalHead& at, RoomSeq last,
                                       const std::function<bool(const JournalEntry&)>& take);
   [[nodiscard]] Result<void> run(JournalCopy& copy, const MaintenanceCalls& calls);
-  // What is wrong with a checkpoint's bytes; nothing also where it has been replaced by a newer one meanwhile.
+  // Checks a checkpoint's bytes. Finds nothing wrong if a newer checkpoint has replaced it in the meantime.
   [[nodiscard]] Result<void> check_bytes(const Checkpoint& one, RoomReport& report);
 
-  std::mutex checkpointing_;  // held while one is written; taken before turn_
+  std::mutex checkpointing_;  // held while a checkpoint is written; taken before turn_
   std::atomic<bool> closing_ = false;
   mutable InTurn turn_;
   std::optional<Journal> journal_;           // nothing: closed
-  JournalHead last_;                         // its head then
-  std::optional<Error> why_closed_to_entries_;  // set once, before the next, which points to it
+  JournalHead last_;                         // the head at closing
+  std::optional<Error> why_closed_to_entries_;  // set once, before the pointer below to it
   std::atomic<const Error*> closed_to_entries_ = nullptr;
   const std::filesystem::path file_;
   const RoomGenesis genesis_;
@@ -208,14 +212,14 @@ class RoomStore {
   std::function<std::int32_t()> today_;
   std::string witness_key_;
   std::vector<RoomSeq> changes_;    // since the newest checkpoint
-  std::optional<RoomSeq> idle_at_;  // its head when tidy_if_idle() looked
+  std::optional<RoomSeq> idle_at_;  // the head at the last call of tidy_if_idle()
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 
 struct PersistedRoom {
   Room room;
   std::unique_ptr<RoomStore> store;
-  bool made = false;  // there was no journal
+  bool made = false;  // true: there was no journal before
 };
 
 }  // namespace osteon
