@@ -65,15 +65,12 @@ struct RuntimeRates {
   std::chrono::nanoseconds tick{1'000'000'000 / 120};
   std::chrono::nanoseconds mesh{1'000'000'000 / 30};
   // Least time between two updates of the surface for the views and tools.
-  std::chrono::nanoseconds looks{
-      250'000'000};
+  std::chrono::nanoseconds looks{250'000'000};
   // Least time between two searches for fragments; zero: never.
-  std::chrono::nanoseconds pieces{1'000'000'000 /
-                                  8};
+  std::chrono::nanoseconds pieces{1'000'000'000 / 8};
   // The bone stands on a compliant mount, about its middle, and everybody with a session can push it; not in a
   // playback.
-  bool mount =
-      false;
+  bool mount = false;
 };
 
 struct RuntimeHealth {

@@ -1,4 +1,4 @@
-// The inside of a RoomRuntime, for its own sources.
+// The implementation of RoomRuntime, for its own source files.
 #pragma once
 #include <algorithm>
 #include <atomic>
@@ -27,12 +27,12 @@ namespace osteon {
 
 [[nodiscard]] Error only_to_be_watched();
 
-// Who watches a playback is no entry of it, so their numbers must not be those of the room that is shown.
+// Watchers of a playback are not among its entries, so their numbers must differ from those of the shown room.
 inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
-// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the board, then a stream's
-// own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of the figures are never
-// held with another.
+// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the state publisher, then a
+// stream's own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of the figures are
+// never held with another.
 struct RoomRuntime::Impl {
   using Clock = RoomRuntime::Clock;
 
@@ -54,36 +54,37 @@ struct RoomRuntime::Impl {
   [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomStore* store);
 
   [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
-  // Of a playback they are among its entries.
+  // In a playback, splits are among the entries.
   [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !player; }
   void run_ticks();
-  // Whether anything was decided.
+  // Returns true if anything was decided.
   bool tick(std::chrono::nanoseconds now, bool last);
   bool play(std::chrono::nanoseconds now);
   void run_pieces();
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
-  void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }  // [tick] when what was decided is durable
+  // [tick] Calls `tell` when what was decided is durable.
+  void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }
   [[nodiscard]] MessageParts entries_of(const RoomEvent& event);
-  // What goes to some of the sessions in place of the entry that the others get.
+  // What some sessions get in place of the entry that the others get.
   struct Personal {
-    AuthorId to;  // null: to all
+    AuthorId to;  // null: all
     Bytes entry;    // null: there is none
     wire::SessionEntry fast;
     [[nodiscard]] bool is_for(AuthorId author) const { return entry && (!to || to == author); }
   };
   [[nodiscard]] Personal personal_message(const RoomEvent& event);
-  // [tick] In a room that nobody keeps; 0: without a name.
+  // [tick] In a room without a store; 0: no name.
   [[nodiscard]] std::uint32_t person_of(const std::string& name) {
     return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
   }
-  // What sessions hear of one event.
+  // What sessions are sent for one event.
   struct Said {
     RoomSeq place;
     MessageParts entries;
     Personal personal;
   };
-  // Whether any hand still lacks some of it.
+  // Returns true if any session still lacks some of the states.
   bool tell_hands(const std::vector<CuttingState>& states);
   [[nodiscard]] std::uint32_t number_of(const Digest& tool);
   void tell_kept(std::chrono::nanoseconds now);
@@ -97,7 +98,7 @@ struct RoomRuntime::Impl {
   void show_scene();
   void read_leaves(std::vector<FieldLeaf>& leaves);
 
-  // All bodies at one place of the order, copied while the room went on.
+  // All bodies at one sequence number, copied while the room went on.
   struct BoneCopy {
     RoomSeq room_seq;
     RoomCounts counts;
@@ -108,18 +109,18 @@ struct RoomRuntime::Impl {
   BoneCopy copy_bone(Bodies which = Bodies::that_exist);
   void ask_for_split(Separation found);
 
-  RoomStore* const store;        // null: nothing is kept
+  RoomStore* const store;        // null: nothing is stored
   std::optional<Player> player;  // of a playback, from the beginning; used by the tick thread alone
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;
   std::shared_mutex room_mutex;
   std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
   const RuntimeRates rates_;
-  const Clock::time_point room_began;  // the room's time 0, as if it had hardly been closed
+  const Clock::time_point room_began;  // time 0 of the room, as if it had hardly been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
 
-  std::mutex numbers_mutex;  // never held with another that is taken within
+  std::mutex numbers_mutex;  // never held with another mutex that is taken within
   std::map<Digest, std::uint32_t> tool_numbers;
 
   std::mutex queue_mutex;
@@ -139,9 +140,9 @@ struct RoomRuntime::Impl {
   std::condition_variable pieces_wake;
   bool pieces_due = true, pieces_end = false;
   std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
-  bool look_wanted = false;                       // someone waits for the next one
+  bool look_wanted = false;                       // somebody waits for the next search
   FragmentDetector pieces{room, room_mutex,
-                          [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // of the piece thread
+                          [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // used by the piece thread
 
   JobThread jobs;
 
@@ -151,16 +152,18 @@ struct RoomRuntime::Impl {
   CutFigures figures;
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
-  bool may_return = false;                // under sessions_mutex: so that they come again
-  Bytes redial;                           // under sessions_mutex: what sessions are told when the process is to stop
-  std::mutex copy_mutex;                  // held while the bone is copied: of a stopped runtime by whoever asks
+  bool may_return = false;                // under sessions_mutex: they may come again
+  Bytes redial;                           // under sessions_mutex: sent to sessions when the process is about to stop
+  std::mutex copy_mutex;                  // held while the bone is copied; of a stopped runtime by every caller
   std::optional<BoneStatus> last_status;  // under copy_mutex
-  std::map<std::string, std::uint32_t> persons;  // of the tick thread: by name, where no journal numbers them
+  std::map<std::string, std::uint32_t> persons;  // of the tick thread: numbers by name, if no journal gives them
   std::vector<Queued> batch;                     // of the tick thread
   std::vector<Committer::Tell> tells;            // of the tick thread
-  bool closing_told = false;             // of the tick thread: sessions are told that the journal is closed to entries
-  std::chrono::nanoseconds next_kept{};  // of the tick thread: when it is next said how much is kept
-  Committer committer;                   // the last member with a thread: it tells the others
+  // Of the tick thread: sessions were informed that the journal is closed to entries.
+  bool closing_told = false;
+  // Of the tick thread: when sessions are next informed how much is durable.
+  std::chrono::nanoseconds next_kept{};
+  Committer committer;                   // the last member with a thread, since it calls the others
 
   std::thread tick_thread, piece_thread;
 };

@@ -1,4 +1,4 @@
-// What waits for a RoomRuntime's tick.
+// What is queued for the tick of a RoomRuntime.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -11,7 +11,7 @@
 namespace osteon {
 
 struct QueuedCut {
-  std::shared_ptr<SessionSubscriber> subscriber;  // owned by its stream and by its queued cuts
+  std::shared_ptr<SessionSubscriber> subscriber;  // shared by its stream and its queued cuts
   Cut cut;
   RoomRuntime::Clock::time_point arrived;
 };

@@ -1,4 +1,4 @@
-// What a room's events look like on their way to its members: serialised once, shared by all streams.
+// Serialises a room's events as messages to its members: each once, shared by all streams.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -25,13 +25,13 @@ namespace osteon {
 [[nodiscard]] Bytes redial_message(std::chrono::milliseconds after, const std::string& why);
 [[nodiscard]] Bytes tool_message(RoomSeq place, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_message(RoomSeq place, const std::vector<SceneItem>& items);
-// What an instructor has decided; `place` null: what held before. `by`: who, as far as it is known.
+// What an instructor has decided. `place` null: what was valid before. `by`: who decided it, as far as known.
 [[nodiscard]] Bytes supervised_message(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch,
                                    const Decider& by);
 [[nodiscard]] Bytes said_message(RoomSeq place, AuthorId from, const WordsEntry& words);
 [[nodiscard]] Bytes partner_entry(const CuttingState& state);
 [[nodiscard]] Bytes bone_entry(const MountPose& seen);
 [[nodiscard]] Bytes noted_entry(RoomSeq place, const std::string& mark);
-[[nodiscard]] MessageParts change_entries(const RoomEvent& event);  // at least one; each of a bounded size
+[[nodiscard]] MessageParts change_entries(const RoomEvent& event);  // at least one; each of bounded size
 
 }  // namespace osteon

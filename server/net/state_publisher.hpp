@@ -1,5 +1,5 @@
-// What viewers and audio clients are shown beside the surface: the newest state of every tool, the scene, the bodies. A
-// thread of its own tells them, so that the room's tick never waits for how many there are.
+// Publishes what viewers and audio clients are shown beside the surface: the newest state of every tool, the scene, the
+// bodies. Sends it on its own thread, so that the room's tick does not depend on the number of readers.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -20,18 +20,18 @@
 
 namespace osteon {
 
-// A WatchCuttingResponse in two parts, each of which is one by itself.
+// A WatchCuttingResponse in two parts. Each part is a WatchCuttingResponse by itself.
 struct ShownNow {
-  Bytes tools;  // every tool's state, at the room's place
+  Bytes tools;  // every tool's state, at the room's sequence number
   Bytes scene;  // items and bodies
 };
 
 class StateSubscriber : public Subscriber {
  public:
-  virtual void offer(const ShownNow& now) = 0;  // newest wins
-  // Whose stream it is; null: nobody knows.
+  virtual void offer(const ShownNow& now) = 0;  // the newest wins
+  // The author of the stream; null: unknown.
   [[nodiscard]] virtual AuthorId author() const { return {}; }
-  // It wants them no closer together, on average.
+  // Least average time between two messages that it wants.
   [[nodiscard]] virtual std::chrono::nanoseconds apart() const { return {}; }
 };
 
@@ -39,31 +39,31 @@ class StateSubscriber : public Subscriber {
 class StatePublisher {
  public:
   using Clock = std::chrono::steady_clock;
-  // A tool whose session is over is shown idle for so many ticks, so that every reader sees it stop.
+  // A tool whose session has ended is shown idle for this many ticks, so that every reader sees it stop.
   static constexpr std::uint64_t kShowIdleTicks = 1200;
 
   StatePublisher();
   ~StatePublisher() { stop(); }
   StatePublisher(const StatePublisher&) = delete;
   StatePublisher& operator=(const StatePublisher&) = delete;
-  void stop();  // tells what was published, then joins the thread
+  void stop();  // sends what was published, then joins the thread
 
-  // The subscriber is offered the newest message at once, and later ones until it leaves or all streams end.
+  // Offers the newest message at once, and later ones until the subscriber leaves or all streams end.
   void watch(StateSubscriber& subscriber);
   void leave(StateSubscriber& subscriber);
-  void end_streams(const std::string& why);  // those open now and those that come later
+  void end_streams(const std::string& why);  // those open now and those opened later
   [[nodiscard]] std::size_t streams() const;
 
-  // Whoever holds a tool is told of the others' on the board's thread: true, and it is called again with the next tick.
+  // Sends the states to sessions, on the thread of the publisher. Returns true to be called again with the next tick.
   using TellHands = std::function<bool(const std::vector<CuttingState>&)>;
   void tell_hands(TellHands tell);
 
-  void offer(CuttingState state);  // newest of its author wins
+  void offer(CuttingState state);  // the newest of its author wins
   void session_over(AuthorId author);
   void show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies);
-  // [tick] What changed since the last call is told from now on, and what is still owed to those who want it seldom.
+  // [tick] Offers what has changed since the last call, and what is still owed to slower readers.
   void publish(RoomSeq room_seq);
-  [[nodiscard]] std::vector<Vec3> tool_tips_mm() const;  // of the tools in a hand
+  [[nodiscard]] std::vector<Vec3> tool_tips_mm() const;  // of the tools that somebody holds
 
  private:
   struct Shown {
@@ -88,11 +88,11 @@ class StatePublisher {
   std::condition_variable wake_;
   std::map<AuthorId, Shown> states_;
   Bytes scene_ = std::make_shared<const std::string>();
-  ShownNow newest_;           // nothing before the first
-  std::uint64_t number_ = 0;  // of the newest, from 1
-  bool changed_ = false;      // since it was made
-  bool due_ = false;          // to be told
-  bool owed_ = false;         // someone lacks the newest, who wants it later
+  ShownNow newest_;           // nothing before the first message
+  std::uint64_t number_ = 0;  // of the newest message, from 1
+  bool changed_ = false;      // since the newest message was made
+  bool due_ = false;          // to be sent
+  bool owed_ = false;         // a reader lacks the newest message and wants it later
   TellHands tell_hands_;
   bool end_ = false;
 

@@ -1,5 +1,5 @@
-// Who watches the surface from where, and what it is drawn for: one surface for all, in full where any of them wants it
-// so.
+// Knows from where viewers look at the surface, and what must be drawn in full for them. All viewers share one surface.
+// It is in full wherever any of them wants that.
 #pragma once
 #include <map>
 #include <mutex>
@@ -15,13 +15,14 @@ namespace osteon {
 // Any thread may call any function but focuses().
 class ViewInterest {
  public:
-  // A mesh stream opens; without a look it wants all of the bone in full.
+  // A mesh stream opens. Without `look` it wants the whole bone in full.
   void open(AuthorId viewer, const std::optional<ViewFrustum>& look);
   void close(AuthorId viewer);
-  // The newest of each viewer counts, until its last stream closes. Of one without a stream: nothing; false.
+  // The newest view of each viewer counts until its last stream closes. Ignored for a viewer without a stream: returns
+  // false.
   bool look(AuthorId viewer, const ViewFrustum& from);
-  // [mesh thread] What the surface is to be drawn for from now on; nothing where that is as good as before. Whoever
-  // comes when everyone has gone finds what the last one looked at.
+  // [mesh thread] What the surface is drawn for from now on; nothing if the last result is still good. After everybody
+  // has gone, a new viewer finds what the last one looked at.
   [[nodiscard]] std::optional<std::vector<Focus>> focuses(double pitch_mm, std::span<const Vec3> tool_tips_mm);
 
  private:
