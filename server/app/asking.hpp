@@ -1,4 +1,4 @@
-// Commands that ask a server which runs, as osteon-server rooms and osteon-server cases do.
+// Commands that ask a running server, such as osteon-server rooms and osteon-server cases.
 #pragma once
 #include <functional>
 
@@ -11,9 +11,9 @@ class App;
 
 namespace osteon {
 
-// Adds to `parent` the command `name` with --server and the credentials's options. Where it is on the command line,
-// `chosen` becomes what reaches the server and then runs `run`; its errors are those of both. Returned for more
-// options.
+// Adds the command `name` to `parent`, with --server and the options for credentials. If it is on the command line,
+// `chosen` becomes a function that connects to the server and calls `run`; its errors are those of both. Returns the
+// command, so that the caller can add options.
 CLI::App* add_asking_command(CLI::App& parent, const char* name, const char* what,
                              std::function<Result<void>()>& chosen, std::function<Result<void>(RoomAdminClient&)> run);
 

@@ -1,4 +1,5 @@
-// osteon-server audit verify, show and forget; and what other commands add to the audit log beside their journal.
+// The commands osteon-server audit verify, show and erase-person, and the audit records of commands that work on a
+// journal.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -12,16 +13,17 @@ class App;
 
 namespace osteon {
 
-// Adds them to the program. `chosen` is set by parsing where one was given.
+// Adds the commands to the program. Parsing sets `chosen` if one of them was given.
 void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen);
 
-// Runs a command and records what came of it in the audit log in the folder of `file`, a journal or a key, where there
-// is one; by the system's user. `event`: its action, object and detail. `signing_key`: empty for the one in that
-// folder. Where it cannot be recorded, standard error says so: whoever may read journals can copy them unseen as well.
+// Runs a command and records its result in the audit log in the folder of `file` (a journal or a key), if there is one,
+// as done by the system's user. `event`: action, object and detail. `signing_key`: empty: the key in that folder. If
+// the record cannot be written, standard error says so. The command still runs, since anybody who can read journals can
+// copy them unseen anyway.
 [[nodiscard]] Result<void> run_audited(const std::filesystem::path& file, const std::filesystem::path& signing_key,
                                        AuditEvent event, const std::function<Result<void>()>& command);
 
-// The record alone.
+// Writes the record alone.
 void record_beside(const std::filesystem::path& file, const std::filesystem::path& signing_key, AuditEvent event);
 
 }  // namespace osteon

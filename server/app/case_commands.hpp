@@ -1,5 +1,4 @@
-// What osteon-server does about cases that are uploaded: osteon-server cases upload, list; and the process that looks
-// one through.
+// The commands for uploaded cases, osteon-server cases upload and list, and the process that validates an upload.
 #pragma once
 #include <functional>
 #include <optional>
@@ -12,11 +11,11 @@ class App;
 
 namespace osteon {
 
-// Adds the command "cases" with its own; `chosen` is set when one of them is on the command line.
+// Adds the command "cases" with its subcommands. Parsing sets `chosen` if one of them was given.
 void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen);
 
-// "check-case ARCHIVE FOLDER QUOTA", see server/upload_validation/case_check.hpp: not for people, so that no help names
-// it. The exit code, or nothing where the command line is another.
+// "check-case ARCHIVE FOLDER QUOTA", see server/upload_validation/case_check.hpp. It is not for people, so no help
+// names it. Returns the exit code, or nothing if the command line is another one.
 [[nodiscard]] std::optional<int> case_check_command(int argc, char** argv);
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// osteon-server verify, recover, backup, migrate, branch, replay, export, people, forget and delete: what is done to
-// journals that no server has open.
+// The commands for journals that no server has open: osteon-server verify, salvage, backup, migrate, branch, replay,
+// export, people, erase-person and delete.
 #pragma once
 #include <functional>
 
@@ -11,7 +11,7 @@ class App;
 
 namespace osteon {
 
-// Adds them to the program. `chosen` is set by parsing where one was given.
+// Adds the commands to the program. Parsing sets `chosen` if one of them was given.
 void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen);
 
 }  // namespace osteon

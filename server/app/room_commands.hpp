@@ -1,4 +1,4 @@
-// What osteon-server does about the rooms of a server that runs: osteon-server rooms list, create, close, …
+// The commands for the rooms of a running server: osteon-server rooms list, create, close, …
 #pragma once
 #include <functional>
 
@@ -10,7 +10,7 @@ class App;
 
 namespace osteon {
 
-// Adds the command "rooms" with its own; `chosen` is set when one of them is on the command line.
+// Adds the command "rooms" with its subcommands. Parsing sets `chosen` if one of them was given.
 void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen);
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// osteon-server ticket: signs a ticket for somebody.
+// The command osteon-server ticket: signs a ticket for somebody.
 #pragma once
 #include <functional>
 
@@ -10,7 +10,7 @@ class App;
 
 namespace osteon {
 
-// Sets `chosen` to what runs when it was given.
+// Adds the command to the program. Parsing sets `chosen` if it was given.
 void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen);
 
 }  // namespace osteon
