@@ -1,4 +1,4 @@
-// Everything that osteon-server is told: from a YAML file, from the command line, or from both.
+// The configuration of osteon-server: from a YAML file, from the command line, or from both.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -12,8 +12,8 @@
 
 namespace osteon {
 
-// What is asked of a hand over a network. No surgical motor gives more than 500 W [A]. A swept voxel takes about a
-// nanosecond of a core; a cup reamer asks for 2e8.
+// Limits of cuts that come over a network. No surgical motor gives more than 500 W [A]. A swept voxel takes about a
+// nanosecond of a core; a cup reamer needs 2e8.
 inline constexpr CutLimits kServedLimits{
     .time_slack = std::chrono::milliseconds(1000), .swept_voxels_per_s = 5e8, .power_w = 500.0};
 
@@ -22,46 +22,46 @@ inline constexpr int kMostCaseMemoryMib = 1 << 20;
 struct ServerConfig {
   std::vector<std::filesystem::path> case_folders;
   std::string listen = "127.0.0.1:0";  // HOST:PORT
-  std::string udp_listen;              // HOST:PORT of the fast path; empty: where `listen` is, a free port
-  std::filesystem::path certificates;  // folder, as Authorizer::open has it
+  std::string udp_listen;              // HOST:PORT of the fast path; empty: the host of `listen`, a free port
+  std::filesystem::path certificates;  // folder, as in Authorizer::open
   std::filesystem::path proxy_socket;  // Unix socket for a proxy of this machine; empty: none
-  bool plain = false;                  // without: plain text, on this machine alone
-  int most_ticket_hours = 0;           // 0: however long a ticket is good
-  int most_connections = 512;          // of everybody together
+  bool plain = false;                  // without certificates: plain text, on this machine alone
+  int most_ticket_hours = 0;           // 0: no limit for the life of a ticket
+  int most_connections = 512;          // of all clients together
   int most_rooms = kMostRooms;         // open and closed ones together
   int most_rooms_per_person = kMostRoomsPerPerson, most_backups_per_person = kMostBackupsPerPerson;
   std::filesystem::path address_file, summary_file, tools_folder;
   std::filesystem::path save_file, resume_file, journal_file, rooms_folder, uploads_folder;
   std::filesystem::path signing_key;   // empty: beside the journals
-  std::filesystem::path audit_file;    // empty: audit.log beside the journals, where any are kept
+  std::filesystem::path audit_file;    // empty: audit.log beside the journals, if there are any
   std::filesystem::path audit_syslog;  // Unix datagram socket; empty: none
   int audit_retention_days = 365;      // 0: records are never removed
   int case_memory_mib = static_cast<int>(kMostCaseMemory >> 20);  // of all cases in memory
-  int retention_days = 0;                                         // 0: nobody is forgotten
+  int retention_days = 0;                                         // 0: nobody is erased
   Detail detail = Detail::automatic;
-  std::string metrics;    // HOST:PORT or PORT, of this machine alone; empty: none are served
-  bool mount = false;     // the bones of rooms stand on mounts
-  int drain_seconds = 5;  // that clients are given to leave in good order
+  std::string metrics;    // HOST:PORT or PORT, for this machine alone; empty: no metrics
+  bool mount = false;     // the bones of rooms stand on compliant mounts
+  int drain_seconds = 5;  // time that clients get to leave in good order
   CutLimits limits = kServedLimits;
 };
 
 struct ConfigRead {
   ServerConfig config;
-  std::vector<std::string>
-      faults;  // "FILE:LINE: "field": what is wrong; what to write", each one sentence; none: it is sound
+  // Each is one sentence: "FILE:LINE: "field": what is wrong; what to write". None: the file is correct.
+  std::vector<std::string> faults;
 };
 
-// Reads a file over what `config` holds. A path that is not absolute begins at the file's folder. Error not_found or
-// internal: the file cannot be read.
+// Reads a file over the values in `config`. A relative path begins at the file's folder. Error not_found or internal:
+// the file cannot be read.
 [[nodiscard]] Result<ConfigRead> read_server_config(const std::filesystem::path& file, ServerConfig config = {});
 
-// Whether what was told fits together, wherever it was told. Error invalid_input, naming the field as the command line
-// does.
+// Checks whether all values fit together, wherever they came from. Error invalid_input, naming the field as the command
+// line does.
 [[nodiscard]] Result<void> check_server_config(const ServerConfig& config);
-// Whether the folders and files that it names are there. Error not_found, naming the field and the path.
+// Checks whether the folders and files that it names exist. Error not_found, naming the field and the path.
 [[nodiscard]] Result<void> check_server_places(const ServerConfig& config);
 
-// The fields that a file may have, in the order of their names; those of "limits" as limits.NAME.
+// The fields that a file may have, in order of their names; those of "limits" as limits.NAME.
 [[nodiscard]] std::vector<std::string> server_config_fields();
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// An address to listen at: HOST:PORT.
+// A place to listen: HOST:PORT.
 #pragma once
 #include <string>
 
@@ -7,14 +7,13 @@
 namespace osteon {
 
 struct HostPort {
-  std::string host;  // as given: a name, four numbers, or [IPv6]
+  std::string host;  // as it was given: a name, four numbers, or [IPv6]
   int port = 0;      // 0: the system chooses
 };
 
-// `option` (for example "--listen") appears in the error message. Error invalid_input: not HOST:PORT with a port from 0
-// to 65535.
+// `option` ("--listen") is for the sentence. Error invalid_input: not HOST:PORT with a port from 0 to 65535.
 [[nodiscard]] Result<HostPort> parse_host_port(const std::string& text, const std::string& option);
-// Whether only this machine can reach the host: localhost, [::1] or four numbers that begin with 127.
+// Whether only this machine reaches it: localhost, [::1] or four numbers that begin with 127.
 [[nodiscard]] bool is_loopback(const std::string& host);
 
 }  // namespace osteon
