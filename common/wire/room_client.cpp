@@ -1,5 +1,4 @@
 #include "common/wire/room_client.hpp"
-#include "common/wire/host_port.hpp"
 
 #include <grpc/support/log.h>
 #include <grpcpp/grpcpp.h>
@@ -14,6 +13,7 @@
 #include "common/field/kernel.hpp"
 #include "common/wire/connection_fault.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/host_port.hpp"
 #include "osteon/v1/room.grpc.pb.h"
 
 namespace osteon::wire {
