@@ -216,7 +216,6 @@ FalconUsb& FalconUsb::operator=(FalconUsb&&) noexcept = default;
 FalconUsb::~FalconUsb() = default;
 
 const std::string& FalconUsb::serial() const noexcept { return wire_->serial; }
-std::uint64_t FalconUsb::broken_frames() const noexcept { return wire_->reader.broken(); }
 
 // Past libusb, whose locks the thread that has crashed may hold: the kernel's own synchronous transfer is one system
 // call, which a handler may make, and queues behind what is under way. A frame that the I/O thread is just submitting

@@ -36,7 +36,6 @@ class FalconUsb {
   // away or fails again and again).
   [[nodiscard]] Result<std::optional<FalconState>> exchange(const FalconCommand& command,
                                                             std::chrono::milliseconds patience);
-  [[nodiscard]] std::uint64_t broken_frames() const noexcept;
 
   // The last of all, for a process that ends: sends a frame without force, and after it none goes out. Any thread, also
   // in a signal's handler, whatever the other calls are doing.

@@ -164,7 +164,6 @@ class Room {
   [[nodiscard]] std::uint64_t bone_changes() const { return bone_changes_; }
   // Leaves that changed since the last call.
   [[nodiscard]] std::vector<BodyLeaves> take_changes() { return std::exchange(changes_, {}); }
-  [[nodiscard]] bool has_changes() const { return !changes_.empty(); }
 
   // Blocks whose payload the events since the last call have made stale, each once.
   [[nodiscard]] std::vector<BlockKey> take_stale_blocks();
