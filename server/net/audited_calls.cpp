@@ -25,16 +25,16 @@ namespace {
 using grpc::StatusCode;
 using grpc::experimental::InterceptionHookPoints;
 
-// What a message says of the call; the event's object is the room of the call's ticket so far.
+// Adds what a message says about the call. Before this, the event's object is the room of the call's ticket.
 using Describe = void (*)(const void* message, AuditEvent& event);
 
-// Of a message that names the room itself.
+// For a message that names the room itself.
 template <class Request>
 void name_room(const void* message, AuditEvent& event) {
   event.object = static_cast<const Request*>(message)->name();
 }
 
-// Of one that makes another room of it.
+// For a message that makes another room from the named one.
 template <class Request>
 void name_both(const void* message, AuditEvent& event) {
   const auto& request = *static_cast<const Request*>(message);
@@ -55,7 +55,7 @@ void describe_joined(const void* message, AuditEvent& event) {
   event.detail += " author " + std::to_string(response.author());
 }
 
-// What holds from now on. Not the words: they are in the journal, from which they can be erased.
+// The restrictions that hold from now on. The words are left out: they are in the journal, where they can be erased.
 void describe_supervision(const void* message, AuditEvent& event) {
   const auto& request = *static_cast<const v1::SuperviseRequest*>(message);
   const v1::Restrictions& all = request.supervision();
@@ -98,8 +98,8 @@ void describe_upload(const void* message, AuditEvent& event) {
 
 struct Row {
   std::string_view method;
-  Describe request = nullptr, response = nullptr;  // null: the message says nothing more
-  bool is_stream = false;                          // that goes down: it is recorded when it begins
+  Describe request = nullptr, response = nullptr;  // null: the message adds nothing
+  bool is_stream = false;                          // a stream from the server: it is recorded when it begins
 };
 constexpr std::array kAudited{
     Row{"/osteon.v1.RoomService/Join", describe_join, describe_joined},
@@ -126,7 +126,7 @@ const Row* find_row(std::string_view method) {
   return row == kAudited.end() ? nullptr : &*row;
 }
 
-// No sentence of the server's: it may name people.
+// A fixed word. The server's own sentences are not used, since they may name people.
 std::string word_of(StatusCode code) {
   switch (code) {
     case StatusCode::INVALID_ARGUMENT:
@@ -169,7 +169,7 @@ std::string header(const grpc::ServerContextBase& context, const char* key) {
   return {first->second.data(), first->second.size()};
 }
 
-// One call. gRPC runs its hooks one after the other.
+// One call. gRPC runs its hooks one after another.
 class AuditedCall final : public grpc::experimental::Interceptor {
  public:
   AuditedCall(AuditTrail& trail, Authorizer* authorizer, grpc::experimental::ServerRpcInfo& call)
@@ -186,14 +186,14 @@ class AuditedCall final : public grpc::experimental::Interceptor {
     }
     if (methods->QueryInterceptionHookPoint(Point::PRE_SEND_STATUS)) {
       const auto* trailers = methods->GetSendTrailingMetadata();
-      const bool is_gates = trailers != nullptr && trailers->contains(kRefusalTrailer);
-      if (!is_gates) end(methods->GetSendStatus().error_code());
+      const bool is_authorizers = trailers != nullptr && trailers->contains(kRefusalTrailer);
+      if (!is_authorizers) end(methods->GetSendStatus().error_code());
     }
     methods->Proceed();
   }
 
  private:
-  // Who and where, as far as the connection and the headers say it.
+  // Person and address, as far as the connection and the headers say them.
   AuditEvent& begun() {
     if (!event_.action.empty()) return event_;
     const grpc::ServerContextBase& context = *call_.server_context();
@@ -225,7 +225,7 @@ class AuditedCall final : public grpc::experimental::Interceptor {
   AuditTrail& trail_;
   Authorizer* const authorizer_;
   grpc::experimental::ServerRpcInfo& call_;
-  const Row* const row_;  // null: of calls that are not audited unless they are refused
+  const Row* const row_;  // null: audited only if the call is refused
   AuditEvent event_{.action = "", .result = kOk};
   bool recorded_ = false;
 };

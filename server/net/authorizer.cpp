@@ -39,7 +39,7 @@ Result<std::string> read_all(const std::filesystem::path& file) {
   return failure(ErrorCode::not_found, file.string() + " cannot be read; deploy/certs makes what --certificates needs");
 }
 
-// The keys of an authority have no business here; who copied them here is told of them as well.
+// The keys of an authority do not belong in this folder. Warns about them too, in case somebody copied them here.
 void warn_of_readable_secrets(const std::filesystem::path& folder) {
   for (const char* name : {"server.key", "proxy.pem", "tickets.key", "ca.key"})
     if (const auto why = who_else_reads(folder / name)) log::warn("READABLE SECRET KEY", {{"fault", *why}});
@@ -59,15 +59,15 @@ void make_space(Map& map) {
   if (map.size() >= kMostRemembered) map.clear();
 }
 
-// gRPC asks it once in every handshake, after the client has shown that it holds the key of its certificate. gRPC
-// itself accepts any certificate there: it says of none why it was refused, and knows no revocation that begins at
-// once.
+// gRPC calls it once in every handshake, after the client has proved that it has the key of its certificate. gRPC is
+// set to accept any certificate. Its own check would not say why a certificate is refused, and would not apply a new
+// revocation at once.
 class HandshakeCheck final : public grpc::experimental::ExternalCertificateVerifier {
  public:
   explicit HandshakeCheck(Authorizer& authorizer) : authorizer_(authorizer) {}
   bool Verify(grpc::experimental::TlsCustomVerificationCheckRequest* request, std::function<void(grpc::Status)>,
               grpc::Status* at_once) override {
-    // At a server OpenSSL has the client's own certificate apart from the others of its chain.
+    // On a server, OpenSSL stores the client's own certificate separately from the others of its chain.
     const grpc::string_ref own = request->peer_cert(), others = request->peer_cert_full_chain();
     const std::string chain = std::string(own.data(), own.size()) + std::string(others.data(), others.size());
     const std::optional<Refusal> why = authorizer_.judge_handshake(chain);
@@ -99,7 +99,7 @@ class Authorizer::Watched final : public OpenStream {
   Role role() const override { return role_; }
   void set_role(Role role) { role_ = role; }
   [[nodiscard]] bool ended() const { return ended_; }
-  // Once.
+  // Called once.
   void end(const Refusal& why) {
     role_ = Role::none;
     if (!ended_.exchange(true)) end_(why);
@@ -145,7 +145,7 @@ Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path
   warn_of_readable_secrets(folder);
   std::unique_ptr<Authorizer> authorizer(new Authorizer(folder, counts, std::move(now)));
   if (const Result<bool> read = authorizer->read_ticket_keys(); !read) return tl::unexpected(read.error());
-  // A list that is wrong at the start would let in whom it is to keep out.
+  // A wrong list at the start would admit people whom it should keep out.
   if (const Result<bool> read = authorizer->access_.refresh(); !read) return tl::unexpected(read.error());
   authorizer->access_list_ = authorizer->access_.list();
   if (const Result<bool> read = authorizer->read_authorities(); !read) return tl::unexpected(read.error());
@@ -154,7 +154,7 @@ Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path
 }
 
 std::shared_ptr<grpc::ServerCredentials> Authorizer::credentials() {
-  // Read again while the server runs; a renewed certificate disturbs nobody who is in.
+  // These files are read again while the server runs. A renewed certificate does not disturb open connections.
   const auto files = std::make_shared<grpc::experimental::FileWatcherCertificateProvider>(  // shared with gRPC
       (folder_ / "server.key").string(), (folder_ / "server.pem").string(), (folder_ / "ca.pem").string(),
       kCertificatesEverySeconds);
@@ -189,7 +189,7 @@ std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
       refusal = Refusal{"flood", true, "too many calls came from you; wait a minute"};
   }
   if (!refusal) return {};
-  // The name in a chain that does not hold is only what somebody says. A revoked one holds otherwise.
+  // The name in an invalid chain is only a claim. A revoked chain is valid otherwise.
   const bool is_verified = chain || chain.error().fault == ChainFault::revoked;
   std::string who =
       certificate ? certificate->user + ", certificate " + certificate->serial : "a certificate without a name";
@@ -241,8 +241,8 @@ Result<PersonCertificate> Authorizer::certificate_of(std::string_view pem) {
   return certificates_.emplace(pem, std::move(*read)).first->second;
 }
 
-// The handshake checked what came over TLS. What a proxy shows is checked here: a mistake in its configuration opens
-// nothing.
+// The handshake has checked certificates that came over TLS. Those that a proxy sends are checked here, so that a
+// mistake in the proxy's configuration admits nobody.
 Result<void> Authorizer::check_shown(const PeerClaims& peer) {
   if (!peer.by_proxy || checked_.contains(peer.certificate_pem)) return {};
   const auto chain = check_client_chain(peer.certificate_pem, *authorities_, now_());
@@ -327,7 +327,7 @@ tl::expected<Caller, Refusal> Authorizer::judge(const CallClaims& call) {
                 .ticket_key = checked->key,
                 .certificate_ends = certificate->ends,
                 .address = call.peer.address};
-  // A role may hold in one room alone: that room has to be known here, however the call names it.
+  // A role may hold in one room only, so the room must be known here, however the call names it.
   std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
   if (room == kAnyRoom && only_room_) room = only_room_();
   if (std::optional<Refusal> refusal = judge_again(caller, room, call.method))
@@ -406,7 +406,7 @@ Result<void> Authorizer::check_resume_locked(const Caller& caller, const std::st
 
 Result<void> Authorizer::joined(const Caller& caller, const std::string& room, int kind, AuthorId author,
                                 Coming coming) {
-  std::vector<std::shared_ptr<Watched>> held, displaced;  // let go of without the lock, which their end takes
+  std::vector<std::shared_ptr<Watched>> held, displaced;  // destroyed without the lock, since their destructors take it
   {
     const std::lock_guard lock(mutex_);
     if (coming == Coming::again)
@@ -415,7 +415,7 @@ Result<void> Authorizer::joined(const Caller& caller, const std::string& room, i
     AuthorId& sitting = seats_[seat];
     if (sitting && sitting != author) {
       ++counts_.displaced;
-      // A room of the same name may have been made anew since, and the number may be somebody else's in it.
+      // A room of the same name may have been made since, and the number may belong to somebody else there.
       const auto known = authors_.find({room, sitting});
       if (known != authors_.end() && known->second.seat == seat) authors_.erase(known);
       for (const std::weak_ptr<Watched>& weak : streams_) held.push_back(weak.lock());
@@ -456,7 +456,8 @@ void Authorizer::forget_room(const std::string& room) {
 Authorizer::Entered Authorizer::enter(const Caller& caller, const std::string& room, AuthorId author,
                                       std::string_view method, End end) {
   auto stream = std::make_shared<Watched>(*this, caller, room, author, method,
-                                          std::move(end));  // shared with look() while it ends it
+                                          // Shared with look() while that ends it.
+                                          std::move(end));
   const std::lock_guard lock(mutex_);
   std::optional<Refusal> refusal = judge_again(stream->caller, room, method);
   if (!refusal && stream->caller.role != caller.role)
@@ -496,7 +497,7 @@ Result<bool> Authorizer::read_authorities() {
     return failure(ErrorCode::invalid_input, (folder_ / "ca.pem").string() + " and crl.pem: " +
                                                  serials.error().message + "; make them with deploy/certs");
   const std::lock_guard lock(mutex_);
-  authorities_ = std::make_shared<const Authorities>(std::move(now));  // shared with handshakes that are under way
+  authorities_ = std::make_shared<const Authorities>(std::move(now));  // shared with handshakes in progress
   listed_serials_ = *serials;
   checked_.clear();
   return true;
@@ -515,7 +516,7 @@ Result<bool> Authorizer::read_ticket_keys() {
   return true;
 }
 
-// A disk that is slow lets no call wait: only what was read is put in under the lock that calls take.
+// A slow disk delays no call: files are read first, and only the result is stored under the lock that calls take.
 void Authorizer::refresh() {
   const std::lock_guard reading(reading_);
   const auto tell = [](std::string_view what, const Result<bool>& read, std::string& told) {
@@ -538,14 +539,14 @@ void Authorizer::refresh() {
   const Result<bool> keys = read_ticket_keys();
   if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
   tell("ticket keys were not read, and those before count on", keys, keys_fault_);
-  // A changed role alone closes no connection: those before a first call would be closed with it.
+  // A changed role alone closes no connection, since this would also close connections before their first call.
   revoked_anew_ = is_revocation || (authorities && *authorities);
 }
 
 void Authorizer::close_revoked() {
   if (!connections_) return;
   const std::lock_guard lock(mutex_);
-  // Whose connection has made no call may have come with a certificate that is revoked now. Who may come does so again.
+  // A connection without a call may use a certificate that was revoked meanwhile. Clients that may connect do so again.
   const std::size_t closed = connections_->close_if(
       [this](const Connection& one) { return one.serial.empty() || revoked(one.serial, one.user, {}); });
   if (closed > 0)
@@ -554,8 +555,8 @@ void Authorizer::close_revoked() {
 
 void Authorizer::look() {
   std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
-  std::vector<std::shared_ptr<Watched>> held;  // let go of without the lock, which their end takes
-  // One look later than their streams end: so the clients still hear why.
+  std::vector<std::shared_ptr<Watched>> held;  // destroyed without the lock, since their destructors take it
+  // Closes connections one check after their streams end, so that the clients still receive the reason.
   if (revoked_anew_.exchange(false)) close_revoked();
   refresh();
   {
@@ -568,7 +569,7 @@ void Authorizer::look() {
       }
       const Role before = stream->caller.role;
       std::optional<Refusal> refusal = judge_again(stream->caller, stream->room, stream->method);
-      // The room knows the role in which somebody joined.
+      // The room knows the role with which somebody joined.
       if (!refusal && stream->caller.role != before) refusal = Refusal{"role", true, changed_role(stream->caller.role)};
       if (refusal) {
         stream->set_role(Role::none);

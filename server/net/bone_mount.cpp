@@ -8,7 +8,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto kTellAtRest = 50ms;
-constexpr auto kLongestStep = 100ms;  // of a machine that stood: time was lost for the bone too
+constexpr auto kLongestStep = 100ms;  // longest step after the machine stood still: the bone loses that time too
 constexpr double kRest_mj = 1e-6;     // less than a thousandth of a millimetre
 
 }  // namespace

@@ -6,14 +6,14 @@
 namespace osteon {
 namespace {
 
-// Programs come again by themselves, over a bad line a few times a second. Each joining stays in the room's memory and
+// Programs connect again by themselves, over a bad line a few times a second. Each join stays in the room's memory and
 // journal.
 constexpr CallRate kComing{4.0, 60.0};
-// Each is a row of the journal, which everybody in the room is told.
+// Each is an entry of the journal that everybody in the room is sent.
 constexpr CallRate kSaying{5.0, 40.0};
-// The same, as of a tool that is dragged, or a script.
+// The same, for calls in quick succession, as when a tool is dragged or a script runs.
 constexpr CallRate kChanging{20.0, 100.0};
-// Takes the bone in hand, and is what programs ask over and over while they wait.
+// Needs the bone, and is what programs ask again and again while they wait.
 constexpr CallRate kLookingUp{100.0, 100.0};
 
 struct Row {

@@ -1,4 +1,4 @@
-// Which room a call is to. For the sources of the services alone: gRPC stays out of headers.
+// Finds the caller and the room of a call. Only for the source files of the services, since gRPC stays out of headers.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 
 namespace osteon {
 
-// A header that comes once or not at all; nothing where it came twice: two readers might take different ones.
+// The value of a header; "" if it is missing. Nothing if it came twice, since two readers might use different values.
 inline std::optional<std::string> metadata_of(const grpc::CallbackServerContext& context, const char* key) {
   const auto [first, last] = context.client_metadata().equal_range(key);
   if (first == last) return std::string();
@@ -30,7 +30,7 @@ inline std::optional<std::string> metadata_of(const grpc::CallbackServerContext&
   return std::string(first->second.data(), first->second.size());
 }
 
-// The headers that a call may have beside those of HTTP/2 and gRPC, which gRPC keeps to itself.
+// The headers that a call may have beside those of HTTP/2 and gRPC, which gRPC does not pass on.
 inline bool is_known_header(std::string_view name, bool by_proxy) {
   static constexpr std::array<std::string_view, 6> kKnown{"osteon-ticket",        "osteon-room-bin", "user-agent",
                                                           "grpc-accept-encoding", "accept-encoding", "grpc-trace-bin"};
@@ -45,8 +45,8 @@ inline tl::expected<Caller, Refusal> judged(Authorizer& authorizer, const grpc::
   return authorizer.judge({.peer = peer, .ticket = ticket, .room = room, .method = method});
 }
 
-// Authorizes a call at its beginning: certificate, ticket, role, headers and how often. Null: it may go on. The one
-// place where calls are counted as admitted or refused; every handler begins with it.
+// Authorizes a call at its beginning: certificate, ticket, role, headers and rate. Null: the call is allowed. Every
+// handler begins with this. It is the only place where calls are counted as admitted or refused.
 inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context,
                                         std::string_view method) {
   if (!rooms.authorizer) return {};
@@ -57,7 +57,7 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
                         .ticket = ticket ? std::string_view(*ticket) : std::string_view(),
                         .room = room ? std::string_view(*room) : std::string_view(),
                         .method = method};
-  // Tells programs the reason, and refused_call_notes() that it was noted.
+  // Sends programs the reason, and lets refused_call_notes() know that the refusal was noted.
   const auto tell = [&](std::string_view reason) { context.AddTrailingMetadata(kRefusalTrailer, std::string(reason)); };
   const auto wrong = [&](std::string sentence) {
     tell("request");
@@ -75,8 +75,8 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
   return status_of(caller.error());
 }
 
-// The call that a request is of: of v1::UndoRequest "/osteon.v1.RoomService/Undo". The names of requests follow those
-// of their calls, and a test holds the protocol to it.
+// The call of a request: "/osteon.v1.RoomService/Undo" for v1::UndoRequest. Requests are named after their calls; a
+// test checks this for the whole protocol.
 template <class Request>
 std::string_view method_of() {
   static const CallRow* const entry = [] {
@@ -95,7 +95,7 @@ std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext
   return refusal_of(rooms, context, method_of<Request>());
 }
 
-// The same of a call that has one answer. False: it was answered with the refusal.
+// The same for a call with one answer. Returns false if the call was answered with the refusal.
 template <class Request>
 bool admitted(const Rooms& rooms, grpc::CallbackServerContext& context, grpc::ServerUnaryReactor* reactor) {
   std::optional<Status> refusal = refusal_of<Request>(rooms, context);
@@ -103,8 +103,8 @@ bool admitted(const Rooms& rooms, grpc::CallbackServerContext& context, grpc::Se
   return !refusal;
 }
 
-// Who calls. Over plain text nobody says so: `user` is empty then, and the caller may do anything. Error denied: the
-// caller's right has ended since the call was let in.
+// The person who calls. Over plain text this is unknown: `user` is empty, and the caller may do anything. Error denied:
+// the caller's right has ended since the call was admitted.
 inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerContext& context) {
   if (!rooms.authorizer) return Caller{};
   auto caller = judged(*rooms.authorizer, context, metadata_of(context, "osteon-room-bin").value_or(""), {});
@@ -112,9 +112,9 @@ inline Result<Caller> caller_of(const Rooms& rooms, const grpc::CallbackServerCo
   return std::move(*caller);
 }
 
-// The same, as whoever they are in `room`, which has a name: of a call whose message names rooms. They need not be the
-// metadata's, by which it was let in. Error denied: the ticket is not for that room, or the role there may not make the
-// call `method`.
+// The same, with the role in `room`, which is not empty. For a call whose message names rooms. These may differ from
+// the room in the metadata, for which the call was admitted. Error denied: the ticket is not for that room, or the role
+// there may not make the call `method`.
 inline Result<Caller> caller_in(const Rooms& rooms, const grpc::CallbackServerContext& context, const std::string& room,
                                 std::string_view method) {
   if (!rooms.authorizer) return Caller{};
@@ -123,7 +123,7 @@ inline Result<Caller> caller_in(const Rooms& rooms, const grpc::CallbackServerCo
   return std::move(*caller);
 }
 
-// By the call's metadata "osteon-room-bin"; without it, the one that the ticket is for, or the only one that is open.
+// By the call's metadata "osteon-room-bin". Without it, the room of the ticket, or the only open room.
 inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context) {
   const Result<Caller> caller = caller_of(rooms, context);
   if (!caller) return tl::unexpected(caller.error());
@@ -132,7 +132,7 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
   return rooms.find(named);
 }
 
-// The same, of a call that is made as `author`. Error denied: that is not who calls.
+// The same for a call that is made as `author`. Error denied: the caller is not this author.
 inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const grpc::CallbackServerContext& context,
                                                      AuthorId author) {
   Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context);
@@ -144,7 +144,7 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
   return room;
 }
 
-// The log keeps the paths.
+// The status has no paths; the log has them.
 inline Status status_of(const Error& error) {
   if (without_paths(error.message) != error.message) log::warn("a call failed", {{"reason", error.message}});
   std::string said = short_words(error.message);
@@ -173,7 +173,7 @@ inline grpc::ServerUnaryReactor* refuse(grpc::ServerUnaryReactor* reactor, Statu
   return reactor;
 }
 
-// The room of a call that has one answer; null once `reactor` was told why there is none.
+// The room of a call with one answer. Null: `reactor` was given the reason.
 inline std::shared_ptr<OpenRoom> room_of(const Rooms& rooms, const grpc::CallbackServerContext& context,
                                          grpc::ServerUnaryReactor* reactor) {
   Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context);
@@ -182,7 +182,7 @@ inline std::shared_ptr<OpenRoom> room_of(const Rooms& rooms, const grpc::Callbac
   return nullptr;
 }
 
-// The same, of one that is made as `author`, whether they have joined it or not.
+// The same for a call that is made as `author`, whether the author has joined or not.
 inline std::shared_ptr<OpenRoom> room_of(const Rooms& rooms, const grpc::CallbackServerContext& context,
                                          grpc::ServerUnaryReactor* reactor, AuthorId author) {
   Result<std::shared_ptr<OpenRoom>> room = called_room(rooms, context, author);
@@ -191,7 +191,7 @@ inline std::shared_ptr<OpenRoom> room_of(const Rooms& rooms, const grpc::Callbac
   return nullptr;
 }
 
-// The same, of a request whose author has joined it.
+// The same for a request whose author has joined.
 template <class Request>
 std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::CallbackServerContext& context,
                                          grpc::ServerUnaryReactor* reactor, const Request& request) {
@@ -202,7 +202,7 @@ std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::Callbac
   return nullptr;
 }
 
-// An event of the room; the call is answered when every session has been told, by what `fill` makes of it.
+// Queues an event of the room. The call is answered when every session was sent the event; `fill` makes the answer.
 template <class Fill>
 grpc::ServerUnaryReactor* change_room(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
                                       std::function<Result<RoomEvent>(Room&)> event, Fill fill) {

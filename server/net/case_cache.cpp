@@ -63,8 +63,8 @@ Result<LoadedCase> CaseCache::load(const Digest& hash) {
     if (found == entries_.end()) return failure(ErrorCode::not_found, "the server has no case " + to_hex(hash));
     known = found->second.known;
     if (auto bone = found->second.loaded.lock()) return LoadedCase{std::move(bone), known.folder};
-    // Refused before it is read, by what it takes or, where that is not known yet, by the bytes of its file, which are
-    // fewer.
+    // Refused before it is read, by the memory that it needs. If this is not known yet, by the size of its file, which
+    // is smaller.
     std::error_code none;
     const std::uint64_t file = std::filesystem::file_size(known.folder / "bone.vdb", none);
     const std::uint64_t least = known.memory_bytes != 0 ? known.memory_bytes : none ? 0 : file;

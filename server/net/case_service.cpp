@@ -1,4 +1,4 @@
-// Cases that are uploaded.
+// The service for uploaded cases.
 #include <grpcpp/alarm.h>
 #include <grpcpp/grpcpp.h>
 
@@ -38,8 +38,8 @@ std::uint64_t bytes_of(const std::filesystem::path& folder) {
   return bytes;
 }
 
-// One upload. What has come goes to the disk at once, so that none of it waits in memory. It ends with its sender's
-// right, and with their patience: each holds one of the few places for uploads.
+// One upload. Received data is written to the disk at once, so that none of it waits in memory. An upload ends when its
+// sender's right ends or when it takes too long, since there are only few concurrent uploads.
 class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest> {
  public:
   static constexpr std::size_t kMostPiece = 1 << 20;
@@ -48,7 +48,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   UploadStream(Rooms& rooms, v1::UploadCaseResponse* response)
       : rooms_(rooms), store_(rooms.store()), response_(response) {}
 
-  // gRPC holds the stream until OnDone; the thread that looks cases through, the authorizer and the alarm may hold it
+  // gRPC holds the stream until OnDone. The thread that validates cases, the authorizer and the alarm may hold it
   // longer.
   static UploadStream* launch(const std::shared_ptr<UploadStream>& stream, const Result<Caller>& caller) {
     stream->self_ = stream;
@@ -56,7 +56,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     return stream.get();
   }
 
-  // A stream that only ends.
+  // Makes a stream that only ends.
   static UploadStream* refuse(const std::shared_ptr<UploadStream>& stream, Status why) {
     stream->self_ = stream;
     stream->end(std::move(why));
@@ -67,7 +67,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
     std::unique_lock lock(mutex_);
     if (finished_ || !upload_) return;
     if (!ok) {
-      // Taken apart and looked through by the thread for that.
+      // The validation thread unpacks and checks it.
       whole_ = true;
       lock.unlock();
       return rooms_.checks.run([this, keep = self_] { keep_case(); });
@@ -84,7 +84,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   void OnDone() override {
     {
       const std::lock_guard lock(mutex_);
-      finished_ = true;  // the alarm is set no more
+      finished_ = true;  // the alarm is not set any more
       alarm_.reset();
       if (!whole_) upload_.reset();
     }
@@ -117,11 +117,11 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   }
 
   void end(Status why) {
-    cancelled_ = true;  // also of a case that is being looked through
+    cancelled_ = true;  // also for a case that is being validated
     const std::lock_guard lock(mutex_);
     finish(std::move(why));
   }
-  // Under mutex_. Once.
+  // Under mutex_. Only the first call has an effect.
   void finish(Status status) {
     if (std::exchange(finished_, true)) return;
     if (!status.ok()) log::warn("upload refused", {{"reason", status.error_message()}});
@@ -141,7 +141,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
       if (const auto self = rang ? weak.lock() : nullptr) self->look_at_the_clock();
     });
   }
-  // Once all has come, time is the business of who looks it through.
+  // Once all data has come, the validation has its own time limit.
   void look_at_the_clock() {
     const std::lock_guard lock(mutex_);
     if (finished_ || whole_) return;
@@ -154,9 +154,9 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
                  : "the upload took longer than the " + seconds + " that it may; send it again over a faster line"});
   }
 
-  // [thread that looks cases through]
+  // [thread that validates cases]
   void keep_case() {
-    // A sender who is gone, or a server that stops: nobody waits for it.
+    // The sender is gone or the server stops: nobody waits for the result.
     const auto stop = [this] { return cancelled_ || rooms_.ending(); };
     Result<StoredCase> stored =
         stop() ? failure(ErrorCode::cancelled, "the upload was given up") : Result<StoredCase>{};
@@ -177,14 +177,14 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   }
 
   Rooms& rooms_;
-  const std::shared_ptr<CaseRepository> store_;  // shared with the rooms; outlives what was uploaded here
-  v1::UploadCaseResponse* const response_;       // until it has finished
+  const std::shared_ptr<CaseRepository> store_;  // shared with the rooms; outlives the uploads
+  v1::UploadCaseResponse* const response_;       // valid until the call has finished
   v1::UploadCaseRequest request_;
   std::atomic<bool> cancelled_{false};
   std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream
   std::mutex mutex_;
   std::shared_ptr<UploadStream> self_;
-  std::unique_ptr<Upload> upload_;  // once all has come, of the thread that keeps it
+  std::unique_ptr<Upload> upload_;  // once all data has come, used by the validation thread
   std::unique_ptr<grpc::Alarm> alarm_;
   Clock::time_point began_, newest_;
   bool whole_ = false, finished_ = false;

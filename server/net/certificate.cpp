@@ -31,7 +31,7 @@ Result<double> certificate_days_left(const std::filesystem::path& pem) {
 void log_server_certificate(const std::filesystem::path& pem, std::chrono::sys_seconds now) {
   const Result<std::string> text = read_file(pem);
   const std::vector<wire::X509Ptr> chain = wire::certificates_of(text ? *text : std::string());
-  if (chain.empty()) return;  // which is told elsewhere
+  if (chain.empty()) return;  // this error is reported elsewhere
   const wire::Validity valid = wire::validity_of(*chain.front());
   const std::string machines = wire::machines_of(*chain.front());
   log::info("server certificate", {{"for", machines}, {"until", wire::text_of(valid.ends)}});

@@ -9,7 +9,7 @@
 namespace osteon {
 namespace {
 
-// As /etc/ssl/openssl.cnf of Debian 12, with the one option more.
+// As in /etc/ssl/openssl.cnf of Debian 12, with one option more.
 constexpr char kDefaults[] =
     "openssl_conf = modules\n"
     "[modules]\nssl_conf = contexts\n"
@@ -19,7 +19,7 @@ constexpr char kDefaults[] =
 }  // namespace
 
 Result<void> prefer_own_cipher_order() {
-  // The system's own file first: read later, it would take the place of this.
+  // Reads the system's own file first. Read later, it would replace these settings.
   OPENSSL_init_crypto(OPENSSL_INIT_LOAD_CONFIG, nullptr);
   const std::unique_ptr<BIO, int (*)(BIO*)> text(BIO_new_mem_buf(kDefaults, sizeof kDefaults - 1), BIO_free);
   const std::unique_ptr<CONF, void (*)(CONF*)> read(NCONF_new(nullptr), NCONF_free);

@@ -21,8 +21,8 @@ std::optional<std::uint64_t> inode_of(int descriptor) {
 
 constexpr std::string_view kUnix = "unix:";
 
-// The peer of a connection in gRPC's words; empty: it has none. Those of a Unix socket all have one address: `inode`
-// tells them apart.
+// The peer of a connection as gRPC writes it; empty: none. All connections of a Unix socket have one address; `inode`
+// distinguishes them.
 std::string peer_of(int descriptor, std::uint64_t inode) {
   sockaddr_storage at{};
   socklen_t size = sizeof at;
@@ -64,7 +64,7 @@ std::size_t Connections::count() {
 
 bool Connections::has_room(std::size_t most) {
   const std::lock_guard lock(mutex_);
-  // Only when it matters is looked which of them are still there.
+  // Looks which connections are still open only if it matters.
   if (open_.size() >= most) drop_closed();
   return open_.size() < most;
 }
@@ -96,9 +96,10 @@ std::size_t Connections::close_if(const std::function<bool(const Connection&)>& 
   std::size_t closed = 0;
   for (auto& [peer, entry] : open_) {
     if (entry.connection.is_proxys || entry.is_cut_off || !which(entry.connection)) continue;
-    // gRPC may close it at this moment and another connection may take its descriptor. That one is cut off then, and
-    // comes again.
-    // What shutdown() leaves in the receive queue would still be read: thousands of calls (CVE-2023-44487).
+    // gRPC may close it at this moment, and another connection may take its descriptor. That one is then cut off, and
+    // connects again.
+    // After shutdown(), the receive queue would still be read: thousands of calls (CVE-2023-44487). So connect() is
+    // used.
     const sockaddr nowhere{.sa_family = AF_UNSPEC, .sa_data = {}};
     ::connect(entry.descriptor, &nowhere, sizeof nowhere);
     entry.is_cut_off = true;

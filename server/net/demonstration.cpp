@@ -26,7 +26,7 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kMostUndecided = 64;
-constexpr Clock::duration kLongestPause = 3s;  // somebody thought, or the room was closed
+constexpr Clock::duration kLongestPause = 3s;  // longer pauses are shortened: somebody thought, or the room was closed
 constexpr Clock::time_point kNever = Clock::time_point::max();
 
 struct Recorded {
@@ -36,14 +36,14 @@ struct Recorded {
 
 }  // namespace
 
-// One thread of its own makes the cuts; the room's threads say what became of them.
+// Its own thread makes the cuts. The room's threads report the results.
 class Demonstration final : public SessionSubscriber, public std::enable_shared_from_this<Demonstration> {
  public:
   Demonstration(RoomRuntime& runtime, AuthorId author, std::vector<Recorded> cuts, double speed)
       : runtime_(runtime), author_(author), cuts_(std::move(cuts)), speed_(speed) {}
 
-  // Before start(). `by` may be whoever they were when they asked; a newer session of theirs leaves what they started
-  // alone.
+  // Call it before start(). `by` may be an earlier identity of the person. A newer session of the same person does not
+  // end what they started.
   [[nodiscard]] Result<void> stand_under(Authorizer& authorizer, const Caller& by, const std::string& room) {
     const auto end = [weak = weak_from_this()](const Refusal& why) {
       if (const auto self = weak.lock()) self->refuse({ErrorCode::denied, why.sentence});
@@ -58,7 +58,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     thread_ = std::thread([this] { run(); });
     return {};
   }
-  // Once, and not on its own thread.
+  // Called once, and not on its own thread.
   void stop() {
     finish();
     if (thread_.joinable()) thread_.join();
@@ -68,14 +68,14 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     return over_;
   }
 
-  // Empty: it came to its end, or somebody ended it.
+  // Empty: it ran to its end, or somebody ended it.
   [[nodiscard]] std::string why() const {
     const std::lock_guard lock(mutex_);
     return why_;
   }
 
   AuthorId author() const override { return author_; }
-  // Its tool goes where it went on the bone, wherever that is on a mount, and no force is recorded.
+  // Its tool follows its path on the bone, wherever the mount has moved the bone. No force is recorded.
   bool feels_bone() const override { return false; }
   void begin(RoomSeq, MessageParts, Bytes complete) override {
     v1::SessionResponse said;
@@ -100,7 +100,8 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
       undecided_.pop_front();
     } else if (entry.kind == wire::SessionEntryKind::rejected) {
       lease_ = entry.lease_epoch;
-      // What fell with the lease is made again under the new one; what is wrong in itself is left out.
+      // Cuts that were rejected because of the lease are made again under the new lease. Cuts that are wrong in
+      // themselves are left out.
       const auto reason = static_cast<Rejection>(entry.reason);
       if (reason == Rejection::lease || reason == Rejection::frozen || reason == Rejection::taken)
         again_.push_back(undecided_.front());
@@ -131,8 +132,9 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     enum class What { cut, rest, end } what;
     Recorded cut{};
   };
-  // Waits for the next cut that is due, for the end, or for the tool to come to rest: at once where it is stopped, else
-  // at `seen_at_work`, until when it is seen at work; null: it rests.
+  // Waits for the next cut that is due, for the end, or for the time to show the tool at rest. A stopped tool is shown
+  // at rest at once; any other tool at `seen_at_work`, the time until which it is shown at work. Null: it is at rest
+  // already.
   Step next(const std::optional<Clock::time_point>& seen_at_work) {
     std::unique_lock lock(mutex_);
     while (!over_) {
@@ -156,7 +158,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
       const std::size_t which = again_.front();
       again_.pop_front();
       undecided_.push_back(which);
-      // Not faster than a tool goes: a lease allows only so much.
+      // Not faster than the tool moved, since a lease allows only a limited rate.
       due_ = Clock::now() + at_speed(std::chrono::microseconds(cuts_[which].cut.path_us));
       return stamped(which);
     }
@@ -200,7 +202,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
       }
     }
     runtime_.leave(*this);
-    std::shared_ptr<OpenStream> watched;  // let go of without the lock, which its end takes
+    std::shared_ptr<OpenStream> watched;  // destroyed without the lock, since its destructor takes it
     const std::lock_guard lock(mutex_);
     over_ = true;
     watched = std::move(watched_);
@@ -214,8 +216,8 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   std::condition_variable wake_;
   std::uint64_t lease_ = 0, author_seq_ = 0;
   BodyId body_;
-  std::size_t made_ = 0;                       // of cuts_
-  std::deque<std::size_t> undecided_, again_;  // which of them
+  std::size_t made_ = 0;                       // number of cuts_ that were made
+  std::deque<std::size_t> undecided_, again_;  // indices into cuts_
   Clock::time_point due_{};
   bool stopped_ = false, over_ = false;
   std::string why_;
@@ -225,13 +227,13 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
 
 namespace {
 
-// What a journal has to show.
+// What is read from a journal.
 struct Recording {
   std::vector<Recorded> cuts;
-  std::vector<Tool> tools;  // that they are made with
+  std::vector<Tool> tools;  // the tools of the cuts
 };
 
-// `over`: nobody waits for it any more.
+// `over`: nobody waits for the result any more.
 Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& what, const std::atomic<bool>& over) {
   std::map<RoomSeq, Recorded> cuts;
   std::set<RoomSeq> undone;
@@ -272,7 +274,7 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
   return out;
 }
 
-// Waits until the room knows it.
+// Waits until the room knows the tool.
 Result<void> add_tool(RoomRuntime& runtime, AuthorId by, const Tool& tool) {
   std::promise<Result<RoomEvent>> answer;
   runtime.queue_event([by, tool](Room& room) { return room.add_tool(by, tool); },

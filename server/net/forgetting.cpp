@@ -37,7 +37,7 @@ std::uint32_t number_of(const Person& person) {
   return number;
 }
 
-// The words of an entry, where it has some.
+// The words of an entry, if it has any.
 std::string* words_in(LogEntry& entry) {
   if (auto* mark = std::get_if<MarkEntry>(&entry.what)) return &mark->label;
   if (auto* said = std::get_if<WordsEntry>(&entry.what)) return &said->words;
@@ -82,7 +82,7 @@ Result<Forgotten> forget_people(Journal& journal, const std::function<bool(const
       names.push_back(person.label);
       pseudonyms.push_back(person.pseudonym);
     }
-  if (number != 0) people.insert(number);  // whose name may be forgotten already
+  if (number != 0) people.insert(number);  // the name may be erased already
   if (people.empty()) return Forgotten{};
   const Result<std::size_t> entries = journal.erase_entries(WordEraser(std::move(people), names));
   if (!entries) return tl::unexpected(entries.error());

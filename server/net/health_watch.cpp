@@ -39,7 +39,7 @@ void HealthWatch::look() {
   const std::lock_guard lock(mutex_);
   const bool open = !rooms_.draining();
   std::map<std::string, bool> now;
-  // What was there once is known as gone; a name that never was is unknown to the service.
+  // A removed name is reported as not serving. The service does not know names that never existed.
   for (const auto& [name, serving] : told_) now[name] = false;
   now[""] = open;
   if (of_ == Of::server_and_rooms)

@@ -44,7 +44,7 @@ Result<Mask> mask_of(const List& list) {
   return Mask(std::move(mask));
 }
 
-// A float holds no pose to the last bit, and a replayed room must have the hash of the one it replays.
+// A float does not hold a pose exactly, and a replayed room must have the same hash as the original.
 void put(const Pose& pose, google::protobuf::RepeatedField<double>& out) {
   for (const double part : pose.position_mm) out.Add(part);
   for (const double part : pose.rotation.coeffs()) out.Add(part);
@@ -57,7 +57,7 @@ Result<Pose> pose_of(const google::protobuf::RepeatedField<double>& parts) {
   return pose;
 }
 
-// As JSON has it.
+// Text as JSON.
 std::string json_text(std::string_view text) {
   std::string out = "\"";
   for (const char c : text) {
@@ -298,7 +298,7 @@ Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutL
                                                std::to_string(genesis.kernel_version) + " and this server's is " +
                                                std::to_string(kKernelVersion) +
                                                "; go on with the release that made it");
-  // Not the server's own box: another release's may hold other tools.
+  // Not the server's own tool box: another release may have other tools.
   auto tools = std::make_shared<ToolBox>();
   for (const Tool& tool : genesis.tools) tools->add(tool);
   Room room(bone, limits, std::move(tools));

@@ -11,7 +11,7 @@ namespace {
 using Time = std::chrono::nanoseconds;
 using namespace std::chrono_literals;
 
-constexpr int kMostInAEntry = 256;  // datagrams received before others are sent: there are floods
+constexpr int kMostInSuccession = 256;  // datagrams received before others are sent, as there may be floods
 constexpr Time kLongestWait = 100ms;
 
 // The clock of all links of this process.
@@ -166,7 +166,7 @@ LinkServerHealth LinkServer::health() const {
 
 void LinkServer::receive_some(Time now) {
   DatagramBuffer buffer;
-  for (int i = 0; i < kMostInAEntry; ++i) {
+  for (int i = 0; i < kMostInSuccession; ++i) {
     const std::optional<Datagram> datagram = port_->receive(buffer);
     if (!datagram) return;
     const std::optional<std::uint32_t> session = session_of(datagram->bytes);

@@ -18,8 +18,8 @@
 namespace osteon {
 namespace {
 
-constexpr int kWaiting = 128;  // that the system keeps until they are accepted
-constexpr int kPauseMs = 100;  // when there is no descriptor for a connection
+constexpr int kWaiting = 128;  // connections that the system queues until they are accepted
+constexpr int kPauseMs = 100;  // pause when there is no descriptor for a connection
 constexpr int kAcceptedAtOnce = 64;
 
 tl::unexpected<Error> refused_by_system(int reason) {
@@ -27,7 +27,7 @@ tl::unexpected<Error> refused_by_system(int reason) {
   return failure(ErrorCode::unavailable, std::generic_category().message(reason));
 }
 
-// A descriptor that listens there; otherwise the reason, negative.
+// Returns a descriptor that listens there, or the negative error number.
 int listen_at(const addrinfo& address, int port) {
   sockaddr_storage at{};
   std::copy_n(reinterpret_cast<const char*>(address.ai_addr), address.ai_addrlen, reinterpret_cast<char*>(&at));
@@ -61,8 +61,8 @@ std::string numeric(const addrinfo& address) {
   return text;
 }
 
-// Over a Unix socket only programs of this process's user and of root may connect, whatever became of the socket's
-// rights.
+// Only programs of this process's user and of root may connect over a Unix socket, even if the socket's permissions
+// were changed.
 bool may_connect(int descriptor) {
   ucred peer{};
   socklen_t size = sizeof peer;
@@ -74,7 +74,8 @@ bool may_connect(int descriptor) {
   return peer.uid == ::geteuid() || peer.uid == 0;
 }
 
-// By the first byte that it sent: a record of a handshake (RFC 8446, section 5.1). No call of plain text begins so.
+// Recognises TLS by the first byte sent: a handshake record (RFC 8446, section 5.1). No call over plain text begins
+// with it.
 bool speaks_tls(int descriptor) {
   constexpr char kHandshake = 22;
   char first = 0;
@@ -97,7 +98,7 @@ Result<std::unique_ptr<Listener>> Listener::open(const std::string& host, int po
   bool has_ipv4 = false;
   for (const addrinfo* address = found; address; address = address->ai_next) {
     if (address->ai_family != AF_INET && address->ai_family != AF_INET6) continue;
-    // All at one port: the first one's, where the system chooses.
+    // All addresses use one port: that of the first, if the system chooses.
     const int socket = listen_at(*address, listener->port_);
     if (socket >= 0) {
       listener->sockets_.push_back(socket);
@@ -135,7 +136,7 @@ Result<std::unique_ptr<Listener>> Listener::open_at(const std::filesystem::path&
     if (::connect(socket, address, sizeof at) == 0) return failure(ErrorCode::exists, "another program listens there");
     std::filesystem::remove(path, unknown);
   }
-  // The rights are those with which it comes into being: there is no moment at which others can open it.
+  // The socket is made with its final permissions, so others can never open it.
   const mode_t before = ::umask(0177);
   const int bound = ::bind(socket, address, sizeof at);
   const int reason = errno;
@@ -155,7 +156,7 @@ Listener::~Listener() {
 
 void Listener::watch_for_tls(std::function<void()> note) {
   note_tls_ = std::move(note);
-  // Clients speak first: the system hands a connection on when its first bytes are there, or after about a second.
+  // Clients speak first, so the system hands a connection on when its first bytes have come, or after about a second.
   const int seconds = 1;
   for (const int socket : sockets_) ::setsockopt(socket, IPPROTO_TCP, TCP_DEFER_ACCEPT, &seconds, sizeof seconds);
 }
@@ -194,7 +195,7 @@ void Listener::accept_from(int listening) {
     if (descriptor < 0) {
       if (errno == EAGAIN || errno == EWOULDBLOCK) return;
       if (errno == EINTR || errno == ECONNABORTED) continue;
-      // Without descriptors or memory the caller waits in the system's queue until there are some again.
+      // Without descriptors or memory, the client waits in the system's queue until there are some again.
       ++failed_;
       pollfd end{wake_, POLLIN, 0};
       (void)::poll(&end, 1, kPauseMs);

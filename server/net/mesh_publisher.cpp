@@ -24,7 +24,7 @@ MeshPublisher::MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRate
 void MeshPublisher::make_whole_surface(const std::function<void(double)>& progress) {
   if (near_) room_.focus({focus_on_nothing()});
   std::vector<BlockKey> keys = room_.bone_blocks();
-  for (const BlockKey& key : room_.take_stale_blocks()) keys.push_back(key);  // fine ones of fields that were loaded
+  for (const BlockKey& key : room_.take_stale_blocks()) keys.push_back(key);  // fine blocks of fields that were loaded
   std::ranges::sort(keys);
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
   std::vector<BlockPayload> payloads(keys.size());
@@ -68,13 +68,13 @@ void MeshPublisher::run() {
     {
       std::unique_lock lock(wake_mutex_);
       const auto called = [&] { return due_ || end_; };
-      if (near_ && !owed_)  // tools move without anything else that wakes this thread
+      if (near_ && !owed_)  // tools move without waking this thread
         wake_.wait_for(lock, rates_.looks, called);
       else if (!owed_)
         wake_.wait(lock, called);
       if (!due_ && end_) return;
-      // A first cut is shown at once, an entry of cuts at the mesh rate: with the tick that comes about then, so that what
-      // it has committed goes at once.
+      // The first of several cuts is shown at once, later ones at the mesh rate. The update waits for the tick near
+      // that time, so that the cuts of that tick are sent at once.
       if (Clock::now() < next) {
         wake_.wait_until(lock, next - about, [&] { return end_; });
         fresh_ = false;
@@ -121,7 +121,8 @@ void MeshPublisher::make_stale_blocks(bool due) {
   std::vector<Clock::time_point> arrivals;
   MeshUpdate update;
   {
-    // Arrivals first: a cut between the two is measured with the next blocks, never before its own are made.
+    // Takes the arrivals first. A cut that comes between is then measured with the next blocks, never before its own
+    // are made.
     const std::lock_guard lock(wake_mutex_);
     std::swap(arrivals, unmeshed_);
   }
@@ -133,7 +134,7 @@ void MeshPublisher::make_stale_blocks(bool due) {
   }
   if (!due && keys.empty()) return;
 
-  // The room goes on between two blocks; one that it changes meanwhile is stale again and made anew.
+  // The room goes on between two blocks. A block that it changes meanwhile becomes stale and is made again.
   std::vector<BlockPayload> payloads;
   payloads.reserve(keys.size());
   for (const BlockKey& key : keys) {
@@ -156,7 +157,7 @@ void MeshPublisher::make_stale_blocks(bool due) {
       else
         surface_.blocks[keys[i]] = message;
     }
-    // Bodies that are gone take their blocks along.
+    // The blocks of bodies that no longer exist go too.
     std::vector<BlockKey> gone;
     for (auto block = surface_.blocks.begin(); block != surface_.blocks.end();) {
       const BodyId body = block->first.body;
@@ -202,7 +203,7 @@ void MeshPublisher::watch(MeshSubscriber& subscriber, const std::optional<ViewFr
     const std::lock_guard lock(surface_mutex_);
     streams_.push_back({&subscriber, Pace(rates_.mesh, streams_.size())});
     view_interest_.open(subscriber.author(), look);
-    // What is there: the finer blocks that this viewer's look asks for follow.
+    // Sends the blocks that exist. The finer blocks that this viewer's view needs follow.
     subscriber.begin(surface_);
     if (ended_) subscriber.end(*ended_);
   }

@@ -29,7 +29,7 @@ using prometheus::MetricType;
 using Labels = std::vector<ClientMetric::Label>;
 namespace fs = std::filesystem;
 
-// Of histograms: around the 8 ms of a tick and what a disk takes.
+// Of histograms: close around the 8 ms of a tick and the times of a disk.
 constexpr std::array<double, 14> kBounds_s{0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.0085,
                                            0.0125, 0.025,   0.05,   0.1,   0.25,   0.5,   1.0};
 
@@ -40,7 +40,7 @@ constexpr std::array<const char*, 17> kReasons{"none",     "body",   "lease", "t
 
 double seconds(double us) { return us * 1e-6; }
 
-// The families in the order in which they were first named.
+// The families are in the order of their first use.
 class Page {
  public:
   void gauge(const char* name, const char* help, Labels labels, double value) {

@@ -1,4 +1,4 @@
-// How an open stream looks to gRPC. For the sources of the services alone: gRPC stays out of headers.
+// Adapts an open stream to gRPC. Only for the source files of the services, since gRPC stays out of headers.
 #include <grpcpp/alarm.h>
 #include <grpcpp/grpcpp.h>
 
@@ -41,9 +41,9 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
   return message;
 }
 
-// What a status says may quote what came, however long that is. A client's gRPC reads 8 kB of it, with three bytes for
-// each of some letters, and after more it reads no answer on that line. Where files lie here is nobody's business
-// there.
+// A status may quote input of any length. A client's gRPC reads 8 kB of a status, with three bytes for each of some
+// letters. After a longer one it reads no more answers on that connection. Paths on the server must not be shown to
+// clients.
 inline std::string short_words(std::string_view why) { return bounded_text(without_paths(why), 1000); }
 
 inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, short_words(std::move(why))}; }
@@ -58,16 +58,16 @@ inline Status not_joined(const char* message, std::uint64_t author) {
                  " has not joined this room; call Join first");
 }
 
-// A stream that owns at most the message in flight; what waits behind it is the derived class's bounded set. Exactly
-// one path calls Finish, decided under the mutex.
+// A stream that owns at most the message in flight. The derived class has the bounded set that waits behind it. Exactly
+// one path calls Finish; this is decided under the mutex.
 template <class Reactor>
 class OutStream : public Reactor {
  public:
-  // A reader who was told that it is over, and does not read that either.
+  // How long a reader may take to read the end of the stream.
   static constexpr std::chrono::milliseconds kLetGoAfter{1000};
 
-  // Hands the stream to gRPC, which holds it until OnDone; queued jobs and cuts may hold it longer. `context`: of its
-  // call, which is cut off where the reader does not read; null: it is not.
+  // Hands the stream to gRPC, which holds it until OnDone. Queued jobs and cuts may hold it longer. `context`: of its
+  // call, which is cancelled if the reader does not read; null: it is never cancelled.
   template <class Stream>
   static Stream* launch(std::shared_ptr<Stream> stream, grpc::CallbackServerContext* context = nullptr) {
     Stream* raw = stream.get();
@@ -77,9 +77,9 @@ class OutStream : public Reactor {
     return raw;
   }
 
-  // From now on `authorizer` ends it when its caller may have it no more, or has come anew; null, over plain text:
-  // nothing does. Before the stream is given to gRPC, or in its reactions to reads. False: the caller, or `author`
-  // where it is not null, may not have it now, and it ends with the reason.
+  // From now on `authorizer` ends the stream when its caller may no longer have it, or has joined again. Null, over
+  // plain text: nothing ends it. Call it before the stream is given to gRPC, or in its reactions to reads. Returns
+  // false if the caller, or `author` if not null, may not have the stream now; the stream then ends with the reason.
   [[nodiscard]] bool stand_under(Authorizer* authorizer, const Caller& caller, const std::string& room, AuthorId author,
                                  std::string_view method) {
     if (authorizer == nullptr) return true;
@@ -115,22 +115,22 @@ class OutStream : public Reactor {
     }
     {
       const std::lock_guard lock(context_mutex_);
-      context_ = nullptr;  // gone after this
+      context_ = nullptr;  // invalid after this
     }
     leave();
-    watched_.reset();  // nobody asks it any more: what came beside the stream has ended too
+    watched_.reset();  // not needed any more: everything beside the stream has ended too
     const std::shared_ptr<void> last = std::move(self_);
   }
 
  protected:
-  // The rest is called under mutex_, except leave().
-  // Fills the next message; false when nothing waits.
+  // The functions below are called under mutex_, except leave().
+  // Fills the next message. Returns false when nothing waits.
   virtual bool take(ByteBuffer& message) = 0;
   virtual void leave() = 0;
-  // It will not be sent any more.
+  // What waits will not be sent.
   virtual void drop_waiting() {}
 
-  // Ends the stream after the message in flight; an OK end sends what waits first, unless there comes a reason not to.
+  // Ends the stream after the message in flight. An OK end sends what waits first, unless an error comes before that.
   void close_locked(Status status) {
     const bool cuts_off = !status.ok() && !finished_ && !failing();
     if (!closing_ || cuts_off) closing_ = Status(status.error_code(), short_words(status.error_message()));
@@ -154,7 +154,7 @@ class OutStream : public Reactor {
   [[nodiscard]] bool may_carry(DatagramContent kind) const {
     return !watched_ || osteon::may_carry(watched_->role(), kind);
   }
-  // Whether its caller may be told that now.
+  // Whether its caller may receive that now.
   [[nodiscard]] bool may_receive(StreamContent content) const {
     return !watched_ || osteon::may_receive(watched_->role(), content);
   }
@@ -166,7 +166,7 @@ class OutStream : public Reactor {
   mutable std::mutex mutex_;
 
  private:
-  // Under mutex_. What is in flight, and the end itself, wait for a reader: for a moment.
+  // Under mutex_. The message in flight, and the end itself, wait for the reader for a short time only.
   void let_go_later() {
     if (done_ || !can_let_go_) return;
     alarm_ = std::make_unique<grpc::Alarm>();
@@ -179,7 +179,7 @@ class OutStream : public Reactor {
     if (context_) context_->TryCancel();
   }
 
-  std::mutex context_mutex_;  // never held with another
+  std::mutex context_mutex_;  // never held with another mutex
   grpc::CallbackServerContext* context_ = nullptr;
   bool can_let_go_ = false;  // set before anybody else has the stream
   std::unique_ptr<grpc::Alarm> alarm_;

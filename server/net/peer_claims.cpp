@@ -13,14 +13,14 @@ namespace {
 constexpr std::string_view kUnixPeer = "unix:";
 constexpr std::size_t kMostCertificateChars = 8192;
 
-// Of a header that came once; otherwise empty.
+// The value of a header that came once; otherwise empty.
 std::string_view header(const grpc::ServerContextBase& context, std::string_view name) {
   const auto [first, last] = context.client_metadata().equal_range({name.data(), name.size()});
   if (first == last || std::next(first) != last) return {};
   return {first->second.data(), first->second.size()};
 }
 
-// PEM of base64 without lines (RFC 7468).
+// PEM from base64 without lines (RFC 7468).
 std::string to_pem(std::string_view base64) {
   constexpr std::size_t kLine = 64;
   if (base64.empty() || base64.size() > kMostCertificateChars) return {};

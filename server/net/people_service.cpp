@@ -1,4 +1,4 @@
-// The people of a room: who is there, and what they decide about each other, draw, say and show.
+// The service for the people of a room: who is there, and what they decide about each other, draw, say and show.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -98,15 +98,16 @@ class PeopleServiceImpl final : public PeopleBase {
       std::erase(subjects, by);
       if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
     }
-    // One event each, in one tick; answered with the last. Of all together, none for whom it changes nothing: most of
-    // those who ever had a hand here are away for good. A room that closes meanwhile answers the rest on this thread.
+    // One event for each subject, all in one tick. The call is answered with the last event. If everybody is meant,
+    // people are skipped for whom nothing changes, since most who ever had a tool here have left for good. A room that
+    // closes meanwhile answers the rest on this thread.
     struct Answer {
       std::mutex mutex;
       std::size_t left = 0;
-      RoomSeq place;  // of the newest event by which it holds, also of earlier ones
+      RoomSeq place;  // of the newest event that makes it valid, also of earlier ones
       std::optional<Error> failed;
     };
-    const auto answer = std::make_shared<Answer>();  // by the events that are queued
+    const auto answer = std::make_shared<Answer>();  // shared by the queued events
     answer->left = subjects.size();
     const bool all = request->subject() == 0;
     for (const AuthorId subject : subjects)
@@ -126,7 +127,7 @@ class PeopleServiceImpl final : public PeopleBase {
             else if (!answer->failed)
               answer->failed = decided.error();
             if (--answer->left > 0) return;
-            // Of those for whom nothing was ever decided it holds from the beginning.
+            // For people about whom nothing was ever decided, it holds from the beginning.
             response->set_room_seq(answer->place ? answer->place.value : room->runtime().room_seq().value);
             lock.unlock();
             reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
@@ -154,7 +155,7 @@ class PeopleServiceImpl final : public PeopleBase {
     if (request->wipe_off() != 0)
       return change_room(
           *room, reactor, [by, id = request->wipe_off()](Room& r) { return r.wipe_off(by, id); }, fill);
-    // All of the caller's: one event each, answered with the last.
+    // Erases all drawings of the caller: one event for each, answered with the last.
     wipe_next(room, by, reactor, response);
     return reactor;
   }
@@ -179,7 +180,7 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!admitted<v1::DemonstrateRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
-    // What was cut in another room is that room's.
+    // Cuts of another room belong to that room.
     const Result<Caller> caller = caller_of(rooms_, *context);
     if (!caller) return refuse(reactor, status_of(caller.error()));
     if (!request->room().empty())
@@ -187,7 +188,7 @@ class PeopleServiceImpl final : public PeopleBase {
               caller_in(rooms_, *context, request->room(), "/osteon.v1.PeopleService/Demonstrate");
           !there)
         return refuse(reactor, status_of(there.error()));
-    // A journal is read, which takes a while: others do not wait for it.
+    // Reading a journal takes a while. Other calls do not wait for it.
     rooms_.recordings.run([this, room, reactor, request, response, caller = *caller] {
       const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()}, caller,
                                                                {.room = request->room(),
@@ -210,7 +211,7 @@ class PeopleServiceImpl final : public PeopleBase {
     if (!admitted<v1::EndDemonstrationRequest>(rooms_, *context, reactor)) return reactor;
     const std::shared_ptr<OpenRoom> room = room_of_member(rooms_, *context, reactor, *request);
     if (!room) return reactor;
-    // Not behind those that are about to begin.
+    // Does not wait behind demonstrations that are about to begin.
     room->runtime().run_slowly([room, reactor, which = AuthorId{request->demonstrator()}] {
       const Result<void> ended = room->demonstrations().end(which);
       reactor->Finish(ended ? Status::OK : status_of(ended.error()));
@@ -219,7 +220,7 @@ class PeopleServiceImpl final : public PeopleBase {
   }
 
  private:
-  // Until none of the caller's is left.
+  // Repeats until none of the caller's drawings is left.
   static void wipe_next(const std::shared_ptr<OpenRoom>& room, AuthorId by, grpc::ServerUnaryReactor* reactor,
                         v1::AnnotateResponse* response) {
     room->runtime().queue_event(

@@ -52,7 +52,7 @@ std::string hex_of(const ASN1_INTEGER* serial) {
   return digits ? digits.get() : "";
 }
 
-// All of one kind in a PEM text; nothing where something in it cannot be read. Other kinds are passed over.
+// All objects of one kind in a PEM text. Nothing if any of them cannot be read. Other kinds are skipped.
 template <class Ptr, auto Read>
 std::optional<std::vector<Ptr>> all_of(std::string_view pem) {
   const Bio bio = reader_of(pem);
@@ -60,7 +60,7 @@ std::optional<std::vector<Ptr>> all_of(std::string_view pem) {
   std::vector<Ptr> all;
   ERR_clear_error();
   while (auto* one = Read(bio.get(), nullptr, nullptr, nullptr)) all.emplace_back(one);
-  // The end of the text is the one fault that is none.
+  // Reaching the end of the text is the only accepted error.
   const unsigned long last = ERR_peek_last_error();
   ERR_clear_error();
   if (ERR_GET_LIB(last) != ERR_LIB_PEM || ERR_GET_REASON(last) != PEM_R_NO_START_LINE) return {};
@@ -71,12 +71,12 @@ std::optional<std::vector<X509Ptr>> certificates_of(std::string_view pem) {
 }
 std::optional<std::vector<Crl>> lists_of(std::string_view pem) { return all_of<Crl, PEM_read_bio_X509_CRL>(pem); }
 
-// As strong as the TLS of Debian asks for: 112 bits, no SHA-1.
+// The same strength as Debian requires for TLS: 112 bits, no SHA-1.
 constexpr int kSecurityLevel = 2;
 
-// A list out of its time is used on, and an authority without a list revokes nobody by one. OpenSSL asks for
-// revocations before it looks at signatures and times: it goes on, so that only a certificate that is sound otherwise
-// is called revoked.
+// Accepts an expired list, and an authority without a list. OpenSSL checks revocations before signatures and times. So
+// a revocation is only noted here and the check goes on: a certificate is called revoked only if nothing else is wrong
+// with it.
 int accept_old_lists(int ok, X509_STORE_CTX* context) {
   const int error = X509_STORE_CTX_get_error(context);
   if (error == X509_V_ERR_CERT_REVOKED) {
@@ -87,7 +87,7 @@ int accept_old_lists(int ok, X509_STORE_CTX* context) {
   return is_old || error == X509_V_ERR_UNABLE_TO_GET_CRL ? 1 : ok;
 }
 
-// The authorities and lists, ready to check with; null where one of them cannot be read.
+// The authorities and lists, ready for checks. Null if one of them cannot be read.
 Store store_of(const Authorities& authorities) {
   const auto trusted = certificates_of(authorities.certificates);
   const auto lists = lists_of(authorities.revocation_lists);
@@ -155,7 +155,7 @@ Result<std::set<std::string>> listed_serials(const Authorities& authorities) {
   std::set<std::string> serials;
   const auto lists = lists_of(authorities.revocation_lists);
   for (const Crl& list : *lists) {
-    STACK_OF(X509_REVOKED)* revoked = X509_CRL_get_REVOKED(list.get());  // null where the list is empty
+    STACK_OF(X509_REVOKED)* revoked = X509_CRL_get_REVOKED(list.get());  // null if the list is empty
     for (int i = 0; i < sk_X509_REVOKED_num(revoked); ++i)
       serials.insert(hex_of(X509_REVOKED_get0_serialNumber(sk_X509_REVOKED_value(revoked, i))));
   }
@@ -173,7 +173,7 @@ Result<PersonCertificate> read_person_certificate(std::string_view pem) {
     const GENERAL_NAME* name = sk_GENERAL_NAME_value(names.get(), i);
     if (name->type != GEN_URI) continue;
     const ASN1_IA5STRING* uri = name->d.uniformResourceIdentifier;
-    // By its length: a zero byte within ends no name.
+    // By its length: a zero byte inside does not end the name.
     const std::string_view text(reinterpret_cast<const char*>(ASN1_STRING_get0_data(uri)),
                                 static_cast<std::size_t>(ASN1_STRING_length(uri)));
     if (!text.starts_with(kPerson)) continue;

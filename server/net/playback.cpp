@@ -3,7 +3,7 @@
 namespace osteon {
 
 std::optional<LogEntry> Player::take(Time now) {
-  // From the first call on, so that nothing has happened before anyone could watch.
+  // From the first call on, so that nothing happens before anyone can watch.
   if (!began_) began_ = now;
   if (playback_.speed <= 0) return {};
   if (!upcoming_ && playback_.next && !(upcoming_ = playback_.next())) stop();

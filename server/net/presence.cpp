@@ -10,7 +10,7 @@
 namespace osteon {
 
 Presence::Presence(const Room& room, const std::map<std::uint32_t, std::string>& names) : room_seq_(room.room_seq()) {
-  revision_ = room.authors() + 1;  // whoever is here from now on was here later than any of them
+  revision_ = room.authors() + 1;  // everybody present from now on was here later than all of them
   for (std::uint64_t author = 1; author <= room.authors(); ++author) {
     const AuthorId id{author};
     Entry& entry = people_[id];
@@ -151,7 +151,7 @@ void Presence::publish(RoomSeq room_seq, Clock::time_point now) {
 Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const {
   const std::lock_guard lock(mutex_);
   if (cursor.begun && cursor.revision == revision_) return nullptr;
-  // Of those who are not here, whoever was here last.
+  // Of the people who have left, the latest.
   std::vector<std::uint64_t> absent;
   for (const auto& [author, entry] : people_)
     if (entry.streams == 0) absent.push_back(entry.last_here);
@@ -161,7 +161,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
     least = absent[absent.size() - kMostAbsent];
   }
 
-  // A person's hand and their window are authors of their own: what is about the one is the other's as well.
+  // A person's tool and window are separate authors. Events about one of them concern the other as well.
   const auto self = people_.find(reader);
   const std::string name = self == people_.end() ? std::string() : self->second.name;
   const auto is_readers = [&](AuthorId author) {
