@@ -30,7 +30,7 @@ std::string system_user() {
   return "system:" + (user != nullptr ? std::string(user->pw_name) : std::to_string(::geteuid()));
 }
 
-// Whether a key is of a server that --key names, or of the one whose signing.key lies beside the log.
+// Accepts keys of the servers that --key names, or of the one whose signing.key lies beside the log.
 Result<std::function<bool(const PublicKey&)>> trusted(const Arguments& given) {
   std::vector<std::string> names = given.keys;
   if (names.empty()) names.push_back(folder_of(given.file) / kSigningKeyFile);
@@ -156,7 +156,7 @@ Result<void> run_audited(const fs::path& file, const fs::path& signing_key, Audi
 }
 
 void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
+  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* audit =
       app.add_subcommand("audit", "Checks or shows who did what on a server, or forgets who somebody was");
   audit->require_subcommand(1);

@@ -32,7 +32,7 @@ Result<void> list(RoomAdminClient& client) {
   return {};
 }
 
-// A folder is packed first, into a file that is gone afterwards.
+// A folder is packed first, into a temporary file.
 Result<void> upload(RoomAdminClient& client, const fs::path& from) {
   fs::path archive = from;
   std::error_code error;
@@ -64,7 +64,7 @@ void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   CLI::App* cases = app.add_subcommand("cases", "The cases of a server that runs: lists them, uploads one");
   cases->require_subcommand(1);
   add_asking_command(*cases, "list", "Lists them all", chosen, list);
-  const auto from = std::make_shared<fs::path>();  // shared by the option and by what runs
+  const auto from = std::make_shared<fs::path>();  // shared by the option and the function that runs
   add_asking_command(*cases, "upload", "Sends a case to the server, which looks it through and keeps it", chosen,
                      [from](RoomAdminClient& client) { return upload(client, *from); })
       ->add_option("case", *from, "Folder of a case, as osteon-import writes it, or a zip archive of one")

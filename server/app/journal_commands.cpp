@@ -63,7 +63,7 @@ auto with_journal(const fs::path& file, const Do& what) -> decltype(what(std::de
   return what(*journal);
 }
 
-// The key that signs what is changed: the one that was given, or the one in the journal's folder. Null: there is none.
+// The key that signs changes: the given one, or the one in the journal's folder. Null: there is none.
 Result<std::shared_ptr<const SigningKeys>> keys_for(const Arguments& given) {
   if (!given.signing_key.empty()) return load_signing_keys(given.signing_key);
   auto keys = load_signing_keys(folder_of(given.file) / kSigningKeyFile);
@@ -71,7 +71,7 @@ Result<std::shared_ptr<const SigningKeys>> keys_for(const Arguments& given) {
   return keys;
 }
 
-// Opens a journal, changes it and closes it, also after an error: so that it still vouches for its end.
+// Opens a journal, changes it and closes it, also after an error, so that its footer is valid again.
 template <class Do>
 auto change_journal(const Arguments& given, const Do& what) -> decltype(what(std::declval<Journal&>())) {
   Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
@@ -84,7 +84,7 @@ auto change_journal(const Arguments& given, const Do& what) -> decltype(what(std
   return done;
 }
 
-// The last event that is meant: what --to says, or, of a journal that confirms all of its own, the last of them.
+// The last event that is meant: that of --to, or the journal's last one if the journal confirms all of its own.
 Result<RoomSeq> last_of(const Journal& journal, const Arguments& given) {
   const RoomSeq head = journal.head().place;
   if (given.at == 0) return check_whole(journal, "--to").map([&] { return head; });
@@ -98,7 +98,7 @@ Result<RoomSeq> last_of(const Journal& journal, const Arguments& given) {
   return RoomSeq{given.at};
 }
 
-// What a file of another name is never to become: a part of the journal, as the next opening would take it.
+// Refuses a target file that the next opening would take for a part of the journal.
 Result<void> check_apart(const fs::path& journal, const fs::path& to) {
   std::error_code ignored;
   if (!fs::equivalent(folder_of(journal), folder_of(to), ignored) || !belongs_to(journal, to.filename().string()))
@@ -112,8 +112,8 @@ Error cannot_write(const fs::path& file, int reason) {
                                    std::string(remedy_of(reason))};
 }
 
-// A file whose name nothing has yet. It grows beside its place and gets its name when it is whole; dropped before, it
-// leaves nothing.
+// A new file under a name that does not exist yet. It is written beside its place and gets its name when it is
+// complete. If it is dropped before, it leaves nothing.
 class NewFile {
  public:
   static Result<NewFile> begin(const fs::path& file) {
@@ -148,7 +148,7 @@ class NewFile {
   Result<void> finish() {
     if (std::fflush(out_) != 0 || ::fsync(::fileno(out_)) != 0) return tl::unexpected(failed());
     bool named = ::renameat2(AT_FDCWD, partial_.c_str(), AT_FDCWD, file_.c_str(), RENAME_NOREPLACE) == 0;
-    // Some file systems know only the older way to replace nothing.
+    // Some file systems have only the older way to avoid replacing a file.
     if (!named && errno == EINVAL)
       named = ::link(partial_.c_str(), file_.c_str()) == 0 && ::unlink(partial_.c_str()) == 0;
     if (!named && errno == EEXIST) return taken();
@@ -170,7 +170,7 @@ class NewFile {
   std::FILE* out_ = nullptr;
 };
 
-// Makes the room again up to the place that --to says, or all of it.
+// Replays the room up to the sequence number of --to, or completely.
 Result<Room> replayed(const Arguments& given) {
   const Result<Case> bone = Case::load(given.case_folder);
   if (!bone) return tl::unexpected(bone.error());
@@ -200,7 +200,7 @@ std::string entries_text(RoomSeq from, RoomSeq to) {
   return std::to_string(from.value) + " to " + std::to_string(to.value);
 }
 
-// Says who signed what. Error invalid_input: the key does not vouch for all of it.
+// Says who signed what. Error invalid_input: the key does not vouch for everything.
 Result<void> check_signatures(const VerifyReport& report, const Arguments& given, const PublicKey& key) {
   const Vouched vouched = vouched_by(key, report);
   const auto by = [&](const PublicKey& who) {
@@ -266,7 +266,7 @@ Result<void> copy(const Arguments& given, decltype(backup_journal)* make) {
   return keys_for(given).and_then([&](const auto& keys) { return make(given.file, given.to, nullptr, keys); });
 }
 
-// Only earlier fields are replaced. Asked before what takes long, and again before they are written.
+// Only older files of cut fields may be replaced. Checked before long work, and again before writing.
 Result<void> check_fields_file(const Arguments& given) {
   const fs::path &file = given.fields, folder = folder_of(file);
   std::error_code ignored;
@@ -317,7 +317,7 @@ Result<void> branch(const Arguments& given) {
   return {};
 }
 
-// What is to become of its branches has to be said: nothing brings a room back.
+// The user must say what happens to its branches, since a deleted room cannot be restored.
 Result<void> remove(const Arguments& given) {
   const Result<std::vector<RoomFile>> branches = branches_of(folder_of(given.file), given.file);
   if (!branches && branches.error().code != ErrorCode::not_found) return tl::unexpected(branches.error());
@@ -334,7 +334,7 @@ Result<void> remove(const Arguments& given) {
   return {};
 }
 
-// One line of text for each event, of all or of one person.
+// Writes one line of text for each event, of everybody or of one person.
 Result<void> write_out(const Arguments& given) {
   if (const Result<void> apart = check_apart(given.file, given.to); !apart) return apart;
   Result<NewFile> out = NewFile::begin(given.to);
@@ -390,13 +390,14 @@ Result<void> list_people(const Arguments& given) {
       std::printf("%s  %04d-%02u-%02u  %s\n", person.pseudonym.c_str(), static_cast<int>(day.year()),
                   static_cast<unsigned>(day.month()), static_cast<unsigned>(day.day()), person.label.c_str());
     }
-    // Of a journal that has lost something nobody knows whether these are all.
+    // If a journal has lost something, nobody knows whether the list is complete.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     return {};
   });
 }
 
-// Of one number: who that was, where the journal knows it. Of many: nobody, since they may be at work in other rooms.
+// By number: erases that person in the audit log too, if the journal knows the name. By age: erases nobody there, since
+// these people may work in other rooms.
 Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::string>& names) {
   std::size_t forgotten = 0;
   for (const std::string& name : names) {
@@ -416,7 +417,7 @@ Result<void> forget(const Arguments& given) {
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
   std::vector<std::string> names;
   const Result<void> done = change_journal(given, [&](Journal& journal) -> Result<void> {
-    // Also where nobody was to be forgotten: a name may be in what cannot be read.
+    // Checked even if nobody is to be erased, since a name may be in entries that cannot be read.
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     const auto came_before = [&](const Person& person) {
       return given.days && person.joined_day < static_cast<std::int32_t>(today.count()) - *given.days;
@@ -436,7 +437,7 @@ Result<void> forget(const Arguments& given) {
   return done.and_then([&] { return forget_in_audit_too(given, names); });
 }
 
-// What the audit log says of a command; nothing of those that only look.
+// The audit record of a command; nothing for commands that only read.
 std::optional<AuditEvent> audited_as(const std::string& name, const Arguments& given) {
   if (name == "verify" || name == "people" || (name == "replay" && given.fields.empty())) return {};
   AuditEvent event{.action = name, .object = given.file.filename().string(), .result = kOk};
@@ -454,7 +455,7 @@ Result<void> run_command(const std::string& name, Result<void> (*run)(const Argu
   return run_audited(given.file, given.signing_key, std::move(*event), [&] { return run(given); });
 }
 
-// What a file is named decides as what room it is served; so a new name is given on purpose.
+// The file's name decides as which room a server serves it. So a new name must be given on purpose.
 Result<void> rename_room(const Arguments& given) {
   return change_journal(given, [&](Journal& journal) -> Result<void> {
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
@@ -470,7 +471,7 @@ Result<void> rename_room(const Arguments& given) {
 }  // namespace
 
 void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
+  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
     CLI::App* sub = app.add_subcommand(name, what);
     sub->add_option("file", given->file, "The journal; no server may have it open")->required();

@@ -55,7 +55,7 @@ Result<PublicKey> public_key_of(const std::string& given) {
 }
 
 void add_key_command(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
+  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* key = app.add_subcommand("key", "Shows or changes the key with which a server signs its journals");
   key->require_subcommand(1);
   const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {

@@ -1,4 +1,4 @@
-// osteon-server: loads a case, runs its room, says how it fares, and leaves a summary.
+// osteon-server: loads a case, runs its rooms, logs their state, and writes a summary at the end.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -99,7 +99,7 @@ nlohmann::json summary_of(const RoomSummary& summary) {
           {"mesh_update_after_cut", durations(health.mesh_update)}};
 }
 
-// Every tool file of a folder, in the order of their names.
+// Loads every tool file of a folder, in order of their names.
 Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   std::error_code error;
   std::vector<std::filesystem::path> files;
@@ -112,7 +112,7 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   for (const std::filesystem::path& file : files) {
     const Result<Tool> tool = load_tool_file(file);
     if (!tool) return tl::unexpected(tool.error());
-    // Who holds it would find out too late.
+    // Otherwise the person who holds the tool would find out too late.
     if (const Result<const ForceLaw*> law = choose_law(*tool); !law)
       return failure(law.error().code, file.string() + ": \"law\": " + law.error().message);
     const auto entries = box.entries();
@@ -127,8 +127,8 @@ Result<void> load_tools(const std::filesystem::path& folder, ToolBox& box) {
   return {};
 }
 
-// The box that every new room begins with. Tools are loaded once, so that a folder that changes meanwhile changes no
-// room.
+// Gives the tool box that every new room begins with. Tools are loaded once, so that a later change of the folder
+// changes no room.
 Result<std::function<std::shared_ptr<ToolBox>()>> tool_boxes(const ServerConfig& options) {
   const std::shared_ptr<ToolBox> loaded = builtin_tool_box();  // shared with the function below
   if (!options.tools_folder.empty())
@@ -152,7 +152,7 @@ Result<Room> make_room(const ServerConfig& options, const Case& bone, std::share
   return room;
 }
 
-// The room that the journal keeps, or a new one in a new journal.
+// The room in the journal, or a new one in a new journal.
 Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::shared_ptr<ToolBox> tools,
                           std::shared_ptr<const SigningKeys> keys, std::unique_ptr<RoomStore>& store) {
   RoomStore::Options keeping{.name = options.journal_file.stem().string(),
@@ -176,8 +176,8 @@ Result<Room> open_journal(const ServerConfig& options, const Case& bone, std::sh
   return std::move(kept->room);
 }
 
-// Cases that were uploaded earlier are served as those of the command line are, and read when a room is of them. One
-// that cannot be described is none.
+// Cases uploaded earlier are served like those of the command line, and read when a room uses them. Cases without a
+// readable description are left out.
 Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder, RoomsOptions& rooms) {
   Result<std::unique_ptr<CaseRepository>> store = CaseRepository::open(folder, "/proc/self/exe");
   if (!store) return tl::unexpected(store.error());
@@ -195,7 +195,7 @@ Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder,
   return known;
 }
 
-// Where it is taken down who does what. Empty: nowhere, since nothing else is kept either.
+// The file of the audit log. Empty: there is none, since nothing else is stored either.
 std::filesystem::path audit_file_of(const ServerConfig& options) {
   if (!options.audit_file.empty()) return options.audit_file;
   if (!options.rooms_folder.empty()) return options.rooms_folder / kAuditLogFile;
@@ -217,7 +217,7 @@ Result<std::shared_ptr<AuditTrail>> open_audit(const ServerConfig& options, std:
   return std::shared_ptr<AuditTrail>(std::move(*trail));
 }
 
-// What signs the journals and the audit log. Null: none is kept.
+// The keys that sign the journals and the audit log. Null: there is none of both.
 Result<std::shared_ptr<const SigningKeys>> open_signing_keys(const ServerConfig& options) {
   const std::filesystem::path audit = audit_file_of(options);
   if (audit.empty()) return nullptr;
@@ -289,7 +289,7 @@ Result<std::unique_ptr<Rooms>> open_rooms(const ServerConfig& options) {
   return rooms;
 }
 
-// The folder of rooms, made where it is missing, is this process's as long as it holds this; null: there is none.
+// Makes the folder of rooms if it is missing, and locks it for this process while the result exists. Null: no folder.
 Result<std::unique_ptr<DiskLock>> take_rooms_folder(const std::filesystem::path& folder) {
   if (folder.empty()) return nullptr;
   std::error_code error;
@@ -298,14 +298,15 @@ Result<std::unique_ptr<DiskLock>> take_rooms_folder(const std::filesystem::path&
     return failure(ErrorCode::internal,
                    "the folder --rooms " + folder.string() + " cannot be made: " + error.message());
   Result<std::unique_ptr<DiskLock>> taken = lock_rooms(folder);
-  // Of another's folder nothing is touched; why one cannot be written, this says in the words of the option.
+  // Leaves another server's folder untouched. If the folder cannot be written, reports this with the name of the
+  // option.
   if (taken || taken.error().code != ErrorCode::exists)
     if (Result<void> usable = check_writable(folder / "open-rooms", "which rooms are open", "--rooms"); !usable)
       return tl::unexpected(usable.error());
   return taken;
 }
 
-// The only room's own, or one for each by its name.
+// The summary of the only room, or one for each room by its name.
 nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, bool many) {
   if (!many && rooms.size() == 1) return summary_of(rooms.begin()->second);
   nlohmann::json all = nlohmann::json::object();
@@ -314,10 +315,10 @@ nlohmann::json summary_of(const std::map<std::string, RoomSummary>& rooms, bool 
 }
 
 Result<void> run(const ServerConfig& options, const StopSignal& stop) {
-  // First, so that nothing is touched of a server that runs; let go last.
+  // Locked first, so that nothing of a running server is touched; released last.
   const Result<std::unique_ptr<DiskLock>> folder = take_rooms_folder(options.rooms_folder);
   if (!folder) return tl::unexpected(folder.error());
-  // An address of an earlier run must not be taken for this one's.
+  // An address file of an earlier run must not be taken for this run's.
   if (!options.address_file.empty()) {
     std::error_code ignored;
     std::filesystem::remove(options.address_file, ignored);
@@ -365,7 +366,7 @@ Result<void> run(const ServerConfig& options, const StopSignal& stop) {
   return write_file(options.summary_file, summary_of(summaries, !options.rooms_folder.empty()).dump(2) + "\n");
 }
 
-// `config`: what the file says, with what the command line says over it. The program's exit code.
+// `config`: the values of the file, replaced by those of the command line. Returns the program's exit code.
 int check(const std::filesystem::path& file, std::vector<std::string> faults, const ServerConfig& config) {
   for (const Result<void>& said : {check_server_config(config), check_server_places(config)})
     if (!said) faults.push_back(file.string() + ": " + said.error().message);
@@ -502,7 +503,8 @@ int main(int argc, char** argv) {
     const Result<ConfigRead> read = read_server_config(config_file);
     if (!read) return log::exit_with(kProgram, read.error());
     options = read->config;
-    if (const auto code = parse_arguments(app, argc, argv)) return *code;  // over what the file says
+    // Values of the command line replace those of the file.
+    if (const auto code = parse_arguments(app, argc, argv)) return *code;
     if (only_check) return check(config_file, read->faults, options);
     if (!read->faults.empty()) return log::exit_with(kProgram, {ErrorCode::invalid_input, read->faults.front()});
   }

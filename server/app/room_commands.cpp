@@ -78,7 +78,7 @@ Result<void> remove(RoomAdminClient& rooms, const Arguments& given) {
 }  // namespace
 
 void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
+  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* rooms = app.add_subcommand(
       "rooms",
       "Makes, lists, closes, branches, shows again, checks, copies and deletes the rooms of a server that runs");

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What is wrong with a field's value; caught where the file and the field are known.
+// What is wrong with a field's value. Caught where the file and the field are known.
 struct Wrong {
   std::string what;
 };
@@ -163,7 +163,7 @@ const std::vector<Field>& limit_fields() {
   return all;
 }
 
-// Letters to insert, remove or replace until one is the other.
+// Edit distance: number of letters to insert, remove or replace to turn one word into the other.
 std::size_t distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> entry(b.size() + 1);
   std::iota(entry.begin(), entry.end(), 0u);

@@ -37,7 +37,7 @@ Result<void> run(const Arguments& given) {
   const Result<Ticket> ticket = make_ticket(given.room, given.user, *role, now + good_for);
   if (!ticket) return tl::unexpected(ticket.error());
   std::printf("%s\n", sign_ticket(*ticket, *key).c_str());
-  // Beside what is kept as the file: by this it can be revoked.
+  // Printed beside the ticket: by this number it can be revoked.
   std::fprintf(stderr, "ticket %s: %s, %s in %s, for %g hours\n", to_hex(ticket->id).c_str(), ticket->user.c_str(),
                given.role.c_str(), given.room == kAnyRoom ? "every room" : given.room.c_str(), given.hours);
   if (good_for > kLongTicket)
@@ -52,7 +52,7 @@ Result<void> run(const Arguments& given) {
 }  // namespace
 
 void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and by what runs
+  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* ticket =
       app.add_subcommand("ticket", "Signs a ticket, with which a person with a certificate may come into a room");
   ticket

@@ -98,8 +98,8 @@ std::size_t Connections::close_if(const std::function<bool(const Connection&)>& 
     if (entry.connection.is_proxys || entry.is_cut_off || !which(entry.connection)) continue;
     // gRPC may close it at this moment, and another connection may take its descriptor. That one is then cut off, and
     // connects again.
-    // After shutdown(), the receive queue would still be read: thousands of calls (CVE-2023-44487). So connect() is
-    // used.
+    // After shutdown(), the receive queue would still be read: thousands of calls (CVE-2023-44487). So the
+    // socket is disconnected instead.
     const sockaddr nowhere{.sa_family = AF_UNSPEC, .sa_data = {}};
     ::connect(entry.descriptor, &nowhere, sizeof nowhere);
     entry.is_cut_off = true;

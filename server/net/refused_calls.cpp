@@ -19,11 +19,11 @@ namespace {
 using grpc::StatusCode;
 using grpc::experimental::InterceptionHookPoints;
 
-// gRPC's log has one function for the process, and no place for what belongs to it.
+// gRPC's log has one function for the whole process, which takes no object. So the watches are global.
 std::mutex watches_mutex;
 std::vector<HandshakeWatch*> watches;
 
-// What OpenSSL says of a handshake that failed, and what that means here.
+// What OpenSSL reports for a failed handshake, and what it means here.
 struct HandshakeFault {
   std::string_view openssl, kind, sentence;
 };
@@ -47,7 +47,7 @@ void hear(gpr_log_func_args* line) {
   if (line->message == nullptr) return;
   const std::string_view said(line->message);
   if (!said.starts_with("Handshake failed")) return;
-  // Of OpenSSL's "error:0A00009C:SSL routines::http request": nothing in it is the stranger's own.
+  // Part of OpenSSL's "error:0A00009C:SSL routines::http request". It contains no text from the client.
   const std::size_t routine = said.rfind("::");
   std::string_view kind = routine == std::string_view::npos ? said : said.substr(routine + 2), sentence = said;
   for (const HandshakeFault& known : kHandshakeFaults)

@@ -53,7 +53,7 @@ template <class Response, class Request>
 Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
                      grpc::Status (v1::RoomsService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                      const Request& request) {
-  // By the role in that room it is let in, too, which may be more than the ticket's.
+  // The call names the room, since the role in that room may be higher than the ticket's role.
   if constexpr (requires { request.name(); }) return ask(channel, call, request, request.name());
   return ask(channel, call, request, "");
 }
@@ -88,7 +88,7 @@ Result<RoomLine> line_of(const Result<Response>& response) {
 Result<RoomAdminClient> RoomAdminClient::reach(const std::string& address, std::chrono::milliseconds patience,
                                                const std::function<bool()>& stop,
                                                const wire::ClientCredentials& credentials) {
-  // A long answer is waited for as long as by a hand.
+  // Connects as a haptic client does, so that a slow answer is awaited for as long.
   Result<std::shared_ptr<grpc::Channel>> channel =
       wire::reach_server(address, wire::ClientKind::haptic, patience, stop, credentials);
   if (!channel) return tl::unexpected(channel.error());
@@ -150,7 +150,7 @@ Result<std::vector<std::string>> RoomAdminClient::remove(const std::string& name
   v1::DeleteRoomRequest request;
   request.set_name(name);
   request.set_with_branches(with_branches);
-  // By the ticket's own room first: who made a branch has a ticket for the room that it was made from.
+  // First with the ticket's own room: who made a branch has a ticket for the room that it was made from.
   auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request, "");
   if (!response && response.error().code == ErrorCode::denied)
     response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request);

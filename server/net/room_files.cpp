@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Ends of names of files that are beside a journal, or not a whole one.
+// Endings of files that lie beside a journal or are incomplete journals.
 constexpr std::array<std::string_view, 9> kNoJournals{"-wal",    "-log",        "-mirror",  "-owner",  ".lock",
                                                       ".failed", ".checkpoint", ".partial", ".copying"};
 
@@ -94,7 +94,7 @@ Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq plac
   genesis->parent = std::exchange(genesis->room, name);
   genesis->parent_room_seq = at->place;
   genesis->parent_chain = at->chain;
-  // Of its people only how many numbers were given, so that none is given twice.
+  // Of its people, only the last number given, so that no number is given twice.
   return JournalCopy::begin_branch(from, to, at->place, to_bytes(*genesis), {kPeopleRegister});
 }
 
@@ -151,7 +151,7 @@ Result<std::vector<fs::path>> delete_room(const fs::path& file, bool branches, D
     if (found)
       for (const RoomFile& branch : *found) files.push_back(branch.file);
   }
-  // The room last: where it is cut short, the branches that are left can still be found by it.
+  // The room last. After an interruption, the remaining branches can still be found from it.
   std::ranges::reverse(files);
   if (const Result<void> done = delete_journals(files, disk); !done) return tl::unexpected(done.error());
   return files;

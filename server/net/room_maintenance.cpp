@@ -1,4 +1,4 @@
-// What a RoomStore does beside the commits of a room in use.
+// The work of RoomStore beside the commits of a room in use.
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -88,7 +88,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
     last = journal.head().place;
     report.head = first_head(journal.genesis());
     report.faults = verify_beside(journal);
-    // A journal whose list of them cannot be read has said so just now.
+    // If the list of checkpoints cannot be read, the journal has just said so.
     return journal.checkpoints().value_or(std::vector<Checkpoint>{});
   });
   if (!checkpoints) return tl::unexpected(checkpoints.error());
@@ -97,7 +97,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
     return failure(ErrorCode::unavailable, "event " + std::to_string(replayed_to.value) + " of the room " +
                                                genesis_.room + " is not kept yet; try again");
 
-  // Rows, and what they make.
+  // Entries, and what they make.
   bool stopped = false;
   Result<void> outcome;
   const Result<void> read = each_entry(report.head, last, [&](const JournalEntry& one) {
@@ -105,7 +105,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
     if (stopped) return false;
     if (calls.progress && one.place.value % 64 == 0)
       calls.progress(static_cast<double>(one.place.value) / static_cast<double>(last.value));
-    if (!outcome) return true;  // what follows is still held against the chain
+    if (!outcome) return true;  // the following entries are still checked against the chain
     const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
     if (!entry) outcome = tl::unexpected(entry.error());
     if (!entry || !room || one.place > replayed_to) return true;
@@ -138,7 +138,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   return report;
 }
 
-// Without the journal's lock: a checkpoint's file never changes.
+// Without the journal's lock, since a checkpoint's file never changes.
 Result<void> RoomStore::check_bytes(const Checkpoint& one, RoomReport& report) {
   std::string bytes;
   const std::filesystem::path file = checkpoint_file(file_, one.at);

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kOwnerEnding = "-owner";  // as owner_file_of() has it
+constexpr std::string_view kOwnerEnding = "-owner";  // as in owner_file_of()
 
 }  // namespace
 

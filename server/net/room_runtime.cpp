@@ -15,7 +15,8 @@ namespace {
 
 using Clock = RoomRuntime::Clock;
 
-// Rows that happen again in one tick at most: so the surface and the health of a fast playback are told as they go.
+// Limit of entries repeated in one tick, so that the surface and the health of a fast playback are published as it goes
+// on.
 constexpr int kEntriesPlayedPerTick = 256;
 
 }  // namespace
@@ -31,8 +32,8 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
   for (Queued& queued : batch) std::visit([this](auto& one) { decide(one); }, queued);
   const bool decided = player ? play(now) : !batch.empty();
   batch.clear();
-  // A commit that fails says so itself. What else closes a journal: damage that was found when it was opened, a
-  // witness, a name or a checkpoint that could not be written.
+  // A failed commit reports itself. A journal can also be closed by damage found at opening, by a witness, or by a name
+  // or a checkpoint that could not be written.
   if (store && store->closed_to_entries() && !closing_told) {
     closing_told = true;
     later([this](const Result<void>&) {
@@ -47,12 +48,12 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
 
 void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
   if (!mount->step(now)) return;
-  // A tick does not wait for those who come, go or are told of entries: the next place is as good.
+  // A tick does not wait for clients that join, leave or are sent entries: the next pose will do as well.
   const std::unique_lock lock(sessions_mutex, std::try_to_lock);
   if (lock) sessions.each([this](SessionSubscriber& subscriber) { subscriber.show_bone(mount->seen(subscriber.author())); });
 }
 
-// Whether anything happened.
+// Returns true if anything happened.
 bool RoomRuntime::Impl::play(std::chrono::nanoseconds now) {
   int played = 0;
   for (; played < kEntriesPlayedPerTick; ++played) {
@@ -97,16 +98,16 @@ void RoomRuntime::Impl::run_ticks() {
     if (decided) reserve.refill();
     timer.done(own);
     figures.publish(last);
-    // Others read a copy, so that a tick never waits for a reader of its figures; only the last one makes sure.
+    // Others read a copy, so that a tick never waits for a reader of its figures. Only the last tick waits, to be sure.
     std::unique_lock lock(stats_mutex, std::try_to_lock);
     if (!lock && last) lock.lock();
     if (!lock) continue;
     stats = own;
-    counts = room.counts();  // which no other thread changes
+    counts = room.counts();  // no other thread changes them
   }
 }
 
-// [committing thread] What was decided since the last transaction will not survive: nobody may build on it.
+// [committing thread] What was decided since the last transaction will be lost, so nobody may build on it.
 void RoomRuntime::Impl::close_room(const Error& why) {
   const std::string sentence = "the room takes no more cuts: " + why.message;
   log::error("journal failed", {{"reason", why.message}});
@@ -203,7 +204,7 @@ void RoomRuntime::tick(std::chrono::nanoseconds now, bool keep) {
   (void)impl_->room.take_stale_blocks();
 }
 
-// A driven runtime's jobs never start.
+// The job thread of a driven runtime never starts, so its jobs run at once.
 void RoomRuntime::run_slowly(std::function<void()> job) { impl_->jobs.run(std::move(job)); }
 
 void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut cut, Clock::time_point arrived) {
@@ -248,7 +249,7 @@ void RoomRuntime::stop() {
   }
   if (impl_->piece_thread.joinable()) {
     impl_->piece_thread.join();
-    // What the last cuts separated, so that the bone is left, and saved, in its pieces.
+    // Splits off what the last cuts separated, so that the bone ends, and is saved, with its fragments as bodies.
     if (impl_->looks_for_pieces())
       for (Separation& found : impl_->pieces.look()) {
         const std::unique_lock lock(impl_->room_mutex);

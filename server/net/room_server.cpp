@@ -42,8 +42,8 @@ Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const Con
   return listener;
 }
 
-// Where `connections.udp_listen` says, or at a free port of where connections come in: then a failure is no error,
-// since the streams carry everything.
+// Opens the fast path at `connections.udp_listen`, or at a free port of the host of `address`. In the second case a
+// failure is no error, since the streams carry everything.
 Result<std::unique_ptr<LinkServer>> hear_datagrams(const ConnectionOptions& connections, const std::string& address) {
   if (connections.udp_listen.empty()) {
     Result<std::unique_ptr<LinkServer>> links = LinkServer::open(address);
@@ -65,14 +65,14 @@ Result<std::unique_ptr<LinkServer>> hear_datagrams(const ConnectionOptions& conn
 }
 
 constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a cut of 64 knots is below 4 kB, a tool made from a mesh a few MB
-constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a piece of a case is 1 MiB
-constexpr int kShortestPingMs = 500;               // clients may ask that often whether the server lives
+constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a part of a case is 1 MiB
+constexpr int kShortestPingMs = 500;               // clients may ping the server this often
 constexpr int kMostStreams = 64;                   // of one connection
 constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is below 1 kB
-// Calls that are begun and reset are bounded after each read (call_flood.hpp); a read of gRPC's 4 MiB has 20 000
-// of them.
+// Calls that are begun and reset are bounded after each read (call_flood.hpp). A read of gRPC's default 4 MiB has 20
+// 000 of them.
 constexpr int kMostReadBytes = 16 * 1024;
-constexpr int kHandshakeMs = 5'000;                                  // for those who have not shown who they are
+constexpr int kHandshakeMs = 5'000;                                  // limit of the handshake
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
 constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
 constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{5};
@@ -128,7 +128,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   if (!listener) return tl::unexpected(listener.error());
   auto impl = std::make_unique<Impl>();
   impl->rooms = std::move(rooms);
-  // What fails is told in one sentence by the caller, not in gRPC's own lines.
+  // The caller reports a failure in one sentence. gRPC's own log lines are not shown.
   impl->listener = std::move(*listener);
   impl->handshakes = std::make_unique<HandshakeWatch>(impl->rooms->refusals, impl->listener->connections());
   std::shared_ptr<grpc::ServerCredentials> credentials = grpc::InsecureServerCredentials();  // shared with gRPC
@@ -159,7 +159,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
                                              proxy.error().message + "; choose another path");
     impl->proxy_listener = std::move(*proxy);
   }
-  // Beside the streams; without it all goes over them.
+  // Beside the streams. Without it, everything goes over them.
   Result<std::unique_ptr<LinkServer>> links = hear_datagrams(connections, impl->listener->address());
   if (!links) return tl::unexpected(links.error());
   impl->links = std::move(*links);
@@ -172,7 +172,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
 
   grpc::EnableDefaultHealthCheckService(true);
   grpc::ServerBuilder builder;
-  // What comes in is accepted and counted by the listener; gRPC takes it over from there.
+  // The listener accepts and counts connections; then gRPC takes them over.
   impl->acceptor = builder.experimental().AddExternalConnectionAcceptor(
       grpc::ServerBuilder::experimental_type::ExternalConnectionType::FROM_FD, credentials);
   if (impl->proxy_listener)
@@ -206,7 +206,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     interceptors.push_back(audited_calls(*impl->rooms->trail(), impl->authorizer.get()));
   }
   builder.experimental().SetInterceptorCreators(std::move(interceptors));
-  // Calls that no service has are authorized, counted and bounded as all others are.
+  // Calls that no service has are authorized, counted and bounded like all others.
   impl->unknown_calls = make_unknown_calls(*impl->rooms);
   builder.RegisterCallbackGenericService(impl->unknown_calls.get());
   for (const auto& service : impl->services) builder.RegisterService(service.get());
@@ -264,7 +264,7 @@ void RoomServer::drain(std::chrono::milliseconds most, const std::function<bool(
 
 std::map<std::string, RoomSummary> RoomServer::stop_all() {
   impl_->rooms->begin_end();
-  // Streams hear why first; those whose reader does not read are cut off after a moment.
+  // Streams are first sent the reason. Streams whose reader does not read are cut off after a moment.
   for (const std::shared_ptr<OpenRoom>& room : impl_->rooms->open_rooms())
     impl_->rooms->draining() ? room->send_away(kStopping) : room->end_streams("the server stops");
   impl_->health.reset();

@@ -18,26 +18,26 @@
 namespace osteon {
 namespace {
 
-constexpr std::size_t kPieceBytes = 128 * 1024;  // of a checkpoint, about
+constexpr std::size_t kPieceBytes = 128 * 1024;  // approximate size of a part of a checkpoint
 
-// Of what a client is told whose room has less than it was told of.
+// For the message to a client whose room has fewer events than were acknowledged to it.
 constexpr const char* kToldEvents = " events that you were told are kept";
 constexpr const char* kJoinAsItIs = "; start again to join it as it is now";
 
-constexpr std::size_t kSyncBytes = 1024 * 1024;  // no commit waits behind more than this of a checkpoint
+constexpr std::size_t kSyncBytes = 1024 * 1024;  // a commit waits for at most this much of a checkpoint
 
 std::int32_t computers_day() {
   return static_cast<std::int32_t>(
       std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch()).count());
 }
 
-// Whether a replay has work with it.
+// Whether a replay must evaluate the entry.
 bool changes_bone(const LogEntry& entry) {
   return std::holds_alternative<CutEntry>(entry.what) || std::holds_alternative<SplitEntry>(entry.what) ||
          std::holds_alternative<UndoEntry>(entry.what) || std::holds_alternative<RedoEntry>(entry.what);
 }
 
-// A piece of a checkpoint: its length, then a JournalFields.
+// A part of a checkpoint: its length, then a JournalFields.
 std::string piece_of(const v1::JournalFields& fields) {
   const std::string bytes = fields.SerializeAsString();
   std::string piece(4, '\0');
@@ -113,7 +113,7 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
     (void)journal->close();
     return tl::unexpected(named.error());
   }
-  genesis->room = options.name;  // which it may have been given since
+  genesis->room = options.name;  // may have been changed since
   std::unique_ptr<RoomStore> store(
       new RoomStore(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
                     options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
@@ -177,7 +177,7 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
   };
   if (Result<void> read = journal_->read(RoomSeq{1}, take); !read) return tl::unexpected(read.error());
   if (!replayed) return tl::unexpected(replayed.error());
-  // Nobody has watched this room yet: all of its surface is made anew.
+  // Nobody has watched this room yet, so its whole surface will be made.
   (void)room->take_changes();
   return room;
 }
@@ -208,7 +208,7 @@ Result<std::uint32_t> RoomStore::person(const std::string& label) {
       if (person.label == label) return static_cast<std::uint32_t>(std::stoul(person.pseudonym));
       newest = std::max(newest, static_cast<std::uint32_t>(std::stoul(person.pseudonym)));
     }
-    // Never again the number of one who was forgotten.
+    // Never gives the number of an erased person again.
     const Result<std::optional<std::string>> given = journal.find_register(kPeopleRegister);
     if (!given) return tl::unexpected(given.error());
     if (*given) newest = std::max(newest, static_cast<std::uint32_t>(std::stoul(**given)));
@@ -278,7 +278,7 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
     if (beyond)
       return failure(checked.error().code,
                      lost_after(head) + ", and takes no more cuts: have its journal recovered, then start again");
-    // Of a journal that is closed it is not known whether its file is as it was written.
+    // If a journal is closed to entries, it is unknown whether its file is as it was written.
     const Result<JournalHead> here = journal.head_at(witness.head.place);
     const bool another_history = here && here->chain != witness.head.chain && journal.closed_because() == nullptr;
     if (!another_history) return checked;

@@ -24,9 +24,9 @@ namespace fs = std::filesystem;
 
 constexpr const char* kEnding = ".journal";
 constexpr const char* kBackupEnding = ".backup";
-constexpr const char* kOpenList = "open-rooms";  // in the folder: the names of those that are open, a line each
+constexpr const char* kOpenList = "open-rooms";  // in the folder: the names of open rooms, one on each line
 constexpr std::chrono::seconds kUpkeepEvery{5};
-// Rows that a playback reads ahead.
+// Entries that a playback reads ahead.
 constexpr std::uint64_t kEntriesAhead = 256;
 
 bool is_name(const std::string& name) {
@@ -36,13 +36,13 @@ bool is_name(const std::string& name) {
   return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, fits) && name.front() != '-';
 }
 
-// A plain name: nobody reaches another folder by it.
+// A plain name, which cannot lead to another folder.
 bool is_backup_name(const std::string& name) {
   const fs::path plain = name;
   return plain == plain.filename() && plain.extension() == kBackupEnding && is_name(plain.stem().string());
 }
 
-// The first few, for a sentence.
+// The first few names, for a sentence.
 std::string some_of(const std::set<std::string>& names) {
   constexpr std::size_t kMost = 5;
   std::string text;
@@ -71,7 +71,7 @@ Error not_kept(const std::string& name) {
 }
 
 std::uint64_t new_server_epoch() {
-  // Without a journal that counts, the calendar is what rises from one opening to the next.
+  // Without a journal that counts openings, the calendar rises from one opening to the next.
   const auto since_1970 = std::chrono::system_clock::now().time_since_epoch();
   return static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(since_1970).count());
 }
@@ -86,7 +86,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-// Reads ahead in a room's journal. The room stays in memory as long as it is shown.
+// Reads ahead in a room's journal. The room stays in memory while it is shown.
 class EntryReader {
  public:
   EntryReader(std::shared_ptr<OpenRoom> room, RoomSeq from, RoomSeq to) : room_(std::move(room)), next_(from), to_(to) {}
@@ -122,7 +122,7 @@ OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptio
       of(std::move(loaded)),
       server_epoch(store ? store->server_epoch() : new_server_epoch()),
       store_(std::move(store)) {
-  // What took long to make again should not take so long the next time.
+  // A room that was slow to open gets a checkpoint, so that the next opening is fast.
   constexpr std::uint64_t kLongReplay = 5000;
   if (store_ && store_->evaluated() > kLongReplay)
     if (const Result<void> kept = store_->checkpoint(room.room_seq(), room.all_leaves()); !kept)
@@ -159,7 +159,7 @@ RoomSummary OpenRoom::close() {
   demonstrations_.end_all();
   runtime_->stop();
   if (store_) {
-    // Nothing is lost where this fails: the next opening takes longer.
+    // Nothing is lost if this fails; only the next opening takes longer.
     if (const Result<void> kept = store_->checkpoint(runtime_->room_seq(), runtime_->all_leaves()); !kept)
       log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
     if (const Result<void> closed = store_->close(); !closed)
@@ -185,7 +185,7 @@ void OpenRoom::maintain(const std::function<bool()>& stop) {
   const bool due = CheckpointPolicy{}.is_due(store_->changes_since_checkpoint(), Clock::now() - newest_checkpoint_);
   if (!due) return;
   newest_checkpoint_ = Clock::now();
-  // Written here: whoever comes is answered by the thread that copies the leaves, and must not wait for the disk.
+  // Written on this thread. The thread that copies the leaves also answers joins, and must not wait for the disk.
   std::promise<RoomRuntime::Leaves> copied;
   runtime_->run_slowly([&] { copied.set_value(runtime_->leaves_now()); });
   const RoomRuntime::Leaves now = copied.get_future().get();
@@ -240,7 +240,7 @@ void Rooms::begin_drain(std::chrono::milliseconds again, const std::string& why)
   }
   const std::vector<std::shared_ptr<OpenRoom>> rooms = open_rooms();
   for (const std::shared_ptr<OpenRoom>& room : rooms) room->runtime().ask_to_redial(again, why);
-  // A demonstration is a session that nobody could ask.
+  // A demonstration is a session that cannot be asked to leave.
   for (const std::shared_ptr<OpenRoom>& room : rooms) room->demonstrations().end_all();
 }
 
@@ -343,7 +343,7 @@ std::string Rooms::owner(const std::string& name) const {
   return owner_of(is_name(name) ? journal_of(name) : options_.folder / name);
 }
 
-// So that nobody uses up the rooms of all.
+// Limits the share of one person, so that nobody uses up the rooms of all.
 Result<void> Rooms::check_share(const Requester& by) const {
   if (by.user.empty() || by.may_have_any_number) return {};
   std::set<std::string> own = owned_by(by.user, options_.folder, kEnding);
@@ -362,7 +362,7 @@ Result<void> Rooms::check_new(const std::string& name, const Requester& by) cons
     return failure(ErrorCode::invalid_input,
                    "\"" + name + "\" is no name of a room; use letters, digits, - and _, at most 64");
   if (Result<void> free = check_free(name); !free) return free;
-  // Each open one holds a bone and threads, each closed one a journal.
+  // An open room holds a bone and threads; a closed one holds a journal.
   if (count() < static_cast<std::size_t>(options_.most_rooms)) return check_share(by);
   return failure(ErrorCode::exhausted, "there are " + std::to_string(options_.most_rooms) +
                                            " rooms, open and closed, as many as there may be; delete some, or start "
@@ -484,7 +484,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Loa
   keeping.journal.keys = options_.keys;
   keeping.retention_days = options_.retention_days;
   if (is_new) keeping.tools = options_.tools();
-  // Half of the work is the events, half the surface, more or less.
+  // The events are about half of the work, the surface is the other half.
   const auto half = [&](double begin) {
     return [&progress, begin](double fraction) {
       if (progress) progress(begin + fraction / 2);
@@ -574,7 +574,7 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
       return tl::unexpected(read.error());
     return store->genesis();
   }
-  // Nobody opens it meanwhile.
+  // Nobody can open it meanwhile.
   const std::lock_guard changing(changing_);
   const Result<fs::path> file = kept_file(name);
   if (!file) return tl::unexpected(file.error());
@@ -598,14 +598,14 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   if (is_backup_name(name)) return remove_backup(name, may);
   std::vector<std::string> names{name};
   if (const Result<fs::path> file = kept_file(name)) {
-    // Only a room's own store can look into a journal that is in use.
+    // Only a room's own store can read a journal that is in use.
     const auto has = [this](const fs::path& of, const JournalHead& head) {
       const Result<std::shared_ptr<OpenRoom>> in_use = find(of.stem().string());
       return in_use && of == journal_of((*in_use)->name) ? (*in_use)->store()->has_head(head) : has_head(of, head);
     };
     const Result<std::vector<RoomFile>> branches = branches_of(options_.folder, *file, has);
     if (!branches) return tl::unexpected(branches.error());
-    // A backup in the folder is no room.
+    // A backup in the folder is not a room.
     for (const RoomFile& branch : *branches)
       if (branch.file == journal_of(branch.file.stem().string())) names.push_back(branch.file.stem().string());
     if (names.size() > 1 && !with_branches) {
@@ -622,7 +622,7 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   for (const std::string& one : names)
     if (const Result<void> allowed = may ? may(one) : Result<void>{}; !allowed) return tl::unexpected(allowed.error());
   std::vector<std::string> deleted;
-  // Those that hang on others first: where this is interrupted, what is left is still known as a branch.
+  // Branches first: after an interruption, the rest is still known as branches.
   for (auto one = names.rbegin(); one != names.rend(); ++one) {
     if (find(*one))
       if (const Result<RoomSummary> closed = close(*one); !closed) return tl::unexpected(closed.error());
@@ -654,7 +654,7 @@ Result<RoomReport> Rooms::verify(const std::string& name) {
   std::promise<BoneStatus> bone;
   (*room)->runtime().run_slowly([&] { bone.set_value((*room)->runtime().bone_status()); });
   const BoneStatus status = bone.get_future().get();
-  // What is decided is kept a moment later.
+  // What is decided is durable a moment later.
   while ((*room)->store()->head().place < status.room_seq && !(*room)->runtime().stopped() && !ending_)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   if ((*room)->store()->head().place < status.room_seq)
@@ -671,7 +671,7 @@ Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& f
   if (!room) return tl::unexpected(room.error());
   if (!(*room)->store()) return tl::unexpected(not_kept(name));
   if (options_.folder.empty()) return tl::unexpected(kept_elsewhere(**room));
-  // A client names no folder: it may not write elsewhere on the server's disk.
+  // A client may not name a folder, as it could then write anywhere on the server's disk.
   if (!is_backup_name(file_name))
     return failure(ErrorCode::invalid_input, "\"" + file_name + "\" is not a plain name that ends in .backup");
   file = options_.folder / file_name;

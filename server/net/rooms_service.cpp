@@ -1,4 +1,4 @@
-// What is done to rooms as a whole.
+// The service for rooms as a whole.
 #include <grpcpp/grpcpp.h>
 
 #include <optional>
@@ -94,7 +94,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request,
                       v1::DeleteRoomResponse* response) override {
     const auto work = [this, context, request, response] {
-      // Of every branch too it is asked whether the caller may.
+      // The right is checked for every branch too.
       const auto may = [&](const std::string& room) { return may_delete(*context, room); };
       const Result<std::vector<std::string>> gone = rooms_.remove(request->name(), request->with_branches(), may);
       if (!gone) return status_of(gone.error());
@@ -159,7 +159,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   [[nodiscard]] bool is_owner(const Caller& caller, const std::string& name) const {
     return !caller.user.empty() && rooms_.owner(name) == caller.user;
   }
-  // An operator, and who made it: also with a ticket for another room, as of a branch that they made.
+  // Operators may delete it, and so may the person who made it. The person's ticket may be for another room, as it is
+  // after making a branch.
   [[nodiscard]] Result<void> may_delete(Context& context, const std::string& name) const {
     if (!rooms_.authorizer) return {};
     const std::string call = method("DeleteRoom");
@@ -171,8 +172,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return failure(ErrorCode::denied, name + " is not yours; only who made it, or an operator, may delete it");
   }
 
-  // Judged by the room that the message names, or as `may` says, at once and again when its turn comes: others may take
-  // minutes before it.
+  // Runs slow work. The right is checked for the room that the message names, or by `may`: at once, and again when the
+  // work begins, since other work may take minutes before it.
   Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work,
                   const std::function<Result<void>()>& may = {}) {
     Reactor* reactor = context->DefaultReactor();
@@ -182,7 +183,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       const Result<void> allowed = may ? may() : in_room();
       return allowed ? std::nullopt : std::optional(status_of(allowed.error()));
     };
-    // A call that names none would be about the only one that is open, whichever that is when its turn comes.
+    // A call without a name would mean the only open room, which may be another one when its turn comes.
     std::optional<Status> refused = room.empty() ? std::optional(invalid("the request names no room")) : refusal();
     if (refused) {
       reactor->Finish(std::move(*refused));

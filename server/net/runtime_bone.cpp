@@ -1,4 +1,4 @@
-// Copies of a room's bone while it is cut, and the pieces that come off it.
+// Copies a room's bone while it is cut, and finds fragments.
 #include <algorithm>
 #include <iterator>
 #include <memory>
@@ -11,15 +11,15 @@ namespace {
 
 using Clock = RoomRuntime::Clock;
 
-// Leaves copied at once. Between two batches the room goes on cutting.
+// Number of leaves copied at once. The room goes on cutting between two batches.
 constexpr std::size_t kLeafBatch = 64;
 
 }  // namespace
 
 Digest RoomRuntime::surface_hash() const { return impl_->mesh.surface_hash(); }
 
-// In batches: a room that is much cut has many leaves, and a tick must not wait until all of them are copied. Those of
-// a body that goes meanwhile stay without values.
+// In batches: a room with many cuts has many leaves, and a tick must not wait until all of them are copied. If a body
+// disappears meanwhile, its leaves stay without values.
 void RoomRuntime::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   for (std::size_t i = 0; i < leaves.size();) {
     const std::shared_lock lock(room_mutex);
@@ -43,7 +43,7 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
     std::vector<Cut> cuts;
     std::uint64_t changes = 0;
     {
-      // Only this thread and, with the lock alone, the tick's use `meanwhile`.
+      // Only this thread uses `meanwhile`, and the tick thread, which holds the lock exclusively.
       const std::shared_lock lock(room_mutex);
       changes = room.bone_changes();
       leaves = places();
@@ -57,8 +57,8 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
       copy.items = room.items();
       cuts = std::move(*meanwhile);
       meanwhile.reset();
-      // Bone that came back or fell apart meanwhile: what was copied before is of another bone. A room in which that
-      // happens all the time is held still.
+      // Bone came back or fell apart meanwhile, so the copy is of another bone. If this happens again and again, the
+      // room is locked for the whole copy.
       if (changes != room.bone_changes()) {
         if (attempt < 3) continue;
         leaves = places();
@@ -67,8 +67,8 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
       }
       for (const BodyId body : bodies()) copy.bodies.emplace(body, CutField(room.bone(), body, room.tools()));
     }
-    // Leaves that contain some of the cuts since their copying began get the others now, and those once more, which
-    // changes nothing: the copy is the bone at room_seq.
+    // A leaf may already contain some of the cuts made since copying began. Applying all of them again adds the missing
+    // ones and changes nothing else. The copy is then the bone at room_seq.
     for (const FieldLeaf& leaf : leaves) copy.bodies.at(leaf.body).restore(leaf);
     for (const Cut& cut : cuts)
       for (auto& [id, field] : copy.bodies) field.apply(cut);
@@ -82,7 +82,7 @@ BoneStatus RoomRuntime::bone_status() {
     const std::shared_lock lock(impl_->room_mutex);
     if (impl_->last_status && impl_->last_status->room_seq == impl_->room.room_seq()) return *impl_->last_status;
   }
-  // Measured on a copy, so that the room is not kept from cutting.
+  // Measured on a copy, so that the room can go on cutting.
   const Impl::BoneCopy copy = impl_->copy_bone();
   BoneStatus status;
   status.room_seq = copy.room_seq;
@@ -90,7 +90,8 @@ BoneStatus RoomRuntime::bone_status() {
   std::vector<FieldLeaf> leaves;
   for (const auto& [id, field] : copy.bodies) {
     status.bodies.push_back(id);
-    // A body lacks what was cut and what is in the others: a piece is there that the bone lacks.
+    // A body lacks what was cut and what is in the other bodies. So what belongs to other bodies must not count as
+    // removed.
     status.removed_mm3 += field.removed_mm3() - (status.bodies.size() > 1 ? bone().volume_mm3() : 0.0);
     std::ranges::move(field.leaves(), std::back_inserter(leaves));
   }
@@ -126,7 +127,7 @@ SavedFields RoomRuntime::saved_fields() {
   return saved;
 }
 
-// [piece thread] What it finds is a queued event like any other.
+// [piece thread] Queues what it finds as an event like any other.
 void RoomRuntime::Impl::run_pieces() {
   while (true) {
     {
@@ -149,13 +150,13 @@ void RoomRuntime::Impl::run_pieces() {
   }
 }
 
-// Waits for the room's decision: until then the room must not tell anyone of its changes, see Separation.
+// Waits for the room's decision. Until then the room must not report its changes to anyone, see Separation.
 void RoomRuntime::Impl::ask_for_split(Separation found) {
-  const auto shared = std::make_shared<Separation>(std::move(found));  // by the queued event and by this thread
+  const auto shared = std::make_shared<Separation>(std::move(found));  // shared by the queued event and this thread
   bool decided = false;
   {
     const std::lock_guard lock(queue_mutex);
-    if (queue_closed) return pieces.lose(shared->parent);  // stop() looks once more, at all of it
+    if (queue_closed) return pieces.lose(shared->parent);  // stop() searches once more, in the whole body
     queue.emplace_back(std::in_place_type<QueuedEvent>,
                        QueuedEvent{[shared](Room& r) { return r.split(std::move(*shared)); },
                                    [this, shared, &decided](const Result<RoomEvent>& split) {
@@ -175,7 +176,7 @@ void RoomRuntime::Impl::ask_for_split(Separation found) {
 
 void RoomRuntime::find_pieces() {
   std::unique_lock lock(impl_->pieces_mutex);
-  // One that has begun may have missed the newest cuts.
+  // A search that has already begun may have missed the newest cuts.
   const std::uint64_t wanted = impl_->looks_begun + 1;
   impl_->pieces_due = impl_->look_wanted = true;
   impl_->pieces_wake.notify_all();

@@ -1,4 +1,4 @@
-// Who comes to a room, what is decided of what they ask, and what everybody is told of it.
+// Joins and sessions of a room: who joins, what is decided of their requests, and what is sent to everybody.
 #include <algorithm>
 #include <charconv>
 #include <future>
@@ -13,7 +13,7 @@ namespace {
 
 using Clock = RoomRuntime::Clock;
 
-// Cuts whose places a session begins with: a haptic client never has more that it knows nothing of.
+// Largest number of cuts whose results a session begins with. A haptic client never has more cuts with unknown results.
 constexpr std::size_t kMostToldAgain = 1024;
 
 }  // namespace
@@ -23,7 +23,7 @@ Error only_to_be_watched() {
           "this room shows what happened in another: it can be watched, with osteon-viewer, and not changed"};
 }
 
-// A name that cannot be read now is shown as nobody's.
+// A name that cannot be read now is left empty.
 std::map<std::uint32_t, std::string> RoomRuntime::Impl::names_of(RoomStore* store) {
   std::map<std::uint32_t, std::string> names;
   if (store == nullptr) return names;
@@ -131,7 +131,7 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
   });
 }
 
-// [tick] Every second, what a client may hold the room to.
+// [tick] Every second: the witness, up to which clients can rely on the room.
 void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
   if (!store || now < next_kept) return;
   next_kept = now + std::chrono::seconds(1);
@@ -143,19 +143,20 @@ void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
   });
 }
 
-// [any thread] Tools are numbered as they come to be told, the same for all sessions.
+// [any thread] Tools get numbers when they are first sent, the same for all sessions.
 std::uint32_t RoomRuntime::Impl::number_of(const Digest& tool) {
   const std::lock_guard lock(numbers_mutex);
   return tool_numbers.emplace(tool, static_cast<std::uint32_t>(tool_numbers.size() + 1)).first->second;
 }
 
-// [tick] What every session hears of an event that is not a cut. Only this thread changes the room.
+// [tick] What every session is sent for an event that is not a cut. Only this thread changes the room.
 MessageParts RoomRuntime::Impl::entries_of(const RoomEvent& event) {
   MessageParts entries;
   if (event.tool) entries.push_back(tool_message(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
   if (event.bone) entries = change_entries(event);
   if (event.scene) entries.push_back(scene_message(event.room_seq, room.items()));
-  if (entries.empty()) entries.push_back(noted_entry(event.room_seq, event.mark));  // so that the order has no gap
+  // So that there is no gap in the sequence numbers.
+  if (entries.empty()) entries.push_back(noted_entry(event.room_seq, event.mark));
   return entries;
 }
 
@@ -175,7 +176,7 @@ RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_message(const RoomEvent&
   return {};
 }
 
-// [thread of the board]
+// [thread of the state publisher]
 bool RoomRuntime::Impl::tell_hands(const std::vector<CuttingState>& states) {
   bool owed = false;
   const std::lock_guard lock(sessions_mutex);
@@ -210,7 +211,7 @@ Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const st
                                                  (impl_->store ? "its journal begins anew, or ends before that join"
                                                                : "without a journal it ends with its server") +
                                                  "; start again to join it as it is now");
-  // What an author may take back goes by the role of the join.
+  // What an author may undo depends on the role of the join.
   if (role && impl_->room.people().role(author) != *role)
     return failure(ErrorCode::denied,
                    "your role here is another than when author " + std::to_string(author.value) + " joined; join anew");
@@ -254,7 +255,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
   MessageParts before;
   bool again = false;
   {
-    // Held until the subscriber is listed: every entry after `contained` is committed, and so offered, later.
+    // Held until the subscriber is in the list. So every entry after `contained` is committed, and offered, later.
     const std::shared_lock room_lock(impl_->room_mutex);
     if (!impl_->room.may_cut(subscriber->author()))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
@@ -265,7 +266,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     for (const ToolBox::Entry* entry : tools)
       before.push_back(tool_message(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
     before.push_back(scene_message(impl_->room.room_seq(), impl_->room.items()));
-    // Whatever holds for the hand, it knows before it could cut; also that nothing does any more.
+    // The client is sent its restrictions before it can cut, also the message that there are none any more.
     const People::Supervised& held = impl_->room.people().supervised(subscriber->author());
     const std::uint64_t lease_epoch = impl_->room.lease_epoch(subscriber->author());
     const Decider by{held.by, impl_->people.name_of(held.by)};
@@ -307,9 +308,9 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     subscriber->set_leaves(std::move(leaves));
     return {};
   }
-  // All that the session begins with tells of what may not be kept yet, and `complete` says that it is decided: the
-  // subscriber sends none of it before it has the leaves, and it has these once it is kept. By datagram nothing is told
-  // sooner either, whose keys are with the rest.
+  // What the session begins with may not be durable yet, and `complete` says that it is decided. So the subscriber
+  // sends nothing before it has the leaves, and it gets them once everything is durable. Datagrams do not come sooner
+  // either, since their keys are sent with the rest.
   queue_event([](Room&) { return RoomEvent{}; },
               [subscriber, leaves = std::move(leaves)](const Result<RoomEvent>& kept) mutable {
                 if (kept) subscriber->set_leaves(std::move(leaves));

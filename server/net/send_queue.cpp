@@ -43,7 +43,7 @@ MessageParts MeshSendQueue::take() {
     waiting_.erase(next);
   }
 
-  // The first round has brought every block of the first surface, each at least as new as that.
+  // The first round has sent every block of the first surface, each at least as new as that surface.
   if (!snapshot_sent_ && (wrapped || waiting_.empty())) {
     snapshot_sent_ = true;
     said_ = snapshot_seq_;
@@ -94,7 +94,7 @@ RoomSeq SessionSendQueue::arrived(std::uint64_t index) {
 }
 
 MessageParts SessionSendQueue::take() {
-  // Until then some of it may not be kept.
+  // Until then some of it may not be durable.
   if (!leaves_known_) return {};
   if (!before_.empty()) {
     MessageParts parts{std::move(before_.front())};
@@ -104,7 +104,7 @@ MessageParts SessionSendQueue::take() {
   v1::SessionResponse response;
   if (next_leaf_ < leaves_.size()) {
     *response.mutable_leaf() = wire::to_wire(leaves_[next_leaf_]);
-    // Every leaf sent frees its memory; the list itself goes with the last.
+    // Each leaf's memory is freed when it is sent; the list itself with the last leaf.
     leaves_[next_leaf_].values = {};
     if (++next_leaf_ == leaves_.size()) {
       leaves_ = {};
@@ -117,7 +117,7 @@ MessageParts SessionSendQueue::take() {
   const Entry entry = std::move(entries_.front());
   entries_.pop_front();
   if (entry.index == 0) return {entry.bytes};
-  // The entry itself is shared by all streams: its number goes behind it, as protobuf merges.
+  // All streams share the entry. Its index is appended, as protobuf merges messages.
   v1::SessionResponse number;
   number.set_index(entry.index);
   return {entry.bytes, serialised(number)};

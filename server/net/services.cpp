@@ -22,7 +22,7 @@
 namespace osteon {
 namespace {
 
-// The case's files, read piece by piece on the thread for files.
+// Sends the case's files, read in parts on the thread for files.
 class CaseStream final : public OutStream<WriteReactor> {
  public:
   static constexpr std::size_t kPieceBytes = 1024 * 1024;
@@ -75,7 +75,7 @@ class CaseStream final : public OutStream<WriteReactor> {
   JobThread& files_;
   const std::filesystem::path folder_;
   Bytes waiting_;
-  // Of the job that reads; the next job is queued only after it has left its piece.
+  // Used by the reading job. The next job is queued only after this one has handed over its part.
   std::size_t file_index_ = 0;
   std::ifstream file_;
   std::uintmax_t file_size_ = 0, sent_ = 0;
@@ -83,7 +83,7 @@ class CaseStream final : public OutStream<WriteReactor> {
 
 constexpr std::uint64_t kLongestUndoMs = 1'000'000'000'000;  // longer than any room
 
-// Why a program of these versions cannot join; OK when it can.
+// Why a program of these versions cannot join; OK if it can.
 Status judge(const v1::JoinRequest& request) {
   if (const Result<void> known = wire::check_protocol_version(request.protocol_version()); !known)
     return status_of(known.error());
@@ -144,12 +144,14 @@ class RoomServiceImpl final : public RoomBase {
       const Case& bone = runtime.bone();
       const bool again = request->resume_author() != 0;
       const Authorizer::Coming coming = again ? Authorizer::Coming::again : Authorizer::Coming::anew;
-      // First what the caller was told is kept: after a loss the caller's number may be another's.
+      // First checks what was acknowledged to the caller: after a loss, the caller's number may belong to another
+      // person.
       if (const Result<void> kept = again ? check_kept(runtime, *request) : Result<void>(); !kept) {
         rooms_.refusals.note("loss", address_of(context->peer()), kept.error().message);
         return reactor->Finish(status_of(kept.error()));
       }
-      // Not sooner: others may have come while this waited for its turn. Who was displaced leaves the room as it is.
+      // Not sooner, since others may have joined while this call waited for its turn. A caller that was displaced must
+      // not change the room.
       if (const Result<void> may = again ? may_resume(caller, *room, *request) : Result<void>(); !may) {
         rooms_.refusals.note("role", address_of(context->peer()), may.error().message);
         return reactor->Finish(status_of(may.error()));
@@ -234,7 +236,7 @@ class RoomServiceImpl final : public RoomBase {
     if (!caller) return refused(status_of(caller.error()));
     std::string of_room;
     if (rooms_.authorizer) {
-      // A ticket for a room opens no other room's case.
+      // A ticket for a room gives no access to another room's case.
       const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
       if (!room) return refused(status_of(room.error()));
       if ((*room)->runtime().bone().hash() != *hash)
@@ -399,7 +401,7 @@ class RoomServiceImpl final : public RoomBase {
     if (room->save.empty())
       return refuse(reactor,
                     {StatusCode::FAILED_PRECONDITION, "this server saves nothing; start it with --save FILE.vdb"});
-    // A client names no folder: it may not write elsewhere on the server's disk.
+    // A client may not name a folder, as it could then write anywhere on the server's disk.
     const std::filesystem::path name = request->file_name();
     if (!name.empty() && (name != name.filename() || name.extension() != ".vdb" || request->file_name().front() == '.'))
       return refuse(reactor, invalid("file_name is not a plain name that ends in .vdb"));
@@ -425,7 +427,7 @@ class RoomServiceImpl final : public RoomBase {
     std::array<std::uint8_t, 32> secret{};
     system_random()(secret);
     response.set_secret(secret.data(), secret.size());
-    // Others see who it is by the certificate, where there is one.
+    // Others see the name in the certificate, if there is one.
     return runtime.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()),
                         caller.role);
   }
@@ -433,11 +435,11 @@ class RoomServiceImpl final : public RoomBase {
     if (request.kept_room_seq() == 0) return {};
     const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
     if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
-    // Programs of before there were seals send none.
+    // Programs from before there were seals send none.
     const Result<Digest> seal = wire::digest_from_wire(request.kept_seal());
     return runtime.check_kept({{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}});
   }
-  // After check_kept(). `role`: what the caller may be now; nothing: whatever it was.
+  // Called after check_kept(). `role`: the caller's role now; nothing: not checked.
   static Result<AuthorId> come_back(RoomRuntime& runtime, const v1::JoinRequest& request, std::optional<Role> role) {
     const AuthorId author{request.resume_author()};
     const Result<void> may = runtime.resume(author, digest_of_secret(request.secret()), {}, role);
@@ -449,7 +451,7 @@ class RoomServiceImpl final : public RoomBase {
     if (!rooms_.authorizer) return {};
     return rooms_.authorizer->check_resume(caller, room.name, request.kind(), AuthorId{request.resume_author()});
   }
-  // What the name of the call does not say.
+  // The checks that do not follow from the name of the call.
   [[nodiscard]] Result<void> may_join(const Caller& caller, const v1::JoinRequest& request) const {
     if (rooms_.authorizer && request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
       return failure(ErrorCode::denied, "your role here, " + std::string(to_string(caller.role)) +

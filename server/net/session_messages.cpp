@@ -6,7 +6,8 @@
 namespace osteon {
 namespace {
 
-// Events that changed the bone in other ways than by cutting travel as leaves; a message holds about so much of them.
+// Events that changed the bone by other means than cuts are sent as leaves. This is the approximate size of one
+// message.
 constexpr std::size_t kChangeBytes = 128 * 1024;
 
 v1::BoneChangeKind wire_kind(EventKind kind) {

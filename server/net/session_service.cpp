@@ -1,4 +1,4 @@
-// The streams of haptic clients, and the fast path beside each.
+// The streams of haptic clients, and the fast path beside each stream.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -22,13 +22,13 @@
 namespace osteon {
 namespace {
 
-// One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick, so a client that sends
-// faster than the room cuts is slowed down by the network instead of filling memory. Datagrams nobody slows down: who
-// sends more of them than a haptic client does before it has heard of the first is ended.
+// One haptic client's session. Reading stops while kMaxQueuedCuts of its cuts wait for a tick. So the network slows
+// down a client that sends faster than the room cuts, and memory stays bounded. Datagrams cannot be slowed down. So a
+// session ends if its client sends more unacknowledged cuts than a haptic client does.
 class SessionStream final : public OutStream<BidiReactor>, public SessionSubscriber, private SessionLink::Receiver {
  public:
   static constexpr int kMaxQueuedCuts = 256;
-  static constexpr int kMostUnacknowledged = 1024;  // cuts that a haptic client sends before it has heard of the first
+  static constexpr int kMostUnacknowledged = 1024;  // cuts that a haptic client sends before the first is acknowledged
   static constexpr std::string_view kMethod = "/osteon.v1.CuttingService/Session";
 
   SessionStream(std::shared_ptr<OpenRoom> room, LinkServer* links, Authorizer* authorizer, Caller caller)
@@ -84,7 +84,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       send_or_give_up(send_queue_.add(place, entry));
       if (send_queue_.index() > before) index = send_queue_.index();
     }
-    // Beside the stream, which carries all.
+    // Beside the stream, which carries everything.
     const bool goes = entry == any && may_carry(content_of(fast));
     if (link_)
       link_->tell(index, goes ? fast : wire::SessionEntry{.room_seq = place, .kind = wire::SessionEntryKind::streamed});
@@ -93,7 +93,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
   }
   bool show_partners(const std::vector<CuttingState>& states) override {
-    if (is_closing()) return false;  // nor are they told by datagram
+    if (is_closing()) return false;  // nor do they get them by datagram
     std::vector<CuttingState> others;
     std::ranges::copy_if(states, std::back_inserter(others),
                          [&](const CuttingState& state) { return state.author != author_; });
@@ -134,7 +134,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       StartRead(&request_);
     }
   }
-  // Said by the room, so that nobody tries again as after a line that broke.
+  // The room ended the session, so the client must not try again as after a broken connection.
   void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
   void replaced(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
@@ -144,7 +144,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
 
   void OnReadDone(bool ok) override {
     if (!ok) {
-      // The client has no more to say: what it queued is still decided and told.
+      // The client will send no more. What it queued is still decided and published.
       const std::lock_guard lock(mutex_);
       reading_ended_ = true;
       if (queued_ == 0) close_locked(Status::OK);
@@ -173,7 +173,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (opened_) return close(invalid("open was sent before"));
     if (!stand_under(authorizer_, caller_, room_->name, AuthorId{request.author()}, kMethod)) return;
     if (request.server_epoch() != room_->server_epoch)
-      // It joined a server that was killed meanwhile: this one knows it, if it joins again.
+      // The client joined a server that was killed meanwhile. This server will know it if it joins again.
       return close({StatusCode::UNAVAILABLE, "open.server_epoch is " + std::to_string(request.server_epoch()) +
                                                  " and the server's " + std::to_string(room_->server_epoch) +
                                                  "; join again"});
@@ -181,12 +181,12 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     author_ = AuthorId{request.author()};
     version_ = room_->version_of(author_);
     const Digest secret = digest_of_secret(request.secret());
-    // Reading goes on after the leaves were taken, so that no cut of this author is among them.
+    // Reading goes on after the leaves were taken, so that they contain no cut of this author.
     runtime_.run_slowly([this, keep = self(), secret] {
       const std::shared_ptr<SessionSubscriber> subscriber(keep, this);
       if (const Result<void> opened = runtime_.open_session(subscriber, secret); !opened)
         return close(invalid(opened.error().message));
-      // A reader that went away meanwhile has left the runtime's list before it was on it.
+      // If the reader left while the session was being opened, it left the runtime's list before it was in it.
       if (!read_on()) leave();
     });
   }
@@ -195,8 +195,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     Result<Cut> cut = wire::from_wire(message);
     if (!cut) return close(invalid(cut.error().message));
     if (cut->author != author_) return close(invalid("cut.author is not the author who opened the session"));
-    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come
-    // in datagrams.
+    // A cut that was taken before is answered with its first result. A cut ahead of its turn may follow others that
+    // come in datagrams.
     const bool again = [&] {
       const std::lock_guard lock(mutex_);
       return cut->author_seq <= taken_;
@@ -208,13 +208,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     read_on();
   }
 
-  // In order of their author_seq, over whichever way they came.
+  // Cuts in order of their author_seq, from the stream or from datagrams.
   void take(Cut cut) override {
     {
       const std::lock_guard lock(mutex_);
       if (closing()) return;
       if (!may_carry(DatagramContent::cuts)) return close_locked(not_allowed());
-      // Beside those that are new there are, after a line broke, as many again as are read of the stream.
+      // Besides the new cuts, after a broken connection as many again may be read from the stream.
       if (queued_ >= kMaxQueuedCuts + kMostUnacknowledged) return close_locked(too_many_cuts());
       ++queued_;
       taken_ = std::max(taken_, cut.author_seq);
@@ -234,8 +234,9 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     }();
     if (newest) runtime_.people().heard(author_, newest);
   }
-  // Whoever was told of more than there is, by a server whose journal has lost its end, has heard all that is left:
-  // what was lost is for the witness that it comes back with to show, and no reason to turn it away here.
+  // A client may have received more events than there are, from a server whose journal has lost its end. It then counts
+  // as having received everything that is left. Such a loss is found by the client's witness at its next join, and is
+  // no reason to refuse it here.
   void hear(RoomSeq newest) {
     runtime_.people().heard(author_, std::min(newest, runtime_.room_seq()));
     read_on();
@@ -258,14 +259,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     read_on();
   }
 
-  // An entry that is streamed is told of without what it says.
+  // For a streamed entry, the datagram names only its kind and has no content.
   [[nodiscard]] DatagramContent content_of(const wire::SessionEntry& entry) const {
     if (entry.kind == wire::SessionEntryKind::supervised) return DatagramContent::supervision;
     const bool others = entry.kind == wire::SessionEntryKind::committed && entry.cut.author != author_;
     return others ? DatagramContent::committed_cuts : DatagramContent::acknowledgements;
   }
 
-  // What an entry of the order tells, of what not every role is told.
+  // The content of an entry, if not every role may receive it.
   [[nodiscard]] static std::optional<StreamContent> content_of(const v1::SessionResponse& entry) {
     switch (entry.message_case()) {
       case v1::SessionResponse::kLeaf:
@@ -282,7 +283,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
         return {};
     }
   }
-  // An entry as the reader may be told it: without what is not for them it says only that there was something.
+  // An entry as the reader's role may receive it. Without the forbidden content it says only that there was an event.
   [[nodiscard]] Bytes entry_for_role(RoomSeq place, const Bytes& entry) const {
     constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision,
                               StreamContent::own_words};
@@ -293,7 +294,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (!content || may_receive(*content)) return entry;
     return place ? noted_entry(place, {}) : nullptr;
   }
-  // The same as this client's version of the protocol has it; null where it has none.
+  // The same in this client's version of the protocol; null if that version has no such message.
   [[nodiscard]] Bytes in_its_version(const Bytes& entry) const {
     if (!entry) return nullptr;
     if (version_ == wire::kProtocolVersion) return entry;
@@ -313,7 +314,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"};
   }
 
-  // Reads the next request, or waits for decided() to do so. False when gRPC has let go of the stream.
+  // Reads the next request, or waits for decided() to do so. Returns false when gRPC has released the stream.
   bool read_on() {
     const std::lock_guard lock(mutex_);
     if (done()) return false;
@@ -345,7 +346,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       if (const Bytes entry = in_its_version(bone_entry(*bone_))) parts = {entry};
       bone_.reset();
     }
-    // Where others' tools are only after all entries: no entry is held up.
+    // Poses of others' tools come after all entries, so that they delay no entry.
     while (parts.empty() && send_queue_.begun()) {
       const std::optional<CuttingState> partner = partners_.take(PartnerSendQueue::Clock::now());
       if (!partner) break;
@@ -357,7 +358,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   void leave() override {
     runtime_.leave(*this);
     if (opened_) log::info("session over", {{"room", room_->name}, {"author", author_.value}});
-    // The reader may go while the session is being opened.
+    // The reader may leave while the session is being opened.
     const auto link = [&] {
       const std::lock_guard lock(mutex_);
       return link_;
@@ -370,16 +371,16 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   LinkServer* const links_;
   Authorizer* const authorizer_;  // null: plain text
   const Caller caller_;
-  std::shared_ptr<SessionLink> link_;  // with the link server; set before the runtime tells of entries
+  std::shared_ptr<SessionLink> link_;  // shared with the link server; set before the runtime sends entries
   ByteBuffer request_;
-  AuthorId author_;  // set before the runtime knows the stream, as the next
+  AuthorId author_;  // set before the runtime knows the stream, as is the next
   std::uint32_t version_ = wire::kProtocolVersion;
-  bool opened_ = false;  // only reactions to reads use it, and these come one by one
+  bool opened_ = false;  // used only by reactions to reads, which come one by one
   SessionSendQueue send_queue_;
   PartnerSendQueue partners_;
-  std::optional<MountPose> bone_;  // newest place of the bone that the stream is to tell
+  std::optional<MountPose> bone_;  // newest pose of the bone that the stream shall send
   PartnerSendQueue::Clock::time_point next_bone_{};
-  int queued_ = 0;           // cuts between reading and deciding
+  int queued_ = 0;           // cuts between reading and decision
   std::uint64_t taken_ = 0;  // newest author_seq that was queued, here or in an earlier session
   bool paused_ = false, reading_ended_ = false;
 };

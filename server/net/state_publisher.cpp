@@ -58,7 +58,7 @@ void StatePublisher::offer(CuttingState state) {
   changed_ = true;
 }
 
-// A tool whose hand is gone stands still: readers must not go on sounding and drawing its last moment.
+// The tool of an ended session is shown idle, so that readers do not go on sounding and drawing its last moment.
 void StatePublisher::session_over(AuthorId author) {
   const std::lock_guard lock(states_mutex_);
   const auto shown = states_.find(author);
@@ -117,7 +117,7 @@ void StatePublisher::run() {
   }
 }
 
-// Where telling everyone takes longer than a tick, the next round brings the newest and skips what came between.
+// If sending to everyone takes longer than a tick, the next round sends the newest state and skips those between.
 void StatePublisher::tell(Clock::time_point now) {
   const std::lock_guard lock(streams_mutex_);
   std::unique_lock states_lock(states_mutex_);

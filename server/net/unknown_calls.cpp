@@ -1,4 +1,4 @@
-// Calls that no service of this server has.
+// Answers calls that no service of this server has.
 #include <grpcpp/generic/async_generic_service.h>
 #include <grpcpp/grpcpp.h>
 
@@ -15,7 +15,7 @@ namespace {
 class RefusedCall final : public grpc::ServerGenericBidiReactor {
  public:
   explicit RefusedCall(Status why) { Finish(std::move(why)); }
-  void OnDone() override { delete this; }  // as gRPC wants it of reactors
+  void OnDone() override { delete this; }  // as gRPC requires of reactors
 };
 
 class UnknownCalls final : public grpc::CallbackGenericService {

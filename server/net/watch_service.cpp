@@ -1,4 +1,4 @@
-// What viewers and audio clients subscribe to.
+// The service to which viewers and audio clients subscribe.
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
@@ -78,7 +78,7 @@ class CuttingStream final : public OutStream<WriteReactor>, public StateSubscrib
  private:
   bool take(ByteBuffer& message) override {
     if (!waiting_) return false;
-    // Two messages of one kind behind each other are one message with the fields of both.
+    // Two messages of one kind, one after the other, are one message with the fields of both.
     MessageParts parts;
     if (may_receive(StreamContent::tool_states)) parts.push_back(waiting_->tools);
     if (may_receive(StreamContent::scene)) parts.push_back(waiting_->scene);
