@@ -72,7 +72,7 @@ Result<void> verify(const Arguments& given) {
 
 std::string who_text(const AuditEntry& entry) {
   if (entry.record.identity.empty()) return "the server";
-  if (entry.is_erased) return "somebody who was forgotten, " + entry.record.identity;
+  if (entry.is_erased) return "somebody who was erased, " + entry.record.identity;
   const AuditIdentity& who = entry.who;
   std::string text = who.person.empty() ? "somebody unknown" : who.person;
   if (!who.certificate.empty()) text += ", certificate " + who.certificate;
@@ -125,8 +125,8 @@ Result<void> forget(const Arguments& given) {
     const Result<std::size_t> gone = erase_person(system_disk(), given.file, given.person);
     if (!gone) return tl::unexpected(gone.error());
     if (*gone == 0)
-      return failure(ErrorCode::not_found, given.file.string() + " knows nobody of the name " + given.person);
-    std::printf("forgotten: %zu identities (what they did stays, under pseudonyms)\n", *gone);
+      return failure(ErrorCode::not_found, given.file.string() + " has no person of the name " + given.person);
+    std::printf("erased: %zu identities (what they did stays, under pseudonyms)\n", *gone);
     return {};
   });
 }
@@ -158,7 +158,7 @@ Result<void> run_audited(const fs::path& file, const fs::path& signing_key, Audi
 void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* audit =
-      app.add_subcommand("audit", "Checks or shows who did what on a server, or forgets who somebody was");
+      app.add_subcommand("audit", "Checks or shows who did what on a server, or erases who somebody was");
   audit->require_subcommand(1);
   const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
     CLI::App* sub = audit->add_subcommand(name, what);
@@ -178,7 +178,7 @@ void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   shown->add_option("--room", given->room, "Only what was done to this room");
   shown->add_option("--since", given->since, "Only from this time on, in UTC: 2026-11-25 or 2026-11-25T12:00:00Z");
   shown->add_flag("--json", given->json, "A line of JSON for each record");
-  CLI::App* gone = command("erase-person", "Forgets who a person was; what they did stays, under a pseudonym", forget);
+  CLI::App* gone = command("erase-person", "Erases who a person was; what they did stays, under a pseudonym", forget);
   gone->add_option("--person", given->person, "Name in the certificate")->required();
   gone->add_option("--signing-key", given->signing_key,
                    "The server's signing key; by default signing.key beside the log");

@@ -65,7 +65,7 @@ void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   cases->require_subcommand(1);
   add_asking_command(*cases, "list", "Lists them all", chosen, list);
   const auto from = std::make_shared<fs::path>();  // shared by the option and the function that runs
-  add_asking_command(*cases, "upload", "Sends a case to the server, which looks it through and keeps it", chosen,
+  add_asking_command(*cases, "upload", "Sends a case to the server, which checks and stores it", chosen,
                      [from](RoomAdminClient& client) { return upload(client, *from); })
       ->add_option("case", *from, "Folder of a case, as osteon-import writes it, or a zip archive of one")
       ->required();

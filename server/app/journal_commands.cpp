@@ -216,7 +216,7 @@ Result<void> check_signatures(const VerifyReport& report, const Arguments& given
   return failure(ErrorCode::invalid_input,
                  given.file.string() + " fits together, but the key " + to_hex(key).substr(0, 16) +
                      " does not vouch for all of it; give the key of the server that wrote it, or "
-                     "take what is not signed for no evidence");
+                     "do not trust what is not signed");
 }
 
 Result<void> verify(const Arguments& given) {
@@ -330,7 +330,7 @@ Result<void> remove(const Arguments& given) {
   const Result<std::vector<fs::path>> gone = delete_room(given.file, given.branches);
   if (!gone) return tl::unexpected(gone.error());
   for (const fs::path& file : *gone) say("deleted", file.string());
-  say("not deleted", "backups, and branches in other folders: nobody has kept where they are");
+  say("not deleted", "backups, and branches in other folders: their places are not stored");
   return {};
 }
 
@@ -406,14 +406,14 @@ Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::
     forgotten += *gone;
   }
   if (forgotten > 0)
-    say("audit log", std::to_string(forgotten) + " identities forgotten (what they did stays, under pseudonyms)");
+    say("audit log", std::to_string(forgotten) + " identities erased (what they did stays, under pseudonyms)");
   return {};
 }
 
 Result<void> forget(const Arguments& given) {
   if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input,
-                   "forget needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
+                   "erase-person needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
   const auto today = std::chrono::duration_cast<std::chrono::days>(std::chrono::system_clock::now().time_since_epoch());
   std::vector<std::string> names;
   const Result<void> done = change_journal(given, [&](Journal& journal) -> Result<void> {
@@ -428,7 +428,8 @@ Result<void> forget(const Arguments& given) {
     if (given.person != 0 && forgotten->people == 0 && forgotten->entries == 0)
       return failure(ErrorCode::not_found, "nobody in " + given.file.string() + " has the number " +
                                                std::to_string(given.person) + "; \"people\" lists those it knows");
-    say("forgotten", std::to_string(forgotten->people) + " (what they did stays, under a number)");
+    say("erased",
+        "the names of " + std::to_string(forgotten->people) + " people (what they did stays, under a number)");
     say("erased", "the words of " + std::to_string(forgotten->entries) + " events");
     say("not erased", "backups and branches made before: they have names and words, or words");
     if (given.person != 0) names = forgotten->names;
@@ -489,8 +490,8 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
                     "The server's signing key; by default signing.key beside the journal, where that is there");
   };
   CLI::App* check =
-      command("verify", "Holds every event against the chain of hashes, and checkpoints and footer against it", verify);
-  check->add_option("--case", given->case_folder, "Folder of the case: makes the room again, too, and says its hashes");
+      command("verify", "Checks every event, the checkpoints and the footer against the chain of hashes", verify);
+  check->add_option("--case", given->case_folder, "Folder of the case: also replays the room and prints its hashes");
   check->add_option("--key", given->key,
                     "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
   CLI::App* recovered = copies("salvage", "Copies what can be confirmed of a damaged journal into a new one", recover);
@@ -499,10 +500,10 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   signs(copies("backup", "Copies a sound journal", [](const Arguments& a) { return copy(a, backup_journal); }));
   signs(copies("migrate", "Copies a journal of an earlier version into one of today's",
                [](const Arguments& a) { return copy(a, migrate_journal); }));
-  CLI::App* branched = copies("branch", "Makes a room of its own from what another was at a place", branch);
+  CLI::App* branched = copies("branch", "Makes a new room from another one as it was at one event", branch);
   signs(branched);
   branched->add_option("--at", given->at, "room_seq of the last event that it takes over; all by default");
-  CLI::App* again = command("replay", "Makes the room again and says its hashes, marks and time", replay);
+  CLI::App* again = command("replay", "Replays the room and prints its hashes, marks and time", replay);
   signs(again);
   again->add_option("--case", given->case_folder, "Folder of the case")->required();
   again->add_option("--to", given->at, "room_seq of the last event; all by default");
@@ -511,12 +512,14 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
       "Writes the bone as it was then (.vdb), for --resume and osteon-import surface; replaces only earlier fields");
   CLI::App* lines = copies("export", "Writes each event as a line of JSON", write_out);
   signs(lines);
-  lines->add_option("--person", given->person, "Number of one, as \"people\" lists it: who it is and only what it did");
+  lines->add_option("--person", given->person,
+                    "Number of a person, as \"people\" lists it: exports only this person's data");
   lines->add_option("--to", given->at, "room_seq of the last event; all by default");
   command("people", "Lists the people whose numbers the events have", list_people);
-  CLI::App* gone = command("erase-person", "Forgets who people were; what they did stays", forget);
-  gone->add_option("--person", given->person, "Number of one, as \"people\" lists it");
-  gone->add_option("--older-than", given->days, "All who came more than so many days ago; 0: all who came before today")
+  CLI::App* gone = command("erase-person", "Erases who people were; what they did stays", forget);
+  gone->add_option("--person", given->person, "Number of a person, as \"people\" lists it");
+  gone->add_option("--older-than", given->days,
+                   "Everybody who joined more than this many days ago; 0: everybody who joined before today")
       ->check(CLI::Range(0, 36500));
   signs(gone);
   CLI::App* renamed =

@@ -399,34 +399,34 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_option(
       "--udp-listen", options.udp_listen,
-      "HOST:PORT for the datagrams of the fast path, HOST numeric; without it where --listen is, at a free port");
+      "HOST:PORT for the datagrams of the fast path, HOST numeric; by default the host of --listen, at a free port");
   app.add_option("--certificates", options.certificates,
-                 "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come "
-                 "with a certificate and a ticket");
+                 "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients "
+                 "connect with a certificate and a ticket");
   app.add_option("--proxy-socket", options.proxy_socket,
-                 "Unix socket at which a proxy on this machine brings calls; deploy/docs/security.md");
+                 "Unix socket for calls from a proxy on this machine; deploy/docs/security.md");
   app.add_flag("--plain", options.plain,
                "Plain text, without certificates and tickets, for clients on this machine alone");
   app.add_option("--most-connections", options.most_connections,
-                 "Of everybody together; further ones are closed at once")
+                 "Of all clients together; more are closed at once")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   app.add_option("--most-ticket-hours", options.most_ticket_hours,
-                 "Refuses tickets that are good for more hours, counted from the call; without it none")
+                 "Refuses tickets that are valid for more hours from the call; by default no limit")
       ->check(CLI::Range(1, 87600));
   app.add_option("--most-rooms", options.most_rooms,
-                 "Open and closed ones together; none is made, branched or shown again beyond")
+                 "Open and closed ones together; no more are made, branched or replayed")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   app.add_option("--most-rooms-per-person", options.most_rooms_per_person,
-                 "Rooms, branches and replays together that somebody who is no operator may have made")
+                 "Rooms, branches and replays together that one person may make; operators have no limit")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
   app.add_option("--most-backups-per-person", options.most_backups_per_person,
-                 "Backups in the folder of rooms that one person, operators too, may have made")
+                 "Backups in the folder of rooms that one person may make, operators too")
       ->check(CLI::Range(1, 65536))
       ->capture_default_str();
-  app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may come");
+  app.add_option("--address-file", options.address_file, "Written with HOST:PORT when clients may connect");
   app.add_option(
       "--tools", options.tools_folder,
       "Folder of tool files (*.yaml, with the STL files they name) that the room knows beside the built-in tools");
@@ -435,16 +435,15 @@ int main(int argc, char** argv) {
                  "client asks");
   CLI::Option* resume =
       app.add_option("--resume", options.resume_file,
-                     "What --save wrote: the room goes on from there; what came before cannot be undone");
+                     "File that --save wrote: the room goes on from there; earlier cuts cannot be undone");
   app.add_option(
          "--journal", options.journal_file,
-         "Every event of the room, on the disk before any hand is told or answered; where the file is there, the room "
-         "goes on, with all that can be undone")
+         "Journal of the room: every event is durable before it is published or acknowledged; if the file exists, the "
+         "room goes on, and its cuts can still be undone")
       ->excludes(resume);
   app.add_option("--rooms", options.rooms_folder,
-                 "Folder of many rooms, each kept in a journal: those that were open are opened, and \"osteon-server "
-                 "rooms\" makes, "
-                 "closes, branches and deletes them")
+                 "Folder of many rooms, each with a journal: those that were open are opened, and \"osteon-server "
+                 "rooms\" makes, closes, branches and deletes them")
       ->excludes(resume)
       ->excludes("--journal")
       ->excludes("--save");
@@ -461,22 +460,21 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0, 36500))
       ->capture_default_str();
   app.add_option("--uploads", options.uploads_folder,
-                 "Folder in which cases are kept that \"osteon-server cases upload\" sends, for rooms of their own; "
-                 "without it none are taken");
+                 "Folder for cases that \"osteon-server cases upload\" sends, for rooms of their own; without it "
+                 "uploads are refused");
   app.add_option("--case-memory-mib", options.case_memory_mib,
-                 "Of all cases in memory: those of --case, and uploaded ones as long as a room is of them; a room that "
-                 "needs more "
-                 "is refused")
+                 "Of all cases in memory: those of --case, and uploaded ones while a room uses them; a room that needs "
+                 "more is refused")
       ->check(CLI::Range(1, kMostCaseMemoryMib))
       ->capture_default_str();
   app.add_option("--retention-days", options.retention_days,
-                 "After so many days a room's journal forgets who somebody was, when it is opened and once a day; what "
+                 "After this many days a room's journal erases who somebody was, at opening and once a day; what "
                  "they did stays")
       ->check(CLI::Range(1, 36500));
   const std::map<std::string, Detail> details{
       {"auto", Detail::automatic}, {"full", Detail::full}, {"near", Detail::near}};
   app.add_flag("--compliant-mount", options.mount,
-               "The bone stands on a compliant mount, so that whoever pushes it is felt by all who have a tool at it");
+               "The bone stands on a compliant mount: when somebody pushes it, everybody with a tool at it feels this");
   app.add_option(
          "--detail", options.detail,
          "full: viewers are sent the whole bone at its own pitch; near: that only where they look and where tools "
@@ -486,17 +484,17 @@ int main(int argc, char** argv) {
       ->default_str("auto");
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   app.add_option("--metrics", options.metrics,
-                 "PORT or HOST:PORT of this machine where Prometheus finds figures of every room");
+                 "PORT or HOST:PORT of this machine at which Prometheus reads figures of every room");
   app.add_option(
          "--drain-seconds", options.drain_seconds,
-         "After SIGTERM or Ctrl-C, how long those in the rooms have to leave in good order; a second signal ends that")
+         "After SIGTERM or Ctrl-C, how long clients have to leave in good order; a second signal ends this")
       ->check(CLI::Range(0, 600))
       ->capture_default_str();
   std::filesystem::path config_file;
   bool only_check = false;
   CLI::Option* from_file =
       app.add_option("--config", config_file, "YAML file with all of these, and limits; the command line wins over it");
-  app.add_flag("--check", only_check, "Says whether the --config file is sound, and what to change in it, and ends")
+  app.add_flag("--check", only_check, "Checks the --config file, says what to change in it, and ends")
       ->needs(from_file);
   if (const auto code = parse_arguments(app, argc, argv)) return *code;
   if (!config_file.empty() && !command) {

@@ -25,7 +25,7 @@ void print(const RoomLine& room) {
                       " sessions, " + std::to_string(room.watchers) + " watchers"
       : room.room_seq ? "stopped, at event " + std::to_string(room.room_seq.value) + ": takes no more cuts"
                       : "closed";
-  if (!room.kept && !room.replay) about += ", not kept";
+  if (!room.kept && !room.replay) about += ", no journal";
   if (!room.parent.empty())
     about += (room.replay ? ", shows " : ", branch of ") + room.parent + (room.replay ? " up to " : " at ") +
              std::to_string(room.parent_room_seq.value);
@@ -55,8 +55,8 @@ Result<void> verify(RoomAdminClient& rooms, const Arguments& given) {
   for (const std::string& fault : checked->faults) std::printf("fault:       %s\n", fault.c_str());
   if (!checked->faults.empty())
     return failure(ErrorCode::invalid_input,
-                   "what is kept of room " + given.name +
-                       " is not sound; close the room and see osteon-server verify and recover");
+                   "the stored room " + given.name +
+                       " is not sound; close the room and see osteon-server verify and salvage");
   std::printf("verdict:     sound\n");
   return {};
 }
@@ -81,7 +81,7 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* rooms = app.add_subcommand(
       "rooms",
-      "Makes, lists, closes, branches, shows again, checks, copies and deletes the rooms of a server that runs");
+      "Makes, lists, closes, branches, replays, checks, copies and deletes the rooms of a server that runs");
   rooms->require_subcommand(1);
   using Run = Result<void> (*)(RoomAdminClient&, const Arguments&);
   const auto command = [&](const char* name, const char* what, Run run) {
@@ -98,16 +98,16 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
           [](RoomAdminClient& c, const Arguments& a) { return print(c.create(a.name, a.case_hash)); })
       ->add_option("--case-hash", given->case_hash,
                    "Which of the server's cases, where it has several; as its log says it");
-  of_room("close", "Ends a room for those in it; what it keeps stays",
+  of_room("close", "Closes a room for everybody in it; its journal stays",
           [](RoomAdminClient& c, const Arguments& a) { return print(c.close(a.name)); });
   of_room("resume", "Opens a closed room where it was left",
           [](RoomAdminClient& c, const Arguments& a) { return print(c.resume(a.name)); });
   CLI::App* branch = of_room(
-      "branch", "Makes a room of its own from what another was at an event",
+      "branch", "Makes a new room from another one as it was at one event",
       [](RoomAdminClient& c, const Arguments& a) { return print(c.branch(a.name, a.new_name, RoomSeq{a.to})); });
   branch->add_option("new", given->new_name, "Name of the branch")->required();
   branch->add_option("--at", given->to, "room_seq of the last event that it takes over; all by default");
-  CLI::App* replay = of_room("replay", "Opens a room in which what happened in another happens again, for viewers",
+  CLI::App* replay = of_room("replay", "Opens a room that replays another one, for viewers",
                              [](RoomAdminClient& c, const Arguments& a) {
                                return print(c.replay(a.name, a.new_name, RoomSeq{a.from}, RoomSeq{a.to}, a.speed));
                              });
@@ -120,7 +120,7 @@ void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   of_room("backup", "Copies a room's journal while the room is cut", back_up)
       ->add_option("file", given->file_name, "Plain name in the server's folder of rooms, ending in .backup")
       ->required();
-  of_room("delete", "Deletes a room and all that is kept of it, or a backup by its name NAME.backup", remove)
+  of_room("delete", "Deletes a room with all its files, or a backup by its name NAME.backup", remove)
       ->add_flag("--with-branches", given->with_branches, "Its branches, and theirs, too");
 }
 

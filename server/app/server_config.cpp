@@ -165,18 +165,18 @@ const std::vector<Field>& limit_fields() {
 
 // Edit distance: number of letters to insert, remove or replace to turn one word into the other.
 std::size_t distance(std::string_view a, std::string_view b) {
-  std::vector<std::size_t> entry(b.size() + 1);
-  std::iota(entry.begin(), entry.end(), 0u);
+  std::vector<std::size_t> costs(b.size() + 1);
+  std::iota(costs.begin(), costs.end(), 0u);
   for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = entry[0];
-    entry[0] = i + 1;
+    std::size_t diagonal = costs[0];
+    costs[0] = i + 1;
     for (std::size_t j = 0; j < b.size(); ++j) {
       const std::size_t same = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = entry[j + 1];
-      entry[j + 1] = std::min({same, entry[j] + 1, diagonal + 1});
+      diagonal = costs[j + 1];
+      costs[j + 1] = std::min({same, costs[j] + 1, diagonal + 1});
     }
   }
-  return entry.back();
+  return costs.back();
 }
 
 std::string nearest(std::string_view name, const std::vector<std::string>& known) {
@@ -271,20 +271,20 @@ Result<void> check_server_config(const ServerConfig& config) {
     return wrong(
         "--uploads needs --rooms, since a case that is uploaded is for rooms of its own; give --rooms FOLDER too");
   if (!config.signing_key.empty() && !ways[0].second && !ways[1].second)
-    return wrong("--signing-key signs journals, and none is kept; give --rooms FOLDER or --journal FILE too");
+    return wrong("--signing-key signs journals, and there are none; give --rooms FOLDER or --journal FILE too");
   if (!config.audit_syslog.empty() && config.audit_file.empty() && !ways[0].second && !ways[1].second)
     return wrong(
-        "--audit-syslog sends audit records, and none are kept; give --audit FILE, --rooms FOLDER or --journal FILE "
+        "--audit-syslog sends audit records, and there are none; give --audit FILE, --rooms FOLDER or --journal FILE "
         "too");
   if (ways[0].second && !config.save_file.empty())
     return wrong("--rooms excludes --save, on the command line as in a --config file; leave one");
   if (config.plain && config.most_ticket_hours != 0)
     return wrong("--most-ticket-hours needs --certificates DIR: over plain text nobody has a ticket");
   if (config.plain && !config.proxy_socket.empty())
-    return wrong("--proxy-socket needs --certificates DIR: a proxy brings calls of people");
+    return wrong("--proxy-socket needs --certificates DIR: a proxy passes on calls of people");
   if (config.plain == !config.certificates.empty())
     return wrong(config.plain ? "--plain excludes --certificates, on the command line as in a --config file; leave one"
-                              : "say how clients come in: --certificates DIR, which deploy/certs makes, or --plain for "
+                              : "say how clients connect: --certificates DIR, which deploy/certs makes, or --plain for "
                                 "plain text on this machine alone");
   return {};
 }

@@ -54,7 +54,7 @@ Result<void> run(const Arguments& given) {
 void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* ticket =
-      app.add_subcommand("ticket", "Signs a ticket, with which a person with a certificate may come into a room");
+      app.add_subcommand("ticket", "Signs a ticket, with which a person with a certificate may enter a room");
   ticket
       ->add_option("--key", given->key, "Secret key of the authority: tickets.key, as deploy/certs authority makes it")
       ->required();

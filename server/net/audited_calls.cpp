@@ -59,12 +59,12 @@ void describe_joined(const void* message, AuditEvent& event) {
 void describe_supervision(const void* message, AuditEvent& event) {
   const auto& request = *static_cast<const v1::SuperviseRequest*>(message);
   const v1::Restrictions& all = request.supervision();
-  event.detail = request.subject() == 0 ? "all hands:" : "author " + std::to_string(request.subject()) + ":";
+  event.detail = request.subject() == 0 ? "everybody:" : "author " + std::to_string(request.subject()) + ":";
   if (all.stopped()) event.detail += " stopped";
   if (all.taken_by() != 0) event.detail += " tool taken";
   if (all.guide() != 0) event.detail += " guided";
   if (all.force_limit() != 0) event.detail += " force limited";
-  if (all.has_zone()) event.detail += " place limited";
+  if (all.has_zone()) event.detail += " zone limited";
   if (all.tools_size() > 0) event.detail += " tools limited";
   if (event.detail.ends_with(':')) event.detail += " free";
 }

@@ -96,7 +96,7 @@ void add_room(Page& page, OpenRoom& room, bool draining) {
     return labels;
   };
   page.gauge("osteon_room_serving", "1 while the room takes cuts.", with(), health.serving && !draining ? 1 : 0);
-  page.gauge("osteon_room_event", "Newest place in the room's order.", with(),
+  page.gauge("osteon_room_event", "Sequence number of the room's newest event.", with(),
              static_cast<double>(health.room_seq.value));
 
   const char* stage = "What a committed cut waits for: the tick, its decision, the disk, the streams.";
@@ -124,7 +124,7 @@ void add_room(Page& page, OpenRoom& room, bool draining) {
   page.gauge("osteon_streams", "Open streams of viewers and audio clients.", with("kind", "cutting"),
              static_cast<double>(health.cutting_streams));
 
-  const char* cuts = "Cuts by what became of them; refused ones broke the protocol.";
+  const char* cuts = "Cuts by outcome; refused ones violated the protocol.";
   page.counter("osteon_cuts_total", cuts, with("outcome", "committed"), static_cast<double>(health.counts.committed));
   page.counter("osteon_cuts_total", cuts, with("outcome", "rejected"), static_cast<double>(health.counts.rejected));
   page.counter("osteon_cuts_total", cuts, with("outcome", "repeated"), static_cast<double>(health.counts.repeated));
@@ -140,26 +140,26 @@ std::vector<MetricFamily> metrics_of(RoomServer& server, const fs::path& certifi
   const bool draining = server.rooms().draining().has_value();
   const auto rooms = server.rooms().open_rooms();
   page.gauge("osteon_rooms", "Open rooms.", {}, static_cast<double>(rooms.size()));
-  page.gauge("osteon_draining", "1 once the server lets nobody in any more.", {}, draining ? 1 : 0);
+  page.gauge("osteon_draining", "1 once the server admits nobody any more.", {}, draining ? 1 : 0);
   auto refusals = server.rooms().refusals.counts();
   for (const char* known : {"version", "request", "room", "draining", "tls"}) refusals.try_emplace(known, 0u);
   for (const auto& [reason, count] : refusals)
-    page.counter("osteon_refusals_total", "Callers turned away at the credentials, and calls refused behind it.",
+    page.counter("osteon_refusals_total", "Connections and calls that were refused.",
                  {{"reason", reason}}, static_cast<double>(count));
   if (!certificate.empty())
     if (const Result<double> days = certificate_days_left(certificate))
-      page.gauge("osteon_certificate_days_left", "Until the server's certificate is over.", {}, *days);
+      page.gauge("osteon_certificate_days_left", "Days until the server's certificate ends.", {}, *days);
   const ConnectionHealth connections = server.connection_health();
   page.gauge("osteon_connections", "Open connections.", {}, static_cast<double>(connections.connections.open));
   page.counter("osteon_connections_refused_total", "Connections closed at once, beyond the limit.", {},
                static_cast<double>(connections.connections.refused));
-  page.counter("osteon_streams_ended_total", "Streams ended since a right to them was over.", {},
+  page.counter("osteon_streams_ended_total", "Streams ended because the right to them had ended.", {},
                static_cast<double>(connections.authorizer.ended));
   const LinkServerHealth links = server.link_health();
-  const char* paths = "Fast paths, and those over which datagrams have come lately.";
+  const char* paths = "Open fast paths, and those over which datagrams came recently.";
   page.gauge("osteon_links", paths, {{"state", "open"}}, static_cast<double>(links.links));
   page.gauge("osteon_links", paths, {{"state", "alive"}}, static_cast<double>(links.alive));
-  page.counter("osteon_unauthenticated_datagrams_total", "Datagrams that nobody with a key has sent.", {},
+  page.counter("osteon_unauthenticated_datagrams_total", "Datagrams that belong to no open session.", {},
                static_cast<double>(links.unauthenticated));
   for (const std::shared_ptr<OpenRoom>& room : rooms) add_room(page, *room, draining);
   return page.take();

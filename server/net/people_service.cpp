@@ -96,7 +96,7 @@ class PeopleServiceImpl final : public PeopleBase {
     if (request->subject() == 0) {
       subjects = room->runtime().people().supervised_hands();
       std::erase(subjects, by);
-      if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a hand in this room"});
+      if (subjects.empty()) return refuse(reactor, {StatusCode::NOT_FOUND, "nobody else has a tool in this room"});
     }
     // One event for each subject, all in one tick. The call is answered with the last event. If everybody is meant,
     // people are skipped for whom nothing changes, since most who ever had a tool here have left for good. A room that

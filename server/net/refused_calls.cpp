@@ -37,7 +37,7 @@ constexpr HandshakeFault kHandshakeFaults[] = {
     {"alert unknown ca", "refuses this server's certificate: authority",
      "it does not know the authority of this server; give that person ca.pem of this server"},
     {"alert bad certificate", "refuses this server's certificate: name",
-     "this server's certificate has another name than the client came by, or does not hold yet; make one for all names "
+     "this server's certificate has another name than the client used, or is not valid yet; make one for all names "
      "with deploy/certs server NAME..."},
     {"alert unsupported certificate", "refuses this server's certificate: purpose",
      "it takes this server's certificate for one of another purpose; make one with deploy/certs server NAME..."},
@@ -56,7 +56,7 @@ void hear(gpr_log_func_args* line) {
       sentence = known.sentence;
     }
   const std::lock_guard lock(watches_mutex);
-  for (HandshakeWatch* watch : watches) watch->note("a stranger: " + std::string(kind), sentence);
+  for (HandshakeWatch* watch : watches) watch->note("an unauthenticated client: " + std::string(kind), sentence);
 }
 
 std::string_view reason_of(StatusCode code) {

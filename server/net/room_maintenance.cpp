@@ -95,7 +95,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   const RoomSeq replayed_to = live ? live->place : RoomSeq{};
   if (replayed_to > last)
     return failure(ErrorCode::unavailable, "event " + std::to_string(replayed_to.value) + " of the room " +
-                                               genesis_.room + " is not kept yet; try again");
+                                               genesis_.room + " is not durable yet; try again");
 
   // Entries, and what they make.
   bool stopped = false;

@@ -74,7 +74,7 @@ constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is b
 constexpr int kMostReadBytes = 16 * 1024;
 constexpr int kHandshakeMs = 5'000;                                  // limit of the handshake
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
-constexpr const char* kStopping = "the server is stopping; come again in a few seconds";
+constexpr const char* kStopping = "the server is stopping; connect again in a few seconds";
 constexpr std::chrono::milliseconds kComeAgainAfter{1000}, kDrainLook{5};
 
 }  // namespace
@@ -222,7 +222,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   };
   if (!impl->authorizer)
     impl->listener->watch_for_tls([watch = impl->handshakes.get()] {
-      watch->note("a stranger: TLS",
+      watch->note("an unauthenticated client: TLS",
                   "it speaks TLS, and this server plain text; give the server --certificates DIR, or "
                   "the client --plain");
     });

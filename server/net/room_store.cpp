@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kPieceBytes = 128 * 1024;  // approximate size of a part of a checkpoint
 
 // For the message to a client whose room has fewer events than were acknowledged to it.
-constexpr const char* kToldEvents = " events that you were told are kept";
+constexpr const char* kToldEvents = " events that were acknowledged to you";
 constexpr const char* kJoinAsItIs = "; start again to join it as it is now";
 
 constexpr std::size_t kSyncBytes = 1024 * 1024;  // a commit waits for at most this much of a checkpoint
@@ -129,7 +129,7 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
   store->retention_days_ = options.retention_days;
   store->today_ = options.today ? options.today : computers_day;
   if (const auto forgotten = store->forget_old(); !forgotten)
-    log::warn("people who should be forgotten are not",
+    log::warn("people whose retention time is over were not erased",
               {{"file", file.string()}, {"reason", forgotten.error().message}});
   const Fields fields = store->newest_fields();
   Result<Room> room = store->replay(bone, options.limits, fields, progress);
@@ -261,7 +261,7 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
     const RoomSeq head = journal.head().place;
     const std::optional<RoomSeq> recovered = journal.recovered_to();
     const auto after_recovery = [&](ErrorCode code) {
-      return failure(code, lost_after(*recovered) + ": its journal was recovered up to event " +
+      return failure(code, lost_after(*recovered) + ": its journal was salvaged up to event " +
                                std::to_string(recovered->value) + kJoinAsItIs);
     };
     const bool beyond = witness.head.place > head;
@@ -277,7 +277,7 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
     if (beyond && recovered) return after_recovery(checked.error().code);
     if (beyond)
       return failure(checked.error().code,
-                     lost_after(head) + ", and takes no more cuts: have its journal recovered, then start again");
+                     lost_after(head) + ", and takes no more cuts: salvage its journal, then start again");
     // If a journal is closed to entries, it is unknown whether its file is as it was written.
     const Result<JournalHead> here = journal.head_at(witness.head.place);
     const bool another_history = here && here->chain != witness.head.chain && journal.closed_because() == nullptr;

@@ -61,13 +61,13 @@ Error not_open(const std::string& name) {
 }
 Error kept_elsewhere(const OpenRoom& room) {
   return {ErrorCode::unavailable,
-          "the room " + room.name + " is kept in " + room.keeper_file().string() +
-              ", not in a folder of rooms; stop the server and see osteon-server --help for what is done to "
-              "its journal, or start it with --rooms FOLDER"};
+          "the room " + room.name + " has its journal in " + room.keeper_file().string() +
+              ", not in a folder of rooms; stop the server and see osteon-server --help for the commands for "
+              "journals, or start it with --rooms FOLDER"};
 }
 Error not_kept(const std::string& name) {
   return {ErrorCode::unavailable,
-          "the room " + name + " is not kept in a journal; start osteon-server with --rooms FOLDER"};
+          "the room " + name + " has no journal; start osteon-server with --rooms FOLDER"};
 }
 
 std::uint64_t new_server_epoch() {
@@ -178,7 +178,7 @@ void OpenRoom::maintain(const std::function<bool()>& stop) {
   if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
     forgotten_ = Clock::now();
     if (const Result<std::size_t> gone = store_->forget_old(); !gone)
-      log::warn("nobody was forgotten", {{"room", name}, {"reason", gone.error().message}});
+      log::warn("people were not erased", {{"room", name}, {"reason", gone.error().message}});
   }
   if (const Result<void> tidied = store_->tidy_if_idle(); !tidied)
     log::warn("the journal's log stays long", {{"room", name}, {"reason", tidied.error().message}});
@@ -217,7 +217,7 @@ void Rooms::run_upkeep() {
     if (options_.retention_days > 0 && Clock::now() >= forget_at) {
       forget_at += std::chrono::hours(24);
       if (const std::size_t gone = forget_owners(options_.folder, std::chrono::days(options_.retention_days)); gone > 0)
-        log::info("owners forgotten", {{"count", gone}});
+        log::info("owners erased", {{"count", gone}});
     }
     for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->maintain(until_the_end().stop);
   };

@@ -196,7 +196,7 @@ Result<void> RoomRuntime::check_kept(const Witness& kept) {
   if (impl_->store) return impl_->store->check_witness(kept);
   return failure(ErrorCode::unavailable,
                  "the room begins anew: it has no journal, and none of the " + std::to_string(kept.head.place.value) +
-                     " events that you were told are kept; start again to join it as it is now");
+                     " events that were acknowledged to you; start again to join it as it is now");
 }
 
 Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept,
@@ -284,7 +284,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
                                                    " has an open session; join again for another");
     if (open) {
-      open->replaced("another connection of the same client has taken its place");
+      open->replaced("another connection of the same client has replaced it");
       impl_->sessions.remove(*open);
       again = true;
     }

@@ -455,7 +455,7 @@ class RoomServiceImpl final : public RoomBase {
   [[nodiscard]] Result<void> may_join(const Caller& caller, const v1::JoinRequest& request) const {
     if (rooms_.authorizer && request.kind() == v1::CLIENT_KIND_HAPTIC && !has_right(caller.role, Right::hold_a_tool))
       return failure(ErrorCode::denied, "your role here, " + std::string(to_string(caller.role)) +
-                                            ", holds no tool; come as a viewer, or ask for a ticket of another role");
+                                            ", holds no tool; join as a viewer, or ask for a ticket of another role");
     return {};
   }
   template <class Fill>

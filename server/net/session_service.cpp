@@ -308,7 +308,8 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   [[nodiscard]] static Status too_many_cuts() {
     return {StatusCode::RESOURCE_EXHAUSTED, std::to_string(kMaxQueuedCuts + kMostUnacknowledged) +
                                                 " cuts of this session wait to be decided; send no more than " +
-                                                std::to_string(kMostUnacknowledged) + " before you have heard of the first"};
+                                                std::to_string(kMostUnacknowledged) +
+                                                " before the first is acknowledged"};
   }
   [[nodiscard]] static Status not_allowed() {
     return {StatusCode::PERMISSION_DENIED, "your role does not hold a tool any more"};

@@ -181,7 +181,7 @@ class ConfirmedBeforeAnOlderCopy : public Confirmed {
 TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCuts) {
   for (const auto& entry : fs::directory_iterator(copy_.path() / "copy")) fs::copy(entry.path(), folder_.path());
   EXPECT_THAT(what_the_hand_is_told(),
-              HasSubstr("has lost 3 of the 3 events that you were told are kept, and takes no more cuts"));
+              HasSubstr("has lost 3 of the 3 events that were acknowledged to you, and takes no more cuts"));
   const auto operator_is_told = [&] {
     return stage_.server().err().find("recover it into a new journal") != std::string::npos;
   };
@@ -193,7 +193,7 @@ TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAfterARecovery) {
       run(program("osteon-server"), {"salvage", copy_.path() / "copy" / "room.journal", journal()}, 30s);
   ASSERT_EQ(recovered.exit_code, 0) << recovered.err;
   EXPECT_THAT(what_the_hand_is_told(),
-              HasSubstr("has lost 3 of the 3 events that you were told are kept: its journal was recovered up "
+              HasSubstr("has lost 3 of the 3 events that were acknowledged to you: its journal was salvaged up "
                         "to event 0; start again to join it as it is now"));
 }
 

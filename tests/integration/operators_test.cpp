@@ -290,7 +290,8 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   EXPECT_EQ(health_of(channel, "anna"), 2);
   const auto late = wire::join_room(stage.address(), wire::ClientKind::haptic, "late", 5s, {}, "anna");
   ASSERT_FALSE(late.has_value());
-  EXPECT_NE(late.error().message.find("the server is stopping; come again"), std::string::npos) << late.error().message;
+  EXPECT_NE(late.error().message.find("the server is stopping; connect again"), std::string::npos)
+      << late.error().message;
   EXPECT_TRUE(stage.server().running()) << "somebody is still there";
   // A second signal: at once.
   stage.server().signal(SIGTERM);

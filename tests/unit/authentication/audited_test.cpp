@@ -208,7 +208,7 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   EXPECT_EQ(shown({"--person", "anna"}).size(), 0u);
   EXPECT_THAT(content(rooms() / "audit.people"), Not(HasSubstr("anna")));
   EXPECT_THAT(audit({"show", log()}).out,
-              HasSubstr("Join hall: ok (CLIENT_KIND_VIEWER author 1)  by somebody who was forgotten"));
+              HasSubstr("Join hall: ok (CLIENT_KIND_VIEWER author 1)  by somebody who was erased"));
   command({"audit", "forget", log(), "--person", "olga"});
   EXPECT_THAT(content(rooms() / "audit.people"), Not(HasSubstr("olga")));
   verify_is_sound();

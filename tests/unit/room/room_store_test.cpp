@@ -120,7 +120,7 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   const std::uint64_t told = late.head.place.value, less = told - early.head.place.value;
   EXPECT_THAT(lost.error().message,
               HasSubstr("the room femur has lost " + std::to_string(less) + " of the " + std::to_string(told) +
-                        " events that you were told are kept, and takes no more cuts"));
+                        " events that were acknowledged to you, and takes no more cuts"));
   EXPECT_EQ(kept.store->check_witness(late).error().message, lost.error().message) << "so does the next";
   EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 1))) << "entries were lost: it takes no more";
   kept.store.reset();
@@ -136,7 +136,8 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   const MemoryDisk::Image image = disk_.image();
   kept.cut(3);
   const Witness late = kept.store->witness();
-  const std::string of_all = " of the " + std::to_string(late.head.place.value) + " events that you were told are kept";
+  const std::string of_all =
+      " of the " + std::to_string(late.head.place.value) + " events that were acknowledged to you";
   const std::string lost = "the room femur has lost " + std::to_string(late.head.place.value - copied.value) + of_all;
   const auto told = [&](const fs::path& file, MemoryDisk& disk) {
     KeptCuts room(file, &disk, "femur", 2);  // with other cuts
@@ -160,7 +161,7 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   const fs::path aside = "/aside/femur";
   ASSERT_TRUE(salvage_journal(kFile, aside, &disk_));
   const auto recovered = told(aside, disk_);
-  const std::string up_to = lost + ": its journal was recovered up to event " + std::to_string(copied.value);
+  const std::string up_to = lost + ": its journal was salvaged up to event " + std::to_string(copied.value);
   EXPECT_THAT(recovered.first, HasSubstr(up_to));
   EXPECT_THAT(recovered.second, HasSubstr(up_to));
 
