@@ -29,7 +29,9 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions su
   for (const Digest& tool : supervision.tools)
     if (!tools_->find(tool))
       return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
-  // Who decided it may not know yet that the person has come again: what held for both alike goes on doing so.
+  // The instructor may not know yet that the person has joined again. If both authors had the same restrictions, the
+  // new
+  // one gets these too.
   const Restrictions before = people_.supervised(subject).supervision;
   const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
   const bool follows = newest && newest != subject && newest != supervision.taken_by && newest != supervision.guide &&
@@ -151,7 +153,7 @@ bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) con
   return std::ranges::none_of(events_, stays);
 }
 
-// Who stops a hand or takes its tool takes its lease: what it predicted on top falls.
+// Whoever stops an author or takes its tool ends its lease: what the author predicted on top is void.
 void Room::apply(const LogEntry& entry, const SuperviseEntry& supervise, RoomEvent& event) {
   event.kind = EventKind::supervise;
   event.people = supervise;
