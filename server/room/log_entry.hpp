@@ -75,8 +75,7 @@ struct MarkEntry {
 };
 
 // Restrictions of an author from now on. The author's lease ends when the author is stopped or freed, or when its tool
-// is
-// taken or given back.
+// is taken or given back.
 struct SuperviseEntry {
   AuthorId subject;
   Restrictions supervision;

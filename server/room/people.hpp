@@ -33,8 +33,7 @@ class People {
   [[nodiscard]] Role role(AuthorId author) const;
   [[nodiscard]] std::uint32_t person(AuthorId author) const;  // pseudonym, 0: unnamed
   // An author without a role may do whatever an author with any role may do. Either the room is older than roles, or
-  // the
-  // server knows nobody by name.
+  // the server knows nobody by name.
   [[nodiscard]] bool supervises(AuthorId author) const;
   [[nodiscard]] bool only_own(AuthorId author) const { return role(author) == Role::trainee; }
   // Whether the author may undo everything that others did.

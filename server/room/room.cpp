@@ -176,8 +176,7 @@ Rejection Room::judge(const Cut& cut) {
 bool Room::beyond_power(const Cut& cut, std::span<const CutField* const> fields) {
   if (limits_.power_w <= 0) return false;
   // Energy of the author's earlier cuts that the motor has not given yet. The tolerance evens out a few samples too
-  // many
-  // or too few.
+  // many or too few.
   const ToolBox::Entry& tool = *tools_->find(cut.tool);
   double& owed_j = owed_j_[cut.author];
   const double owed_after_j =

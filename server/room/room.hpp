@@ -79,9 +79,8 @@ class Room {
   [[nodiscard]] std::chrono::nanoseconds time() const { return now_; }
 
   // Makes a new author, the event's `author`, with a number that is never reused. The restrictions of the person's
-  // newest
-  // author then hold for the new one too, by a log entry of their own (RoomEvent::further). This does not happen when
-  // the server itself joins, which has no secret.
+  // newest author then hold for the new one too, by a log entry of their own (RoomEvent::further). This does not happen
+  // when the server itself joins, which has no secret.
   RoomEvent admit(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   AuthorId join(MemberKind kind, std::uint32_t person = 0, const Digest& secret = {}, Role role = Role::none);
   [[nodiscard]] bool knows(AuthorId author) const;
@@ -110,8 +109,7 @@ class Room {
   Result<RoomEvent> add_tool(AuthorId by, const Tool& tool);  // sequence number 0 if it is known already
   // Takes back these events, or the newest `count` events of one author or (null) of all; a trainee only takes back
   // their own. With a cut, every later split of a body that the cut had reached is undone too, and so is what was done
-  // to
-  // the piece as such. Later cuts stay in the bone.
+  // to the piece as such. Later cuts stay in the bone.
   Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);  // all events after it

@@ -227,8 +227,8 @@ void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) 
     events_.at(entry.place).missed = std::make_shared<const Cut>(cut);
 }
 
-// A rejected cut also voids what its author has predicted on top of it. But a stale cut shows that the author does
-// not know of the new epoch yet. Raising the epoch again would make the next cuts stale as well.
+// A rejected cut also voids what its author has predicted on top of it. But a stale cut shows that the author does not
+// know of the new epoch yet. Raising the epoch again would make the next cuts stale as well.
 void Room::apply(const LogEntry& entry, const RejectionEntry& rejection, RoomEvent& event) {
   event.kind = EventKind::cut;
   ++counts_.rejected;

@@ -30,8 +30,7 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions su
     if (!tools_->find(tool))
       return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
   // The instructor may not know yet that the person has joined again. If both authors had the same restrictions, the
-  // new
-  // one gets these too.
+  // new one gets these too.
   const Restrictions before = people_.supervised(subject).supervision;
   const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
   const bool follows = newest && newest != subject && newest != supervision.taken_by && newest != supervision.guide &&
