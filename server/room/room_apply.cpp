@@ -467,16 +467,16 @@ Result<void> Room::set_fields(std::span<const FieldLeaf> leaves) {
   for (const FieldLeaf& leaf : leaves)
     if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() ||
         !near.contains(shift_down(leaf.origin, leaf.level)))
-      return failure(ErrorCode::invalid_input, "the fields hold a leaf that is none of this bone's");
+      return failure(ErrorCode::invalid_input, "the fields hold a leaf that does not belong to this bone");
   for (const FieldLeaf& leaf : leaves)
     if (!bodies_.contains(leaf.body))
       return failure(ErrorCode::invalid_input, "the fields hold leaves of body " + std::to_string(leaf.body.value) +
-                                                   ", which the room does not have at place " +
+                                                   ", which the room does not have at event " +
                                                    std::to_string(room_seq_.value));
   for (const FieldLeaf& leaf : leaves) bodies_.at(leaf.body).field.restore(leaf);
-  RoomEvent nobody_hears;
+  RoomEvent unsent;
   for (auto& [id, body] : bodies_)
-    if (body.present) show_whole(id, nobody_hears);
+    if (body.present) show_whole(id, unsent);
   return {};
 }
 

@@ -243,7 +243,7 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (places.empty()) return refuse("undo names no event");
   for (const RoomSeq place : places) {
-    if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " is none that can be undone");
+    if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " cannot be undone");
     if (events_.at(place).undone) return refuse("event " + std::to_string(place.value) + " is undone already");
   }
   const std::set<RoomSeq> named(places.begin(), places.end());
@@ -273,7 +273,7 @@ Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) 
 
 Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (mark > room_seq_) return refuse("place " + std::to_string(mark.value) + " lies beyond the newest event");
+  if (mark > room_seq_) return refuse("event " + std::to_string(mark.value) + " lies beyond the newest event");
   std::set<RoomSeq> places;
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
     if (can_be_undone(event->first) && !event->second.undone) places.insert(event->first);
@@ -360,7 +360,7 @@ Result<RoomEvent> Room::split(Separation found) {
 Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& placing) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
-  if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
+  if (!tools_->find(item.tool)) return refuse("item.tool_hash names a tool that the room does not have");
   if (item.id != 0 && !items_.contains(item.id))
     return refuse("item.item: the room has no item " + std::to_string(item.id));
   if (item.id == 0 && items_.size() >= kMostItems)
