@@ -1,6 +1,6 @@
 // The newest entries of a journal, before its database has them. This is a write-ahead log in two files with the same
-// entries. An entry is durable in both before it is acknowledged, so each file shows how far the other must go. What is
-// damaged in one file is read from the other.
+// batches of entries, one batch for each append. A batch is durable in both files before its entries are acknowledged,
+// so each file shows how far the other must go. What is damaged in one file is read from the other.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -25,7 +25,7 @@ struct LogStart {
   Digest journal;  // the journal it belongs to: the chain of its genesis
   std::uint64_t generation = 0;  // rises by one whenever the log begins anew
   JournalHead base;  // the last entry that the database had then
-  // Who signs each entry, and from which entry on. None: nobody does.
+  // Who signs each batch, and from which entry on. None: nobody does.
   struct Signer {
     PublicKey key;
     RoomSeq since;
@@ -38,15 +38,15 @@ struct LogContents {
   std::uint64_t generation = 0;  // the newest generation in either file; 0: neither can be read
   std::vector<JournalEntry> entries;  // those after the head that was asked for
   JournalHead head;  // of the last of them
-  std::optional<SignedRange> signature;  // of the entry that leads to head; not checked, may be anything
+  std::optional<SignedRange> signature;  // of the batch that leads to head; not checked, may be anything
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // where each file starts
   RoomSeq witnessed;  // the furthest entry that either file knows
   // What one file lacks and the other has, or an incomplete write; one sentence each.
   std::vector<std::string> notes;
   std::vector<std::string> foreign;  // files of another journal; one sentence each
   std::vector<std::string> faults;  // why neither can be read; one sentence each
-  // A write was cut short in one file. It may have spoiled the entry before it, and the other file does not have that
-  // entry.
+  // A write was cut short in one file. It may have spoiled the batch before it, and the other file does not have that
+  // batch.
   bool doubtful = false;
 };
 

@@ -289,7 +289,7 @@ TEST_F(SignedJournal, NamesAPersonWhoWasExchanged) {
   }
   EXPECT_TRUE(vouched(key_).all());
   run_sql("UPDATE people SET label = 'Berta' WHERE pseudonym = '1'");
-  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("an entry of its people is damaged")));
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the record of a person is damaged")));
   run_sql("UPDATE people SET label = 'Anna' WHERE pseudonym = '1'");
   ASSERT_TRUE(open(nullptr).set_person({"1", "Berta", 20000}));
   EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the name of person 1"));
@@ -401,15 +401,15 @@ TEST_F(SignedJournal, TakesTheSignatureOfEarlierRowsForNoOther) {
           "' AS first; DELETE FROM signatures; INSERT INTO signatures SELECT * FROM first.signatures");
   const auto report = verify_journal(file_);
   ASSERT_TRUE(report);
-  EXPECT_THAT(report->faults, Contains(HasSubstr("the signature at place 20 vouches for another history")));
+  EXPECT_THAT(report->faults, Contains(HasSubstr("the signature at event 20 vouches for another history")));
 }
 
 TEST_F(SignedJournal, NamesASignatureThatNoKeyMade) {
   write(keys_, 0, 20, true);
   run_sql("UPDATE signatures SET since = 2 WHERE place = 20");
-  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at place 20 is damaged")));
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at event 20 is damaged")));
   run_sql("UPDATE signatures SET key = zeroblob(31) WHERE place = 20");
-  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at place 20 is damaged")));
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at event 20 is damaged")));
 }
 
 TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
@@ -432,7 +432,7 @@ TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
     EXPECT_FALSE(journal.is_vouched_for(journal.checkpoints()->front())) << "whose bone the server would serve";
   }
   EXPECT_FALSE(open(new_keys()).is_vouched_for("room name").value());
-  EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the checkpoint at place 20", "the register \"room name\""));
+  EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the checkpoint at event 20", "the register \"room name\""));
 }
 
 // Of another genesis, a register's signature is none.
