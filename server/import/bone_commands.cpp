@@ -52,7 +52,7 @@ Result<std::string> write_surface(const CutField& field, const std::string& file
   return std::string(text);
 }
 
-// The bone as it is after the cuts of --fields, as one body of them.
+// The bone after the cuts of --fields: one body of them.
 Result<CutField> load_body(const Arguments& a) {
   auto bone = Case::load(a.bone);
   if (!bone) return tl::unexpected(bone.error());
@@ -75,7 +75,7 @@ Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
   return write_surface(*field, a.out, bar.stage(0.0, 1.0));
 }
 
-// One way to ask whether the tool meets bone: its answer, the median of its times, what it keeps.
+// Measures one way to test whether the tool meets bone: its answer, its median time, and its memory.
 template <class Ask>
 std::string contact_line(const char* way, const std::vector<SamplePoint>& points, const Pose& pose,
                          std::size_t memory_bytes, Ask ask) {
@@ -141,7 +141,7 @@ Result<std::string> run_contact(const Arguments& a) {
                       [&] { return first_contact(distance, points, pose); });
 }
 
-// Peak memory of this process, MB; zero where the system does not say.
+// Peak memory of this process, MB; zero if the system does not report it.
 double peak_memory_mb() {
   const auto status = read_file("/proc/self/status");
   if (!status) return 0.0;
@@ -149,10 +149,11 @@ double peak_memory_mb() {
   return at == std::string::npos ? 0.0 : std::strtod(status->c_str() + at + 6, nullptr) / 1024.0;
 }
 
-// Why a step removed nothing, for a person: what its tip meets on its way, and where bone is.
+// Explains to a person why a step removed nothing: what the tip meets on its path, and where bone is.
 std::string nothing_removed(std::size_t number, const CarveStep& step, const StepReport& report, const Case& bone) {
   bool in_bone = false;
-  double free_mm = std::numeric_limits<double>::infinity();  // a lower bound of the distance to bone, all along
+  // a lower bound of the distance to bone along the whole path
+  double free_mm = std::numeric_limits<double>::infinity();
   const auto look = [&](const Vec3& tip) {
     in_bone = in_bone || bone.surface_mm(tip) < 0.0;
     free_mm = std::min(free_mm, std::max(bone.clearance_mm(tip), std::max(0.0, bone.surface_mm(tip))));
@@ -225,7 +226,7 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
   return text;
 }
 
-// What says a kind's size best, in words.
+// The dimensions that describe a kind's size best, in words.
 std::string dimensions(const Tool& tool) {
   std::string text;
   for (const EditableField& field : editable_fields(tool.kind)) {
@@ -260,7 +261,7 @@ std::string dimensions(const Tool& tool) {
   return text;
 }
 
-// `field=value`, each by the rules of a tool file; says in words what was changed.
+// Applies `field=value` settings, each by the rules of a tool file. Returns the changes in words.
 Result<std::string> change(Tool& tool, const std::vector<std::string>& settings) {
   std::string changes;
   for (const std::string& setting : settings) {
@@ -279,8 +280,8 @@ Result<std::string> change(Tool& tool, const std::vector<std::string>& settings)
   return changes;
 }
 
-// The tool with what --set, --name and --title say, as a tool file. A room tells tools by their names, so that a
-// changed one gets another: that of its file unless --name gives one.
+// Writes the tool with the changes of --set, --name and --title as a tool file. A room identifies tools by name, so a
+// changed tool gets another name: that of its file, unless --name gives one.
 Result<void> write_changed(Tool& tool, const Arguments& a) {
   const fs::path file(a.out);
   if (file.extension() != ".yaml" && file.extension() != ".yml")
@@ -363,7 +364,7 @@ Result<std::string> run_hash(const Arguments& a) {
 }  // namespace
 
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
-  // Owners: the options that write into it and the command that reads it, both for as long as the program runs.
+  // Shared by the options that write into it and the command that reads it, both for the life of the program.
   const auto shared = std::make_shared<Arguments>();
   Arguments& a = *shared;
 
