@@ -50,7 +50,7 @@ void only(const YAML::Node& node, std::initializer_list<const char*> allowed) {
 // Tip, axis and across. Values that a pose omits are taken from the step.
 Pose pose_of(const Vec3& at, const YAML::Node& own, const YAML::Node& step) {
   const YAML::Node axis_node = own["axis"] ? own["axis"] : step["axis"];
-  if (!axis_node) throw Wrong{"axis is missing: the way out of the tool's tip, such as [0, 0, -1]"};
+  if (!axis_node) throw Wrong{"axis is missing: the direction out of the tool's tip, such as [0, 0, -1]"};
   const Vec3 axis = vector_of(axis_node, "axis");
   if (axis.norm() < 1e-6) throw Wrong{"axis has no length"};
   const YAML::Node across_node = own["across"] ? own["across"] : step["across"];

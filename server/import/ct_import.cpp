@@ -287,8 +287,8 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
       s.first[axis] = std::min(s.first[axis], island.first[axis]);
       s.last[axis] = std::max(s.last[axis], island.last[axis]);
     }
-  if (auto told = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.9, 1.0)); !told)
-    return tl::unexpected(told.error());
+  if (auto summarised = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.9, 1.0)); !summarised)
+    return tl::unexpected(summarised.error());
   return s;
 }
 
@@ -318,7 +318,7 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   geometry.directions = scan.volume.directions;
   if (!(geometry.spacing_mm.minCoeff() >= kLeastSpacing_mm) || !(geometry.spacing_mm.maxCoeff() <= kMostSpacing_mm))
     return failure(ErrorCode::invalid_input,
-                   "voxels of " + imaging::describe(geometry) + " are of no CT; export the scan again");
+                   "voxels of " + imaging::describe(geometry) + " are not those of a CT; export the scan again");
 
   const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
   if (!(pitch_mm >= kLeastPitch_mm) || !(pitch_mm <= kMostPitch_mm))

@@ -171,7 +171,7 @@ Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
                                                "; give a folder, zip or ISO image with a CT series");
     default:
       return failure(ErrorCode::invalid_input,
-                     path.string() + " is no folder, zip, ISO image or DICOM file; give one with a CT series");
+                     path.string() + " is not a folder, zip, ISO image or DICOM file; give one with a CT series");
   }
   // The files that a DICOMDIR lists lie below it, and a slice's series lies beside it.
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");

@@ -260,14 +260,14 @@ class Arranger {
     if (at == gaps.size()) return std::nullopt;
     series_.entry.slice_mm = usual_mm;
     char brief[64], text[96];
-    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one place" : "a gap of %.3g mm", gaps[at]);
+    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one position" : "a gap of %.3g mm", gaps[at]);
     if (usual_mm < 1e-3)
-      std::snprintf(text, sizeof text, " lie at the same place, as most do");
+      std::snprintf(text, sizeof text, " lie at the same position, like most slices");
     else
       std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
     return wrong(brief, subject_ + ": the slices " + name(at) + " and " + name(at + 1) + text +
                             (gaps[at] > usual_mm ? missing_() : "") +
-                            "; add the missing slices or remove the doubled ones");
+                            "; add the missing slices or remove the duplicates");
   }
 
   CtSeries& series_;

@@ -191,7 +191,7 @@ Result<LabelLegend> read_legend(const fs::path& file) {
   if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no legend " + file.string());
   try {
     const YAML::Node root = YAML::LoadFile(file.string());
-    if (!root.IsMap()) return wrong("it is no map");
+    if (!root.IsMap()) return wrong("it is not a map");
     for (const auto& entry : root)
       if (const auto key = entry.first.as<std::string>(); key != "bones" && key != "tolerance")
         return wrong("unknown key " + key);

@@ -86,7 +86,7 @@ std::string segmentation_text(const CtSegmentation& found) {
     for (std::size_t i = 0; i < found.joined_cm3.size(); ++i)
       pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
     text += "joined     by marrow alone: pieces with " + pieces +
-            " cm3 of denser bone, as at a narrow fracture; --hollow parts them\n";
+            " cm3 of denser bone, as at a narrow fracture; --hollow separates them\n";
   }
   if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kDifference * kept_cm3)
     text += line(
