@@ -34,6 +34,7 @@ struct StepReport {
 // Cuts of one frame at 30 Hz, for a tool that cuts at 1 kHz.
 inline constexpr int kCutsPerFrame = 33;
 
+// A case's bone and what the steps have cut of it. Not synchronised.
 class Carving {
  public:
   Carving(Case bone, double cut_mm);

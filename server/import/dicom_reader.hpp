@@ -12,8 +12,8 @@ struct SeriesOptions {
   std::optional<int> series;  // number in the list; absent: the largest that can be imported
 };
 
-// `input`: a folder with all that is in it, a zip, tar or ISO 9660 image, a DICOMDIR (then its folder is searched), or
-// one slice (then its series). The content decides, never the name.
+// `input`: a folder with all that is in it, a zip, a tar or an ISO 9660 image. Or a DICOMDIR, whose folder is searched;
+// or one slice, whose series is read. The content decides, never the name.
 // Files are read in other processes. A file that crashes a library costs only that file, unless it is a slice of the
 // series that is read. Slices are ordered by their position along the normal of their plane, never by file name or
 // number. Other files than CT slices are counted in the report.

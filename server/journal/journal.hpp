@@ -83,10 +83,10 @@ class Journal {
   // them, and little more than 1 MiB.
   [[nodiscard]] JournalSlice read_slice(const JournalHead& after, RoomSeq last, std::size_t most_entries);
 
-  // Checks what somebody was told is durable, for example a client's last acknowledged entry. Error unavailable: the
-  // journal is behind it and from now on accepts no more entries, unless it was salvaged with losses (see
-  // recovered_to); or it already accepts no entries, and its file does not contain what the witness knows. Error
-  // invalid_input: the witness knows another history.
+  // Checks a head that was acknowledged as durable, for example a client's last acknowledged entry. Errors:
+  // - unavailable: the journal is behind it and from now on accepts no more entries, unless it was salvaged with losses
+  //   (see recovered_to). Or it already accepts no entries, and its file does not contain what the witness knows.
+  // - invalid_input: the witness knows another history.
   [[nodiscard]] Result<void> check_witness(const JournalHead& witness);
   // The last entry that was salvaged from a damaged journal. What a witness knows beyond it is lost for good.
   [[nodiscard]] std::optional<RoomSeq> recovered_to() const;
@@ -127,8 +127,8 @@ class Journal {
   // Copies the entries of the log into the database if there are some hundred. It takes a few syncs, so call it when
   // the room is idle. After an error the journal accepts no more entries.
   [[nodiscard]] Result<void> tidy();
-  // What was found when it was opened, one sentence each: what one file of its log lacked and the other had, an
-  // incomplete write because its process was killed, entries that its key does not vouch for.
+  // Findings from when it was opened, one sentence each. Examples: one file of its log lacked what the other had; a
+  // write is incomplete because its process was killed; its key does not vouch for some entries.
   [[nodiscard]] const std::vector<std::string>& notes() const;
   // Whether one of JournalOptions::keys signed a register that exists. Without keys: true for every register that
   // exists.

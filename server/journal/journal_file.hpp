@@ -71,6 +71,7 @@ struct Walk {
   std::optional<Error> stopped;  // why the next one does not
 };
 
+// A journal's file, open for reading or writing. Not synchronised: one thread at a time.
 class JournalFile {
  public:
   // Makes the tables in a file of that name. The file must not exist.

@@ -12,10 +12,11 @@ namespace osteon {
 
 struct StoredBlock {
   std::uint64_t version = 0;  // rises with every change of this block; the first is 1
-  BlockPayload payload;       // empty where no surface is left
+  BlockPayload payload;       // empty if no surface is left
   Digest mesh_hash;
 };
 
+// The newest version of every block. Not synchronised.
 class BlockStore {
  public:
   // Returns the stored block if this call changed it. Returns null if the block already has these bytes, or if it never

@@ -16,6 +16,7 @@ namespace osteon {
 
 inline constexpr std::size_t kMostWordsBytes = 1024;
 
+// Not synchronised; it is a part of the Room.
 class People {
  public:
   struct Supervised {

@@ -108,8 +108,8 @@ class Room {
   // item, tool or event), unavailable (nothing to undo or redo, or the bone has changed since).
   Result<RoomEvent> add_tool(AuthorId by, const Tool& tool);  // sequence number 0 if it is known already
   // Takes back these events, or the newest `count` events of one author or (null) of all; a trainee only takes back
-  // their own. With a cut, every later split of a body that the cut had reached is undone too, and so is what was done
-  // to the piece as such. Later cuts stay in the bone.
+  // their own. With a cut, every later split of a body that the cut had reached is undone too. With a split, what was
+  // done to its piece as such is undone. Later cuts stay in the bone.
   Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);  // all events after it

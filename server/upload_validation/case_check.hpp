@@ -32,8 +32,8 @@ inline constexpr std::string_view kSoundCase = "sound";
                                              const std::filesystem::path& folder, const UploadQuota& quota,
                                              const std::function<bool()>& stop = {});
 
-// [main of that program, before other threads] Gives up the rights that it does not need, checks the case, prints one
-// line for the waiting process, and returns the exit code. `quota`: as check_case() writes it.
+// [main of that program, before other threads] Gives up the rights that it does not need and checks the case. Then it
+// prints one line for the waiting process, and returns the exit code. `quota`: as check_case() writes it.
 [[nodiscard]] int run_case_check(const std::filesystem::path& archive, const std::filesystem::path& folder,
                                  const std::string& quota);
 
