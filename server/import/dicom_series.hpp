@@ -31,9 +31,9 @@ struct CtSeries {
 [[nodiscard]] std::vector<CtSeries> sort_series(std::vector<DicomHeader> headers, const FoundFiles& found,
                                                 SkippedFiles& skipped);
 
-// The index of the series to import: `number`, or else the series that contains `file`, or else the largest. If a larger
-// series is of a kind that cannot be imported (tilted, several frames), one that can is preferred, unless it has only a
-// few slices. A larger one with a missing or damaged slice is chosen, so that its fault is reported. Errors:
+// The index of the series to import: `number`, or else the series that contains `file`, or else the largest. If a
+// larger series is of a kind that cannot be imported (tilted, several frames), one that can is preferred, unless it has
+// only a few slices. A larger one with a missing or damaged slice is chosen, so that its fault is reported. Errors:
 // invalid_input and unsupported (no CT, no such number). The chosen series may still have a fault.
 [[nodiscard]] Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const FoundFiles& found,
                                                 const SkippedFiles& skipped, std::optional<int> number,
