@@ -76,9 +76,9 @@ Result<std::size_t> Journal::erase_entries(const std::function<std::optional<std
   });
   if (!read_all) return tl::unexpected(read_all.error());
   if (instead.empty()) return 0;
-  const auto signed_range = state.file.signed_range();
-  if (!signed_range) return tl::unexpected(signed_range.error());
-  if (!signed_range->empty() && !state.options.keys)
+  const auto signatures = state.file.signed_entries();
+  if (!signatures) return tl::unexpected(signatures.error());
+  if (!signatures->empty() && !state.options.keys)
     return failure(ErrorCode::denied, state.path.string() +
                                           " was signed by its server, which has to sign what is erased too; "
                                           "give its key with --signing-key FILE");

@@ -210,10 +210,10 @@ Result<void> Journal::begin_signing() {
   const SigningKeys* keys = state.options.keys.get();
   if (keys == nullptr) return {};
   state.file.sign_with(&keys->key());
-  const auto all = state.file.signed_range();
+  const auto all = state.file.signed_entries();
   if (!all) return tl::unexpected(all.error());
   const auto last =
-      std::find_if(all->rbegin(), all->rend(), [&](const SignedRange& one) { return keys->trusts(one.key); });
+      std::find_if(all->rbegin(), all->rend(), [&](const SignedEntries& one) { return keys->trusts(one.key); });
   const RoomSeq head = state.head.place;
   const bool any = last != all->rend();
   const Result<bool> erased = is_vouched_for(kErasedRegister);

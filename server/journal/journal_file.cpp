@@ -502,8 +502,8 @@ std::optional<PublicKey> JournalFile::signer_of(const Checkpoint& found) const {
   return check_seal(found.seal, seal_of(found), first_head(genesis_).chain).value_or(Seal{}).key;
 }
 
-Result<std::vector<SignedRange>> JournalFile::signed_range() {
-  std::vector<SignedRange> all;
+Result<std::vector<SignedEntries>> JournalFile::signed_entries() {
+  std::vector<SignedEntries> all;
   if (version_ >= kVersionWithSignatures) {
     auto statement = database_.prepare("SELECT place, since, chain, key, signature FROM signatures ORDER BY place");
     if (!statement) return tl::unexpected(statement.error());
@@ -511,7 +511,7 @@ Result<std::vector<SignedRange>> JournalFile::signed_range() {
       const Result<bool> more = statement->step();
       if (!more) return tl::unexpected(more.error());
       if (!*more) break;
-      SignedRange& one = all.emplace_back();
+      SignedEntries& one = all.emplace_back();
       one.head.place.value = static_cast<std::uint64_t>(statement->integer(0));
       one.since.value = static_cast<std::uint64_t>(statement->integer(1));
       const auto chain = digest_of(statement->bytes(2));
@@ -527,7 +527,7 @@ Result<std::vector<SignedRange>> JournalFile::signed_range() {
   return all;
 }
 
-Result<void> JournalFile::add_signed_entries(const SignedRange& entries) {
+Result<void> JournalFile::add_signed_entries(const SignedEntries& entries) {
   auto statement =
       database_.prepare("INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
@@ -544,12 +544,12 @@ Result<void> JournalFile::add_signed_entries(const SignedRange& entries) {
 
 // Only the caller can judge whose key it is.
 void JournalFile::inspect_signatures(Inspection& found) {
-  const auto all = signed_range();
+  const auto all = signed_entries();
   if (!all) {
     found.faults.push_back(all.error().message);
     return;
   }
-  for (const SignedRange& one : *all) {
+  for (const SignedEntries& one : *all) {
     const std::string what = "the signature at event " + std::to_string(one.head.place.value);
     if (!fits(one))
       found.faults.push_back(damaged(what).value().message);

@@ -120,7 +120,7 @@ class JournalFile {
   [[nodiscard]] std::optional<PublicKey> signer_of(const Checkpoint& found) const;
   // In the order of their sequence numbers, that of its log last. inspect() checks them against their keys and the log
   // entries.
-  [[nodiscard]] Result<std::vector<SignedRange>> signed_range();
+  [[nodiscard]] Result<std::vector<SignedEntries>> signed_entries();
   // Checks the whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
   [[nodiscard]] Inspection inspect(bool files);
   // Checks everything but pages and log entries, whose head `found` has: what vouches for them, and what is stored
@@ -137,7 +137,7 @@ class JournalFile {
   [[nodiscard]] Result<void> add_entries(std::span<const JournalEntry> entries, JournalHead& head);
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
   [[nodiscard]] Result<void> add_register(const SealedRegister& copied);
-  [[nodiscard]] Result<void> add_signed_entries(const SignedRange& entries);
+  [[nodiscard]] Result<void> add_signed_entries(const SignedEntries& entries);
   [[nodiscard]] Result<void> note_generation(const LogStart& start);  // invalidates the footer
   [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
   [[nodiscard]] Result<void> add_person(const Person& person);

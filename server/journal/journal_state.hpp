@@ -26,7 +26,7 @@ struct Journal::State {
   std::optional<Error> closed = {};
   std::vector<std::string> notes = {};  // from when it was opened
   std::optional<RoomSeq> signed_since = {};  // none: nothing is signed
-  std::optional<SignedRange> last_signature = {};  // of the newest entries, until the database has it
+  std::optional<SignedEntries> last_signature = {};  // of the newest entries, until the database has it
   bool only_read = false;
 };
 

@@ -52,27 +52,27 @@ VerifyReport report_of(JournalFile& file) {
                       .faults = std::move(found.faults),
                       .notes = std::move(found.notes)};
   if (!report.sound()) return report;  // nobody vouches for damaged data
-  const auto entries = file.signed_range();
+  const auto entries = file.signed_entries();
   const auto checkpoints = file.checkpoints();
   const auto keys = file.find_register(kKeysRegister);
   if (entries)
-    for (const SignedRange& one : *entries) report.signed_range.push_back({one.since, one.head.place, one.key});
+    for (const SignedEntries& one : *entries) report.signed_range.push_back({one.since, one.head.place, one.key});
   if (keys && *keys) report.successions = decode_successions(**keys).value_or(std::vector<Succession>{});
   if (checkpoints)
     for (const Checkpoint& one : *checkpoints)
-      report.entries.emplace_back("the checkpoint at event " + std::to_string(one.at.place.value), file.signer_of(one));
+      report.seals.emplace_back("the checkpoint at event " + std::to_string(one.at.place.value), file.signer_of(one));
   if (const auto names = file.registers())
     for (const std::string& name : *names) {
       if (name == kGenerationRegister || name == kIdRegister || name == kKeysRegister) continue;
       if (const auto one = file.find_sealed(name); one && *one)
-        report.entries.emplace_back("the register \"" + name + "\"", file.signer_of(**one));
+        report.seals.emplace_back("the register \"" + name + "\"", file.signer_of(**one));
     }
   std::vector<std::optional<PublicKey>> signers;
   if (const auto people = file.people(&signers))
     for (std::size_t i = 0; i < people->size(); ++i)
-      report.entries.emplace_back("the name of person " + (*people)[i].pseudonym, signers[i]);
+      report.seals.emplace_back("the name of person " + (*people)[i].pseudonym, signers[i]);
   if (const auto footer = file.find_sealed(kFooterRegister); footer && *footer && report.closed_cleanly)
-    report.entries.emplace_back("the footer", file.signer_of(**footer));
+    report.seals.emplace_back("the footer", file.signer_of(**footer));
   return report;
 }
 
@@ -104,7 +104,7 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
       else
         none.emplace_back(from, to);
     } else {
-      auto& some = own.contains(by->key) ? vouched.entries : vouched.by_others;
+      auto& some = own.contains(by->key) ? vouched.ranges : vouched.by_others;
       if (!some.empty() && some.back().key == by->key && some.back().to.value + 1 == from.value)
         some.back().to = to;
       else
@@ -112,11 +112,11 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
     }
     from.value = end + 1;
   }
-  for (const auto& [what, signer] : report.entries) {
+  for (const auto& [what, signer] : report.seals) {
     if (signer && own.contains(*signer))
-      ++vouched.entries;
+      ++vouched.seals;
     else
-      vouched.other_entries.push_back(what);
+      vouched.other_seals.push_back(what);
   }
   return vouched;
 }
@@ -156,7 +156,7 @@ struct JournalCopy::State {
   // Taken from the source and not yet put into the target.
   std::vector<JournalEntry> entries = {};
   std::vector<SealedRegister> registers = {};
-  std::vector<SignedRange> signed_range = {};
+  std::vector<SignedEntries> signatures = {};
   std::vector<Person> people = {};
   std::vector<Checkpoint> checkpoints = {};
   std::optional<Error> no_checkpoint = {};  // why the last of them could not be copied
@@ -231,14 +231,14 @@ struct JournalCopying {
       }
     }
     if (!state.only) {
-      const auto signatures = state.source->signed_range();
+      const auto signatures = state.source->signed_entries();
       if (!signatures) {
         if (Result<void> on = left_out(state, signatures.error()); !on) return on;
       } else {
-        for (const SignedRange& one : *signatures)
+        for (const SignedEntries& one : *signatures)
           if (const auto chain = state.source->chain_at(one.head.place);
               one.head.place <= state.copied.place && fits(one) && chain && *chain == one.head.chain)
-            state.signed_range.push_back(one);
+            state.signatures.push_back(one);
       }
       auto people = state.source->people();
       if (people)
@@ -299,7 +299,7 @@ struct JournalCopying {
       // Another genesis needs other seals.
       for (const SealedRegister& one : state.registers)
         if (done) done = state.only ? file.set_register(one.name, one.value) : file.add_register(one);
-      for (const SignedRange& one : state.signed_range)
+      for (const SignedEntries& one : state.signatures)
         if (done) done = file.add_signed_entries(one);
       for (const Person& person : state.people)
         if (done) done = file.add_person(person);

@@ -29,20 +29,20 @@ struct VerifyReport {
   std::vector<SignedRange> signed_range = {};  // in order of their ends; they may overlap
   // Checkpoints, registers, people and the footer of a closed journal, and who signed each of them. What the journal
   // records for itself is not listed.
-  std::vector<std::pair<std::string, std::optional<PublicKey>>> entries = {};
+  std::vector<std::pair<std::string, std::optional<PublicKey>>> seals = {};
   std::vector<Succession> successions = {};  // it stores them about its server's keys
   [[nodiscard]] bool sound() const { return faults.empty(); }
 };
 
 // What a server vouches for in a sound report: with one key, and with the keys before and after it.
 struct Vouched {
-  std::vector<SignedRange> entries;  // one after the other
+  std::vector<SignedRange> ranges;  // one after the other
   std::vector<SignedRange> by_others;  // entries that another key signed and no key of this server
   std::vector<std::pair<RoomSeq, RoomSeq>> by_nobody;  // both ends included
-  std::size_t entries = 0;  // of VerifyReport::entries, signed by this server
-  std::vector<std::string> other_entries;  // not signed by this server
+  std::size_t seals = 0;  // of VerifyReport::seals, signed by this server
+  std::vector<std::string> other_seals;  // not signed by this server
   [[nodiscard]] bool all() const {
-    return (!entries.empty() || entries > 0) && by_others.empty() && by_nobody.empty() && other_entries.empty();
+    return (!ranges.empty() || seals > 0) && by_others.empty() && by_nobody.empty() && other_seals.empty();
   }
 };
 [[nodiscard]] Vouched vouched_by(const PublicKey& key, const VerifyReport& report);

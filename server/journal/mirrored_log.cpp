@@ -273,7 +273,7 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
       found.head = next->head;
       found.signature.reset();
       if (next->signature)
-        found.signature = SignedRange{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
+        found.signature = SignedEntries{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
       more = true;
       break;
     }

@@ -38,7 +38,7 @@ struct LogContents {
   std::uint64_t generation = 0;  // the newest generation in either file; 0: neither can be read
   std::vector<JournalEntry> entries;  // those after the head that was asked for
   JournalHead head;  // of the last of them
-  std::optional<SignedRange> signature;  // of the batch that leads to head; not checked, may be anything
+  std::optional<SignedEntries> signature;  // of the batch that leads to head; not checked, may be anything
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // where each file starts
   RoomSeq witnessed;  // the furthest entry that either file knows
   // What one file lacks and the other has, or an incomplete write; one sentence each.

@@ -296,11 +296,11 @@ Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const fs::path& f
   return load_signing_keys(file);
 }
 
-SignedRange sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head) {
+SignedEntries sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head) {
   return {since, head, key.public_key(), key.sign(message_of(since, head))};
 }
 
-bool fits(const SignedRange& entries) {
+bool fits(const SignedEntries& entries) {
   return entries.since && entries.since <= entries.head.place &&
          verifies(entries.key, message_of(entries.since, entries.head), entries.signature);
 }

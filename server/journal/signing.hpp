@@ -90,15 +90,15 @@ inline constexpr const char* kSigningKeyFile = "signing.key";
 
 // A key states: I decided the entries from `since` on, and they lead to `head`. Through the chain this covers the
 // content of those entries.
-struct SignedRange {
+struct SignedEntries {
   RoomSeq since;
   JournalHead head;
   PublicKey key;
   Signature signature;
 };
-[[nodiscard]] SignedRange sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head);
+[[nodiscard]] SignedEntries sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head);
 // Whether the key made the signature, and such entries are possible.
-[[nodiscard]] bool fits(const SignedRange& entries);
+[[nodiscard]] bool fits(const SignedEntries& entries);
 
 // A seal stands beside each stored value that the chain does not cover. It is the value's hash, or the key that signed
 // the hash with its signature. `genesis`: chain_0 of the journal, so that the seal is valid in no other journal.
