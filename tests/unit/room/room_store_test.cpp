@@ -282,7 +282,7 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults[0],
-              AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
+              AllOf(HasSubstr("the checkpoint at event " + std::to_string(kept.room->room_seq().value)),
                     HasSubstr("is not what its entries make")));
   EXPECT_EQ(report->checkpoints, 2u) << "its bytes are those that were written";
 
