@@ -16,10 +16,10 @@ namespace osteon {
 // Adds the commands to the program. Parsing sets `chosen` if one of them was given.
 void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen);
 
-// Runs a command and records its result in the audit log in the folder of `file` (a journal or a key), if there is one,
-// as done by the system's user. `event`: action, object and detail. `signing_key`: empty: the key in that folder. If
-// the record cannot be written, standard error says so. The command still runs, since anybody who can read journals can
-// copy them unseen anyway.
+// Runs a command and records its result, as done by the system's user. The record goes to the audit log in the folder
+// of `file` (a journal or a key), if there is one. `event`: action, object and detail. `signing_key`: empty: the key in
+// that folder. If the record cannot be written, standard error says so. This is no error of the command, since anybody
+// who can read journals can copy them unseen anyway.
 [[nodiscard]] Result<void> run_audited(const std::filesystem::path& file, const std::filesystem::path& signing_key,
                                        AuditEvent event, const std::function<Result<void>()>& command);
 

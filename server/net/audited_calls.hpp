@@ -15,9 +15,9 @@ class Authorizer;
 // "DeleteRoom" of "/osteon.v1.RoomsService/DeleteRoom"; "call" of nothing.
 [[nodiscard]] std::string_view call_name(std::string_view method);
 
-// Whether a call is recorded even if it succeeds. This holds for everybody who enters, for everything that only an
-// operator or instructor may do, and for everything that moves data out of or into the server. Cuts and drawings are
-// not recorded here, since the room's journal has them.
+// Whether a call is recorded even if it succeeds. Recorded are: every entry of a client, all calls that only an
+// operator or instructor may make, and all that move data out of or into the server. Cuts and drawings are not recorded
+// here, since the room's journal has them.
 [[nodiscard]] bool is_audited(std::string_view method);
 
 // Records these calls. Of all other calls, records those that a handler refuses; the authorizer records its own

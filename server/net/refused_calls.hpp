@@ -17,10 +17,10 @@ namespace osteon {
 
 class AuditTrail;
 
-// While it lives, a handshake that fails before any certificate is seen is noted as "tls", for example of a client
-// without a certificate or with plain text. gRPC reports such failures only in its log, for the whole process and
-// without an address. The rest of that log is dropped. The addresses noted are those of all connections over which no
-// call has come. Any thread may call it.
+// While it lives, a handshake that fails before any certificate is seen is noted as "tls". The client may have no
+// certificate or speak plain text. gRPC reports such failures only in its log, for the whole process and without an
+// address. The rest of that log is dropped. The addresses noted are those of all connections over which no call has
+// come. Any thread may call it.
 class HandshakeWatch {
  public:
   HandshakeWatch(RefusalCounts& refusals, Connections& connections);  // both outlive this object
@@ -40,9 +40,9 @@ class HandshakeWatch {
 // The trailing header of a call that the authorizer refused: its reason in one word. The authorizer has noted the call.
 inline constexpr const char* kRefusalTrailer = "osteon-refusal";
 
-// Notes every call that ends because its message was malformed or nonsense ("request"), asked for too much ("quota"),
-// or was not allowed for its caller ("denied"). Notes it under the caller's address. Join and the authorizer note their
-// own refusals. `refusals` outlives the server.
+// Notes every call that ends because of its message. The message was malformed or nonsense ("request"), asked for too
+// much ("quota"), or was not allowed for its caller ("denied"). The call is noted under the caller's address. Join and
+// the authorizer note their own refusals. `refusals` outlives the server.
 [[nodiscard]] std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(
     RefusalCounts& refusals);
 

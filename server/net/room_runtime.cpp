@@ -15,8 +15,8 @@ namespace {
 
 using Clock = RoomRuntime::Clock;
 
-// Limit of entries repeated in one tick, so that the surface and the health of a fast playback are published as it goes
-// on.
+// Largest number of entries repeated in one tick. So the surface and the health of a fast playback are published while
+// it goes on.
 constexpr int kEntriesPlayedPerTick = 256;
 
 }  // namespace

@@ -48,8 +48,8 @@ struct BoneAt {
 };
 
 // Decides when the next checkpoint is due. Evaluating a cut again takes a tenth of a millisecond, with a large tool one
-// or two milliseconds, so the next opening takes a few seconds at most. The least time between checkpoints prevents
-// that a bone that is cut fast is written all the time, as every checkpoint contains all its leaves.
+// or two milliseconds. So the next opening takes a few seconds at most. Every checkpoint contains all leaves of the
+// bone. So there is a least time between two, as a bone that is cut fast would otherwise be written all the time.
 struct CheckpointPolicy {
   std::uint64_t changes = 2000;
   std::chrono::nanoseconds apart = std::chrono::seconds(60);
@@ -69,9 +69,9 @@ struct RoomReport {
 };
 
 // The time at which a reopened room continues. Nobody knows how long the room was closed, and its clients worked on
-// meanwhile. They work on for two seconds without an answer, or up to the most cuts that they leave unconfirmed (3.6 s)
-// if they received anything else. These cuts arrive when the room is open again, and the time that they took must have
-// passed by then.
+// meanwhile. Without any answer they work on for two seconds. If they received anything else, they go on up to the most
+// cuts that they leave unconfirmed (3.6 s). These cuts arrive when the room is open again, and the time that they took
+// must have passed by then.
 inline constexpr std::chrono::nanoseconds kTimeAway = std::chrono::seconds(4);
 [[nodiscard]] std::chrono::nanoseconds reopened_time(const Room& room);
 
@@ -133,10 +133,10 @@ class RoomStore {
   // checked against the chain. `take` may wait, so an open room can be replayed while it is cut. Errors: those of the
   // first entry that does not fit.
   [[nodiscard]] Result<void> read(RoomSeq from, RoomSeq to, const std::function<bool(const LogEntry&)>& take);
-  // Checks every entry up to the current head against the chain, the bytes of every checkpoint against their digest,
-  // its fields against their hash, and all other witnesses. `live` is a durable sequence number with its bone. With it,
-  // the entries are also replayed into a fresh room of this case up to there, and the bones are compared; this takes as
-  // long as all its cuts. Damage is described in the report. Errors: unavailable (`live` is beyond the head),
+  // Checks every entry up to the current head against the chain. Checks the bytes of every checkpoint against their
+  // digest, its fields against their hash, and all other witnesses. `live` is a durable sequence number with its bone.
+  // With it, the entries are also replayed into a fresh room of this case up to there, and the bones are compared. This
+  // takes as long as all its cuts. Damage is described in the report. Errors: unavailable (`live` is beyond the head),
   // cancelled, unsupported (another case).
   [[nodiscard]] Result<RoomReport> verify(const Case& bone, const std::optional<BoneAt>& live,
                                           const MaintenanceCalls& calls = {});

@@ -43,8 +43,8 @@ class MeshSendQueue {
 
   explicit MeshSendQueue(MeshUpdate snapshot);
   void add(const MeshUpdate& update);
-  // The next message, of about kMessageBytes at most. Blocks leave in a cycle in the order of their keys, so that no
-  // block waits for ever behind blocks that change all the time.
+  // The next message, of about kMessageBytes at most. Blocks leave in a cycle in the order of their keys. So no block
+  // waits for ever behind blocks that change all the time.
   [[nodiscard]] MessageParts take();
   [[nodiscard]] std::size_t waiting() const { return waiting_.size(); }
 
