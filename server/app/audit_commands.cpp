@@ -119,7 +119,7 @@ Result<void> show(const Arguments& given) {
                                                " are no records; \"osteon-server audit verify\" names the first");
 }
 
-Result<void> forget(const Arguments& given) {
+Result<void> erase_from_audit(const Arguments& given) {
   const AuditEvent event{.action = "audit-forget", .result = kOk};
   return run_audited(given.file, given.signing_key, event, [&]() -> Result<void> {
     const Result<std::size_t> gone = erase_person(system_disk(), given.file, given.person);
@@ -178,7 +178,8 @@ void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   shown->add_option("--room", given->room, "Only what was done to this room");
   shown->add_option("--since", given->since, "Only from this time on, in UTC: 2026-11-25 or 2026-11-25T12:00:00Z");
   shown->add_flag("--json", given->json, "A line of JSON for each record");
-  CLI::App* gone = command("erase-person", "Erases who a person was; what they did stays, under a pseudonym", forget);
+  CLI::App* gone =
+      command("erase-person", "Erases who a person was; what they did stays, under a pseudonym", erase_from_audit);
   gone->add_option("--person", given->person, "Name in the certificate")->required();
   gone->add_option("--signing-key", given->signing_key,
                    "The server's signing key; by default signing.key beside the log");

@@ -249,7 +249,7 @@ Result<void> verify(const Arguments& given) {
   return {};
 }
 
-Result<void> recover(const Arguments& given) {
+Result<void> salvage(const Arguments& given) {
   const Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
   if (!keys) return tl::unexpected(keys.error());
   const Result<RecoverReport> report = salvage_journal(given.file, given.to, nullptr, {}, RoomSeq{given.at}, *keys);
@@ -398,7 +398,7 @@ Result<void> list_people(const Arguments& given) {
 
 // By number: erases that person in the audit log too, if the journal knows the name. By age: erases nobody there, since
 // these people may work in other rooms.
-Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::string>& names) {
+Result<void> erase_in_audit_too(const Arguments& given, const std::vector<std::string>& names) {
   std::size_t forgotten = 0;
   for (const std::string& name : names) {
     const Result<std::size_t> gone = erase_person(system_disk(), folder_of(given.file) / kAuditLogFile, name);
@@ -410,7 +410,7 @@ Result<void> forget_in_audit_too(const Arguments& given, const std::vector<std::
   return {};
 }
 
-Result<void> forget(const Arguments& given) {
+Result<void> erase_people(const Arguments& given) {
   if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input,
                    "erase-person needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
@@ -435,7 +435,7 @@ Result<void> forget(const Arguments& given) {
     if (given.person != 0) names = forgotten->names;
     return {};
   });
-  return done.and_then([&] { return forget_in_audit_too(given, names); });
+  return done.and_then([&] { return erase_in_audit_too(given, names); });
 }
 
 // The audit record of a command; nothing for commands that only read.
@@ -494,7 +494,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
   check->add_option("--case", given->case_folder, "Folder of the case: also replays the room and prints its hashes");
   check->add_option("--key", given->key,
                     "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
-  CLI::App* recovered = copies("salvage", "Copies what can be confirmed of a damaged journal into a new one", recover);
+  CLI::App* recovered = copies("salvage", "Copies what can be confirmed of a damaged journal into a new one", salvage);
   recovered->add_option("--to", given->at, "room_seq of the last event; all by default");
   signs(recovered);
   signs(copies("backup", "Copies a sound journal", [](const Arguments& a) { return copy(a, backup_journal); }));
@@ -516,7 +516,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
                     "Number of a person, as \"people\" lists it: exports only this person's data");
   lines->add_option("--to", given->at, "room_seq of the last event; all by default");
   command("people", "Lists the people whose numbers the events have", list_people);
-  CLI::App* gone = command("erase-person", "Erases who people were; what they did stays", forget);
+  CLI::App* gone = command("erase-person", "Erases who people were; what they did stays", erase_people);
   gone->add_option("--person", given->person, "Number of a person, as \"people\" lists it");
   gone->add_option("--older-than", given->days,
                    "Everybody who joined more than this many days ago; 0: everybody who joined before today")

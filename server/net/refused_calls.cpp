@@ -43,7 +43,7 @@ constexpr HandshakeFault kHandshakeFaults[] = {
      "it takes this server's certificate for one of another purpose; make one with deploy/certs server NAME..."},
 };
 
-void hear(gpr_log_func_args* line) {
+void read_log_line(gpr_log_func_args* line) {
   if (line->message == nullptr) return;
   const std::string_view said(line->message);
   if (!said.starts_with("Handshake failed")) return;
@@ -114,7 +114,7 @@ HandshakeWatch::HandshakeWatch(RefusalCounts& refusals, Connections& connections
     const std::lock_guard lock(watches_mutex);
     watches.push_back(this);
   }
-  gpr_set_log_function(hear);
+  gpr_set_log_function(read_log_line);
 }
 
 HandshakeWatch::~HandshakeWatch() {

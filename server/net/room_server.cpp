@@ -44,7 +44,7 @@ Result<std::unique_ptr<Listener>> listen_on(const std::string& listen, const Con
 
 // Opens the fast path at `connections.udp_listen`, or at a free port of the host of `address`. In the second case a
 // failure is no error, since the streams carry everything.
-Result<std::unique_ptr<LinkServer>> hear_datagrams(const ConnectionOptions& connections, const std::string& address) {
+Result<std::unique_ptr<LinkServer>> open_fast_path(const ConnectionOptions& connections, const std::string& address) {
   if (connections.udp_listen.empty()) {
     Result<std::unique_ptr<LinkServer>> links = LinkServer::open(address);
     if (links) return links;
@@ -105,7 +105,7 @@ Result<void> RoomServer::check_listen(const std::string& listen, const Connectio
   const Result<std::unique_ptr<Listener>> listener = listen_on(listen, connections);
   if (!listener) return tl::unexpected(listener.error());
   if (connections.udp_listen.empty()) return {};
-  const Result<std::unique_ptr<LinkServer>> links = hear_datagrams(connections, (*listener)->address());
+  const Result<std::unique_ptr<LinkServer>> links = open_fast_path(connections, (*listener)->address());
   if (!links) return tl::unexpected(links.error());
   return {};
 }
@@ -160,7 +160,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
     impl->proxy_listener = std::move(*proxy);
   }
   // Beside the streams. Without it, everything goes over them.
-  Result<std::unique_ptr<LinkServer>> links = hear_datagrams(connections, impl->listener->address());
+  Result<std::unique_ptr<LinkServer>> links = open_fast_path(connections, impl->listener->address());
   if (!links) return tl::unexpected(links.error());
   impl->links = std::move(*links);
   impl->services.push_back(make_room_service(*impl->rooms));

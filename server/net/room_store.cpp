@@ -21,7 +21,7 @@ namespace {
 constexpr std::size_t kPieceBytes = 128 * 1024;  // approximate size of a part of a checkpoint
 
 // For the message to a client whose room has fewer events than were acknowledged to it.
-constexpr const char* kToldEvents = " events that were acknowledged to you";
+constexpr const char* kAcknowledgedEvents = " events that were acknowledged to you";
 constexpr const char* kJoinAsItIs = "; start again to join it as it is now";
 
 constexpr std::size_t kSyncBytes = 1024 * 1024;  // a commit waits for at most this much of a checkpoint
@@ -247,15 +247,15 @@ Witness RoomStore::witness() const {
 
 Result<void> RoomStore::check_witness(const Witness& witness) {
   const std::string room = "the room " + genesis_.room;
-  const std::string told = std::to_string(witness.head.place.value) + kToldEvents;
+  const std::string events = std::to_string(witness.head.place.value) + kAcknowledgedEvents;
   const bool sealed = witness.seal == seal_of(witness.head), without_seal = witness.seal == Digest{};
   const auto lost_after = [&](RoomSeq place) {
-    return room + " has lost " + std::to_string(witness.head.place.value - place.value) + " of the " + told;
+    return room + " has lost " + std::to_string(witness.head.place.value - place.value) + " of the " + events;
   };
   // Another journal has another key.
   const auto begins_anew = [&] {
-    return failure(ErrorCode::invalid_input, room + " begins anew: its journal has none of the " + told + kJoinAsItIs +
-                                                 ", or have the lost journal put back first");
+    return failure(ErrorCode::invalid_input, room + " begins anew: its journal has none of the " + events +
+                                                 kJoinAsItIs + ", or have the lost journal put back first");
   };
   return with_journal([&](Journal& journal) -> Result<void> {
     const RoomSeq head = journal.head().place;
@@ -286,7 +286,8 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
     if (without_seal) return checked;
     if (!sealed) return begins_anew();
     return failure(checked.error().code,
-                   room + " has lost some of the " + told + ": an older copy of its journal has gone on" + kJoinAsItIs);
+                   room + " has lost some of the " + events + ": an older copy of its journal has gone on" +
+                       kJoinAsItIs);
   });
 }
 

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr const char* kEnding = ".journal";
 constexpr const char* kBackupEnding = ".backup";
 constexpr const char* kOpenList = "open-rooms";  // in the folder: the names of open rooms, one on each line
-constexpr std::chrono::seconds kUpkeepEvery{5};
+constexpr std::chrono::seconds kMaintainEvery{5};
 // Entries that a playback reads ahead.
 constexpr std::uint64_t kEntriesAhead = 256;
 
@@ -226,7 +226,7 @@ void Rooms::run_upkeep() {
     lock.unlock();
     maintain();
     lock.lock();
-  } while (!upkeep_wake_.wait_for(lock, kUpkeepEvery, [&] { return ending_.load(); }));
+  } while (!upkeep_wake_.wait_for(lock, kMaintainEvery, [&] { return ending_.load(); }));
 }
 
 MaintenanceCalls Rooms::until_the_end() const {

@@ -63,7 +63,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       }
       const Result<Requester> by = requester(*context, "CreateRoom", request->name());
       if (!by) return status_of(by.error());
-      return told(rooms_.create(request->name(), hash ? &*hash : nullptr, *by), response->mutable_room());
+      return answer_with(rooms_.create(request->name(), hash ? &*hash : nullptr, *by), response->mutable_room());
     });
   }
   Reactor* CloseRoom(Context* context, const v1::CloseRoomRequest* request, v1::CloseRoomResponse* response) override {
@@ -80,14 +80,16 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   Reactor* ResumeRoom(Context* context, const v1::ResumeRoomRequest* request,
                       v1::ResumeRoomResponse* response) override {
     return slowly(context, "ResumeRoom", request->name(),
-                  [this, request, response] { return told(rooms_.resume(request->name()), response->mutable_room()); });
+                  [this, request, response] {
+                    return answer_with(rooms_.resume(request->name()), response->mutable_room());
+                  });
   }
   Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request,
                       v1::BranchRoomResponse* response) override {
     return slowly(context, "BranchRoom", request->name(), [this, context, request, response] {
       const Result<Requester> by = requester(*context, "BranchRoom", request->name());
       if (!by) return status_of(by.error());
-      return told(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}, *by),
+      return answer_with(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}, *by),
                   response->mutable_room());
     });
   }
@@ -142,7 +144,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, "ReplayRoom", request->name(), [this, context, request, response] {
       const Result<Requester> by = requester(*context, "ReplayRoom", request->name());
       if (!by) return status_of(by.error());
-      return told(rooms_.replay(request->name(), request->new_name(), RoomSeq{request->from_room_seq()},
+      return answer_with(rooms_.replay(request->name(), request->new_name(), RoomSeq{request->from_room_seq()},
                                 RoomSeq{request->to_room_seq()}, request->speed(), *by),
                   response->mutable_room());
     });
@@ -195,7 +197,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     });
     return reactor;
   }
-  Status told(const Result<std::shared_ptr<OpenRoom>>& room, v1::RoomInfo* info) {
+  Status answer_with(const Result<std::shared_ptr<OpenRoom>>& room, v1::RoomInfo* info) {
     if (!room) return status_of(room.error());
     for (const RoomListing& listing : rooms_.list())
       if (listing.name == (*room)->name) *info = to_wire(listing);

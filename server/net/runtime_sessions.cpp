@@ -14,7 +14,7 @@ namespace {
 using Clock = RoomRuntime::Clock;
 
 // Largest number of cuts whose results a session begins with. A haptic client never has more cuts with unknown results.
-constexpr std::size_t kMostToldAgain = 1024;
+constexpr std::size_t kMostRepeatedResults = 1024;
 
 }  // namespace
 
@@ -275,7 +275,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(lease_epoch);
     complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(subscriber->author()));
-    for (const RoomSeq place : impl_->room.decided_places(subscriber->author(), kMostToldAgain))
+    for (const RoomSeq place : impl_->room.decided_places(subscriber->author(), kMostRepeatedResults))
       complete.mutable_complete()->add_decided_room_seqs(place.value);
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
