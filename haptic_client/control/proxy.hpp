@@ -34,7 +34,7 @@ struct ProxyStep {
   bool heel_contact = false;
   bool on_metal = false;     // it turns, and metal is in its way: it goes no further there, and nothing is cut
   bool returned = false;     // bone came back where the tool is: it cuts nothing until it has left that bone
-  // the returned bone is too deep to be felt: no force, the spindle must stand, until the tool is drawn out
+  // The returned bone is too deep to be felt: no force, the spindle must stand, until the tool is drawn out
   bool locked = false;
   double feed_mm_per_s = 0;  // into bone, along the direction of cutting
   double density_g_cm3 = 0;  // engaged-area weighted
@@ -62,7 +62,7 @@ struct ProxyStep {
 // What surrounds the tool besides the bone.
 struct Surroundings {
   std::span<const PlacedGuide> items;
-  // the guide whose opening holds the tool, 0 for none: it is not touched, because the opening's play applies
+  // The guide whose opening holds the tool, 0 for none: it is not touched, because the opening's play applies
   std::uint32_t guide = 0;
   const CuttingEffects* effects = nullptr;  // of the tool in hand; null: it is clean and as sharp as its model says
 };
