@@ -14,7 +14,8 @@ struct EnergyParams {
   double allowance_mj = 0.008;          // energy that one contact may give beyond what it got
   double tank_mj = 2.0;                 // largest part of the damping's work that is saved for later
   double surprise_mm_per_s2 = 10000.0;  // assumed largest acceleration of a hand and its device [A]
-  // Assumed acceleration in calm motion: this, or `wary` times the largest of late if that is less. [A]
+  // Smallest assumed acceleration. Where `wary` times the recent acceleration is larger, that is assumed, up to
+  // surprise_mm_per_s2. [A]
   double calm_mm_per_s2 = 2000.0;
   double wary = 2.0, lately_s = 0.2;  // [A]
   double turn_arm_mm = 20.0;          // at this arm, a rotation's acceleration is assumed to equal a translation's [A]
