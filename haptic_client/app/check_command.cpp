@@ -13,12 +13,12 @@ namespace osteon::haptic {
 namespace {
 
 constexpr int kPriority = 80;
-// What a client with a large bone locks: the case, the cut field, bricks, queues.
+// Memory that a client with a large bone locks: the case, the cut field, bricks, queues.
 constexpr long kMemory_kib = 1024 * 1024;
 
-// How many of its ticks an empty loop missed.
+// Returns the number of ticks that an empty loop missed.
 std::uint64_t measure(double seconds) {
-  // Not on the stack: a histogram of each microsecond.
+  // Not on the stack: it is a histogram of each microsecond.
   static TickStats stats;
   bool fifo = false;
   std::thread([&] {

@@ -46,7 +46,7 @@ constexpr const char* kReadme =
 constexpr const char* kBone = "bone";
 constexpr const char* kDevice = "device";
 
-// HDF5 would print its own account of what the callers say in a sentence; it does so for each thread.
+// Switches off HDF5's own error output, because the callers report errors. The setting is per thread.
 void be_quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
 Hdf5Handle text_type(std::size_t size) {
@@ -57,7 +57,7 @@ Hdf5Handle text_type(std::size_t size) {
   return type;
 }
 
-// As a text of variable length, which Python's readers give as a str.
+// As a string of variable length, which Python's readers return as a str.
 bool set_text(hid_t object, const char* name, const std::string& text) {
   const Hdf5Handle type = text_type(H5T_VARIABLE), space(H5Screate(H5S_SCALAR), H5Sclose);
   const Hdf5Handle attribute(H5Acreate2(object, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
@@ -83,7 +83,7 @@ Hdf5Handle make_dataset(hid_t file, const std::string& path, hid_t type, hid_t s
   return {H5Dcreate2(file, path.c_str(), type, space, links.id(), creation, H5P_DEFAULT), H5Dclose};
 }
 
-// A value that is there from the start and may be set at the end.
+// A value that exists from the start and may be set at the end.
 Hdf5Handle make_value(hid_t file, const char* path, hid_t type, const void* value) {
   const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   Hdf5Handle dataset = make_dataset(file, path, type, space.id(), H5P_DEFAULT);
@@ -135,7 +135,7 @@ hid_t native<std::uint8_t>() {
   return H5T_NATIVE_UINT8;
 }
 
-// An array that grows by rows, and the rows of it that are not written yet.
+// An array that grows by rows, and its rows that are not written yet.
 template <class Row>
 struct Column {
   std::string path, units, frame, meaning;
@@ -155,7 +155,7 @@ void put(std::vector<std::byte>& to, const T* values, std::size_t count) {
   to.insert(to.end(), bytes, bytes + count * sizeof(T));
 }
 
-// A column of `width` values of type T, given by a function of the row that returns an array or one value.
+// A column of `width` values of type T. `get` takes the row and returns an array or one value.
 template <class T, class Row, class Get>
 Column<Row> column(const char* path, const char* units, const char* frame, const char* meaning, Get get) {
   Column<Row> made;
@@ -210,7 +210,7 @@ bool make_column(hid_t file, Column<Row>& made, hsize_t chunk_rows) {
   const hsize_t now[] = {0, width}, most[] = {H5S_UNLIMITED, width}, chunk[] = {chunk_rows, width};
   const Hdf5Handle space(H5Screate_simple(rank, now, most), H5Sclose),
       creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  // Compressed as its neighbours' recordings are; poses hardly change from one row to the next.
+  // Compressed, as in the recordings of similar programs; poses hardly change from one row to the next.
   if (H5Pset_chunk(creation.id(), rank, chunk) < 0 || H5Pset_shuffle(creation.id()) < 0 ||
       H5Pset_deflate(creation.id(), 1) < 0)
     return false;
@@ -279,7 +279,7 @@ struct RecordFile::Impl {
   tl::unexpected<Error> failed(const char* what);
 
   ~Impl() {
-    // HDF5 cannot close what it could not write; it is left as it is, as if the process had been killed.
+    // HDF5 cannot close what it could not write. The file is left as it is, as if the process had been killed.
     if (abandoned) abandon();
   }
   void abandon() {
@@ -303,7 +303,7 @@ tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
 void RecordFile::Impl::make_columns() {
   using R = TickRow;
   const double s = info.loop.force_scale;
-  // What the loop would show on a device that has no motors for it is shown by nobody.
+  // On a device without motors the loop's force is not shown.
   const bool forces = info.device_info.force_axes > 0, torques = info.device_info.torque_axes > 0;
   const auto add = [this](auto&& made) { columns.push_back(std::forward<decltype(made)>(made)); };
   add(column<double, R>(recording::kHandlePose, "mm, mm, mm, 1, 1, 1, 1", kDevice, "the device's handle",
@@ -461,7 +461,7 @@ bool RecordFile::Impl::make_metadata() {
        make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), "metadata/laws", laws) &&
        make_texts(file.id(), "metadata/event_bits", event_names()) &&
        make_texts(file.id(), "metadata/range_bits", range_names());
-  // What is known later only: there from the start, because nothing new may appear while others read.
+  // Values known only later. They exist from the start, because no new objects may appear while others read.
   const std::string nothing(64, '\0');
   const std::uint64_t zero = 0;
   const Hdf5Handle hash_type = text_type(64);
@@ -478,7 +478,7 @@ bool RecordFile::Impl::make_metadata() {
                   "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
 }
 
-// The same array under the names that each group of the layout knows it by.
+// Links the same array under the names of each group of the layout.
 bool RecordFile::Impl::make_links() {
   for (const char* group :
        {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose", "high_frequency_poses/drill_pose",
@@ -572,7 +572,7 @@ Result<void> RecordFile::append(std::span<const TickRow> rows) {
     for (Column<TickRow>& column : impl.columns) column.take(row, column.waiting);
     ++impl.seen;
     if (++impl.waiting < kChunkRows) continue;
-    // Stopped in time, the file can still be closed as it should be, and others have a little left.
+    // Stopped in time, the file can still be closed properly, and other programs have a little space left.
     struct statvfs disk {};
     if (statvfs(impl.path.c_str(), &disk) == 0 &&
         static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < impl.keep_free_bytes)

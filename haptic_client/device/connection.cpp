@@ -38,7 +38,7 @@ void DeviceConnection::tell_advice() {
 }
 
 void DeviceConnection::keep() {
-  std::string told;  // why it could not be opened again, so that it is said once
+  std::string told;  // why it could not be reopened, so that the reason is reported once
   while (true) {
     {
       std::unique_lock lock(mutex_);

@@ -87,7 +87,7 @@ std::string all_names() {
   return names;
 }
 
-// `text`: one of the names that were joined in `whole`.
+// `text`: one of the names that are joined in `whole`.
 Made make_one(std::string_view text, std::string_view whole, const DeviceOptions& options) {
   const std::size_t colon = text.find(':');
   const std::string_view name = text.substr(0, colon);
@@ -113,7 +113,7 @@ Made make_one(std::string_view text, std::string_view whole, const DeviceOptions
 
 Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, const DeviceOptions& options) {
   std::vector<std::unique_ptr<HapticDevice>> parts;
-  // A recording's path may hold any letter, so it stands alone.
+  // A recording's path may contain any character, so it stands alone.
   const std::string_view whole = names;
   const bool alone = names.starts_with("recorded:");
   while (true) {
