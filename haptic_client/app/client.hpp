@@ -19,7 +19,7 @@ namespace osteon::haptic {
 struct ClientOptions {
   std::filesystem::path session_log;
   std::filesystem::path record;            // HDF5
-  // The recording that moves the handle; the room's bone must be as it was when the recording began
+  // The recording that moves the handle; the room's bone must be as it was when the recording began.
   const RecordedDevice* played = nullptr;
   bool status = false;                     // a line each second on standard output
 };

@@ -41,7 +41,7 @@ struct RecordingEnd {
 
 class RecordFile {
  public:
-  // Rows are written in chunks of this size; a killed writer loses fewer rows
+  // Rows are written in chunks of this size; a killed writer loses fewer rows.
   static constexpr std::size_t kChunkRows = 500;
   // Free space left on the disk; a recording ends before it uses it.
   static constexpr std::uint64_t kKeepFree_bytes = 16u << 20;

@@ -21,7 +21,7 @@ struct CouplingMoment {
   double limit_n = 0;                         // physical: the device's limit divided by s
   double energy_scale = 1;  // mJ at the handle for each physical mJ: s divided by the workspace's scale
   bool touching = false;
-  // In the last tick less force than the spring's was shown, and the slew limit was not the reason
+  // In the last tick less force than the spring's was shown, and the slew limit was not the reason.
   bool fell_short = false;
   // Of a device that shows torque. Bone frame; axis times angle, from the proxy's orientation to the handle's.
   double stiffness_nmm_per_rad = 0;     // of the rotation, physical; 0: no torque is shown
@@ -33,7 +33,7 @@ struct CouplingMoment {
 struct CouplingForce {
   Vec3 spring_n = Vec3::Zero();          // of the bone on the tool, within the limit: the physical force
   Vec3 damping_n = Vec3::Zero();         // k_c·T of the sampled spring, never more than the spring
-  // The part of the cutting force that smoothing holds back, of the bone on the tool
+  // The part of the cutting force that smoothing holds back, of the bone on the tool.
   Vec3 cutting_lag_n = Vec3::Zero();
   Vec3 turn_spring_nmm = Vec3::Zero();   // of the bone on the tool about its tip, within the limit, physical
   Vec3 turn_damping_nmm = Vec3::Zero();  // like damping_n, never more than the rotation's spring

@@ -37,7 +37,7 @@ struct LoopParams {
   double continuous_nmm = 0;
   double slew_n_per_ms = 0.5;  // growth of force that the hand did not cause, on the device
   double smooth_s = 2e-3;      // tau of (7.15), for the cutting force alone
-  // Time from no force to full force after a device was connected or calibrated, and back at the end
+  // Time from no force to full force after a device was connected or calibrated, and back at the end.
   double ramp_s = 0.3;
   bool motor_effects = true;
   bool tool_effects = true;  // bluntness, clogging, grab, binding, blows
@@ -74,7 +74,7 @@ enum LoopEvent : std::uint32_t {
   kGuided = 64,           // a guide holds the tool
   kStalled = 128,         // the spindle stands under its load
   kBreakthrough = 256,    // the bone that was cut has ended: the coupling's extension was released
-  // Bone that came back, or the tool's own rotation, pushed the tool from the handle: this became offset
+  // Bone that came back, or the tool's own rotation, pushed the tool from the handle: this became offset.
   kPushedAway = 512,
   kEnergyLimited = 1024,  // the passivity monitor cut the force
   kRamping = 2048,        // after connecting, or because the room is over
@@ -98,10 +98,10 @@ struct LoopReport {
   Vec3 guide_device_n = Vec3::Zero();       // the guidance spring's part: paid for by the guiding handle's motion
   Vec3 partner_device_n = Vec3::Zero();     // the rest: others' tools that touch this one
   Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
-  // To write to a device that shows torque, device frame: the sum of the two below
+  // To write to a device that shows torque, device frame: the sum of the two below.
   Vec3 torque_device_nmm = Vec3::Zero();
   Vec3 coupling_device_nmm = Vec3::Zero();  // of the rotation's spring: passive, in the ledger
-  // Moment of the cut: active, within the coupling's force at the arm of a rotation
+  // Moment of the cut: active, within the coupling's force at the arm of a rotation.
   Vec3 motor_device_nmm = Vec3::Zero();
   Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
   Pose pose_bone_proxy, pose_bone_device;
@@ -221,7 +221,7 @@ class HapticLoop {
   Pose bone_, bone_before_;         // relative to its rest pose, now and in the last tick
   bool moved_ = false;              // the bone is not at rest
   bool device_was_ok_ = true;
-  // In the last tick less than the coupling's spring was shown, and the slew limit was not the reason
+  // In the last tick less than the coupling's spring was shown, and the slew limit was not the reason.
   bool fell_short_ = false;
   double ramp_ = 0;          // 0 … 1
 };

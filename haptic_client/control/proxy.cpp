@@ -26,7 +26,7 @@ constexpr double kFlatField = 0.3;  // a shorter gradient means nothing: samples
 constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
 constexpr double kSkiveSpeed_mm_per_s = 30.0;
 constexpr double kMostSkive_mm = 3.0;
-// Stiffness with which a hand, and the other beside it, hold the point against that [A]
+// Stiffness with which a hand, and the other beside it, hold the point against that. [A]
 constexpr double kHand_n_per_mm = 20.0;
 // Play of a tool in its own hole, in insets. Points that stand some millimetres apart around it permit a little more
 // between them.

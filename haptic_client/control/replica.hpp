@@ -63,7 +63,7 @@ class Replica {
   [[nodiscard]] std::uint64_t last_own() const { return last_own_; }  // newest own cut that is in predicted()
   [[nodiscard]] std::size_t unconfirmed() const { return pending_.size(); }
   [[nodiscard]] std::uint64_t rejected() const { return rejected_; }
-  // Pending cuts that were applied again because of rejected ones
+  // Pending cuts that were applied again because of rejected ones.
   [[nodiscard]] std::uint64_t cut_again() const { return cut_again_; }
 
  private:

@@ -59,7 +59,7 @@ struct ReadyStep {
   std::vector<Vec3> sweep_mm;                                    // positions of the tip, burr
   double sweep_length_mm = 0;                                    // from the first to the last of them
   std::size_t line_places = 1;                                   // number of them in each of the lines to and fro
-  // Waits at the end of each line, which is too short for the hand to follow; else only at the last
+  // Waits at the end of each line, which is too short for the hand to follow; else only at the last.
   bool dwells = false;
   [[nodiscard]] bool takes_tool() const { return plan.action != Action::wait && plan.action != Action::place; }
   [[nodiscard]] bool feeds() const { return plan.action == Action::drill || plan.action == Action::screw; }

@@ -18,7 +18,7 @@ namespace osteon::haptic {
 struct PedalAxisParams {
   bool inverted = false;  // the pedal's rest is the axis' upper end
   double play = 0.05;     // [A] share of the range at either end that counts as the end
-  // [A] share of the range from its rest within which the first reading of an unpressed pedal must lie
+  // [A] share of the range from its rest within which the first reading of an unpressed pedal must lie.
   double near = 0.25;
 };
 

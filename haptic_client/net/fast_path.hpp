@@ -66,7 +66,7 @@ class FastPath {
   mutable std::mutex mutex_;
   wire::ClientLink link_;
   std::uint64_t pushed_;                        // newest cut that the link was given
-  // state_seq of each partner's last state passed on; used by the thread only
+  // state_seq of each partner's last state passed on; used by the thread only.
   std::map<AuthorId, std::uint64_t> partners_;
   bool end_ = false;
   std::thread thread_;

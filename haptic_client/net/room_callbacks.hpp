@@ -78,7 +78,7 @@ struct RoomCallbacks {
   // Called once with each `complete`, just before or after it, and at every change of restrictions.
   std::function<void(const HandSupervised& decided)> supervised{};
   std::function<void(const WordsSaid& said)> said{};
-  // Newest state of a partner's tool; outside the order of events
+  // Newest state of a partner's tool; outside the order of events.
   std::function<void(const CuttingState& partner)> partner{};
   // Whether the newest datagram says that the caller's hand is stopped. Called when this has changed; its log entry may
   // arrive later. Ignore a flag that is older than the newest log entry (by its lease's epoch). Called from another
