@@ -160,21 +160,21 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   // The reader and this thread deliver one at a time.
   std::mutex delivering;
   // Guarded: when the last message was received; none while everything is at rest.
-  std::optional<Clock::time_point> heard;
+  std::optional<Clock::time_point> received_at;
   auto watch = StateSubscription::start(
       std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
         const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
         const std::lock_guard lock(delivering);
         engine.deliver(scene);
-        heard = received;
+        received_at = received;
       });
 
   std::optional<Error> broken;
   while (!broken && !stop.wait_for(kPoll)) {
     states.drain(engine, **output);
-    if (const std::lock_guard lock(delivering); heard && Clock::now() - *heard > kStale) {
+    if (const std::lock_guard lock(delivering); received_at && Clock::now() - *received_at > kStale) {
       engine.deliver(audio::SoundScene{});
-      heard.reset();
+      received_at.reset();
     }
     broken = watch->ended();
     if (const std::string why = (*output)->failure_reason(); !why.empty()) broken = Error{ErrorCode::unavailable, why};

@@ -79,8 +79,8 @@ Handpiece make_handpiece(HandpieceKind kind) {
   OSTEON_CHECK(piece.partials.size() <= kMaxPartials);
   double mean_square = 0;
   for (const Partial& p : piece.partials) {
-    const double heard = p.level * radiation(p.ratio * piece.rated_rpm / 60.0);
-    if (p.source != Source::tooth) mean_square += 0.5 * heard * heard;
+    const double radiated = p.level * radiation(p.ratio * piece.rated_rpm / 60.0);
+    if (p.source != Source::tooth) mean_square += 0.5 * radiated * radiated;
   }
   const double scale = kFreeLevel / std::sqrt(mean_square);
   for (Partial& p : piece.partials) p.level *= scale;

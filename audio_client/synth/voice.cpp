@@ -122,8 +122,8 @@ void Voice::add_partials(Block& block) noexcept {
     flutter_[i] += flutter_share * (noise_.next() - flutter_[i]);
     const double hz = partial.ratio * spindle_hz;
     double level = 0;
-    if (const double heard = audible(hz, rate_hz_); heard > 0 && hz > 0) {
-      level = partial.level * gains[static_cast<std::size_t>(partial.source)] * speed * radiation(hz) * heard *
+    if (const double audibility = audible(hz, rate_hz_); audibility > 0 && hz > 0) {
+      level = partial.level * gains[static_cast<std::size_t>(partial.source)] * speed * radiation(hz) * audibility *
               std::pow(std::max(hz, 100.0) / 2000.0, tilt) * (1.0 + flutter_scale * flutter_[i]);
     }
     const float from = level_[i], to = static_cast<float>(level);

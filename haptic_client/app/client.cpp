@@ -51,20 +51,20 @@ std::int64_t ns(Clock::time_point t) {
 
 // Messages of the room on their way to the replica's thread.
 struct Committed {
-  RoomSeq place;
+  RoomSeq room_seq;
   Cut cut;
 };
 struct Rejected {
-  RoomSeq place;
+  RoomSeq room_seq;
   std::uint64_t author_seq;
   std::uint64_t lease_epoch;
   std::string reason;
 };
 struct Noted {
-  RoomSeq place;  // of an event that does not change the bone
+  RoomSeq room_seq;  // of an event that does not change the bone
 };
 struct SceneSet {
-  RoomSeq place;
+  RoomSeq room_seq;
   std::vector<SceneItem> items;
 };
 struct ToolNamed {
@@ -83,7 +83,7 @@ struct Partners {
     AuthorId author;  // null: none
     std::uint64_t state_seq = 0;
     Pose pose_bone_tool, pose_bone_device;
-    std::int64_t heard_ns = 0;
+    std::int64_t received_ns = 0;
     std::size_t tool = 0;  // hash of its name
   };
   std::array<Partner, kMost> of;
@@ -218,18 +218,18 @@ class Client {
       taken_.wait(lock, [this] { return from_room_.size() < kMostFromRoom || replica_over_; });
       if (replica_over_) return;
       from_room_.push_back(std::move(event));
-      heard_ns_ = ns(Clock::now());
+      received_ns_ = ns(Clock::now());
       wake_.notify_one();
     };
     RoomCallbacks events;
     events.leaf = [pass](const FieldLeaf& leaf) { pass(leaf); };
     events.complete = [pass](const RoomAtJoin& room) { pass(room); };
     events.change = [pass](BonePart&& part) { pass(std::move(part)); };
-    events.scene = [pass](RoomSeq place, const std::vector<SceneItem>& items) { pass(SceneSet{place, items}); };
-    events.noted = [pass](RoomSeq place) { pass(Noted{place}); };
-    events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
-    events.rejected = [pass](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
-      pass(Rejected{place, seq, lease, why});
+    events.scene = [pass](RoomSeq room_seq, const std::vector<SceneItem>& items) { pass(SceneSet{room_seq, items}); };
+    events.noted = [pass](RoomSeq room_seq) { pass(Noted{room_seq}); };
+    events.committed = [pass](RoomSeq room_seq, const Cut& cut) { pass(Committed{room_seq, cut}); };
+    events.rejected = [pass](RoomSeq room_seq, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
+      pass(Rejected{room_seq, seq, lease, why});
     };
     events.supervised = [this, pass](const HandSupervised& decided) {
       // Passed to the loop at once: it must not wait for earlier work of the replica.
@@ -242,7 +242,7 @@ class Client {
     };
     events.said = [pass](const WordsSaid& said) { pass(said); };
     events.partner = [this, pass](const CuttingState& state) {
-      hear_partner(state);
+      receive_partner(state);
       if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost &&
           named_tools_.insert(state.tool_name).second)
         pass(ToolNamed{state.tool_name});
@@ -257,19 +257,19 @@ class Client {
   }
 
   // Called on whichever thread the session uses for it; one at a time.
-  void hear_partner(const CuttingState& state) {
+  void receive_partner(const CuttingState& state) {
     // The entry with the oldest state is replaced.
-    Partners::Partner* place = &heard_partners_.of[0];
-    for (Partners::Partner& partner : heard_partners_.of) {
+    Partners::Partner* place = &received_partners_.of[0];
+    for (Partners::Partner& partner : received_partners_.of) {
       if (partner.author == state.author) {
         place = &partner;
         break;
       }
-      if (partner.heard_ns < place->heard_ns) place = &partner;
+      if (partner.received_ns < place->received_ns) place = &partner;
     }
     *place = {state.author,           state.state_seq,  state.pose_bone_tool,
               state.pose_bone_device, ns(Clock::now()), std::hash<std::string>{}(state.tool_name)};
-    partners_.store(heard_partners_);
+    partners_.store(received_partners_);
   }
 
   // [haptic] Applies an instructor's restrictions and guidance.
@@ -286,7 +286,7 @@ class Client {
     for (const Partners::Partner& partner : partners_.value().of)
       if (partner.author)
         felt_partners_[count++] = {partner.author.value, partner.pose_bone_tool,
-                                   line_s + 1e-9 * static_cast<double>(now_ns - partner.heard_ns),
+                                   line_s + 1e-9 * static_cast<double>(now_ns - partner.received_ns),
                                    partner_solids_.value().find(partner.tool)};
     loop.see_partners(std::span(felt_partners_).first(count));
   }
@@ -307,9 +307,9 @@ class Client {
   }
 
   bool wait_joined() {
-    heard_ns_ = ns(Clock::now());
+    received_ns_ = ns(Clock::now());
     while (!joined_ && link_ok_ && !stop_.wait_for(2ms))
-      if (Clock::now().time_since_epoch() - std::chrono::nanoseconds(heard_ns_) > kJoinPatience)
+      if (Clock::now().time_since_epoch() - std::chrono::nanoseconds(received_ns_) > kJoinPatience)
         give_up({ErrorCode::unavailable, "the server has sent nothing for " + std::to_string(kJoinPatience.count()) +
                                              " s while the bone was fetched; look at the server's log"});
     return joined_ && link_ok_;
@@ -379,8 +379,8 @@ class Client {
   // [watchdog] Reports at most every five seconds.
   void stalled() {
     const auto now = Clock::now();
-    if (stall_told_ && now - *stall_told_ < 5s) return;
-    stall_told_ = now;
+    if (stall_reported_at_ && now - *stall_reported_at_ < 5s) return;
+    stall_reported_at_ = now;
     log::warn("the haptic loop stands", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
   }
 
@@ -395,16 +395,16 @@ class Client {
         events.swap(from_room_);
         taken_.notify_all();
       }
-      const bool heard = !events.empty();
+      const bool any_received = !events.empty();
       // Read before the queues: what was closed up to here must still be taken.
       const bool over = touching_over_;
       take_own_cuts();
       for (FromRoom& event : events) std::visit([this](auto& e) { take(e); }, event);
       events.clear();
       replica_.settle();
-      watch_room(heard);
+      watch_room(any_received);
       build_patch();
-      if (heard || replica_.unconfirmed() > 0) reserve.refill();
+      if (any_received || replica_.unconfirmed() > 0) reserve.refill();
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
       const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();
@@ -519,9 +519,9 @@ class Client {
       return;
     }
   }
-  void take(const Noted& noted) { replica_.note(noted.place); }
+  void take(const Noted& noted) { replica_.note(noted.room_seq); }
   void take(const SceneSet& scene) {
-    replica_.note(scene.place);
+    replica_.note(scene.room_seq);
     std::vector<PlacedGuide>& guides = guides_.writable();
     guides.clear();
     for (const SceneItem& item : scene.items)
@@ -535,13 +535,13 @@ class Client {
   }
   void take(const Committed& committed) {
     const bool own = committed.cut.author == room_.room().author;
-    if (own) cut_log_.confirm(committed.cut.author_seq, committed.place, ns(Clock::now()));
+    if (own) cut_log_.confirm(committed.cut.author_seq, committed.room_seq, ns(Clock::now()));
     if (own) rejected_in_a_row_ = 0;
-    replica_.commit(committed.place, committed.cut, own);
+    replica_.commit(committed.room_seq, committed.cut, own);
   }
   void take(const Rejected& rejected) {
     cut_log_.confirm(rejected.author_seq, RoomSeq{}, ns(Clock::now()));
-    const bool fell = replica_.reject(rejected.place, rejected.author_seq);
+    const bool fell = replica_.reject(rejected.room_seq, rejected.author_seq);
     follow_lease(rejected.lease_epoch);
     // An instructor's decision that was on its way when this was cut.
     const auto because = [&](Rejection reason) { return rejected.reason == sentence(reason); };
@@ -558,11 +558,11 @@ class Client {
     give_up({ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason});
   }
 
-  void watch_room(bool heard) {
+  void watch_room(bool any_received) {
     const double now_s = 1e-9 * static_cast<double>(ns(Clock::now()));
     // Without a connection everything that will be cut is unconfirmed.
     const bool silent = interrupted_ && replica_.unconfirmed() == 0;
-    const RoomHealth health = watch_.update(now_s, heard && !interrupted_, silent ? 1 : replica_.unconfirmed());
+    const RoomHealth health = watch_.update(now_s, any_received && !interrupted_, silent ? 1 : replica_.unconfirmed());
     unconfirmed_ = replica_.unconfirmed();
     const RoomHealth before = room_health_.exchange(health);
     if (health == before) return;
@@ -722,8 +722,8 @@ class Client {
     if (health != RoomHealth::follows)
       std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
     if (live_.refresh()) {
-      const TickStats now = live_.value().since(told_);
-      told_ = live_.value();
+      const TickStats now = live_.value().since(last_ticks_);
+      last_ticks_ = live_.value();
       std::printf(", loop %.0f us (99 of 100: %.0f), late %.0f us (%.0f), %llu missed", now.work.percentile_us(50),
                   now.work.percentile_us(99), now.lateness.percentile_us(50), now.lateness.percentile_us(99),
                   static_cast<unsigned long long>(now.missed));
@@ -756,7 +756,7 @@ class Client {
   TripleBuffer<MountLoad> pushes_;                                // haptic → reporter
   std::atomic<std::uint64_t> stop_flag_{0};                       // the newest datagram's stop flag, likewise
   TripleBuffer<Partners> partners_;                               // others' tools, session → haptic
-  Partners heard_partners_;                                       // written by the session's thread, like the next
+  Partners received_partners_;                                       // written by the session's thread, like the next
   std::set<std::string> named_tools_;
   TripleBuffer<PartnerSolids> partner_solids_;  // replica → haptic
   PartnerSolids known_solids_;                  // replica thread
@@ -764,8 +764,8 @@ class Client {
   std::atomic<double> line_lag_s_{0};
   SpscQueue<TickRow, 2048> rows_;      // haptic → reporter
   TripleBuffer<TickStats> live_;       // haptic → reporter, once a second
-  TickStats told_;                     // reporter: of the last line
-  std::optional<Clock::time_point> stall_told_;  // watchdog
+  TickStats last_ticks_;                     // reporter: of the last line
+  std::optional<Clock::time_point> stall_reported_at_;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
   std::mutex mutex_;  // guards the three below; never taken by the haptic thread
@@ -773,7 +773,7 @@ class Client {
   std::deque<FromRoom> from_room_;
   std::optional<Error> lost_why_;
   std::condition_variable wake_, taken_;
-  std::atomic<std::int64_t> heard_ns_{0};
+  std::atomic<std::int64_t> received_ns_{0};
   std::atomic<RoomHealth> room_health_{RoomHealth::follows};
   std::atomic<std::size_t> unconfirmed_{0};
   std::atomic<std::size_t> items_left_{0};  // by the plan

@@ -60,8 +60,8 @@ std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   const auto since = static_cast<std::int64_t>(report.state_seq - stay.last_seq);
   stay.ticks = std::max<std::int64_t>(0, stay.ticks - (since - 1)) + 1;
   stay.last_seq = report.state_seq;
-  if (stay.told || stay.ticks < kLasting_ticks) return {};
-  stay.told = true;
+  if (stay.reported || stay.ticks < kLasting_ticks) return {};
+  stay.reported = true;
   return out_of_range_sentence(*model.law, report.out_of_range);
 }
 

@@ -74,7 +74,7 @@ class RangeWatch {
   struct Stay {
     std::uint64_t last_seq = 0;  // of the last tick outside
     std::int64_t ticks = 0;      // number of ticks outside minus inside up to then
-    bool told = false;
+    bool reported = false;
   };
   std::vector<Use> uses_;
   std::vector<Stay> stays_;  // of each use

@@ -41,10 +41,10 @@ void Replica::add_own(const Cut& cut) {
   pending_.push_back({cut, predict(cut)});
 }
 
-void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
+void Replica::commit(RoomSeq seq, const Cut& cut, bool own) {
   // A repeated answer: the bone has had this cut, and may have lost it to an undo since.
-  if (place <= room_seq_) return;
-  room_seq_ = place;
+  if (seq <= room_seq_) return;
+  room_seq_ = seq;
   for (auto& [id, held] : bodies_) held.committed.apply(cut);
   if (own) {
     // The prediction contains it already: applying it again would change nothing.
@@ -62,8 +62,8 @@ void Replica::fall(const Pending& pending) {
   for (const Coord origin : pending.changed) undone_.insert({pending.cut.level, origin});
 }
 
-bool Replica::reject(RoomSeq place, std::uint64_t author_seq) {
-  note(place);
+bool Replica::reject(RoomSeq seq, std::uint64_t author_seq) {
+  note(seq);
   ++rejected_;
   const auto found = std::ranges::find(pending_, author_seq, [](const Pending& p) { return p.cut.author_seq; });
   if (found == pending_.end()) return false;
@@ -107,8 +107,8 @@ void Replica::renew(RoomSeq contained, std::span<const BodyId> bodies, std::span
   });
 }
 
-void Replica::change(RoomSeq place, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
-  note(place);
+void Replica::change(RoomSeq seq, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
+  note(seq);
   for (const BodyId id : bodies) {
     again_ |= !bodies_.contains(id);  // a new body does not contain the pending cuts
     body(id);

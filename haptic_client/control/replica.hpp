@@ -33,15 +33,15 @@ class Replica {
   void joined(RoomSeq contained) { room_seq_ = contained; }  // all leaves were given
   void add_own(const Cut& cut);                              // predicted at once
   // In room_seq order; entries already passed do nothing. Own cuts leave the prediction.
-  void commit(RoomSeq place, const Cut& cut, bool own);
+  void commit(RoomSeq seq, const Cut& cut, bool own);
   // For an own cut: what it removed comes back with settle(). Returns false when the cut was no longer pending, for
   // example after an undo.
-  bool reject(RoomSeq place, std::uint64_t author_seq);
+  bool reject(RoomSeq seq, std::uint64_t author_seq);
   // Part of an event that changed the bone in another way: leaves as committed now, and the bodies that exist.
-  void change(RoomSeq place, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves);
+  void change(RoomSeq seq, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves);
   // The room no longer takes cuts of an earlier lease; what was predicted under one is dropped.
   void lease(std::uint64_t epoch);
-  void note(RoomSeq place) { room_seq_ = std::max(room_seq_, place); }  // of an event that leaves the bone as it is
+  void note(RoomSeq seq) { room_seq_ = std::max(room_seq_, seq); }  // of an event that leaves the bone as it is
   // Replaces everything by the room as it is at `contained`, after its connection was lost. `leaves`: all that are
   // stored. Own cuts up to `decided` are in them, or were rejected. Only differences are changed, so that unchanged
   // bone stays under the tool.

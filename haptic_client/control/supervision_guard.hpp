@@ -31,7 +31,7 @@ struct HapticRestrictions {
   [[nodiscard]] bool may_cut() const noexcept { return !stopped && !taken_by; }
 };
 // `tools`: the loop's.
-[[nodiscard]] HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq place,
+[[nodiscard]] HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq room_seq,
                                                      std::uint64_t lease_epoch, std::span<const ToolModel> tools);
 
 // The restrictions in words, for a line of a log; empty: there are none.

@@ -92,9 +92,9 @@ Made make_one(std::string_view text, std::string_view whole, const DeviceOptions
   const std::size_t colon = text.find(':');
   const std::string_view name = text.substr(0, colon);
   const std::string argument(colon == std::string_view::npos ? std::string_view{} : text.substr(colon + 1));
-  const std::string told = "--device " + std::string(whole) + ": ";
+  const std::string prefix = "--device " + std::string(whole) + ": ";
   if (name == "recorded" && text != whole)
-    return failure(ErrorCode::invalid_input, told + "a recording is played alone; name nothing beside it");
+    return failure(ErrorCode::invalid_input, prefix + "a recording is played alone; name nothing beside it");
   for (const Kind& kind : kKinds) {
     if (kind.name != name) continue;
     if (kind.argument.empty() && colon != std::string_view::npos)
@@ -104,9 +104,9 @@ Made make_one(std::string_view text, std::string_view whole, const DeviceOptions
   }
   if (find_simulated_device(name))
     return failure(ErrorCode::invalid_input,
-                   told + std::string(name) + " has a hand of our own making; name it alone, with a --plan");
+                   prefix + std::string(name) + " has a hand of our own making; name it alone, with a --plan");
   const std::string what = name.empty() ? "a name is missing" : "there is no device \"" + std::string(name) + '"';
-  return failure(ErrorCode::not_found, told + what + "; choose among " + all_names() + ", joined by \"+\"");
+  return failure(ErrorCode::not_found, prefix + what + "; choose among " + all_names() + ", joined by \"+\"");
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ class Falcon final : public HapticDevice {
   void run() {
     if (options_.priority > 0) (void)try_realtime(options_.priority);
     FalconCommand command{.homing = true, .lights = kFalconRed};
-    auto heard = Clock::now();
+    auto received_at = Clock::now();
     while (!stopping_) {
       const Result<std::optional<FalconState>> state = usb_->exchange(command, kFramePatience);
       const auto now = Clock::now();
@@ -109,13 +109,13 @@ class Falcon final : public HapticDevice {
         // Stops any force that the device still shows.
         command.motors = {};
         exchange_.go(DeviceStatus::fault);
-        if (now - heard > kSilencePatience)
+        if (now - received_at > kSilencePatience)
           return lose(
               {ErrorCode::unavailable,
                "the Falcon has stopped answering; unplug it, switch its power off and on, and plug it in again"});
         continue;
       }
-      heard = now;
+      received_at = now;
       command = follow(**state, now);
     }
     (void)usb_->exchange({}, kFramePatience);  // without force, lights out

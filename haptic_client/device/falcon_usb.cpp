@@ -295,9 +295,9 @@ Result<bool> FalconUsb::runs(milliseconds patience) {
   const auto deadline = Clock::now() + patience;
   do {
     // Without force or homing: a frame that firmware in any state may receive.
-    const Result<std::optional<FalconState>> heard = exchange({}, kAnswerPatience);
-    if (!heard) return tl::unexpected(heard.error());
-    if (heard->has_value()) return true;
+    const Result<std::optional<FalconState>> state = exchange({}, kAnswerPatience);
+    if (!state) return tl::unexpected(state.error());
+    if (state->has_value()) return true;
   } while (Clock::now() < deadline);
   return false;
 }
@@ -313,18 +313,18 @@ Result<void> FalconUsb::load(std::span<const std::uint8_t> image) {
     std::array<std::uint8_t, kFalconGreetingAnswer.size() + 1> answer{};
     const Result<std::size_t> size = wire.receive(answer, kAnswerPatience);
     if (!size) return tl::unexpected(size.error());
-    const auto heard = std::span(answer).first(*size);
-    const auto said = heard.subspan(!heard.empty() && heard[0] == 0 ? 1 : 0);
-    greeted = std::equal(said.begin(), said.end(), kFalconGreetingAnswer.begin(), kFalconGreetingAnswer.end());
+    const auto bytes = std::span(answer).first(*size);
+    const auto reply = bytes.subspan(!bytes.empty() && bytes[0] == 0 ? 1 : 0);
+    greeted = std::equal(reply.begin(), reply.end(), kFalconGreetingAnswer.begin(), kFalconGreetingAnswer.end());
   }
   if (!greeted) return unavailable(std::string("the Falcon's boot loader does not answer; ") + kReplug);
 
   if (Result<void> set = wire.set(falcon_loading_settings()); !set) return set;
   if (Result<void> sent = wire.send(std::span(&kFalconReady, 1)); !sent) return sent;
   std::uint8_t ready = 0;
-  const Result<std::size_t> heard = wire.receive(std::span(&ready, 1), kEchoPatience);
-  if (!heard) return tl::unexpected(heard.error());
-  if (*heard != 1 || ready != kFalconReady)
+  const Result<std::size_t> echoed = wire.receive(std::span(&ready, 1), kEchoPatience);
+  if (!echoed) return tl::unexpected(echoed.error());
+  if (*echoed != 1 || ready != kFalconReady)
     return unavailable(std::string("the Falcon is not ready for its firmware; ") + kReplug);
 
   for (std::size_t at = 0; at < image.size(); at += kFalconPiece) {

@@ -11,7 +11,7 @@ namespace {
 using Time = std::chrono::nanoseconds;
 using namespace std::chrono_literals;
 
-constexpr int kMostInAEntry = 64;  // datagrams received before one is sent
+constexpr int kMostInARow = 64;  // datagrams received before one is sent
 constexpr Time kLongestWait = 100ms;
 
 // The clock of all links of this process.
@@ -139,7 +139,7 @@ void FastPath::run() {
     {
       const std::lock_guard lock(mutex_);
       if (end_) return;
-      for (int i = 0; i < kMostInAEntry; ++i) {
+      for (int i = 0; i < kMostInARow; ++i) {
         const std::optional<Datagram> datagram = port_->receive(buffer);
         if (!datagram) break;
         link_.receive(datagram->bytes, now_of_links());

@@ -68,13 +68,13 @@ struct WordsSaid {
 struct RoomCallbacks {
   std::function<void(const FieldLeaf& leaf)> leaf{};
   std::function<void(const RoomAtJoin& room)> complete{};
-  std::function<void(RoomSeq place, const Cut& cut)> committed{};  // of anybody, including the caller
+  std::function<void(RoomSeq room_seq, const Cut& cut)> committed{};  // of anybody, including the caller
   // For the caller's cut. What the caller cut on top of it is dropped too. `lease_epoch` is that of the caller's lease
   // from now on.
-  std::function<void(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)>
+  std::function<void(RoomSeq room_seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)>
       rejected{};
   std::function<void(BonePart&& part)> change{};
-  std::function<void(RoomSeq place, const std::vector<SceneItem>& items)> scene{};  // all items from now on
+  std::function<void(RoomSeq room_seq, const std::vector<SceneItem>& items)> scene{};  // all items from now on
   // Called once with each `complete`, just before or after it, and at every change of restrictions.
   std::function<void(const HandSupervised& decided)> supervised{};
   std::function<void(const WordsSaid& said)> said{};
@@ -87,7 +87,7 @@ struct RoomCallbacks {
   // Pose of the bone on its mount, in a room that has one: the newest, outside the order of events. Called from another
   // thread, one call at a time. Its numbers begin anew after `interrupted`. It must not wait.
   std::function<void(const MountPose& seen)> bone{};
-  std::function<void(RoomSeq place)> noted{};  // a tool was added, somebody joined, a mark was set
+  std::function<void(RoomSeq room_seq)> noted{};  // a tool was added, somebody joined, a mark was set
   std::function<void(const Error& why)> interrupted{};
   std::function<void(const Error& why)> lost{};  // for good: the room is over, or no longer knows this client
 };

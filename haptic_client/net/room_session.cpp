@@ -216,8 +216,8 @@ struct RoomSession::Impl {
   std::shared_ptr<FastPath> fast;  // of the present stream; held by those who use it at the moment
 
   // Sequence number of the newest event that was passed on, over the present stream.
-  std::atomic<std::uint64_t> heard{0};
-  std::atomic<bool> heard_leaves{false};  // no datagram acknowledges the leaves
+  std::atomic<std::uint64_t> passed_on{0};
+  std::atomic<bool> received_leaves{false};  // no datagram acknowledges the leaves
 
   mutable std::mutex mutex;
   std::condition_variable wake;
@@ -239,12 +239,12 @@ void RoomSession::Impl::write(Line& open) {
   std::optional<Cut> cut;
   std::optional<CuttingState> state;
   std::optional<MountLoad> push_now;
-  std::uint64_t told = 0;
-  auto tell_at = std::chrono::steady_clock::now();
+  std::uint64_t acknowledged = 0;
+  auto acknowledge_at = std::chrono::steady_clock::now();
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait_until(lock, tell_at, [&] {
+      wake.wait_until(lock, acknowledge_at, [&] {
         return underway.something_to_send() || push || closing || over || line != &open || redial;
       });
       // A draining server decides what it has received and no more. The rest is sent when the session continues.
@@ -260,11 +260,11 @@ void RoomSession::Impl::write(Line& open) {
     }
     const std::shared_ptr<FastPath> path = fast_path();
     // Datagrams themselves acknowledge the received log entries.
-    if (const auto now = std::chrono::steady_clock::now(); now >= tell_at) {
-      tell_at = now + kAcknowledgeEvery;
-      const bool leaves = heard_leaves.exchange(false);
-      if (const std::uint64_t place = heard; place != told && (leaves || !(path && path->health().alive))) {
-        request.mutable_acknowledged()->set_room_seq(told = place);
+    if (const auto now = std::chrono::steady_clock::now(); now >= acknowledge_at) {
+      acknowledge_at = now + kAcknowledgeEvery;
+      const bool leaves = received_leaves.exchange(false);
+      if (const std::uint64_t newest = passed_on; newest != acknowledged && (leaves || !(path && path->health().alive))) {
+        request.mutable_acknowledged()->set_room_seq(acknowledged = newest);
         if (written = open.stream->Write(request); !written) break;
       }
     }
@@ -315,7 +315,7 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                           [this](wire::IndexedEntry entry) {
                             const std::lock_guard lock(read_mutex);
                             (void)reader->take(std::move(entry));
-                            heard = reader->place().value;
+                            passed_on = reader->place().value;
                           },
                       .dead =
                           [this] {
@@ -358,8 +358,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   {
     const std::lock_guard lock(read_mutex);
     reader->begin();
-    heard = 0;
-    heard_leaves = false;
+    passed_on = 0;
+    received_leaves = false;
   }
   offer.reset();
   redial_why.clear();
@@ -378,8 +378,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       follow(response);
       const bool complete = response.has_complete();
       Result<void> taken = reader->take(std::move(response));
-      heard = reader->place().value;
-      if (complete) heard_leaves = true;
+      passed_on = reader->place().value;
+      if (complete) received_leaves = true;
       return taken;
     }();
     if (!delivered) {

@@ -80,17 +80,17 @@ void SessionReader::supervised(const HandSupervised& decided) {
   if (events_.supervised) events_.supervised(decided);
 }
 
-void SessionReader::committed(RoomSeq place, const Cut& cut) {
-  place_ = std::max(place_, place);
+void SessionReader::committed(RoomSeq seq, const Cut& cut) {
+  place_ = std::max(place_, seq);
   if (cut.author == own_) decided_(cut.author_seq);
-  if (events_.committed) events_.committed(place, cut);
+  if (events_.committed) events_.committed(seq, cut);
 }
 
-void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch,
+void SessionReader::rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch,
                              const std::string& reason) {
-  place_ = std::max(place_, place);
+  place_ = std::max(place_, seq);
   decided_(author_seq);
-  if (events_.rejected) events_.rejected(place, author_seq, lease_epoch, reason);
+  if (events_.rejected) events_.rejected(seq, author_seq, lease_epoch, reason);
 }
 
 Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
@@ -115,7 +115,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const v1::FieldComplete& entry = response.complete();
       complete_(entry.decided_author_seq());
       RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(), entry.decided_author_seq()};
-      for (const std::uint64_t place : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{place});
+      for (const std::uint64_t seq : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{seq});
       if (events_.complete) events_.complete(room);
       place_ = std::max(place_, RoomSeq{entry.room_seq()});
       // Nothing was sent about this hand: the restrictions of an earlier stream are over.

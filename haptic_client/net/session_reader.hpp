@@ -48,9 +48,9 @@ class SessionReader {
   [[nodiscard]] Result<void> deliver(const v1::SessionResponse& response);
   [[nodiscard]] Result<void> deliver(const wire::SessionEntry& entry);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
-  void committed(RoomSeq place, const Cut& cut);
+  void committed(RoomSeq seq, const Cut& cut);
   void supervised(const HandSupervised& decided);
-  void rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
+  void rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
 
   const AuthorId own_;
   const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
