@@ -212,15 +212,15 @@ Result<void> run(const Options& options, const StopSignal& stop) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Makes the tools of a room heard: the drill's sound follows speed, load and bone density.", kProgram);
+  CLI::App app("Plays the sound of a room's tools: it follows speed, load and bone density.", kProgram);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
   app.add_option("--name", options.name, "Who you are, shown to others")->capture_default_str();
   wire::add_credential_options(app, options.credentials);
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
-  app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");
-  app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state came and when it sounded");
+  app.add_option("--wav", options.wav_file, "Record the sound: 48 kHz, 16 bit, mono");
+  app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state was received and when it was played");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
       ->check(CLI::Range(0.0, 3600.0))

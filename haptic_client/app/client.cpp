@@ -381,7 +381,7 @@ class Client {
     const auto now = Clock::now();
     if (stall_reported_at_ && now - *stall_reported_at_ < 5s) return;
     stall_reported_at_ = now;
-    log::warn("the haptic loop stands", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
+    log::warn("the haptic loop has stalled", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
   }
 
   void replica_thread() {
@@ -446,7 +446,7 @@ class Client {
   void take(const Interrupted& interrupted) {
     // Contact continues with the present bone. The received leaves replace it all at once, so that no bone is missing
     // in between.
-    if (joined_ && !interrupted_) log::warn("the line to the server is interrupted", {{"reason", interrupted.why}});
+    if (joined_ && !interrupted_) log::warn("the connection to the server is interrupted", {{"reason", interrupted.why}});
     interrupted_ = joined_;
     renewed_.clear();
     // Before joining, the received bone may have been restored since: begin anew.
@@ -459,7 +459,7 @@ class Client {
     changing_ = interrupted_ = false;
     renewed_ = {};
     ++outcome_.interruptions;
-    log::info("the line to the server stands again",
+    log::info("the connection to the server is restored",
               {{"room_seq", room.contained.value}, {"unconfirmed_cuts", replica_.unconfirmed()}});
   }
   void take(const RoomAtJoin& room) {
@@ -495,7 +495,7 @@ class Client {
     if (words.empty() && !supervised_) return;
     supervised_ = !words.empty();
     const std::string what = words.empty() ? "free" : words, by = called(decided.by);
-    log::info("an instructor decides",
+    log::info("an instructor changed the restrictions",
               {{"room_seq", decided.place.value}, {"what", what}, {"by", by}, {"words", decided.supervision.words}});
     outcome_.restrictions.push_back({ns(Clock::now()), decided.place.value, what, by});
     guard_ = words.empty() ? "" : by;
@@ -573,7 +573,7 @@ class Client {
     if (health == RoomHealth::lost && link_ok_)
       give_up({ErrorCode::unavailable,
                interrupted_
-                   ? "the line to the server has not come back; see whether osteon-server still runs and can be reached"
+                   ? "the connection to the server was not restored; see whether osteon-server still runs and can be reached"
                    : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
                          " cuts; see whether it runs and can be reached"});
   }
@@ -651,7 +651,7 @@ class Client {
       item.turns = left.turns;
       const Result<std::uint32_t> set = room_.set_item(item);
       if (!set && set.error().code == ErrorCode::denied) {  // a stopped person places nothing until the stop is over
-        log::warn("an item waits", {{"because", set.error().message}});
+        log::warn("an item cannot be placed yet", {{"because", set.error().message}});
         items_from_ = Clock::now() + 2s;
         return;
       }
@@ -676,7 +676,7 @@ class Client {
     const LoopReport& r = row.report;
     const bool forbidden = (r.events & kForbidden) != 0, led = (r.events & kHandGuided) != 0;
     if (forbidden != was_forbidden_) loop_notes_.push_back({row.mono_ns, 0, forbidden ? "may not cut" : "may cut"});
-    if (led != was_led_) loop_notes_.push_back({row.mono_ns, 0, led ? "is led" : "is led no more"});
+    if (led != was_led_) loop_notes_.push_back({row.mono_ns, 0, led ? "is led" : "is no longer led"});
     was_forbidden_ = forbidden;
     was_led_ = led;
     outcome_.forbidden_ticks += forbidden;

@@ -283,7 +283,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   const std::string field = outcome->field_hash ? to_hex(*outcome->field_hash).substr(0, 12) : "unknown";
   std::string unconfirmed;
   if (outcome->unconfirmed > 0)
-    unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in what follows)";
+    unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in the following figures)";
   std::printf(
       "%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
       "field %s at %llu; %llu of %llu ms missed\n",
@@ -319,8 +319,8 @@ int main(int argc, char** argv) {
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, options.credentials);
   app.add_option("--name", options.room.name,
-                 "How others in the room see you called; over plain text also who you are, so that without it nobody "
-                 "is you again");
+                 "Your name for others in the room; over plain text it is also your identity, which is new each time "
+                 "without it");
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");
@@ -335,7 +335,7 @@ int main(int argc, char** argv) {
       "Your hand: from where you look, front (unless said otherwise), back, left, right, top or bottom of the "
       "patient, or the direction x,y,z");
   app.add_option("--at", options.hand.at,
-                 "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
+                 "Your hand: the point x,y,z in mm above which the tool begins; by default the bone's middle");
   app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
   app.add_option(
       "--law", options.hand.law,
@@ -348,13 +348,13 @@ int main(int argc, char** argv) {
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option(
       "--record", options.client.record,
-      "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A "
-      "file that is there is left alone");
+      "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. "
+      "An existing file is not overwritten");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
   app.add_option(
       "--udp", options.room.fast_path,
-      "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server says");
+      "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server names");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")->capture_default_str();
   app.add_flag("--status", options.client.status, "A short line on standard output each second");

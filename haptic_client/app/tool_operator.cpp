@@ -18,7 +18,7 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, Devi
     choice.simulated_ = *simulated;
     if (options.plan.empty())
       return failure(ErrorCode::invalid_input, "--device " + options.device +
-                                                   " has a hand of our own making, which needs a --plan; name a device "
+                                                   " has a simulated hand, which needs a --plan; name a device "
                                                    "for your own hand (osteon-haptic devices lists them) or give one");
   } else {
     Result<std::unique_ptr<CombinedDevice>> device = make_devices(options.device, options.devices);
@@ -118,7 +118,7 @@ Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBo
       return tl::unexpected(played.error());
     if (recorded_->session().start_hash.empty())
       log::warn("the recording does not say what bone it began on",
-                {{"remedy", "see that the room's is as it was then"}});
+                {{"remedy", "make sure that the room's bone is in the same state as then"}});
     // The recorded hand reacted to a certain force; another force would not match it.
     if (force_scale == 0.0) force_scale = recorded_->session().force_scale;
   }

@@ -73,7 +73,7 @@ Result<Vec3> read_point(std::string_view text, std::string_view option) {
   Vec3 v;
   if (!read_numbers(text, v))
     return failure(ErrorCode::invalid_input,
-                   std::string(option) + " must be a place x,y,z in millimetres, not \"" + std::string(text) + '"');
+                   std::string(option) + " must be a point x,y,z in millimetres, not \"" + std::string(text) + '"');
   return v;
 }
 

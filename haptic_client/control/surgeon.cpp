@@ -278,18 +278,18 @@ Digest plan_digest(const ReadyPlan& plan) {
 const char* given_up_words(SurgeonPhase phase) {
   switch (phase) {
     case SurgeonPhase::take_up:
-      return "the bone round the tool was not known in time; look at the server's log";
+      return "the bone around the tool was not known in time; look at the server's log";
     case SurgeonPhase::spin_up:
       return "the spindle did not come up to its speed";
     case SurgeonPhase::seek:
-      return "the tool did not meet the bone; look whether something is in its way";
+      return "the tool did not meet the bone; check whether something is in its way";
     case SurgeonPhase::push:
       return "the bone did not give way; press harder (\"push_n\"), or take another tool or a sharper one";
     case SurgeonPhase::feed:
-      return "the tool did not come as deep as asked; feed it more slowly (\"feed_mm_per_s\"), or take a device that "
+      return "the tool did not reach the wanted depth; feed it more slowly (\"feed_mm_per_s\"), or take a device that "
              "shows more force";
     case SurgeonPhase::sweep:
-      return "the bur did not come as deep as asked; take a sharper one, or hold it more stiffly "
+      return "the bur did not reach the wanted depth; take a sharper one, or hold it more stiffly "
              "(\"hand_stiffness_n_per_mm\")";
     case SurgeonPhase::retract:
       return "the tool did not come out of the bone";

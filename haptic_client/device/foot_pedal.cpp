@@ -105,13 +105,13 @@ class FootPedal final : public HapticDevice {
   Result<void> tend() override { return reader_.health(); }
   [[nodiscard]] std::string advice() const override {
     if (armed_) return "";
-    if (!elsewhere_) return "let the foot pedal go once; until then it turns nothing";
+    if (!elsewhere_) return "release the foot pedal once; until then the spindle does not turn";
     return std::string(
-               "the foot pedal was down when it was first heard of and turns nothing; if nobody pressed it, it rests "
+               "the foot pedal was down at its first reading, so the spindle does not turn; if nobody pressed it, it rests "
                "at "
                "the other end of its axis: ") +
            (options_.axis.inverted ? "leave out \"inverted\"" : "name it pedal-axis:inverted") +
-           "; else let it go and plug it in again";
+           "; else release it and plug it in again";
   }
 
   DeviceReading read() noexcept override { return exchange_.read(); }

@@ -191,7 +191,7 @@ class OpenHaptics final : public HapticDevice {
         !sensible(limits_.workspace_radius_mm, 2000.0))
       return failure(
           ErrorCode::unsupported,
-          "the PHANToM \"" + info_.model + "\" does not tell its force, stiffness and workspace; update its driver");
+          "the PHANToM \"" + info_.model + "\" does not report its force, stiffness and workspace; update its driver");
     // For a device that does not report its continuous force, a quarter of its peak is assumed. [A]
     if (!sensible(limits_.continuous_n, limits_.peak_n)) limits_.continuous_n = 0.25 * limits_.peak_n;
     return {};
@@ -244,7 +244,7 @@ class OpenHaptics final : public HapticDevice {
     else if (state == hd::kNeedsManual)
       advice_ = "hold the PHANToM's arms at right angles, as in its manual, and press the front button";
     else
-      advice_ = "move the PHANToM's handle slowly until it has found its place";
+      advice_ = "move the PHANToM's handle slowly until it has found its position";
     calibrated_ = state == hd::kCalibrated;
   }
 

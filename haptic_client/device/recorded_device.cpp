@@ -323,7 +323,7 @@ Result<void> check_played_on(const RecordedDevice& recorded, std::string_view fi
   return failure(ErrorCode::invalid_input,
                  "--device " + std::string(recorded.name()) + " began on bone in another state (field " +
                      began_on.substr(0, 12) + ") than the room's (field " + std::string(field_hash.substr(0, 12)) +
-                     "); start osteon-server anew on the case, or with the --resume that it then had");
+                     "); restart osteon-server on the case, or with the --resume that it had then");
 }
 
 Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file) {

@@ -39,7 +39,7 @@ constexpr auto kCaseSilence = 60s;                         // a whole case takes
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
   return {ErrorCode::internal,
-          "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
+          "cannot store the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
 }
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {
@@ -131,7 +131,7 @@ Result<void> fetch_tools(const wire::JoinedRoom& room, ToolBox& tools) {
   constexpr auto kPatience = 10s;
   const auto stub = v1::RoomService::NewStub(room.channel);
   const auto lost = [](const grpc::Status& status) {
-    return failure(ErrorCode::unavailable, "the server does not say which tools it has: " + status.error_message() +
+    return failure(ErrorCode::unavailable, "the server does not list its tools: " + status.error_message() +
                                                "; see whether osteon-server still runs");
   };
   v1::ListToolsRequest list;
@@ -384,7 +384,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     }();
     if (!delivered) {
       broken =
-          Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
+          Error{delivered.error().code, "the server sent an invalid message: " + delivered.error().message};
       open.context.TryCancel();
     }
   }

@@ -183,7 +183,7 @@ TEST(Recording, BeganOnBoneInOneState) {
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message,
               testing::HasSubstr("a.h5 began on bone in another state (field aaaaaaaaaaaa) than the "
-                                 "room's (field bbbbbbbbbbbb); start osteon-server anew"));
+                                 "room's (field bbbbbbbbbbbb); restart osteon-server"));
   const auto done = python(
       "import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
       "assert f['metadata/field_hash_at_start'].attrs['meaning']\n"
