@@ -1,5 +1,5 @@
-// The bone on its compliant mount as the user of one haptic client feels it. It takes the poses received from the room,
-// moves the bone by the loop's last force, and makes the loads to be sent. Without a mount in the room nothing is
+// The bone on its compliant mount as the user of one haptic client feels it. It takes the poses received from the room.
+// It moves the bone by the loop's last force, and makes the loads to be sent. Without a mount in the room nothing is
 // received, and the bone rests.
 #pragma once
 #include <cstdint>

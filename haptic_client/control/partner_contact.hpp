@@ -1,6 +1,6 @@
 // Contact of tool with tool: the force of a partner's tool on the tool in hand where both touch. The partner's pose
-// arrives late and a few times a second. The surface points of the own tool are tested against the solid of the
-// partner's tool, and a spring pushes them out of it:
+// arrives late and a few times a second. Surface points of the own tool are tested against the solid of the partner's
+// tool. A spring pushes them out of it:
 //
 //   F = k d + b v,  never pulling, at most most_n        d: deepest point; v: its own speed inwards
 //

@@ -412,8 +412,8 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
   query.direction_bone = direction;
   query.least_facing = model.least_facing;
   query.strength = &model.strength;
-  // Tests from the inset point along the direction to a quarter pitch ahead of the face, never beyond the wall of the
-  // tool's own hole. Sides that cut but hardly face forward are tested in front of their own face.
+  // Tests from the inset point along the direction to a quarter pitch ahead of the face. This is never beyond the wall
+  // of the tool's own hole. Sides that cut but hardly face forward are tested in front of their own face.
   const double ahead_mm = 0.25 * model.fine_pitch_mm;
   if (model.tool.kind == ToolKind::broach) {
     query.lift_mm = model.inset + ahead_mm;

@@ -13,7 +13,7 @@ struct SessionTick {
   LoopReport report;
 };
 
-// Moves the handle by whoever holds it, tick by tick, and runs the loop.
+// A session of one tool operator. In each tick the operator moves the handle, and the loop responds.
 class Session {
  public:
   virtual ~Session() = default;

@@ -1,10 +1,11 @@
 // Names in a recording, which haptic_client/app writes and the recorded device and h5py read.
 //
-// The groups are those of the recordings of FIVRS, the volumetric drilling simulator on AMBF (github.com/
-// LCSR-SICKKIDS/volumetric_drilling, its recording script and the description of its format): `metadata`, `data`,
-// `high_frequency_poses`, `drill_force_feedback`, `burr_change`. Each sample has its `time_stamp`. Poses are [x, y, z,
-// qx, qy, qz, qw], wrenches are [fx, fy, fz, tx, ty, tz]. Unlike there, lengths are millimetres. Every array names its
-// unit and its frame. The room's journal contains the removed bone, so there is no `voxels_removed`.
+// The groups are those of the recordings of FIVRS, the volumetric drilling simulator on AMBF. Source:
+// github.com/LCSR-SICKKIDS/volumetric_drilling, its recording script and the description of its format. The groups are
+// `metadata`, `data`, `high_frequency_poses`, `drill_force_feedback`, `burr_change`. Each sample has its `time_stamp`.
+// Poses are [x, y, z, qx, qy, qz, qw], wrenches are [fx, fy, fz, tx, ty, tz]. Unlike there, lengths are millimetres.
+// Every array names its unit and its frame. The room's journal contains the removed bone, so there is no
+// `voxels_removed`.
 #pragma once
 
 namespace osteon::haptic::recording {
