@@ -12,23 +12,11 @@ crypto_hash_sha256_state* sodium_state(std::array<std::byte, 128>& storage) {
   return reinterpret_cast<crypto_hash_sha256_state*>(storage.data());
 }
 
-int nibble(char c) {
-  if (c >= '0' && c <= '9') return c - '0';
-  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-  return -1;
-}
-
 }  // namespace
 
 std::string to_hex(const Digest& digest) {
-  static constexpr char kDigits[] = "0123456789abcdef";
-  std::string hex;
-  hex.reserve(2 * digest.bytes.size());
-  for (const std::uint8_t byte : digest.bytes) {
-    hex += kDigits[byte >> 4];
-    hex += kDigits[byte & 15];
-  }
-  return hex;
+  char hex[2 * sizeof digest.bytes + 1];
+  return sodium_bin2hex(hex, sizeof hex, digest.bytes.data(), digest.bytes.size());
 }
 
 Result<Digest> digest_from_hex(std::string_view hex) {
@@ -36,12 +24,11 @@ Result<Digest> digest_from_hex(std::string_view hex) {
   if (hex.size() != 2 * digest.bytes.size())
     return failure(ErrorCode::invalid_input,
                    "a hash needs 64 hexadecimal digits, this has " + std::to_string(hex.size()));
-  for (std::size_t i = 0; i < digest.bytes.size(); ++i) {
-    const int high = nibble(hex[2 * i]);
-    const int low = nibble(hex[2 * i + 1]);
-    if (high < 0 || low < 0) return failure(ErrorCode::invalid_input, "a hash has only the digits 0-9 and a-f");
-    digest.bytes[i] = static_cast<std::uint8_t>(16 * high + low);
-  }
+  // libsodium also takes capitals. One digest has one text.
+  const bool is_hex = sodium_hex2bin(digest.bytes.data(), digest.bytes.size(), hex.data(), hex.size(), nullptr, nullptr,
+                                     nullptr) == 0;
+  if (!is_hex || to_hex(digest) != hex)
+    return failure(ErrorCode::invalid_input, "a hash has only the digits 0-9 and a-f");
   return digest;
 }
 

@@ -29,12 +29,4 @@ using NewtonsPerMillimetre = Quantity<struct NewtonPerMillimetreTag>;
 using GramsPerCm3 = Quantity<struct GramPerCm3Tag>;
 using RevolutionsPerMinute = Quantity<struct RpmTag>;
 
-inline namespace literals {
-constexpr Millimetres operator""_mm(long double v) { return Millimetres{static_cast<double>(v)}; }
-constexpr Seconds operator""_s(long double v) { return Seconds{static_cast<double>(v)}; }
-constexpr Newtons operator""_N(long double v) { return Newtons{static_cast<double>(v)}; }
-constexpr GramsPerCm3 operator""_g_cm3(long double v) { return GramsPerCm3{static_cast<double>(v)}; }
-constexpr RevolutionsPerMinute operator""_rpm(long double v) { return RevolutionsPerMinute{static_cast<double>(v)}; }
-}  // namespace literals
-
 }  // namespace osteon

@@ -1,6 +1,9 @@
-// The start of every program's main: its arguments, or what to say of them.
+// Command lines of all programs: parsing, --version, and help that fits a terminal.
 #pragma once
+#include <cstddef>
 #include <optional>
+#include <string>
+#include <string_view>
 
 namespace CLI {  // NOLINT(readability-identifier-naming): the library's
 class App;
@@ -8,8 +11,14 @@ class App;
 
 namespace osteon {
 
-// Parses into what `app` was told of. An exit code when main must return at once: 0 after printing the help that was
-// asked for, 1 after one sentence on what is wrong with the arguments.
+inline constexpr std::size_t kHelpColumns = 100;  // widest line of a help text, characters
+
+// Parses the arguments into what `app` was given, which has --help and --version afterwards. Returns an exit code where
+// main must return at once: 0 after it has printed the help or the version, 1 after one sentence on what is wrong.
 [[nodiscard]] std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv);
+
+// `text` broken at blanks into lines of at most `columns` characters. Each line but the first begins with `indent`
+// blanks; the first has `used` columns in front of it already. Line breaks in `text` stay.
+[[nodiscard]] std::string wrapped(std::string_view text, std::size_t columns, std::size_t indent, std::size_t used);
 
 }  // namespace osteon

@@ -46,11 +46,11 @@ class ClientLink {
 
   // Anything may come.
   void receive(std::span<const std::uint8_t> datagram, Time now);
-  // The stream's copy of a entry. False: it has come before, or is too far ahead of what was taken.
+  // The stream's copy of an entry. False: it has come before, or is too far ahead of what was taken.
   bool offer(const IndexedEntry& entry) { return entries_.offer(entry.index, entry.entry); }
   // The stream has brought this entry, and before it all that had not been taken here: none of them comes out any more.
   void heard(std::uint64_t index) { entries_.skip(index); }
-  // Rows in order of their index, each once. A entry of kind streamed comes only after its copy was offered.
+  // Rows in order of their index, each once. An entry of kind streamed comes only after its copy was offered.
   [[nodiscard]] std::optional<IndexedEntry> take_entry();
 
   // When send() has something, at `now` or later; to be asked anew after any other call.

@@ -4,11 +4,11 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <charconv>
 #include <fstream>
 #include <system_error>
 
 #include "common/wire/certificate_files.hpp"
+#include "common/wire/host_port.hpp"
 
 namespace osteon::wire {
 namespace {
@@ -60,20 +60,6 @@ Result<ClientCredentials> client_credentials(const CredentialArguments& argument
   if (const Result<ProbeFiles> files = read_certificate_files(credentials.certificates); !files)
     return tl::unexpected(files.error());
   return credentials;
-}
-
-bool is_loopback(const std::string& host) {
-  if (host == "localhost" || host == "[::1]") return true;
-  // Four numbers: a name or a longer text is not taken for an address.
-  int parts[4] = {};
-  const char *at = host.data(), *last = at + host.size();
-  for (int i = 0; i < 4; ++i) {
-    const auto [end, error] = std::from_chars(at, last, parts[i]);
-    if (error != std::errc{} || parts[i] < 0 || parts[i] > 255) return false;
-    at = end;
-    if (i < 3 && (at == last || *at++ != '.')) return false;
-  }
-  return at == last && parts[0] == 127;
 }
 
 Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const ClientCredentials& credentials,

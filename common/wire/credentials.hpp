@@ -32,8 +32,6 @@ void add_credential_options(CLI::App& app, CredentialArguments& arguments);
 // sentence says what to give.
 [[nodiscard]] Result<ClientCredentials> client_credentials(const CredentialArguments& arguments);
 
-// Whether only this machine is reached there: localhost, [::1] or four numbers that begin with 127.
-[[nodiscard]] bool is_loopback(const std::string& host);
 // Errors: those of read_certificate_files, invalid_input (plain text to `address`, HOST:PORT, of another machine).
 [[nodiscard]] Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(
     const ClientCredentials& credentials, const std::string& address);

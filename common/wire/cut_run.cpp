@@ -218,7 +218,7 @@ Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNum
   return state;
 }
 
-// The item of a entry that is no cut is a piece of a packet by itself.
+// The item of an entry that is no cut is a piece of a packet by itself.
 SendItem piece_of(const SessionEntry& entry, std::uint64_t index) {
   v1::DownPacket packet;
   if (entry.kind == SessionEntryKind::rejected) {

@@ -81,7 +81,7 @@ struct SessionEntry {
   friend bool operator==(const SessionEntry&, const SessionEntry&) = default;
 };
 
-// The same of a entry of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream
+// The same of an entry of any kind; a supervision of many tools, or of somebody with a long name, goes over the stream
 // too.
 inline constexpr std::size_t kMostToolsInPacket = 8, kMostNameInPacket = 64;
 [[nodiscard]] inline bool fits_a_packet(const SessionEntry& entry) {

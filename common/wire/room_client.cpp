@@ -13,6 +13,7 @@
 #include "common/field/kernel.hpp"
 #include "common/wire/connection_fault.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/host_port.hpp"
 #include "osteon/v1/room.grpc.pb.h"
 
 namespace osteon::wire {
@@ -28,7 +29,7 @@ constexpr auto kAgainTime = 1s;                    // for one attempt to come ba
 constexpr int kConnectMs = 3000;
 // A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server
 // allows pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the
-// bone: it waits longer than its RoomWatch does.
+// bone: it waits longer than its ConfirmationMonitor does.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
 // The room that a channel's calls are to: empty, the only one that is open.
@@ -99,13 +100,9 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address,
   return grpc::experimental::CreateCustomChannelWithInterceptors(address, tls, arguments, std::move(namers));
 }
 
-bool is_host_port(const std::string& address) {
-  const std::size_t colon = address.rfind(':');
-  if (colon == std::string::npos || colon == 0 || address.find('/') != std::string::npos) return false;
-  const std::string port = address.substr(colon + 1);
-  return !port.empty() && port.size() <= 5 &&
-         std::all_of(port.begin(), port.end(), [](char c) { return c >= '0' && c <= '9'; }) && std::stoi(port) > 0 &&
-         std::stoi(port) <= 65535;
+bool can_be_reached(const std::string& address) {
+  const Result<HostPort> at = parse_host_port(address, "--server");
+  return at && at->port > 0 && address.find('/') == std::string::npos;
 }
 
 // gRPC's words for an answer in HTTP alone, of a proxy or of a server that knows no gRPC.
@@ -144,7 +141,7 @@ Error error_of(const grpc::Status& status, const std::string& server) {
 Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room,
                                              ClientKind kind, std::chrono::milliseconds patience,
                                              const std::function<bool()>& stop, const ClientCredentials& credentials) {
-  if (!is_host_port(address))
+  if (!can_be_reached(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as " +
                                                  "127.0.0.1:50151, without http:// and without a path");

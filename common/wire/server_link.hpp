@@ -48,7 +48,7 @@ class ServerLink {
   // kind streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every
   // entry above acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const IndexedEntry& entry);
-  // A entry that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which
+  // An entry that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which
   // raises the lease too. It is pushed, unless `index` is 0: it has no number, having been among what the client was
   // sent first.
   bool tell(std::uint64_t index, const SessionEntry& entry);

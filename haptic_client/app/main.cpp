@@ -17,6 +17,7 @@
 #include "haptic_client/app/client.hpp"
 #include "haptic_client/app/devices_command.hpp"
 #include "haptic_client/app/laws_command.hpp"
+#include "haptic_client/app/plan_command.hpp"
 #include "haptic_client/app/tool_operator.hpp"
 
 namespace {
@@ -308,12 +309,11 @@ int main(int argc, char** argv) {
     return run_check(argc - 1, argv + 1);
   if (argc > 1 && std::string_view(argv[1]) == "laws") return run_laws(argc - 1, argv + 1);
   if (argc > 1 && std::string_view(argv[1]) == "devices") return run_devices(argc - 1, argv + 1);
+  if (argc > 1 && std::string_view(argv[1]) == "plan") return run_plan(argc - 1, argv + 1);
   Options options;
   CLI::App app(
       "Feels and cuts the bone of a room at 1 kHz: with your hand at a haptic device, or with a simulated one that "
-      "carries out a "
-      "plan. "
-      "Other commands: check, devices, laws (each with --help).",
+      "carries out a plan. Other commands: check, devices, laws, plan (each with --help).",
       kProgram);
   app.add_option("--server", options.room.address, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");

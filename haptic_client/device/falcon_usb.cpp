@@ -217,7 +217,6 @@ FalconUsb& FalconUsb::operator=(FalconUsb&&) noexcept = default;
 FalconUsb::~FalconUsb() = default;
 
 const std::string& FalconUsb::serial() const noexcept { return wire_->serial; }
-std::uint64_t FalconUsb::broken_frames() const noexcept { return wire_->reader.broken(); }
 
 // Bypasses libusb, whose locks the crashed thread may hold. The kernel's own synchronous transfer is one system call,
 // which a handler may make. It queues behind transfers under way. The I/O thread may be submitting a frame between the

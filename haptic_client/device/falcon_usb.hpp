@@ -36,7 +36,6 @@ class FalconUsb {
   // unavailable (the device was disconnected or fails repeatedly).
   [[nodiscard]] Result<std::optional<FalconState>> exchange(const FalconCommand& command,
                                                             std::chrono::milliseconds patience);
-  [[nodiscard]] std::uint64_t broken_frames() const noexcept;
 
   // The last call, for a process that ends: sends a frame without force; after it none is sent. Any thread, even in a
   // signal handler, whatever the other calls are doing.

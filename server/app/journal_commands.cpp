@@ -206,13 +206,13 @@ Result<void> check_signatures(const VerifyReport& report, const Arguments& given
   const auto by = [&](const PublicKey& who) {
     return "by " + to_hex(who).substr(0, 16) + (who == key ? "" : ", an earlier or later key of this server");
   };
-  for (const SignedRange& one : vouched.entries) say("signed", entries_text(one.from, one.to) + " " + by(one.key));
+  for (const SignedRange& one : vouched.ranges) say("signed", entries_text(one.from, one.to) + " " + by(one.key));
   for (const SignedRange& one : vouched.by_others)
     say("not signed", entries_text(one.from, one.to) + " by this key, but by " + to_hex(one.key));
   for (const auto& [from, to] : vouched.by_nobody) say("not signed", entries_text(from, to) + " by anybody");
-  for (const std::string& entry : vouched.other_entries) say("not signed", entry + " by this server");
+  for (const std::string& entry : vouched.other_seals) say("not signed", entry + " by this server");
   if (vouched.all()) return {};
-  if (vouched.entries.empty() && vouched.entries == 0) say("not signed", "anything by this server");
+  if (vouched.ranges.empty() && vouched.seals == 0) say("not signed", "anything by this server");
   return failure(ErrorCode::invalid_input,
                  given.file.string() + " fits together, but the key " + to_hex(key).substr(0, 16) +
                      " does not vouch for all of it; give the key of the server that wrote it, or "

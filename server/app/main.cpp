@@ -403,7 +403,7 @@ int main(int argc, char** argv) {
                  "Folder with ca.pem, server.pem, server.key and tickets.pub, as deploy/certs makes it: clients come "
                  "with a certificate and a ticket");
   app.add_option("--proxy-socket", options.proxy_socket,
-                 "Unix socket at which a proxy on this machine brings calls; deploy/front-proxy.md");
+                 "Unix socket at which a proxy on this machine brings calls; deploy/docs/security.md");
   app.add_flag("--plain", options.plain,
                "Plain text, without certificates and tickets, for clients on this machine alone");
   app.add_option("--most-connections", options.most_connections,

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "common/runtime/files.hpp"
-#include "server/net/host_port.hpp"
+#include "common/wire/host_port.hpp"
 
 namespace osteon {
 namespace {

@@ -9,7 +9,7 @@
 namespace osteon {
 namespace {
 
-// Why the record cannot follow on the one before it. `line`: counted from 1.
+// Why the record cannot follow the one before it.
 std::optional<std::string> gap(const AuditRecord& record, const AuditReport& before) {
   const std::uint64_t due = before.last + 1;
   if (record.sequence > due)
@@ -35,14 +35,14 @@ class Verifier {
   }
   AuditReport finish(std::uint64_t rest) {
     if (rest > 0)
-      report_.notes.push_back("the last line is not whole, " + std::to_string(rest) +
-                              " bytes: its writer was ended or is at work; the server removes it");
+      report_.notes.push_back("the last line is incomplete, " + std::to_string(rest) +
+                              " bytes: its writer was killed or is still writing; the server removes it");
     if (!report_.sound()) return std::move(report_);
     if (report_.records == 0)
       report_.fault = "there is no record in it; a log has at least that of the server's start";
     else if (!starts_well())
       report_.fault = "line 1: all records before number " + std::to_string(report_.first) +
-                      " are missing, and no record says that they were removed after their time";
+                      " are missing, and no record says that they were removed because of their age";
     else if (expected_ && !found_)
       report_.fault = "no line has the hash " + to_hex(*expected_) + ": records are missing after line " +
                       std::to_string(lines_) + ", or it is another log's";
@@ -78,7 +78,7 @@ class Verifier {
   const std::optional<Digest>& expected_;
   AuditReport report_;
   AuditStart begins_;
-  std::vector<AuditStart> starts_;  // that retention records name
+  std::vector<AuditStart> starts_;  // those that retention records name
   std::uint64_t lines_ = 0;
   bool found_ = false;
 };

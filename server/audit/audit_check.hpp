@@ -1,4 +1,4 @@
-// Reads an audit log and says whether it is whole: "osteon-server audit verify" and "show".
+// Reads an audit log and reports whether it is complete and unchanged: "osteon-server audit verify" and "show".
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -14,26 +14,27 @@ namespace osteon {
 
 struct AuditReport {
   std::uint64_t records = 0, first = 0, last = 0;  // first, last: sequence numbers
-  Digest last_hash;                                // of the last line
-  std::optional<std::string> fault;  // names the first line that is not as it was written; nothing: all are
-  std::vector<std::string> notes;    // what is no fault of the log, one sentence each
+  Digest last_hash;  // of the last line
+  std::optional<std::string> fault;  // names the first line that is not as it was written; nothing: there is none
+  std::vector<std::string> notes;  // findings that are no fault of the log, one sentence each
   [[nodiscard]] bool sound() const { return !fault; }
 };
 
-// Nobody can see that records are missing at the end: the log before them was whole as well. `expected`, the hash of a
-// record as the system's log has it, shows that: it must be the hash of some line.
-// `trusts`: whether a key is the server's. Errors: those of Disk::read; invalid_input (it is no log).
+// The log alone cannot show that records are missing at its end, because the rest is still correct. `expected` can: it
+// is the hash of a record as the system's log has it, and must be the hash of some line.
+// `trusts`: whether a key is the server's. Errors: those of Disk::read; invalid_input (not an audit log).
 [[nodiscard]] Result<AuditReport> verify_audit(Disk& disk, const std::filesystem::path& file,
                                                const std::function<bool(const PublicKey&)>& trusts,
                                                const std::optional<Digest>& expected = {});
 
-// A record as people read it.
+// A record in the form that people read.
 struct AuditEntry {
   AuditRecord record;
-  AuditIdentity who;       // as far as it is known
-  bool is_erased = false;  // nobody knows any more whose pseudonym it is
+  AuditIdentity who;  // as far as it is known
+  bool is_erased = false;  // the person behind the pseudonym was erased
 };
-// All records in order. Returns how many lines are none: verify_audit() names the first. Errors as there.
+// Reads all records in order. Returns the number of lines that are not records; verify_audit() names the first. Errors
+// as there.
 [[nodiscard]] Result<std::size_t> read_audit(Disk& disk, const std::filesystem::path& file,
                                              const std::function<void(const AuditEntry&)>& take);
 

@@ -18,7 +18,7 @@ constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
 constexpr std::chrono::milliseconds kLockPatience{5000}, kLockEvery{5};
 constexpr std::string_view kBegins = "begins at ", kAfter = " after ";
 
-// Held by whoever changes the log or the people beside it. The file is made where it is missing.
+// The lock for changing the log or the people file beside it. Makes the lock's file if it is missing.
 Result<std::unique_ptr<DiskLock>> lock(Disk& disk, const fs::path& log) {
   const std::string name = log.filename().string();
   const fs::path file = folder_of(log) / (name.substr(0, name.find('.')) + ".lock");
@@ -73,7 +73,7 @@ Result<void> AuditLog::refresh() {
   const auto now = disk_->identity(file_);
   if (!now) return tl::unexpected(now.error());
   if (*now && seen_ && seen_->same_file(**now) && seen_->size == (*now)->size) return {};
-  // After a write that failed: the next one goes over what came of it.
+  // After a failed write: the next write overwrites what it left.
   if (*now && seen_ && seen_->same_file(**now) && (*now)->size > seen_->size && (*now)->size <= seen_->size + unsure_) {
     unsure_ = (*now)->size - seen_->size;
     return {};
@@ -86,7 +86,7 @@ Result<void> AuditLog::refresh() {
   return {};
 }
 
-// The next record follows on what this process has written, so "audit verify" finds the gap.
+// The next record continues what this process has written, so "audit verify" finds the gap.
 void AuditLog::warn_of_loss() const {
   log::error("records of the audit log were removed while this process uses it",
              {{"file", file_.string()}, {"last_sequence", sequence_}});
@@ -97,8 +97,8 @@ Result<void> AuditLog::read_end(std::uint64_t size) {
   const Result<std::string> read = disk_->read(file_, from, static_cast<std::size_t>(size - from));
   if (!read) return tl::unexpected(read.error());
   const std::size_t whole = read->rfind('\n');
-  if (whole == std::string::npos && from > 0) return replace("its last 64 KiB have no end of a line");
-  // A line that is not whole was never acknowledged: its writer was killed, or the disk was full.
+  if (whole == std::string::npos && from > 0) return replace("its last 64 KiB contain no line end");
+  // An incomplete line was never acknowledged: its writer was killed, or the disk was full.
   const std::uint64_t end = whole == std::string::npos ? 0 : from + whole + 1;
   if (end < size) {
     log::warn("the audit log ends in the middle of a line, which is removed",
@@ -115,7 +115,7 @@ Result<void> AuditLog::read_end(std::uint64_t size) {
   const std::string_view line = lines.substr(lines.rfind('\n') + 1);
   const Result<AuditRecord> record = decode_record(line);
   if (!record) return replace("its last line is damaged: " + record.error().message);
-  // While this process runs, a command may have changed to a key that is not known here.
+  // While this process runs, a command may have changed to a key that is unknown here.
   if (!opened_ && !keys_->trusts(record->key))
     return replace("its last record is signed by another key, " + to_hex(record->key));
   if (record->sequence < sequence_) {
@@ -130,7 +130,7 @@ Result<void> AuditLog::read_end(std::uint64_t size) {
 Result<void> AuditLog::replace(const std::string& why) {
   if (unfit_ == Unfit::refuse)
     return failure(ErrorCode::invalid_input, "nothing can be added to the audit log " + file_.string() + ": " + why +
-                                                 "; \"osteon-server audit verify\" says more");
+                                                 "; \"osteon-server audit verify\" gives details");
   fs::path aside = file_;
   std::string time = rfc3339(std::chrono::system_clock::now());
   std::erase_if(time, [](char c) { return c == '-' || c == ':'; });
@@ -201,7 +201,7 @@ Result<std::vector<AuditLog::Written>> AuditLog::write(std::span<const AuditEven
     lines += line + "\n";
     written.push_back({std::move(record), previous});
   }
-  // First who it was: no record names somebody of whom nothing is kept.
+  // The identities first, so that every pseudonym in a record has its stored identity.
   if (const Result<void> saved = people_.save(); !saved) return tl::unexpected(saved.error());
   if (const Result<void> put = put_at_end(lines); !put) return tl::unexpected(put.error());
   sequence_ = sequence;
@@ -231,7 +231,7 @@ Result<std::size_t> AuditLog::remove_before(std::chrono::system_clock::time_poin
   if (!held) return tl::unexpected(held.error());
   if (const Result<void> read = refresh(); !read) return tl::unexpected(read.error());
   if (!seen_) return std::size_t{0};
-  // The first that stays; where none does, the record that says so.
+  // Finds the first record that stays. If none stays, it is the record that reports the removal.
   const std::string limit = rfc3339(time);
   AuditStart start{.sequence = sequence_ + 1, .previous = last_};
   std::uint64_t from = seen_->size, line_begins = 0;
@@ -252,7 +252,7 @@ Result<std::size_t> AuditLog::remove_before(std::chrono::system_clock::time_poin
   if (const auto rest = for_each_line(*disk_, file_, look); !rest) return tl::unexpected(rest.error());
   if (!outcome) return tl::unexpected(outcome.error());
   if (removed == 0) return removed;
-  // First the record: a file that begins sooner than it says is well.
+  // The record first: a file that begins earlier than the record says is valid.
   const AuditEvent said{
       .action = kRetention, .object = std::to_string(removed) + " records", .result = kOk, .detail = detail_of(start)};
   if (const auto written = write(std::span(&said, 1)); !written) return tl::unexpected(written.error());

@@ -1,6 +1,6 @@
-// The audit log on the disk: "audit.log", one record a line, with "audit.people" and "audit.lock" beside it, all for
-// their owner alone. Several processes may append to one log, as a server and a command beside it: each holds the lock
-// meanwhile.
+// The audit log on the disk: "audit.log", one record per line, with "audit.people" and "audit.lock" beside it. Only
+// their owner may read these files. Several processes may append to one log, for example a server and a command. Each
+// holds the lock while it does so.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -16,15 +16,15 @@
 
 namespace osteon {
 
-// Its name, where nobody says another: in the folder of the journals.
+// Default name, in the folder of the journals.
 inline constexpr const char* kAuditLogFile = "audit.log";
 
-// Not thread safe. After an error the same call may be made again. Errors: those of the disk; unavailable (another
-// process held the lock for five seconds).
+// Not thread safe. A call may be repeated after an error. Errors: those of the disk; unavailable (another process held
+// the lock for five seconds).
 class AuditLog {
  public:
-  // What becomes of a log whose last record is damaged, or of another server's key. A server sets it aside under
-  // another name, says so in its log and in the new audit log, and begins one. A command refuses, with invalid_input.
+  // What to do with a log whose last record is damaged, or signed by another server's key. A server renames it, reports
+  // this in its log and in the new audit log, and begins a new one. A command refuses with invalid_input.
   enum class Unfit { set_aside, refuse };
   [[nodiscard]] static Result<AuditLog> open(Disk& disk, std::filesystem::path file,
                                              std::shared_ptr<const SigningKeys> keys, Unfit unfit);
@@ -33,16 +33,17 @@ class AuditLog {
     AuditRecord record;
     Digest hash;  // of its line
   };
-  // All of them, safely on the disk, or an error and none that counts.
+  // Appends all events durably; after an error none of them counts.
   [[nodiscard]] Result<std::vector<Written>> append(std::span<const AuditEvent> events);
-  // Removes the records from before `time`, and the identities that only they name. A record says so. Returns how many.
+  // Removes the records before `time`, and the identities that only these name. A record says so. Returns the number of
+  // removed records.
   [[nodiscard]] Result<std::size_t> remove_before(std::chrono::system_clock::time_point time);
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
 
  private:
   AuditLog(Disk& disk, std::filesystem::path file, std::shared_ptr<const SigningKeys> keys, Unfit unfit);
-  // Learns where the log ends now. Under the lock, as all below.
+  // Finds the present end of the log. This function and all below need the lock.
   [[nodiscard]] Result<void> refresh();
   [[nodiscard]] Result<void> read_end(std::uint64_t size);
   [[nodiscard]] Result<void> replace(const std::string& why);  // as `unfit_` says
@@ -51,7 +52,7 @@ class AuditLog {
   [[nodiscard]] Result<std::vector<Written>> write(std::span<const AuditEvent> events);
   [[nodiscard]] Result<void> put_at_end(const std::string& lines);
   [[nodiscard]] Result<void> forget_unnamed();
-  // Puts the bytes from one offset to another in place of the file.
+  // Replaces the file by its bytes from one offset to another.
   [[nodiscard]] Result<void> keep_only(std::uint64_t from, std::uint64_t to);
 
   Disk* disk_;
@@ -59,25 +60,25 @@ class AuditLog {
   std::shared_ptr<const SigningKeys> keys_;  // shared with the journals
   Unfit unfit_;
   AuditPeople people_;
-  std::optional<FileIdentity> seen_;     // the file as this object left it; its size: of the whole lines
-  std::uint64_t sequence_ = 0;           // of the last record
-  Digest last_;                          // hash of its line
-  std::optional<AuditEvent> aside_;      // to be recorded with the next
-  std::uint64_t unsure_ = 0;             // bytes after seen_->size that a failed write may have left
-  bool opened_ = false, named_ = false;  // named_: the folder was synced since this made the file
+  std::optional<FileIdentity> seen_;  // the file as this object left it, with the size of its complete lines
+  std::uint64_t sequence_ = 0;  // of the last record
+  Digest last_;  // hash of its line
+  std::optional<AuditEvent> aside_;  // to be recorded with the next events
+  std::uint64_t unsure_ = 0;  // bytes after seen_->size that a failed write may have left
+  bool opened_ = false, named_ = false;  // named_: the folder was synced since this object made the file
 };
 
-// Removes a person's identities from beside a log; the records stay. Returns how many. Errors: those of the disk;
-// unavailable, as above.
+// Removes a person's identities from the file beside a log; the records stay. Returns the number of removed identities.
+// Errors: those of the disk; unavailable, as above.
 [[nodiscard]] Result<std::size_t> erase_person(Disk& disk, const std::filesystem::path& log, std::string_view person);
 
-// What a retention record says: its detail, and that again.
+// The content of a retention record. The functions convert it to the record's detail and back.
 struct AuditStart {
   std::uint64_t sequence = 0;  // of the first record that was kept
-  Digest previous;             // hash of the line before it
+  Digest previous;  // hash of the line before it
   friend bool operator==(const AuditStart&, const AuditStart&) = default;
 };
 [[nodiscard]] std::string detail_of(const AuditStart& start);
-[[nodiscard]] std::optional<AuditStart> start_of(const AuditRecord& record);  // nothing: it says no such thing
+[[nodiscard]] std::optional<AuditStart> start_of(const AuditRecord& record);  // nothing: the record is not one
 
 }  // namespace osteon

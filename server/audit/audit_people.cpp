@@ -63,7 +63,7 @@ Result<std::vector<AuditPerson>> read_people(Disk& disk, const std::filesystem::
     return true;
   });
   if (!rest && rest.error().code != ErrorCode::not_found) return tl::unexpected(rest.error());
-  if (unreadable != nullptr) *unreadable = wrong + (rest && *rest > 0 ? 1 : 0);  // a last line that is not whole
+  if (unreadable != nullptr) *unreadable = wrong + (rest && *rest > 0 ? 1 : 0);  // an incomplete last line
   return all;
 }
 
@@ -99,7 +99,7 @@ std::string AuditPeople::pseudonym(const AuditIdentity& who) {
 Result<void> AuditPeople::save() {
   if (waiting_.empty()) return {};
   const std::uint64_t end = seen_ ? seen_->size : 0;
-  // After an error the disk may show what it does not hold: then refresh() writes all anew.
+  // After an error the disk may show data that it has not stored. Then refresh() writes everything again.
   failed_ = true;
   auto file = disk_->open(file_);
   if (!file) return tl::unexpected(file.error());

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Keeps the signatures of records apart from all others of the same key.
+// Keeps the signatures of records distinct from all other signatures of the same key.
 constexpr std::string_view kSigned = "osteon-audit-1\n";
 constexpr std::string_view kBeforeSignature = ",\"signature\":\"", kAfterSignature = "\"}";
 constexpr std::size_t kSignatureDigits = 2 * sizeof(Signature::bytes);
@@ -60,7 +60,7 @@ std::string encode(AuditRecord& record, const SigningKey& key) {
                     {"object", record.object},     {"result", record.result},
                     {"detail", record.detail},     {"previous", to_hex(record.previous)},
                     {"key", to_hex(record.key)}};
-  // ASCII alone, so that no reader takes a character of a name for the end of a line.
+  // ASCII only, so that no reader mistakes a character of a name for a line end.
   std::string line = fields.dump(-1, ' ', true, Json::error_handler_t::replace);
   line.pop_back();  // "}"
   const Signature signature = key.sign(signed_digest(line));
@@ -125,7 +125,7 @@ std::string clean_text(std::string_view text) {
   // U+0080 to U+009F control a terminal as well.
   for (std::size_t i = 0; i + 1 < kept.size(); ++i)
     if (kept[i] == '\xc2' && static_cast<unsigned char>(kept[i + 1]) < 0xa0) kept[i] = kept[i + 1] = '?';
-  // The library replaces what is not UTF-8.
+  // The library replaces bytes that are not UTF-8.
   return Json::parse(Json(kept).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
 }
 
@@ -136,7 +136,7 @@ AuditIdentity clean(const AuditIdentity& who) {
 Result<std::uint64_t> for_each_line(Disk& disk, const std::filesystem::path& file,
                                     const std::function<bool(std::string_view line, std::uint64_t next)>& take) {
   std::string held;
-  std::uint64_t begins = 0;  // of `held` in the file
+  std::uint64_t begins = 0;  // offset of `held` in the file
   for (;;) {
     const Result<std::string> piece = disk.read(file, begins + held.size(), kLongestLine);
     if (!piece) return tl::unexpected(piece.error());

@@ -1,5 +1,5 @@
-// One record of the audit log: who did what to what, and what came of it. A record is one line of JSON. It names the
-// hash of the line before it, and is signed with Ed25519, so that nobody changes, removes or adds a line unseen.
+// One record of the audit log: who did what, to which object, with which result. A record is one line of JSON. It has
+// the hash of the line before it and an Ed25519 signature. So nobody can change, remove or add a line unnoticed.
 #pragma once
 #include <chrono>
 #include <compare>
@@ -15,24 +15,24 @@
 
 namespace osteon {
 
-// Who it was. What is not known is empty.
+// Who acted. Unknown fields are empty.
 struct AuditIdentity {
-  std::string person{};       // of the certificate; of a command, the system's user
+  std::string person{};  // of the certificate; for a command, the system's user
   std::string certificate{};  // serial number, hexadecimal
-  std::string ticket{};       // id, hexadecimal
+  std::string ticket{};  // id, hexadecimal
   std::string address{};      // "ipv4:10.0.0.7"
   friend auto operator<=>(const AuditIdentity&, const AuditIdentity&) = default;
 };
 
-// A name that a certificate claims, of which nobody could verify the signature, begins with this.
+// Prefix of a name that a certificate claims, if nobody could verify its signature.
 inline constexpr std::string_view kClaimed = "claimed:";
 
-// What happened. No field but the identity names a person, since only the identity can be erased.
+// What happened. Only the identity may name a person, because only the identity can be erased.
 struct AuditEvent {
   AuditIdentity who{};
-  std::string action;    // one word: "Join", "DeleteRoom", "handshake"
+  std::string action;  // one word: "Join", "DeleteRoom", "handshake"
   std::string object{};  // a room, a case, a file
-  std::string result;    // kOk, kRefused, kFailed or kLost
+  std::string result;  // kOk, kRefused, kFailed or kLost
   std::string detail{};  // fixed words and numbers
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
 };
@@ -41,35 +41,35 @@ inline constexpr const char *kOk = "ok", *kRefused = "refused", *kFailed = "fail
 inline constexpr const char* kRetention = "retention";
 
 struct AuditRecord {
-  std::uint64_t sequence = 0;  // from 1, without a gap
+  std::uint64_t sequence = 0;  // from 1, without gaps
   std::string time;            // RFC 3339, UTC, microseconds
-  std::string identity;        // pseudonym; empty: the server itself
+  std::string identity;  // pseudonym; empty: the server itself
   std::string action, object, result, detail;
-  Digest previous;  // SHA-256 of the line before this, without its end; of the first, zeros
-  PublicKey key;    // that signed it
+  Digest previous;  // SHA-256 of the line before this one, without its line end; zeros in the first record
+  PublicKey key;  // the key that signed it
 };
 
-// The record as a line without its end. `record.key` is set to that of `key`. Bytes that are not UTF-8 are replaced.
+// The record as a line without its line end. Sets `record.key` to that of `key`. Replaces bytes that are not UTF-8.
 [[nodiscard]] std::string encode(AuditRecord& record, const SigningKey& key);
-// Error invalid_input: it is not a record, or its signature does not fit it.
+// Error invalid_input: not a record, or its signature does not fit.
 [[nodiscard]] Result<AuditRecord> decode_record(std::string_view line);
 [[nodiscard]] Digest hash_of_line(std::string_view line);
 
-// "2026-11-25T12:08:31.123456Z". Two texts compare as their times do.
+// "2026-11-25T12:08:31.123456Z". Two such texts compare like their times.
 [[nodiscard]] std::string rfc3339(std::chrono::system_clock::time_point time);
 
-// The first kMostText bytes as valid UTF-8, without control characters. What is wrong is replaced.
+// The first kMostText bytes as valid UTF-8, without control characters. Invalid bytes are replaced.
 inline constexpr std::size_t kMostText = 256;
 [[nodiscard]] std::string clean_text(std::string_view text);
 [[nodiscard]] AuditIdentity clean(const AuditIdentity& who);
 
-// Hexadecimal digits of any bytes, and the bytes again. Error invalid_input: not lower-case digits, two for a byte.
+// Hexadecimal digits of any bytes, and the reverse. Error invalid_input: not lower-case digits, two for each byte.
 [[nodiscard]] std::string hex_of(std::string_view bytes);
 [[nodiscard]] Result<std::string> bytes_of_hex(std::string_view hex);
 
-// Every whole line of a file, in order, until `take` returns false. `take` gets the line without its end and the offset
-// at which the next one begins. Returns how many bytes follow the last whole line; 0 where `take` ended it. Errors:
-// those of Disk::read; invalid_input (a line of more than 1 MiB).
+// Passes each complete line of a file to `take`, in order, until `take` returns false. `take` gets the line without its
+// line end, and the offset of the next line. Returns the number of bytes after the last complete line, or 0 if `take`
+// returned false. Errors: those of Disk::read; invalid_input (a line of more than 1 MiB).
 [[nodiscard]] Result<std::uint64_t> for_each_line(
     Disk& disk, const std::filesystem::path& file,
     const std::function<bool(std::string_view line, std::uint64_t next)>& take);

@@ -9,7 +9,7 @@ namespace osteon {
 namespace {
 
 constexpr std::size_t kMostAtOnce = 256;  // records of one write
-constexpr std::chrono::hours kKeepUpEvery{24};
+constexpr std::chrono::hours kMaintainEvery{24};
 
 void shorten(std::string& text) {
   if (text.size() > kMostText) text.resize(kMostText);
@@ -31,7 +31,7 @@ Result<std::unique_ptr<AuditTrail>> AuditTrail::open(AuditOptions options, Disk*
       AuditLog::open(disk != nullptr ? *disk : system_disk(), options.file, options.keys, AuditLog::Unfit::set_aside);
   if (!log) return tl::unexpected(log.error());
   std::unique_ptr<AuditTrail> trail(new AuditTrail(std::move(options), std::move(*log)));
-  // At once, so that a server whose log cannot be written does not start.
+  // Written at once, so that a server whose log cannot be written does not start.
   trail->batch_.push_back({.action = "start", .result = kOk});
   auto written = trail->log_.append(trail->batch_);
   if (!written) return tl::unexpected(written.error());
@@ -127,7 +127,7 @@ void AuditTrail::run() {
     lock.lock();
   }
   if (const std::size_t left = batch_.size() + waiting_.size(); left > 0)
-    log::error("audit records are lost, since the disk does not take them", {{"records", left}});
+    log::error("audit records are lost because the disk does not accept them", {{"records", left}});
 }
 
 void AuditTrail::write(std::unique_lock<std::mutex>& lock) {
@@ -135,12 +135,12 @@ void AuditTrail::write(std::unique_lock<std::mutex>& lock) {
     batch_.push_back(std::move(waiting_.front()));
     waiting_.pop_front();
   }
-  // Once in a batch, also where it is tried again and again.
+  // Only once in a batch, even if the batch is tried again several times.
   const std::uint64_t lost = batch_.size() <= kMostAtOnce ? std::exchange(lost_, 0) : 0;
   if (lost > 0)
     batch_.push_back({.action = "lost",
                       .result = kLost,
-                      .detail = std::to_string(lost) + " events for which the queue had no place"});
+                      .detail = std::to_string(lost) + " events for which the queue had no space"});
   if (batch_.empty()) return;
   const bool was_failing = counts_.failing;
   lock.unlock();
@@ -163,8 +163,8 @@ void AuditTrail::tell(const std::vector<AuditLog::Written>& written) {
 
 void AuditTrail::maintain() {
   const auto now = Clock::now();
-  if (options_.retention_days == 0 || (kept_up_ != Clock::time_point{} && now - kept_up_ < kKeepUpEvery)) return;
-  kept_up_ = now;
+  if (options_.retention_days == 0 || (maintained_at_ != Clock::time_point{} && now - maintained_at_ < kMaintainEvery)) return;
+  maintained_at_ = now;
   const auto removed =
       log_.remove_before(std::chrono::system_clock::now() - std::chrono::days(options_.retention_days));
   if (!removed)

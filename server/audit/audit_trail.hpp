@@ -1,5 +1,5 @@
-// Takes down who did what in a running server. Whoever records never waits for a disk: a queue, and a thread that
-// writes to the audit log and sends the same to the system's log.
+// Records who did what in a running server. The recording thread never waits for a disk: events go into a queue, and
+// another thread writes them to the audit log and sends them to the system's log.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -21,34 +21,34 @@
 namespace osteon {
 
 struct AuditOptions {
-  std::filesystem::path file{};               // "audit.log" in the folder of the journals
+  std::filesystem::path file{};  // "audit.log" in the folder of the journals
   std::shared_ptr<const SigningKeys> keys{};  // shared with the journals
-  std::filesystem::path syslog{};             // Unix datagram socket of the system's log; empty: nothing is sent
-  int retention_days = 0;                     // after which records are removed; 0: never
-  std::size_t most_waiting = 4096;            // events; refusals take at most half of it
-  std::chrono::milliseconds window = std::chrono::minutes(10);  // in which equal refusals count as one
-  std::chrono::milliseconds retry{1000};                        // after an error of the disk
+  std::filesystem::path syslog{};  // Unix datagram socket of the system's log; empty: nothing is sent
+  int retention_days = 0;  // after which records are removed; 0: never
+  std::size_t most_waiting = 4096;  // events; refusals take at most half of it
+  std::chrono::milliseconds window = std::chrono::minutes(10);  // time in which equal refusals count as one
+  std::chrono::milliseconds retry{1000};  // after a disk error
 };
 
 struct AuditCounts {
   std::uint64_t written = 0;  // records
-  std::uint64_t lost = 0;     // events for which there was no place in the queue
-  bool failing = false;       // the disk did not take the last records
+  std::uint64_t lost = 0;  // events for which the queue had no space
+  bool failing = false;  // the disk did not accept the last records
 };
 
 // Any thread.
 class AuditTrail {
  public:
-  // Removes what is older than it may be, and records "start". Errors: those of AuditLog.
+  // Removes records that are too old, and records "start". Errors: those of AuditLog.
   [[nodiscard]] static Result<std::unique_ptr<AuditTrail>> open(AuditOptions options, Disk* disk = nullptr);
-  // Records "stop", and writes what waits. What a failing disk does not take then is lost, and logged.
+  // Records "stop", and writes what is waiting. If the disk fails then, the rest is lost, and the loss is logged.
   ~AuditTrail();
   AuditTrail(const AuditTrail&) = delete;
   AuditTrail& operator=(const AuditTrail&) = delete;
 
-  // Equal refusals of one person are one record, and at the end of the window another with their number. Of each
-  // person kMostOfOne different ones are recorded in a window, of all strangers together kMostOfUnauthenticated; a record
-  // counts the others.
+  // Equal refusals of one person make one record, and at the end of the window another one with their number. In a
+  // window at most kMostOfOne different refusals of each person are recorded, and kMostOfUnauthenticated of all
+  // unauthenticated callers together. A record gives the number of the others.
   void record(AuditEvent event);
   [[nodiscard]] AuditCounts counts() const;
 
@@ -57,7 +57,7 @@ class AuditTrail {
  private:
   AuditTrail(AuditOptions options, AuditLog log);
   using Clock = std::chrono::steady_clock;
-  // A person's refusals since the window began: how often each came again, and how many found no place.
+  // A person's refusals since the window began: how often each was repeated, and how many were not recorded.
   struct Refusals {
     struct Repeated {
       AuditEvent event;
@@ -66,24 +66,24 @@ class AuditTrail {
     std::map<std::tuple<AuditIdentity, std::string, std::string, std::string>, Repeated> seen;
     std::uint64_t omitted = 0;
   };
-  // Under mutex_. True: it is another of the same, and only counted.
+  // Called under mutex_. True: it repeats an earlier refusal and is only counted.
   [[nodiscard]] bool is_counted(const AuditEvent& event);
   void put(AuditEvent event, std::size_t most);
   void end_window();
   void run();
-  void write(std::unique_lock<std::mutex>& lock);            // what waits; lets go of the lock meanwhile
+  void write(std::unique_lock<std::mutex>& lock);  // writes what is waiting; releases the lock while it does so
   void tell(const std::vector<AuditLog::Written>& written);  // [writer] the batch is on the disk
-  void maintain();                                           // [writer] retention
+  void maintain();  // [writer] retention
 
   const AuditOptions options_;
-  AuditLog log_;  // of the writer, as the next three
+  AuditLog log_;  // used by the writer only, like the next three
   SyslogSocket syslog_;
-  std::vector<AuditEvent> batch_;  // that the disk has not taken yet
-  Clock::time_point kept_up_;
+  std::vector<AuditEvent> batch_;  // events that the disk has not accepted yet
+  Clock::time_point maintained_at_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<AuditEvent> waiting_;
-  std::map<std::string, Refusals> refusals_;  // by person; "": strangers
+  std::map<std::string, Refusals> refusals_;  // by person; "": unauthenticated
   Clock::time_point window_ends_;
   std::uint64_t lost_ = 0;  // not yet recorded
   AuditCounts counts_;

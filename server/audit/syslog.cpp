@@ -18,7 +18,7 @@ namespace {
 constexpr int kAuthPriv = 10, kWarning = 4, kNotice = 5;
 constexpr std::size_t kLongestHost = 255, kLongestMessageId = 32;
 
-// HOSTNAME, PROCID and MSGID are of printable ASCII without spaces; "-" where there is nothing (RFC 5424, 6.2).
+// HOSTNAME, PROCID and MSGID are printable ASCII without spaces, or "-" if empty (RFC 5424, 6.2).
 std::string header_field(std::string_view text, std::size_t most) {
   std::string field(text.substr(0, most));
   std::ranges::replace_if(
@@ -32,7 +32,7 @@ std::string host_name() {
   return header_field(name.data(), kLongestHost);
 }
 
-// A value between quotes: these three have to be escaped (RFC 5424, 6.3.3).
+// A value in quotes. These three characters have to be escaped (RFC 5424, 6.3.3).
 std::string parameter(std::string_view name, std::string_view value) {
   std::string text = " " + std::string(name) + "=\"";
   for (const char c : clean_text(value)) {
@@ -70,7 +70,7 @@ bool SyslogSocket::send(const std::string& message) {
   int reason = name.size() < sizeof at.sun_path ? 0 : ENAMETOOLONG;
   if (reason == 0) {
     std::memcpy(at.sun_path, name.data(), name.size());
-    // By its name each time, so that a system log that was started again is found.
+    // Addressed by name each time, so that a restarted system log is found.
     const auto* to = reinterpret_cast<const sockaddr*>(&at);
     if (::sendto(socket_, message.data(), message.size(), MSG_DONTWAIT | MSG_NOSIGNAL, to, sizeof at) >= 0) return true;
     reason = errno;

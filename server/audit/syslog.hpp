@@ -1,4 +1,4 @@
-// Messages to the system's log (RFC 5424) over a Unix datagram socket, at which journald or rsyslog listens.
+// Messages to the system's log (RFC 5424) over a Unix datagram socket on which journald or rsyslog listens.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -7,11 +7,11 @@
 
 namespace osteon {
 
-// Where journald and rsyslog listen.
+// The socket of journald and rsyslog.
 inline constexpr const char* kSystemLogSocket = "/dev/log";
 
-// A record as a message: facility authpriv, severity notice, of a refusal warning. `line_hash` lets a reader tell
-// later whether the end of the log is missing.
+// A record as a message: facility authpriv, severity notice, or warning for a refusal. `line_hash` later shows a reader
+// whether the end of the log is missing.
 [[nodiscard]] std::string syslog_message(const AuditRecord& record, const AuditIdentity& who, const Digest& line_hash);
 
 // Not thread safe.
@@ -21,7 +21,7 @@ class SyslogSocket {
   ~SyslogSocket();
   SyslogSocket(const SyslogSocket&) = delete;
   SyslogSocket& operator=(const SyslogSocket&) = delete;
-  // Never waits. False: the message was not taken; the first time, the program's log says why.
+  // Never blocks. False: the message was not accepted. The first time, the program's log says why.
   bool send(const std::string& message);
 
  private:

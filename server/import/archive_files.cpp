@@ -48,7 +48,7 @@ std::string reason_of(archive* a) {
   return reason != nullptr ? shown_text(reason, 100) : "unknown reason";
 }
 
-// A file that is written to its end or not at all.
+// A file that is either written completely or removed.
 class Output {
  public:
   explicit Output(const fs::path& path)
@@ -101,7 +101,7 @@ class Unpacker {
   }
 
  private:
-  // A tar ends in two blocks of zeros; the library does not miss them.
+  // A tar ends with two blocks of zeros. The library does not report their absence.
   [[nodiscard]] bool has_end() const {
     if ((archive_format(archive_.get()) & ARCHIVE_FORMAT_BASE_MASK) != ARCHIVE_FORMAT_TAR ||
         archive_filter_code(archive_.get(), 0) != ARCHIVE_FILTER_NONE)
@@ -123,7 +123,7 @@ class Unpacker {
     return failure(ErrorCode::cancelled, "stopped while unpacking " + file_.string());
   }
 
-  // The next bytes of the entry, up to a whole piece; none at its end. An entry alone may be damaged.
+  // The next bytes of the entry, up to a full buffer; none at its end. A single entry may be damaged.
   Result<std::optional<std::size_t>> read_piece() {
     std::size_t got = 0;
     while (got < piece_.size()) {
@@ -170,7 +170,7 @@ class Unpacker {
   Result<void> skip(FileKind kind, const std::string& name) {
     found_.skipped.add(kind, name);
     if (archive_filter_code(archive_.get(), 0) == ARCHIVE_FILTER_NONE) return {};
-    // A packed tar is read to its end anyway; here it can be stopped.
+    // A packed tar is read to its end anyway. Reading it here allows the user to stop it.
     for (;;) {
       const auto got = read_piece();
       if (!got) return tl::unexpected(got.error());
@@ -265,7 +265,7 @@ InputKind kind_by_entries(const fs::path& archive, ChildChannel& channel) {
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) return entries == 0 ? InputKind::other : InputKind::archive;
     const char* path = archive_entry_pathname(entry);
     if (path != nullptr && fs::path(path).filename() == "main.plist") return InputKind::inv3;
-    // Read in pieces, not skipped at once: the parent wants to hear that the child is alive.
+    // Read in parts and not skipped at once, so that the parent sees that the child is alive.
     const void* data = nullptr;
     std::size_t size = 0;
     la_int64_t offset = 0;
@@ -291,7 +291,7 @@ InputKind tar_kind(const fs::path& archive, const KeepGoing& keep_going) {
       if (message.front() == static_cast<char>(known)) kind = known;
     return true;
   };
-  (void)run_isolated(work, keep_going);  // of one that cannot be read the kind is `other`
+  (void)run_isolated(work, keep_going);  // if it cannot be read, the kind stays `other`
   return kind;
 }
 

@@ -1,4 +1,4 @@
-// Unpacks what may be DICOM from a zip, an ISO 9660 image or a tar.
+// Unpacks files that may be DICOM from a zip, an ISO 9660 image or a tar.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -9,10 +9,10 @@
 
 namespace osteon::import {
 
-// A folder that only this user can look into, removed with everything in it.
+// A folder that only this user can read. It is removed with all its contents.
 class TemporaryFolder {
  public:
-  // Error: internal (no room, no permission), with the remedy.
+  // Error: internal (no space, no permission), with the remedy.
   [[nodiscard]] static Result<TemporaryFolder> make();
   TemporaryFolder(TemporaryFolder&& other) noexcept : path_(std::move(other.path_)) { other.path_.clear(); }
   TemporaryFolder& operator=(TemporaryFolder&&) = delete;
@@ -30,13 +30,13 @@ struct ArchiveLimits {
   std::uint64_t spare_bytes = std::uint64_t{256} << 20;  // left free on the disk
 };
 
-// Files are numbered in `into`; no name of the archive becomes one of the disk. Links, archives in the archive and what
-// cannot be DICOM are counted, not unpacked.
+// Numbers the files in `into`, so that no name in the archive becomes a name on the disk. Links, archives in the
+// archive and files that cannot be DICOM are counted but not unpacked.
 // Errors: invalid_input (damaged, encrypted, too many entries), exhausted (too many bytes), internal (disk), cancelled.
 [[nodiscard]] Result<FoundFiles> unpack_archive(const std::filesystem::path& archive, const std::filesystem::path& into,
                                                 const ArchiveLimits& limits, const KeepGoing& keep_going);
 
-// What a tar, packed by gzip or not, holds: an InVesalius project, other files, or nothing that is a tar.
+// The content of a tar, with or without gzip: an InVesalius project, other files, or no tar at all.
 [[nodiscard]] InputKind tar_kind(const std::filesystem::path& archive, const KeepGoing& keep_going);
 
 }  // namespace osteon::import

@@ -52,7 +52,7 @@ Result<std::string> write_surface(const CutField& field, const std::string& file
   return std::string(text);
 }
 
-// The bone as it is after the cuts of --fields, as one body of them.
+// The bone after the cuts of --fields: one body of them.
 Result<CutField> load_body(const Arguments& a) {
   auto bone = Case::load(a.bone);
   if (!bone) return tl::unexpected(bone.error());
@@ -75,7 +75,7 @@ Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
   return write_surface(*field, a.out, bar.stage(0.0, 1.0));
 }
 
-// One way to ask whether the tool meets bone: its answer, the median of its times, what it keeps.
+// Measures one way to test whether the tool meets bone: its answer, its median time, and its memory.
 template <class Ask>
 std::string contact_line(const char* way, const std::vector<SamplePoint>& points, const Pose& pose,
                          std::size_t memory_bytes, Ask ask) {
@@ -107,7 +107,7 @@ Result<std::string> run_contact(const Arguments& a) {
   if (!tool) return tl::unexpected(tool.error());
   const Vec3 axis(a.axis[0], a.axis[1], a.axis[2]);
   if (!axis.allFinite() || !(axis.stableNorm() > 1e-6))
-    return failure(ErrorCode::invalid_input, "--axis has no length or no finite one");
+    return failure(ErrorCode::invalid_input, "--axis has no length, or is not finite");
   const Vec3 at(a.at[0], a.at[1], a.at[2]);
   if (!at.allFinite()) return failure(ErrorCode::invalid_input, "--at is not finite; give X,Y,Z in mm");
   const Pose pose = pose_along(at, axis.stableNormalized());
@@ -141,7 +141,7 @@ Result<std::string> run_contact(const Arguments& a) {
                       [&] { return first_contact(distance, points, pose); });
 }
 
-// Peak memory of this process, MB; zero where the system does not say.
+// Peak memory of this process, MB; zero if the system does not report it.
 double peak_memory_mb() {
   const auto status = read_file("/proc/self/status");
   if (!status) return 0.0;
@@ -149,10 +149,11 @@ double peak_memory_mb() {
   return at == std::string::npos ? 0.0 : std::strtod(status->c_str() + at + 6, nullptr) / 1024.0;
 }
 
-// Why a step removed nothing, for a person: what its tip meets on its way, and where bone is.
+// Explains to a person why a step removed nothing: what the tip meets on its path, and where bone is.
 std::string nothing_removed(std::size_t number, const CarveStep& step, const StepReport& report, const Case& bone) {
   bool in_bone = false;
-  double free_mm = std::numeric_limits<double>::infinity();  // a lower bound of the distance to bone, all along
+  // a lower bound of the distance to bone along the whole path
+  double free_mm = std::numeric_limits<double>::infinity();
   const auto look = [&](const Vec3& tip) {
     in_bone = in_bone || bone.surface_mm(tip) < 0.0;
     free_mm = std::min(free_mm, std::max(bone.clearance_mm(tip), std::max(0.0, bone.surface_mm(tip))));
@@ -225,7 +226,7 @@ Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
   return text;
 }
 
-// What says a kind's size best, in words.
+// The dimensions that describe a kind's size best, in words.
 std::string dimensions(const Tool& tool) {
   std::string text;
   for (const EditableField& field : editable_fields(tool.kind)) {
@@ -260,7 +261,7 @@ std::string dimensions(const Tool& tool) {
   return text;
 }
 
-// `field=value`, each by the rules of a tool file; says in words what was changed.
+// Applies `field=value` settings, each by the rules of a tool file. Returns the changes in words.
 Result<std::string> change(Tool& tool, const std::vector<std::string>& settings) {
   std::string changes;
   for (const std::string& setting : settings) {
@@ -279,8 +280,8 @@ Result<std::string> change(Tool& tool, const std::vector<std::string>& settings)
   return changes;
 }
 
-// The tool with what --set, --name and --title say, as a tool file. A room tells tools by their names, so that a
-// changed one gets another: that of its file unless --name gives one.
+// Writes the tool with the changes of --set, --name and --title as a tool file. A room identifies tools by name, so a
+// changed tool gets another name: that of its file, unless --name gives one.
 Result<void> write_changed(Tool& tool, const Arguments& a) {
   const fs::path file(a.out);
   if (file.extension() != ".yaml" && file.extension() != ".yml")
@@ -363,35 +364,35 @@ Result<std::string> run_hash(const Arguments& a) {
 }  // namespace
 
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
-  // Owners: the options that write into it and the command that reads it, both for as long as the program runs.
+  // Shared by the options that write into it and the command that reads it, both for the life of the program.
   const auto shared = std::make_shared<Arguments>();
   Arguments& a = *shared;
 
   CLI::App* surface = app.add_subcommand("surface", "Write a bone's surface, cut or not, as a closed mesh");
   surface->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
   surface->add_option("--out", a.out, "File to write: .stl, .ply or .obj")->required();
-  surface->add_option("--fields", a.fields, "What was cut from it: a file of carve, or of osteon-server --save");
-  surface->add_option("--body", a.body, "Which body of the fields: 0 is the bone, others are pieces sawn off")
+  surface->add_option("--fields", a.fields, "Cut fields: a file from carve or from osteon-server --save");
+  surface->add_option("--body", a.body, "Body in the fields: 0 is the bone, others are separated pieces")
       ->capture_default_str();
   commands.push_back({surface, [shared](const StopSignal& stop) { return run_surface(*shared, stop); }});
 
   CLI::App* contact = app.add_subcommand(
-      "contact", "Ask whether a tool meets bone: by the segmentation's cells, two ways, and by the distance field");
+      "contact", "Test whether a tool meets bone: two ways with the segmentation's cells, and with the distance field");
   contact->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
-  contact->add_option("TOOL", a.tool, "A tool of the box, or a tool file")->required();
+  contact->add_option("TOOL", a.tool, "Name of a tool in the tool box, or a tool file")->required();
   contact->add_option("--at", a.at, "Its tip, X,Y,Z, mm")->delimiter(',')->expected(3)->required();
-  contact->add_option("--axis", a.axis, "The way out of its tip, X,Y,Z")->delimiter(',')->expected(3)->required();
-  contact->add_option("--fields", a.fields, "What was cut from the bone: a file of carve, or of osteon-server --save");
-  contact->add_option("--body", a.body, "Which body of the fields")->capture_default_str();
-  contact->add_option("--level", a.level, "Ask at pitch h / 2^level")
+  contact->add_option("--axis", a.axis, "Direction out of its tip, X,Y,Z")->delimiter(',')->expected(3)->required();
+  contact->add_option("--fields", a.fields, "Cut fields: a file from carve or from osteon-server --save");
+  contact->add_option("--body", a.body, "Body in the fields")->capture_default_str();
+  contact->add_option("--level", a.level, "Test at pitch h / 2^level")
       ->check(CLI::Range(0, kLevels - 1))
       ->capture_default_str();
-  contact->add_option("--points", a.points, "So many points of the tool's surface, about")
+  contact->add_option("--points", a.points, "Approximate number of points on the tool")
       ->check(CLI::Range(100, 100000))
       ->capture_default_str();
   commands.push_back({contact, [shared](const StopSignal&) { return run_contact(*shared); }});
 
-  CLI::App* carve = app.add_subcommand("carve", "Cut a bone as a script says, and say what every step did and cost");
+  CLI::App* carve = app.add_subcommand("carve", "Cut a bone by a script, and report what every step did and cost");
   carve->add_option("CASE_DIR", a.bone, "Folder of the case")->required();
   carve
       ->add_option("SCRIPT", a.script,
@@ -400,7 +401,7 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   carve->add_option("--out", a.out, "File of the cut fields, .vdb")->required();
   carve->add_option("--surface", a.surface, "Also write what is left of the bone: .stl, .ply or .obj");
   carve->add_option("--report", a.report, "Also write the steps' numbers as JSON");
-  carve->add_option("--cut", a.cut_mm, "Longest way of one cut, mm")
+  carve->add_option("--cut", a.cut_mm, "Longest path of one cut, mm")
       ->check(CLI::Range(0.01, 25.0))
       ->capture_default_str();
   commands.push_back({carve, [shared](const StopSignal& stop) { return run_carve(*shared, stop); }});
@@ -408,8 +409,8 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::App* tools = app.add_subcommand(
       "tools", "List the tool box: name, kind, level of its cuts, hash, dimensions; or change a tool");
   CLI::Option* named =
-      tools->add_option("NAME", a.tool, "Of this tool alone, with what --set may change of it and the limits");
-  tools->add_option("--file", a.file, "Of a tool file instead")->excludes(named);
+      tools->add_option("NAME", a.tool, "Show only this tool, its fields that --set may change, and their limits");
+  tools->add_option("--file", a.file, "Show a tool file instead")->excludes(named);
   tools->add_option("--set", a.set, "Change a field, such as diameter_mm=3 or teeth=4; may be given again")
       ->expected(1)
       ->take_all();
@@ -420,7 +421,7 @@ void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   commands.push_back({tools, [shared](const StopSignal&) { return run_tools(*shared); }});
 
   CLI::App* hash = app.add_subcommand("hash", "Print the hash of cut fields");
-  hash->add_option("FIELDS", a.fields, "File of carve, or of osteon-server --save")->required();
+  hash->add_option("FIELDS", a.fields, "File from carve or from osteon-server --save")->required();
   commands.push_back({hash, [shared](const StopSignal&) { return run_hash(*shared); }});
 }
 

@@ -15,7 +15,7 @@ Result<TriangleMesh> bone_surface(const CutField& field, const KeepGoing& keep_g
   SurfaceBlocks blocks(field.body());
   for (const auto& [level, leaves] : cut) blocks.touch(level, leaves);
 
-  // Cells reach one sample beyond a block, so a surface may lie in the block below the first sample.
+  // Cells reach one sample beyond a block, so a surface may lie in the block before the first sample.
   std::vector<BlockKey> keys = blocks.fine_blocks();
   const CoordBox samples = bone.bounds_samples();
   const Coord first = shift_down(samples.min - Coord{1, 1, 1}, 4), last = shift_down(samples.max, 4);

@@ -5,7 +5,7 @@
 
 namespace osteon::import {
 
-// What viewers are shown at full detail, with the vertices that blocks share joined; its normals too.
+// The surface that viewers get at full detail, with shared vertices of blocks joined. It includes the normals.
 // Error: cancelled, invalid_input (nothing is left of the bone).
 [[nodiscard]] Result<TriangleMesh> bone_surface(const CutField& field, const KeepGoing& keep_going);
 

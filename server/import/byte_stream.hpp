@@ -27,7 +27,7 @@ class ByteWriter {
   std::string bytes_;
 };
 
-// Takes out in the order of packing. Once bytes are missing, everything is refused.
+// Reads values in the order in which they were written. Once bytes are missing, every further read fails.
 class ByteReader {
  public:
   explicit ByteReader(std::string_view bytes) : bytes_(bytes) {}

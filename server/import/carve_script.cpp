@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kMostSteps = 100000;
 constexpr double kFarthest_mm = 1000.0;
 
-// What is wrong with one step; caught where the file and the step's number are known.
+// A fault of one step. It is caught where the file and the step's number are known.
 struct Wrong {
   std::string what;
 };
@@ -47,10 +47,10 @@ void only(const YAML::Node& node, std::initializer_list<const char*> allowed) {
   }
 }
 
-// Tip, axis and across; what a pose leaves out is taken from the step.
+// Tip, axis and across. Values that a pose omits are taken from the step.
 Pose pose_of(const Vec3& at, const YAML::Node& own, const YAML::Node& step) {
   const YAML::Node axis_node = own["axis"] ? own["axis"] : step["axis"];
-  if (!axis_node) throw Wrong{"axis is missing: the way out of the tool's tip, such as [0, 0, -1]"};
+  if (!axis_node) throw Wrong{"axis is missing: the direction out of the tool's tip, such as [0, 0, -1]"};
   const Vec3 axis = vector_of(axis_node, "axis");
   if (axis.norm() < 1e-6) throw Wrong{"axis has no length"};
   const YAML::Node across_node = own["across"] ? own["across"] : step["across"];

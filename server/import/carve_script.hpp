@@ -8,7 +8,7 @@
 //         - {at: [0, 8, -6], axis: [0, 0, -1], across: [1, 0, 0]}
 //       level: 1                     # default: the tool's own
 //
-// `across` is where a blade's width goes; it may be left out for tools that are round. Millimetres in the bone's frame.
+// `across` is the direction of a blade's width. It may be omitted for round tools. Millimetres in the bone's frame.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -24,13 +24,13 @@ namespace osteon::import {
 struct CarveStep {
   Tool tool;
   std::vector<Pose> path;    // pose_bone_tool, at least one
-  std::optional<int> level;  // as wished; a case and a tool bound it
+  std::optional<int> level;  // as requested; the case and the tool limit it
 };
 
 // Errors: not_found, invalid_input; each names the file and the step.
 [[nodiscard]] Result<std::vector<CarveStep>> read_carve_script(const std::filesystem::path& file);
 
-// A tool by its name in the box, or from a file with the ending .yaml, beside `folder` unless the path is absolute.
+// A tool by its name in the tool box, or from a file with the ending .yaml. A relative path starts at `folder`.
 [[nodiscard]] Result<Tool> tool_named(const std::string& name, const std::filesystem::path& folder);
 
 }  // namespace osteon::import

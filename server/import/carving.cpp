@@ -131,7 +131,7 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
   return report;
 }
 
-// The largest part stays the body that it was; each piece becomes a body of its own, and debris vanishes.
+// The largest part stays the body that it was. Each piece becomes a body of its own, and debris vanishes.
 void Carving::part(std::size_t body, StepReport& report) {
   for (const Fragment& fragment : finders_[body].take_fragments(bodies_[body])) {
     if (fragment.debris()) {
@@ -159,7 +159,8 @@ void Carving::note_taken(std::vector<FieldLeaf> mask) {
   history_.add_mask(taken_.back(), std::move(mask));
 }
 
-// Gives body 0 back what came off it, so that it is the bone with nothing but the cuts, and parts it anew.
+// Returns to body 0 everything that separated from it, so that it is the bone with only the cuts. Then separates it
+// again.
 void Carving::settle() {
   if (std::exchange(settled_, true) || taken_.empty()) return;
   const auto touch = [&](int level, const std::vector<Coord>& origins) {
@@ -182,7 +183,7 @@ double Carving::removed_mm3(std::size_t bodies) const {
   return sum;
 }
 
-// What a server does for its viewers after a frame's cuts: gathers the blocks that changed and makes their surface.
+// The same work that a server does for its viewers after a frame's cuts: gathers the changed blocks and meshes them.
 void Carving::mesh_changes(int level, const std::vector<Coord>& leaves, bool last, std::vector<double>& frame_ms) {
   for (const BlockKey& key : surface_.touch(level, leaves)) stale_.push_back(key);
   if (++unmeshed_cuts_ < kCutsPerFrame && !last) return;

@@ -61,12 +61,12 @@ Result<void> parse_keep(const std::string& text, CtOptions& options) {
   return {};
 }
 
-// Names the input in what went wrong with its content.
+// Adds the input's name to an error about its content.
 Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
 }
 
-// A scan of whatever kind the input is by its content.
+// Reads a scan of any kind; the input's content decides which.
 Result<CtScan> read_scan(const Arguments& a, const KeepGoing& reading) {
   const InputKind kind = input_kind(a.input, reading);
   if (!reading(0.0)) return tl::unexpected(stopped());
@@ -215,7 +215,7 @@ Result<std::string> run_labels(const Arguments& a, const StopSignal& stop) {
   return text;
 }
 
-// A number within these bounds. Unlike CLI::Range it refuses "nan".
+// A number within these limits. Unlike CLI::Range it refuses "nan".
 CLI::Validator within(double low, double high) {
   char text[64];
   std::snprintf(text, sizeof text, "NUMBER in [%g - %g]", low, high);
@@ -274,7 +274,7 @@ Result<void> check_free(const std::string& path) {
 }
 
 void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
-  // Owners: the options that write into it and the command that reads it, both for as long as the program runs.
+  // Shared by the options that write into it and the command that reads it, both for the life of the program.
   const auto shared = std::make_shared<Arguments>();
   Arguments& a = *shared;
 

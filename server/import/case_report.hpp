@@ -1,4 +1,4 @@
-// What `osteon-import info` says about a case.
+// The text of `osteon-import info` about a case.
 #pragma once
 #include <string>
 

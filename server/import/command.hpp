@@ -1,4 +1,4 @@
-// What the commands of osteon-import share: how they are found, run, shown and stopped.
+// The common part of the commands of osteon-import: how they are found, run, shown and stopped.
 #pragma once
 #include <functional>
 #include <optional>
@@ -9,22 +9,23 @@
 #include "common/runtime/stop_signal.hpp"
 #include "common/volume/iso_surface.hpp"
 
-namespace CLI {  // NOLINT(readability-identifier-naming): the library's
+namespace CLI {  // the library's
 class App;
 }
 
 namespace osteon::import {
 
-// One of them: its part of the command line, and its work, which returns the text for standard output.
+// One command: its part of the command line, and its work. The work returns the text for standard output.
 struct Command {
   CLI::App* app;
   std::function<Result<std::string>(const StopSignal& stop)> run;
 };
 
-void add_case_commands(CLI::App& app, std::vector<Command>& commands);  // make cases, and say what one is
+void add_case_commands(CLI::App& app, std::vector<Command>& commands);  // make and describe cases
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands);  // work on a case's bone, and list the tools
 
-// One bar over all stages, shown when the first work is done: a refused input leaves only its sentence.
+// One progress bar over all stages. It appears when the first work is done, so a refused input prints only its
+// sentence.
 class Bar {
  public:
   explicit Bar(const StopSignal& stop, const char* what = "importing") : stop_(stop), what_(what) {}

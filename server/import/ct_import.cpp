@@ -15,16 +15,17 @@
 namespace osteon::import {
 namespace {
 
-// Shares of the time that the stages take, for one bar over all of them.
+// Shares of the stages in the total time, for one progress bar over all of them.
 constexpr double kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
-// Pieces of an island that are told when marrow alone joins them: this large, also beside the largest.
+// Smallest size of parts of an island that are reported if only marrow connects them: absolute, and relative to the
+// largest.
 constexpr double kLargePiece_cm3 = 0.5, kLargePiece = 0.1;
 constexpr double kLeastPitch_mm = 0.02, kMostPitch_mm = 10.0;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;  // of a CT's voxels
-// Around the voxels at work, so that whatever the segmentation looks at beside a bone is there.
+// Margin around the processed voxels, so that everything that the segmentation reads beside a bone is included.
 constexpr double kMargin_mm = 5.0;
 
-// A part of the scan, and on which sides it ends where the scan does.
+// A part of the scan, and the sides on which it ends with the scan.
 struct Region {
   std::array<int, 3> first{}, last{};
   imaging::ScanEnds ends{};
@@ -41,7 +42,7 @@ Region grown(const std::array<int, 3>& first, const std::array<int, 3>& last, co
   return region;
 }
 
-// Around everything at or above the threshold; all of the scan where nothing is. Error: cancelled.
+// The part around everything at or above the threshold; the whole scan if there is nothing. Error: cancelled.
 Result<Region> dense_region(const imaging::HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
   std::array<int, 3> first = volume.dims, last{-1, -1, -1};
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
@@ -67,7 +68,7 @@ CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& 
   return covering_samples(cells.grown(5.0 * pitch_mm), pitch_mm);
 }
 
-// Bone ends where the scan does: the intersection of two solids is the maximum of their distances.
+// Bone ends where the scan ends: the intersection of two solids is the maximum of their distances.
 Result<void> cap_at_scan(const imaging::HuVolume& scan, double pitch_mm, DenseVolume<float>& surface_mm,
                          const KeepGoing& keep_going) {
   const auto band = static_cast<float>(4.0 * pitch_mm);
@@ -103,12 +104,12 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
   return kept;
 }
 
-// Labels of the lattice's samples out of those of the voxels: the nearest voxel's, and where that is no bone, as next
-// to the surface, any of the cell's.
+// Labels of the lattice's samples from those of the voxels. A sample takes the label of the nearest voxel. If that is
+// not bone, as near the surface, it takes that of any voxel of the cell.
 class NearestLabel {
  public:
   NearestLabel(const imaging::HuVolume& volume, const imaging::VoxelMask& bones) : volume_(volume), bones_(bones) {}
-  // The index of the voxel that a sample in bone takes its labels from.
+  // The index of the voxel from which a sample in bone takes its labels.
   [[nodiscard]] std::size_t voxel(const Vec3& position_mm) const {
     const Vec3 at = volume_.voxel(position_mm);
     const auto clamped = [&](double c, std::size_t axis) {
@@ -131,8 +132,8 @@ class NearestLabel {
   const imaging::VoxelMask& bones_;
 };
 
-// Samples for the case out of the scan, a part at a time: density and labels only where there is bone in or near a
-// leaf.
+// Makes the samples of the case from the scan, one part at a time. Density and labels are computed only where bone is
+// in or near a leaf.
 class CaseSamples {
  public:
   CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard,
@@ -210,7 +211,7 @@ class CaseSamples {
   std::vector<float> hu_;
 };
 
-// The part of the scan with dense voxels, its islands, and which bone each voxel belongs to.
+// The part of the scan with dense voxels, its islands, and the bone to which each voxel belongs.
 struct Segmented {
   imaging::HuVolume volume;
   imaging::VoxelMask bones;
@@ -218,7 +219,7 @@ struct Segmented {
   CtSegmentation found;
 };
 
-// Large pieces of dense and cancellous bone that are parts of kept islands, cm³, largest first. Error: cancelled.
+// Large parts of kept islands that consist of dense and cancellous bone, cm³, largest first. Error: cancelled.
 Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imaging::VoxelMask& bone,
                                                   const KeepGoing& keep_going) {
   imaging::VoxelMask firm(s.volume.dims);
@@ -238,7 +239,7 @@ Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imag
   return volumes_cm3;
 }
 
-// What was found and what became of it, into `s.found`. Error: cancelled.
+// Writes into `s.found` what was found and what was done with it. Error: cancelled.
 Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& islands, std::vector<int> kept,
                        Segmented& s, const KeepGoing& keep_going) {
   CtSegmentation& found = s.found;
@@ -252,7 +253,7 @@ Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& i
   for (const imaging::Island& island : islands.list) found.left_out_cm3 += island.volume_cm3;
   for (const int number : kept) found.left_out_cm3 -= islands.list[static_cast<std::size_t>(number - 1)].volume_cm3;
   if (kept.size() == islands.list.size()) found.left_out_cm3 = 0.0;
-  // Of several islands each has pieces of its own, which nobody takes for a fracture.
+  // Several islands each have parts of their own, which nobody mistakes for a fracture.
   if (kept.size() == 1) {
     auto pieces = pieces_without_marrow(s, bone, keep_going);
     if (!pieces) return tl::unexpected(pieces.error());
@@ -286,12 +287,12 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
       s.first[axis] = std::min(s.first[axis], island.first[axis]);
       s.last[axis] = std::max(s.last[axis], island.last[axis]);
     }
-  if (auto told = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.9, 1.0)); !told)
-    return tl::unexpected(told.error());
+  if (auto summarised = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.9, 1.0)); !summarised)
+    return tl::unexpected(summarised.error());
   return s;
 }
 
-// The signed distance to the kept bones, which end where the scan does. `geometry`: of the whole scan.
+// The signed distance to the kept bones, which end where the scan ends. `geometry`: of the whole scan.
 Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::HuVolume& geometry, double threshold_hu,
                                            double pitch_mm, const KeepGoing& keep_going) {
   const CoordBox box = lattice_box(s.volume, s.first, s.last, pitch_mm);
@@ -317,7 +318,7 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   geometry.directions = scan.volume.directions;
   if (!(geometry.spacing_mm.minCoeff() >= kLeastSpacing_mm) || !(geometry.spacing_mm.maxCoeff() <= kMostSpacing_mm))
     return failure(ErrorCode::invalid_input,
-                   "voxels of " + imaging::describe(geometry) + " are of no CT; export the scan again");
+                   "voxels of " + imaging::describe(geometry) + " are not those of a CT; export the scan again");
 
   const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
   if (!(pitch_mm >= kLeastPitch_mm) || !(pitch_mm <= kMostPitch_mm))

@@ -1,4 +1,4 @@
-// What a reader of CT files hands over.
+// The result of a reader of CT files.
 #pragma once
 #include <string>
 
@@ -9,8 +9,8 @@ namespace osteon::import {
 
 struct CtScan {
   imaging::HuVolume volume;
-  std::string source;   // kind and geometry only: no name, date or number of a patient, nor the file's name
-  SeriesReport report;  // for the person who imports; a case keeps nothing of it
+  std::string source;  // kind and geometry only: no name, date or number of a patient, nor the file's name
+  SeriesReport report;  // for the person who imports; a case stores nothing of it
 };
 
 }  // namespace osteon::import

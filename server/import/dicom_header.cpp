@@ -26,7 +26,8 @@ constexpr std::uint32_t kLongestValue = 4096;
 constexpr double kFarthest_mm = 1e6;
 constexpr std::size_t kShownLetters = 64;
 
-// SOP classes that are no images of a modality, by the beginning of their UID below 1.2.840.10008. The first that fits.
+// SOP classes that are not images of a modality, by the beginning of their UID below 1.2.840.10008. The first match
+// counts.
 struct SopClass {
   std::string_view uid;
   FileKind kind;
@@ -85,7 +86,7 @@ std::string trimmed(std::string text) {
   return text;
 }
 
-// "1.0\0.0": values separated by backslashes; empty where any is not a finite number.
+// "1.0\0.0": values separated by backslashes. Empty if any is not a finite number.
 std::vector<double> numbers(const std::string& text) {
   std::vector<double> values;
   std::size_t begin = 0;
@@ -101,7 +102,7 @@ std::vector<double> numbers(const std::string& text) {
   return values;
 }
 
-// Lengths and places within reach; beyond it they are as good as none.
+// Lengths and positions within a plausible range. Values beyond it count as missing.
 std::vector<double> near(std::vector<double> values) {
   if (std::ranges::any_of(values, [](double v) { return std::abs(v) > kFarthest_mm; })) values.clear();
   return values;
@@ -112,7 +113,7 @@ int integer(const std::string& text, int otherwise) {
   return values.empty() ? otherwise : static_cast<int>(std::clamp(values.front(), -1e9, 1e9));
 }
 
-// Values as text, without those that are longer than any that is asked for.
+// Values as text. Values longer than any that is needed are omitted.
 class Values {
  public:
   explicit Values(const gdcm::File& file) : data_(file.GetDataSet()) { filter_.SetFile(file); }
@@ -138,11 +139,11 @@ std::string meta_text(const gdcm::File& file, const gdcm::Tag& tag) {
              : trimmed(std::string(bytes->GetPointer(), bytes->GetLength()));
 }
 
-// Everything before the pixels, and their place where there are any. False where the file cannot be read so far.
+// Reads everything before the pixels, and their offset if there are any. False if the file cannot be read that far.
 bool read_before_pixels(gdcm::Reader& reader, const fs::path& file, DicomHeader& h) {
   reader.SetFileName(file.c_str());
   if (!reader.ReadUpToTag(kPixelData, {kPixelData})) return false;
-  // The reader stops behind the element's head, or else at the end of the file.
+  // The reader stops after the element's header, or else at the end of the file.
   h.pixel_offset = reader.GetStreamCurrentPosition();
   if (h.pixel_offset >= h.bytes) h.pixel_offset = 0;
   return true;
@@ -175,7 +176,7 @@ void read_slice(const Values& values, const gdcm::File& file, DicomHeader& h) {
   h.padding = numbers(text(0x0028, 0x0120));
 }
 
-// Other programs write whole CT volumes as secondary captures; pictures of a screen have no place in the patient.
+// Other programs write whole CT volumes as secondary captures. Pictures of a screen have no position in the patient.
 bool is_placed(const DicomHeader& h) {
   return h.position.size() == 3 && h.orientation.size() == 6 && h.spacing.size() == 2 && h.slope.size() == 1 &&
          h.intercept.size() == 1 && h.samples == 1;
@@ -191,7 +192,7 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
   h.image_type = values.text(0x0008, 0x0008);
   h.kind = kind_of(sop_class, h.modality, h.image_type);
   if (!whole) {
-    // What is no CT is told by what it is, whether or not it can be read.
+    // A file that is not CT is reported by its kind, whether or not it can be read.
     const bool unknown = h.kind == FileKind::ct_slice || (h.kind == FileKind::other_modality && h.modality.empty());
     if (unknown) h.kind = FileKind::damaged;
     return;
@@ -201,7 +202,7 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
   if (h.kind == FileKind::secondary_capture && !is_placed(h)) return;
   h.kind = FileKind::ct_slice;
   bool has_pixels = h.pixel_offset > 0;
-  // Within a deflated file the place in the stream says nothing.
+  // In a deflated file the position in the stream has no meaning.
   if (reader.GetFile().GetHeader().GetDataSetTransferSyntax() == gdcm::TransferSyntax::DeflatedExplicitVRLittleEndian) {
     gdcm::Reader all;
     all.SetFileName(file.c_str());

@@ -1,4 +1,4 @@
-// What the header of a DICOM file says, before its pixels are read.
+// The header of a DICOM file, read before its pixels.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -13,30 +13,30 @@
 namespace osteon::import {
 
 struct DicomHeader {
-  std::size_t file = 0;  // among those found
+  std::size_t file = 0;  // index among the found files
   std::uint64_t bytes = 0;
   std::uint64_t pixel_offset = 0;  // of the value of the pixel data; 0 in a deflated file
   FileKind kind = FileKind::damaged;
   std::string modality;
 
-  // Of a CT slice, and of one without pixels.
+  // For a CT slice, and for one without pixels.
   std::string series, instance, transfer_syntax, photometric, image_type;
-  std::string description, kernel;  // as they may be shown
+  std::string description, kernel;  // safe to be shown
   int series_number = 0, acquisition = 0, temporal_position = 0;
   int frames = 1;
   int columns = 0, rows = 0;
   int bits_allocated = 0, bits_stored = 0, samples = 1;
   std::vector<double> position, orientation, spacing, slope, intercept;
-  std::vector<double> padding;  // stored value of pixels that are no part of the scan
+  std::vector<double> padding;  // stored value of pixels that are not part of the scan
 
   void pack(ByteWriter& to) const;
   bool unpack(ByteReader& from);
 };
 
-// The library may abort on a damaged file: call it in a process that may die.
+// The library may abort on a damaged file, so call this in a process that may die.
 [[nodiscard]] DicomHeader read_header(const std::filesystem::path& file);
 
-// Kind by SOP class, modality and image type, as for a file whose pixels are there.
+// Kind by SOP class, modality and image type, for a file that has pixels.
 [[nodiscard]] FileKind kind_of(std::string_view sop_class, std::string_view modality, std::string_view image_type);
 
 }  // namespace osteon::import

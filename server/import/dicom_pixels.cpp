@@ -28,7 +28,7 @@ std::uint32_t little_endian(const unsigned char* bytes, int count) {
   return value;
 }
 
-// The library takes a file that ends within its pixels for a whole one and leaves the rest zero.
+// The library accepts a file that ends within its pixels as complete, and leaves the rest zero.
 bool pixels_are_whole(const DicomHeader& h, const fs::path& file, std::uint64_t plain_bytes) {
   if (h.pixel_offset == 0) return true;  // deflated: the stream itself knows its end
   const bool is_plain = h.transfer_syntax.empty() || h.transfer_syntax == "1.2.840.10008.1.2" ||
@@ -66,8 +66,8 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
   if ((width != 1 && width != 2) || image.GetBufferLength() != pixels * width)
     return broken("has pixel data of another size than its header says");
   if (!pixels_are_whole(h, file, pixels * width)) return broken("is cut off within its pixel data");
-  // Some scanners write metal beyond the range that BitsStored promises. The library would cut those bits off and so
-  // turn metal into air; plain pixels are therefore taken as they lie in the file.
+  // Some scanners write metal beyond the range of BitsStored. The library would cut those bits off and so turn metal
+  // into air. So plain pixels are taken as they are in the file.
   std::vector<char> buffer(image.GetBufferLength());
   const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
   const gdcm::ByteValue* bytes = image.GetDataElement().GetByteValue();
@@ -82,7 +82,7 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
   // Signed values may lack their sign in the bits above the stored ones.
   const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
   const int unused = is_signed ? std::clamp(16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()), 0, 15) : 0;
-  // Padding counts as air, but only where it would be bright: some files name a value that their pixels have too.
+  // Padding counts as air, but only if it would be bright: some files name a value that real pixels have too.
   const bool has_padding = h.padding.size() == 1 && std::abs(h.padding[0]) <= kLargestStored &&
                            h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
   const auto padding =

@@ -22,10 +22,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kMostDeaths = 100;  // of processes that read headers
-// Fewer files, or a smaller archive, are searched in a moment: no progress is shown before what is wrong with them.
+// Fewer files, or a smaller archive, are searched in a moment. Then no progress appears before an error.
 constexpr std::size_t kManyFiles = 500;
 constexpr std::uint64_t kLargeArchive = std::uint64_t{64} << 20;  // bytes
-constexpr double kUnpackedEnd = 0.4;                              // of the progress of an archive
+constexpr double kUnpackedEnd = 0.4;  // of the progress of an archive
 constexpr double kHeadersEnd = 0.6;
 
 void silence_library() {
@@ -37,7 +37,7 @@ void silence_library() {
 struct Input {
   FoundFiles found;
   std::optional<TemporaryFolder> folder;  // of an archive
-  std::optional<std::size_t> named_file;  // when a slice was given
+  std::optional<std::size_t> named_file;  // if a slice was given
 };
 
 void pack(const FoundFiles& found, ByteWriter& to) {
@@ -87,7 +87,7 @@ Result<Input> unpacked(const fs::path& archive, const KeepGoing& keep_going) {
   work.run = [&](ChildChannel& channel) -> Result<void> {
     const auto found = unpack_archive(archive, into, {}, [&](double fraction) {
       channel.progress(fraction);
-      return true;  // the parent ends this process when the user wants it stopped
+      return true;  // the parent ends this process if the user stops the import
     });
     if (!found) return tl::unexpected(found.error());
     ByteWriter packer;
@@ -109,7 +109,7 @@ Result<Input> unpacked(const fs::path& archive, const KeepGoing& keep_going) {
   return input;
 }
 
-// All headers, by one process after the other: where one dies, its file is damaged and the next goes on behind it.
+// Reads all headers, in one process after the other. If one dies, its file is damaged, and the next continues after it.
 Result<std::vector<DicomHeader>> read_headers(const FoundFiles& found, const KeepGoing& keep_going) {
   std::vector<DicomHeader> headers;
   const std::size_t files = found.files.size();
@@ -171,9 +171,9 @@ Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
                                                "; give a folder, zip or ISO image with a CT series");
     default:
       return failure(ErrorCode::invalid_input,
-                     path.string() + " is no folder, zip, ISO image or DICOM file; give one with a CT series");
+                     path.string() + " is not a folder, zip, ISO image or DICOM file; give one with a CT series");
   }
-  // The files that a DICOMDIR lists lie below it; beside a slice lies its series.
+  // The files that a DICOMDIR lists lie below it, and a slice's series lies beside it.
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   FoundFiles alone{
       .input = path.string(), .archive = false, .files = {{path, path.filename().string()}}, .skipped = {}};

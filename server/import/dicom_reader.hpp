@@ -1,4 +1,4 @@
-// Reads a CT series, one DICOM file for each slice, from what a hospital hands out: a folder, a zip or a CD image.
+// Reads a CT series, one DICOM file for each slice, in the forms that hospitals provide: a folder, a zip or a CD image.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -9,15 +9,16 @@
 namespace osteon::import {
 
 struct SeriesOptions {
-  std::optional<int> series;  // by its number in the list; else the largest that can be imported
+  std::optional<int> series;  // number in the list; absent: the largest that can be imported
 };
 
-// `input`: a folder with all that is in it, a zip, tar or ISO 9660 image, a DICOMDIR (then its folder is searched), or
-// one slice (then its series). Known by content, never by name. Files are read in other processes: one that a library
-// cannot stand costs that file alone, unless it is a slice of the series that is read. Slices are ordered by their
-// position along the normal of their plane, never by file name or number. What is no CT slice is counted in the report.
-// Refused is what would make the volume's shape or its values doubtful: several frames in a file, a tilted gantry,
-// uneven gaps, missing spacing, position, rescaling or pixels, retired compressions. Errors: not_found, invalid_input,
+// `input`: a folder with all that is in it, a zip, a tar or an ISO 9660 image. Or a DICOMDIR, whose folder is searched;
+// or one slice, whose series is read. The content decides, never the name.
+// Files are read in other processes. A file that crashes a library costs only that file, unless it is a slice of the
+// series that is read. Slices are ordered by their position along the normal of their plane, never by file name or
+// number. Other files than CT slices are counted in the report.
+// Input is refused if it makes the volume's shape or values doubtful: several frames in a file, a tilted gantry, uneven
+// gaps, missing spacing, position, rescaling or pixels, retired compressions. Errors: not_found, invalid_input,
 // unsupported, exhausted, cancelled, internal (temporary folder).
 [[nodiscard]] Result<CtScan> read_dicom_series(const std::filesystem::path& input, const SeriesOptions& options,
                                                const KeepGoing& keep_going);
@@ -25,7 +26,7 @@ struct SeriesOptions {
   return read_dicom_series(input, {}, keep_going);
 }
 
-// What the same call would choose from, without reading pixels. `taken` is 0 where none could be imported.
+// The series from which the same call would choose, without reading pixels. `taken` is 0 if none can be imported.
 [[nodiscard]] Result<SeriesReport> list_dicom_series(const std::filesystem::path& input, const KeepGoing& keep_going);
 
 }  // namespace osteon::import

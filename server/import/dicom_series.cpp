@@ -14,8 +14,8 @@ namespace {
 constexpr int kLargestAxis = 1 << 14;
 constexpr double kMostVoxels = 4e9;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;
-constexpr int kFewSlices = 8;                // fewer are no volume to operate on
-constexpr std::size_t kGroupsCompared = 64;  // of one UID; hostile files could have each slice differ
+constexpr int kFewSlices = 8;  // fewer are not a volume to operate on
+constexpr std::size_t kGroupsCompared = 64;  // of one UID; in hostile files every slice could differ
 
 using Slices = std::vector<DicomHeader>;
 
@@ -25,14 +25,14 @@ bool has_spacing(const DicomHeader& h) {
   return h.spacing.size() == 2 &&
          std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastSpacing_mm && mm <= kMostSpacing_mm; });
 }
-// Two unit vectors; others would make positions along the normal that are no numbers.
+// Two unit vectors. With others, positions along the normal would not be finite numbers.
 bool has_orientation(const DicomHeader& h) {
   return h.orientation.size() == 6 &&
          std::ranges::all_of(h.orientation, [](double part) { return std::abs(part) <= 1.1; });
 }
 bool has_place(const DicomHeader& h) { return has_spacing(h) && has_orientation(h) && h.position.size() == 3; }
 
-// What sets the second apart from the first; nothing where both may be slices of one volume.
+// How the second differs from the first; null if both may be slices of one volume.
 const char* difference(const DicomHeader& a, const DicomHeader& b) {
   if ((a.frames > 1) != (b.frames > 1)) return b.frames > 1 ? "several frames" : "a single frame";
   if (a.columns != b.columns || a.rows != b.rows) return "another size";
@@ -47,7 +47,7 @@ const char* difference(const DicomHeader& a, const DicomHeader& b) {
   return nullptr;
 }
 
-// The same instance at the same place: a file that was copied. The largest is kept, as one may be cut off.
+// Removes copied files: the same instance at the same position. The largest is kept, because a copy may be truncated.
 Slices without_copies(Slices slices, SkippedFiles& skipped, const FoundFiles& found) {
   std::map<std::tuple<std::string, std::string, std::vector<double>, int>, std::size_t> seen;
   Slices kept;
@@ -68,7 +68,7 @@ Slices without_copies(Slices slices, SkippedFiles& skipped, const FoundFiles& fo
   return kept;
 }
 
-// Slices of one UID that may be of one volume.
+// Slices of one UID that may belong to one volume.
 std::vector<Slices> group_compatible(Slices slices) {
   std::vector<Slices> groups;
   for (DicomHeader& h : slices) {
@@ -82,7 +82,7 @@ std::vector<Slices> group_compatible(Slices slices) {
   std::ranges::stable_sort(groups, std::greater{}, [](const Slices& g) {
     return std::pair(has_spacing(g.front()) && has_orientation(g.front()), g.size());
   });
-  // A slice that has lost its spacing or orientation must not vanish from its series without a word.
+  // A slice that has lost its spacing or orientation must not vanish from its series unreported.
   const auto is_lost = [](const Slices& g) { return !has_spacing(g.front()) || !has_orientation(g.front()); };
   const std::size_t compared = std::min(groups.size(), kGroupsCompared);
   std::vector<Slices> kept;
@@ -114,7 +114,7 @@ bool places_repeat(const Slices& slices) {
   return false;
 }
 
-// Parts a group whose places repeat, by the first mark that leaves no part with repeated ones.
+// Splits a group whose positions repeat, by the first property after which no part has repeated positions.
 std::vector<Slices> split_by_acquisition(Slices slices) {
   if (!places_repeat(slices)) return {std::move(slices)};
   using Mark = std::function<std::string(const DicomHeader&)>;
@@ -134,7 +134,7 @@ std::vector<Slices> split_by_acquisition(Slices slices) {
   return {std::move(slices)};
 }
 
-// Makes the grid of one series, or says what is wrong with it.
+// Makes the grid of one series, or reports what is wrong with it.
 class Arranger {
  public:
   Arranger(CtSeries& series, const FoundFiles& found, std::string subject, std::function<std::string()> missing)
@@ -165,7 +165,7 @@ class Arranger {
     return {brief, {code, sentence}};
   }
 
-  // One file alone; what it lacks is named as DICOM names it.
+  // Checks one file alone. Missing attributes are named as DICOM names them.
   [[nodiscard]] std::optional<SeriesFault> check(const DicomHeader& h) const {
     const std::string file = found_.shown(h.file);
     const auto lacks = [&](const std::string& what) {
@@ -193,7 +193,7 @@ class Arranger {
     if (!has_orientation(h)) return lacks("ImageOrientationPatient (0020,0037)");
     if (h.intercept.size() != 1 || h.slope.size() != 1 || h.slope[0] == 0.0)
       return lacks("RescaleSlope and RescaleIntercept (0028,1052-1053)");
-    // Spectral selection and progression were retired from DICOM; decoders give noise without noticing.
+    // Spectral selection and progression were retired from DICOM. Decoders return noise without an error.
     if (h.transfer_syntax == "1.2.840.10008.1.2.4.53" || h.transfer_syntax == "1.2.840.10008.1.2.4.55")
       return cannot("a retired compression", "uses a retired JPEG compression (" + h.transfer_syntax +
                                                  "); export the series uncompressed or lossless");
@@ -225,7 +225,7 @@ class Arranger {
     const double step_mm = length_mm / static_cast<double>(gaps.size());
     series_.entry.slice_mm = step_mm;
 
-    // A tilted gantry moves the slices sideways within their plane: a sheared volume.
+    // A tilted gantry moves the slices sideways within their plane, which shears the volume.
     const Vec3 travel = vec(series_.slices.back().position) - vec(first().position);
     const double sideways_mm = (travel - normal * length_mm).norm();
     char text[160];
@@ -241,13 +241,13 @@ class Arranger {
     return std::nullopt;
   }
 
-  // One missing slice opens a gap of two steps; a position written with one decimal must pass.
+  // One missing slice opens a gap of two steps. A position written with one decimal must pass.
   std::optional<SeriesFault> check_gaps(const std::vector<double>& places, const std::vector<double>& gaps,
                                         double step_mm) {
     std::vector<double> sorted = gaps;
     std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
     const double usual_mm = sorted[sorted.size() / 2];
-    // The worst gap, or else the first slice that has drifted from where even steps would put it.
+    // The worst gap, or else the first slice that has drifted from the position that even steps would give.
     std::size_t at = gaps.size();
     double worst_mm = 0.2 * usual_mm;
     for (std::size_t i = 0; i < gaps.size(); ++i)
@@ -260,20 +260,20 @@ class Arranger {
     if (at == gaps.size()) return std::nullopt;
     series_.entry.slice_mm = usual_mm;
     char brief[64], text[96];
-    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one place" : "a gap of %.3g mm", gaps[at]);
+    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one position" : "a gap of %.3g mm", gaps[at]);
     if (usual_mm < 1e-3)
-      std::snprintf(text, sizeof text, " lie at the same place, as most do");
+      std::snprintf(text, sizeof text, " lie at the same position, like most slices");
     else
       std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
     return wrong(brief, subject_ + ": the slices " + name(at) + " and " + name(at + 1) + text +
                             (gaps[at] > usual_mm ? missing_() : "") +
-                            "; add the missing slices or remove the doubled ones");
+                            "; add the missing slices or remove the duplicates");
   }
 
   CtSeries& series_;
   const FoundFiles& found_;
   const std::string subject_;
-  const std::function<std::string()> missing_;  // what may belong into a gap
+  const std::function<std::string()> missing_;  // files that may belong into a gap
 };
 
 std::string plane_of(const DicomHeader& h) {
@@ -295,8 +295,8 @@ SeriesEntry entry_of(const Slices& slices) {
   return entry;
 }
 
-// Files that belong to a series by its UID and are none of its slices: what may be missing in a gap. `groups` and
-// `no_pixels` lie together by UID.
+// Files that belong to a series by its UID but are not slices of it. They may be what is missing in a gap. Groups of
+// one UID are adjacent, and `no_pixels` is sorted by UID.
 std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t at, const Slices& no_pixels,
                                 const FoundFiles& found, const SkippedFiles& skipped) {
   const DicomHeader& own = groups[at].front();
@@ -316,9 +316,9 @@ std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t a
     const DicomHeader& h = groups[i].front();
     const char* what = i == at || groups[i].size() > groups[at].size() ? nullptr : difference(own, h);
     if (what == nullptr) continue;
-    const std::string told =
+    const std::string detail =
         h.frames > 1 ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
-    if (!add(found.files[h.file].name, told)) return text;
+    if (!add(found.files[h.file].name, detail)) return text;
   }
   for (const SkippedFiles::Count& c : skipped.counts())
     if (c.kind == FileKind::damaged || c.kind == FileKind::unreadable)
@@ -329,7 +329,7 @@ std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t a
 
 double voxels(const CtSeries& s) { return static_cast<double>(s.entry.slices) * s.entry.rows * s.entry.columns; }
 
-// Nothing of CT: says what is there instead.
+// Error for an input without CT: reports what is there instead.
 Error no_series(const FoundFiles& found, const SkippedFiles& skipped) {
   const std::string& input = found.input;
   if (skipped.empty())
@@ -397,8 +397,8 @@ Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const Fou
     if (voxels(series[i]) > voxels(series[largest])) largest = i;
     if (!series[i].fault && (!best || voxels(series[i]) > voxels(series[*best]))) best = i;
   }
-  // A larger one with a missing or damaged slice is most likely the one that is meant: another bone without a question
-  // would be wrong. One of a kind that nobody can import, as a tilted one, gives way.
+  // A larger series with a missing or damaged slice is most likely the intended one. Importing another bone without
+  // asking would be wrong. A larger series of a kind that nobody can import, such as a tilted one, is not chosen.
   const CtSeries& most = series[largest];
   const bool is_meant =
       most.fault && most.fault->error.code != ErrorCode::unsupported && most.entry.slices >= kFewSlices;

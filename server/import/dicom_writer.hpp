@@ -7,7 +7,7 @@
 
 namespace osteon::import {
 
-// Makes the folder, which must not exist, and fills it; what was written is removed when anything fails.
+// Makes the folder, which must not exist, and fills it. If anything fails, removes what was written.
 // Errors: exists, internal (disk), cancelled.
 [[nodiscard]] Result<void> write_dicom_series(const imaging::HuVolume& volume, const std::filesystem::path& folder,
                                               const KeepGoing& keep_going);

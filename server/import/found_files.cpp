@@ -17,15 +17,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t kIsoMark = 32769;  // behind sixteen sectors that belong to nobody
+constexpr std::uint64_t kIsoMark = 32769;  // after sixteen unused sectors
 
-// The elements with which headerless DICOM begins, as one of the three plain encodings has them.
+// The first elements of DICOM without a header, in one of the three plain encodings.
 class Elements {
  public:
   Elements(std::span<const unsigned char> head, bool big, bool explicit_vr)
       : head_(head), big_(big), explicit_vr_(explicit_vr) {}
 
-  // Four sound ones in rising order, the first of them one that begins a data set.
+  // Four valid elements in rising order, the first of which can begin a data set.
   [[nodiscard]] bool sound() const {
     std::uint64_t at = 0;
     std::uint32_t before = 0;
@@ -76,15 +76,15 @@ bool is_zip(std::span<const unsigned char> head) {
 bool is_gzip(std::span<const unsigned char> head) { return has(head, 0, "\x1f\x8b"); }
 bool is_tar(std::span<const unsigned char> head) { return has(head, 257, "ustar"); }
 
-// A descriptor of its own for every look, closed with the scope. A pipe does not keep us waiting.
-class ViewFrustum {
+// A file that is open while this object lives. Opening a pipe does not block.
+class OpenedFile {
  public:
-  explicit ViewFrustum(const fs::path& file) : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
-  ~ViewFrustum() {
+  explicit OpenedFile(const fs::path& file) : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
+  ~OpenedFile() {
     if (descriptor_ >= 0) ::close(descriptor_);
   }
-  ViewFrustum(const ViewFrustum&) = delete;
-  ViewFrustum& operator=(const ViewFrustum&) = delete;
+  OpenedFile(const OpenedFile&) = delete;
+  OpenedFile& operator=(const OpenedFile&) = delete;
   std::size_t read(std::uint64_t at, std::span<unsigned char> bytes) const {
     const ssize_t n = descriptor_ < 0 ? -1 : ::pread(descriptor_, bytes.data(), bytes.size(), static_cast<off_t>(at));
     return n > 0 ? static_cast<std::size_t>(n) : 0;
@@ -94,7 +94,7 @@ class ViewFrustum {
   int descriptor_;
 };
 
-// Walks one folder after the other, in whatever order the disk gives.
+// Walks one folder after the other, in the order that the disk gives.
 class Walk {
  public:
   Walk(const fs::path& root, FoundFiles& found, const KeepGoing& keep_going)
@@ -175,13 +175,13 @@ InputKind input_kind(const fs::path& path, const KeepGoing& keep_going) {
   if (!fs::exists(status)) return InputKind::absent;
   if (fs::is_directory(status)) return InputKind::folder;
   if (!fs::is_regular_file(status)) return InputKind::other;
-  const ViewFrustum look(path);
+  const OpenedFile opened(path);
   std::array<unsigned char, kHeadBytes> bytes{};
-  const std::span<const unsigned char> head(bytes.data(), look.read(0, bytes));
+  const std::span<const unsigned char> head(bytes.data(), opened.read(0, bytes));
   std::array<unsigned char, 5> mark{};
-  if (look.read(kIsoMark, mark) == mark.size() && has(mark, 0, "CD001")) return InputKind::archive;
+  if (opened.read(kIsoMark, mark) == mark.size() && has(mark, 0, "CD001")) return InputKind::archive;
   if (is_zip(head)) return InputKind::archive;
-  // An InVesalius project is a tar, packed or not.
+  // An InVesalius project is a tar, compressed or not.
   if (is_gzip(head) || is_tar(head)) return path.extension() == ".inv3" ? InputKind::inv3 : tar_kind(path, keep_going);
   return content_of(head) == Content::dicom ? InputKind::dicom_file : InputKind::other;
 }

@@ -1,4 +1,4 @@
-// The files of a scan's input: those of a folder, or those that an archive was unpacked to.
+// The files of a scan's input: those of a folder, or those unpacked from an archive.
 #pragma once
 #include <cstddef>
 #include <filesystem>
@@ -21,7 +21,7 @@ struct FoundFiles {
   std::string input;  // as it was given
   bool archive = false;
   std::vector<FoundFile> files;  // sorted by name
-  SkippedFiles skipped;          // what is no regular file
+  SkippedFiles skipped;  // everything that is not a regular file
 
   // "folder/inner/name", "archive.zip: inner/name"
   [[nodiscard]] std::string shown(std::size_t file) const;
@@ -30,16 +30,17 @@ struct FoundFiles {
 inline constexpr int kMostFiles = 200'000;
 inline constexpr int kMostLevels = 32;
 
-// Regular files of a folder and of those in it, `levels` deep. A link to a file is one; a link to a folder is not
-// followed. Errors: not_found, invalid_input (too many files), cancelled.
+// Regular files of a folder and of its subfolders, `levels` deep. A link to a file counts as a file; a link to a folder
+// is not followed. Errors: not_found, invalid_input (too many files), cancelled.
 [[nodiscard]] Result<FoundFiles> find_files(const std::filesystem::path& folder, int levels,
                                             const KeepGoing& keep_going);
 
-// What the first bytes of a file say it is.
+// The kind of a file, according to its first bytes.
 enum class Content { empty, dicom, archive, other };
 inline constexpr std::size_t kHeadBytes = 4096;
-// DICOM has its mark at byte 128, or, as old scanners wrote it, begins at once with several sound elements of group 2
-// or 8: raw numbers are not taken for it. `head`: the first kHeadBytes, or all of a shorter file.
+// DICOM has its mark at byte 128. Files of old scanners instead begin with several valid elements of group 2 or 8;
+// these are checked so that raw numbers are not mistaken for DICOM. `head`: the first kHeadBytes, or all of a shorter
+// file.
 [[nodiscard]] Content content_of(std::span<const unsigned char> head);
 
 // How a path can be read as a scan.

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kChunk = 1 << 20;
 constexpr std::size_t kLargestPlist = 16 << 20;
 constexpr int kLargestAxis = 1 << 14;
-constexpr std::size_t kFirstValues = std::size_t{1} << 20;  // for which memory is taken before any has come
+constexpr std::size_t kFirstValues = std::size_t{1} << 20;  // for which memory is allocated before any data has arrived
 
 struct CloseArchive {
   void operator()(archive* a) const { archive_read_free(a); }
@@ -39,7 +39,7 @@ Error damaged(const fs::path& file, archive* a) {
                                         (reason != nullptr ? reason : "unknown reason") + "); copy or export it again"};
 }
 
-// Walks to the entry whose name without folders is `name`. Null when the archive has no such entry.
+// Walks to the entry whose name without folders is `name`. Null if the archive has no such entry.
 Result<archive_entry*> find_entry(archive* a, const fs::path& file, const std::string& name) {
   archive_entry* entry = nullptr;
   bool any = false;
@@ -47,7 +47,7 @@ Result<archive_entry*> find_entry(archive* a, const fs::path& file, const std::s
     const int status = archive_read_next_header(a, &entry);
     if (status == ARCHIVE_EOF) return nullptr;
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) {
-      // What begins as a gzip archive and goes on as nothing is a damaged one.
+      // A file that begins as a gzip archive, but has no valid entry, is damaged.
       if (any || archive_filter_code(a, 0) == ARCHIVE_FILTER_GZIP) return tl::unexpected(damaged(file, a));
       return tl::unexpected(no_project(file));
     }
@@ -154,7 +154,7 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
   if (!fs::exists(file, error))
     return failure(ErrorCode::not_found,
                    "there is no file " + file.string() + "; give an InVesalius project or a DICOM folder");
-  // Two passes, since the matrix may come before the list that says its shape.
+  // Two passes, because the matrix may come before the list that gives its shape.
   const auto project = read_project(file);
   if (!project) return tl::unexpected(project.error());
 
@@ -178,7 +178,7 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
     return failure(ErrorCode::invalid_input,
                    file.string() + ": " + project->matrix_name + " has " + std::to_string(archive_entry_size(*entry)) +
                        " bytes where the shape in main.plist needs " + std::to_string(expected) + "; export it again");
-  // Memory grows with the bytes that come, not with what the file claims.
+  // Memory grows with the bytes that arrive, not with the size that the file claims.
   std::size_t got = 0;
   while (got < expected) {
     if (!keep_going(static_cast<double>(got) / static_cast<double>(expected)))

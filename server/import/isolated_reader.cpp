@@ -26,10 +26,10 @@ namespace osteon::import {
 namespace {
 
 constexpr int kPollMilliseconds = 20;
-constexpr int kPatienceMilliseconds = 120'000;  // of polls that bring nothing: a suspended process loses none
+constexpr int kPatienceMilliseconds = 120'000;  // counts polls without data, so a suspended process loses no time
 constexpr std::size_t kLargestMessage = std::size_t{1} << 30;  // a slice of 16384 x 16384 is half of it
 
-// What the child tells: which file it opens, how far it is, a part of the result, and at last how it ended.
+// The child's messages: the file that it opens, its progress, a part of the result, and finally how it ended.
 enum class Record : char { file, progress, message, done, error };
 
 template <class T>
@@ -43,7 +43,7 @@ void put_text(int descriptor, std::string_view text) {
   if (!write_all(descriptor, text.data(), text.size())) ::_exit(1);
 }
 
-// A length that a damaged file claims must not take the machine's memory. Sanitizers reserve far more than they use.
+// A length that a damaged file claims must not use up the machine's memory. Sanitizers reserve far more than they use.
 void limit_memory([[maybe_unused]] std::size_t more_bytes) {
 #if !OSTEON_SANITIZED
   unsigned long pages = 0;
@@ -87,7 +87,7 @@ Result<void> run_guarded(const IsolatedWork& work, ChildChannel& channel) try {
   ::_exit(0);
 }
 
-// The parent's end. Reading fails for good when the child is gone or silent, or the user wants to stop.
+// The parent's end of the pipe. Once the child is gone or silent, or the user wants to stop, every read fails.
 class Line {
  public:
   Line(int descriptor, const KeepGoing& keep_going) : descriptor_(descriptor), keep_going_(keep_going) {}
@@ -223,7 +223,7 @@ IsolatedEnd run_isolated(const IsolatedWork& work, const KeepGoing& keep_going) 
   Line line(ends[0], keep_going);
   IsolatedEnd end = listen(line, work);
   ::close(ends[0]);
-  ::kill(child, SIGKILL);  // it has said everything, or is not wanted any more
+  ::kill(child, SIGKILL);  // it has sent everything, or is no longer wanted
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }

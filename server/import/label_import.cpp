@@ -10,7 +10,7 @@ namespace osteon::import {
 namespace {
 
 constexpr int kMargin = 5;  // samples beyond the bone: the band and the cell around it
-// Shares of the time that the stages take.
+// Shares of the stages in the total time.
 constexpr double kSmoothEnd = 0.35;
 constexpr double kResampleEnd = 0.4;
 constexpr double kSurfaceEnd = 0.85;
@@ -28,7 +28,7 @@ DenseVolume<std::uint8_t> cropped(const DenseVolume<std::uint8_t>& from, const C
   return out;
 }
 
-// Bone ends where the volume does, half a voxel beyond the outer centres: the intersection of two solids is the maximum
+// Bone ends where the volume ends, half a voxel beyond the outer centres: the intersection of two solids is the maximum
 // of their distances.
 void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVolume<float>& surface_mm) {
   const CoordBox& box = surface_mm.box;
@@ -51,8 +51,9 @@ void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVol
       }
 }
 
-// Smoothing draws convex bone in by some hundredths of a voxel. Moves the whole surface back by one distance, so that
-// the volume is that of the labels again: dV = A δ, with A from the samples within half a pitch of the surface.
+// Smoothing moves the surface of convex bone inwards by some hundredths of a voxel. This moves the whole surface back
+// by one distance, so that the volume is again that of the labels: dV = A δ, with A from the samples within half a
+// pitch of the surface.
 void restore_volume(double labelled_mm3, double pitch_mm, DenseVolume<float>& surface_mm) {
   constexpr double kMost = 0.15;  // voxels: more would be another bone
   double inside = 0, near = 0;
@@ -80,7 +81,7 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   for (const ColourCount& colour : stack.colours)
     if (colour.label != 0) labelled_mm3 += static_cast<double>(colour.voxels) * spacing.prod();
 
-  // Only the bone's box, and what the filter and the band reach beyond it.
+  // Only the bone's box, and the reach of the filter and the band beyond it.
   const CoordBox all = volume.labels.box;
   CoordBox voxels = imaging::bone_voxels(volume).grown(kMargin);
   voxels.min = {std::max(voxels.min.x, all.min.x), std::max(voxels.min.y, all.min.y),

@@ -16,7 +16,7 @@ struct LabelOptions {
 
 struct LabelImport {
   Case bone;
-  double labelled_mm3 = 0;  // volume of the bone's voxels; that of `bone` is what smoothing made of it
+  double labelled_mm3 = 0;  // volume of the bone's voxels; that of `bone` is the volume after smoothing
 };
 
 // Errors: invalid_input (a lattice too large), cancelled.

@@ -17,12 +17,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Slices that are decoded before they are turned into columns of z: whole cache lines are written.
+// Slices that are decoded before they are converted to columns of z, so that whole cache lines are written.
 constexpr int kBatch = 32;
 constexpr std::size_t kMostKinds = 250;
 constexpr double kLargestVolume = 1.0e9;  // voxels
 constexpr double kLargestSlice = 6.4e7;  // pixels: a small file can claim far more, and all of them are decoded at once
-constexpr double kDensest_g_cm3 = 3.0;   // enamel
+constexpr double kDensest_g_cm3 = 3.0;  // enamel
 
 struct Slice {
   std::int64_t number = 0;
@@ -81,7 +81,7 @@ Result<std::vector<Slice>> find_slices(const fs::path& folder) {
   return slices;
 }
 
-// RGBA bytes of one file; libpng's simplified reader converts every kind of PNG and reports errors as text.
+// RGBA bytes of one file. libpng's simplified reader converts every kind of PNG and reports errors as text.
 Result<std::vector<Rgba>> read_png(const fs::path& file, int& width, int& height) {
   png_image image{};
   image.version = PNG_IMAGE_VERSION;
@@ -117,7 +117,7 @@ int label_of(const Rgba& c, const LabelLegend& legend) {
   return 0;
 }
 
-// Colours met so far. Neighbouring pixels mostly have one colour, so the last one is looked at first.
+// The colours found so far. Neighbouring pixels mostly have the same colour, so the last one is checked first.
 class Palette {
  public:
   explicit Palette(const LabelLegend& legend) : legend_(legend) {}
@@ -191,7 +191,7 @@ Result<LabelLegend> read_legend(const fs::path& file) {
   if (!fs::exists(file, error)) return failure(ErrorCode::not_found, "there is no legend " + file.string());
   try {
     const YAML::Node root = YAML::LoadFile(file.string());
-    if (!root.IsMap()) return wrong("it is no map");
+    if (!root.IsMap()) return wrong("it is not a map");
     for (const auto& entry : root)
       if (const auto key = entry.first.as<std::string>(); key != "bones" && key != "tolerance")
         return wrong("unknown key " + key);

@@ -17,10 +17,10 @@ struct BoneColour {
   double density_g_cm3 = 1.9;
 };
 
-// Which colours are bone; every other one, known or noise, is not.
+// The colours of bone. Every other colour, known or noise, is not bone.
 struct LabelLegend {
   std::vector<BoneColour> bones{{"bone", {255, 249, 219}, 1.9}};
-  int tolerance = 8;  // by which each of red, green and blue may differ
+  int tolerance = 8;  // largest difference of red, green and blue, each
 };
 
 // "R,G,B" or "R,G,B:DENSITY_G_CM3".
@@ -35,13 +35,13 @@ struct ColourCount {
 };
 
 struct LabelStack {
-  imaging::LabelVolume volume;       // labels in the order of the legend, from 1
+  imaging::LabelVolume volume;  // labels in the order of the legend, from 1
   std::vector<ColourCount> colours;  // most frequent first
 };
 
-// Slices by the number at the end of their names. Columns go along x, rows along y, slices along z.
-// Errors: not_found (no such folder), invalid_input (no PNG files, a slice that is missing, of another size or not a
-// PNG, no bone colour at all), cancelled.
+// Slices are ordered by the number at the end of their names. Columns go along x, rows along y, slices along z.
+// Errors: not_found (no such folder), invalid_input (no PNG files; a slice that is missing, of another size or not a
+// PNG; no bone colour at all), cancelled.
 [[nodiscard]] Result<LabelStack> read_label_stack(const std::filesystem::path& folder, const LabelLegend& legend,
                                                   const Vec3& spacing_mm, const KeepGoing& keep_going);
 

@@ -17,7 +17,7 @@ constexpr double kDensest_g_cm3 = 3.0;  // enamel
 constexpr double kThickest_mm = 500.0;
 constexpr int kSubsamples = 16;  // along a voxel's edge, where the tube's circles cross it
 
-// Integral over depth from zero of a value given layer by layer; the outer layers go on beyond the ends.
+// Integral over depth from zero of a value given for each layer. The outer layers continue beyond the ends.
 template <class Value>
 double integral(const std::vector<Layer>& layers, double depth_mm, Value value) {
   double sum = std::min(depth_mm, 0.0) * value(layers.front());
@@ -35,7 +35,7 @@ double hu_above_air(const Layer& layer) {
   return imaging::hounsfield(imaging::kRho1995, layer.density_g_cm3) - imaging::kAir_hu;
 }
 
-// The length that two intervals share.
+// The length of the overlap of two intervals.
 double overlap(double a_low, double a_high, double b_low, double b_high) {
   return std::max(0.0, std::min(a_high, b_high) - std::max(a_low, b_low));
 }
@@ -54,7 +54,7 @@ std::string describe(const Phantom& phantom) {
   return text + " mm:g/cm3";
 }
 
-// Refuses pitches at which the layers would fall between the samples, or the samples fill the memory.
+// Refuses pitches at which layers would lie between the samples, or the samples would fill the memory.
 Result<void> check_pitch(const Phantom& phantom, double pitch_mm) {
   const double thinnest = std::ranges::min(phantom.layers, {}, &Layer::thickness_mm).thickness_mm;
   if (pitch_mm > thinnest || pitch_mm > phantom.width_mm)
@@ -128,7 +128,7 @@ double Phantom::volume_mm3() const {
 }
 
 double Phantom::surface_mm(const Vec3& point_mm) const {
-  // Beyond each pair of parallel faces, or the round one; outside, the nearest edge or corner counts.
+  // Distance beyond each pair of parallel faces, or beyond the round face. Outside, the nearest edge or corner counts.
   const double half = 0.5 * width_mm;
   Vec3 beyond;
   if (kind == PhantomKind::block) {

@@ -20,9 +20,9 @@ struct Layer {
 // "5:1.9,20:0.3,5:1.9": thickness in mm and density in g/cm³ of each layer, outermost first.
 [[nodiscard]] Result<std::vector<Layer>> parse_layers(std::string_view text);
 
-// A block: the first layer's top face is z = 0, the others follow downwards; square, `width_mm` wide, centred on the
-// z axis. A tube: a cylinder along z whose first layer is the outer shell and whose last is the core, so its radius is
-// the sum of the layers; `width_mm` long, centred on the origin.
+// A block is square, `width_mm` wide and centred on the z axis. The first layer's top face is z = 0, and the others
+// follow downwards. A tube is a cylinder along z, `width_mm` long and centred on the origin. Its first layer is the
+// outer shell and its last the core, so its radius is the sum of the layers.
 struct Phantom {
   PhantomKind kind = PhantomKind::block;
   std::vector<Layer> layers;
@@ -33,10 +33,10 @@ struct Phantom {
   [[nodiscard]] double volume_mm3() const;
   // Exact Euclidean distance to the outer surface, negative inside.
   [[nodiscard]] double surface_mm(const Vec3& point_mm) const;
-  // Depth below the layered face: where the layers are counted from.
+  // Depth below the layered face, where the first layer begins.
   [[nodiscard]] double depth_mm(const Vec3& point_mm) const;
-  // Mean over `blur_mm` of depth, so that samples a pitch apart keep each layer's mass and each interface's place.
-  // Outer layers go on beyond the surface, which alone says where the bone ends.
+  // Mean over `blur_mm` of depth. So samples one pitch apart preserve each layer's mass and each interface's position.
+  // The outer layers continue beyond the surface, because only the surface says where the bone ends.
   [[nodiscard]] double density_g_cm3(const Vec3& point_mm, double blur_mm) const;
 };
 
@@ -44,12 +44,13 @@ struct Phantom {
 [[nodiscard]] Result<Case> build_phantom_case(const Phantom& phantom, double pitch_mm, const std::string& title,
                                               const KeepGoing& keep_going);
 
-// What a CT scanner without noise and with box-shaped voxels sees of it, in air: the mean HU of each voxel.
+// What a CT scanner without noise and with box-shaped voxels sees of it in air: the mean HU of each voxel.
 [[nodiscard]] Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm,
                                                      const KeepGoing& keep_going);
 
-// The threshold that is least wrong for all layers that reach the surface: half way between air and bone puts the
-// edge of a blurred step where it was, so this is the middle between the halves of the lightest and the densest.
+// The threshold with the smallest error for all layers that reach the surface. Half way between air and bone puts the
+// edge of a blurred step where it was. So this is the middle between the half values of the lightest and the densest
+// layer.
 [[nodiscard]] double suitable_threshold_hu(const Phantom& phantom);
 
 }  // namespace osteon::import

@@ -8,8 +8,8 @@ namespace osteon::import {
 namespace {
 
 constexpr std::size_t kMostListed = 40;
-constexpr double kDifference = 0.05;       // between voxels and case that is told
-constexpr double kLeastListed_cm3 = 0.05;  // smaller ones are summed up
+constexpr double kDifference = 0.05;  // between voxels and case; larger ones are reported
+constexpr double kLeastListed_cm3 = 0.05;  // smaller islands are summed up
 
 template <class... Values>
 std::string line(const char* format, Values... values) {
@@ -18,7 +18,7 @@ std::string line(const char* format, Values... values) {
   return text;
 }
 
-// Where a point is within a box, as a patient's sides: LPS. Empty in the middle third of all.
+// The position of a point within a box, as a patient's sides: LPS. "middle" if it is in the middle third of all axes.
 std::string place_words(const Vec3& at, const Box& box) {
   static constexpr const char* kWords[3][2] = {{"right", "left"}, {"front", "back"}, {"foot end", "head end"}};
   std::string words;
@@ -30,7 +30,7 @@ std::string place_words(const Vec3& at, const Box& box) {
   return words.empty() ? "middle" : words;
 }
 
-// Of each island, in the order of the list.
+// For each island, in the order of the list.
 std::vector<bool> which_are_kept(const CtSegmentation& found) {
   std::vector<bool> kept(found.islands.size(), false);
   for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
@@ -86,7 +86,7 @@ std::string segmentation_text(const CtSegmentation& found) {
     for (std::size_t i = 0; i < found.joined_cm3.size(); ++i)
       pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
     text += "joined     by marrow alone: pieces with " + pieces +
-            " cm3 of denser bone, as at a narrow fracture; --hollow parts them\n";
+            " cm3 of denser bone, as at a narrow fracture; --hollow separates them\n";
   }
   if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kDifference * kept_cm3)
     text += line(

@@ -1,4 +1,4 @@
-// Which CT series an input holds, which of them was taken, and what was skipped.
+// The CT series of an input, the one that was taken, and the skipped files.
 #pragma once
 #include <string>
 #include <vector>
@@ -8,11 +8,11 @@
 namespace osteon::import {
 
 struct SeriesEntry {
-  int number = 0;           // 1 .. n, by which --series takes it
-  std::string description;  // of the scanner's operator; shown, never stored
+  int number = 0;  // 1 .. n, the argument of --series
+  std::string description;  // from the scanner's operator; shown, never stored
   int slices = 0, rows = 0, columns = 0;
-  double row_mm = 0.0, column_mm = 0.0, slice_mm = 0.0;  // between neighbours; 0 where unknown
-  std::string plane;                                     // axial, coronal, sagittal, oblique
+  double row_mm = 0.0, column_mm = 0.0, slice_mm = 0.0;  // between neighbours; 0 if unknown
+  std::string plane;  // axial, coronal, sagittal, oblique
   std::string kernel;
   std::string problem;  // why it cannot be imported
 };
@@ -26,10 +26,11 @@ struct SeriesReport {
 // "\"HEAD 1.0 H60s\", 180 slices, 512x512, 0.45x0.45x1 mm, axial, kernel H60s"
 [[nodiscard]] std::string describe(const SeriesEntry& entry);
 
-// Lines for the report of an import: the series taken, the others, what was skipped. Empty for an input without series.
+// Lines for the report of an import: the series taken, the others, the skipped files. Empty for an input without
+// series.
 [[nodiscard]] std::string report_lines(const SeriesReport& report);
 
-// All series, one a line, the one that would be taken marked; and what was skipped.
+// All series, one per line, with a mark at the one that would be taken; and the skipped files.
 [[nodiscard]] std::string list_text(const SeriesReport& report);
 [[nodiscard]] std::string list_json(const SeriesReport& report);
 

@@ -43,7 +43,7 @@ bool keeps_names(FileKind kind) {
   return kind == FileKind::damaged || kind == FileKind::unreadable || kind == FileKind::no_pixels;
 }
 
-// One character of UTF-8 from the front of `text`, or nothing where there is none.
+// The first UTF-8 character of `text`, or nothing if there is none.
 std::optional<std::pair<char32_t, std::size_t>> first_character(std::string_view text) {
   const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
   if (byte(0) < 0x80) return std::pair{static_cast<char32_t>(byte(0)), std::size_t{1}};
@@ -59,7 +59,7 @@ std::optional<std::pair<char32_t, std::size_t>> first_character(std::string_view
   return std::pair{code, size};
 }
 
-// Controls of both sets, and marks that change the direction of what follows.
+// Control characters of both sets, and marks that change the direction of the text after them.
 bool is_control(char32_t code) {
   return code < 0x20 || (code >= 0x7f && code < 0xa0) || (code >= 0x200b && code < 0x2010) ||
          (code >= 0x2028 && code < 0x2030) || (code >= 0x2066 && code < 0x206a) || code == 0xfeff;

@@ -1,4 +1,4 @@
-// What an input holds beside CT slices, counted by kind.
+// Files of an input besides CT slices, counted by kind.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -14,7 +14,7 @@ enum class FileKind : std::uint8_t {
   index,  // DICOMDIR
   localizer,
   dose_report,
-  report,  // structured, of another content
+  report,  // structured, with other content
   secondary_capture,
   segmentation,
   registration,
@@ -22,25 +22,25 @@ enum class FileKind : std::uint8_t {
   presentation,
   document,
   raw_data,
-  other_modality,  // named with it
+  other_modality,  // named in the count
   no_pixels,
   copy,
   damaged,
   unreadable,  // no permission, or the disk fails
   not_dicom,
   empty,
-  archive,   // within a folder or another archive
-  link,      // to a folder or to nothing; within an archive any
-  special,   // pipes, sockets, devices
+  archive,  // within a folder or another archive
+  link,  // to a folder or to nothing; within an archive, any link
+  special,  // pipes, sockets, devices
   too_deep,  // folders below the last level that is searched
 };
 
-// "3 localizers", "1 MR image"; the noun alone for a count of zero.
+// "3 localizers", "1 MR image"; only the noun for a count of zero.
 [[nodiscard]] std::string count_text(FileKind kind, const std::string& modality, int count);
 
 class SkippedFiles {
  public:
-  // Names are kept of files that a person may want to look at: damaged, unreadable, without pixels.
+  // Stores the names of files that a person may want to inspect: damaged, unreadable, without pixels.
   void add(FileKind kind, const std::string& name, const std::string& modality = {});
   void add(const SkippedFiles& other);
 
@@ -61,8 +61,8 @@ class SkippedFiles {
   std::vector<Count> counts_;
 };
 
-// Text of a file as it may be shown: valid UTF-8 without control characters, cut to `most` characters. `latin1`: what
-// is no UTF-8 is ISO 8859-1.
+// Text of a file in a form that may be shown: valid UTF-8 without control characters, cut to `most` characters.
+// `latin1`: bytes that are not UTF-8 are ISO 8859-1.
 [[nodiscard]] std::string shown_text(std::string_view text, std::size_t most, bool latin1 = false);
 
 }  // namespace osteon::import

@@ -1,4 +1,4 @@
-// Integers and digests as bytes of the journal's files: 8 bytes, little endian, and 32.
+// Integers and digests as bytes in the journal's files: 8 bytes, little endian, and 32 bytes.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -15,19 +15,19 @@ inline void put_integer(std::string& to, std::uint64_t value) {
   for (int i = 0; i < 8; ++i) to += static_cast<char>(value >> (8 * i));
 }
 
-// The integer at an offset; `bytes` must go 8 bytes beyond it.
+// The integer at an offset. `bytes` must have at least 8 bytes from there.
 [[nodiscard]] inline std::uint64_t integer_at(std::string_view bytes, std::size_t at) {
   std::uint64_t value = 0;
   for (std::size_t i = 0; i < 8; ++i) value |= std::uint64_t{static_cast<unsigned char>(bytes[at + i])} << (8 * i);
   return value;
 }
 
-// A view of the digest, which must outlive it.
+// A view of the digest, which must outlive the view.
 [[nodiscard]] inline std::string_view as_text(const Digest& digest) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
 }
 
-// Nothing: of another length.
+// Nothing if the bytes have another length.
 [[nodiscard]] inline std::optional<Digest> digest_of(std::string_view bytes) {
   Digest digest;
   if (bytes.size() != digest.bytes.size()) return std::nullopt;

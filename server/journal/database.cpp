@@ -11,7 +11,7 @@
 namespace osteon {
 namespace {
 
-// One sentence of SQLite's, with the system's reason where there is one.
+// One sentence from SQLite, with the system's reason if there is one.
 Error error_of(sqlite3* connection, const std::string& file) {
   const int code = sqlite3_errcode(connection) & 0xff;  // without what the extended code adds
   const bool of_system = code == SQLITE_IOERR || code == SQLITE_FULL || code == SQLITE_CANTOPEN;
@@ -24,8 +24,8 @@ Error error_of(sqlite3* connection, const std::string& file) {
       return {ErrorCode::exists, message + "; close it in the program that has it open"};
     case SQLITE_CORRUPT:
     case SQLITE_FORMAT:
-      return {ErrorCode::invalid_input, message + "; recover it into a new journal, or go on from a backup"};
-    // Files that never were a journal are told apart before SQLite sees them.
+      return {ErrorCode::invalid_input, message + "; salvage it into a new journal, or go on from a backup"};
+    // Files that never were a journal are recognised before SQLite sees them.
     case SQLITE_NOTADB:
       return {ErrorCode::invalid_input, file + ": its first page is damaged; go on from a backup"};
     case SQLITE_READONLY:
@@ -39,8 +39,8 @@ Error error_of(sqlite3* connection, const std::string& file) {
   }
 }
 
-// A path as SQLite takes it with parameters behind it. A torn write to SQLite's log may spoil what it has committed
-// before: the journal's own log still has that.
+// A path in the form in which SQLite accepts parameters after it. A torn write to SQLite's log may spoil what it has
+// committed before, but the journal's own log still has that.
 std::string uri_of(const std::filesystem::path& file) {
   static constexpr char kDigits[] = "0123456789ABCDEF";
   std::string uri = "file:";
@@ -108,7 +108,7 @@ struct Database::Connection {
 };
 
 void Database::Close::operator()(Connection* connection) const {
-  // A statement that outlives the database would keep it open: then it ends with the statement.
+  // A statement that outlives the database would keep it open. Then it is closed with the statement.
   sqlite3_close_v2(connection->handle);
   delete connection;
 }
@@ -124,14 +124,14 @@ Result<Database> Database::open(const std::filesystem::path& file, const Disk& d
                     SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE | (options.create ? SQLITE_OPEN_CREATE : 0);
   const int code = sqlite3_open_v2(uri.c_str(), &connection.handle, flags, vfs.empty() ? nullptr : vfs.c_str());
   if (code != SQLITE_OK) return tl::unexpected(error_of(connection.handle, connection.file));
-  // SQLite then opens it to be read, and fails later for a reason of its own.
+  // Otherwise SQLite opens the file read-only, and fails later for a reason of its own.
   if (!options.peek && sqlite3_db_readonly(connection.handle, "main") == 1)
     return failure(ErrorCode::internal,
                    connection.file + " cannot be written to; see to its permissions, or copy it to another place");
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   sqlite3_db_config(connection.handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
-  // EXCLUSIVE keeps the index of the log in memory: no file of it that another process could have damaged, and nobody
-  // beside us.
+  // EXCLUSIVE keeps the index of the log in memory. So there is no index file that another process could damage, and
+  // nobody else uses the database.
   std::string settings =
       "PRAGMA locking_mode=EXCLUSIVE; PRAGMA temp_store=MEMORY; PRAGMA mmap_size=0; PRAGMA secure_delete=ON;"
       "PRAGMA cell_size_check=ON; PRAGMA cache_spill=OFF; PRAGMA trusted_schema=OFF; PRAGMA fullfsync=ON; PRAGMA "

@@ -1,6 +1,6 @@
-// SQLite as the journal uses it: one connection that has the file to itself. A transaction is open most of the time and
-// holds what the journal's own log has made durable. SQLite's write-ahead log has something only while it is committed.
-// Errors are sentences; what SQLite returns stops here.
+// SQLite for the journal: one connection that has the file to itself. A transaction is open most of the time. It holds
+// what the journal's own log has made durable. SQLite's write-ahead log is used only while this transaction is
+// committed. Errors are sentences; error codes of SQLite go no further than this file.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -17,18 +17,18 @@ struct sqlite3_stmt;
 
 namespace osteon {
 
-// One SQL statement, run any number of times. Columns and parameters count from 0.
+// One SQL statement, which can run many times. Columns and parameters count from 0.
 class Statement {
  public:
   Statement& integer(int at, std::int64_t value);
-  Statement& text(int at, std::string_view value);  // must stay until the next step
+  Statement& text(int at, std::string_view value);  // must remain valid until the next step
   Statement& blob(int at, std::string_view value);  // likewise
-  [[nodiscard]] Result<bool> step();                // true: there is a entry
-  [[nodiscard]] Result<void> run();                 // to its end; ready to run again
+  [[nodiscard]] Result<bool> step();  // true: there is a result row
+  [[nodiscard]] Result<void> run();  // to its end; ready to run again
   void reset();
 
   [[nodiscard]] std::int64_t integer(int column) const;
-  [[nodiscard]] std::string_view bytes(int column) const;  // of a text or blob, until the next step
+  [[nodiscard]] std::string_view bytes(int column) const;  // of a text or blob, valid until the next step
 
  private:
   friend class Database;
@@ -42,32 +42,32 @@ class Statement {
 
 struct DatabaseOptions {
   bool create = false;
-  bool durable = true;  // false: SQLite waits for no write; for tests that must see entries lost
+  bool durable = true;  // false: SQLite waits for no write; for tests in which entries must be lost
   int page_bytes = 4096;
-  bool peek = false;  // reads the file as it lies there, without its log and beside whoever has it open
-  std::filesystem::path shown_as = {};  // what errors name, where the file is a copy; empty: the file
+  bool peek = false;  // reads the file as it is, without its log, while another process may have it open
+  std::filesystem::path shown_as = {};  // what errors name if the file is a copy; empty: the file
 };
 
-// Not synchronised; one thread at a time.
+// Not synchronised: one thread at a time.
 class Database {
  public:
   [[nodiscard]] static Result<Database> open(const std::filesystem::path& file, const Disk& disk,
                                              const DatabaseOptions& options);
-  // Closing carries nothing from the log into the file: that is for carry_log(), while it still can be told to have
-  // failed.
+  // Closing copies nothing from the log into the file. That is the task of carry_log(), which can still report an
+  // error.
   Database(Database&&) noexcept = default;
   Database& operator=(Database&&) noexcept = default;
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
-  [[nodiscard]] Result<void> run(const std::string& sql);            // statements without entries that matter
-  [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first entry; 0 without one
+  [[nodiscard]] Result<void> run(const std::string& sql);  // statements whose result rows do not matter
+  [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first result row; 0 if there is none
   [[nodiscard]] Result<std::string> text(std::string_view sql);
-  // What is changed between the two is in memory until the second, which returns when SQLite's log has it durably.
+  // Changes between the two calls stay in memory until commit(). It returns when SQLite's log has them durably.
   [[nodiscard]] Result<void> begin();
   [[nodiscard]] Result<void> commit();
-  // Copies SQLite's log into the file, both synced, and cuts it to nothing. Outside of a transaction.
+  // Copies SQLite's log into the file, syncs both, and truncates the log. Call it outside of a transaction.
   [[nodiscard]] Result<void> carry_log();
-  // What is read next comes from the disk, not from the pages that SQLite still has in memory.
+  // The next reads come from the disk, not from the pages that SQLite has in memory.
   void forget_pages();
   [[nodiscard]] bool read_only() const;  // known once something was read
 

@@ -29,7 +29,7 @@ tl::unexpected<Error> cannot(const char* what, const fs::path& file, int reason)
                            std::generic_category().message(reason) + std::string(remedy_of(reason)));
 }
 
-// A file that was to be made is missing only because its folder is.
+// If a file that was to be made is missing, its folder is missing.
 tl::unexpected<Error> cannot_make(const char* what, const fs::path& file, int reason) {
   if (reason != ENOENT) return cannot(what, file, reason);
   return failure(ErrorCode::not_found,
@@ -75,7 +75,7 @@ class SystemFile final : public DiskFile {
     return {};
   }
 
-  // In one call, which some disks do without emptying their whole cache.
+  // A single call: some disks then do not have to flush their whole cache.
   Result<void> write_durably(std::uint64_t from, std::string_view piece) override {
     while (!piece.empty()) {
       const iovec bytes{const_cast<char*>(piece.data()), piece.size()};
@@ -89,7 +89,7 @@ class SystemFile final : public DiskFile {
     return {};
   }
 
-  // Data and size, not times: so a file that is only written over needs no change of the file system's own records.
+  // Syncs data and size, but no times. So overwriting a file does not change the metadata of the file system.
   Result<void> sync() override {
     if (::fdatasync(fd_.get()) != 0) return cannot("sync", file_, errno);
     return {};
@@ -123,12 +123,12 @@ class SystemScratch final : public ScratchFolder {
   fs::path path_;
 };
 
-// Whether a second process is refused the lock that this one holds. Some file systems grant it to everybody.
+// Whether this lock excludes a second process. Some file systems grant the lock to everybody.
 Result<bool> keeps_others_out(const fs::path& file) {
   const char* name = file.c_str();
   const pid_t child = ::fork();
   if (child < 0) return cannot("start a process that tries the lock of", file, errno);
-  if (child == 0) {  // only calls that are safe after a fork of one of many threads
+  if (child == 0) {  // only calls that are safe after a fork of a process with many threads
     const int fd = ::open(name, O_RDONLY | O_CLOEXEC);
     ::_exit(fd >= 0 && ::flock(fd, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK ? 0 : 1);
   }
@@ -150,7 +150,7 @@ class SystemDisk final : public Disk {
     const int fd = ::open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
     if (fd < 0) return cannot_make("open", file, errno);
     auto opened = std::make_unique<SystemFile>(file, fd);
-    if (::lseek(fd, 0, SEEK_END) < 0) return cannot("open", file, errno);  // where write() goes on
+    if (::lseek(fd, 0, SEEK_END) < 0) return cannot("open", file, errno);  // where write() continues
     return opened;
   }
 
@@ -170,8 +170,8 @@ class SystemDisk final : public Disk {
     return bytes;
   }
 
-  // Asks for no times. Whoever asks for them makes the next write note them anew, and the next sync takes twice as
-  // long.
+  // Does not ask for times. Whoever asks for them makes the next write record them again, and then the next sync takes
+  // twice as long.
   Result<std::optional<FileIdentity>> identity(const fs::path& file) override {
     struct statx about {};
     if (::statx(AT_FDCWD, file.c_str(), 0, STATX_INO | STATX_SIZE, &about) == 0)
@@ -209,8 +209,8 @@ class SystemDisk final : public Disk {
     return names;
   }
 
-  // flock() rather than a file that merely exists: it ends with its holder, even one that was killed. It does not end
-  // when this process closes the file elsewhere, as the locks of fcntl() do that SQLite takes.
+  // flock() and not just a file that exists: the lock ends with its holder, even if that was killed. It does not end
+  // when this process closes the file elsewhere. The fcntl() locks that SQLite uses do end then.
   Result<std::unique_ptr<DiskLock>> lock(const fs::path& file, LockKind kind) override {
     for (;;) {
       int fd = ::open(file.c_str(), O_RDWR | O_CLOEXEC);
@@ -221,7 +221,8 @@ class SystemDisk final : public Disk {
         if (errno != EWOULDBLOCK) return cannot("lock", file, errno);
         return failure(ErrorCode::exists, file.string() + " is held by another process");
       }
-      // Its holder may have removed or renamed it before it let go: then the name stands for another file.
+      // The holder may have removed or renamed the file before it released the lock. Then the name refers to another
+      // file.
       struct stat mine {
       }, named{};
       if (::fstat(fd, &mine) != 0) return cannot("look at", file, errno);

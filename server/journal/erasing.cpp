@@ -1,5 +1,5 @@
-// Rows of which something was erased. The chain keeps their hash, and a sealed register says what stands in their
-// place.
+// Entries of which something was erased. The chain still covers their original hash, and a sealed register records what
+// replaces them.
 #include <utility>
 
 #include "common/core/check.hpp"
@@ -52,7 +52,7 @@ JournalHead JournalFile::next_in_chain(const JournalHead& before, const JournalE
 }
 
 Result<void> JournalFile::erase(std::span<const JournalEntry> instead) {
-  auto statement = database_.prepare("UPDATE entries SET bytes = ? WHERE place = ?");
+  auto statement = database_.prepare("UPDATE rows SET bytes = ? WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
   for (const JournalEntry& entry : instead) {
     const auto chain = chain_at(entry.place);
@@ -76,14 +76,14 @@ Result<std::size_t> Journal::erase_entries(const std::function<std::optional<std
   });
   if (!read_all) return tl::unexpected(read_all.error());
   if (instead.empty()) return 0;
-  const auto signed_range = state.file.signed_range();
-  if (!signed_range) return tl::unexpected(signed_range.error());
-  if (!signed_range->empty() && !state.options.keys)
+  const auto signatures = state.file.signed_entries();
+  if (!signatures) return tl::unexpected(signatures.error());
+  if (!signatures->empty() && !state.options.keys)
     return failure(ErrorCode::denied, state.path.string() +
                                           " was signed by its server, which has to sign what is erased too; "
                                           "give its key with --signing-key FILE");
   Database& database = state.file.database();
-  // Pages that the entries once were on may hold copies of them, and so may the log's file behind its end.
+  // Pages that held the entries before may contain copies of them, and so may the log's file after its end.
   const Result<void> done = write([&] {
     return state.file.erase(instead)
         .and_then([&] { return keep_signature(); })

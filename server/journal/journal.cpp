@@ -17,9 +17,9 @@ constexpr std::uint64_t kTidyBytes = std::uint64_t{64} << 10;
 
 fs::path with(const fs::path& file, std::string_view end) { return file.string() + std::string(end); }
 
-// After a failed sync the system may show bytes that are not on the disk, and never write them: not even a later sync
-// does. What a process that died has left in SQLite's log is therefore written anew before it counts, into a file of
-// its own: a torn write over it could spoil what the database has only half copied.
+// After a failed sync the system may show bytes that are not on the disk, and a later sync may not write them either.
+// So what a process that died left in SQLite's log is written again before it counts. It goes into a new file, because
+// a torn write over the log could spoil what the database has only half copied.
 Result<void> renew_wal(Disk& disk, const fs::path& wal) {
   const auto size = disk.size(wal);
   if (!size) return tl::unexpected(size.error());
@@ -31,7 +31,8 @@ Result<void> renew_wal(Disk& disk, const fs::path& wal) {
   return renewed->finish().map([](const WrittenFile&) {});
 }
 
-// Whatever a process that died was about to write: half a checkpoint, one that was never noted, one that was given up.
+// Removes what a process that died was about to write: half a checkpoint, or one that was never recorded or was
+// dropped.
 Result<void> clear_leftovers(Disk& disk, const fs::path& file, const std::vector<Checkpoint>& kept) {
   const auto names = disk.list(folder_of(file));
   if (!names) return tl::unexpected(names.error());
@@ -85,8 +86,8 @@ Journal::Journal(Journal&&) noexcept = default;
 Journal& Journal::operator=(Journal&&) noexcept = default;
 Journal::~Journal() = default;
 
-// Made beside its place, so that a journal is there whole or not at all. The lock is the file's own and stays when it
-// is renamed.
+// The journal is made under another name, so that it exists whole or not at all. The lock belongs to the file itself
+// and stays when the file is renamed.
 Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, JournalOptions options) {
   Disk& disk = disk_of(options);
   if (Result<void> clear = check_nothing_left(disk, file); !clear) return tl::unexpected(clear.error());
@@ -98,7 +99,7 @@ Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, 
     return disk.remove(partial).and_then([&] { return disk.remove(wal_of(partial)); });
   };
   const DatabaseOptions as_made{.create = true, .durable = options.durable, .page_bytes = options.page_bytes};
-  const Result<void> made = check_nothing_left(disk, file)  // again: another process may have made one meanwhile
+  const Result<void> made = check_nothing_left(disk, file)  // again: another process may have made one since
                                 .and_then([&] { return disk.create(partial).map([](const auto&) {}); })
                                 .and_then([&] { return disk.remove(wal_of(partial)); })
                                 .and_then([&] { return JournalFile::make(partial, genesis, disk, as_made); })
@@ -177,8 +178,8 @@ Result<Journal> Journal::open_locked(const fs::path& file, const JournalOptions&
   return journal;
 }
 
-// First the database gets all that the old log files have, and keeps it whatever happens: a process that died may have
-// seen a sync of theirs fail. Then a generation begins.
+// First the database durably gets everything in the old log files, because a sync of these files may have failed in a
+// process that died. Then a new generation begins.
 Result<void> Journal::begin_log() {
   State& state = *state_;
   if (Result<void> kept = state.file.keep_log(); !kept) return kept;
@@ -190,7 +191,7 @@ Result<void> Journal::begin_log() {
   return note_keys().and_then([&] { return carry(); });
 }
 
-// Whoever has a later key of the same server, or an earlier one, finds here that they belong together.
+// Whoever has a later or an earlier key of the same server finds here that the keys belong together.
 Result<void> Journal::note_keys() {
   State& state = *state_;
   if (!state.options.keys) return {};
@@ -209,10 +210,10 @@ Result<void> Journal::begin_signing() {
   const SigningKeys* keys = state.options.keys.get();
   if (keys == nullptr) return {};
   state.file.sign_with(&keys->key());
-  const auto all = state.file.signed_range();
+  const auto all = state.file.signed_entries();
   if (!all) return tl::unexpected(all.error());
   const auto last =
-      std::find_if(all->rbegin(), all->rend(), [&](const SignedRange& one) { return keys->trusts(one.key); });
+      std::find_if(all->rbegin(), all->rend(), [&](const SignedEntries& one) { return keys->trusts(one.key); });
   const RoomSeq head = state.head.place;
   const bool any = last != all->rend();
   const Result<bool> erased = is_vouched_for(kErasedRegister);
@@ -229,7 +230,7 @@ Result<void> Journal::begin_signing() {
   if (head.value == 0) return {};
   const RoomSeq signed_to = any ? last->head.place : RoomSeq{};
   const std::string entries = "entries " + std::to_string(signed_to.value + 1) + " to " + std::to_string(head.value);
-  // Whoever recovered it with the key has accepted them.
+  // A person who had the key salvaged the journal and thereby accepted these entries.
   const Result<bool> accepted = is_vouched_for(kRecoveredRegister);
   if (!accepted) return tl::unexpected(accepted.error());
   if (any && (!*accepted || head > state.recovered_to.value_or(RoomSeq{})))
@@ -237,7 +238,7 @@ Result<void> Journal::begin_signing() {
         ErrorCode::unavailable,
         state.path.string() + ": this server's key signed the entries up to " + std::to_string(signed_to.value) +
             ", but not " + entries +
-            ": somebody else wrote them; recover the signed ones into a new journal: osteon-server salvage " +
+            ": somebody else wrote them; salvage the signed ones into a new journal: osteon-server salvage " +
             state.path.string() + " NEW --to " + std::to_string(signed_to.value) + " --signing-key KEY");
   state.notes.push_back(entries + " were not signed by this server's key, which signs those after them");
   return {};
@@ -283,7 +284,7 @@ Result<void> Journal::carry() {
       .and_then([&] { return database.begin(); })
       .and_then([&] { return state.disk->identity(state.path); })
       .and_then([&](const std::optional<FileIdentity>& now) -> Result<void> {
-        if (now && now->same_file(state.identity)) state.identity = *now;  // as long as it is now, at least
+        if (now && now->same_file(state.identity)) state.identity = *now;  // at least the present size
         state.generation = start.generation;
         state.last_signature.reset();
         return {};
@@ -300,9 +301,9 @@ const JournalHead& Journal::head() const { return state_->head; }
 const std::string& Journal::genesis() const { return state_->file.genesis(); }
 std::optional<RoomSeq> Journal::recovered_to() const { return state_->recovered_to; }
 
-// Every change goes through here: the first that fails is the last. Whether it reached the disk is then unknown, and
-// what the system shows of the file is not to be trusted, so a note beside the file keeps the next process from going
-// on as well.
+// All changes go through here, and none is made after the first that fails. It is then unknown whether that change
+// reached the disk, and what the system shows of the file cannot be trusted. So a note beside the file stops the next
+// process from continuing, too.
 Result<void> Journal::write(const std::function<Result<void>()>& work) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
@@ -310,12 +311,12 @@ Result<void> Journal::write(const std::function<Result<void>()>& work) {
   Result<void> done = check_named();
   if (done) done = work();
   if (done) return done;
-  close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more entries, since a write to it failed: " +
-                                              done.error().message + "; recover it into a new journal"});
+  close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more entries because a write to it failed: " +
+                                              done.error().message + "; salvage it into a new journal"});
   return tl::unexpected(*state.closed);
 }
 
-// Whoever replaces or removes the file while it is open would have the entries written to one that nobody finds.
+// If somebody replaced or removed the open file, the entries would be written to a file that nobody finds.
 Result<void> Journal::check_named() {
   State& state = *state_;
   const auto now = state.disk->identity(state.path);
@@ -335,7 +336,7 @@ void Journal::close_for_good(Error reason) {
   State& state = *state_;
   close_to_entries(std::move(reason));
   if (auto note = DurableFile::begin(*state.disk, failed_of(state.path)); note && note->write(state.closed->message))
-    static_cast<void>(note->finish());  // best effort: the disk may take nothing at all
+    static_cast<void>(note->finish());  // best effort: the disk may accept no data at all
 }
 
 Result<void> Journal::append(std::span<const JournalEntry> entries) {
@@ -346,10 +347,10 @@ Result<void> Journal::append(std::span<const JournalEntry> entries) {
       return failure(ErrorCode::invalid_input,
                      state.path.string() + ": entry " + std::to_string(entry.place.value) + " has " +
                          std::to_string(entry.bytes.size()) + " bytes, more than the " +
-                         std::to_string(state.options.most_entry_bytes) + " that a entry may have");
+                         std::to_string(state.options.most_entry_bytes) + " that an entry may have");
   if (entries.empty()) return {};
   JournalHead head = state.head;
-  // Into the transaction, which is in memory, and into the log, which makes them safe.
+  // Adds them to the transaction, which is in memory, and to the log, which makes them durable.
   const Result<void> done = write([&] {
     return state.file.add_entries(entries, head).and_then([&] {
       std::optional<Signature> signature;
@@ -362,7 +363,7 @@ Result<void> Journal::append(std::span<const JournalEntry> entries) {
   });
   if (!done) return done;
   state.head = head;
-  // The entries are safe whatever becomes of this.
+  // The entries are already durable, so an error here does not matter to the caller.
   if (state.log->is_full()) static_cast<void>(write([&] { return carry(); }));
   return {};
 }
@@ -407,23 +408,23 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
   const std::string place = std::to_string(witness.place.value), file = state.path.string();
   if (witness.place > state.head.place && state.recovered_to)
     return failure(ErrorCode::unavailable,
-                   file + " was recovered to place " + std::to_string(state.recovered_to->value) +
-                       ", and a client knows place " + place + ": what it knows beyond is lost, it has to join anew");
+                   file + " was salvaged up to event " + std::to_string(state.recovered_to->value) +
+                       ", and a client knows event " + place + ": what it knows beyond that is lost; it has to join again");
   if (witness.place > state.head.place) {
-    // Also for the next process: whoever knows more may not come again to say so.
+    // The note also closes the journal for the next process, because the witness may never come back to report this.
     close_for_good({ErrorCode::unavailable,
-                    file + " goes to place " + std::to_string(state.head.place.value) +
-                        ", but a client was told that place " + place +
-                        " is safe: entries were lost; recover it into a new journal, or go on from a backup"});
+                    file + " goes to event " + std::to_string(state.head.place.value) +
+                        ", but a client was told that event " + place +
+                        " is durable: entries were lost; salvage it into a new journal, or go on from a backup"});
     return tl::unexpected(*state.closed);
   }
   const auto chain = state.file.chain_at(witness.place);
   if (chain && *chain == witness.chain) return {};
-  // What the system shows of the file after a write has failed says nothing about the client.
+  // After a failed write, what the system shows of the file says nothing about the client.
   if (state.closed) return tl::unexpected(*state.closed);
   if (!chain) return tl::unexpected(chain.error());
   return failure(ErrorCode::invalid_input,
-                 file + " and a client know different histories up to place " + place + "; it has to join anew");
+                 file + " and a client know different histories up to event " + place + "; it has to join again");
 }
 
 Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta, std::string_view seal) {
@@ -432,14 +433,14 @@ Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::str
   const auto chain = state.file.chain_at(at.place);
   if (!chain) return tl::unexpected(chain.error());
   if (at.place > state.head.place || *chain != at.chain)
-    return failure(ErrorCode::invalid_input, state.path.string() + ": a checkpoint at place " +
+    return failure(ErrorCode::invalid_input, state.path.string() + ": a checkpoint at event " +
                                                  std::to_string(at.place.value) +
                                                  " is of another history than the journal's");
   const auto all = checkpoints();
   if (!all) return tl::unexpected(all.error());
   if (std::any_of(all->begin(), all->end(), [&](const Checkpoint& c) { return c.at == at; }))
     return failure(ErrorCode::exists,
-                   state.path.string() + " has a checkpoint at place " + std::to_string(at.place.value));
+                   state.path.string() + " has a checkpoint at event " + std::to_string(at.place.value));
   auto file = DurableFile::begin(*state.disk, checkpoint_file(state.path, at));
   if (!file) return tl::unexpected(file.error());
   return CheckpointFile({at, std::string(meta), 0, {}, std::string(seal)}, std::move(*file));
@@ -517,9 +518,9 @@ Result<void> Journal::set_person(const Person& person) { return set_beside({}, {
 
 Result<std::vector<Person>> Journal::people() { return state_->file.people(); }
 
-// A entry that is deleted is overwritten, but a copy of it may be left where the tree once moved it to another page. So
-// the whole table is emptied, which overwrites every page that it ever had, and those who stay are written anew.
-// SQLite's log, which has the pages as they were, is cut to nothing whenever the journal's is carried.
+// A deleted row is overwritten, but a copy may remain where the tree once moved the row to another page. So the whole
+// table is emptied, which overwrites every page that it ever had, and the remaining people are written again. SQLite's
+// log contains the old pages. It is truncated whenever the journal's log is copied into the database.
 Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)>& kept) {
   const auto all = people();
   if (!all) return tl::unexpected(all.error());
@@ -575,8 +576,8 @@ Result<void> Journal::close() {
   }
   state_.reset();
   if (vouched && done) {
-    static_cast<void>(disk.remove(wal_of(path)));  // which is empty
-    static_cast<void>(remove_log(path, disk));     // which the footer says is needed no more
+    static_cast<void>(disk.remove(wal_of(path)));  // it is empty
+    static_cast<void>(remove_log(path, disk));  // no longer needed, as the footer says
   }
   return done;
 }

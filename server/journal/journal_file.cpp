@@ -16,10 +16,10 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kApplication = 0x4f73744a;  // "OstJ"
-constexpr std::string_view kRemedy = "; recover it into a new journal";
+constexpr std::string_view kRemedy = "; salvage it into a new journal";
 
-// The tables of each version, and how its entries read as those of today. A new version gets an entry of its own, and the
-// older ones columns for what they did not have.
+// The tables of each version, and the query that reads its entries like those of today. A new version gets a Version of
+// its own. The queries of older versions add the columns that these did not have.
 struct Version {
   int number;
   std::string tables;
@@ -35,20 +35,20 @@ struct Version {
   " seal BLOB NOT NULL) STRICT, WITHOUT ROWID;"
 
 constexpr const char* kTimedTables =
-    "CREATE TABLE entries(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
+    "CREATE TABLE rows(place INTEGER PRIMARY KEY, at_ns INTEGER NOT NULL, bytes BLOB NOT NULL,"
     " chain BLOB NOT NULL) STRICT;" OSTEON_OTHER_TABLES;
 constexpr const char* kSignatureTable =
     "CREATE TABLE signatures(place INTEGER PRIMARY KEY, since INTEGER NOT NULL, chain BLOB NOT NULL, key BLOB NOT NULL,"
     " signature BLOB NOT NULL) STRICT;";
 constexpr int kVersionWithSignatures = 4;
 constexpr const char* kTimedEntries =
-    "SELECT place, at_ns, bytes, chain FROM entries WHERE place > ? AND place <= ? ORDER BY place";
+    "SELECT place, at_ns, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place";
 
 const std::array kVersions{
     Version{1,
-            "CREATE TABLE entries(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
+            "CREATE TABLE rows(place INTEGER PRIMARY KEY, bytes BLOB NOT NULL, chain BLOB NOT NULL) "
             "STRICT;" OSTEON_OTHER_TABLES,
-            "SELECT place, 0, bytes, chain FROM entries WHERE place > ? AND place <= ? ORDER BY place"},
+            "SELECT place, 0, bytes, chain FROM rows WHERE place > ? AND place <= ? ORDER BY place"},
     Version{2, kTimedTables, kTimedEntries}, Version{3, kTimedTables, kTimedEntries},
     Version{kJournalVersion, std::string(kTimedTables) + kSignatureTable, kTimedEntries}};
 
@@ -56,7 +56,7 @@ const Version& version_of(int number) {
   return *std::find_if(kVersions.begin(), kVersions.end(), [&](const Version& v) { return v.number == number; });
 }
 
-constexpr const char* kInsertEntry = "INSERT INTO entries(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
+constexpr const char* kInsertEntry = "INSERT INTO rows(place, at_ns, bytes, chain) VALUES(?, ?, ?, ?)";
 
 Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
   std::unique_ptr<DiskFile> copy;
@@ -72,7 +72,7 @@ Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
       .map([](const WrittenFile&) {});
 }
 
-// What stands beside the chain is confirmed entry by entry.
+// The chain does not cover what is stored beside it. A seal confirms each such value.
 Digest seal_of(const Checkpoint& checkpoint) {
   Hasher hasher;
   hasher.text("checkpoint");
@@ -133,12 +133,12 @@ bool is_partial_of(const fs::path& journal, std::string_view name) {
          parse_checkpoint_file(journal, name);
 }
 
-// SQLite takes an empty file for a new database, and throws away the log beside it. When the power failed while the log
-// was being carried into the file, the first page may be lost, and the log still has it: then SQLite has to judge.
+// SQLite takes an empty file for a new database, and deletes the log beside it. If the power failed while the log was
+// copied into the file, the first page may be lost although the log still has it. Then SQLite has to judge.
 Result<void> check_is_journal(const fs::path& file, Disk& disk) {
   constexpr std::size_t kSmallestPage = 512, kLooked = std::size_t{64} << 10, kApplicationAt = 68;
   constexpr std::string_view kMagic("SQLite format 3\0", 16), kOwn("OstJ"),
-      kEntries("CREATE TABLE entries(place INTEGER PRIMARY KEY");
+      kEntries("CREATE TABLE rows(place INTEGER PRIMARY KEY");
   const auto size = disk.size(file);
   if (!size) return tl::unexpected(size.error());
   if (!*size) return failure(ErrorCode::not_found, "there is no journal " + file.string());
@@ -163,7 +163,7 @@ Result<void> check_is_journal(const fs::path& file, Disk& disk) {
 bool belongs_to(const fs::path& journal, std::string_view name) {
   const std::string own = journal.filename().string();
   if (!name.starts_with(own)) return false;
-  // A lock of earlier versions; the last two are SQLite's, where somebody else looked into it.
+  // A lock of earlier versions. The last two are SQLite's, present if another program opened the file.
   for (const std::string_view end : {"", "-log", "-mirror", "-owner", "-wal", ".failed", ".lock", "-shm", "-journal"})
     if (name == own + std::string(end)) return true;
   return is_partial_of(journal, name) || parse_checkpoint_file(journal, name);
@@ -217,10 +217,10 @@ Result<JournalFile> JournalFile::open(const fs::path& file, Disk& disk, const Da
   return of_database(file, disk, std::move(*database), false);
 }
 
-// A database whose own file has everything is read where it lies. Any other would have to be written to.
+// A database whose own file is complete is read in place. Any other would have to be written to.
 Result<JournalFile> JournalFile::open_to_read(const fs::path& file, Disk& disk) {
   if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
-  // Read where it lies, SQLite does not look at what says that it keeps a log.
+  // In this mode SQLite does not check the bytes that say that the database has a log.
   constexpr std::string_view kKeepsLog = "\2\2";
   constexpr std::uint64_t kKeepsLogAt = 18;
   const auto versions = disk.read(file, kKeepsLogAt, kKeepsLog.size());
@@ -261,7 +261,7 @@ Result<JournalFile> JournalFile::of_database(const fs::path& file, Disk& disk, D
   const auto generation = opened.find_register(kGenerationRegister), footer = opened.find_register(kFooterRegister);
   const auto id = opened.find_register(kIdRegister);
   if (id && *id) opened.id_ = **id;
-  static_cast<void>(opened.read_erased());  // inspect() says what is wrong with it
+  static_cast<void>(opened.read_erased());  // inspect() reports what is wrong with it
   if (generation && *generation) opened.generation_ = decode_number(**generation).value_or(0);
   const auto closed = footer && *footer ? decode_footer(**footer) : std::nullopt;
   opened.needs_log_ = opened.generation_ != 0 && !(closed && closed->clean);
@@ -287,7 +287,7 @@ Result<void> JournalFile::make_id() {
 }
 
 Result<JournalHead> JournalFile::stored_head() {
-  auto statement = database_.prepare("SELECT place, chain FROM entries ORDER BY place DESC LIMIT 1");
+  auto statement = database_.prepare("SELECT place, chain FROM rows ORDER BY place DESC LIMIT 1");
   if (!statement) return tl::unexpected(statement.error());
   const Result<bool> entry = statement->step();
   if (!entry) return tl::unexpected(entry.error());
@@ -298,7 +298,7 @@ Result<JournalHead> JournalFile::stored_head() {
 
 Result<void> JournalFile::take_log() {
   const auto stored = stored_head();
-  if (!stored) {  // inspect() says what is wrong with the entries
+  if (!stored) {  // inspect() reports what is wrong with the entries
     log_.faults.push_back(stored.error().message);
     return {};
   }
@@ -307,17 +307,17 @@ Result<void> JournalFile::take_log() {
   if (!read) return tl::unexpected(read.error());
   log_ = std::move(*read);
   for (const auto& [path, base] : log_.bases) {
-    if (base.place > stored->place) continue;  // what is missing between is counted by inspect()
+    if (base.place > stored->place) continue;  // inspect() counts what is missing between
     const auto chain = chain_at(base.place);
     if (chain && *chain == base.chain) continue;
-    log_.faults.push_back(path.string() + " goes on from another history than " + file_.string() + " has");
+    log_.faults.push_back(path.string() + " continues another history than " + file_.string() + " has");
     needs_log_ = true;
   }
   if (log_.entries.empty() || version_ == 1) return {};
   JournalHead head = *stored;
   const Result<void> added = add_entries(log_.entries, head);
   if (added) return {};
-  // The tables are damaged. What can be read of them is all that there is.
+  // The tables are damaged. Only what can be read from them is available.
   log_.faults.push_back(added.error().message);
   needs_log_ = true;
   return database_.run("ROLLBACK").and_then([&] { return database_.begin(); });
@@ -363,16 +363,16 @@ Result<void> JournalFile::check_tables(bool peek) {
     return failure(ErrorCode::invalid_input,
                    file_.string() + " is no journal, or its first page is damaged; go on from a backup");
   if (Result<void> known = read_version(); !known) return known;
-  if (!peek && database_.read_only())  // of no permission to write, or of a first page that claims a file of the future
+  if (!peek && database_.read_only())  // no permission to write, or a first page that claims a future version
     return failure(ErrorCode::invalid_input,
-                   file_.string() + " cannot be written to; see to its permissions, or recover it");
+                   file_.string() + " cannot be written to; see to its permissions, or salvage it");
 
   // A damaged definition could make SQLite read the right bytes wrongly.
   const Result<std::string> tables =
       database_.text("SELECT group_concat(sql, ';') || ';' FROM (SELECT sql FROM sqlite_schema ORDER BY rowid)");
   if (!tables) return tl::unexpected(tables.error());
   if (*tables == version_of(version_).tables) return {};
-  return damaged("what says how its tables of version " + std::to_string(version_) + " are made");
+  return damaged("the definition of its tables of version " + std::to_string(version_));
 }
 
 Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
@@ -412,7 +412,7 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
 
 Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
   if (place.value == 0) return first_head(genesis_).chain;
-  auto statement = database_.prepare("SELECT chain FROM entries WHERE place = ?");
+  auto statement = database_.prepare("SELECT chain FROM rows WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
   const Result<bool> entry = statement->integer(0, static_cast<std::int64_t>(place.value)).step();
   if (!entry) return tl::unexpected(entry.error());
@@ -438,7 +438,7 @@ Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
     checkpoint.digest = digest.value_or(Digest{});
     checkpoint.seal = statement->bytes(5);
     if (!chain || !digest || !check_seal(checkpoint.seal, seal_of(checkpoint), first_head(genesis_).chain))
-      return damaged("the entry of the checkpoint at place " + std::to_string(checkpoint.at.place.value));
+      return damaged("the record of the checkpoint at event " + std::to_string(checkpoint.at.place.value));
     all.push_back(std::move(checkpoint));
   }
 }
@@ -454,7 +454,7 @@ Result<std::vector<Person>> JournalFile::people(std::vector<std::optional<Public
     Person person{std::string(statement->bytes(0)), std::string(statement->bytes(1)),
                   static_cast<std::int32_t>(statement->integer(2))};
     const auto seal = check_seal(statement->bytes(3), seal_of(person), first_head(genesis_).chain);
-    if (!seal) return damaged("an entry of its people");
+    if (!seal) return damaged("the record of a person");
     if (signers != nullptr) signers->push_back(seal->key);
     all.push_back(std::move(person));
   }
@@ -482,11 +482,11 @@ Result<std::optional<std::string>> JournalFile::find_register(std::string_view n
 Result<std::optional<SealedRegister>> JournalFile::find_sealed(std::string_view name) {
   auto statement = database_.prepare("SELECT value, seal FROM registers WHERE name = ?");
   if (!statement) return tl::unexpected(statement.error());
-  const Result<bool> entry = statement->text(0, name).step();
-  if (!entry) return tl::unexpected(entry.error());
-  if (!*entry) return std::nullopt;
+  const Result<bool> stored = statement->text(0, name).step();
+  if (!stored) return tl::unexpected(stored.error());
+  if (!*stored) return std::nullopt;
   SealedRegister found{std::string(name), std::string(statement->bytes(0)), std::string(statement->bytes(1))};
-  // The genesis is what all others are held against, and bound by the chain itself.
+  // All other seals depend on the genesis, and the chain itself covers it.
   const Digest entry = seal_of(name, found.value), genesis = first_head(genesis_).chain;
   const bool fits =
       name == kGenesisRegister ? found.seal == as_text(entry) : check_seal(found.seal, entry, genesis).has_value();
@@ -502,8 +502,8 @@ std::optional<PublicKey> JournalFile::signer_of(const Checkpoint& found) const {
   return check_seal(found.seal, seal_of(found), first_head(genesis_).chain).value_or(Seal{}).key;
 }
 
-Result<std::vector<SignedRange>> JournalFile::signed_range() {
-  std::vector<SignedRange> all;
+Result<std::vector<SignedEntries>> JournalFile::signed_entries() {
+  std::vector<SignedEntries> all;
   if (version_ >= kVersionWithSignatures) {
     auto statement = database_.prepare("SELECT place, since, chain, key, signature FROM signatures ORDER BY place");
     if (!statement) return tl::unexpected(statement.error());
@@ -511,13 +511,13 @@ Result<std::vector<SignedRange>> JournalFile::signed_range() {
       const Result<bool> more = statement->step();
       if (!more) return tl::unexpected(more.error());
       if (!*more) break;
-      SignedRange& one = all.emplace_back();
+      SignedEntries& one = all.emplace_back();
       one.head.place.value = static_cast<std::uint64_t>(statement->integer(0));
       one.since.value = static_cast<std::uint64_t>(statement->integer(1));
       const auto chain = digest_of(statement->bytes(2));
       const std::string_view key = statement->bytes(3), signature = statement->bytes(4);
       if (!chain || key.size() != one.key.bytes.size() || signature.size() != one.signature.bytes.size())
-        return damaged("the signature at place " + std::to_string(one.head.place.value));
+        return damaged("the signature at event " + std::to_string(one.head.place.value));
       one.head.chain = *chain;
       std::ranges::copy(key, one.key.bytes.begin());
       std::ranges::copy(signature, one.signature.bytes.begin());
@@ -527,7 +527,7 @@ Result<std::vector<SignedRange>> JournalFile::signed_range() {
   return all;
 }
 
-Result<void> JournalFile::add_signed_entries(const SignedRange& entries) {
+Result<void> JournalFile::add_signed_entries(const SignedEntries& entries) {
   auto statement =
       database_.prepare("INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
@@ -542,15 +542,15 @@ Result<void> JournalFile::add_signed_entries(const SignedRange& entries) {
       .run();
 }
 
-// Whose key it is, only who asks can judge.
+// Only the caller can judge whose key it is.
 void JournalFile::inspect_signatures(Inspection& found) {
-  const auto all = signed_range();
+  const auto all = signed_entries();
   if (!all) {
     found.faults.push_back(all.error().message);
     return;
   }
-  for (const SignedRange& one : *all) {
-    const std::string what = "the signature at place " + std::to_string(one.head.place.value);
+  for (const SignedEntries& one : *all) {
+    const std::string what = "the signature at event " + std::to_string(one.head.place.value);
     if (!fits(one))
       found.faults.push_back(damaged(what).value().message);
     else
@@ -562,8 +562,8 @@ void JournalFile::check_witness(const JournalHead& witness, const std::string& w
   found.witnessed = std::max(found.witnessed, witness.place);
   if (witness.place > found.head.place) {
     const std::uint64_t missing = witness.place.value - found.head.place.value;
-    found.faults.push_back(file_.string() + " goes to place " + std::to_string(found.head.place.value) + ", but " +
-                           what + " vouches for place " + std::to_string(witness.place.value) + ": " +
+    found.faults.push_back(file_.string() + " goes to event " + std::to_string(found.head.place.value) + ", but " +
+                           what + " vouches for event " + std::to_string(witness.place.value) + ": " +
                            std::to_string(missing) + (missing == 1 ? " entry is missing" : " entries are missing") +
                            std::string(kRemedy));
     return;
@@ -572,7 +572,7 @@ void JournalFile::check_witness(const JournalHead& witness, const std::string& w
   if (!chain) {
     found.faults.push_back(chain.error().message);
   } else if (*chain != witness.chain) {
-    found.faults.push_back(file_.string() + ": " + what + " vouches for another history up to place " +
+    found.faults.push_back(file_.string() + ": " + what + " vouches for another history up to event " +
                            std::to_string(witness.place.value) + std::string(kRemedy));
   }
 }
@@ -581,7 +581,7 @@ Inspection JournalFile::inspect(bool files) {
   Inspection found;
   const auto note = [&](const Error& error) { found.faults.push_back(error.message); };
 
-  // Pages first: the entries may all be there and the tree above them be damaged, which the next append would make worse.
+  // Pages first: all entries may be there while the tree above them is damaged. The next append would make that worse.
   const Result<std::string> pages = database_.text("PRAGMA quick_check(1)");
   if (!pages)
     note(pages.error());
@@ -594,10 +594,10 @@ Inspection JournalFile::inspect(bool files) {
   if (walked.stopped) {
     found.first_bad = RoomSeq{walked.head.place.value + 1};
     note(*walked.stopped);
-  } else if (const Result<std::int64_t> entries = database_.integer("SELECT count(*) FROM entries"); !entries) {
+  } else if (const Result<std::int64_t> entries = database_.integer("SELECT count(*) FROM rows"); !entries) {
     note(entries.error());
-  } else if (static_cast<std::uint64_t>(*entries) != found.head.place.value) {  // some have places below 1
-    found.faults.push_back(file_.string() + " has entries that are in no place of the order" + std::string(kRemedy));
+  } else if (static_cast<std::uint64_t>(*entries) != found.head.place.value) {  // some have sequence numbers below 1
+    found.faults.push_back(file_.string() + " has entries with sequence numbers below 1" + std::string(kRemedy));
   }
   inspect_beside(files, found);
   return found;
@@ -608,9 +608,9 @@ void JournalFile::inspect_log(Inspection& found) {
   if (log_.witnessed > found.head.place) check_witness({log_.witnessed, {}}, "its log", found);
   found.witnessed = std::max(found.witnessed, log_.witnessed);
   for (const std::string& foreign : log_.foreign)
-    found.faults.push_back(foreign + "; put the files of one moment together again, or recover it into a new journal");
+    found.faults.push_back(foreign + "; put the files of the same moment together again, or salvage it into a new journal");
   if (!needs_log_) return;
-  const std::string untold = "how many entries are missing after place " + std::to_string(found.head.place.value) +
+  const std::string untold = "how many entries are missing after event " + std::to_string(found.head.place.value) +
                              " cannot be told" + std::string(kRemedy);
   for (const std::string& fault : log_.faults) found.faults.push_back(fault + std::string(kRemedy));
   if (!log_.faults.empty()) found.faults.push_back(file_.string() + ": " + untold);
@@ -627,8 +627,8 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   inspect_log(found);
   inspect_signatures(found);
   if (!erased_.empty())
-    found.notes.push_back("words were erased from " + std::to_string(erased_.size()) +
-                          " entries; the chain keeps what their hash was");
+    found.notes.push_back("text was erased from " + std::to_string(erased_.size()) +
+                          " entries; the chain still covers their original hash");
   if (const auto bytes = find_register(kFooterRegister); !bytes) {
     note(bytes.error());
   } else if (*bytes) {
@@ -639,7 +639,7 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
       found.closed_cleanly = footer->clean;
       check_witness(footer->head, "its footer", found);
       if (footer->clean && footer->head.place < found.head.place)
-        found.faults.push_back(file_.string() + " goes on behind its footer" + std::string(kRemedy));
+        found.faults.push_back(file_.string() + " continues after its footer" + std::string(kRemedy));
     }
   }
 
@@ -648,17 +648,17 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   } else {
     for (const Checkpoint& checkpoint : *all) {
       const fs::path file = checkpoint_file(file_, checkpoint.at);
-      check_witness(checkpoint.at, "the checkpoint at place " + std::to_string(checkpoint.at.place.value), found);
+      check_witness(checkpoint.at, "the checkpoint at event " + std::to_string(checkpoint.at.place.value), found);
       if (!files) continue;
       const auto read = read_in_pieces(*disk_, file, [](std::string_view) { return Result<void>{}; });
       if (!read)
         note(read.error());
       else if (read->size != checkpoint.size || read->digest != checkpoint.digest)
-        found.faults.push_back(file.string() + " is not what was written; the checkpoint before it has to serve");
+        found.faults.push_back(file.string() + " is not what was written; the checkpoint before it has to be used");
     }
   }
 
-  // A checkpoint is written only of entries that are safe: its name alone vouches for them.
+  // A checkpoint is written only of durable entries, so its name alone vouches for them.
   if (const auto names = disk_->list(folder_of(file_)); !names) {
     note(names.error());
   } else {
@@ -706,8 +706,8 @@ Result<void> JournalFile::add_entries(std::span<const JournalEntry> entries, Jou
   return {};
 }
 
-// SQLite's log may have what a process that died had committed and only begun to copy into the file. Nothing is put
-// behind that: a torn write would spoil its end, and leave the file half copied.
+// SQLite's log may contain what a process that died had committed and only partly copied into the file. Nothing is
+// appended to that log: a torn write would spoil its end and leave the file half copied.
 Result<void> JournalFile::keep_log() {
   JournalHead head = stored_head_;
   return database_.run("ROLLBACK")
@@ -719,7 +719,7 @@ Result<void> JournalFile::keep_log() {
         const auto signature = std::exchange(log_.signature, std::nullopt);
         return signature ? add_signed_entries(*signature) : Result<void>{};
       })
-      // Until the next generation begins it needs no log.
+      // No log is needed until the next generation begins.
       .and_then([&] {
         return set_register(kFooterRegister, encode_footer({head, true}));
       })

@@ -1,5 +1,5 @@
-// A journal's tables, as this and every older version of them is read: for the journal itself and for what checks,
-// copies and recovers one. Reading writes nothing.
+// Reads a journal's tables, in this version and every older one. The journal itself uses it, and so does the code that
+// checks, copies and salvages journals. Reading writes nothing.
 #pragma once
 #include <algorithm>
 #include <cstdint>
@@ -24,32 +24,32 @@
 namespace osteon {
 
 // Files beside the journal's own, besides log_of() and mirror_of().
-[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);         // SQLite's write-ahead log
+[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);  // SQLite's write-ahead log
 [[nodiscard]] std::filesystem::path owner_file_of(const std::filesystem::path& journal);  // names who made it
-[[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);  // says why it takes no more entries
-// Its name is a witness: of the place and the chain there.
+// says why it accepts no more entries
+[[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);
+// Its name is a witness: it contains the sequence number and the chain there.
 [[nodiscard]] std::filesystem::path checkpoint_file(const std::filesystem::path& journal, const JournalHead& at);
 [[nodiscard]] std::optional<JournalHead> parse_checkpoint_file(const std::filesystem::path& journal,
                                                                std::string_view name);
-// Whether a name in the journal's folder is of something that is still being written: the journal, its log, a
-// checkpoint.
+// Whether a name in the journal's folder belongs to an unfinished file: the journal, its log or a checkpoint.
 [[nodiscard]] bool is_partial_of(const std::filesystem::path& journal, std::string_view name);
-// Whether it is the journal itself or anything that was made beside it, also by earlier versions.
+// Whether it is the journal itself or any file made beside it, also by earlier versions.
 [[nodiscard]] bool belongs_to(const std::filesystem::path& journal, std::string_view name);
 
-// Tells a file that cannot be a journal before anything is made beside it: one of another program, a folder, one that
-// is cut short. What SQLite has to judge, a first page that the log may still have, is well. Errors: not_found;
-// invalid_input; those of reading it.
+// Recognises a file that cannot be a journal, before anything is made beside it: a file of another program, a folder,
+// or a truncated file. It accepts what only SQLite can judge: a first page that the log may still hold. Errors:
+// not_found; invalid_input; those of reading it.
 [[nodiscard]] Result<void> check_is_journal(const std::filesystem::path& file, Disk& disk);
 
-// What a file says of itself.
+// What was found in a journal's file.
 struct Inspection {
-  JournalHead head;                  // of the last entry that the chain confirms
-  std::vector<std::string> faults;   // one sentence each; none: sound
-  std::optional<RoomSeq> first_bad;  // entry
+  JournalHead head;  // of the last entry that the chain confirms
+  std::vector<std::string> faults;  // one sentence each; none: sound
+  std::optional<RoomSeq> first_bad;  // sequence number of the entry
   bool closed_cleanly = false;
-  RoomSeq witnessed;               // the furthest place that its log, a footer or a checkpoint vouches for
-  std::vector<std::string> notes;  // of its log: what one file lacks and the other has, a write that is not whole
+  RoomSeq witnessed;  // the furthest entry that its log, a footer or a checkpoint vouches for
+  std::vector<std::string> notes;  // of its log: what one file lacks and the other has, an incomplete write
 };
 
 // A register as it is stored.
@@ -57,105 +57,108 @@ struct SealedRegister {
   std::string name, value, seal;
 };
 
-// A entry of which something was erased.
+// An entry of which something was erased.
 struct ErasedEntry {
   Digest chain;  // at the entry, as it was written
-  Digest bytes;  // of what stands in its place
+  Digest bytes;  // of what replaces it
 };
-using ErasedEntries = std::map<std::uint64_t, ErasedEntry>;  // by place
+using ErasedEntries = std::map<std::uint64_t, ErasedEntry>;  // by sequence number
 [[nodiscard]] std::string encode_erased(const ErasedEntries& entries);
 [[nodiscard]] std::optional<ErasedEntries> decode_erased(std::string_view bytes);
 
 struct Walk {
-  JournalHead head;              // of the last entry that fitted
+  JournalHead head;  // of the last entry that fitted
   std::optional<Error> stopped;  // why the next one does not
 };
 
+// A journal's file, open for reading or writing. Not synchronised: one thread at a time.
 class JournalFile {
  public:
-  // Makes the tables in a file of that name. Nothing else may be there.
+  // Makes the tables in a file of that name. The file must not exist.
   [[nodiscard]] static Result<void> make(const std::filesystem::path& file, std::string_view genesis, Disk& disk,
                                          const DatabaseOptions& options);
-  // Any version that this program reads. The entries of its log are taken into a transaction, which stays open. Error
-  // invalid_input: no journal, or damaged beyond reading.
+  // Opens any version that this program reads. It takes the entries of the log into a transaction, which stays open.
+  // Error invalid_input: not a journal, or too damaged to read.
   [[nodiscard]] static Result<JournalFile> open(const std::filesystem::path& file, Disk& disk,
                                                 const DatabaseOptions& options);
-  // Only to be read. Nothing is written beside it: what is not in its file yet is put together in a copy elsewhere.
-  // Nobody may have it open for writing. Errors as of open().
+  // Opens for reading only, and writes nothing beside it. If entries are not in the file yet, it assembles a copy
+  // elsewhere. Nobody may have the file open for writing. Errors as of open().
   [[nodiscard]] static Result<JournalFile> open_to_read(const std::filesystem::path& file, Disk& disk);
 
-  // One that may be in use, as far as its log has been carried into the file: only to look for single things in it,
-  // since it may be written to at the same time. What it began as is always there, and held against its seal. Errors as
-  // of open().
+  // Opens a journal that may be in use, as far as its log has been copied into the file. Use it only to look for single
+  // values, because another process may write to the file at the same time. The genesis is always there and is checked
+  // against its seal. Errors as of open().
   [[nodiscard]] static Result<JournalFile> peek(const std::filesystem::path& file, Disk& disk);
 
   [[nodiscard]] int version() const { return version_; }
   [[nodiscard]] const std::string& genesis() const { return genesis_; }
   [[nodiscard]] Database& database() { return database_; }
-  // What its log names as its journal: a hash of its genesis and, since version 3, of random bytes of its own. So a log
-  // of a room that began alike is not taken for its own.
+  // Identifies the journal in its log: a hash of its genesis and, since version 3, of random bytes of its own. So the
+  // log of another room with the same beginning is not mistaken for its own.
   [[nodiscard]] Digest identity() const;
-  // For one that has no random bytes yet. Within a transaction.
+  // For a journal that has no random bytes yet. Within a transaction.
   [[nodiscard]] Result<void> make_id();
-  // The newest generation of its log that is known; 0: it never had a log.
+  // The newest known generation of its log; 0: it never had a log.
   [[nodiscard]] std::uint64_t generation() const { return std::max(generation_, log_.generation); }
 
-  // Rows of which something was erased, as a register of the journal says. The chain goes on over them.
+  // Entries of which something was erased, as a register of the journal lists them. The chain continues over them.
   [[nodiscard]] const ErasedEntries& erased() const { return erased_; }
-  // Of the journal that this is a growing copy of.
+  // Of the journal of which this is a growing copy.
   void take_erased(const ErasedEntries& entries) { erased_ = entries; }
 
-  // Rows after `before` up to `last`, each held against the chain, as long as `take` returns true.
+  // Walks over the entries after `before` up to `last`, each checked against the chain, while `take` returns true.
   [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
                           const std::function<bool(const JournalEntry&, const JournalHead&)>& take);
   [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
-  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
+  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();  // newest first
   [[nodiscard]] Result<std::vector<Person>> people(std::vector<std::optional<PublicKey>>* signers = nullptr);
-  [[nodiscard]] Result<std::vector<std::string>> registers();  // their names, the journal's own not
+  [[nodiscard]] Result<std::vector<std::string>> registers();  // their names, without the journal's own
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
   [[nodiscard]] Result<std::optional<SealedRegister>> find_sealed(std::string_view name);
   // Who signed an entry that was read from here. None: nobody.
   [[nodiscard]] std::optional<PublicKey> signer_of(const SealedRegister& found) const;
   [[nodiscard]] std::optional<PublicKey> signer_of(const Checkpoint& found) const;
-  // In order of their places, that of its log last. inspect() holds them against their keys and against the entries.
-  [[nodiscard]] Result<std::vector<SignedRange>> signed_range();
-  // The whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
+  // In the order of their sequence numbers, that of its log last. inspect() checks them against their keys and the log
+  // entries.
+  [[nodiscard]] Result<std::vector<SignedEntries>> signed_entries();
+  // Checks the whole file: its pages, its chain, its witnesses. `files`: the checkpoints' bytes too.
   [[nodiscard]] Inspection inspect(bool files);
-  // All but pages and entries, of which `found` has the head: what vouches for them, and what is kept beside them.
+  // Checks everything but pages and log entries, whose head `found` has: what vouches for them, and what is stored
+  // beside them.
   void inspect_beside(bool files, Inspection& found);
 
-  // Commits the entries of the log, so that the log is needed no more. Of one that was opened to be written to.
+  // Commits the entries of the log, so that the log is no longer needed. For a file that was opened for writing.
   [[nodiscard]] Result<void> keep_log();
 
-  // Entries that are written from now on are signed with it. Null: with none. It must outlive this.
+  // Signs all entries that are written from now on with this key. Null: with none. The key must outlive this object.
   void sign_with(const SigningKey* key) { key_ = key; }
 
-  // Within a transaction. Rows go on from `head`, which goes on with them.
+  // Within a transaction. The entries continue from `head`, which is updated.
   [[nodiscard]] Result<void> add_entries(std::span<const JournalEntry> entries, JournalHead& head);
   [[nodiscard]] Result<void> set_register(std::string_view name, std::string_view value);
   [[nodiscard]] Result<void> add_register(const SealedRegister& copied);
-  [[nodiscard]] Result<void> add_signed_entries(const SignedRange& entries);
-  [[nodiscard]] Result<void> note_generation(const LogStart& start);  // which ends what a footer said
+  [[nodiscard]] Result<void> add_signed_entries(const SignedEntries& entries);
+  [[nodiscard]] Result<void> note_generation(const LogStart& start);  // invalidates the footer
   [[nodiscard]] Result<void> add_checkpoint(const Checkpoint& checkpoint);
   [[nodiscard]] Result<void> add_person(const Person& person);
-  // Puts these bytes in place of those that the entries have.
+  // Replaces the bytes of these entries.
   [[nodiscard]] Result<void> erase(std::span<const JournalEntry> instead);
 
  private:
   JournalFile(std::filesystem::path file, Disk& disk, Database database)
       : file_(std::move(file)), disk_(&disk), database_(std::move(database)) {}
-  // `database` may be a copy of `file`, or the file as it lies there (`peek`).
+  // `database` may be a copy of `file`, or the file as it is (`peek`).
   [[nodiscard]] static Result<JournalFile> of_database(const std::filesystem::path& file, Disk& disk, Database database,
                                                        bool peek);
   [[nodiscard]] Result<void> read_version();
   [[nodiscard]] Result<void> check_tables(bool peek);
   [[nodiscard]] Result<JournalHead> stored_head();
-  // Inserts the entries that its log has beyond its last one.
+  // Inserts the entries of the log that the table lacks.
   [[nodiscard]] Result<void> take_log();
   [[nodiscard]] Result<void> read_erased();
-  // As next_head(), and of an erased entry what its chain was.
+  // As next_head(). For an erased entry it is the chain that the original had.
   [[nodiscard]] JournalHead next_in_chain(const JournalHead& before, const JournalEntry& entry) const;
-  // To the tables of the current version, within a transaction.
+  // Upgrades to the tables of the current version, within a transaction.
   [[nodiscard]] Result<void> upgrade();
   void inspect_signatures(Inspection& found);
   void inspect_log(Inspection& found);
@@ -164,9 +167,9 @@ class JournalFile {
 
   std::filesystem::path file_;
   Disk* disk_;
-  std::unique_ptr<ScratchFolder> scratch_;  // where the database is a copy; outlives it
+  std::unique_ptr<ScratchFolder> scratch_;  // if the database is a copy; outlives it
   Database database_;
-  std::optional<Statement> insert_;  // of a entry
+  std::optional<Statement> insert_;  // of an entry
   const SigningKey* key_ = nullptr;
   int version_ = 0;
   std::string genesis_;
@@ -181,9 +184,9 @@ class JournalFile {
 inline constexpr std::string_view kGenesisRegister = "genesis", kFooterRegister = "footer",
                                   kEpochRegister = "server_epoch", kRecoveredRegister = "recovered",
                                   kGenerationRegister = "log generation", kIdRegister = "journal id",
-                                  kKeysRegister = "signing keys", kErasedRegister = "erased entries";
+                                  kKeysRegister = "signing keys", kErasedRegister = "erased rows";
 
-// A head that is kept as a register, with a mark.
+// A head that is stored as a register, with a flag.
 struct Footer {
   JournalHead head;
   bool clean = false;

@@ -1,4 +1,4 @@
-// What a journal keeps beside its entries.
+// What a journal stores besides its log entries.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -14,23 +14,23 @@ namespace osteon {
 struct JournalOptions {
   Disk* disk = nullptr;  // null: the computer's; must outlive the journal
   std::size_t most_entry_bytes = std::size_t{64} << 20;
-  std::uint64_t log_bytes = std::uint64_t{1} << 20;   // of each log file; what is beyond it goes into the database
-  int page_bytes = 4096;                              // of a new journal; not below the disk's sectors
-  bool durable = true;                                // false, for tests only: no entry is waited for
-  std::shared_ptr<const SigningKeys> keys = nullptr;  // that vouch for what is written; null: nobody does
+  std::uint64_t log_bytes = std::uint64_t{1} << 20;  // of each log file; what exceeds it goes into the database
+  int page_bytes = 4096;  // of a new journal; not smaller than the disk's sectors
+  bool durable = true;  // false, for tests only: waits for no sync
+  std::shared_ptr<const SigningKeys> keys = nullptr;  // they sign what is written; null: nothing is signed
 };
 
-// The room as it was at one place, in a file of its own: opaque to the journal.
+// The room at one sequence number, in a file of its own. Its content is opaque to the journal.
 struct Checkpoint {
   JournalHead at;
   std::string meta;  // a few words of the owner's
   std::uint64_t size = 0;
-  Digest digest;          // SHA-256 of the file's bytes
-  std::string seal = {};  // of the four above; empty: it is made when the checkpoint is added
+  Digest digest;  // SHA-256 of the file's bytes
+  std::string seal = {};  // of the four above; empty: made when the checkpoint is added
 };
 
-// Who a pseudonym of the entries is. Apart from the chain, so that a person can be forgotten and the entries still be
-// confirmed.
+// The person behind a pseudonym in the log entries. It is not part of the chain, so that a person can be erased and the
+// entries still be confirmed.
 struct Person {
   std::string pseudonym;
   std::string label;

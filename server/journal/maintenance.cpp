@@ -12,15 +12,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
-// More openings than any lost part of a journal can have counted.
+// More openings than the lost part of any journal can have counted.
 constexpr std::uint64_t kEpochsSkipped = 1'000'000;
 
 constexpr std::string_view kLock = ".lock";  // of earlier versions
 
-// The name of a copy that is not yet whole.
+// Name of an unfinished copy.
 fs::path growing_copy(const fs::path& to) { return to.string() + ".copying"; }
 
-// A journal that is only read, while nobody writes to it.
+// A journal that is opened for reading only, while nobody writes to it.
 class Source {
  public:
   static Result<Source> open(const fs::path& file, Disk& disk) {
@@ -51,28 +51,28 @@ VerifyReport report_of(JournalFile& file) {
                       .closed_cleanly = found.closed_cleanly,
                       .faults = std::move(found.faults),
                       .notes = std::move(found.notes)};
-  if (!report.sound()) return report;  // nobody vouches for what is damaged
-  const auto entries = file.signed_range();
+  if (!report.sound()) return report;  // nobody vouches for damaged data
+  const auto entries = file.signed_entries();
   const auto checkpoints = file.checkpoints();
   const auto keys = file.find_register(kKeysRegister);
   if (entries)
-    for (const SignedRange& one : *entries) report.signed_range.push_back({one.since, one.head.place, one.key});
+    for (const SignedEntries& one : *entries) report.signed_range.push_back({one.since, one.head.place, one.key});
   if (keys && *keys) report.successions = decode_successions(**keys).value_or(std::vector<Succession>{});
   if (checkpoints)
     for (const Checkpoint& one : *checkpoints)
-      report.entries.emplace_back("the checkpoint at place " + std::to_string(one.at.place.value), file.signer_of(one));
+      report.seals.emplace_back("the checkpoint at event " + std::to_string(one.at.place.value), file.signer_of(one));
   if (const auto names = file.registers())
     for (const std::string& name : *names) {
       if (name == kGenerationRegister || name == kIdRegister || name == kKeysRegister) continue;
       if (const auto one = file.find_sealed(name); one && *one)
-        report.entries.emplace_back("the register \"" + name + "\"", file.signer_of(**one));
+        report.seals.emplace_back("the register \"" + name + "\"", file.signer_of(**one));
     }
   std::vector<std::optional<PublicKey>> signers;
   if (const auto people = file.people(&signers))
     for (std::size_t i = 0; i < people->size(); ++i)
-      report.entries.emplace_back("the name of person " + (*people)[i].pseudonym, signers[i]);
+      report.seals.emplace_back("the name of person " + (*people)[i].pseudonym, signers[i]);
   if (const auto footer = file.find_sealed(kFooterRegister); footer && *footer && report.closed_cleanly)
-    report.entries.emplace_back("the footer", file.signer_of(**footer));
+    report.seals.emplace_back("the footer", file.signer_of(**footer));
   return report;
 }
 
@@ -87,7 +87,7 @@ Result<VerifyReport> verify_journal(const fs::path& file, Disk* disk) {
 Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
   const std::set<PublicKey> own = keys_of_line(key, report.successions);
   Vouched vouched;
-  // Rows between two of these places are all signed by the same keys.
+  // All entries between two of these sequence numbers are signed by the same keys.
   std::set<std::uint64_t> ends{report.head.place.value};
   for (const SignedRange& range : report.signed_range) ends.insert({range.from.value - 1, range.to.value});
   RoomSeq from{1};
@@ -104,7 +104,7 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
       else
         none.emplace_back(from, to);
     } else {
-      auto& some = own.contains(by->key) ? vouched.entries : vouched.by_others;
+      auto& some = own.contains(by->key) ? vouched.ranges : vouched.by_others;
       if (!some.empty() && some.back().key == by->key && some.back().to.value + 1 == from.value)
         some.back().to = to;
       else
@@ -112,11 +112,11 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
     }
     from.value = end + 1;
   }
-  for (const auto& [what, signer] : report.entries) {
+  for (const auto& [what, signer] : report.seals) {
     if (signer && own.contains(*signer))
-      ++vouched.entries;
+      ++vouched.seals;
     else
-      vouched.other_entries.push_back(what);
+      vouched.other_seals.push_back(what);
   }
   return vouched;
 }
@@ -138,25 +138,25 @@ Result<VerifyReport> verify_journal(Journal& journal) {
   return report_of(state.file);
 }
 
-// The copy grows under a name of its own beside its place, and gets its name when it is whole.
+// The copy grows under another name in the target folder, and gets its name when it is complete.
 struct JournalCopy::State {
   fs::path from, to, growing;
   Disk* disk;
   JournalFile* source;
   std::string genesis;  // of the copy
-  JournalHead copied;   // as the source has it
-  JournalHead head;     // as the copy has it
+  JournalHead copied;  // as the source has it
+  JournalHead head;  // as the copy has it
   RoomSeq last;
-  std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and nobody
-  bool damaged = false;                               // what cannot be read is left out
-  std::optional<std::uint64_t> epochs = {};           // recovered: openings that the lost part cannot have counted
-  std::shared_ptr<const SigningKeys> keys = {};       // sign what is not copied as it is
-  bool signs_entries = false;                            // those of a branch, which has another chain
+  std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and no people
+  bool damaged = false;  // what cannot be read is left out
+  std::optional<std::uint64_t> epochs = {};  // salvaged: more openings than the lost part can have counted
+  std::shared_ptr<const SigningKeys> keys = {};  // they sign what is not copied as it is
+  bool signs_entries = false;  // those of a branch, which has another chain
   std::optional<Journal> target = {};
   // Taken from the source and not yet put into the target.
   std::vector<JournalEntry> entries = {};
   std::vector<SealedRegister> registers = {};
-  std::vector<SignedRange> signed_range = {};
+  std::vector<SignedEntries> signatures = {};
   std::vector<Person> people = {};
   std::vector<Checkpoint> checkpoints = {};
   std::optional<Error> no_checkpoint = {};  // why the last of them could not be copied
@@ -183,12 +183,13 @@ struct JournalCopying {
                                   {.disk = state.disk, .keys = state.signs_entries ? state.keys : nullptr});
     if (!target) return tl::unexpected(target.error());
     state.target = std::move(*target);
-    // Their chain is that of the entries as they were. A branch has another chain, of what stands there now.
+    // The copy keeps the chain of the original entries. A branch has another chain, computed from their present
+    // content.
     if (!state.only) JournalInside::of(*state.target).file.take_erased(state.source->erased());
     return {};
   }
 
-  // Also what an earlier copy that was cut short left behind.
+  // Also removes what an earlier, interrupted copy left.
   static Result<void> clear_growing(const JournalCopy::State& state) {
     const auto names = state.disk->list(folder_of(state.growing));
     if (!names) return tl::unexpected(names.error());
@@ -230,14 +231,14 @@ struct JournalCopying {
       }
     }
     if (!state.only) {
-      const auto signatures = state.source->signed_range();
+      const auto signatures = state.source->signed_entries();
       if (!signatures) {
         if (Result<void> on = left_out(state, signatures.error()); !on) return on;
       } else {
-        for (const SignedRange& one : *signatures)
+        for (const SignedEntries& one : *signatures)
           if (const auto chain = state.source->chain_at(one.head.place);
               one.head.place <= state.copied.place && fits(one) && chain && *chain == one.head.chain)
-            state.signed_range.push_back(one);
+            state.signatures.push_back(one);
       }
       auto people = state.source->people();
       if (people)
@@ -252,7 +253,7 @@ struct JournalCopying {
     return {};
   }
 
-  // One that could not be copied may have been replaced by a newer one meanwhile.
+  // A checkpoint that could not be copied may have been replaced by a newer one in the meantime.
   static Result<void> pass_over(JournalCopy::State& state) {
     const auto known = state.source->checkpoints();
     const Error why = *std::exchange(state.no_checkpoint, std::nullopt);
@@ -298,7 +299,7 @@ struct JournalCopying {
       // Another genesis needs other seals.
       for (const SealedRegister& one : state.registers)
         if (done) done = state.only ? file.set_register(one.name, one.value) : file.add_register(one);
-      for (const SignedRange& one : state.signed_range)
+      for (const SignedEntries& one : state.signatures)
         if (done) done = file.add_signed_entries(one);
       for (const Person& person : state.people)
         if (done) done = file.add_person(person);
@@ -339,7 +340,7 @@ struct JournalCopying {
       done =
           state.disk->rename(checkpoint_file(state.growing, checkpoint.at), checkpoint_file(state.to, checkpoint.at));
     }
-    if (done) done = state.disk->rename(state.growing, state.to);  // last: what vouches for it is there
+    if (done) done = state.disk->rename(state.growing, state.to);  // last: everything that vouches for it is there
     if (done) done = state.disk->sync_folder(folder_of(state.to));
     return done;
   }
@@ -355,7 +356,8 @@ JournalCopy::~JournalCopy() {
 
 Result<JournalCopy> JournalCopy::begin(Journal& source, const fs::path& to) {
   auto& state = JournalInside::of(source);
-  // The newest entries' signature goes to where the copy takes it from. Where that fails, the copy has an earlier one.
+  // Stores the signature of the newest entries where the copy reads it. If that fails, the copy gets an earlier
+  // signature.
   if (state.signed_since) static_cast<void>(JournalInside::carry(source));
   auto copy = JournalCopying::begin(state.path, state.file, state.head.place, to, *state.disk);
   if (copy) copy->state_->keys = state.options.keys;
@@ -371,7 +373,7 @@ Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& t
   copy->state_->genesis = std::move(genesis);
   copy->state_->only = std::move(registers);
   copy->state_->keys = state.options.keys;
-  copy->state_->signs_entries = state.signed_since == RoomSeq{1};  // the server vouches for all that it copies
+  copy->state_->signs_entries = state.signed_since == RoomSeq{1};  // the server vouches for everything that it copies
   return copy;
 }
 
@@ -431,7 +433,7 @@ Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk)
   auto source = Source::open(file, or_system(disk));
   if (source) return (*source)->chain_at(head.place).map([&](const auto& chain) { return chain == head.chain; });
   if (source.error().code != ErrorCode::exists) return tl::unexpected(source.error());
-  // What is read beside a write may be half of one: only a entry that fits the one before it counts.
+  // What is read during a write may be incomplete. Only an entry that fits the one before it counts.
   auto peeked = JournalFile::peek(file, or_system(disk));
   if (!peeked) return tl::unexpected(source.error());
   if (!head.place) return first_head(peeked->genesis()) == head;
@@ -470,8 +472,8 @@ Result<void> delete_journals(const std::vector<fs::path>& files, Disk* given) {
     all.push_back(std::move(doomed));
   }
   for (Doomed& doomed : all) {
-    // The file itself first, and for good: without its log it would be a shorter journal, which nothing contradicts
-    // once the checkpoints are gone, while a log without its file is nothing.
+    // The file itself is removed first, and durably. Without its log it would be a shorter journal that nothing
+    // contradicts once the checkpoints are gone. A log without its file is harmless.
     const fs::path folder = folder_of(doomed.file);
     Result<void> done = disk.remove(doomed.file).and_then([&] { return disk.sync_folder(folder); });
     for (const fs::path& other : doomed.others)

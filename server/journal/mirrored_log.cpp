@@ -13,19 +13,20 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A file is a first sector, which says what it belongs to, and entries one after the other. An entry is as long as it
-// needs to be: a torn write may spoil the sector in which the last one ends, and then the other file has that one.
-// Where the generation has a signer, a signature stands behind the entries of each entry. Journals of version 3 have logs
-// without length and signer.
+// A file is a first sector, which says what the file belongs to, and then batches: the entries of one append. A batch
+// is not padded. A torn write may spoil the sector in which the previous batch ends, but then the other file has that
+// batch. If the generation has a signer, a signature follows the entries of each batch. Logs of journals of version 3
+// have no length and no signer.
 constexpr std::string_view kMagic = "OsteonL2", kMagicOfVersion3 = "OsteonL1";
 constexpr std::size_t kFirstSector = 4096, kSaltBytes = 16, kChainBytes = 32, kChecksumBytes = 16;
 constexpr std::size_t kSaltEnd = kMagic.size() + kChainBytes + 2 * 8 + kChainBytes + kSaltBytes;
 constexpr std::size_t kStartBytes = kSaltEnd + 8 + sizeof(PublicKey) + 8;  // length, key, first signed entry
 constexpr std::size_t kSignatureBytes = sizeof(Signature);
-// No log gets as long: it is carried into the database once it is full, and a commit has few entries.
+// No log gets this long: a full log is copied into the database, and a commit has few entries.
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 30;
 constexpr const char* kForeign = "belongs to another journal";
-constexpr std::size_t kEntryHead = kSaltBytes + 3 * 8 + kChainBytes;  // salt, bytes of entries, count, first place, chain
+// salt, bytes of entries, count, first sequence number, chain
+constexpr std::size_t kBatchHead = kSaltBytes + 3 * 8 + kChainBytes;
 
 std::string checksum(std::string_view bytes) {
   Hasher hasher;
@@ -53,7 +54,7 @@ std::string encode_start(const LogStart& start, std::string_view salt, std::uint
   return bytes + checksum(bytes);
 }
 
-std::string encode_entry(std::span<const JournalEntry> entries, const JournalHead& head,
+std::string encode_batch(std::span<const JournalEntry> entries, const JournalHead& head,
                          const std::optional<Signature>& signature, std::string_view salt) {
   std::string body;
   for (const JournalEntry& entry : entries) {
@@ -71,64 +72,64 @@ std::string encode_entry(std::span<const JournalEntry> entries, const JournalHea
   return bytes + checksum(bytes);
 }
 
-struct Entry {
-  std::uint64_t first = 0;  // place
-  JournalHead head;         // after it
+struct Batch {
+  std::uint64_t first = 0;  // sequence number
+  JournalHead head;  // after the batch
   std::vector<JournalEntry> entries;
   std::optional<Signature> signature;
 };
 
-// The entry at the front of `bytes`, and how long it is. Nothing where no whole and sound one is there.
-std::optional<std::pair<Entry, std::size_t>> decode_entry(std::string_view bytes, std::string_view salt,
+// The batch at the front of `bytes`, and its length. Nothing if there is no complete and sound batch.
+std::optional<std::pair<Batch, std::size_t>> decode_batch(std::string_view bytes, std::string_view salt,
                                                           bool is_signed) {
-  const std::size_t signature = is_signed ? kSignatureBytes : 0, least = kEntryHead + signature + kChecksumBytes;
+  const std::size_t signature = is_signed ? kSignatureBytes : 0, least = kBatchHead + signature + kChecksumBytes;
   if (bytes.size() < least || !bytes.starts_with(salt)) return std::nullopt;
   const std::uint64_t body = integer_at(bytes, kSaltBytes), count = integer_at(bytes, kSaltBytes + 8);
   if (body > bytes.size() - least || count == 0 || count > body) return std::nullopt;
-  const std::size_t size = kEntryHead + body + signature;
+  const std::size_t size = kBatchHead + body + signature;
   if (checksum(bytes.substr(0, size)) != bytes.substr(size, kChecksumBytes)) return std::nullopt;
 
-  Entry entry;
-  entry.first = integer_at(bytes, kSaltBytes + 16);
-  entry.head = {RoomSeq{entry.first + count - 1}, *digest_of(bytes.substr(kSaltBytes + 24, kChainBytes))};
-  std::string_view left = bytes.substr(kEntryHead, body);
+  Batch batch;
+  batch.first = integer_at(bytes, kSaltBytes + 16);
+  batch.head = {RoomSeq{batch.first + count - 1}, *digest_of(bytes.substr(kSaltBytes + 24, kChainBytes))};
+  std::string_view left = bytes.substr(kBatchHead, body);
   for (std::uint64_t i = 0; i < count; ++i) {
     if (left.size() < 16 || integer_at(left, 8) > left.size() - 16) return std::nullopt;
     const std::uint64_t length = integer_at(left, 8);
-    entry.entries.push_back({RoomSeq{entry.first + i}, static_cast<std::int64_t>(integer_at(left, 0)),
+    batch.entries.push_back({RoomSeq{batch.first + i}, static_cast<std::int64_t>(integer_at(left, 0)),
                           std::string(left.substr(16, length))});
     left.remove_prefix(16 + length);
   }
   if (!left.empty()) return std::nullopt;
-  if (is_signed) std::ranges::copy(bytes.substr(kEntryHead + body, signature), entry.signature.emplace().bytes.begin());
-  return std::pair{std::move(entry), size + kChecksumBytes};
+  if (is_signed) std::ranges::copy(bytes.substr(kBatchHead + body, signature), batch.signature.emplace().bytes.begin());
+  return std::pair{std::move(batch), size + kChecksumBytes};
 }
 
-// What one of the two files holds.
+// The content of one of the two files.
 struct FoundFile {
   fs::path path;
   std::string unreadable;  // why nothing of it counts; empty: its start is sound
   LogStart start;
-  std::vector<Entry> entries;
+  std::vector<Batch> batches;
   bool is_there = false;
-  bool damaged = false;       // something that cannot be read lies between entries
-  bool is_cut = false;        // shorter than it was made
-  bool ends_in_part = false;  // of an entry
-  [[nodiscard]] RoomSeq last() const { return entries.empty() ? start.base.place : entries.back().head.place; }
+  bool damaged = false;  // something unreadable lies between batches
+  bool is_cut = false;  // shorter than it was made
+  bool ends_in_part = false;  // with part of a batch
+  [[nodiscard]] RoomSeq last() const { return batches.empty() ? start.base.place : batches.back().head.place; }
 };
 
-void read_entries(std::string_view bytes, std::string_view salt, FoundFile& file) {
+void read_batches(std::string_view bytes, std::string_view salt, FoundFile& file) {
   std::size_t at = kFirstSector;
   while (at < bytes.size()) {
     const bool is_signed = file.start.signer.has_value();
-    if (auto entry = decode_entry(bytes.substr(at), salt, is_signed)) {
-      at += entry->second;
-      file.entries.push_back(std::move(entry->first));
+    if (auto batch = decode_batch(bytes.substr(at), salt, is_signed)) {
+      at += batch->second;
+      file.batches.push_back(std::move(batch->first));
       continue;
     }
-    // The bytes here may be what an earlier generation left, part of an entry, or damage with entries behind it.
+    // These bytes may be remains of an earlier generation, part of a batch, or damage with batches after it.
     std::size_t next = bytes.find(salt, at + 1);
-    while (next != bytes.npos && !decode_entry(bytes.substr(next), salt, is_signed)) next = bytes.find(salt, next + 1);
+    while (next != bytes.npos && !decode_batch(bytes.substr(next), salt, is_signed)) next = bytes.find(salt, next + 1);
     if (next == bytes.npos) {
       file.ends_in_part = bytes.substr(at).starts_with(salt);
       return;
@@ -179,48 +180,48 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
     signer.since.value = integer_at(first, kSaltEnd + 8 + signer.key.bytes.size());
     if (signer.since) file.start.signer = signer;
   }
-  read_entries(bytes, first.substr(kSaltEnd - kSaltBytes, kSaltBytes), file);
+  read_batches(bytes, first.substr(kSaltEnd - kSaltBytes, kSaltBytes), file);
   return file;
 }
 
-// The entries of an entry that follow `head`, if they lead to where the entry says. Nothing: it is of another history.
-std::optional<std::vector<JournalEntry>> entries_after(const Entry& entry, JournalHead head) {
+// The entries of a batch that follow `head`, if they lead to the head of the batch. Nothing: another history.
+std::optional<std::vector<JournalEntry>> entries_after(const Batch& batch, JournalHead head) {
   std::vector<JournalEntry> entries;
-  for (const JournalEntry& entry : entry.entries) {
+  for (const JournalEntry& entry : batch.entries) {
     if (entry.place <= head.place) continue;
     head = next_head(head, entry);
     entries.push_back(entry);
   }
-  if (head != entry.head) return std::nullopt;
+  if (head != batch.head) return std::nullopt;
   return entries;
 }
 
-// The entry of a file that goes on from `head`, or nothing.
-const Entry* find_next(const FoundFile& file, const JournalHead& head) {
-  const auto found = std::ranges::find_if(file.entries, [&](const Entry& entry) {
-    return entry.first <= head.place.value + 1 && entry.head.place > head.place;
+// The batch of a file that continues from `head`, or null.
+const Batch* find_next(const FoundFile& file, const JournalHead& head) {
+  const auto found = std::ranges::find_if(file.batches, [&](const Batch& batch) {
+    return batch.first <= head.place.value + 1 && batch.head.place > head.place;
   });
-  return found == file.entries.end() ? nullptr : &*found;
+  return found == file.batches.end() ? nullptr : &*found;
 }
 
-// A kill or a power failure leaves the mirror one entry behind the log, or one generation ahead of it and empty. Any
-// other distance means that one of them was exchanged for an older copy.
+// After a kill or a power failure, the mirror may be one batch behind the log, or one generation ahead of it and empty.
+// Any other difference means that one of them was replaced by an older copy.
 void find_older_copy(FoundFile& log, FoundFile& mirror) {
   if (!log.unreadable.empty() || !mirror.unreadable.empty()) return;
   const std::uint64_t a = log.start.generation, b = mirror.start.generation;
   if (b < a) mirror.unreadable = "is an older copy";
-  if (b > a + 1 || (b == a + 1 && !mirror.entries.empty())) log.unreadable = "is an older copy";
+  if (b > a + 1 || (b == a + 1 && !mirror.batches.empty())) log.unreadable = "is an older copy";
 }
 
-// What of one file the other makes good, and a write that is not whole.
+// Notes what one file lacks and the other has, and incomplete writes.
 void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents& found) {
   const auto note = [&](const FoundFile& bad, const FoundFile& good, const std::string& what) {
     found.notes.push_back(bad.path.string() + " " + what + "; its entries were read from " + good.path.string());
   };
-  const auto lacks_entries = [&](const FoundFile& one, const FoundFile& other) {
-    return std::ranges::any_of(other.entries, [&](const Entry& entry) {
-      return entry.head.place <= one.last() && entry.first > one.start.base.place.value &&
-             std::ranges::none_of(one.entries, [&](const Entry& own) { return own.head == entry.head; });
+  const auto lacks_batches = [&](const FoundFile& one, const FoundFile& other) {
+    return std::ranges::any_of(other.batches, [&](const Batch& batch) {
+      return batch.head.place <= one.last() && batch.first > one.start.base.place.value &&
+             std::ranges::none_of(one.batches, [&](const Batch& own) { return own.head == batch.head; });
     });
   };
   if (!log.unreadable.empty() && !mirror.unreadable.empty()) return;
@@ -230,11 +231,11 @@ void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents
   if (log.is_cut) return note(log, mirror, "was cut");
   if (mirror.is_cut) return note(mirror, log, "was cut");
   for (const FoundFile* file : {&log, &mirror})
-    if (file->ends_in_part) found.notes.push_back(file->path.string() + " ends in a write that is not whole");
+    if (file->ends_in_part) found.notes.push_back(file->path.string() + " ends in an incomplete write");
   if (mirror.start.generation > log.start.generation) return;
-  if (log.damaged || log.last() < mirror.last() || lacks_entries(log, mirror)) note(log, mirror, "is damaged");
-  const bool one_behind = !log.entries.empty() && mirror.last().value + 1 == log.entries.back().first;
-  if (mirror.damaged || (mirror.last() < log.last() && !one_behind) || lacks_entries(mirror, log))
+  if (log.damaged || log.last() < mirror.last() || lacks_batches(log, mirror)) note(log, mirror, "is damaged");
+  const bool one_behind = !log.batches.empty() && mirror.last().value + 1 == log.batches.back().first;
+  if (mirror.damaged || (mirror.last() < log.last() && !one_behind) || lacks_batches(mirror, log))
     note(mirror, log, "is damaged");
 }
 
@@ -264,7 +265,7 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
   for (bool more = true; more;) {
     more = false;
     for (const FoundFile& file : members) {
-      const Entry* next = file.unreadable.empty() ? find_next(file, found.head) : nullptr;
+      const Batch* next = file.unreadable.empty() ? find_next(file, found.head) : nullptr;
       if (next == nullptr) continue;
       const auto entries = entries_after(*next, found.head);
       if (!entries) continue;
@@ -272,7 +273,7 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
       found.head = next->head;
       found.signature.reset();
       if (next->signature)
-        found.signature = SignedRange{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
+        found.signature = SignedEntries{file.start.signer->since, next->head, file.start.signer->key, *next->signature};
       more = true;
       break;
     }
@@ -284,7 +285,7 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
   if (found.faults.empty() && is_lost(members[0]) && is_lost(members[1]))
     for (const FoundFile& file : members)
       if (file.is_cut)
-        found.faults.push_back(file.path.string() + " was cut, and the other file of the log, too, is not whole");
+        found.faults.push_back(file.path.string() + " was cut, and the other file of the log is incomplete, too");
   if (any) note_differences(members[0], members[1], found);
   const auto &log = members[0], &mirror = members[1];
   const auto cut_short = [](const FoundFile& file) { return file.ends_in_part || file.damaged; };
@@ -324,7 +325,8 @@ Result<MirroredLog::Member> MirroredLog::open_member(const fs::path& path) {
   if (!*identity) return failure(ErrorCode::internal, path.string() + " was removed while it was opened");
   member.identity = **identity;
   member.written = member.identity.size;
-  // Written, not only reserved: the first write to reserved space changes the file system's own records.
+  // The bytes are written, not only reserved: the first write to reserved space changes the metadata of the file
+  // system.
   const std::string zeros(kPiece, '\0');
   for (std::uint64_t at = member.identity.size; at < capacity_; at += kPiece) {
     const std::string_view piece = std::string_view(zeros).substr(0, std::min<std::uint64_t>(kPiece, capacity_ - at));
@@ -340,11 +342,11 @@ Result<void> MirroredLog::check_named(const Member& member) {
   if (!now) return tl::unexpected(now.error());
   if (*now && (*now)->same_file(member.identity) && (*now)->size >= member.written) return {};
   return failure(ErrorCode::internal, member.path.string() + " was " + (*now ? "replaced or cut" : "removed") +
-                                          " while its room was open; recover the journal into a new one");
+                                          " while its room was open; salvage the journal into a new one");
 }
 
 Result<void> MirroredLog::begin(Member& member, const LogStart& start) {
-  // Nobody can put something into a entry that is taken for an entry.
+  // With a random salt, nobody can put bytes into an entry that are mistaken for a batch.
   std::array<std::uint8_t, kSaltBytes> salt{};
   system_random()(salt);
   member.salt.assign(salt.begin(), salt.end());
@@ -362,15 +364,15 @@ Result<void> MirroredLog::begin_log(const LogStart& start) { return begin(log_, 
 Result<void> MirroredLog::append(std::span<const JournalEntry> entries, const JournalHead& head,
                                  const std::optional<Signature>& signature) {
   OSTEON_CHECK(!entries.empty() && log_.end != 0 && mirror_.end != 0);
-  // One after the other: a write that the power cuts short spoils one file at most.
+  // One after the other, so that a write that a power failure cuts short spoils one file at most.
   for (Member* member : {&log_, &mirror_}) {
     OSTEON_CHECK(signature.has_value() == member->is_signed);
-    const std::string entry = encode_entry(entries, head, signature, member->salt);
+    const std::string batch = encode_batch(entries, head, signature, member->salt);
     if (Result<void> named = check_named(*member); !named) return named;
     const Result<void> put =
-        durable_ ? member->file->write_durably(member->end, entry) : member->file->write_at(member->end, entry);
+        durable_ ? member->file->write_durably(member->end, batch) : member->file->write_at(member->end, batch);
     if (!put) return put;
-    member->end += entry.size();
+    member->end += batch.size();
     member->written = std::max(member->written, member->end);
   }
   return {};

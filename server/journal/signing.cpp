@@ -38,7 +38,7 @@ std::string hex_of(std::string_view bytes) {
   return text;
 }
 
-// Exactly as many bytes as the text has to be.
+// Requires exactly as many bytes as `bytes` has.
 bool read_hex(std::string_view text, std::span<std::uint8_t> bytes) {
   std::size_t count = 0;
   return text.size() == 2 * bytes.size() &&
@@ -56,7 +56,7 @@ Digest message_of(const PublicKey& before, const PublicKey& after) {
 
 Digest message_of(RoomSeq since, const JournalHead& head) {
   Hasher hasher;
-  hasher.text("osteon journal entries");
+  hasher.text("osteon journal rows");
   hasher.integer(since.value);
   hasher.integer(head.place.value);
   hasher.text(as_text(head.chain));
@@ -125,14 +125,14 @@ tl::unexpected<Error> cannot(const std::string& what, const fs::path& file, int 
                                           std::generic_category().message(reason) + std::string(remedy_of(reason)));
 }
 
-// A file beside the named one, for its owner alone, safe on the disk. It is removed again when this goes.
+// A durable file beside the named one that only its owner may read. The destructor removes it.
 class Draft {
  public:
   explicit Draft(const fs::path& file) : path_(file.string() + ".XXXXXX") {}
   Draft(const Draft&) = delete;
   Draft& operator=(const Draft&) = delete;
   ~Draft() { ::unlink(path_.c_str()); }
-  // The system's reason, or 0.
+  // The system's error number, or 0.
   [[nodiscard]] int write(std::string_view content) {
     const int fd = ::mkostemp(path_.data(), O_CLOEXEC);  // with mode 0600
     if (fd < 0) return errno;
@@ -276,7 +276,7 @@ Result<std::shared_ptr<const SigningKeys>> load_or_make_signing_keys(const fs::p
   Draft draft(file);
   if (const int reason = draft.write(text_of(SigningKeys(SigningKey::make()))); reason != 0)
     return cannot("write", file, reason);
-  // A link replaces nothing: of two servers that start at once, both take the key of the first.
+  // A link replaces nothing. If two servers start at once, both take the key of the first.
   if (::link(draft.path().c_str(), file.c_str()) != 0 && errno != EEXIST) return cannot("write", file, errno);
   if (Result<void> synced = system_disk().sync_folder(folder_of(file)); !synced) return tl::unexpected(synced.error());
   return load_signing_keys(file);
@@ -296,11 +296,11 @@ Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const fs::path& f
   return load_signing_keys(file);
 }
 
-SignedRange sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head) {
+SignedEntries sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head) {
   return {since, head, key.public_key(), key.sign(message_of(since, head))};
 }
 
-bool fits(const SignedRange& entries) {
+bool fits(const SignedEntries& entries) {
   return entries.since && entries.since <= entries.head.place &&
          verifies(entries.key, message_of(entries.since, entries.head), entries.signature);
 }

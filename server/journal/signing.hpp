@@ -1,5 +1,5 @@
-// Ed25519 signatures (RFC 8032) with which a server vouches for what it wrote into a journal. The chain of hashes shows
-// that entries fit together; anybody can compute it. Only who has the secret key can sign.
+// Ed25519 signatures (RFC 8032). With them a server vouches for what it wrote into a journal. The chain of hashes shows
+// that entries fit together, but anybody can compute it. Only the owner of the secret key can sign.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -27,14 +27,14 @@ struct Signature {
 
 // 64 hexadecimal digits.
 [[nodiscard]] std::string to_hex(const PublicKey& key);
-// White space around the digits does not count. Error invalid_input: anything else.
+// White space around the digits is ignored. Error invalid_input: anything else.
 [[nodiscard]] Result<PublicKey> parse_public_key(std::string_view text);
 [[nodiscard]] bool verifies(const PublicKey& key, const Digest& message, const Signature& signature);
 
-// A secret key. Its bytes are wiped when it goes.
+// A secret key. Its bytes are wiped when it is destroyed.
 class SigningKey {
  public:
-  [[nodiscard]] static SigningKey make();  // of the system's random bytes
+  [[nodiscard]] static SigningKey make();  // from the system's random bytes
   [[nodiscard]] static SigningKey from_seed(const std::array<std::uint8_t, 32>& seed);
   SigningKey(const SigningKey&) = default;
   SigningKey& operator=(const SigningKey&) = default;
@@ -49,7 +49,8 @@ class SigningKey {
   PublicKey public_;
 };
 
-// One key takes over from another. Both sign it: else anybody could name a key of their own as the earlier one.
+// One key takes over from another. Both sign the change; otherwise anybody could name a key of their own as the earlier
+// one.
 struct Succession {
   PublicKey before, after;
   Signature by_before, by_after;
@@ -58,10 +59,10 @@ struct Succession {
 [[nodiscard]] Succession succeed(const SigningKey& before, const SigningKey& after);
 [[nodiscard]] std::string encode_successions(std::span<const Succession> all);
 [[nodiscard]] std::optional<std::vector<Succession>> decode_successions(std::string_view bytes);
-// The key, and all that came before and after it as far as both signatures of each step hold.
+// The key, and all keys before and after it, as far as both signatures of each step are valid.
 [[nodiscard]] std::set<PublicKey> keys_of_line(const PublicKey& key, std::span<const Succession> successions);
 
-// What a server signs with, and the keys that it signed with before. Fixed once it is made: any thread.
+// The key with which a server signs, and its earlier keys. Immutable, so any thread may use it.
 class SigningKeys {
  public:
   explicit SigningKeys(SigningKey key, std::vector<Succession> successions = {});
@@ -75,37 +76,37 @@ class SigningKeys {
   std::set<PublicKey> line_;
 };
 
-// Its name, where nobody says another: in the folder of the journals.
+// Default name, in the folder of the journals.
 inline constexpr const char* kSigningKeyFile = "signing.key";
-// The keys in a text file that only its owner may read. Errors, naming the file: not_found; invalid_input (it is no key
-// file, or others may read it).
+// Loads the keys from a text file that only its owner may read. Errors, naming the file: not_found; invalid_input (not
+// a key file, or others may read it).
 [[nodiscard]] Result<std::shared_ptr<const SigningKeys>> load_signing_keys(const std::filesystem::path& file);
-// The same. Where the file is missing, one with a new key is made, safe on the disk, for its owner alone. Error
-// internal: it cannot be written.
+// The same. If the file is missing, makes a durable one with a new key that only its owner may read. Error internal: it
+// cannot be written.
 [[nodiscard]] Result<std::shared_ptr<const SigningKeys>> load_or_make_signing_keys(const std::filesystem::path& file);
-// Puts a new key into the file, which the present one signs. The file holds the old one or the new one at every moment.
-// Whoever has loaded the file signs with the old key until it loads it again.
+// Puts a new key into the file, and the present key signs it. At every moment the file holds the old or the new key.
+// Whoever has loaded the file signs with the old key until loading it again.
 [[nodiscard]] Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const std::filesystem::path& file);
 
-// A key says: I decided the entries from `since` on, and they lead to `head`. Through the chain this holds for what those
-// entries are.
-struct SignedRange {
+// A key states: I decided the entries from `since` on, and they lead to `head`. Through the chain this covers the
+// content of those entries.
+struct SignedEntries {
   RoomSeq since;
   JournalHead head;
   PublicKey key;
   Signature signature;
 };
-[[nodiscard]] SignedRange sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head);
-// Whether the key made the signature, and of entries that can be.
-[[nodiscard]] bool fits(const SignedRange& entries);
+[[nodiscard]] SignedEntries sign_entries(const SigningKey& key, RoomSeq since, const JournalHead& head);
+// Whether the key made the signature, and such entries are possible.
+[[nodiscard]] bool fits(const SignedEntries& entries);
 
-// What stands beside each entry that the chain does not confirm: its hash, or the key that signed the hash and its
-// signature. `genesis`: chain_0 of the journal, so that it counts in no other.
+// A seal stands beside each stored value that the chain does not cover. It is the value's hash, or the key that signed
+// the hash with its signature. `genesis`: chain_0 of the journal, so that the seal is valid in no other journal.
 [[nodiscard]] std::string make_seal(const Digest& entry, const Digest& genesis, const SigningKey* key);
 struct Seal {
   std::optional<PublicKey> key;  // none: nobody signed it
 };
-// Nothing: it does not fit the entry.
+// Nothing: it does not fit the value.
 [[nodiscard]] std::optional<Seal> check_seal(std::string_view seal, const Digest& entry, const Digest& genesis);
 
 }  // namespace osteon

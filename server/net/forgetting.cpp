@@ -37,7 +37,7 @@ std::uint32_t number_of(const Person& person) {
   return number;
 }
 
-// The words of a entry, where it has some.
+// The words of an entry, where it has some.
 std::string* words_in(LogEntry& entry) {
   if (auto* mark = std::get_if<MarkEntry>(&entry.what)) return &mark->label;
   if (auto* said = std::get_if<WordsEntry>(&entry.what)) return &said->words;

@@ -73,7 +73,7 @@ void MeshPublisher::run() {
       else if (!owed_)
         wake_.wait(lock, called);
       if (!due_ && end_) return;
-      // A first cut is shown at once, a entry of cuts at the mesh rate: with the tick that comes about then, so that what
+      // A first cut is shown at once, an entry of cuts at the mesh rate: with the tick that comes about then, so that what
       // it has committed goes at once.
       if (Clock::now() < next) {
         wake_.wait_until(lock, next - about, [&] { return end_; });

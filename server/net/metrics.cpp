@@ -17,7 +17,7 @@
 #include "common/field/rejection.hpp"
 #include "server/journal/journal_file.hpp"
 #include "server/net/certificate.hpp"
-#include "server/net/host_port.hpp"
+#include "common/wire/host_port.hpp"
 #include "server/net/room_server.hpp"
 
 namespace osteon {

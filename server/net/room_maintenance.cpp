@@ -113,7 +113,7 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
     (void)room->take_changes();
     for (const Checkpoint& point : *checkpoints)
       if (point.at.place == one.place && to_hex(field_hash(room->all_leaves(), pitch_mm_)) != point.meta)
-        report.faults.push_back("the checkpoint at place " + std::to_string(one.place.value) + " of " + file_.string() +
+        report.faults.push_back("the checkpoint at event " + std::to_string(one.place.value) + " of " + file_.string() +
                                 " is not what its entries make; remove it");
     return true;
   });

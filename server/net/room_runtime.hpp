@@ -46,7 +46,7 @@ class SessionSubscriber : public Subscriber {
   [[nodiscard]] virtual bool feels_bone() const { return true; }
   // [tick] Where the bone stands on its mount, to this one.
   virtual void show_bone(const MountPose& /*seen*/) {}
-  // What holds for the hand from the beginning, as a entry that has no number: after begin().
+  // What holds for the hand from the beginning, as an entry that has no number: after begin().
   virtual void hold(const wire::SessionEntry& /*supervised*/) {}
   // A tool's number in few bytes: after begin() for those of the room, and before the entry that adds another.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}

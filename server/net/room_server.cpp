@@ -16,7 +16,7 @@
 #include "server/net/certificate.hpp"
 #include "server/net/cipher_order.hpp"
 #include "server/net/health_watch.hpp"
-#include "server/net/host_port.hpp"
+#include "common/wire/host_port.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/refused_calls.hpp"

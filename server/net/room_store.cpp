@@ -310,7 +310,7 @@ Result<void> RoomStore::checkpoint(RoomSeq place, std::span<const FieldLeaf> lea
   if (!file) return tl::unexpected(file.error());
   for (std::size_t next = 0, unsynced = 0; next < leaves.size();) {
     if (closing_ || (calls.stop && calls.stop()))
-      return given_up("the checkpoint at place " + std::to_string(place.value));
+      return given_up("the checkpoint at event " + std::to_string(place.value));
     v1::JournalFields fields;
     for (std::size_t size = 0; next < leaves.size() && size < kPieceBytes; ++next) {
       *fields.add_leaves() = wire::to_wire(leaves[next]);

@@ -73,7 +73,7 @@ class SessionSendQueue {
   // beyond that changes nothing when its entry is applied again, since a cut field is a minimum over its cuts and all
   // other entries set leaves as they are at their place.
   void set_leaves(std::vector<FieldLeaf> leaves);
-  // A entry of the room's order; one up to `contained` is skipped. False when kMaxEntries wait already; the entry is then
+  // An entry of the room's order; one up to `contained` is skipped. False when kMaxEntries wait already; the entry is then
   // not taken. Rows that are taken count from 1 on, and carry their number.
   [[nodiscard]] bool add(RoomSeq place, Bytes entry);
   [[nodiscard]] bool takes(RoomSeq place) const { return place > contained_; }

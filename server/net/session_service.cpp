@@ -258,14 +258,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     read_on();
   }
 
-  // A entry that is streamed is told of without what it says.
+  // An entry that is streamed is told of without what it says.
   [[nodiscard]] DatagramContent content_of(const wire::SessionEntry& entry) const {
     if (entry.kind == wire::SessionEntryKind::supervised) return DatagramContent::supervision;
     const bool others = entry.kind == wire::SessionEntryKind::committed && entry.cut.author != author_;
     return others ? DatagramContent::committed_cuts : DatagramContent::acknowledgements;
   }
 
-  // What a entry of the order tells, of what not every role is told.
+  // What an entry of the order tells, of what not every role is told.
   [[nodiscard]] static std::optional<StreamContent> content_of(const v1::SessionResponse& entry) {
     switch (entry.message_case()) {
       case v1::SessionResponse::kLeaf:
@@ -282,7 +282,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
         return {};
     }
   }
-  // A entry as the reader may be told it: without what is not for them it says only that there was something.
+  // An entry as the reader may be told it: without what is not for them it says only that there was something.
   [[nodiscard]] Bytes entry_for_role(RoomSeq place, const Bytes& entry) const {
     constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision,
                               StreamContent::own_words};

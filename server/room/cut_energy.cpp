@@ -24,8 +24,8 @@ const CutEnergy::Samples& CutEnergy::samples(const ToolBox::Entry& tool) {
     low[axis] = tool.body.lowest[static_cast<std::size_t>(axis)] * kQuantum_mm;
     high[axis] = tool.body.highest[static_cast<std::size_t>(axis)] * kQuantum_mm;
   }
-  // Halton's points: no two lie in one plane, so that a tool that goes forward meets them one by one. As many as it
-  // takes: a blade is a small part of its box.
+  // Halton's points: no two lie in one plane, so an advancing tool meets them one by one. Draws as many as it takes,
+  // because a blade fills only a small part of its box.
   const auto halton = [](int index, int base) {
     double value = 0, part = 1;
     for (; index > 0; index /= base) value += (part /= base) * (index % base);

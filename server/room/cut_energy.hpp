@@ -1,4 +1,5 @@
-// The least energy that a cut takes, known before it is evaluated: what no motor can give is refused.
+// The least energy that a cut takes, estimated before the cut is evaluated. A room rejects a cut that needs more energy
+// than a motor can give.
 #pragma once
 #include <map>
 #include <span>
@@ -13,18 +14,19 @@ namespace osteon {
 // Not synchronised.
 class CutEnergy {
  public:
-  // Bone that is inside the cutting body at one pose of the path is gone after the cut, so that the energy to take it,
-  // of the pose where that is most, is a lower bound. ∫ u(ρ) dV with u the ultimate stress [A], by samples in the body,
-  // so exact only over many cuts: see resolution_j(). `fields`: of all bodies that the room has. J.
+  // A lower bound of the energy of a cut, J. After the cut no bone is left inside the cutting body, at any pose of the
+  // path. So the energy to remove the bone inside it at one pose is a lower bound; the pose with the most counts.
+  // The energy is ∫ u(ρ) dV with u the ultimate stress [A]. It is summed over samples of the body, so it is exact only
+  // over many cuts: see resolution_j(). `fields`: those of all bodies that the room has.
   [[nodiscard]] double least_j(const Cut& cut, const ToolBox::Entry& tool, std::span<const CutField* const> fields);
-  // What one sample stands for in cortical bone, J.
+  // Energy that one sample stands for in cortical bone, J.
   [[nodiscard]] double resolution_j(const ToolBox::Entry& tool);
 
  private:
-  // Points of the cutting body in the tool's frame; each stands for as much of its volume.
+  // Points of the cutting body in the tool's frame. Each stands for an equal part of the body's volume.
   struct Samples {
     std::vector<Vec3> at_mm;
-    double volume_mm3 = 0;  // of each
+    double volume_mm3 = 0;  // of each point
   };
   const Samples& samples(const ToolBox::Entry& tool);
   std::map<Digest, Samples> samples_;

@@ -1,4 +1,4 @@
-// Rows: what a room has decided, in one order. They are all that a journal keeps and all that a replay needs: applied
+// Log entries: what a room has decided, in one order. A journal stores only them, and a replay needs only them. Applied
 // to a room as it began, they make the same room again, without judging anything a second time.
 #pragma once
 #include <chrono>
@@ -20,20 +20,20 @@
 
 namespace osteon {
 
-// What a client may do in a room: only a surgeon's cuts are taken.
+// What a client may do in a room. Only a surgeon's cuts are accepted.
 enum class MemberKind : std::uint8_t { surgeon, watcher };
 
 struct JoinEntry {
-  AuthorId author;  // given here, never again
+  AuthorId author;  // assigned here, never again
   MemberKind kind = MemberKind::watcher;
-  std::uint32_t person = 0;  // a pseudonym: who it is, is written elsewhere and can be forgotten; 0: unnamed
-  Digest secret{};           // SHA-256 of what proves that a later connection is the same author's
-  Role role = Role::none;    // none: in a room from before there were roles, or of the server itself
+  std::uint32_t person = 0;  // pseudonym; the person's name is stored elsewhere and can be erased; 0: unnamed
+  Digest secret{};  // SHA-256 of the secret by which a later connection proves that it is the same author's
+  Role role = Role::none;  // none: the room is older than roles, or the server itself joined
 };
 struct CutEntry {
   Cut cut;
 };
-// It has a place in the order, so that its author hears of it in order and never twice.
+// It has a sequence number, so that its author receives it in order and only once.
 struct RejectionEntry {
   AuthorId author;
   std::uint64_t author_seq = 0;
@@ -42,46 +42,48 @@ struct RejectionEntry {
 };
 // One piece of a split, or debris.
 struct SplitPiece {
-  BodyId body;     // of debris null
-  CoordBox reach;  // samples of level 0 that its bone is in
-  Mask left;       // min(R, left) leaves the piece of its parent
+  BodyId body;  // null for debris
+  CoordBox reach;  // samples of level 0 that contain its bone
+  Mask left;  // min(R, left) leaves only this piece of its parent
 };
 struct SplitEntry {
   BodyId parent;
-  Mask taken;  // min(R, taken) takes the pieces from their parent
+  Mask taken;  // min(R, taken) removes the pieces from their parent
   std::vector<SplitPiece> pieces;
 };
 struct UndoEntry {
-  std::vector<RoomSeq> places;  // tombstones from now on, oldest first: what was asked for and what fell with it
+  // tombstones from now on, oldest first: the events that were asked for and those that depend on them
+  std::vector<RoomSeq> places;
 };
 struct RedoEntry {
-  std::vector<RoomSeq> undos;   // that are undone themselves, newest first
-  std::vector<RoomSeq> places;  // what comes again, oldest first
+  std::vector<RoomSeq> undos;  // undo events that are undone themselves, newest first
+  std::vector<RoomSeq> places;  // events that take effect again, oldest first
 };
 struct RemoveBodyEntry {
   BodyId body;
 };
 struct ItemEntry {
   std::uint32_t item = 0;
-  std::optional<SceneItem> set;  // nothing: taken out
+  std::optional<SceneItem> set;  // nothing: removed
 };
 struct ToolEntry {
   Tool tool;
 };
-// A place in the order that a person wants to find again.
+// An event that a person wants to find again.
 struct MarkEntry {
   std::string label;
 };
 
-// What holds for a hand from now on. Who stops a hand or frees it, takes its tool or gives it back, ends its lease.
+// Restrictions of an author from now on. The author's lease ends when the author is stopped or freed, or when its tool
+// is taken or given back.
 struct SuperviseEntry {
   AuthorId subject;
   Restrictions supervision;
 };
-// An annotation as it is from now on.
+// The new state of an annotation.
 struct AnnotationEntry {
   std::uint32_t id = 0;
-  std::optional<Annotation> drawn;  // nothing: wiped off
+  std::optional<Annotation> drawn;  // nothing: erased
 };
 struct WordsEntry {
   AuthorId to;  // null: to all
@@ -90,14 +92,14 @@ struct WordsEntry {
 
 struct LogEntry {
   RoomSeq place;
-  std::chrono::nanoseconds at{};  // since the room was made, by the clock of the server that decided
-  AuthorId author;                // who asked for it; null: the room itself
+  std::chrono::nanoseconds at{};  // time since the room was made, by the clock of the server that decided
+  AuthorId author;  // who asked for it; null: the room itself
   std::variant<JoinEntry, CutEntry, RejectionEntry, SplitEntry, UndoEntry, RedoEntry, RemoveBodyEntry, ItemEntry, ToolEntry, MarkEntry,
                SuperviseEntry, AnnotationEntry, WordsEntry>
       what;
 };
 
-// Names a cut's bytes: every field, in the order of the protocol.
+// Identifies a cut's bytes: every field, in the order of the protocol.
 [[nodiscard]] Digest cut_digest(const Cut& cut);
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// The people of a room as its entries have made them: what they may do, what was decided about them, what they have drawn.
+// The people of a room, as its log entries describe them: what they may do, their restrictions and their annotations.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -16,12 +16,13 @@ namespace osteon {
 
 inline constexpr std::size_t kMostWordsBytes = 1024;
 
+// Not synchronised; it is a part of the Room.
 class People {
  public:
   struct Supervised {
     Restrictions supervision;
-    RoomSeq place;  // of the entry that set it
-    AuthorId by;    // who did
+    RoomSeq place;  // sequence number of the entry that set it
+    AuthorId by;  // the author who did
   };
 
   void join(AuthorId author, Role role, std::uint32_t person, bool hand) { members_[author] = {role, person, hand}; }
@@ -31,31 +32,31 @@ class People {
   void draw(const AnnotationEntry& entry);
 
   [[nodiscard]] Role role(AuthorId author) const;
-  [[nodiscard]] std::uint32_t person(AuthorId author) const;  // a pseudonym, 0: unnamed
-  // An author without a role may do whatever one with any role may: his room is from before there were roles, or his
-  // server knows nobody by name.
+  [[nodiscard]] std::uint32_t person(AuthorId author) const;  // pseudonym, 0: unnamed
+  // An author without a role may do whatever an author with any role may do. Either the room is older than roles, or
+  // the server knows nobody by name.
   [[nodiscard]] bool supervises(AuthorId author) const;
   [[nodiscard]] bool only_own(AuthorId author) const { return role(author) == Role::trainee; }
-  // Whether they may take back all that others did.
+  // Whether the author may undo everything that others did.
   [[nodiscard]] bool may_undo_all(AuthorId author) const;
-  // Whether both are one person, as far as it is known who they are.
+  // Whether both are the same person, as far as the persons are known.
   [[nodiscard]] bool same_person(AuthorId a, AuthorId b) const {
     return a == b || (person(a) != 0 && person(a) == person(b));
   }
-  // The hand of a person that came last, here or not; null: there is none, or nobody knows who it is (0).
+  // The person's surgeon author that joined last, present or not. Null: there is none, or the person is unknown (0).
   [[nodiscard]] AuthorId newest_hand(std::uint32_t person) const;
-  // What holds for a hand; nothing but the default where nobody has decided anything.
+  // The restrictions of an author. The default if nobody has set any.
   [[nodiscard]] const Supervised& supervised(AuthorId author) const;
-  // What an author keeps to: what holds for it as a hand, then what holds for the newest hand of its person, unless it
-  // may supervise others.
+  // What the author must obey: its own restrictions, then those of its person's newest surgeon author. An author that
+  // may supervise others has only its own.
   [[nodiscard]] std::array<const Restrictions*, 2> binding(AuthorId author) const;
   [[nodiscard]] const std::map<std::uint32_t, Annotation>& annotations() const { return annotations_; }
   [[nodiscard]] std::uint32_t last_annotation() const { return last_annotation_; }
-  // The one that a new drawing of this kind takes the place of; 0: none.
+  // The annotation that a new one of this kind replaces; 0: none.
   [[nodiscard]] std::uint32_t replaced_by(const Annotation& drawn) const;
 
-  // Adds nothing where nobody has a role, was supervised or has drawn anything: as the hash of a room was before there
-  // were people.
+  // Adds nothing if nobody has a role, was supervised or has drawn anything. So the hash of an older room, from before
+  // there were people, stays as it was.
   void add_to(Hasher& hasher) const;
 
  private:

@@ -21,8 +21,8 @@ double norm(const QuantisedPose& knot) {
 // Rounding to steps of 1/32767 moves the norm by less than 1e-4.
 constexpr double kUnitTolerance = 0.01;
 
-// The bound on swept voxels may be overdrawn by what it gives in so long: cuts come in bursts after a bad moment of the
-// net.
+// The bound on swept voxels may be exceeded by what it allows in this time, because cuts arrive in bursts after a
+// network delay.
 constexpr double kBurst_s = 3.0;
 
 constexpr double kEvenOut = 8.0;
@@ -133,7 +133,7 @@ Result<Outcome> Room::submit(const Cut& cut) {
     return refuse("cut.author_seq is " + std::to_string(cut.author_seq) + " where " + std::to_string(next) +
                   " comes next");
 
-  // What was decided stays decided, so a cut may be sent again after a lost answer.
+  // A decision is final, so a cut may be sent again if its answer was lost.
   if (cut.author_seq < next) {
     const Decided& entry = entries[cut.author_seq - 1];
     if (entry.bytes != cut_digest(cut))
@@ -175,7 +175,8 @@ Rejection Room::judge(const Cut& cut) {
 
 bool Room::beyond_power(const Cut& cut, std::span<const CutField* const> fields) {
   if (limits_.power_w <= 0) return false;
-  // What the motor has not given yet, since an author's cuts before; some samples too many or too few even out.
+  // Energy of the author's earlier cuts that the motor has not given yet. The tolerance evens out a few samples too
+  // many or too few.
   const ToolBox::Entry& tool = *tools_->find(cut.tool);
   double& owed_j = owed_j_[cut.author];
   const double owed_after_j =
@@ -186,7 +187,7 @@ bool Room::beyond_power(const Cut& cut, std::span<const CutField* const> fields)
   return false;
 }
 
-// What of a cut depends on no other.
+// The part of the judgement that depends on no other cut.
 Rejection Room::judge_form(const Cut& cut) const {
   const ToolBox::Entry* entry = tools_->find(cut.tool);
   if (!entry || !entry->body.cuts()) return Rejection::tool;
@@ -206,7 +207,7 @@ Rejection Room::judge_form(const Cut& cut) const {
   return swept_mm(cut, *entry) > limits_.swept_mm ? Rejection::sweep : Rejection::none;
 }
 
-// No point of the cutting part goes further than its tip plus the arc of its far end.
+// No point of the cutting part moves further than the tip's path plus the arc of its far end.
 double Room::swept_mm(const Cut& cut, const ToolBox::Entry& tool) const {
   double swept_mm = 0;
   for (std::size_t i = 1; i < cut.path.size(); ++i) {
@@ -217,8 +218,8 @@ double Room::swept_mm(const Cut& cut, const ToolBox::Entry& tool) const {
   return swept_mm;
 }
 
-// Samples of its level in the box of the cutting part, drawn out by the way that it goes and grown by the band: at
-// least what the kernel looks at.
+// Samples of the cut's level in the box of the cutting part, lengthened by its path and grown by the band. The kernel
+// visits at least as many.
 double Room::swept_voxels(const Cut& cut) const {
   const ToolBox::Entry& tool = *tools_->find(cut.tool);
   const double pitch_mm = level_pitch_mm(bone().pitch_mm(), cut.level);
@@ -249,7 +250,7 @@ std::vector<BlockKey> Room::bone_blocks() const {
 void Room::list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const {
   const CoordBox& samples = body.reach;
   if (samples.empty()) return;
-  // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
+  // Cells reach one sample beyond the block, so a surface may lie in the block before the first sample.
   const Coord first = shift_down(samples.min - Coord{1, 1, 1}, 4), last = shift_down(samples.max, 4);
   static_assert(kBlockCells == 1 << 4);
   for (int x = first.x; x <= last.x; ++x)

@@ -1,4 +1,4 @@
-// What a room's entries do to it: the same for one that was just decided and for one of a journal, years later.
+// How log entries change a room. It is the same for a new entry and for one of a journal, years later.
 #include <algorithm>
 #include <chrono>
 #include <functional>
@@ -11,10 +11,11 @@
 namespace osteon {
 namespace {
 
-// Key in a piece's history of the mask that leaves it of its parent: no event of its own. Places of events stay below.
+// Key, in a piece's history, of the mask that leaves only the piece of its parent. It is no event of its own. Sequence
+// numbers stay below it.
 constexpr std::uint64_t kLeftOfSplit = std::uint64_t{1} << 63;
 
-// No room lives longer; far from where times overflow.
+// Longest life of a room, far from where times overflow.
 constexpr std::chrono::nanoseconds kLongest = std::chrono::hours(24 * 365 * 100);
 
 tl::unexpected<Error> impossible(const LogEntry& entry, const std::string& why) {
@@ -30,10 +31,10 @@ bool meet(const CoordBox& a, const CoordBox& b) {
          b.min.z <= a.max.z;
 }
 
-// Where anything of a bone can be, in samples of level 0: a piece's masks reach a leaf and the band beyond it.
+// Where anything of a bone can be, in samples of level 0. A piece's masks reach one leaf and the band beyond the bone.
 CoordBox about(const Case& bone) { return bone.bounds_samples().grown(2 * kLeafSize); }
 
-// A mask as a split may have it: sorted leaves of the lattice, about the bone, that hold values.
+// Whether a split may have this mask: sorted leaves of the lattice, near the bone, that hold values.
 bool is_mask(const Mask& mask, const CoordBox& about) {
   if (!mask) return false;
   const auto place_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
@@ -62,8 +63,8 @@ Result<void> Room::replay(const LogEntry& entry, Fields fields) {
   return {};
 }
 
-// Not whether it would be decided so again, but whether it can have been: what a damaged or forged journal names may
-// not exist.
+// Checks whether the entry is possible, not whether the room would decide it again. A damaged or forged journal may
+// name what does not exist.
 Result<void> Room::can_follow(const LogEntry& entry) const {
   const auto possible = [&](bool holds, const char* why) -> Result<void> {
     return holds ? Result<void>{} : Result<void>(impossible(entry, why));
@@ -113,7 +114,7 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
         const auto found = room.events_.find(place);
         return found != room.events_.end() && found->second.kind == EventKind::undo && !found->second.undone;
       };
-      // Newest undo first, oldest event first, none twice.
+      // Newest undo first, oldest event first, no duplicates.
       bool all = !redo.undos.empty() && std::ranges::all_of(redo.undos, stands) &&
                  std::ranges::is_sorted(redo.undos, std::greater_equal{}) &&
                  std::ranges::is_sorted(redo.places, std::less_equal{});
@@ -226,8 +227,8 @@ void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) 
     events_.at(entry.place).missed = std::make_shared<const Cut>(cut);
 }
 
-// What its author has predicted on top of a cut that fell, falls too; but a stale cut says that he does not know yet,
-// and to raise the epoch for it would make the next ones stale as well.
+// A rejected cut also voids what its author has predicted on top of it. But a stale cut shows that the author does not
+// know of the new epoch yet. Raising the epoch again would make the next cuts stale as well.
 void Room::apply(const LogEntry& entry, const RejectionEntry& rejection, RoomEvent& event) {
   event.kind = EventKind::cut;
   ++counts_.rejected;
@@ -236,7 +237,7 @@ void Room::apply(const LogEntry& entry, const RejectionEntry& rejection, RoomEve
   grant(surgeons_.at(rejection.author));
 }
 
-// Epochs are places of the order, so that none comes twice and everyone sees the same.
+// Epochs are sequence numbers, so none repeats and everyone sees the same.
 void Room::grant(Surgeon& surgeon) {
   surgeon.epoch = room_seq_.value + 1;
   surgeon.granted = now_;
@@ -290,7 +291,7 @@ void Room::apply(const LogEntry& entry, const RedoEntry& redo, RoomEvent& event)
   event.kind = EventKind::redo;
   add_event(entry, EventKind::redo);
   for (const RoomSeq undo : redo.undos) events_.at(undo).undone = true;
-  // Cuts first: a piece is made from its parent as it is with all of them.
+  // Cuts first: a piece is made from its parent with all of them applied.
   std::vector<RoomSeq> cuts;
   for (const RoomSeq place : redo.places)
     if (events_.at(place).kind == EventKind::cut) cuts.push_back(place);
@@ -314,7 +315,7 @@ void Room::apply(const LogEntry& entry, const RedoEntry& redo, RoomEvent& event)
     if (again.kind == EventKind::remove_body) bodies_.at(again.body).present = false;
   }
   if (event.bone) bone_came_back(event);
-  // A body that was changed and then taken away again is not told of.
+  // A body that was changed and then removed again is not reported.
   std::erase_if(event.leaves, [&](const FieldLeaf& leaf) { return !exists(leaf.body); });
 }
 
@@ -378,14 +379,14 @@ void Room::add_body(BodyId id, CutField field, CutHistory history, const CoordBo
   bodies_.emplace(id, Body{std::move(field), std::move(history), SurfaceBlocks(id), reach});
 }
 
-// Every leaf of a body that comes or comes back, and every block that it may be drawn with.
+// Adds every leaf of a body that appears or comes back, and every block in which it may be drawn.
 void Room::show_whole(BodyId id, RoomEvent& event) {
   Body& body = bodies_.at(id);
   std::vector<FieldLeaf> leaves = body.field.leaves();
   std::map<int, std::vector<Coord>> cut;
   for (const FieldLeaf& leaf : leaves)
     if (meet(level_0_box(leaf.level, leaf.origin), body.reach)) cut[leaf.level].push_back(leaf.origin);
-  // Most of a piece's leaves are gone throughout and far from it: only those round it are drawn.
+  // Most of a piece's leaves are entirely empty and far from it. Only those round it are drawn.
   for (const auto& [level, origins] : cut)
     for (const BlockKey& key : body.surface.touch(level, origins)) stale_.insert(key);
   std::vector<BlockKey> whole;
@@ -397,7 +398,7 @@ void Room::show_whole(BodyId id, RoomEvent& event) {
   event.bone = true;
 }
 
-// A copy of the parent with all but the piece gone.
+// A copy of the parent with everything but the piece removed.
 CutField Room::made_piece(const Body& parent, const SplitPiece& piece) const {
   CutField field(bone(), piece.body, tools_);
   for (const FieldLeaf& leaf : parent.field.leaves()) field.restore(leaf);
@@ -405,7 +406,8 @@ CutField Room::made_piece(const Body& parent, const SplitPiece& piece) const {
   return field;
 }
 
-// What the parent lost since the copy that a piece was made from; between split and undo a field only falls.
+// Applies what the parent lost since the copy from which the piece was made. Between a split and an undo, a field only
+// loses bone.
 void Room::catch_up(const Body& parent, CutField& field) const {
   FieldLeaf leaf;
   for (const BodyLeaves& change : changes_) {
@@ -419,7 +421,7 @@ void Room::catch_up(const Body& parent, CutField& field) const {
   }
 }
 
-// The pieces are copies of the parent, each with all but itself gone; then the parent loses them.
+// The pieces are copies of the parent, each with everything else removed. Then the parent loses them.
 void Room::cut_apart(RoomSeq place, Event& entry, RoomEvent& event) {
   Body& parent = bodies_.at(entry.body);
   const RoomSeq left_key{kLeftOfSplit | place.value};
@@ -465,16 +467,16 @@ Result<void> Room::set_fields(std::span<const FieldLeaf> leaves) {
   for (const FieldLeaf& leaf : leaves)
     if (leaf.level < 0 || leaf.level >= kLevels || !leaf.holds_values() ||
         !near.contains(shift_down(leaf.origin, leaf.level)))
-      return failure(ErrorCode::invalid_input, "the fields hold a leaf that is none of this bone's");
+      return failure(ErrorCode::invalid_input, "the fields hold a leaf that does not belong to this bone");
   for (const FieldLeaf& leaf : leaves)
     if (!bodies_.contains(leaf.body))
       return failure(ErrorCode::invalid_input, "the fields hold leaves of body " + std::to_string(leaf.body.value) +
-                                                   ", which the room does not have at place " +
+                                                   ", which the room does not have at event " +
                                                    std::to_string(room_seq_.value));
   for (const FieldLeaf& leaf : leaves) bodies_.at(leaf.body).field.restore(leaf);
-  RoomEvent nobody_hears;
+  RoomEvent unsent;
   for (auto& [id, body] : bodies_)
-    if (body.present) show_whole(id, nobody_hears);
+    if (body.present) show_whole(id, unsent);
   return {};
 }
 

@@ -1,4 +1,4 @@
-// What a room says of an event that it has decided.
+// What a room reports of an event that it has decided.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -15,13 +15,13 @@
 
 namespace osteon {
 
-// A decided cut: its place in the room's order and whether it was applied there.
+// A decided cut: its sequence number in the room, and whether it was applied.
 struct Outcome {
   RoomSeq room_seq;
   Rejection rejection = Rejection::none;
-  bool repeated = false;          // decided before: this is its first outcome
-  std::uint64_t lease_epoch = 0;  // of its author from now on
-  CutReport report;               // of an applied cut, of all bodies together
+  bool repeated = false;  // decided before; this is the first outcome
+  std::uint64_t lease_epoch = 0;  // of its author, from now on
+  CutReport report;  // of an applied cut, over all bodies
   [[nodiscard]] bool committed() const { return rejection == Rejection::none; }
 };
 
@@ -40,25 +40,25 @@ enum class EventKind : std::uint8_t {
   words
 };
 
-// A decided event that is not a cut, with what every holder of the bone must take over.
+// A decided event that is not a cut, with everything that the holder of a replica must apply.
 struct RoomEvent {
   RoomSeq room_seq;
   EventKind kind = EventKind::cut;
-  AuthorId author;                // null: the room itself
+  AuthorId author;  // null: the room itself
   bool bone = false;              // bodies or leaves changed
   bool scene = false;             // items changed
-  std::vector<BodyId> bodies;     // that exist from now on
-  std::vector<FieldLeaf> leaves;  // changed ones as they are now, and all of a body that is new
-  std::uint64_t lease_epoch =
-      0;  // of every lease that was granted before, from now on; 0: as they were; supervise: of the subject's
-  const ToolBox::Entry* tool = nullptr;  // one that was added
-  std::uint32_t item = 0;                // one that was set or taken out
-  std::optional<Placed> set;             // as it stands now, where it was set
-  std::vector<RoomSeq> places;           // undo, redo: of the events taken back or done again, oldest first
-  CutReport cut;                         // of all bodies together
-  std::string mark;                      // its label
+  std::vector<BodyId> bodies;  // those that exist from now on
+  std::vector<FieldLeaf> leaves;  // changed leaves in their new state, and all leaves of a new body
+  // Epoch, from now on, of every lease that was granted before; 0: unchanged. supervise: epoch of the subject's lease.
+  std::uint64_t lease_epoch = 0;
+  const ToolBox::Entry* tool = nullptr;  // the tool that was added
+  std::uint32_t item = 0;  // the item that was set or removed
+  std::optional<Placed> set;  // its new state, if it was set
+  std::vector<RoomSeq> places;  // undo, redo: sequence numbers of the events taken back or done again, oldest first
+  CutReport cut;  // over all bodies
+  std::string mark;  // its label
   std::variant<std::monostate, SuperviseEntry, AnnotationEntry, WordsEntry> people;  // what was decided, drawn or said
-  std::vector<RoomEvent> further;  // decided with it, each at a place of its own after it
+  std::vector<RoomEvent> further;  // follow-ups decided with it, each with a sequence number of its own after it
 };
 
 }  // namespace osteon

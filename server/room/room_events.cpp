@@ -1,4 +1,4 @@
-// What a room decides beside cuts: undo and redo, pieces, the scene, tools, marks.
+// What a room decides besides cuts: undo and redo, pieces, the scene, tools, marks.
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -12,14 +12,14 @@
 namespace osteon {
 namespace {
 
-// Key in a body's history of a field that was loaded: no event of its own. Places of events stay below.
+// Key, in a body's history, of a field that was loaded. It is no event of its own. Sequence numbers stay below it.
 constexpr std::uint64_t kLoaded = std::uint64_t{1} << 62;
 
 tl::unexpected<Error> refuse(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
 
 auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
 
-// Masks of several fragments as one: a leaf that several name is taken once, with the least values.
+// Unites the masks of several fragments. A leaf that several masks contain is kept once, with the smallest values.
 std::vector<FieldLeaf> united(std::vector<FieldLeaf> masks) {
   if (std::ranges::is_sorted(masks, std::less_equal{}, place_of)) return masks;
   std::ranges::stable_sort(masks, {}, place_of);
@@ -46,7 +46,7 @@ bool is_guide(const Tool& tool) {
          tool.kind == ToolKind::four_in_one_block;
 }
 
-// A room that goes on from what was saved began with that.
+// A room that continues from a saved state began with that state.
 Digest begun_with(const Digest& genesis, const SavedFields& saved) {
   Hasher hasher;
   hasher.text("osteon-room-resumed-1");
@@ -93,7 +93,7 @@ Result<Room> Room::resume(Case bone, const SavedFields& saved, CutLimits limits,
       return tl::unexpected(added.error());
     else if (!room.tools_->find(tool.hash()))
       room.tools_->add(tool);
-  // Set by nobody and not to be undone.
+  // Nobody set them, and they cannot be undone.
   room.events_[RoomSeq{}] = {.kind = EventKind::tool};
   for (const SceneItem& item : saved.items) {
     if (!room.tools_->find(item.tool)) return refuse("the saved scene has an item of a tool that is not saved");
@@ -145,7 +145,7 @@ std::vector<SceneItem> Room::items() const {
         std::find_if(entries.rbegin(), entries.rend(), [&](const ItemState& entry) { return !events_.at(entry.place).undone; });
     if (newest != entries.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
-  // Whether a guide is fixed follows from the pins that stand with it.
+  // The pins in the scene decide whether a guide is fixed.
   const std::vector<Standing> scene = with_tools(standing);
   for (std::size_t i = 0; i < scene.size(); ++i)
     if (is_guide(scene[i].tool))
@@ -183,7 +183,7 @@ Result<void> Room::know(const Tool& tool) const {
   const auto entries = tools_->entries();
   if (entries.size() >= kMostTools)
     return refuse("the room knows " + std::to_string(kMostTools) + " tools and takes no more");
-  // States and lists name tools by their names, so that two must not have one.
+  // States and lists identify tools by name, so two tools must not share a name.
   for (const ToolBox::Entry* entry : entries)
     if (entry->tool.name == tool.name)
       return failure(ErrorCode::exists,
@@ -191,9 +191,11 @@ Result<void> Room::know(const Tool& tool) const {
   return {};
 }
 
-// What was done to a piece as such falls with the split that made it; with a cut falls every later split of a body that
-// the cut had reached, since the bone that comes back may hold the piece; and so with an earlier split of that body,
-// whose bone would come back in the later piece too.
+// Adds the events that depend on `places`.
+// - With a split: what was done to its piece as such.
+// - With a cut: every later split of a body that the cut had reached, because the bone that comes back may hold the
+//   piece.
+// - With an earlier split: every later split of the same body, because the bone would come back in the later piece too.
 std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
   std::set<BodyId> pieces_gone;
   bool more = true;
@@ -209,7 +211,8 @@ std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
           falls |= fallen < place && parent != bodies_.end() && parent->second.history.contains(fallen);
       } else if (event.kind == EventKind::remove_body) {
         falls = pieces_gone.contains(event.body);
-        // Whoever took the rest away had the piece in view: without it, the room would have no bone at all.
+        // Somebody removed the rest because the piece was still there. Without the piece, the room would have no bone
+        // at all.
         for (const RoomSeq fallen : places) {
           const Event& split = events_.at(fallen);
           falls |= fallen < place && split.kind == EventKind::split && split.body == event.body;
@@ -240,7 +243,7 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (places.empty()) return refuse("undo names no event");
   for (const RoomSeq place : places) {
-    if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " is none that can be undone");
+    if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " cannot be undone");
     if (events_.at(place).undone) return refuse("event " + std::to_string(place.value) + " is undone already");
   }
   const std::set<RoomSeq> named(places.begin(), places.end());
@@ -270,11 +273,11 @@ Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) 
 
 Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (mark > room_seq_) return refuse("place " + std::to_string(mark.value) + " lies beyond the newest event");
+  if (mark > room_seq_) return refuse("event " + std::to_string(mark.value) + " lies beyond the newest event");
   std::set<RoomSeq> places;
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
     if (can_be_undone(event->first) && !event->second.undone) places.insert(event->first);
-  // A split is nobody's own: it falls with the cut that parted the piece.
+  // A split belongs to nobody: it is undone with the cut that separated the piece.
   if (people_.only_own(by))
     std::erase_if(places, [&](RoomSeq place) { return events_.at(place).kind == EventKind::split; });
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
@@ -294,7 +297,7 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
 
   std::set<RoomSeq> again;
   for (const RoomSeq undo : entry.undos) {
-    // The same bone may have come off again meanwhile: that split stands, and the earlier one stays undone.
+    // The same bone may have separated again since. Then that split holds, and the earlier one stays undone.
     const auto split_since = [&](BodyId parent) {
       return std::any_of(events_.upper_bound(undo), events_.end(), [&](const auto& later) {
         return later.second.kind == EventKind::split && !later.second.undone && later.second.body == parent;
@@ -357,7 +360,7 @@ Result<RoomEvent> Room::split(Separation found) {
 Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& placing) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
-  if (!tools_->find(item.tool)) return refuse("item.tool_hash is of no tool that the room knows");
+  if (!tools_->find(item.tool)) return refuse("item.tool_hash names a tool that the room does not have");
   if (item.id != 0 && !items_.contains(item.id))
     return refuse("item.item: the room has no item " + std::to_string(item.id));
   if (item.id == 0 && items_.size() >= kMostItems)

@@ -16,20 +16,21 @@ std::string author_name(AuthorId author) { return "author " + std::to_string(aut
 
 Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions supervision) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
-  if (!people_.supervises(by)) return deny(author_name(by) + " is no instructor here");
+  if (!people_.supervises(by)) return deny(author_name(by) + " is not an instructor in this room");
   if (!surgeons_.contains(subject))
-    return failure(ErrorCode::not_found, author_name(subject) + " has no hand in this room");
+    return failure(ErrorCode::not_found, author_name(subject) + " has no tool in this room");
   if (Result<void> sound = check(supervision); !sound) return tl::unexpected(sound.error());
   for (const AuthorId named : {supervision.taken_by, supervision.guide}) {
     if (!named) continue;
     if (named == subject)
-      return refuse("supervision names the hand itself as who holds or guides it; name another author");
+      return refuse("supervision names the author itself as holder or guide of its tool; name another author");
     if (!knows(named)) return refuse("supervision names " + author_name(named) + ", who has not joined this room");
   }
   for (const Digest& tool : supervision.tools)
     if (!tools_->find(tool))
       return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
-  // Who decided it may not know yet that the person has come again: what held for both alike goes on doing so.
+  // The instructor may not know yet that the person has joined again. If both authors had the same restrictions, the
+  // new one gets these too.
   const Restrictions before = people_.supervised(subject).supervision;
   const AuthorId newest = people_.role(subject) == Role::none ? subject : people_.newest_hand(people_.person(subject));
   const bool follows = newest && newest != subject && newest != supervision.taken_by && newest != supervision.guide &&
@@ -67,7 +68,7 @@ Result<RoomEvent> Room::wipe_off(AuthorId by, std::uint32_t annotation) {
   if (known == people_.annotations().end())
     return failure(ErrorCode::not_found, "the room has no annotation " + std::to_string(annotation));
   if (known->second.author != by && !people_.supervises(by))
-    return deny("annotation " + std::to_string(annotation) + " is another's, which only an instructor wipes off");
+    return deny("annotation " + std::to_string(annotation) + " is another's; only an instructor may wipe it off");
   return decide(by, AnnotationEntry{annotation, std::nullopt});
 }
 
@@ -86,7 +87,7 @@ Result<void> Room::may_change(AuthorId by) const {
     if (!held->may_cut())
       return deny(
           std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
-          "; until an instructor lets you go on, you take nothing back, do nothing again, place and take away nothing");
+          "; you cannot undo, redo, place or remove anything until an instructor lets you go on");
   return {};
 }
 
@@ -117,8 +118,8 @@ Result<void> Room::may_take_back(AuthorId by, const std::set<RoomSeq>& places) c
   if (people_.only_own(by)) return are_own(by, places);
   if (!takes_all_of_others(by, places)) return {};
   return deny(
-      "this takes back all that others have done here, which only an instructor does; take back less, or only your "
-      "own");
+      "this takes back all that others have done here, and only an instructor may do that; take back less, or only "
+      "your own");
 }
 
 Result<void> Room::may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const {
@@ -127,7 +128,7 @@ Result<void> Room::may_do_again(AuthorId by, const std::set<RoomSeq>& undos) con
   for (const RoomSeq place : undos)
     if (const Event& undo = events_.at(place); undo.all_of_others && !people_.same_person(by, undo.author))
       return deny("event " + std::to_string(place.value) +
-                  " took back all that others had done, which only an instructor does again");
+                  " took back all that others had done; only an instructor may redo it");
   return {};
 }
 
@@ -135,7 +136,7 @@ Result<void> Room::are_own(AuthorId by, const std::set<RoomSeq>& places) const {
   for (const RoomSeq place : places)
     if (!people_.same_person(by, events_.at(place).author))
       return deny("event " + std::to_string(place.value) + " is not " + author_name(by) +
-                  "'s own, and a trainee takes back no other");
+                  "'s own, and a trainee may only take back their own");
   return {};
 }
 
@@ -151,7 +152,7 @@ bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) con
   return std::ranges::none_of(events_, stays);
 }
 
-// Who stops a hand or takes its tool takes its lease: what it predicted on top falls.
+// Whoever stops an author or takes its tool ends its lease: what the author predicted on top is void.
 void Room::apply(const LogEntry& entry, const SuperviseEntry& supervise, RoomEvent& event) {
   event.kind = EventKind::supervise;
   event.people = supervise;

@@ -1,4 +1,4 @@
-// Pieces that have come apart, as whoever looks for them tells the room.
+// Fragments that have separated, as the fragment detector reports them to the room.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -8,14 +8,15 @@
 
 namespace osteon {
 
-// What has come apart from a body. `fields`: for each piece that is no debris, in order, the field that it will have,
-// made beforehand because that takes long: from a copy of the parent in which nothing is missing but what
-// take_changes() has yet to tell. Each of the body that the piece will be, next_body() and on; without it the room
-// makes the field itself.
+// Fragments that have separated from a body.
+// `fields`: the future field of each fragment that is not debris, in order. They are made beforehand because that takes
+// long. Each is made from a copy of the parent that lacks only the changes that take_changes() has yet to return. Each
+// belongs to the body that its fragment will become: next_body() and those after it. If a field is missing, the room
+// makes it itself.
 struct Separation {
   BodyId parent;
   std::vector<Fragment> fragments;
-  std::uint64_t seen = 0;  // bone_epoch() when it was looked for
+  std::uint64_t seen = 0;  // bone_epoch() of the room when the search began
   std::vector<CutField> fields = {};
 };
 

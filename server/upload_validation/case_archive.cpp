@@ -39,7 +39,7 @@ std::string reason_of(archive* a) {
   return reason != nullptr ? reason : "unknown reason";
 }
 
-// Takes an open archive apart, counting as it goes.
+// Unpacks an open archive and counts the bytes on the way.
 class Unpacker {
  public:
   Unpacker(archive* a, std::string name, std::uint64_t packed_bytes, const UploadQuota& quota, const PutPiece& put)
@@ -69,26 +69,26 @@ class Unpacker {
     return failure(ErrorCode::invalid_input, name_ + " " + what);
   }
   tl::unexpected<Error> damaged() const {
-    return bad("is no sound zip archive (" + reason_of(archive_) + "); pack the case again");
+    return bad("is not a sound zip archive (" + reason_of(archive_) + "); pack the case again");
   }
 
-  // The file of a case that an entry is, if it may be one at all.
+  // The file of a case that an entry contains, if it may be one.
   Result<std::string> file_of(archive_entry* entry) {
     const char* given = archive_entry_pathname(entry);
     const std::string path = given != nullptr ? given : "";
-    // Not said as it is: what a stranger calls an entry belongs in no log.
+    // The entry's name is omitted: a name of untrusted origin does not belong in a log.
     const auto refuse = [&](const std::string& why) -> Result<std::string> { return bad("has an entry that " + why); };
     if (archive_entry_is_encrypted(entry) != 0) return refuse("is encrypted; pack the case without a password");
     if (archive_entry_symlink(entry) != nullptr || archive_entry_hardlink(entry) != nullptr)
       return refuse("is a link; pack the files themselves");
-    if (archive_entry_filetype(entry) != AE_IFREG) return refuse("is no plain file; pack the files of the case alone");
+    if (archive_entry_filetype(entry) != AE_IFREG) return refuse("is not a plain file; pack only the files of the case");
     const std::size_t slash = path.find('/');
     const std::string folder = slash == std::string::npos ? "" : path.substr(0, slash);
     const std::string file = slash == std::string::npos ? path : path.substr(slash + 1);
     const bool plain = folder != ".." && folder != "." && (slash == std::string::npos || !folder.empty()) &&
                        folder.find('\\') == std::string::npos;
     if (!plain || std::ranges::find(kCaseFiles, file) == std::end(kCaseFiles))
-      return refuse("is no file of a case; pack case.json and bone.vdb alone");
+      return refuse("is not a file of a case; pack only case.json and bone.vdb");
     if (folder_ && *folder_ != folder) return refuse("lies in another folder than those before it; pack one case");
     folder_ = folder;
     if (files_.contains(file)) return refuse("comes twice; pack the case again");
@@ -96,7 +96,8 @@ class Unpacker {
   }
 
   Result<void> take(archive_entry* entry) {
-    if (archive_entry_filetype(entry) == AE_IFDIR) return {};  // holds nothing; its files are judged by their own names
+    // it has no content; its files are checked by their own names
+    if (archive_entry_filetype(entry) == AE_IFDIR) return {};
     const Result<std::string> file = file_of(entry);
     if (!file) return tl::unexpected(file.error());
     std::uint64_t& size = files_[*file];
@@ -115,7 +116,7 @@ class Unpacker {
           static_cast<double>(unpacked_bytes_) > quota_.ratio * static_cast<double>(packed_bytes_))
         return failure(ErrorCode::exhausted, name_ + " unpacks to more than " +
                                                  std::to_string(static_cast<int>(quota_.ratio)) +
-                                                 " times its size, as no case does");
+                                                 " times its size; no case does that");
       if (Result<void> put = put_(*file, std::span(piece).first(static_cast<std::size_t>(n))); !put) return put;
     }
   }
@@ -140,11 +141,11 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, c
   const std::string name = file.filename().string();
   if (bytes > quota.archive_bytes)
     return failure(ErrorCode::exhausted,
-                   name + " is larger than the " + std::to_string(quota.archive_bytes) + " bytes that are taken here");
+                   name + " is larger than the " + std::to_string(quota.archive_bytes) + " bytes that this server accepts");
   const Reader a = zip_reader();
   if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK)
     return failure(ErrorCode::invalid_input,
-                   name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
+                   name + " is not a zip archive (" + reason_of(a.get()) + "); pack the case as a zip archive");
   return Unpacker(a.get(), name, bytes, quota, put).run();
 }
 
@@ -153,7 +154,7 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(std::span<const std::by
   const Reader a = zip_reader();
   if (archive_read_open_memory(a.get(), bytes.data(), bytes.size()) != ARCHIVE_OK)
     return failure(ErrorCode::invalid_input,
-                   name + " is no zip archive (" + reason_of(a.get()) + "); pack the case as one");
+                   name + " is not a zip archive (" + reason_of(a.get()) + "); pack the case as a zip archive");
   return Unpacker(a.get(), name, bytes.size(), quota, put).run();
 }
 
@@ -170,7 +171,7 @@ Result<void> pack_case(const fs::path& folder, const fs::path& file) {
     const std::uint64_t size = fs::file_size(from, error);
     std::ifstream in(from, std::ios::binary);
     if (error || !in)
-      return failure(ErrorCode::not_found, folder.string() + " is no case: it has no " + std::string(name));
+      return failure(ErrorCode::not_found, folder.string() + " is not a case: it has no " + std::string(name));
     const std::unique_ptr<archive_entry, FreeEntry> entry(archive_entry_new());
     archive_entry_set_pathname(entry.get(), std::string(name).c_str());
     archive_entry_set_size(entry.get(), static_cast<la_int64_t>(size));

@@ -41,7 +41,7 @@ constexpr std::uint64_t kAddressesToMemory = 4;  // allocators and threads reser
 
 tl::unexpected<Error> cannot_start(int reason) {
   return failure(ErrorCode::internal,
-                 std::string("the process that looks cases through cannot be started: ") + std::strerror(reason));
+                 std::string("the process that checks cases cannot be started: ") + std::strerror(reason));
 }
 
 class Descriptor {
@@ -62,7 +62,7 @@ class Descriptor {
   int number_;
 };
 
-// A child that is gone when this is.
+// A child process. The destructor ends it.
 class Child {
  public:
   explicit Child(pid_t id) : id_(id) {}
@@ -77,7 +77,7 @@ class Child {
     id_ = 0;
     return status_;
   }
-  // Of one that has said everything: it is given a moment to end.
+  // For a child that has sent its whole answer: waits a moment for it to end.
   int join(Clock::time_point until) {
     while (id_ != 0 && ::waitpid(id_, &status_, WNOHANG) == 0) {
       if (Clock::now() > until) return end();
@@ -96,7 +96,7 @@ class Child {
   int status_ = 0;
 };
 
-// All that the child says; nothing where it says too much, takes too long or is not wanted any more.
+// The child's whole answer. Nothing if it is too long, takes too long or is no longer wanted.
 std::optional<std::string> listen(int descriptor, Clock::time_point until, const std::function<bool()>& stop) {
   std::string said;
   std::array<char, 4096> piece{};
@@ -118,7 +118,7 @@ void limit_self(__rlimit_resource resource, std::uint64_t most) {
   ::setrlimit(resource, &limit);
 }
 
-// What the process may unpack, in one of its arguments.
+// The quota as an argument of the process.
 std::string text_of(const UploadQuota& quota) {
   return nlohmann::json{{"archive_bytes", quota.archive_bytes},
                         {"unpacked_bytes", quota.unpacked_bytes},
@@ -138,7 +138,7 @@ UploadQuota quota_of(const std::string& text) {
   return quota;
 }
 
-// How the process says which kind of error it is.
+// Names the kind of error in the answer of the process.
 const char* word_of(ErrorCode code) {
   if (code == ErrorCode::exhausted) return "exhausted";
   return code == ErrorCode::internal ? "internal" : "invalid";
@@ -150,13 +150,13 @@ ErrorCode code_of(const nlohmann::json& answer) {
   return word == "internal" ? ErrorCode::internal : ErrorCode::invalid_input;
 }
 
-// A kernel without what confines the process is said once, not with every case.
+// Reports only once, not for every case, that the kernel cannot confine the process fully.
 void say_what_holds(const nlohmann::json& answer) {
   const auto holds = [&](const char* what) { return answer.contains(what) && answer[what] == true; };
   if (holds("files_held") && holds("calls_held")) return;
   static std::atomic<bool> said{false};
   if (!said.exchange(true))
-    log::warn("cases are looked through with less held back than could be",
+    log::warn("cases are checked in a process that this system cannot confine fully",
               {{"files_held", holds("files_held")}, {"calls_held", holds("calls_held")}});
 }
 
@@ -172,7 +172,7 @@ bool has_plain_files(const fs::path& folder) {
   return !error && files == std::size(kCaseFiles);
 }
 
-// A file of the case as it is unpacked.
+// Writes the files of the case while it is unpacked.
 class Files {
  public:
   explicit Files(fs::path folder) : folder_(std::move(folder)) {}
@@ -191,7 +191,7 @@ class Files {
 
  private:
   static Result<void> no_space(std::string_view file) {
-    return failure(ErrorCode::internal, "the server cannot unpack " + std::string(file) + ": its disk takes no more");
+    return failure(ErrorCode::internal, "the server cannot unpack " + std::string(file) + ": its disk accepts no more data");
   }
   const fs::path folder_;
   std::string name_;
@@ -233,7 +233,8 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   if (failed != 0) return cannot_start(failed);
   Child child(id);
   out.close();
-  // Before it has read a byte of the case, or nearly; what it can do until then is what it can do anyway.
+  // The limits apply before the process has read any of the case, or nearly. Whatever it does until then, it may do
+  // anyway.
   child.limit(RLIMIT_DATA, quota.memory_bytes);
   child.limit(RLIMIT_AS, kAddressesToMemory * quota.memory_bytes);
   child.limit(RLIMIT_FSIZE, quota.unpacked_bytes);
@@ -243,9 +244,9 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   if (!said) {
     (void)child.end();
     if (stop && stop())
-      return failure(ErrorCode::cancelled, "the case is not looked through, since it is not wanted any more");
+      return failure(ErrorCode::cancelled, "the check of the case was cancelled");
     return failure(ErrorCode::exhausted,
-                   "the case takes longer to read than the " + std::to_string(quota.time.count()) + " s that it may");
+                   "reading the case takes longer than the allowed " + std::to_string(quota.time.count()) + " s");
   }
   const int status = child.join(Clock::now() + std::chrono::seconds(5));
   const nlohmann::json answer = nlohmann::json::parse(*said, nullptr, false);
@@ -256,12 +257,12 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
                      answer["hash"].is_string() && answer.contains("title") && answer["title"].is_string() &&
                      answer.contains("memory_bytes") && answer["memory_bytes"].is_number_unsigned();
   if (!whole && WIFSIGNALED(status) && (WTERMSIG(status) == SIGXCPU || WTERMSIG(status) == SIGXFSZ))
-    return failure(ErrorCode::exhausted, "the case takes more to read than it may");
+    return failure(ErrorCode::exhausted, "reading the case takes more processor time or disk than allowed");
   if (!whole)
     return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
   const Result<Digest> hash = digest_from_hex(answer["hash"].get<std::string>());
   if (!hash) return tl::unexpected(hash.error());
-  // One that was taken over by what it read may have left anything.
+  // A process that the file has taken over may have left anything there.
   if (!has_plain_files(folder / kSoundCase))
     return failure(ErrorCode::invalid_input, "the case is damaged so that it cannot be read; import it again");
   return CheckedCase{*hash, answer["title"].get<std::string>(), answer["memory_bytes"].get<std::uint64_t>()};
@@ -271,7 +272,7 @@ int run_case_check(const fs::path& archive, const fs::path& folder, const std::s
   limit_self(RLIMIT_CORE, 0);
   ::prctl(PR_SET_DUMPABLE, 0);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  ::close_range(3, ~0U, 0);  // whatever the server had open is none of its business
+  ::close_range(3, ~0U, 0);  // closes everything that the server had open
   const Confinement held = confine_to(folder);
   nlohmann::json answer;
   try {
@@ -281,7 +282,7 @@ int run_case_check(const fs::path& archive, const fs::path& folder, const std::s
     else
       answer = {{"hash", to_hex(read->hash())}, {"title", read->info().title}, {"memory_bytes", read->memory_bytes()}};
   } catch (const std::bad_alloc&) {
-    answer = {{"error", "the case takes more memory to read than it may"}, {"code", word_of(ErrorCode::exhausted)}};
+    answer = {{"error", "reading the case takes more memory than allowed"}, {"code", word_of(ErrorCode::exhausted)}};
   } catch (const std::exception& broken) {
     answer = {{"error", std::string("the case is not sound: it cannot be read: ") + broken.what()}};
   }

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kIncoming = "incoming-", kArchive = "upload.zip";
 constexpr std::uintmax_t kMostDescription = 1 << 20;  // bytes
-constexpr std::string_view kNote = "memory.json";     // in a case's folder: what it takes once it is loaded
+constexpr std::string_view kNote = "memory.json";  // in a case's folder: the memory that it takes when it is loaded
 
 tl::unexpected<Error> disk(const fs::path& where, const std::string& why) {
   return failure(ErrorCode::internal, "cannot write " + where.string() + ": " + why);
@@ -53,9 +53,9 @@ Result<void> Upload::add(std::string_view piece) {
   bytes_ += piece.size();
   if (bytes_ > quota_.archive_bytes)
     return failure(ErrorCode::exhausted, "the upload is larger than the " + std::to_string(quota_.archive_bytes) +
-                                             " bytes that are taken here; ask the operator for a larger quota");
+                                             " bytes that this server accepts; ask the operator for a larger quota");
   file_->out.write(piece.data(), static_cast<std::streamsize>(piece.size()));
-  return file_->out ? Result<void>{} : Result<void>(disk(folder_ / kArchive, "the disk takes no more"));
+  return file_->out ? Result<void>{} : Result<void>(disk(folder_ / kArchive, "the disk accepts no more data"));
 }
 
 Result<std::unique_ptr<CaseRepository>> CaseRepository::open(fs::path folder, fs::path program, UploadQuota quota) {
@@ -100,7 +100,7 @@ Result<std::unique_ptr<Upload>> CaseRepository::begin() {
 
 Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop) {
   upload->file_->out.close();
-  if (!upload->file_->out) return disk(upload->folder(), "the disk takes no more");
+  if (!upload->file_->out) return disk(upload->folder(), "the disk accepts no more data");
   const fs::path sound = upload->folder() / kSoundCase;
   std::error_code error;
   const Result<CheckedCase> checked = check_case(program_, upload->folder() / kArchive, upload->folder(), quota_, stop);
@@ -115,7 +115,7 @@ Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const st
     stored.known = true;
     return stored;
   }
-  // Others may have come since it began.
+  // Other cases may have been stored since this upload began.
   if (case_bytes() + stored.bytes > quota_.kept_bytes)
     return failure(ErrorCode::exhausted, "the server's folder of cases has no " + std::to_string(stored.bytes) +
                                              " bytes left for this one; ask the operator to delete some");
@@ -135,7 +135,7 @@ std::vector<fs::path> CaseRepository::folders() const {
 
 Result<StoredCase> CaseRepository::peek(const fs::path& folder) {
   const Result<Digest> hash = digest_from_hex(folder.filename().string());
-  if (!hash) return failure(ErrorCode::invalid_input, folder.string() + " is not called by the hash of a case");
+  if (!hash) return failure(ErrorCode::invalid_input, folder.string() + " is not named by the hash of a case");
   std::error_code none;
   if (fs::file_size(folder / "case.json", none) > kMostDescription || none)
     return failure(
@@ -148,7 +148,7 @@ Result<StoredCase> CaseRepository::peek(const fs::path& folder) {
     return failure(
         ErrorCode::invalid_input,
         (folder / "case.json").string() + " does not describe a case; delete the folder and upload the case again");
-  // Without the note, as of an earlier version, it shows when the case is loaded.
+  // Without the note, as in an earlier version, the size is known once the case is loaded.
   const bool known = note.is_object() && note.contains("memory_bytes") && note["memory_bytes"].is_number_unsigned();
   return StoredCase{*hash,  about["title"].get<std::string>(),
                     folder, bytes_in(folder),

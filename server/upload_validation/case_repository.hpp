@@ -1,4 +1,4 @@
-// A folder of cases that people have uploaded: each in a folder of its own, called by its hash.
+// A folder of uploaded cases. Each case is in a folder of its own, named by its hash.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -19,12 +19,12 @@ struct StoredCase {
   Digest hash;
   std::string title;
   std::filesystem::path folder;
-  std::uint64_t bytes = 0;         // on the disk
-  bool known = false;              // it was there before
-  std::uint64_t memory_bytes = 0;  // that it takes once it is loaded; 0: not known
+  std::uint64_t bytes = 0;  // on the disk
+  bool known = false;  // it was there before
+  std::uint64_t memory_bytes = 0;  // memory that it takes when it is loaded; 0: unknown
 };
 
-// An archive on its way in, in a file of the store that is gone with this.
+// An archive that is being uploaded, in a file of the repository. The destructor removes the file.
 class Upload {
  public:
   ~Upload();
@@ -50,31 +50,31 @@ class CaseRepository {
  public:
   static constexpr int kMostUploads = 4;  // at once
 
-  // `program`: what check_case() starts. What was left half done by an earlier process goes. Error internal: the folder
+  // `program`: what check_case() starts. Removes what an earlier process left unfinished. Error internal: the folder
   // cannot be made or written.
   [[nodiscard]] static Result<std::unique_ptr<CaseRepository>> open(std::filesystem::path folder,
                                                                     std::filesystem::path program,
                                                                     UploadQuota quota = {});
 
-  // Error exhausted: so many are under way already, or the store is full.
+  // Error exhausted: too many uploads are under way, or the repository is full.
   [[nodiscard]] Result<std::unique_ptr<Upload>> begin();
-  // Takes it apart, looks it through and keeps it; takes long. Errors: those of check_case(), exhausted (the store is
+  // Checks the upload and stores it. This takes long. Errors: those of check_case(), exhausted (the repository is
   // full), internal (disk), cancelled (`stop` returned true).
   [[nodiscard]] Result<StoredCase> keep(std::unique_ptr<Upload> upload, const std::function<bool()>& stop = {});
-  // Folders of the cases that are kept, in the order of their hashes.
+  // Folders of the stored cases, in the order of their hashes.
   [[nodiscard]] std::vector<std::filesystem::path> folders() const;
-  // What is kept in one of them, without reading its bone. Error invalid_input: its description cannot be read.
+  // Describes one of them without reading its bone. Error invalid_input: its description cannot be read.
   [[nodiscard]] static Result<StoredCase> peek(const std::filesystem::path& folder);
   [[nodiscard]] const UploadQuota& quota() const { return quota_; }
 
  private:
   CaseRepository(std::filesystem::path folder, std::filesystem::path program, UploadQuota quota)
       : folder_(std::move(folder)), program_(std::move(program)), quota_(quota) {}
-  [[nodiscard]] std::uint64_t case_bytes() const;  // of those that are kept
+  [[nodiscard]] std::uint64_t case_bytes() const;  // of the stored cases
 
   const std::filesystem::path folder_, program_;
   const UploadQuota quota_;
-  std::mutex keeping_;  // one is moved to its place at a time
+  std::mutex keeping_;  // one case at a time is moved to its final folder
   std::atomic<int> open_{0};
   std::atomic<std::uint64_t> next_{0};
 };

@@ -17,7 +17,7 @@
 namespace osteon {
 namespace {
 
-// Landlock as its documentation has it, beyond what Debian 12's headers know.
+// Landlock as its documentation describes it, beyond what the headers of Debian 12 have.
 struct Ruleset {
   std::uint64_t files, net, scoped;
 };
@@ -26,10 +26,10 @@ struct __attribute__((packed)) Beneath {
   std::int32_t folder;
 };
 constexpr std::uint32_t kVersion = 1, kPathBeneath = 1;
-// Bit by bit: execute, write, read, list; remove folders, files; make devices of characters, folders, files, sockets,
-// pipes, devices of blocks, symbolic links; move between folders, shorten, control devices.
+// Bits in order: execute, write, read, list; remove folders, files; make character devices, folders, files, sockets,
+// pipes, block devices, symbolic links; move between folders, truncate, control devices.
 constexpr std::uint64_t kAll1 = (1u << 13) - 1, kMove = 1u << 13, kShorten = 1u << 14, kControl = 1u << 15;
-constexpr std::uint64_t kOwn = 0b1'1011'1110 | kMove | kShorten;  // of those, what the folder is for
+constexpr std::uint64_t kOwn = 0b1'1011'1110 | kMove | kShorten;  // of these, what the folder is for
 static_assert((kOwn & (1u << 0 | 1u << 6 | 1u << 9 | 1u << 10 | 1u << 11 | 1u << 12)) == 0,
               "no programs, devices, sockets, pipes and links");
 constexpr std::uint64_t kSignals = 1u << 1;
@@ -58,7 +58,7 @@ constexpr std::uint32_t kMachine = AUDIT_ARCH_AARCH64;
 constexpr std::uint32_t kMachine = 0;
 #endif
 
-// Denied with EPERM. Reading and writing, memory, threads and clocks are left.
+// Denied with EPERM. Reading and writing, memory, threads and clocks stay allowed.
 constexpr long kDenied[] = {SYS_socket,
                             SYS_execve,
                             SYS_execveat,
@@ -91,7 +91,7 @@ bool confine_calls() {
   };
   const auto load = [&](std::size_t at) { add(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(at)); };
   const auto deny = [&] { add(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EPERM); };
-  // Numbers mean these calls on this machine alone; those of x32 begin at bit 30.
+  // The numbers mean these calls on this architecture only. Those of x32 begin at bit 30.
   load(offsetof(seccomp_data, arch));
   add(BPF_JMP | BPF_JEQ | BPF_K, kMachine, 1, 0);
   deny();
@@ -102,7 +102,7 @@ bool confine_calls() {
     add(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, 1);
     deny();
   }
-  // A process may end itself, and look at its own limits; nobody else's.
+  // A process may signal itself and read its own limits, but nobody else's.
   for (const auto& [call, self] :
        {std::pair{SYS_tgkill, static_cast<std::uint32_t>(::getpid())}, std::pair{SYS_prlimit64, 0u}}) {
     load(offsetof(seccomp_data, nr));

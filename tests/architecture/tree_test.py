@@ -1,9 +1,13 @@
 """Holds every source file to the layers and sizes of the design; and shows that each rule can fail."""
 import os
+import re
+import shutil
+import subprocess
 import unittest
 from pathlib import Path
 
 import references
+import style
 import tree
 
 ROOT = Path(os.environ.get("OSTEON_SOURCE_DIR", Path(__file__).resolve().parents[2]))
@@ -39,6 +43,52 @@ class TheTree(unittest.TestCase):
         faults = [fault for f in files
                   for fault in references.reference_faults(relative(f), f.read_text(encoding="utf-8"), listed)]
         self.assertEqual(faults, [])
+
+
+class TheStyle(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.texts = {}
+        for file in style.tracked_files(ROOT):
+            try:
+                cls.texts[relative(file)] = file.read_text(encoding="utf-8")
+            except UnicodeDecodeError:
+                continue
+
+    def test_lines_are_narrow(self):
+        self.assertEqual([fault for item in self.texts.items() for fault in style.width_faults(*item)], [])
+
+    def test_cmake_lists_one_source_on_a_line(self):
+        self.assertEqual([fault for item in self.texts.items() for fault in style.cmake_faults(*item)], [])
+
+    def test_replaced_names_are_gone(self):
+        retired = style.retired_names(self.texts[style.GLOSSARY])
+        self.assertGreater(len(retired), 20)
+        faults = [fault for path, text in self.texts.items() if path not in style.MAY_NAME_THEM
+                  for fault in style.name_faults(path, text, retired)]
+        self.assertEqual(faults, [])
+
+    def test_long_functions_have_a_reason(self):
+        listed = dict(re.match(r"(\S+ \S+): (.+)", line).groups()
+                      for line in self.texts[style.LONG_FUNCTIONS].splitlines() if line and not line.startswith("#"))
+        found = {f"{path} {name}" for path, text in self.texts.items() for name, _ in style.long_functions(path, text)}
+        self.assertEqual(found - set(listed), set(), "break these up, or say why not")
+        self.assertEqual(set(listed) - found, set(), "these are short now")
+
+    @unittest.skipUnless((ROOT / ".git").exists(), "no repository")
+    def test_subjects_of_commits_are_imperatives(self):
+        log = subprocess.run(["git", "-C", str(ROOT), "log", "--no-merges", "--format=%s", f"{style.SINCE}..HEAD"],
+                             capture_output=True, text=True, check=False)
+        if log.returncode != 0:
+            self.skipTest("the repository does not reach back to the commit from which on this holds")
+        self.assertEqual([fault for subject in log.stdout.splitlines() for fault in style.subject_faults(subject)], [])
+
+    @unittest.skipUnless(shutil.which("clang-format"), "clang-format is not installed; deploy/install does that")
+    def test_code_is_formatted(self):
+        files = [str(ROOT / path) for path in self.texts if path.endswith((".cpp", ".hpp", ".inl"))]
+        said = subprocess.run(["clang-format", "--dry-run", "-Werror", "--style=file", *files], capture_output=True,
+                              text=True, check=False)
+        self.assertEqual(said.returncode, 0, said.stderr[:4000])
 
 
 class TheRules(unittest.TestCase):
@@ -105,6 +155,30 @@ class TheRules(unittest.TestCase):
         self.assertTrue(faults("// as in §5.4"))
         self.assertFalse(faults("// Chi 2005, §2"))
         self.assertTrue(faults("// DESIGN section 5"))
+
+    def test_style(self):
+        wide = "x" * 121
+        self.assertTrue(style.width_faults("a.cpp", wide))
+        self.assertFalse(style.width_faults("a.cpp", "ö" * 120))
+        self.assertFalse(style.width_faults("a.md", "| " + wide))
+        self.assertTrue(style.cmake_faults("x/CMakeLists.txt", "  SOURCES a.cpp b.cpp"))
+        self.assertFalse(style.cmake_faults("x/CMakeLists.txt", "  SOURCES a.cpp"))
+        self.assertTrue(style.name_faults("a.cpp", "OldName old;", ["OldName"]))
+        self.assertFalse(style.name_faults("a.cpp", "OldNames old;", ["OldName"]))
+        self.assertEqual(style.retired_names("## Replaced names\n| `OldName`, `Older` | `New` |\n"), ["OldName", "Older"])
+
+    def test_long_functions(self):
+        body = "  f();\n" * 71
+        self.assertEqual(style.long_functions("a.cpp", f"int a;\nvoid long_one(\n    int x) {{\n{body}}}\n"),
+                         [("long_one", 71)])
+        self.assertEqual(style.long_functions("a.cpp", f"namespace x {{\n{body}}}\n"), [])
+        self.assertEqual(style.long_functions("a.cpp", f"X::X(int a)\n    : a_(a) {{\n{body}}}\n"), [("X::X", 71)])
+
+    def test_subjects(self):
+        for subject in ("reject cuts", "Rejected cuts", "Rejecting cuts", "Reject cuts.", "Reject; say", "R" * 73):
+            self.assertTrue(style.subject_faults(subject), subject)
+        for subject in ("Reject cuts after a freeze", "Bring the proxy back", "Feed the watchdog"):
+            self.assertFalse(style.subject_faults(subject), subject)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ struct EntriesInput {
 inline constexpr std::chrono::nanoseconds kStep = std::chrono::milliseconds(8);
 [[nodiscard]] std::chrono::nanoseconds time_of(const Record& record, std::chrono::nanoseconds before);
 
-// One change: a entry dropped, doubled or moved, or one field of one entry set to a number that may hurt.
+// One change: an entry dropped, doubled or moved, or one field of one entry set to a number that may hurt.
 void change_entries(Bytes& data, std::mt19937& random);
 
 }  // namespace osteon::fuzz

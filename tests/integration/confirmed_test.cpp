@@ -183,7 +183,7 @@ TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCu
   EXPECT_THAT(what_the_hand_is_told(),
               HasSubstr("has lost 3 of the 3 events that you were told are kept, and takes no more cuts"));
   const auto operator_is_told = [&] {
-    return stage_.server().err().find("recover it into a new journal") != std::string::npos;
+    return stage_.server().err().find("salvage it into a new journal") != std::string::npos;
   };
   EXPECT_TRUE(wait_until(operator_is_told, 10s)) << stage_.server().err();
 }

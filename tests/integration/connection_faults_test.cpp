@@ -58,7 +58,7 @@ std::regex pattern_of(const std::string& text) {
   return std::regex(pattern);
 }
 
-// A entry of the page's tables.
+// An entry of the page's tables.
 struct Listed {
   std::string sentence, log;  // of the client, whole; of the server: empty: nothing
 };

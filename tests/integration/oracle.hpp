@@ -23,7 +23,7 @@ class Oracle {
   Oracle(const Oracle& other);
   Oracle& operator=(const Oracle&) = delete;
 
-  void asked();                                      // for something that becomes a entry at most
+  void asked();                                      // for something that becomes an entry at most
   void heard(RoomSeq place);                         // of any event
   void heard_cut(RoomSeq place, std::string bytes);  // of a v1::Cut
   void heard_mark(RoomSeq place, std::string label);

@@ -292,7 +292,7 @@ void SimClient::hear_entry(wire::IndexedEntry entry) {
   by_datagram_ = true;
   const Result<void> taken = reader_->take(std::move(entry));
   by_datagram_ = false;
-  ledger_.check(taken.has_value(), Invariant::datagrams, "a entry that came in a datagram is not taken");
+  ledger_.check(taken.has_value(), Invariant::datagrams, "an entry that came in a datagram is not taken");
 }
 
 void SimClient::compare(const v1::SessionResponse& response) {
@@ -536,7 +536,7 @@ void SimClient::cut(int left) {
   send();
   replica_->add_own(one);
   felt_[one.author_seq] = one.lease_epoch;
-  ledger_.check(replica_->unconfirmed() <= haptic::RoomWatch::kMostUnconfirmed + 1, Invariant::bounds,
+  ledger_.check(replica_->unconfirmed() <= haptic::ConfirmationMonitor::kMostUnconfirmed + 1, Invariant::bounds,
                 "a replica holds too much unconfirmed");
   later(kCutTime, [this, left] { cut(left - 1); });
 }

@@ -174,7 +174,7 @@ class SimClient {
   std::optional<Backoff> backoff_;
   std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
   std::optional<haptic::Replica> replica_;
-  haptic::RoomWatch watch_;
+  haptic::ConfirmationMonitor watch_;
   haptic::RoomHealth health_{};
   std::deque<FromRoom> from_room_;
   std::vector<FieldLeaf> renewed_;

@@ -23,7 +23,7 @@ enum class Breakage {
   none,
   dedup,      // a cut that was sent again is taken again
   ordering,   // now and then two neighbouring entries change places
-  skipping,   // now and then a entry is left out
+  skipping,   // now and then an entry is left out
   replica,    // on coming back a client takes leaves over what it holds, instead of taking on what is held there
   forgetful,  // the journal waits for no disk
   unsaid,     // now and then a hand is not told what was decided about it

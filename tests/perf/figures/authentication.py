@@ -1,4 +1,5 @@
-"""Figures of closed certificates: strangers who knock as often as they like, and bytes of every kind. Hands are simulated."""
+"""Figures of closed certificates: strangers who knock as often as they like, and bytes of every kind. Hands are
+simulated."""
 import functools
 import json
 import os
@@ -35,7 +36,8 @@ def resident_mb(pid):
 
 
 def is_refused(line, may_stay=False):
-    """Hung up on with nothing, or with one alert of TLS; with `may_stay` also who hears nothing as long as they wait."""
+    """Hung up on with nothing, or with one alert of TLS; with `may_stay` also who hears nothing as long as they
+    wait."""
     said = b""
     try:
         while more := line.recv(4096):
@@ -50,8 +52,10 @@ def is_refused(line, may_stay=False):
 
 
 def knock(address, kind, waits=False):
-    """One stranger: who says nothing (0), speaks plain HTTP/2 (1), sends noise (2), or begins TLS without a certificate (3). True
-    when they were refused: whatever else is answered counts as let in, and so does a line that stays open behind what was said. Who
+    """One stranger: who says nothing (0), speaks plain HTTP/2 (1), sends noise (2), or begins TLS without a
+    certificate (3). True
+    when they were refused: whatever else is answered counts as let in, and so does a line that stays open behind what
+    was said. Who
     says nothing hears whether the door speaks first, and where it `waits`, that it hangs up at last.
     """
     with socket.create_connection(address, timeout=PATIENCE_S) as line:
@@ -88,7 +92,9 @@ def open_door(run, household, out):
     """Strangers at a door that was left open on purpose: how many of them are noticed to be let in."""
     address_file = out / "logs" / "open-address"
     address_file.unlink(missing_ok=True)
-    server = household.start("open-server", [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0", "--plain",
+    server = household.start("open-server",
+                             [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0",
+                              "--plain",
                                              "--address-file", address_file])
     host, port = household.wait_for_file(address_file, "osteon-server", 60.0).rsplit(":", 1)
     refused = knocks((host, int(port)), OPEN_KNOCKS)
@@ -106,20 +112,26 @@ def knocking(run):
         noticed = open_door(run, household, out)
         address_file = out / "logs" / "address"
         address_file.unlink(missing_ok=True)
-        server = household.start("osteon-server", [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0",
-                                                   *certificates.server, "--address-file", address_file, "--summary", out / "server.json",
+        server = household.start("osteon-server",
+                                 [run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0",
+                                                   *certificates.server, "--address-file", address_file, "--summary",
+                                  out / "server.json",
                                                    "--journal", out / f"{ROOM}.journal"])
         address = household.wait_for_file(address_file, "osteon-server", 60.0)
         host, port = address.rsplit(":", 1)
         plan = out / "plan.json"
         # Slow enough that it is at work all the while.
         plan.write_text(json.dumps(plans.drill("rig", feed_mm_per_s=0.14, beyond_mm=1)), encoding="utf-8")
-        hand = household.start("hand", [run.programs / "osteon-haptic", "--server", address, *certificates.person("anna", "trainee"),
-                                        "--room", ROOM, "--plan", plan, "--cut-log", out / "cuts.csv", "--summary", out / "hand.json",
+        hand = household.start("hand",
+                               [run.programs / "osteon-haptic", "--server", address,
+                                *certificates.person("anna", "trainee"),
+                                        "--room", ROOM, "--plan", plan, "--cut-log", out / "cuts.csv", "--summary",
+                                out / "hand.json",
                                         "--session-log", out / "hand.csv"])
         hand.may_end = True
         time.sleep(QUIET_S)
-        pid = int(subprocess.run(["pgrep", "-f", str(address_file)], capture_output=True, text=True, check=True).stdout.split()[0])
+        pid = int(subprocess.run(["pgrep", "-f", str(address_file)], capture_output=True, text=True,
+                                 check=True).stdout.split()[0])
         memory, began = resident_mb(pid), time.monotonic_ns()
         refused = knocks((host, int(port)), KNOCKS)
         ended, after = time.monotonic_ns(), resident_mb(pid)
@@ -140,10 +152,14 @@ def knocking(run):
     if not any("reason=tls" in line for line in said):
         raise Failure("the server's log does not say that there were strangers; its last lines:", "\n".join(log[-5:]))
     same = record.read_json(out / "server.json")["field_hash"] == record.read_json(out / "hand.json")["field_hash"]
-    run.tables.append(("Strangers at the door", [("seconds", round((ended - began) / 1e9, 1)), ("cuts meanwhile", int(during.sum())),
-                                                ("commit p99 before, ms", round(float(np.percentile(took[before], 99)), 2)),
-                                                ("commit p99 meanwhile, ms", round(float(np.percentile(took[during], 99)), 2)),
-                                                ("memory before, MB", round(memory, 1)), ("memory after, MB", round(after, 1)),
+    run.tables.append(("Strangers at the door",
+                       [("seconds", round((ended - began) / 1e9, 1)), ("cuts meanwhile", int(during.sum())),
+                                                ("commit p99 before, ms",
+                                                 round(float(np.percentile(took[before], 99)), 2)),
+                                                ("commit p99 meanwhile, ms",
+                                                 round(float(np.percentile(took[during], 99)), 2)),
+                                                ("memory before, MB", round(memory, 1)),
+                        ("memory after, MB", round(after, 1)),
                                                 ("lines that the server logged", len(log))]))
     return {
         "knocks": (KNOCKS, None),
@@ -157,7 +173,8 @@ def knocking(run):
 
 
 def fuzz(target, inputs, run):
-    """So many changed inputs of one target, in as many processes as there are processors, each with changes of its own."""
+    """So many changed inputs of one target, in as many processes as there are processors, each with changes of its
+    own."""
     inputs = max(inputs, FUZZ_SOAK) if run.soak else inputs
     many = len(os.sched_getaffinity(0))
     run.say(f"{inputs} changed inputs: {target}")
@@ -165,9 +182,11 @@ def fuzz(target, inputs, run):
     processes = []
     try:
         for i, text in enumerate(texts):
-            asked = {"OSTEON_FUZZ_TARGET": target, "OSTEON_FUZZ_RUNS": str(-(-inputs // many)), "OSTEON_FUZZ_SEED": str(i + 1)}
+            asked = {"OSTEON_FUZZ_TARGET": target, "OSTEON_FUZZ_RUNS": str(-(-inputs // many)),
+                     "OSTEON_FUZZ_SEED": str(i + 1)}
             with text.open("w", encoding="utf-8") as out:
-                processes.append(subprocess.Popen([run.programs / "fuzz.mutations", "--gtest_filter=*MutatedInputs"], stdout=out,
+                processes.append(subprocess.Popen([run.programs / "fuzz.mutations", "--gtest_filter=*MutatedInputs"],
+                                                  stdout=out,
                                                   stderr=subprocess.STDOUT, env={**os.environ, **asked}))
         codes = [process.wait() for process in processes]
     finally:

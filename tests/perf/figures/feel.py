@@ -1,4 +1,5 @@
-"""Figures of what drilling and burring feel like, by osteon-feel: the reference simulations of the feed rig and of the hands
+"""Figures of what drilling and burring feel like, by osteon-feel: the reference simulations of the feed rig and of the
+hands
 on virtual time, what changes them and what must not, a burr's forces, guided drilling. Each group leaves a picture."""
 import json
 
@@ -58,16 +59,19 @@ def hands(run):
     rows = [("hand", "force N", "feed mm/s", "plunge mm", "reference")]
     for who, reference in PLUNGE_MM.items():
         one = out[who]
-        rows.append((who, "/".join(f"{f:.1f}" for f in one["force_n"]), "/".join(f"{v:.2f}" for v in one["feed_mm_per_s"]),
+        rows.append((who, "/".join(f"{f:.1f}" for f in one["force_n"]),
+                     "/".join(f"{v:.2f}" for v in one["feed_mm_per_s"]),
                      f"{one['plunge_mm']:.2f}", reference))
     rows += [(f"{who} over {name}", "", "", " ".join(f"{v:.2f}" for v in out[name][who]["plunge_mm"]),
               " ".join(f"{v:g}" for v in out[name]["values"])) for name in DIRECTIONS for who in PLUNGE_MM]
     run.tables.append((f"hands, simulated device; picture: {picture}", rows))
     # What was let go on the spring of the hand and on the coupling: F / K + F / K_c after the cone's exit.
-    closed = {who: out[who]["force_n"][2] * (1 / out[who]["stiffness_n_per_mm"] + 1 / COUPLING_N_PER_MM) for who in PLUNGE_MM}
+    closed = {who: out[who]["force_n"][2] * (1 / out[who]["stiffness_n_per_mm"] + 1 / COUPLING_N_PER_MM)
+              for who in PLUNGE_MM}
     return {
         **{f"feel_{who}_plunge_error": (percent(out[who]["plunge_mm"], PLUNGE_MM[who]), None) for who in PLUNGE_MM},
-        "feel_plunge_closed_form_error": (max(percent(out[who]["after_exit_mm"], closed[who]) for who in PLUNGE_MM), None),
+        "feel_plunge_closed_form_error": (max(percent(out[who]["after_exit_mm"], closed[who]) for who in PLUNGE_MM),
+                                          None),
         "feel_plunge_wrong_ways": (len(wrong_ways(out)), None),
     }
 
@@ -86,7 +90,8 @@ def steps(run):
         which = "pitch" if r["case"].startswith("1 kHz") else "tick"
         worst[which] = max(worst[which], *changes)
         rows.append((r["case"], r["hand"], "/".join(f"{f:.2f}" for f in r["force_n"]),
-                     "/".join(f"{v:.3f}" for v in r["feed_mm_per_s"]), f"{r['plunge_mm']:.2f}", f"{r['after_exit_mm']:.2f}",
+                     "/".join(f"{v:.3f}" for v in r["feed_mm_per_s"]), f"{r['plunge_mm']:.2f}",
+                     f"{r['after_exit_mm']:.2f}",
                      f"{max(changes):.2f}"))
     run.tables.append(("ticks and pitches, simulated device", rows))
     return {"feel_tick_change": (worst["tick"], None), "feel_pitch_change": (worst["pitch"], None)}
@@ -103,7 +108,8 @@ def profiles(run):
         shown = (mean["total_n"], force["total_n"].max(), mean["x_n"], mean["y_n"], mean["z_n"])
         rows.append((kind, *(f"{v:.2f}" for v in shown), one["removed_mm3"]))
         values[f"feel_{kind}_force"] = (mean["total_n"], None, 0.0, float(force["total_n"].max()))
-    run.tables.append((f"forces of a round burr on cortical bone, simulated device; pictures: {', '.join(pictures)}", rows))
+    run.tables.append((f"forces of a round burr on cortical bone, simulated device; pictures: {', '.join(pictures)}",
+                       rows))
     return values
 
 
@@ -112,7 +118,8 @@ def guided(run):
     picture = leave(run, "guided", "guided", out)
     most = {way: [r["most_of_play"] for r in out["runs"] if r["guided"] is way] for way in (True, False)}
     run.tables.append((f"guided drilling with a trembling hand, simulated device; picture: {picture}",
-                       [("hand", "through the sleeve", "cuts off the line", "beyond the play", "tool as a part of the play")] + [
+                       [("hand", "through the sleeve", "cuts off the line", "beyond the play",
+                         "tool as a part of the play")] + [
                            (r["hand"], "yes" if r["guided"] else "no", f"{max(r['off_mm']):.3f} mm",
                             f"{r['cut_excess_mm']:.4f} mm", f"{r['most_of_play']:.4f}") for r in out["runs"]]))
     excess = {way: [r["cut_excess_mm"] for r in out["runs"] if r["guided"] is way] for way in (True, False)}

@@ -1,4 +1,5 @@
-"""The pictures of osteon-feel: force over depth and time, plunges over what changes them, a burr's forces, a guide's play."""
+"""The pictures of osteon-feel: force over depth and time, plunges over what changes them, a burr's forces, a guide's
+play."""
 import sys
 from pathlib import Path
 
@@ -65,7 +66,8 @@ def hands(out, file):
     force_axes.set_xlabel("depth of the tip, mm")
     force_axes.set_ylabel("thrust, N")
     force_axes.legend()
-    names = {"push_n": "push, N", "wear": "wear of the drill (1: sharp)", "stiffness_n_per_mm": "stiffness K of the hand, N/mm",
+    names = {"push_n": "push, N", "wear": "wear of the drill (1: sharp)",
+             "stiffness_n_per_mm": "stiffness K of the hand, N/mm",
              "damping_n_s_per_mm": "damping B of the hand, N·s/mm"}
     for axes, (name, label) in zip(bottom.subplots(1, 4, sharey=True), names.items()):
         for who, colour in COLOURS.items():
@@ -80,7 +82,8 @@ def hands(out, file):
 def profile(out, file):
     """Total force and its parts along X, Y and Z over time, as Figures 7.7 and 7.8 of the dissertation show them."""
     figure, axes = plt.subplots(4, 1, figsize=(10, 8), sharex=True, constrained_layout=True)
-    parts = [("total_n", "(a) total", ACCENT), ("x_n", "(b) X, along the sweep", STEEL), ("y_n", "(c) Y, across it", STEEL),
+    parts = [("total_n", "(a) total", ACCENT), ("x_n", "(b) X, along the sweep", STEEL),
+             ("y_n", "(c) Y, across it", STEEL),
              ("z_n", "(d) Z, into the bone", STEEL)]
     time = np.array(out["time_s"]) - out["time_s"][0]
     for one, (key, label, colour) in zip(axes, parts):
@@ -88,7 +91,8 @@ def profile(out, file):
         one.set_ylabel("force, N")
         one.set_title(label, fontsize=10, loc="left")
     axes[-1].set_xlabel("time, s")
-    figure.suptitle(f"{out['kind']} of cortical bone, {out['tool']}, {out['sweep_mm_per_s']:g} mm/s: force of the bone on "
+    figure.suptitle(f"{out['kind']} of cortical bone, {out['tool']}, {out['sweep_mm_per_s']:g} mm/s: force of the "
+                    "bone on "
                     "the tool", fontsize=11)
     save(figure, file)
 
@@ -97,7 +101,8 @@ def guided(out, file):
     figure, axes = plt.subplots(figsize=(10, 4.4), constrained_layout=True)
     marks = {"rig": "x", "expert": ".", "novice": "+"}
     for one in out["runs"]:
-        axes.plot(one["depth_mm"][::3], one["off_mm"][::3], marks[one["hand"]], color=STEEL if one["guided"] else ACCENT, ms=3,
+        axes.plot(one["depth_mm"][::3], one["off_mm"][::3], marks[one["hand"]], color=STEEL if one["guided"]
+                  else ACCENT, ms=3,
                   mew=0.6, alpha=0.7, label=f"{one['hand']}, {'through the sleeve' if one['guided'] else 'by eye'}")
     depth = np.array([0.0, 30.0])
     play = out["play_mm"] * (1 + 2 * depth / out["sleeve_mm"])

@@ -42,12 +42,14 @@ def list_figures(figures, as_json):
     width = max(len(f.name) for f in figures)
     for f in figures:
         beside = f"; baseline: {f.baseline}" if f.baseline else ""
-        print(f"{f.name:{width}}  {f.unit:9}  {f.target_text():8}  {f.measures}{beside}{'; only with --full' if f.full else ''}")
+        print(f"{f.name:{width}}  {f.unit:9}  {f.target_text():8}  "
+              f"{f.measures}{beside}{'; only with --full' if f.full else ''}")
 
 
 def commit():
     def git(*arguments):
-        return subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True, check=False).stdout.strip()
+        return subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True,
+                              check=False).stdout.strip()
     changed = " with uncommitted changes" if git("status", "--porcelain", "--untracked-files=no") else ""
     return (git("rev-parse", "--short=12", "HEAD") or "unknown") + changed
 
@@ -119,7 +121,8 @@ def main():
     parser.add_argument("--list", action="store_true", help="show the figures and what they measure; run nothing")
     parser.add_argument("--json", action="store_true", help="print JSON instead of lines")
     parser.add_argument("--soak", action="store_true", help="longer runs and more repetitions")
-    parser.add_argument("--full", action="store_true", help="also the figures that take minutes; each also runs when it is named")
+    parser.add_argument("--full", action="store_true",
+                        help="also the figures that take minutes; each also runs when it is named")
     parser.add_argument("--save", action="store_true",
                         help="also write all results with commit and conditions into tests/perf/results")
     parser.add_argument("--build", type=Path, help=argparse.SUPPRESS)
@@ -146,7 +149,8 @@ def main():
     folder = options.build / "figures"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    run = groups.Run(options.build / "bin", folder, options.soak, lambda text: print(f"# {text}", file=sys.stderr, flush=True))
+    run = groups.Run(options.build / "bin", folder, options.soak,
+                     lambda text: print(f"# {text}", file=sys.stderr, flush=True))
     load = os.getloadavg()[0]
     try:
         values = measure(figures, run, groups.GROUPS)

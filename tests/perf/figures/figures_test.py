@@ -11,7 +11,8 @@ import groups  # noqa: E402
 import registry  # noqa: E402
 from registry import Figure  # noqa: E402
 
-FORM = re.compile(r"^\S+ \S+ \S+ \(baseline \S+, ratio \S+(, min \S+, max \S+)?(, threads \d+)?\) target \S+ (ok|short|info)$")
+FORM = re.compile(r"^\S+ \S+ \S+ \(baseline \S+, ratio \S+(, min \S+, max \S+)?(, threads \d+)?\) "
+                  r"target \S+ (ok|short|info)$")
 TIMES = {"ns", "us", "ms", "s"}
 
 

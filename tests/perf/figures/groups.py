@@ -69,7 +69,8 @@ class Run:
     def output(self, program, *arguments, progress=False):
         """What a program prints; `progress`: what it says meanwhile is for the user."""
         command = [self.programs / program, *map(str, arguments)]
-        result = subprocess.run(command, stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE, text=True,
+        result = subprocess.run(command, stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE,
+                                text=True,
                                 check=False)
         if result.returncode != 0:
             raise Failure(f"{program} ended with {result.returncode}: {(result.stderr or '').strip()[-400:]}")
@@ -77,7 +78,8 @@ class Run:
 
     def outcome(self, program, *arguments):
         """What a program prints and its exit code, where another than 0 says something too."""
-        result = subprocess.run([self.programs / program, *map(str, arguments)], capture_output=True, text=True, check=False)
+        result = subprocess.run([self.programs / program, *map(str, arguments)], capture_output=True, text=True,
+                                check=False)
         if not result.stdout:
             raise Failure(f"{program} ended with {result.returncode} and says nothing: {result.stderr.strip()[-400:]}")
         return result.stdout, result.returncode

@@ -1,4 +1,5 @@
-"""Figures of the haptic loop: what its coupling does with energy, what a tick costs, what a silent network does to it. All
+"""Figures of the haptic loop: what its coupling does with energy, what a tick costs, what a silent network does to it.
+All
 with simulated devices and hands."""
 import json
 
@@ -12,7 +13,8 @@ def stability(run):
     """A million ticks on virtual time, and a million with torque and turns; the same numbers on every machine."""
     run.say("stability: two million ticks of stroking, pressing and cutting")
     out = json.loads(run.output("osteon-stability", 10_000_000 if run.soak else 1_000_000, progress=True))
-    names = ("axes", "scene", "delay_ms", "episodes", "touching", "generated_mj", "worst_mj", "net_mj", "cutting_mj", "turned_mj",
+    names = ("axes", "scene", "delay_ms", "episodes", "touching", "generated_mj", "worst_mj", "net_mj", "cutting_mj",
+             "turned_mj",
              "held_back", "returned", "undone")
     three, six = out["three_axes"], out["six_axes"]
     for axes, all_ in ((3, three), (6, six)):
@@ -66,7 +68,8 @@ def tick(run):
 
 
 def blackout(run):
-    """The middle of three parts without a network. Missed periods come in bursts when the machine stops a virtual one, so
+    """The middle of three parts without a network. Missed periods come in bursts when the machine stops a virtual one,
+    so
     what decides is whether the difference is beyond what such counts scatter by."""
     run.say("a network blackout of 10 s")
     out = json.loads(run.output("osteon-loop-bench", "blackout", 30 if run.soak else 10))
@@ -76,7 +79,8 @@ def blackout(run):
         rows.append((part, p["ticks"], p["missed"], f"{p['late_p50_us']:.1f}", f"{p['late_p99_us']:.1f}",
                      f"{p['late_p999_us']:.1f}", f"{p['late_max_us']:.0f}", f"{p['work_p50_us']:.1f}",
                      f"{p['work_p99_us']:.1f}", p["cutting_ticks"], p["held_ticks"]))
-    run.tables.append((f"network blackout, real-time {'on' if out['realtime'] else 'refused'}, at most {out['most_unconfirmed']} "
+    run.tables.append((f"network blackout, real-time {'on' if out['realtime'] else 'refused'}, at most "
+                       f"{out['most_unconfirmed']} "
                        "cuts unconfirmed", rows))
     without = 0.5 * (out["before"]["missed"] + out["after"]["missed"])
     missed = out["blackout"]["missed"]
@@ -84,7 +88,8 @@ def blackout(run):
     return {
         "blackout_missed": Measured(1e4 * missed / out["blackout"]["ticks"], 1e4 * without / out["blackout"]["ticks"]),
         "blackout_missed_more": Measured((missed - without) / scatter),
-        "blackout_late_p99": Measured(out["blackout"]["late_p99_us"], max(out[p]["late_p99_us"] for p in ("before", "after"))),
+        "blackout_late_p99": Measured(out["blackout"]["late_p99_us"],
+                                      max(out[p]["late_p99_us"] for p in ("before", "after"))),
     }
 
 

@@ -47,7 +47,8 @@ class Place:
         address_file.unlink(missing_ok=True)
         socket_file = folder / "proxy.sock"
         self.server = household.start("osteon-server", [
-            run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0", *self.certificates.server,
+            run.programs / "osteon-server", "--case", run.phantom(), "--listen", "127.0.0.1:0",
+                                                        *self.certificates.server,
             "--address-file", address_file, *(["--proxy-socket", socket_file] if proxied else []), *more])
         address = household.wait_for_file(address_file, "osteon-server", 60.0)
         self.children = [self.server]

@@ -29,7 +29,8 @@ def spread(counters, name="ratio", threads=None):
 
 
 def repeated(run, pattern, repetitions):
-    """{name: [counters of each repetition]}, the benchmarks in random turns, so that what disturbs the machine for a while
+    """{name: [counters of each repetition]}, the benchmarks in random turns, so that what disturbs the machine for a
+    while
     disturbs all."""
     out = json.loads(run.output("osteon-bench", "--benchmark_format=json", f"--benchmark_filter={pattern}",
                                 "--benchmark_min_time=0.1", f"--benchmark_repetitions={repetitions}",
@@ -47,7 +48,8 @@ def over(values, baseline=None, threads=None):
 
 
 def cutting(run):
-    """Decided at work: successive cuts through fresh bone. The same cut again and again, and what is left when the plain
+    """Decided at work: successive cuts through fresh bone. The same cut again and again, and what is left when the
+    plain
     way walks none but the leaves near the tool, inform."""
     run.say("cutting, a burr and a drill at work")
     work = {tool: {} for tool in ("burr", "drill")}
@@ -57,11 +59,13 @@ def cutting(run):
     runs = repeated(run, "^cut_(burr|drill)/(hot|world_box|near_leaves)", 7 if run.soak else 3)
     runs |= repeated(run, "^cut_(burr|drill)/cold", 7 if run.soak else 3)
     values = {}
-    rows = [("tool", "way", "us p50", "min", "p99", "max", "visited", "computed", "modified", "samples a quantum apart")]
+    rows = [("tool", "way", "us p50", "min", "p99", "max", "visited", "computed", "modified",
+             "samples a quantum apart")]
     for tool, w in work.items():
         def times(name, key="real_time", tool=tool):
             return np.array([b[key] for b in runs[f"cut_{tool}/{name}"]])
-        values[f"cut_{tool}"] = Measured(w["ours_median_us"], w["plain_median_us"], w["ours_min_us"], w["ours_max_us"], 1)
+        values[f"cut_{tool}"] = Measured(w["ours_median_us"], w["plain_median_us"], w["ours_min_us"], w["ours_max_us"],
+                                         1)
         plain, near = times("world_box"), times("near_leaves")
         for suffix, threads in (("", 1), ("_2", 2)):
             values[f"cut_{tool}_speedup{suffix}"] = Measured(w[f"ratio{suffix}"], None, w[f"ratio{suffix}_min"],
@@ -91,22 +95,26 @@ def cutting(run):
     one = {pose: by_threads[1] for pose, by_threads in tools.items()}
     slowest = max(one, key=lambda pose: one[pose]["p99_us"])
     longest = max(one, key=lambda pose: one[pose]["max_us"])
-    rows = [("tool", "begins", "mm deep", "pitch mm", "us p50, 1 thread", "p99", "max", "us p50, 2 threads", "p99", "max",
+    rows = [("tool", "begins", "mm deep", "pitch mm", "us p50, 1 thread", "p99", "max", "us p50, 2 threads", "p99",
+             "max",
              "visited", "computed", "modified", "cuts", "memory kB")]
     for (tool, way), c in sorted(one.items()):
         two = tools[tool, way].get(2, {})
         rows.append((tool, way, f"{c['depth_mm']:g}", f"{c['pitch_mm']:g}",
                      *(f"{c[key]:.0f}" for key in ("median_us", "p99_us", "max_us")),
                      *(f"{two.get(key, math.nan):.0f}" for key in ("median_us", "p99_us", "max_us")),
-                     *(f"{c[key]:.0f}" for key in ("visited", "computed", "modified", "cuts")), f"{c['memory_bytes'] / 1e3:.0f}"))
-    run.tables.append((f"a cut of 8 ms by every tool that cuts, at its own level, entering bone and seated in it; the slowest is "
+                     *(f"{c[key]:.0f}" for key in ("visited", "computed", "modified", "cuts")),
+                     f"{c['memory_bytes'] / 1e3:.0f}"))
+    run.tables.append((f"a cut of 8 ms by every tool that cuts, at its own level, entering bone and seated in it; the "
+                       "slowest is "
                        f"{' '.join(slowest)} (p99), the longest single cut {one[longest]['max_us']:.0f} us by "
                        f"{' '.join(longest)}", rows))
     for suffix, threads in (("", 1), ("_2", 2)):
         having = [by_threads[threads] for by_threads in tools.values() if threads in by_threads]
         for figure, key in (("tools_slowest_cut", "p99_us"), ("tools_slowest_cut_p50", "median_us")):
             parts = [c[key] / TOOL_BUDGET_US for c in having]
-            values[figure + suffix] = Measured(max(parts), None, min(parts), max(parts), threads) if parts else Measured(None)
+            values[figure + suffix] = Measured(max(parts), None, min(parts), max(parts),
+                                               threads) if parts else Measured(None)
         most = [c["max_us"] for c in having] or [None]
         values[f"tools_longest_cut{suffix}"] = Measured(max(most), None, min(most), max(most), threads)
     values["tools_measured"] = Measured(len({tool for tool, _ in one}))
@@ -119,10 +127,12 @@ def surface(run):
     whole = {threads: b.get(f"mesh_whole_bone_versus_flying_edges/{threads}", {}) for threads in (1, 2)}
     differences = [abs(w["triangles"] - w["flying_edges_triangles"]) for w in whole.values() if w]
     frame = b.get("mesh_frame_of_33_cuts", {})
-    parts = [key for key in ("frame_ms", "frame_max_ms", "touch_ms", "blocks_ms", "cuts_ms", "flying_edges_ms", "blocks")
+    parts = [key
+             for key in ("frame_ms", "frame_max_ms", "touch_ms", "blocks_ms", "cuts_ms", "flying_edges_ms", "blocks")
              if key in frame]
     if parts:
-        run.tables.append(("a frame of 33 burr cuts: naming its stale blocks (touch) and making them; the cuts are beside it", [
+        run.tables.append(("a frame of 33 burr cuts: naming its stale blocks (touch) and making them; the cuts are "
+                           "beside it", [
             tuple(parts), tuple(f"{frame[key]:.3g}" for key in parts)]))
     return {
         "mesh_block_speedup": spread(b.get("mesh_block_versus_flying_edges", {}), threads=1),
@@ -144,7 +154,8 @@ def convergence_order(pitches, errors):
 
 
 def accuracy(run):
-    """Distances are exact on the samples and linear between them, so smooth bodies converge with the square of the pitch."""
+    """Distances are exact on the samples and linear between them, so smooth bodies converge with the square of the
+    pitch."""
     run.say("accuracy")
     out = json.loads(run.output("osteon-accuracy", 300 if run.soak else 60))
     values = {}
@@ -156,7 +167,8 @@ def accuracy(run):
         pitches = out[body]["pitches"]
         at = {p["pitch_mm"]: p for p in pitches}
         coarse = [p for p in pitches if p["pitch_mm"] >= 0.125]
-        values[f"accuracy_{body}_volume"] = Measured(at[0.125]["error_percent_max"], None, at[0.125]["error_percent_min"],
+        values[f"accuracy_{body}_volume"] = Measured(at[0.125]["error_percent_max"], None,
+                                                     at[0.125]["error_percent_min"],
                                                      at[0.125]["error_percent_max"])
         values[f"accuracy_{body}_order"] = Measured(convergence_order([p["pitch_mm"] for p in coarse],
                                                                       [p["error_percent_p50"] for p in coarse]))
@@ -164,7 +176,8 @@ def accuracy(run):
                                                       min(p["deviation_pitches_max"] for p in coarse),
                                                       max(p["deviation_pitches_max"] for p in coarse))
         for p in pitches:
-            rows.append((body, out[body]["tool"], p["pitch_mm"], f"{p['error_percent_p50']:.4f}", f"{p['error_percent_max']:.4f}",
+            rows.append((body, out[body]["tool"], p["pitch_mm"], f"{p['error_percent_p50']:.4f}",
+                         f"{p['error_percent_max']:.4f}",
                          f"{p['deviation_pitches_p50']:.4f}", f"{p['deviation_pitches_p99']:.4f}",
                          f"{p['deviation_pitches_max']:.4f}", p["vertices"]))
     run.tables.append((f"accuracy, {out['trials']} random places and orientations each", rows))
@@ -187,8 +200,10 @@ def set_property_run(run, cuts, orders, threads, first=0, program="osteon-set-pr
 
 
 def kernels_tried(run, cuts, expected):
-    """Kernels of other compilers and settings, and the program's own with fewer lanes, two orders each: how many compilers
-    built all three (unoptimised, optimised without AVX, with AVX), how many builds, how many widths, how many differ."""
+    """Kernels of other compilers and settings, and the program's own with fewer lanes, two orders each: how many
+    compilers
+    built all three (unoptimised, optimised without AVX, with AVX), how many builds, how many widths, how many
+    differ."""
     programs = sorted(path.name for path in Path(run.programs).glob("osteon-set-property-*"))
     own = [set_property_run(run, cuts, 2, 2, lanes=lanes) for lanes in LANES]
     own = {f"as built, {o['lanes']} lanes": o for o in own}  # a width that the processor has not is another one again
@@ -203,14 +218,17 @@ def kernels_tried(run, cuts, expected):
         ways.setdefault(compiler, set()).add(way.rstrip("0123456789"))
     outcomes = own | builds
     differing = [name for name, o in outcomes.items() if o["differing"] or o["name"] != expected]
-    run.tables.append((f"kernels, {cuts} cuts in two orders each", [("kernel", "name of the bone", "lanes", "seconds")] + [
+    run.tables.append((f"kernels, {cuts} cuts in two orders each",
+                       [("kernel", "name of the bone", "lanes", "seconds")] + [
         (name, o["name"][:16], o["lanes"], o["seconds"]) for name, o in outcomes.items()]))
     return {"compilers": Measured(sum({"unoptimised", "plain", "avx"} <= had for had in ways.values())),
-            "kernels": Measured(len(builds)), "lanes": Measured(len(own)), "kernel_differences": Measured(len(differing))}
+            "kernels": Measured(len(builds)), "lanes": Measured(len(own)),
+            "kernel_differences": Measured(len(differing))}
 
 
 def orders_tried(run, cuts, orders):
-    """As many orders again with two threads as with one, each another: how many gave another bone, how many were distinct."""
+    """As many orders again with two threads as with one, each another: how many gave another bone, how many were
+    distinct."""
     one = set_property_run(run, cuts, orders // 2, 1)
     two = set_property_run(run, cuts, orders - orders // 2, 2, first=orders // 2)
     differing = one["differing"] + two["differing"] + int(one["name"] != two["name"])
@@ -248,18 +266,21 @@ def growth(run):
     sizes = {s["samples"]: s for s in out["sizes"]}
     # Groove by groove: sums of them would rise together whatever they were.
     burs = []
-    rows = [("bur", "grooves", "mm3 least", "mm3 most", "bytes a mm3", "bytes a mm2", "correlation with volume", "with area")]
+    rows = [("bur", "grooves", "mm3 least", "mm3 most", "bytes a mm3", "bytes a mm2", "correlation with volume",
+             "with area")]
     for bur in out["memory"]:
         area, volume, used = (np.array([g[key] for g in bur["grooves"]]) for key in ("area_mm2", "volume_mm3", "bytes"))
         per_volume, with_volume = through_zero(volume, used)
         per_area, with_area = through_zero(area, used)
         burs.append({"tool": bur["tool"], "area": area, "volume": volume, "bytes": used, "per_volume": per_volume,
                      "per_area": per_area, "with_volume": with_volume})
-        rows.append((bur["tool"], len(used), f"{volume.min():.1f}", f"{volume.max():.1f}", f"{per_volume:.0f}", f"{per_area:.0f}",
+        rows.append((bur["tool"], len(used), f"{volume.min():.1f}", f"{volume.max():.1f}", f"{per_volume:.0f}",
+                     f"{per_area:.0f}",
                      f"{with_volume:.4f}", f"{with_area:.4f}"))
     both = {key: np.concatenate([b[key] for b in burs]) for key in ("volume", "area", "bytes")}
     fits = [through_zero(both[key], both["bytes"]) for key in ("volume", "area")]
-    rows.append(("both", len(both["bytes"]), "", "", *(f"{slope:.0f}" for slope, _ in fits), *(f"{fit:.4f}" for _, fit in fits)))
+    rows.append(("both", len(both["bytes"]), "", "", *(f"{slope:.0f}" for slope, _ in fits),
+                 *(f"{fit:.4f}" for _, fit in fits)))
     import pictures  # draws with matplotlib, which no other group needs
     pictures.growth(out, burs, run.folder / "growth.png")
     run.tables.append(("memory that each groove adds, slopes through zero", rows))
@@ -276,7 +297,8 @@ def growth(run):
         "growth_memory_per_volume_large": Measured(burs[1]["per_volume"]),
         "growth_memory_per_area": Measured(burs[0]["per_area"]),
         "growth_memory_per_area_large": Measured(burs[1]["per_area"]),
-        "growth_memory_linear": over([b["with_volume"] for b in burs])._replace(value=min(b["with_volume"] for b in burs)),
+        "growth_memory_linear": over([b["with_volume"] for b in burs])._replace(value=min(b["with_volume"]
+                                                                                          for b in burs)),
         "growth_memory_bone_ratio": Measured(largest["bytes_per_cut"] / sizes[128]["bytes_per_cut"]),
     }
 
@@ -298,21 +320,25 @@ def of(out, name, beside, threads=None):
 
 
 def refinement(run):
-    """The dissertation's Table 5.4: method 1 resamples the whole sub-volume that a tool meets, method 2 where it cuts."""
+    """The dissertation's Table 5.4: method 1 resamples the whole sub-volume that a tool meets, method 2 where it
+    cuts."""
     run.say("adaptive resolution")
     out = json.loads(run.output("osteon-refinement-bench"))
-    rows = [("resolution, method", "first cut us", "later cuts us", "memory MB", "finest mm in 1 GB", "areas", "samples cut")]
+    rows = [("resolution, method", "first cut us", "later cuts us", "memory MB", "finest mm in 1 GB", "areas",
+             "samples cut")]
     values = {}
     for times in ("2x", "4x"):
         for method in (1, 2):
             name = f"{times}_method{method}"
-            rows.append((f"{times}, method {method}", f"{out[f'{name}_first_us_p50']:.0f}", f"{out[f'{name}_later_us_p50']:.0f}",
+            rows.append((f"{times}, method {method}", f"{out[f'{name}_first_us_p50']:.0f}",
+                         f"{out[f'{name}_later_us_p50']:.0f}",
                          f"{out[f'{name}_megabytes']:.2f}", f"{out[f'{name}_reachable_mm']:.4f}", out[f"{name}_areas"],
                          out[f"{times}_cut_samples"]))
         values |= {
             f"refinement_{times}_first": of(out, f"{times}_method2_first_us", f"{times}_method1_first_us", 1),
             f"refinement_{times}_later": of(out, f"{times}_method2_later_us", f"{times}_method1_later_us", 1),
-            f"refinement_{times}_memory_saved": Measured(out[f"{times}_method1_megabytes"] / out[f"{times}_method2_megabytes"]),
+            f"refinement_{times}_memory_saved": Measured(
+                out[f"{times}_method1_megabytes"] / out[f"{times}_method2_megabytes"]),
         }
     values["refinement_differences"] = Measured(sum(out[f"{times}_differing_samples"] for times in ("2x", "4x")))
     run.tables.append(("adaptive resolution, after Table 5.4", rows))
@@ -341,7 +367,8 @@ def contact(run):
     """Thousands of points of a tool against the bone round it, beside OpenVDB's sampler."""
     run.say("contact")
     out = json.loads(run.output("osteon-contact-bench"))
-    run.tables.append((f"contact of {out['points']} points, {out['lanes']} at a time, {100.0 * out['in_bone']:.0f} % of them in bone", [
+    run.tables.append((f"contact of {out['points']} points, {out['lanes']} at a time, {100.0 * out['in_bone']:.0f} % "
+                       "of them in bone", [
         ("way", "us p50", "min", "max")] + [
         (way, *(f"{out[f'{key}_us_{what}']:.1f}" for what in ("p50", "min", "max")))
         for way, key in (("ours", "contact"), ("GridSampler, accessor", "accessor"), ("GridSampler, tree", "tree"))]))
@@ -371,11 +398,14 @@ def real_case(run, name, make_case):
     import pictures  # draws with matplotlib
     pictures.burred_bone(vertices, out["pitch_mm"], picture)
     vertices.unlink()
-    run.tables.append((f"{name}: bone of {'x'.join(map(str, out['samples']))} samples at {out['pitch_mm']:.4g} mm, cut at "
-                       f"{out['cut_pitch_mm']:.4g} mm; picture: {picture}", [(key, value) for key, value in out.items()]))
+    run.tables.append((f"{name}: bone of {'x'.join(map(str, out['samples']))} samples at {out['pitch_mm']:.4g} mm, "
+                       "cut at "
+                       f"{out['cut_pitch_mm']:.4g} mm; picture: {picture}",
+                       [(key, value) for key, value in out.items()]))
     # A frame's whole work, cuts and blocks, beside the surface of the whole bone by the same mesher.
     return {
-        f"real_{name}_frame": Measured(out["frame_ms_p50"], out["whole_ms"], out["frame_ms_min"], out["frame_ms_max"], 1),
+        f"real_{name}_frame": Measured(out["frame_ms_p50"], out["whole_ms"], out["frame_ms_min"], out["frame_ms_max"],
+                                       1),
         f"real_{name}_frame_budget": Measured(out["frame_ms_p50"] / FRAME_MS, None, out["frame_ms_min"] / FRAME_MS,
                                               out["frame_ms_max"] / FRAME_MS, 1),
         f"real_{name}_cut_p99": Measured(out["cut_us_p99"], out["cut_us_p50"], None, None, 1),
@@ -406,7 +436,8 @@ def real_skull(run):
     return real_case(run, "skull", make)
 
 
-GROUPS = {"cutting": cutting, "accuracy": accuracy, "set_property": set_property, "set_property_full": set_property_full,
+GROUPS = {"cutting": cutting, "accuracy": accuracy, "set_property": set_property,
+          "set_property_full": set_property_full,
           "growth": growth, "undo": undo, "surface": surface,
           "refinement": refinement, "collision": collision, "contact": contact,
           "real_temporal": real_temporal, "real_skull": real_skull}

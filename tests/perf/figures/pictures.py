@@ -25,7 +25,8 @@ def growth(out, burs, file):
                                     (by_area, "area", "surface cut by a groove", "mm²")):
         for bur, colour in zip(burs, (ACCENT, STEEL)):
             slope = bur[f"per_{key}"]
-            memory.plot(bur[key], bur["bytes"] / 1e6, ".", color=colour, label=f"{bur['tool']}, {slope / 1e3:.1f} kB/{unit}")
+            memory.plot(bur[key], bur["bytes"] / 1e6, ".", color=colour,
+                        label=f"{bur['tool']}, {slope / 1e3:.1f} kB/{unit}")
             ends = np.array([0.0, bur[key].max()])
             memory.plot(ends, slope * ends / 1e6, color=colour, lw=1)
         memory.set_xlim(left=0)
@@ -38,7 +39,8 @@ def growth(out, burs, file):
 
 
 def burred_bone(vertices, pitch_mm, file, width=1000):
-    """A bone from in front by its mesh's vertices, each as large as a voxel, the nearest on top; what was cut in red."""
+    """A bone from in front by its mesh's vertices, each as large as a voxel, the nearest on top; what was cut in
+    red."""
     rows = np.fromfile(vertices, dtype=np.float32).reshape(-1, 7)
     x, depth, y = rows[:, 0], rows[:, 1], rows[:, 2]
     scale = max(np.ptp(x), np.ptp(y)) / (width - 40)

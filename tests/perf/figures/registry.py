@@ -43,11 +43,12 @@ COMPARISONS = {
 
 ACCESSOR = "voxel by voxel through an OpenVDB accessor"
 EMPTY_LOOP = "the same of an empty 1 kHz loop"
-# Target of fuzz.mutations, what is changed in it, who takes that, and inputs; ten million of each with --soak. A million where each
+# Target of fuzz.mutations, what is changed in it, who takes that, and inputs; ten million of each with --soak. A
+# million where each
 # input costs a millisecond: the bone is cut, or SQLite opens a file three times and recovers it.
 FUZZED = (
-    ("ticket", "tickets", "the door", 10_000_000),
-    ("upload", "archives", "the intake", 10_000_000),
+    ("ticket", "tickets", "the authorizer", 10_000_000),
+    ("upload", "archives", "the upload validation", 10_000_000),
     ("supervision", "decisions", "the wire", 10_000_000),
     ("annotation", "drawings", "the wire", 10_000_000),
     ("up_packet", "datagrams, and packets with the key,", "the server's end of a fast path", 10_000_000),
@@ -105,75 +106,101 @@ FIGURES = [
     Figure("plunge_novice_over_expert", "ratio", "novice's plunge over the expert's", "novice", (">=", 1.5),
            baseline="of the reference simulation"),
     # The same on virtual time, with a simulated device, and what changes it; and what guides and burrs do.
-    Figure("feel_rig_cortical_error", "percent", "feed rig on virtual time: thrust in the cortical layers against 28.9 N",
+    Figure("feel_rig_cortical_error", "percent",
+           "feed rig on virtual time: thrust in the cortical layers against 28.9 N",
            "feel_rig", ("<=", 3.0)),
-    Figure("feel_rig_medullary_error", "percent", "feed rig on virtual time: thrust in the medullary layer against 3.25 N",
+    Figure("feel_rig_medullary_error", "percent",
+           "feed rig on virtual time: thrust in the medullary layer against 3.25 N",
            "feel_rig", ("<=", 3.0)),
     Figure("feel_rig_force_ratio", "ratio", "thrust in the cortical layers over that in the medullary one", "feel_rig",
            (">=", 8.0)),
-    Figure("feel_rig_ramp_error", "ratio", "way of the tip while more and more of its point is in bone (by the root of the "
+    Figure("feel_rig_ramp_error", "ratio",
+           "way of the tip while more and more of its point is in bone (by the root of the "
            "engaged share) against the cone's height, as a part of half the drill's pitch", "feel_rig", ("<=", 1.0)),
     Figure("feel_rig_after_exit", "n", "largest thrust once the cone has left the bone", "feel_rig", ("==", 0)),
-    Figure("feel_expert_plunge_error", "percent", "expert's plunge on virtual time against 6.0 mm", "feel_hands", ("<=", 15.0)),
-    Figure("feel_novice_plunge_error", "percent", "novice's plunge on virtual time against 14.4 mm", "feel_hands", ("<=", 15.0)),
-    Figure("feel_plunge_closed_form_error", "percent", "how far the tip goes after the cone's exit against F/K + F/K_c, either "
+    Figure("feel_expert_plunge_error", "percent", "expert's plunge on virtual time against 6.0 mm", "feel_hands",
+           ("<=", 15.0)),
+    Figure("feel_novice_plunge_error", "percent", "novice's plunge on virtual time against 14.4 mm", "feel_hands",
+           ("<=", 15.0)),
+    Figure("feel_plunge_closed_form_error", "percent",
+           "how far the tip goes after the cone's exit against F/K + F/K_c, either "
            "hand", "feel_hands", ("<=", 15.0)),
-    Figure("feel_plunge_wrong_ways", "count", "of eight sweeps (push, wear, stiffness and damping of the hand; expert, novice) "
-           "those in which the plunge does not rise with push and wear and fall with stiffness and damping", "feel_hands",
+    Figure("feel_plunge_wrong_ways", "count",
+           "of eight sweeps (push, wear, stiffness and damping of the hand; expert, novice) "
+           "those in which the plunge does not rise with push and wear and fall with stiffness and damping",
+           "feel_hands",
            ("==", 0)),
-    Figure("feel_tick_change", "percent", "largest change of any force, feed and plunge of rig, expert and novice at 0.5 and "
+    Figure("feel_tick_change", "percent",
+           "largest change of any force, feed and plunge of rig, expert and novice at 0.5 and "
            "2 kHz against 1 kHz", "feel_steps", ("<=", 3.0)),
     Figure("feel_pitch_change", "percent", "the same with a bone at 0.25 and 1 mm against one at 0.5 mm", "feel_steps",
            ("<=", 3.0)),
     Figure("feel_burring_force", "n", "mean force while a round burr takes 0.5 mm off cortical bone", "feel_profiles"),
     Figure("feel_milling_force", "n", "mean force while it mills a slot of 2.5 mm, in passes", "feel_profiles"),
-    Figure("feel_guided_excess", "mm", "how far the cuts of a trembling hand through a sleeve lie beyond its play c (1 + 2 L / "
+    Figure("feel_guided_excess", "mm",
+           "how far the cuts of a trembling hand through a sleeve lie beyond its play c (1 + 2 L / "
            "L_sleeve); paths of cuts are simplified by up to 0.01 mm", "feel_guided", ("<=", 0.01), baseline="by eye"),
-    Figure("feel_guided_of_play", "ratio", "how far the drill itself gets off the planned line, as a part of that play and a "
+    Figure("feel_guided_of_play", "ratio",
+           "how far the drill itself gets off the planned line, as a part of that play and a "
            "pose's quantum", "feel_guided", ("<=", 1.0), baseline="by eye"),
     # The force laws by themselves.
     Figure("laws_listed", "count", "force laws that can be chosen", "laws", (">=", 9)),
     Figure("laws_chi_error", "percent", "Chi's thrust at 0.3 to 2.0 g/cm3, 1000 rpm, 1 mm/s, against the points of "
            "comparison, which have two or three digits", "laws", ("<=", 2.0)),
-    Figure("laws_allotta_thrust_error", "percent", "Allotta's thrust of drills of 2.5 to 7.94 mm against the same", "laws",
+    Figure("laws_allotta_thrust_error", "percent", "Allotta's thrust of drills of 2.5 to 7.94 mm against the same",
+           "laws",
            ("<=", 0.2)),
     Figure("laws_allotta_torque_error", "percent", "Allotta's torque of the same drills", "laws", ("<=", 0.2)),
-    Figure("laws_allotta_energy_error", "ratio", "work of Allotta's torque for each mm3 of the hole over K_s, less one", "laws",
+    Figure("laws_allotta_energy_error", "ratio", "work of Allotta's torque for each mm3 of the hole over K_s, less one",
+           "laws",
            ("<=", 1e-9)),
-    Figure("laws_fitted_error", "percent", "spring-damper and multi-point thrust at the cortical point that they are fitted to",
+    Figure("laws_fitted_error", "percent",
+           "spring-damper and multi-point thrust at the cortical point that they are fitted to",
            "laws", ("<=", 1.0)),
-    Figure("laws_inverse_error", "ratio", "feed of every law's force at its point, against the feed of that point", "laws",
+    Figure("laws_inverse_error", "ratio", "feed of every law's force at its point, against the feed of that point",
+           "laws",
            ("<=", 1e-9)),
     Figure("laws_allotta_over_chi", "ratio", "how much the two drilling laws disagree in cortical bone", "laws",
            baseline="of the reference page"),
     # Agreement of all holders of the bone, over every session of this run.
-    Figure("field_hash_differences", "count", "sessions after which server and haptic client held different bone", "rig",
+    Figure("field_hash_differences", "count", "sessions after which server and haptic client held different bone",
+           "rig",
            ("==", 0)),
-    Figure("mesh_hash_differences", "count", "viewers, one of them late, that held another surface than the server at the end",
+    Figure("mesh_hash_differences", "count",
+           "viewers, one of them late, that held another surface than the server at the end",
            "rig", ("==", 0)),
-    # Cutting at 0.125 mm, cuts of a haptic client (8 ms) at work: each goes on from the one before, into fresh bone. Single
+    # Cutting at 0.125 mm, cuts of a haptic client (8 ms) at work: each goes on from the one before, into fresh bone.
+    # Single
     # threads unless they say otherwise.
     *[figure for tool, what, least in (("burr", "a 3.2 mm burr going sideways, half immersed", 7.0),
                                        ("drill", "a 3.5 mm drill going straight in", 15.0))
       for figure in (
         Figure(f"cut_{tool}", "us", f"one cut of {what}, at 0.125 mm", "cutting", baseline=ACCESSOR),
-        Figure(f"cut_{tool}_speedup", "ratio", f"{what}: a ValueAccessor over the voxels of the tool's world bounding block, "
+        Figure(f"cut_{tool}_speedup", "ratio",
+               f"{what}: a ValueAccessor over the voxels of the tool's world bounding block, "
                "over ours, for the same cuts in turns", "cutting", (">=", least)),
         Figure(f"cut_{tool}_speedup_2", "ratio", "the same with two threads for ours", "cutting", (">=", least)),
-        Figure(f"cut_{tool}_speedup_hot", "ratio", f"{what}: the same for one cut again and again, which changes nothing any "
+        Figure(f"cut_{tool}_speedup_hot", "ratio",
+               f"{what}: the same for one cut again and again, which changes nothing any "
                "more", "cutting"),
         Figure(f"cut_{tool}_speedup_near", "ratio", "that with a ValueAccessor over no leaves but those near the tool",
                "cutting"),
         *[figure for suffix, threads in (("", "one thread"), ("_2", "two threads")) for figure in (
-            Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget", f"{what}, every cut at a place of its own at least 7 mm from all "
-                   f"others, so that each leaf it changes is new, {threads}, 96 MiB written before every cut to empty the "
-                   "caches; memory reserved between cuts as the server does: 99th percentile as a part of 200 us", "cutting",
+            Figure(f"cut_{tool}_cold_p99{suffix}", "of_budget",
+                   f"{what}, every cut at a place of its own at least 7 mm from all "
+                   f"others, so that each leaf it changes is new, {threads}, 96 MiB written before every cut to empty "
+                   "the "
+                   "caches; memory reserved between cuts as the server does: 99th percentile as a part of 200 us",
+                   "cutting",
                    ("<=", 1.0)),
-            Figure(f"cut_{tool}_cold_given_p99{suffix}", "of_budget", "the same without that reserve: the system gives the "
+            Figure(f"cut_{tool}_cold_given_p99{suffix}", "of_budget",
+                   "the same without that reserve: the system gives the "
                    "memory for new leaves page by page while it cuts", "cutting"),
             Figure(f"cut_{tool}_cold{suffix}", "us", "median of the former", "cutting"))])],
-    Figure("tools_slowest_cut", "of_budget", "the slowest of the cutting tools, each at its own level, entering bone and seated "
-           "in it with all of its cutting part, the worse of both: 99th percentile as a part of 2 ms", "cutting", ("<=", 1.0)),
+    Figure("tools_slowest_cut", "of_budget",
+           "the slowest of the cutting tools, each at its own level, entering bone and seated "
+           "in it with all of its cutting part, the worse of both: 99th percentile as a part of 2 ms", "cutting",
+           ("<=", 1.0)),
     Figure("tools_slowest_cut_2", "of_budget", "the same with two threads", "cutting", ("<=", 1.0)),
     Figure("tools_slowest_cut_p50", "of_budget", "the slowest by the median, as a part of 2 ms", "cutting"),
     Figure("tools_slowest_cut_p50_2", "of_budget", "the same with two threads", "cutting"),
@@ -187,8 +214,10 @@ FIGURES = [
     Figure("mesh_whole_bone_speedup_2", "ratio", "the same for a whole bone, two threads each", "surface", (">=", 2.5)),
     Figure("mesh_triangle_difference", "count", "triangles of the whole bone that vtkFlyingEdges3D has more or fewer",
            "surface", ("==", 0)),
-    Figure("mesh_frame_share", "ratio", "vtkFlyingEdges3D on the whole bone over what a frame of 33 burr cuts costs the "
-           "surface: naming its stale blocks and making them. The cuts themselves are not in it, as flying edges makes none",
+    Figure("mesh_frame_share", "ratio",
+           "vtkFlyingEdges3D on the whole bone over what a frame of 33 burr cuts costs the "
+           "surface: naming its stale blocks and making them. The cuts themselves are not in it, as flying edges "
+           "makes none",
            "surface", (">=", 250.0)),
     Figure("mesh_frame_share_with_cuts", "ratio", "the same with the 33 cuts in the frame", "surface"),
     Figure("mesh_bytes_per_triangle", "bytes", "a burred block on the wire per triangle", "surface", ("<=", 2.2)),
@@ -198,143 +227,192 @@ FIGURES = [
     Figure("mesh_decode", "us", "rebuilding one block of surface from its bytes", "surface",
            baseline="vtkFlyingEdges3D on the same samples"),
     # How true cuts are, at random places and orientations: the worst trial decides.
-    *[figure for body, what in (("sphere", "a sphere cut by the 3.2 mm burr"), ("hole", "a hole drilled through a slab"),
+    *[figure for body,
+      what in (("sphere", "a sphere cut by the 3.2 mm burr"), ("hole", "a hole drilled through a slab"),
                                 ("kerf", "a saw's kerf through a shaft")) for figure in (
-        Figure(f"accuracy_{body}_volume", "percent", f"volume of {what} at 0.125 mm against its closed form", "accuracy",
+        Figure(f"accuracy_{body}_volume", "percent", f"volume of {what} at 0.125 mm against its closed form",
+               "accuracy",
                ("<=", 0.5)),
-        Figure(f"accuracy_{body}_order", "order", f"the same error's rate: it falls with the pitch to this power, 0.5 to "
+        Figure(f"accuracy_{body}_order", "order",
+               f"the same error's rate: it falls with the pitch to this power, 0.5 to "
                "0.125 mm", "accuracy", (">=", 1.5)),
         Figure(f"accuracy_{body}_surface", "pitches", f"largest distance of vertices from {what}, away from edges",
                "accuracy", ("<=", 0.15)))],
     # The bone is a function of the set of its cuts.
-    Figure("set_property_differences", "count", "random orders with repeats, of 300 random cuts of all tools, that gave "
+    Figure("set_property_differences", "count",
+           "random orders with repeats, of 300 random cuts of all tools, that gave "
            "another bone", "set_property", ("==", 0)),
     Figure("set_property_orders", "count", "distinct orders tried for that, half with one thread, half with two",
            "set_property", ("==", 20)),
-    Figure("set_property_partly_cut", "ratio", "samples of that bone between uncut and gone; without them it would prove "
+    Figure("set_property_partly_cut", "ratio",
+           "samples of that bone between uncut and gone; without them it would prove "
            "nothing", "set_property", (">=", 0.1)),
-    Figure("set_property_compilers", "count", "compilers that built the kernel unoptimised, optimised without AVX, and with AVX",
+    Figure("set_property_compilers", "count",
+           "compilers that built the kernel unoptimised, optimised without AVX, and with AVX",
            "set_property", (">=", 2)),
     Figure("set_property_kernels", "count", "builds of the kernel by those compilers, two orders each", "set_property",
            (">=", 6)),
-    Figure("set_property_lanes", "count", "widths of the program's own kernel (samples computed at once), two orders each",
+    Figure("set_property_lanes", "count",
+           "widths of the program's own kernel (samples computed at once), two orders each",
            "set_property", (">=", 2)),
-    Figure("set_property_kernel_differences", "count", "of builds and widths, those that gave another bone", "set_property",
+    Figure("set_property_kernel_differences", "count", "of builds and widths, those that gave another bone",
+           "set_property",
            ("==", 0)),
-    Figure("set_property_full_differences", "count", "100 orders with repeats, of 10000 random cuts of all tools, half with "
+    Figure("set_property_full_differences", "count",
+           "100 orders with repeats, of 10000 random cuts of all tools, half with "
            "one thread, half with two, that gave another bone", "set_property_full", ("==", 0), full=True),
-    Figure("set_property_full_orders", "count", "distinct orders tried for that", "set_property_full", ("==", 100), full=True),
-    Figure("set_property_full_kernel_differences", "count", "kernels that gave another bone for these cuts, two orders each",
+    Figure("set_property_full_orders", "count", "distinct orders tried for that", "set_property_full", ("==", 100),
+           full=True),
+    Figure("set_property_full_kernel_differences", "count",
+           "kernels that gave another bone for these cuts, two orders each",
            "set_property_full", ("==", 0), full=True),
     # Growth.
-    *[Figure(f"growth_cut_{size}", "ratio", f"a burr's cut in a bone of {size}^3 samples over the same in 128^3", "growth",
+    *[Figure(f"growth_cut_{size}", "ratio", f"a burr's cut in a bone of {size}^3 samples over the same in 128^3",
+             "growth",
              ("<=", 1.25)) for size in (256, 512, 1024)],
-    *[Figure(f"growth_memory_per_{what}{suffix}", "bytes", f"memory that grooves of a {bur} mm bur add to the cut field, per "
+    *[Figure(f"growth_memory_per_{what}{suffix}", "bytes",
+             f"memory that grooves of a {bur} mm bur add to the cut field, per "
              f"{unit}, slope through zero", "growth") for what, unit in (("volume", "mm3 of bone that they remove"),
                                                                 ("area", "mm2 of surface that they cut"))
       for bur, suffix in (("3.2", ""), ("6", "_large"))],
-    Figure("growth_memory_linear", "ratio", "correlation of the memory that a groove adds with the volume it removes, groove by "
+    Figure("growth_memory_linear", "ratio",
+           "correlation of the memory that a groove adds with the volume it removes, groove by "
            "groove, the lower of two burs", "growth", (">=", 0.95)),
     Figure("growth_memory_bone_ratio", "ratio", "memory of a cut in the largest bone over the smallest, cuts scattered",
            "growth"),
     # Taking back.
     Figure("undo_leaves", "count", "leaves rebuilt to take one of 1000 burr cuts back, median", "undo"),
-    Figure("undo_time", "us", "taking one of 1000 burr cuts back, median", "undo", baseline="applying all the others again"),
+    Figure("undo_time", "us", "taking one of 1000 burr cuts back, median", "undo",
+           baseline="applying all the others again"),
     Figure("undo_share", "ratio", "time to take one cut back over that of applying all the others again", "undo",
            ("<=", 0.1)),
     Figure("undo_differences", "count", "bones that were not as if the cut had never been made", "undo", ("==", 0)),
     # Adaptive resolution: method 1 resamples a whole sub-volume, method 2, ours, where the tool cuts (Table 5.4).
     *[figure for times in ("2x", "4x") for figure in (
-        Figure(f"refinement_{times}_first", "us", f"cuts that reach new bone at {times} resolution, method 2", "refinement",
+        Figure(f"refinement_{times}_first", "us", f"cuts that reach new bone at {times} resolution, method 2",
+               "refinement",
                baseline="method 1"),
         Figure(f"refinement_{times}_later", "us", f"later cuts at {times} resolution, method 2", "refinement",
                baseline="method 1"),
-        Figure(f"refinement_{times}_memory_saved", "ratio", f"memory of method 1 over that of method 2 at {times} resolution",
+        Figure(f"refinement_{times}_memory_saved", "ratio",
+               f"memory of method 1 over that of method 2 at {times} resolution",
                "refinement"))],
-    Figure("refinement_differences", "count", "samples on which the bone that is read from method 1's resampled sub-volumes "
+    Figure("refinement_differences", "count",
+           "samples on which the bone that is read from method 1's resampled sub-volumes "
            "differs from that of method 2, both resolutions", "refinement",
            ("==", 0)),
     # Collision by segmentation cells (7.2) and by the distance field, on a sphere.
     *[figure for way, what in (("nearest", "cells, the nearest voxel of a mixed one"),
-                               ("trilinear", "cells, mixed ones trilinear"), ("distance", "distance field")) for figure in (
+                               ("trilinear", "cells, mixed ones trilinear"), ("distance", "distance field"))
+      for figure in (
         Figure(f"collision_{way}_error", "pitches", f"{what}: where a point counts as inside, rms and largest error",
                "collision"),
         Figure(f"collision_{way}_cost", "ns", f"{what}: asking for one point", "collision",
                baseline="the cut field's own grids"))],
     Figure("collision_distance_gain", "ratio", "error of cells with the nearest voxel over that of the distance field",
            "collision", (">=", 1.0)),
-    Figure("collision_cells_memory", "ratio", "memory of the cells over that of the distance field's samples", "collision"),
+    Figure("collision_cells_memory", "ratio", "memory of the cells over that of the distance field's samples",
+           "collision"),
     # Contact of a tool of 4096 points in the haptic loop: distances, normals, density, force and torque in one pass.
-    Figure("contact_4096", "us", "one collision and force evaluation of 4096 points with density, median with warm caches",
+    Figure("contact_4096", "us",
+           "one collision and force evaluation of 4096 points with density, median with warm caches",
            "contact", baseline="OpenVDB's GridSampler through an accessor, with central differences"),
-    Figure("contact_speedup", "ratio", "OpenVDB's GridSampler (BoxSampler, through an accessor) doing the same with central "
+    Figure("contact_speedup", "ratio",
+           "OpenVDB's GridSampler (BoxSampler, through an accessor) doing the same with central "
            "differences, over ours, in turns", "contact", (">=", 30.0)),
     Figure("contact_of_budget", "of_budget", "the same evaluation as a part of 25 us", "contact", ("<=", 1.0)),
-    Figure("contact_difference", "um", "largest difference of the two in distance near the surface", "contact", ("<=", 1.0)),
+    Figure("contact_difference", "um", "largest difference of the two in distance near the surface", "contact",
+           ("<=", 1.0)),
     Figure("contact_force_difference", "ratio", "largest difference of the two in force and torque, against their size",
            "contact", ("<=", 0.01)),
-    # The coupling between hand and tool on simulated devices: a million ticks on virtual time, others cutting and bone taken back
-    # under the tool, 0 to 200 ms on the way to the room. Energies at the handle, accounted for from outside. The same again on
+    # The coupling between hand and tool on simulated devices: a million ticks on virtual time, others cutting and bone
+    # taken back
+    # under the tool, 0 to 200 ms on the way to the room. Energies at the handle, accounted for from outside. The same
+    # again on
     # devices that show torque, to a hand that tilts its tool by up to 15 degrees.
     *[figure for prefix, on in (("stability", ""), ("stability_six", "six axes: ")) for figure in (
-        Figure(f"{prefix}_ticks", "count", f"{on}ticks of stroking, pressing into a cavity and a thin wall, burring and drilling",
+        Figure(f"{prefix}_ticks", "count",
+               f"{on}ticks of stroking, pressing into a cavity and a thin wall, burring and drilling",
                "haptic_stability", (">=", 1_000_000), full=True),
         Figure(f"{prefix}_contacts", "count", f"{on}contacts in them", "haptic_stability", (">=", 1000), full=True),
-        Figure(f"{prefix}_undone", "count", f"{on}cuts that were taken back meanwhile", "haptic_stability", (">=", 1000),
+        Figure(f"{prefix}_undone", "count", f"{on}cuts that were taken back meanwhile", "haptic_stability",
+               (">=", 1000),
                full=True),
-        Figure(f"{prefix}_worst_contact", "mj", f"{on}most that the coupling gave in one contact, to the hand and to cutting, "
+        Figure(f"{prefix}_worst_contact", "mj",
+               f"{on}most that the coupling gave in one contact, to the hand and to cutting, "
                "beyond what the hand put in", "haptic_stability", ("<=", 0.01), full=True),
         Figure(f"{prefix}_generated", "mj", f"{on}the same over all contacts that gave anything", "haptic_stability",
                ("<=", 1.0), full=True),
         Figure(f"{prefix}_net", "mj", f"{on}what all contacts gave together; negative: what the coupling took",
                "haptic_stability", ("<=", 0.0), baseline="less the work of cutting", full=True),
-        Figure(f"{prefix}_cutting_power", "n_mm", f"{on}least product of cutting force and way of the tool in any tick: never "
-               "negative by construction, as ticks that would make it so count as rubbing", "haptic_stability", (">=", 0.0),
+        Figure(f"{prefix}_cutting_power", "n_mm",
+               f"{on}least product of cutting force and way of the tool in any tick: never "
+               "negative by construction, as ticks that would make it so count as rubbing", "haptic_stability",
+               (">=", 0.0),
                full=True),
-        Figure(f"{prefix}_pushed_back", "percent", f"{on}such ticks, in which the tool turned back by more than it cut, to those "
-               "that cut: so few that means over cutting ticks hold to a hundredth", "haptic_stability", ("<=", 1.0), full=True),
-        Figure(f"{prefix}_pushed_back_most", "mj", f"{on}the most that the cutting force would have given in one of them; it is "
+        Figure(f"{prefix}_pushed_back", "percent",
+               f"{on}such ticks, in which the tool turned back by more than it cut, to those "
+               "that cut: so few that means over cutting ticks hold to a hundredth", "haptic_stability", ("<=", 1.0),
+               full=True),
+        Figure(f"{prefix}_pushed_back_most", "mj",
+               f"{on}the most that the cutting force would have given in one of them; it is "
                "not shown", "haptic_stability", full=True),
-        Figure(f"{prefix}_step", "n", f"{on}growth of force in a tick beyond the slew limit and what the hand's motion explains",
+        Figure(f"{prefix}_step", "n",
+               f"{on}growth of force in a tick beyond the slew limit and what the hand's motion explains",
                "haptic_stability", ("<=", 1e-9), full=True),
-        Figure(f"{prefix}_step_still", "n", f"{on}growth of force in a tick while the hand stood still", "haptic_stability",
+        Figure(f"{prefix}_step_still", "n", f"{on}growth of force in a tick while the hand stood still",
+               "haptic_stability",
                ("<=", 0.5000001), full=True),
-        Figure(f"{prefix}_fall", "n", f"{on}fall of force in a tick beyond the same, but for breakthroughs and safety zeros: the "
+        Figure(f"{prefix}_fall", "n",
+               f"{on}fall of force in a tick beyond the same, but for breakthroughs and safety zeros: the "
                "monitor's doing", "haptic_stability", full=True),
         Figure(f"{prefix}_late", "count", f"{on}ticks that came so late that no force was shown", "haptic_stability",
                (">=", 1000), full=True),
-        Figure(f"{prefix}_motor_excess", "n", f"{on}the motor's force beyond s mu F_n, orbiting in a cavity and elsewhere",
+        Figure(f"{prefix}_motor_excess", "n",
+               f"{on}the motor's force beyond s mu F_n, orbiting in a cavity and elsewhere",
                "haptic_stability", ("<=", 1e-9), full=True),
-        Figure(f"{prefix}_motor_late", "n", f"{on}the motor's force later than 10 ms after the pedal", "haptic_stability",
+        Figure(f"{prefix}_motor_late", "n", f"{on}the motor's force later than 10 ms after the pedal",
+               "haptic_stability",
                ("==", 0), full=True),
         Figure(f"{prefix}_motor_largest", "n", f"{on}the motor's largest force", "haptic_stability", full=True),
         Figure(f"{prefix}_thin_wall", "mm", f"{on}how deep a burr was pressed into a wall of 1 mm that it does not cut",
                "haptic_stability", ("<=", 0.3), full=True),
-        Figure(f"{prefix}_allocations", "count", f"{on}heap allocations of all these ticks", "haptic_stability", ("==", 0),
+        Figure(f"{prefix}_allocations", "count", f"{on}heap allocations of all these ticks", "haptic_stability",
+               ("==", 0),
                full=True))],
     Figure("stability_six_turned", "mj", "what the hand put in by turning alone", "haptic_stability", full=True),
-    Figure("stability_six_torque_step", "n", "growth of torque in a tick, over the arm of a turn, beyond the slew limit and what "
+    Figure("stability_six_torque_step", "n",
+           "growth of torque in a tick, over the arm of a turn, beyond the slew limit and what "
            "the hand's motion explains", "haptic_stability", ("<=", 1e-9), full=True),
-    Figure("stability_six_torque_excess", "nmm", "torque beyond the device's limit, or of the cut beyond the force at the arm "
+    Figure("stability_six_torque_excess", "nmm",
+           "torque beyond the device's limit, or of the cut beyond the force at the arm "
            "of a turn", "haptic_stability", ("<=", 1e-9), full=True),
-    Figure("stability_six_torque_late", "nmm", "the cut's own torque later than 10 ms after the pedal", "haptic_stability",
+    Figure("stability_six_torque_late", "nmm", "the cut's own torque later than 10 ms after the pedal",
+           "haptic_stability",
            ("==", 0), full=True),
     Figure("stability_six_torque_largest", "nmm", "the largest torque", "haptic_stability", full=True),
-    # Two users who push a bone on its mount against each other, on virtual time: lines of 0, 50 and 150 ms one way, and one of
+    # Two users who push a bone on its mount against each other, on virtual time: lines of 0, 50 and 150 ms one way,
+    # and one of
     # either; but for the first with 30 ms of jitter and 30 % loss.
     *[figure for line, what in (("0", "lines without delay"), ("50", "lines of 50 ms"), ("150", "lines of 150 ms"),
                                 ("0_and_150", "a line without delay and one of 150 ms")) for figure in (
-        Figure(f"mount_rest_error_{line}ms", "percent", f"{what}: largest error of what either feels of the other at rest, "
-               "against the closed form of two springs on the mount", "haptic_mount", ("<=", 5.0), baseline="mean", full=True),
-        Figure(f"mount_rests_{line}ms", "count", f"{what}: pushes at whose ends that was measured", "haptic_mount", (">=", 30),
+        Figure(f"mount_rest_error_{line}ms", "percent",
+               f"{what}: largest error of what either feels of the other at rest, "
+               "against the closed form of two springs on the mount", "haptic_mount", ("<=", 5.0), baseline="mean",
+               full=True),
+        Figure(f"mount_rests_{line}ms", "count", f"{what}: pushes at whose ends that was measured", "haptic_mount",
+               (">=", 30),
                full=True))],
-    Figure("mount_ticks", "count", "ticks over each of these lines, of hands that push, that never rest, and that are three "
+    Figure("mount_ticks", "count",
+           "ticks over each of these lines, of hands that push, that never rest, and that are three "
            "times as stiff", "haptic_mount", (">=", 1_000_000), full=True),
-    Figure("mount_made_of_allowance", "ratio", "most that the bones shown ever gave both hands beyond what both put in, over "
+    Figure("mount_made_of_allowance", "ratio",
+           "most that the bones shown ever gave both hands beyond what both put in, over "
            "what they are allowed to, once", "haptic_mount", ("<=", 1.000001), full=True),
     Figure("mount_account", "mj", "what clients tell of energy against the work reckoned from outside", "haptic_mount",
            ("<=", 1e-3), full=True),
-    Figure("mount_growth", "ratio", "largest force in the second half of the ticks over that in the first", "haptic_mount",
+    Figure("mount_growth", "ratio", "largest force in the second half of the ticks over that in the first",
+           "haptic_mount",
            ("<=", 1.5), full=True),
     Figure("mount_uncontrolled", "mj", "what the stiff hands would be given without the controller", "haptic_mount",
            (">=", 100.0), baseline="most with it", full=True),
@@ -352,19 +430,24 @@ FIGURES = [
                "haptic_tick", ("<=", 1.0)),
         Figure(f"tick_{tool}_wedged_p50", "us", "the same, median", "haptic_tick"),
         Figure(f"tick_{tool}_wedged_p99", "us", "the same, 99th percentile", "haptic_tick"),
-        Figure(f"tick_{tool}_wedged_late", "of_period", "the same as a part of the 1000 us that a tick has", "haptic_tick",
+        Figure(f"tick_{tool}_wedged_late", "of_period", "the same as a part of the 1000 us that a tick has",
+               "haptic_tick",
                ("<=", 1.0)))],
-    Figure("blackout_missed", "per_10000", "periods that no tick ran in, per 10000 ticks, while the network is silent for 10 s",
+    Figure("blackout_missed", "per_10000",
+           "periods that no tick ran in, per 10000 ticks, while the network is silent for 10 s",
            "haptic_blackout", baseline="before and after, in the same run"),
-    Figure("blackout_missed_more", "sigma", "how many more they are than before and after, over what such counts scatter by",
+    Figure("blackout_missed_more", "sigma",
+           "how many more they are than before and after, over what such counts scatter by",
            "haptic_blackout", ("<=", 3.0)),
     Figure("blackout_late_p99", "us", "lateness of ticks meanwhile, 99th percentile", "haptic_blackout",
            baseline="before and after, in the same run"),
     # Devices on an emulated USB.
-    Figure("falcon_cycles", "count", "frames each way with an emulated Falcon", "falcon_cycles", (">=", 100000), full=True),
+    Figure("falcon_cycles", "count", "frames each way with an emulated Falcon", "falcon_cycles", (">=", 100000),
+           full=True),
     Figure("falcon_cycle_faults", "count", "of them, spoilt ones and those that gave another place than the grip's",
            "falcon_cycles", ("==", 0), full=True),
-    Figure("falcon_unplug_faults", "count", "of ten unpluggings in between, those unnoticed or followed by force once it was "
+    Figure("falcon_unplug_faults", "count",
+           "of ten unpluggings in between, those unnoticed or followed by force once it was "
            "there again", "falcon_cycles", ("==", 0), full=True),
     Figure("falcon_cycle_rate", "per_s", "cycles a second that the emulation gives", "falcon_cycles", full=True),
     # A room that loses nothing: simulated, and with real processes.
@@ -377,8 +460,10 @@ FIGURES = [
            ("<=", 1.0), full=True),
     Figure("simulated_full_seeds", "count", "larger rooms simulated at up to 30 % loss, with splits", "simulated_full",
            (">=", 300), full=True),
-    Figure("simulated_full_failures", "count", "of them, those that broke an invariant", "simulated_full", ("==", 0), full=True),
-    Figure("simulated_full_settled", "of_budget", "longest virtual time from quiet until all held one bone, as a part of 2 s",
+    Figure("simulated_full_failures", "count", "of them, those that broke an invariant", "simulated_full", ("==", 0),
+           full=True),
+    Figure("simulated_full_settled", "of_budget",
+           "longest virtual time from quiet until all held one bone, as a part of 2 s",
            "simulated_full", ("<=", 1.0), full=True),
     Figure("simulated_breakages_missed", "count", "rules that can be broken on purpose without that a seed fails",
            "simulated_broken", ("==", 0), full=True),
@@ -388,7 +473,8 @@ FIGURES = [
     Figure("journal_acknowledged", "count", "rows acknowledged in them", "journal", (">=", 100_000)),
     Figure("journal_lost", "count", "of these rows, those lost or different", "journal", ("==", 0)),
     Figure("journal_bad_trials", "count", "trials with anything that must not be", "journal", ("==", 0)),
-    Figure("journal_not_durable_lost", "count", "rows lost in 100 trials without waiting for the disk", "journal", (">=", 1)),
+    Figure("journal_not_durable_lost", "count", "rows lost in 100 trials without waiting for the disk", "journal",
+           (">=", 1)),
     Figure("journal_damage_trials", "count", "killed journals of which one file was damaged", "journal",
            (">=", 10_000)),
     Figure("journal_damage_silent", "count", "of them, those that lost something in silence", "journal", ("==", 0)),
@@ -403,23 +489,31 @@ FIGURES = [
           ("p50", "wait for a commit, median", 1.3), ("p99", "the same, 99th percentile", 1.3),
           ("bytes", "bytes written for a row, the database's too", bytes_most))],
     Figure("server_kills", "count", "servers killed at work", "server_kills", (">=", 2000), full=True),
-    Figure("server_kills_acknowledged", "count", "cuts that they had acknowledged", "server_kills", (">=", 20_000), full=True),
-    Figure("server_kills_lost", "count", "of them lost, kept twice, left out, or holders with another bone", "server_kills",
+    Figure("server_kills_acknowledged", "count", "cuts that they had acknowledged", "server_kills", (">=", 20_000),
+           full=True),
+    Figure("server_kills_lost", "count", "of them lost, kept twice, left out, or holders with another bone",
+           "server_kills",
            ("==", 0), full=True),
-    Figure("server_kills_back", "ms", "from a server's return until both hands stood in its room again, median, in the slowest of "
+    Figure("server_kills_back", "ms",
+           "from a server's return until both hands stood in its room again, median, in the slowest of "
            "four rooms", "server_kills", full=True),
-    Figure("bad_network_runs", "count", "real rooms at 40 +- 10 ms, 30 % loss, 10 % reorder, 5 % duplication", "bad_network",
+    Figure("bad_network_runs", "count", "real rooms at 40 +- 10 ms, 30 % loss, 10 % reorder, 5 % duplication",
+           "bad_network",
            (">=", 50), full=True),
-    Figure("bad_network_faults", "count", "of them not converged, and cuts not decided", "bad_network", ("==", 0), full=True),
+    Figure("bad_network_faults", "count", "of them not converged, and cuts not decided", "bad_network", ("==", 0),
+           full=True),
     Figure("bad_network_converged", "of_budget", "longest time from quiet until all held one bone, as a part of 2 s",
            "bad_network", ("<=", 1.0), full=True),
     Figure("felt_loopback_p99", "of_budget",
-           "from one hand's sending of a cut until the other's patch has it, as a part of 25 ms: 99th percentile of the cuts of "
-           "all runs; min, max: of the median and of the worst run", "bad_network", ("<=", 1.0), baseline=MACHINE, full=True),
+           "from one hand's sending of a cut until the other's patch has it, as a part of 25 ms: 99th percentile of "
+           "the cuts of "
+           "all runs; min, max: of the median and of the worst run", "bad_network", ("<=", 1.0), baseline=MACHINE,
+           full=True),
     Figure("felt_bad_p99", "of_budget", "the same at 40 +- 10 ms and 30 % loss, as a part of 150 ms", "bad_network",
            ("<=", 1.0), baseline=MACHINE, full=True),
     # Where that time goes, on the loopback.
-    *[Figure(f"felt_stage_{stage}", "ms", f"{what}, median", "felt_stages", baseline="at 40 +- 10 ms and 30 % loss", full=True)
+    *[Figure(f"felt_stage_{stage}", "ms", f"{what}, median", "felt_stages", baseline="at 40 +- 10 ms and 30 % loss",
+             full=True)
       for stage, what in (
           ("uplink", "from sending a cut until the server has it"), ("wait_for_tick", "until its tick begins"),
           ("decide", "until it is decided and applied"), ("commit", "until it is on the disk and told"),
@@ -428,36 +522,51 @@ FIGURES = [
     Figure("felt_stage_close", "ms", "from a motion until its cut closes, at most, by construction", "felt_stages",
            baseline="at 40 +- 10 ms and 30 % loss", full=True),
     # An instructor's word.
-    Figure("freeze_p99", "of_budget", "from the answer to an instructor who stops a hand until its loop cuts no more, less the "
-           "time of the way, 99th percentile of the worst of 0, 50 and 150 ms one way, as a part of two ticks of the server, "
+    Figure("freeze_p99", "of_budget",
+           "from the answer to an instructor who stops a hand until its loop cuts no more, less the "
+           "time of the way, 99th percentile of the worst of 0, 50 and 150 ms one way, as a part of two ticks of the "
+           "server, "
            "16.7 ms", "override", ("<=", 1.0), baseline="median", full=True),
-    Figure("freeze_p99_loss", "of_budget", "the same with 30 % of the datagrams lost", "override", baseline="median", full=True),
-    Figure("freeze_missing", "count", "words that stopped no hand before the next, on all these lines", "override", ("==", 0),
+    Figure("freeze_p99_loss", "of_budget", "the same with 30 % of the datagrams lost", "override", baseline="median",
            full=True),
-    Figure("override_force_step", "ratio", "largest growth of force in a tick that the hand did not cause, of hands that are "
-           "stopped, taken over, given back, limited, led and undone under at 0, 50 and 150 ms, on bone that stands and on a mount, "
+    Figure("freeze_missing", "count", "words that stopped no hand before the next, on all these lines", "override",
+           ("==", 0),
+           full=True),
+    Figure("override_force_step", "ratio",
+           "largest growth of force in a tick that the hand did not cause, of hands that are "
+           "stopped, taken over, given back, limited, led and undone under at 0, 50 and 150 ms, on bone that stands "
+           "and on a mount, "
            "over the slew limit", "override", ("<=", 1.000001), baseline="on the mount", full=True),
-    Figure("override_energy", "ratio", "most that one contact, or the pull of a leading hand, gave such a hand beyond what it "
+    Figure("override_energy", "ratio",
+           "most that one contact, or the pull of a leading hand, gave such a hand beyond what it "
            "got, as a part of 0.01 mJ", "override", ("<=", 1.0), baseline="on the mount", full=True),
-    Figure("override_mount_made", "ratio", "most that a bone on its mount gave such a hand and another user, who pushes it "
-           "suddenly, beyond what both put in, over what they are allowed to, once", "override", ("<=", 1.0), full=True),
-    Figure("override_mount_carried", "mm", "way of such a bone under tools that touched it, least of the three delays", "override",
+    Figure("override_mount_made", "ratio",
+           "most that a bone on its mount gave such a hand and another user, who pushes it "
+           "suddenly, beyond what both put in, over what they are allowed to, once", "override", ("<=", 1.0),
+           full=True),
+    Figure("override_mount_carried", "mm", "way of such a bone under tools that touched it, least of the three delays",
+           "override",
            (">=", 50.0), full=True),
-    Figure("override_in_contact", "count", "times that each of these took hold of a tool on bone: the rarest, at the delay and on "
+    Figure("override_in_contact", "count",
+           "times that each of these took hold of a tool on bone: the rarest, at the delay and on "
            "the bone where it was rarest", "override", (">=", 5), full=True),
     # Closed certificates.
     Figure("knocks", "count", "strangers at the door while a hand works: silent, in plain HTTP/2, noise, TLS without a "
            "certificate", "knocking", (">=", 100_000), full=True),
-    Figure("knocks_let_in", "count", "of them answered but by a refusal, or not hung up on", "knocking", ("==", 0), full=True),
-    Figure("knocks_noticed", "count", "of 60 at a door without TLS, left open on purpose, those that this count says were let in",
+    Figure("knocks_let_in", "count", "of them answered but by a refusal, or not hung up on", "knocking", ("==", 0),
+           full=True),
+    Figure("knocks_noticed", "count",
+           "of 60 at a door without TLS, left open on purpose, those that this count says were let in",
            "knocking", (">=", 50), full=True),
     Figure("knocks_memory", "mb", "what the server's memory grew by meanwhile", "knocking", ("<=", 64.0),
            baseline="its memory before", full=True),
-    Figure("knocks_logged", "count", "lines that its log says of them; of none of them it would be a failure", "knocking", ("<=", 20),
+    Figure("knocks_logged", "count", "lines that its log says of them; of none of them it would be a failure",
+           "knocking", ("<=", 20),
            full=True),
     Figure("knocks_commit", "ms", "from a cut of the hand until it is confirmed, median, meanwhile", "knocking",
            baseline="before they came", full=True),
-    Figure("knocks_differences", "count", "hands with another bone than the server's at the end", "knocking", ("==", 0), full=True),
+    Figure("knocks_differences", "count", "hands with another bone than the server's at the end", "knocking", ("==", 0),
+           full=True),
     Figure("damaged_cases", "count", "uploads of a case with one to three bytes changed, ten of them of 65 MB",
            "damaged_cases", (">=", 1000), full=True),
     Figure("damaged_cases_taken", "count", "of them taken as another case", "damaged_cases", ("==", 0), full=True),
@@ -481,37 +590,48 @@ FIGURES = [
     Figure("proxy_upload_ratio", "ratio",
            "time to send 32 MiB to the server over that through the proxy, at a round trip of 150 ms "
            "(a relay that delays both directions and bounds nothing)", "insider_uploads", (">=", 0.8), full=True),
-    *[Figure(f"fuzzed_{target}", "count", f"changed {what} that {take} took or refused, and nothing else", f"fuzz_{target}",
+    *[Figure(f"fuzzed_{target}", "count", f"changed {what} that {take} took or refused, and nothing else",
+             f"fuzz_{target}",
              (">=", inputs), full=True) for target, what, take, inputs in FUZZED],
     Figure("simulated_decisions", "count", "decisions of instructors about hands in the simulated rooms", "simulated",
            (">=", 10_000), full=True),
-    Figure("simulated_forbidden", "count", "cuts that were refused for them; one that was taken would be a failure", "simulated",
+    Figure("simulated_forbidden", "count", "cuts that were refused for them; one that was taken would be a failure",
+           "simulated",
            full=True),
     # What one tool costs its line and its room's disk.
     Figure("uplink_cutting", "kbit_per_s", "a tool's uplink while it cuts: sealed datagrams and the stream's bytes and "
            "acknowledgements, headers included", "uplink", ("<=", 300.0), full=True),
     Figure("uplink_cutting_loss", "kbit_per_s", "the same at 40 +- 10 ms and 30 % loss", "uplink", ("<=", 300.0),
            baseline="without loss", full=True),
-    Figure("uplink_idle_share", "ratio", "uplink of a tool that rests over that of one that cuts, on the worse of both lines",
+    Figure("uplink_idle_share", "ratio",
+           "uplink of a tool that rests over that of one that cuts, on the worse of both lines",
            "uplink", ("<=", 0.2), full=True),
-    Figure("journal_mb_per_hour", "mb", "journal of a tool that cuts for an hour without pause, from a shorter time, and one "
+    Figure("journal_mb_per_hour", "mb",
+           "journal of a tool that cuts for an hour without pause, from a shorter time, and one "
            "checkpoint", "uplink", full=True),
-    Figure("rooms_per_core", "count", "rooms that a core holds with a tool cutting in each and a journal on the disk, viewers and "
-           "lines to clients not counted; of 1, 4 or 16 rooms in one process the most that keep their ticks", "rooms_per_core",
+    Figure("rooms_per_core", "count",
+           "rooms that a core holds with a tool cutting in each and a journal on the disk, viewers and "
+           "lines to clients not counted; of 1, 4 or 16 rooms in one process the most that keep their ticks",
+           "rooms_per_core",
            baseline="without journals", full=True),
     Figure("forged", "count", "datagrams forged, flipped or replayed", "forgery", (">=", 10_000_000), full=True),
     Figure("forged_accepted", "count", "of them accepted", "forgery", ("==", 0), full=True),
     Figure("forged_answered", "count", "bytes answered to them", "forgery", ("==", 0), full=True),
-    Figure("genuine_lost", "count", "genuine datagrams in between that were not accepted", "forgery", ("==", 0), full=True),
+    Figure("genuine_lost", "count", "genuine datagrams in between that were not accepted", "forgery", ("==", 0),
+           full=True),
     Figure("observers_p99", "of_budget",
            "from a cut's commit until each of 150 observers has its surface, 99th percentile, as a part of "
            "40 ms", "observers", ("<=", 1.0), baseline="10 observers", full=True),
-    Figure("observers_stalled_p99", "of_budget", "the same of the others while ten never read", "observers", ("<=", 1.0),
+    Figure("observers_stalled_p99", "of_budget", "the same of the others while ten never read", "observers",
+           ("<=", 1.0),
            full=True),
-    Figure("observers_stalled_effect", "ratio", "what ten stalled ones do to the others", "observers", ("<=", 1.25), full=True),
-    Figure("observers_rate", "ratio", "messages a second that the slowest observer gets, over 30", "observers", (">=", 0.95),
+    Figure("observers_stalled_effect", "ratio", "what ten stalled ones do to the others", "observers", ("<=", 1.25),
            full=True),
-    Figure("observers_there", "count", "of three runs, those after which all had the newest surface", "observers", ("==", 3),
+    Figure("observers_rate", "ratio", "messages a second that the slowest observer gets, over 30", "observers",
+           (">=", 0.95),
+           full=True),
+    Figure("observers_there", "count", "of three runs, those after which all had the newest surface", "observers",
+           ("==", 3),
            full=True),
     Figure("observers_memory", "ratio", "memory of the server with ten stalled ones over that without", "observers",
            ("<=", 1.1), full=True),
@@ -532,11 +652,14 @@ FIGURES = [
                                 ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (
         Figure(f"real_{name}_frame", "ms", f"{what}: 33 burr cuts and all blocks that they change, median",
                f"real_{name}", baseline="the surface of the whole bone, once", full=True),
-        Figure(f"real_{name}_frame_budget", "of_budget", "the same as a part of a 30 Hz frame", f"real_{name}", ("<=", 1.0),
+        Figure(f"real_{name}_frame_budget", "of_budget", "the same as a part of a 30 Hz frame", f"real_{name}",
+               ("<=", 1.0),
                full=True),
-        Figure(f"real_{name}_cut_p99", "us", f"{what}: one cut, 99th percentile", f"real_{name}", baseline="median", full=True),
+        Figure(f"real_{name}_cut_p99", "us", f"{what}: one cut, 99th percentile", f"real_{name}", baseline="median",
+               full=True),
         Figure(f"real_{name}_memory", "mb", f"{what}: memory of the case", f"real_{name}", full=True),
-        Figure(f"real_{name}_memory_cut", "mb", f"{what}: memory of what all these cuts added", f"real_{name}", full=True))],
+        Figure(f"real_{name}_memory_cut", "mb", f"{what}: memory of what all these cuts added", f"real_{name}",
+               full=True))],
 ]
 
 

@@ -1,4 +1,5 @@
-"""Figures of a room that loses nothing: simulated rooms, journals on failing disks, killed servers, bad networks, forgers and
+"""Figures of a room that loses nothing: simulated rooms, journals on failing disks, killed servers, bad networks,
+forgers and
 many observers. All hands are simulated; networks are simulated, or impaired on this machine."""
 import json
 import os
@@ -109,7 +110,8 @@ def server_kills(run):
     rooms = 20 if run.soak else 4
     run.say(f"{500 * rooms} killed servers")
     outs = [json.loads(run.output("osteon-server-kills", 500, 2 + room)) for room in range(rooms)]
-    run.tables.append(("Killed servers, rooms of 500 kills", [(name, *(out[name] for out in outs)) for name in outs[0]]))
+    run.tables.append(("Killed servers, rooms of 500 kills",
+                       [(name, *(out[name] for out in outs)) for name in outs[0]]))
     total = {name: sum(out[name] for out in outs) for name in outs[0] if isinstance(outs[0][name], int)}
     return {
         "server_kills": (total["kills"], None),
@@ -128,7 +130,8 @@ def bad_network(run):
     # Of all cuts of all runs together; beside it what the machine itself does to whoever waits, wakes and syncs.
     def felt(kind, bound_ms):
         of = kind["felt_ms"]
-        return Measured(of["p99_pooled"] / bound_ms, kind["machine_ms"]["p99"] / bound_ms, low=of["p99_median_run"] / bound_ms,
+        return Measured(of["p99_pooled"] / bound_ms, kind["machine_ms"]["p99"] / bound_ms,
+                        low=of["p99_median_run"] / bound_ms,
                         high=of["p99_worst_run"] / bound_ms)
 
     return {
@@ -153,7 +156,8 @@ def felt_stages(run):
     for name, key in (("lateness of ticks", "tick_late_ms"), ("transactions", "transaction_ms")):
         rows.append((name, good[key]["p50"], good[key]["p99"], bad[key]["p50"], bad[key]["p99"]))
     run.tables.append(("Stages of a felt cut; hands and the bad network are simulated", rows))
-    values = {f"felt_stage_{stage}": (good["stages"][stage]["p50"], bad["stages"][stage]["p50"]) for stage in FELT_STAGES}
+    values = {f"felt_stage_{stage}": (good["stages"][stage]["p50"], bad["stages"][stage]["p50"])
+              for stage in FELT_STAGES}
     values["felt_stage_close"] = (good["cut_closes_after_ms"]["most"], bad["cut_closes_after_ms"]["most"])
     values["felt_stage_all"] = (good["whole"]["p50"], bad["whole"]["p50"])
     return values
@@ -179,7 +183,8 @@ def uplink(run):
     return {
         "uplink_cutting": (clean["cutting"]["kbit_per_s"], None),
         "uplink_cutting_loss": (bad["cutting"]["kbit_per_s"], clean["cutting"]["kbit_per_s"]),
-        "uplink_idle_share": (max(kind["idle"]["kbit_per_s"] / kind["cutting"]["kbit_per_s"] for kind in (clean, bad)), None),
+        "uplink_idle_share": (max(kind["idle"]["kbit_per_s"] / kind["cutting"]["kbit_per_s"] for kind in (clean, bad)),
+                              None),
         "journal_mb_per_hour": (1e-6 * (hour + kept["checkpoints"]["at_last"]), None),
     }
 
@@ -194,9 +199,11 @@ def rooms_per_core(run):
     rows = [("rooms", "cores", "rooms per core", "ticks missed", "late p99 ms", "transaction p99 ms", "behind s")]
     for kind in [*out["cutting"], out["not_kept"], out["idle"]]:
         worst = kind["worst_room_ms"]
-        rows.append((kind["rooms"], kind["cores"], kind["rooms_per_core"], kind["tick_missed_share"], worst["tick_late_p99"],
+        rows.append((kind["rooms"], kind["cores"], kind["rooms_per_core"], kind["tick_missed_share"],
+                     worst["tick_late_p99"],
                      worst["commit_p99"], kind["behind_at_the_end_s"]))
-    run.tables.append(("Rooms in one process, a simulated tool in each; the last two without journals, and without work", rows))
+    run.tables.append(("Rooms in one process, a simulated tool in each; the last two without journals, and without "
+                       "work", rows))
     held = [kind for kind in out["cutting"] if kind["tick_missed_share"] <= MOST_MISSED] or out["cutting"][:1]
     return {"rooms_per_core": (held[-1]["rooms_per_core"], out["not_kept"]["rooms_per_core"])}
 
@@ -233,17 +240,22 @@ def observers(run):
 def override(run):
     run.say("how soon and how gently an instructor's word takes hold")
     out = json.loads(run.output("osteon-override", 100 if run.soak else 40))
-    rows = [("one way ms", "loss", "stopped", "p50 ms", "p99 ms", "most ms", "from asking p50 ms", "p99 ms", "cuts refused")]
+    rows = [("one way ms", "loss", "stopped", "p50 ms", "p99 ms", "most ms", "from asking p50 ms", "p99 ms",
+             "cuts refused")]
     for line in out["lines"]:
         after, asked = line["after_answer"], line["after_asking"]
-        rows.append((line["one_way_ms"], line["loss"], f"{line['stopped']} of {line['asked']}", after["p50"], after["p99"],
+        rows.append((line["one_way_ms"], line["loss"], f"{line['stopped']} of {line['asked']}", after["p50"],
+                     after["p99"],
                      after["max"], asked["p50"], asked["p99"], line["cuts_stopped"]))
-    run.tables.append(("From an instructor's word until the hand cuts no more, less the way; hand and line are simulated", rows))
+    run.tables.append(("From an instructor's word until the hand cuts no more, less the way; hand and line are "
+                       "simulated", rows))
     touch = out["touch"]
-    felt = ("mount", "one_way_ms", "step_over_slew", "contact_mj", "led_mj", "made_mj", "carried_mm", "touching_s", "cutting_s")
+    felt = ("mount", "one_way_ms", "step_over_slew", "contact_mj", "led_mj", "made_mj", "carried_mm", "touching_s",
+            "cutting_s")
     held = tuple(touch[0]["in_contact"])
     run.tables.append(("What hands feel of it, and how often each took hold of a tool on bone",
-                       [felt + held] + [tuple(t[n] for n in felt) + tuple(t["in_contact"][n] for n in held) for t in touch]))
+                       [felt + held] + [tuple(t[n] for n in felt) + tuple(t["in_contact"][n] for n in held)
+                                        for t in touch]))
     yielding = [t for t in touch if t["mount"]]
     whole = [line for line in out["lines"] if line["loss"] == 0]
     lossy = [line for line in out["lines"] if line["loss"] > 0]
@@ -266,7 +278,8 @@ def override(run):
 
 
 GROUPS = {"override": override,
-          "simulated": simulated, "simulated_full": simulated_full, "simulated_broken": simulated_broken, "journal": journal,
+          "simulated": simulated, "simulated_full": simulated_full, "simulated_broken": simulated_broken,
+          "journal": journal,
           "journal_commits": journal_commits,
           "server_kills": server_kills, "bad_network": bad_network, "felt_stages": felt_stages, "uplink": uplink,
           "rooms_per_core": rooms_per_core, "forgery": forgery, "observers": observers}

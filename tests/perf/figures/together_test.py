@@ -1,4 +1,5 @@
-"""How deploy/demo --together judges what hands felt: growth of force that neither the hand nor the slew limit explains."""
+"""How deploy/demo --together judges what hands felt: growth of force that neither the hand nor the slew limit
+explains."""
 import sys
 import unittest
 from pathlib import Path

@@ -456,7 +456,7 @@ TEST(CallRates, AreThoseOfCallsThatThereAre) {
   int limited = 0;
   for (const CallRow& entry : call_entries()) limited += find_call_rate(entry.method) != nullptr ? 1 : 0;
   EXPECT_EQ(limited, 21);
-  // All that makes a entry of the journal.
+  // All that makes an entry of the journal.
   for (const char* method :
        {"Join", "Mark", "Undo", "Redo", "AddTool", "RemoveBody", "SetSceneItem", "RemoveSceneItem"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.RoomService/") + method), nullptr) << method;

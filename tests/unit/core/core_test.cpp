@@ -46,8 +46,8 @@ TEST(Id, IsNullWhenZero) {
 }
 
 TEST(Units, AddAndCompareWithinTheirKind) {
-  EXPECT_EQ(1.5_mm + 0.5_mm, 2.0_mm);
-  EXPECT_LT(1.0_N, 2.0_N);
+  EXPECT_EQ(Millimetres{1.5} + Millimetres{0.5}, Millimetres{2.0});
+  EXPECT_LT(Newtons{1.0}, Newtons{2.0});
   static_assert(!std::is_convertible_v<double, Newtons> && !std::is_convertible_v<Millimetres, Newtons>);
 }
 

@@ -1,4 +1,4 @@
-// Rows of which something was erased: the chain and its signatures still hold, and nobody else can replace a entry.
+// Rows of which something was erased: the chain and its signatures still hold, and nobody else can replace an entry.
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
@@ -75,7 +75,7 @@ TEST_F(ErasingTest, WithoutTheKeyNothingIsErased) {
   EXPECT_TRUE(equal(entries_of(*journal), entries_));
 }
 
-// Whoever can write the file puts something in place of a entry, and says itself that it was erased.
+// Whoever can write the file puts something in place of an entry, and says itself that it was erased.
 TEST_F(ErasingTest, AServerTakesNoRowsThatSomebodyElseReplaced) {
   make(keys_);
   {
@@ -100,11 +100,11 @@ TEST_F(ErasingTest, WhatStandsInPlaceOfARowIsSealed) {
     ASSERT_EQ(journal.erase_entries(every_third).value(), 30u);
     ASSERT_TRUE(journal.close());
   }
-  sql("UPDATE entries SET bytes = CAST('other' AS BLOB) WHERE place = 3");
+  sql("UPDATE rows SET bytes = CAST('other' AS BLOB) WHERE place = 3");
   const auto report = verify_journal(file_);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{3});
-  sql("UPDATE entries SET bytes = CAST('-' AS BLOB) WHERE place = 3; UPDATE registers SET value = CAST('' AS BLOB) WHERE "
+  sql("UPDATE rows SET bytes = CAST('-' AS BLOB) WHERE place = 3; UPDATE registers SET value = CAST('' AS BLOB) WHERE "
       "name = 'erased entries'");
   EXPECT_FALSE(verify_journal(file_)->sound());
 }

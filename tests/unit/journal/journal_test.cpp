@@ -126,7 +126,7 @@ TEST_F(JournalTest, HoldsWitnessesAgainstItsHistory) {
   const Result<void> ahead = journal.check_witness({RoomSeq{6}, journal.head().chain});
   ASSERT_FALSE(ahead);
   EXPECT_EQ(ahead.error().code, ErrorCode::unavailable);
-  EXPECT_THAT(ahead.error().message, HasSubstr("goes to place 5, but a client was told that place 6 is safe"));
+  EXPECT_THAT(ahead.error().message, HasSubstr("goes to event 5, but a client was told that event 6 is durable"));
   ASSERT_NE(journal.closed_because(), nullptr);
   const JournalEntry next{RoomSeq{6}, 0, ""};
   EXPECT_FALSE(journal.append({&next, 1}));
@@ -195,8 +195,8 @@ TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
     Journal journal = reopen();
     ASSERT_NE(journal.closed_because(), nullptr);
     EXPECT_EQ(journal.closed_because()->code, ErrorCode::unavailable);
-    EXPECT_THAT(journal.closed_because()->message, HasSubstr("goes to place 5"));
-    EXPECT_THAT(journal.closed_because()->message, HasSubstr("vouches for place 9: 4 entries are missing"));
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("goes to event 5"));
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("vouches for event 9: 4 entries are missing"));
     EXPECT_TRUE(equal(entries_of(journal), {entries.begin(), entries.begin() + 5}));
     EXPECT_FALSE(journal.append({&entries[5], 1}));
   }
@@ -248,7 +248,7 @@ TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
   {
     Journal journal = reopen();
     ASSERT_NE(journal.closed_because(), nullptr);
-    EXPECT_THAT(journal.closed_because()->message, HasSubstr("recover it into a new journal"));
+    EXPECT_THAT(journal.closed_because()->message, HasSubstr("salvage it into a new journal"));
   }
   ASSERT_TRUE(salvage_journal(kFile, "/room/new", &disk_));
   Journal journal = std::move(Journal::open("/room/new", options()).value());

@@ -68,7 +68,7 @@ class LogTest : public ::testing::Test {
   MemoryDisk disk_{1};
   std::vector<JournalEntry> entries_ = [] {
     std::vector<JournalEntry> entries = some_entries(5, 60);
-    for (JournalEntry& entry : entries) entry.bytes += "a entry is as long as this at least";
+    for (JournalEntry& entry : entries) entry.bytes += "an entry is as long as this at least";
     return entries;
   }();
   MemoryDisk::Image before_;
@@ -113,7 +113,7 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
 TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
   make_killed();
   for (const char* file : {kLog, kMirror}) flip(file, 50);
-  EXPECT_THAT(expect_closed(50), HasSubstr("goes to place 50, but its log vouches for place 60: 10 entries are missing"));
+  EXPECT_THAT(expect_closed(50), HasSubstr("goes to event 50, but its log vouches for event 60: 10 entries are missing"));
   const auto recovered = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->head.place, RoomSeq{50});
@@ -127,11 +127,11 @@ TEST_F(LogTest, ItsLossIsNamed) {
   const MemoryDisk::Image killed = disk_.image();
   for (const char* file : {kLog, kMirror}) ASSERT_TRUE(disk_.remove(file));
   EXPECT_THAT(expect_closed(40),
-              HasSubstr("its log is missing: how many entries are missing after place 40 cannot be told"));
+              HasSubstr("its log is missing: how many entries are missing after event 40 cannot be told"));
   disk_.load(killed);
   for (const char* file : {kLog, kMirror}) disk_.cut(file, 0);
   EXPECT_THAT(expect_closed(40), HasSubstr("is damaged"));
-  EXPECT_THAT(verify_journal(kFile, &disk_)->faults, Contains(HasSubstr("after place 40 cannot be told")));
+  EXPECT_THAT(verify_journal(kFile, &disk_)->faults, Contains(HasSubstr("after event 40 cannot be told")));
   // Behind the first sector, and where an entry ends: what is left looks like a log with fewer entries.
   for (const std::size_t entry : {40, 50}) {
     disk_.load(killed);
@@ -139,7 +139,7 @@ TEST_F(LogTest, ItsLossIsNamed) {
       disk_.cut(file, entry == 40 ? 4096 : killed.at(file).find(entries_[entry - 1].bytes) + entries_[entry - 1].bytes.size() + 16);
     EXPECT_THAT(expect_closed(entry), HasSubstr("was cut"));
     EXPECT_THAT(verify_journal(kFile, &disk_)->faults,
-                Contains(HasSubstr("after place " + std::to_string(entry) + " cannot be told")));
+                Contains(HasSubstr("after event " + std::to_string(entry) + " cannot be told")));
   }
 }
 
@@ -181,7 +181,7 @@ TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
     append(journal, entries_, 40, 60);
   }
   disk_.put(kFile, earlier.at(kFile));
-  EXPECT_THAT(expect_closed(20), HasSubstr("goes to place 20, but its log vouches for place 60: 40 entries are missing"));
+  EXPECT_THAT(expect_closed(20), HasSubstr("goes to event 20, but its log vouches for event 60: 40 entries are missing"));
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
   EXPECT_EQ(Journal::open(kFile, options())->head().place, RoomSeq{20})
       << "an older copy of all files: only witnesses know more";
@@ -198,7 +198,7 @@ TEST_F(LogTest, AnOlderLogBesideANewerDatabaseIsNamed) {
   }
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
   EXPECT_THAT(expect_closed(20),
-              HasSubstr("its log is an older copy: how many entries are missing after place 20 cannot be told"));
+              HasSubstr("its log is an older copy: how many entries are missing after event 20 cannot be told"));
 }
 
 TEST_F(LogTest, IsNotTakenFromAnotherJournalThatBeganAlike) {
@@ -231,7 +231,7 @@ TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
     }
 }
 
-// A entry is as large as it may be, and has in it what looks like the entry of a log.
+// An entry is as large as it may be, and has in it what looks like the entry of a log.
 TEST_F(LogTest, TakesARowThatIsLargerThanItself) {
   {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());

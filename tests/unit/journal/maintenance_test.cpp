@@ -250,7 +250,7 @@ TEST(Migration, RefusesTablesThatAreNotThoseOfTheVersion) {
   const test::TempDir folder;
   { ASSERT_TRUE(Journal::create(folder / "journal", "bone")->close()); }
   change(folder / "journal",
-         "CREATE TRIGGER t AFTER INSERT ON entries BEGIN DELETE FROM entries WHERE place = new.place; END");
+         "CREATE TRIGGER t AFTER INSERT ON rows BEGIN DELETE FROM rows WHERE place = new.place; END");
   const auto opened = Journal::open(folder / "journal");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);

@@ -34,7 +34,7 @@ void make_old_journal(const std::filesystem::path& file, int version, const std:
     ASSERT_EQ(sqlite3_exec(database, sql.c_str(), nullptr, nullptr, &why), SQLITE_OK) << why << " in " << sql;
   };
   run("PRAGMA journal_mode=WAL; PRAGMA wal_autocheckpoint=0");
-  run(std::string("CREATE TABLE entries(place INTEGER PRIMARY KEY, ") + (timed ? "at_ns INTEGER NOT NULL, " : "") +
+  run(std::string("CREATE TABLE rows(place INTEGER PRIMARY KEY, ") + (timed ? "at_ns INTEGER NOT NULL, " : "") +
       "bytes BLOB NOT NULL, chain BLOB NOT NULL) STRICT");
   run("CREATE TABLE registers(name TEXT PRIMARY KEY, value BLOB NOT NULL, seal BLOB NOT NULL) STRICT, WITHOUT ROWID");
   run("CREATE TABLE checkpoints(place INTEGER PRIMARY KEY, chain BLOB NOT NULL, meta BLOB NOT NULL, size INTEGER NOT"
@@ -51,7 +51,7 @@ void make_old_journal(const std::filesystem::path& file, int version, const std:
   std::vector<JournalEntry> so_far;
   for (const JournalEntry& entry : entries) {
     so_far.push_back(entry);
-    run("INSERT INTO entries VALUES(" + std::to_string(entry.place.value) + ", " +
+    run("INSERT INTO rows VALUES(" + std::to_string(entry.place.value) + ", " +
         (timed ? std::to_string(entry.at_ns) + ", " : "") + hex(entry.bytes) + ", " +
         hex(test::plain_head("bone", so_far).chain.bytes) + ")");
   }

@@ -214,10 +214,10 @@ TEST_F(SignedJournal, IsVouchedForToItsEndHoweverItsServerEnded) {
     write(keys_, 0, 20, close);
     write(keys_, 20, 45, !close);
     const Vouched found = vouched(key_);
-    EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
-    EXPECT_THAT(text_of(found.entries), ElementsAre("1-45"));
+    EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_seals);
+    EXPECT_THAT(text_of(found.ranges), ElementsAre("1-45"));
     const Vouched by_another = vouched(SigningKey::make().public_key());
-    EXPECT_THAT(by_another.entries, IsEmpty());
+    EXPECT_THAT(by_another.ranges, IsEmpty());
     EXPECT_THAT(text_of(by_another.by_others), ElementsAre("1-45"));
   }
 }
@@ -228,7 +228,7 @@ TEST_F(SignedJournal, IsVouchedForByNobodyWithoutAKey) {
   // A server with a key vouches for what it adds, not for what it found.
   write(keys_, 20, 30, false);
   const Vouched found = vouched(key_);
-  EXPECT_THAT(text_of(found.entries), ElementsAre("21-30"));
+  EXPECT_THAT(text_of(found.ranges), ElementsAre("21-30"));
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-20"));
   EXPECT_THAT(open(keys_).notes(), IsEmpty()) << "the second time it knows them";
 }
@@ -238,7 +238,7 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
   write(keys_, 0, 20, true);
   write(nullptr, 20, 50, true);
   const Vouched found = vouched(key_);
-  EXPECT_THAT(text_of(found.entries), ElementsAre("1-20"));
+  EXPECT_THAT(text_of(found.ranges), ElementsAre("1-20"));
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("21-50"));
   {
     Journal journal = open(keys_);
@@ -248,7 +248,7 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
   // Without the key nobody makes the server take them.
   ASSERT_TRUE(salvage_journal(file_, folder_ / "by a script"));
   EXPECT_NE(std::move(Journal::open(folder_ / "by a script", {.keys = keys_}).value()).closed_because(), nullptr);
-  EXPECT_THAT(vouched(key_, folder_ / "by a script").other_entries, Contains("the register \"recovered\""));
+  EXPECT_THAT(vouched(key_, folder_ / "by a script").other_seals, Contains("the register \"recovered\""));
   // Only the signed entries.
   ASSERT_TRUE(salvage_journal(file_, folder_ / "signed", nullptr, {}, RoomSeq{20}, keys_));
   EXPECT_TRUE(vouched(key_, folder_ / "signed").all());
@@ -257,9 +257,9 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
   file_ = folder_ / "all";
   write(keys_, 50, 60, true);
   const Vouched recovered = vouched(key_);
-  EXPECT_THAT(text_of(recovered.entries), ElementsAre("1-20", "51-60"));
+  EXPECT_THAT(text_of(recovered.ranges), ElementsAre("1-20", "51-60"));
   EXPECT_THAT(text_of(recovered.by_nobody), ElementsAre("21-50"));
-  EXPECT_THAT(recovered.other_entries, IsEmpty());
+  EXPECT_THAT(recovered.other_seals, IsEmpty());
 }
 
 // Whoever cuts it back to an earlier signature has no footer for that place.
@@ -267,10 +267,10 @@ TEST_F(SignedJournal, NamesAFooterThatAScriptWrote) {
   write(keys_, 0, 20, true);
   write(keys_, 20, 30, true);
   run_sql(
-      "DELETE FROM entries WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
+      "DELETE FROM rows WHERE place > 20; DELETE FROM signatures WHERE place > 20;"
       "DELETE FROM registers WHERE name IN ('footer', 'log generation')");
   write(nullptr, 0, 0, true);
-  EXPECT_THAT(vouched(key_).other_entries, Contains("the footer"));
+  EXPECT_THAT(vouched(key_).other_seals, Contains("the footer"));
 }
 
 TEST_F(SignedJournal, IsNotVouchedForWhereNothingIsSigned) {
@@ -289,17 +289,17 @@ TEST_F(SignedJournal, NamesAPersonWhoWasExchanged) {
   }
   EXPECT_TRUE(vouched(key_).all());
   run_sql("UPDATE people SET label = 'Berta' WHERE pseudonym = '1'");
-  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("an entry of its people is damaged")));
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the record of a person is damaged")));
   run_sql("UPDATE people SET label = 'Anna' WHERE pseudonym = '1'");
   ASSERT_TRUE(open(nullptr).set_person({"1", "Berta", 20000}));
-  EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the name of person 1"));
+  EXPECT_THAT(vouched(key_).other_seals, ElementsAre("the name of person 1"));
 }
 
 // A signature of the attacker's own key, for entries that there are not.
 TEST_F(SignedJournal, IsRecoveredWithoutSignaturesThatDoNotFit) {
   write(keys_, 0, 20, true);
   const SigningKey theirs = SigningKey::make();
-  const SignedRange bogus = sign_entries(theirs, RoomSeq{1}, {RoomSeq{10}, Digest{}});
+  const SignedEntries bogus = sign_entries(theirs, RoomSeq{1}, {RoomSeq{10}, Digest{}});
   const auto hex = [](const auto& bytes) {
     std::string text;
     for (const std::uint8_t byte : bytes) {
@@ -321,10 +321,10 @@ TEST_F(SignedJournal, NamesRowsThatAnotherKeySigned) {
   const auto others = new_keys();
   write(others, 20, 50, true);
   const Vouched found = vouched(key_);
-  EXPECT_THAT(text_of(found.entries), ElementsAre("1-20"));
+  EXPECT_THAT(text_of(found.ranges), ElementsAre("1-20"));
   EXPECT_THAT(text_of(found.by_others), ElementsAre("21-50"));
   EXPECT_FALSE(found.all());
-  EXPECT_THAT(text_of(vouched(others->key().public_key()).entries), ElementsAre("21-50"));
+  EXPECT_THAT(text_of(vouched(others->key().public_key()).ranges), ElementsAre("21-50"));
 }
 
 TEST_F(SignedJournal, KnowsTheLineOfItsServersKeys) {
@@ -349,11 +349,11 @@ TEST_F(SignedJournal, KeepsItsSignaturesInABackup) {
     append(journal, entries_, 20, 30);
   }
   ASSERT_TRUE(backup_journal(file_, folder_ / "without key"));
-  EXPECT_THAT(vouched(key_, folder_ / "without key").other_entries, ElementsAre("the footer"));
+  EXPECT_THAT(vouched(key_, folder_ / "without key").other_seals, ElementsAre("the footer"));
   ASSERT_TRUE(backup_journal(file_, folder_ / "backup", nullptr, keys_));
   const Vouched found = vouched(key_, folder_ / "backup");
-  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
-  EXPECT_THAT(text_of(found.entries), ElementsAre("1-30"));
+  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_seals);
+  EXPECT_THAT(text_of(found.ranges), ElementsAre("1-30"));
 }
 
 TEST_F(SignedJournal, KeepsItsSignaturesInACopyThatItsServerMakes) {
@@ -365,8 +365,8 @@ TEST_F(SignedJournal, KeepsItsSignaturesInACopyThatItsServerMakes) {
   while (!copy->step().value()) {
   }
   const Vouched found = vouched(key_, folder_ / "copy");
-  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_entries);
-  EXPECT_THAT(text_of(found.entries), ElementsAre("1-30"));
+  EXPECT_TRUE(found.all()) << ::testing::PrintToString(found.other_seals);
+  EXPECT_THAT(text_of(found.ranges), ElementsAre("1-30"));
 }
 
 // A branch would turn entries of nobody into entries of the server.
@@ -388,7 +388,7 @@ TEST_F(SignedJournal, SignsABranchThatItsServerMakes) {
   ASSERT_TRUE(copy);
   while (!copy->step().value()) {
   }
-  EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").entries), ElementsAre("1-10"));
+  EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").ranges), ElementsAre("1-10"));
 }
 
 TEST_F(SignedJournal, TakesTheSignatureOfEarlierRowsForNoOther) {
@@ -401,15 +401,15 @@ TEST_F(SignedJournal, TakesTheSignatureOfEarlierRowsForNoOther) {
           "' AS first; DELETE FROM signatures; INSERT INTO signatures SELECT * FROM first.signatures");
   const auto report = verify_journal(file_);
   ASSERT_TRUE(report);
-  EXPECT_THAT(report->faults, Contains(HasSubstr("the signature at place 20 vouches for another history")));
+  EXPECT_THAT(report->faults, Contains(HasSubstr("the signature at event 20 vouches for another history")));
 }
 
 TEST_F(SignedJournal, NamesASignatureThatNoKeyMade) {
   write(keys_, 0, 20, true);
   run_sql("UPDATE signatures SET since = 2 WHERE place = 20");
-  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at place 20 is damaged")));
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at event 20 is damaged")));
   run_sql("UPDATE signatures SET key = zeroblob(31) WHERE place = 20");
-  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at place 20 is damaged")));
+  EXPECT_THAT(verify_journal(file_)->faults, Contains(HasSubstr("the signature at event 20 is damaged")));
 }
 
 TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
@@ -432,7 +432,7 @@ TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
     EXPECT_FALSE(journal.is_vouched_for(journal.checkpoints()->front())) << "whose bone the server would serve";
   }
   EXPECT_FALSE(open(new_keys()).is_vouched_for("room name").value());
-  EXPECT_THAT(vouched(key_).other_entries, ElementsAre("the checkpoint at place 20", "the register \"room name\""));
+  EXPECT_THAT(vouched(key_).other_seals, ElementsAre("the checkpoint at event 20", "the register \"room name\""));
 }
 
 // Of another genesis, a register's signature is none.
@@ -457,7 +457,7 @@ TEST_F(SignedJournal, GoesOnFromOneOfAnOldVersion) {
   write(keys_, 30, 40, false);
   const Vouched found = vouched(key_);
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-30"));
-  EXPECT_THAT(text_of(found.entries), ElementsAre("31-40"));
+  EXPECT_THAT(text_of(found.ranges), ElementsAre("31-40"));
 }
 
 }  // namespace

@@ -64,7 +64,7 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
           std::string text = std::to_string(a) + " " + std::to_string(number);
           text.resize(12, ' ');
           for (const auto& server : servers) {
-            // A entry is joined to the author's last one where that is the entry before; a real packet joins it over others
+            // An entry is joined to the author's last one where that is the entry before; a real packet joins it over others
             // too.
             const bool follows = last_entry[a] != 0 && last_entry[a] + 1 == entries.size();
             if (!server->say(text, std::string(40, 'h'), follows)) outcome.each_once_in_order = false;

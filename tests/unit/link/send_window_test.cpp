@@ -299,7 +299,7 @@ TEST(SendWindow, Table) {
       EXPECT_GT(wide[5].p99_ms, 2.0 * way_ms);
     }
     EXPECT_GT(wide[3].p99_ms, 2.0 * way_ms);
-    // Four packets in a entry are lost once in 123 times: then the fifth brings it, 32 ms later.
+    // Four packets in an entry are lost once in 123 times: then the fifth brings it, 32 ms later.
     EXPECT_LT(wide[10].p99_ms, way_ms + 10.0 + 5.0 * 8.0);
     EXPECT_LT(wide[0].p99_ms, way_ms + 10.0 + 5.0 * 8.0) << "as SendRate chooses";
     // With two thirds of the bytes packets go every 11 ms.

@@ -140,7 +140,7 @@ TEST_P(LogEntries, ReplayedMakeTheSameRoom) {
     ASSERT_EQ(replayed.room_hash(), busy.room.room_hash()) << "event " << i << ", entry " << entries;
     ASSERT_EQ(replayed.room_seq(), busy.room.room_seq());
   }
-  EXPECT_EQ(entries, busy.room.room_seq().value) << "every place of the order is a entry";
+  EXPECT_EQ(entries, busy.room.room_seq().value) << "every place of the order is an entry";
   EXPECT_TRUE(replayed.take_entries().empty()) << "what was decided elsewhere is not decided again";
   expect_same(busy.room, replayed);
 }

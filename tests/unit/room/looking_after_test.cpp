@@ -13,7 +13,7 @@
 
 #include "server/net/certificate.hpp"
 #include "server/net/health_watch.hpp"
-#include "server/net/host_port.hpp"
+#include "common/wire/host_port.hpp"
 #include "server/net/metrics.hpp"
 #include "server/net/refusals.hpp"
 #include "tests/support/disk/memory_disk.hpp"

@@ -203,7 +203,7 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   const auto report = verify_journal(kFile, &disk_);
   ASSERT_TRUE(report);
   EXPECT_THAT(report->faults, IsEmpty());
-  EXPECT_THAT(report->notes, ElementsAre(HasSubstr("words were erased from")));
+  EXPECT_THAT(report->notes, ElementsAre(HasSubstr("text was erased from")));
   kept.open(kFile);
   EXPECT_EQ(kept.room->field_hash(), later);
   EXPECT_EQ(test::replay_of(test::entries_of(*kept.store, head.place)).field_hash(), bone);

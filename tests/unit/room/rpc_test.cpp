@@ -78,7 +78,7 @@ TEST_F(RoomRpc, AWordAboutAllIsARowForThoseAloneWhomItChanges) {
   EXPECT_EQ(tell(absent.value, false), before + 3);
   EXPECT_EQ(tell(0, true), before + 4);
   EXPECT_EQ(head(), before + 4) << "the one who was freed alone";
-  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a word about one is a entry";
+  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a word about one is an entry";
 }
 
 TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
@@ -88,7 +88,7 @@ TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
   MeshReader viewer(address());
   ASSERT_TRUE(wait_until([&] { return first->own() == 12 && second->own() == 12 && first->seq() == second->seq(); },
                          kPatience));
-  // Who watches may have come after the last cut, which is a entry as well.
+  // Who watches may have come after the last cut, which is an entry as well.
   const RoomSeq last_cut = std::max(first->acknowledged().at(12), second->acknowledged().at(12));
   ASSERT_TRUE(viewer.read_to(last_cut));
   const auto surface = viewer.hashes();

@@ -222,7 +222,7 @@ TEST(SessionSendQueue, LeavesOutWhatHasArrived) {
   EXPECT_EQ(send_queue.index(), 5u);
   EXPECT_EQ(parsed(send_queue.take()).index(), 4u);
   EXPECT_EQ(parsed(send_queue.take()).index(), 5u);
-  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not a entry of the order";
+  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not an entry of the order";
 }
 
 TEST(SessionSendQueue, GivesUpAReaderThatIsTooFarBehind) {

@@ -708,7 +708,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   bad_down.Clear();
   bad_down.add_entries();
   malformed_down(bad_down);
-  // A entry whose content is not here yet does not come out before the stream's copy of it.
+  // An entry whose content is not here yet does not come out before the stream's copy of it.
   v1::DownPacket marker;
   marker.add_streamed()->set_index(1);
   pair.say(marker);

@@ -32,7 +32,7 @@ constexpr const char *kFile = "/rooms/femur", *kTo = "/else/copy";
 
 class KeeperTest : public ::testing::Test {
  protected:
-  // Writes a entry whenever it is called: where the journal were held meanwhile, for ever.
+  // Writes an entry whenever it is called: where the journal were held meanwhile, for ever.
   MaintenanceCalls writing(KeptCuts& kept, int& written) {
     return {[&kept, &written](double) {
               kept.cut(1);
@@ -176,8 +176,8 @@ TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
   // What a hand may have done since the last entry: cuts until it hears nothing for so long, or leaves so many
   // unconfirmed.
   constexpr double kTick_s = 0.001, kAway_s = std::chrono::duration<double>(kTimeAway).count();
-  static_assert(kAway_s > haptic::RoomWatch::kSilence_s);
-  static_assert(kAway_s > haptic::RoomWatch::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
+  static_assert(kAway_s > haptic::ConfirmationMonitor::kSilence_s);
+  static_assert(kAway_s > haptic::ConfirmationMonitor::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
   KeptCuts kept(kFile, &disk_, "femur");
   EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "a new one";
   kept.cut(3);
@@ -281,7 +281,7 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults[0],
-              AllOf(HasSubstr("the checkpoint at place " + std::to_string(kept.room->room_seq().value)),
+              AllOf(HasSubstr("the checkpoint at event " + std::to_string(kept.room->room_seq().value)),
                     HasSubstr("is not what its entries make")));
   EXPECT_EQ(report->checkpoints, 2u) << "its bytes are those that were written";
 

@@ -1,9 +1,7 @@
-#include "server/net/host_port.hpp"
+#include "common/wire/host_port.hpp"
 
 #include <charconv>
 #include <system_error>
-
-#include "common/wire/credentials.hpp"
 
 namespace osteon {
 
@@ -19,6 +17,18 @@ Result<HostPort> parse_host_port(const std::string& text, const std::string& opt
   return failure(ErrorCode::invalid_input, option + " " + text + " is not HOST:PORT with a port from 0 to 65535");
 }
 
-bool is_loopback(const std::string& host) { return wire::is_loopback(host); }
+bool is_loopback(const std::string& host) {
+  if (host == "localhost" || host == "[::1]") return true;
+  // Four numbers: a name or a longer text is not taken for an address.
+  int parts[4] = {};
+  const char *at = host.data(), *last = at + host.size();
+  for (int i = 0; i < 4; ++i) {
+    const auto [end, error] = std::from_chars(at, last, parts[i]);
+    if (error != std::errc{} || parts[i] < 0 || parts[i] > 255) return false;
+    at = end;
+    if (i < 3 && (at == last || *at++ != '.')) return false;
+  }
+  return at == last && parts[0] == 127;
+}
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// A place to listen: HOST:PORT.
+// Network addresses as options give them: HOST:PORT.
 #pragma once
 #include <string>
 

@@ -1,0 +1,73 @@
+"""Every program's --help, --version, man page and completion. OSTEON_BIN: the folder of the programs."""
+import os
+import re
+import shutil
+import subprocess
+import unittest
+from pathlib import Path
+
+BIN = Path(os.environ["OSTEON_BIN"])
+SOURCE = Path(os.environ["OSTEON_SOURCE_DIR"])
+PROGRAMS = ("osteon-import", "osteon-server", "osteon-haptic", "osteon-viewer", "osteon-audio")
+WIDEST = 100  # columns
+
+
+def said(*command):
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False, timeout=60)
+    if done.returncode != 0:
+        raise AssertionError(f"{command}: exit code {done.returncode}: {done.stderr}")
+    return done.stdout
+
+
+def subcommands(text):
+    listed = re.findall(r"^  ([a-z][a-z-]*) ", text.partition("Subcommands:")[2], re.M)
+    others = re.search(r"Other commands: ([a-z, ]+) \(", " ".join(text.split()))
+    return listed + (others[1].split(", ") if others else [])
+
+
+def all_helps(*command):
+    """(command, its help) of a program and everything below it."""
+    text = said(*command, "--help")
+    yield command, text
+    for name in subcommands(text):
+        yield from all_helps(*command, name)
+
+
+def completed(program, *words):
+    script = (f'. "{SOURCE}/deploy/completion.bash"; COMP_WORDS=({program} {" ".join(words)}); '
+              f'COMP_CWORD={len(words)}; _osteon "{BIN / program}" "{words[-1]}"; printf "%s\\n" "${{COMPREPLY[@]}}"')
+    return said("bash", "-c", script).split()
+
+
+class Help(unittest.TestCase):
+    def test_fits_a_terminal(self):
+        count = 0
+        for program in PROGRAMS:
+            for command, text in all_helps(BIN / program):
+                count += 1
+                for line in text.splitlines():
+                    self.assertLessEqual(len(line), WIDEST, f"{command}: {line}")
+        self.assertGreater(count, 40)
+
+    def test_has_a_version(self):
+        for program in PROGRAMS:
+            self.assertRegex(said(BIN / program, "--version"), rf"^{program} \d+\.\d+\.\d+\n$")
+
+    @unittest.skipUnless(shutil.which("help2man"), "help2man is not installed; deploy/install does that")
+    def test_makes_a_man_page(self):
+        for program in PROGRAMS:
+            page = said("help2man", "--no-info", BIN / program)
+            self.assertIn(".SH OPTIONS", page)
+            self.assertIn(program, page)
+
+    def test_completes(self):
+        self.assertIn("erase-person", completed("osteon-server", "er"))
+        self.assertIn("create", completed("osteon-server", "rooms", ""))
+        self.assertIn("--case-hash", completed("osteon-server", "rooms", "create", "--ca"))
+        self.assertIn("plan", completed("osteon-haptic", "pl"))
+        self.assertIn("--timeout", completed("osteon-viewer", "--ti"))
+        self.assertEqual(completed("osteon-viewer", "--nothing-like-it"), [])
+
+
+if __name__ == "__main__":
+    unittest.main()

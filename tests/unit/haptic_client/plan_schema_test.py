@@ -1,0 +1,79 @@
+"""deploy/docs/plan.schema.json and osteon-haptic plan check agree on which plans are valid.
+
+plan_schema_test.py OSTEON_HAPTIC: the values are changed at random, with a fixed seed."""
+import copy
+import json
+import os
+import random
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import jsonschema
+
+SCHEMA = json.loads((Path(os.environ["OSTEON_SOURCE_DIR"]) / "deploy/docs/plan.schema.json").read_text(encoding="utf-8"))
+HAPTIC = os.environ["OSTEON_HAPTIC"]
+PLANS = 400
+POINT = {"point_mm": [1.0, 2.0, 3.0], "axis": [0.0, 0.0, -1.0]}
+VALID = [
+    {"action": "wait", "seconds": 0.5},
+    {"action": "place", "tool": "guide-1", "entry": POINT},
+    {"action": "place", "entry": {"toward": [0.0, 0.0, -1.0]}, "seconds": 1.0},
+    {"action": "screw", "tool": "screw-1", "spindle_rpm": 200.0, "entry": POINT, "tremor_mm": 0.1},
+    {"action": "burr", "tool": "burr-round-5", "window_mm": [4.0, 5.0], "depth_mm": 1.0, "sweep_mm_per_s": 10.0,
+     "entry": POINT},
+    {"action": "drill", "tool": "drill-3.2", "hand": "expert", "push_n": 29.0, "entry": POINT},
+    {"action": "drill", "hand": "rig", "feed_mm_per_s": 1.0, "beyond_mm": 5.0, "entry": {"beside_last_mm": [6.0, 0.0]}},
+    {"action": "drill", "guide": True, "wear": 2.0, "law": "chi"},
+    {"action": "drill", "tool": "pin-1", "to_mm": 20.0, "leave": True, "entry": POINT},
+]
+# What a value may become. Numbers beyond every limit and on some; values of other types; nothing.
+OTHERS = [-1.0, 0.0, 1.0, 1e9, "expert", "x", True, False, None, [], [1.0, 2.0], [1.0, 2.0, 3.0], {}]
+FIELDS = sorted({field for step in VALID for field in step} | {"leave", "guide", "unknown"})
+
+
+def changed(step, chance):
+    step = copy.deepcopy(step)
+    field = chance.choice(FIELDS)
+    if chance.random() < 0.3:
+        step.pop(field, None)
+    else:
+        step[field] = copy.deepcopy(chance.choice(OTHERS))
+    return step
+
+
+class PlanSchema(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
+        self.by_schema = jsonschema.Draft202012Validator(SCHEMA)
+
+    def by_program(self, plan):
+        file = self.folder / "plan.json"
+        file.write_text(json.dumps(plan), encoding="utf-8")
+        done = subprocess.run([HAPTIC, "plan", "check", file], capture_output=True, text=True, check=False, timeout=30)
+        self.assertIn(done.returncode, (0, 1), done.stderr)
+        return done.returncode == 0, done.stderr
+
+    def test_valid_plans_are_valid_for_both(self):
+        plan = {"steps": VALID}
+        self.by_schema.validate(plan)
+        self.assertEqual(self.by_program(plan), (True, ""))
+
+    def test_both_judge_changed_plans_alike(self):
+        chance, valid = random.Random(1), 0
+        for _ in range(PLANS):
+            plan = {"steps": [changed(chance.choice(VALID), chance)]}
+            taken, said = self.by_program(plan)
+            valid += taken
+            # A law that does not suit its tool is for the program alone.
+            if not taken and '"law"' in said:
+                continue
+            self.assertEqual(self.by_schema.is_valid(plan), taken, f"{json.dumps(plan)}: {said}")
+        self.assertGreater(valid, PLANS // 20)
+        self.assertLess(valid, PLANS // 2)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
