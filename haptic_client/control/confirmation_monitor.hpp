@@ -34,7 +34,8 @@ class ConfirmationMonitor {
   static constexpr double kSilence_s = 2.0;
   static constexpr double kLost_s = 20.0;  // the connection itself waits longer: common/wire/room_client.cpp
 
-  // `any_received`: something was received from the room since the last call. `now_s`: time of a clock that never goes back.
+  // `any_received`: something was received from the room since the last call. `now_s`: time of a clock that never goes
+  // back.
   RoomHealth update(double now_s, bool any_received, std::size_t unconfirmed) noexcept {
     if (any_received || unconfirmed == 0) waiting_since_s_ = now_s;
     const double silence_s = now_s - waiting_since_s_;

@@ -110,7 +110,7 @@ struct LoopReport {
   Vec3 offset_mm = Vec3::Zero();
   EnergyReport energy;  // of the coupling, at the handle
   double guide_distance_mm = 0;  // while led: from this handle's position to the guiding handle's, bone frame
-  double guide_play_mm = 0;      // while in a guide: permitted distance of the tip from the opening's axis
+  double guide_play_mm = 0;      // while in a guide: permitted distance of the tip from the opening's middle
   double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
   double across_n = 0;        // of the law, across the feed; the hand feels it through the motor port
   unsigned out_of_range = 0;  // bits of OutOfRange: where the law is used outside its range

@@ -664,7 +664,7 @@ TEST(Recording, LeavesALittleOfTheDisk) {
     ASSERT_FALSE(appended);
     EXPECT_EQ(i, RecordFile::kChunkRows);
     EXPECT_EQ(appended.error().message,
-              "the recording " + (temp / "a.h5").string() + " ends here: the disk is all but full");
+              "the recording " + (temp / "a.h5").string() + " ends here: the disk is almost full");
   }
   const auto read = python(
       "import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and "
