@@ -1,4 +1,4 @@
-// osteon-audio: joins a room and makes its tools heard.
+// osteon-audio: joins a room and plays the sound of its tools.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -30,9 +30,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr const char* kProgram = "osteon-audio";
 constexpr auto kPoll = 20ms;
-// Tools of which nothing was heard for so long run down: a working server sends their states at 120 Hz.
+// Tools whose state was not received for so long run down. A working server sends their states at 120 Hz.
 constexpr auto kStale = 2s;
-// Running down takes half a second at most; an output that does not go on must not hold the program.
+// Running down takes at most half a second. An output that does not continue must not block the program.
 constexpr auto kRunDown = 2s;
 
 struct Options {
@@ -43,11 +43,12 @@ struct Options {
   double patience_s = 5;
 };
 
-// Rows of the state log and the latency that they add up to.
+// Rows of the state log, and the latency computed from them.
 //
-// sounded_mono_ns is the start of the render() call that first used the state, plus the frames that the synthesis looks
-// ahead (64, 1.3 ms), plus the output's latency: all buffers in front of the card, full (4 x 256 frames, 21.3 ms). On
-// PulseAudio this is an upper bound; the monitor of a null sink hears a frame up to one buffer earlier.
+// sounded_mono_ns is a sum. It begins with the start of the render() call that first used the state. The frames that
+// the synthesis looks ahead are added (64, 1.3 ms). The output's latency is added: all buffers in front of the card,
+// full (4 x 256 frames, 21.3 ms). On PulseAudio this is an upper bound; the monitor of a null sink receives a frame up
+// to one buffer earlier.
 class StateLog {
  public:
   [[nodiscard]] Result<void> open(const std::filesystem::path& file) {
@@ -91,10 +92,11 @@ nlohmann::json summary_of(const Options& options, const audio::SoundEngine& engi
   nlohmann::json summary = {
       {"output", options.output},
       {"frames", engine.frames()},
-      // With the session log's mono_ns, the place of a moment of the work in the recording.
+      // With the session log's mono_ns, this gives the position of a moment of the work in the recording.
       {"first_frame_mono_ns", engine.first_frame_ns() + output.latency().count()},
       {"seconds", static_cast<double>(engine.frames()) / 48000.0},
-      // PulseAudio's own underruns do not reach RtAudio 5.2; these are the calls that came too late to fill in time.
+      // PulseAudio's own underruns do not reach RtAudio 5.2. These are the calls that came too late to fill the
+      // buffers.
       {"gaps", output.gaps()},
       {"states_sounded", states.latency().count()},
       {"callback_work",
@@ -124,7 +126,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   audio::OutputParams output_params;
   output_params.kind = *kind;
 
-  // What fails on this machine is found before the server is bothered.
+  // Errors on this machine are found before the server is contacted.
   if (Result<void> usable = check_writable(options.state_log_file, "the state log", "--state-log"); !usable)
     return usable;
   if (Result<void> usable = check_writable(options.wav_file, "the recording", "--wav"); !usable) return usable;
@@ -139,11 +141,11 @@ Result<void> run(const Options& options, const StopSignal& stop) {
       options.server, wire::ClientKind::audio, options.name,
       std::chrono::milliseconds(static_cast<std::int64_t>(1000 * options.patience_s)), [&] { return stop.requested(); },
       options.room, *credentials);
-  // A stop is what was asked for, also before the server answered.
+  // A stop was requested, perhaps before the server answered.
   if (!room && room.error().code == ErrorCode::cancelled) return {};
   if (!room) return tl::unexpected(room.error());
 
-  // Only now: opening empties the files, and without a server an earlier recording must stay.
+  // Opened only now: opening empties the files, and without a server an earlier recording must stay.
   StateLog states;
   if (Result<void> opened = states.open(options.state_log_file); !opened) return opened;
   if (!options.wav_file.empty()) {
@@ -155,29 +157,31 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (Result<void> started = (*output)->start(); !started) return started;
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
 
-  // The reader and this thread deliver in turns.
+  // The reader and this thread deliver one at a time.
   std::mutex delivering;
-  std::optional<Clock::time_point> heard;  // guarded: when the last message came, none while all is at rest
+  // Guarded: when the last message was received; none while everything is at rest.
+  std::optional<Clock::time_point> received_at;
   auto watch = StateSubscription::start(
       std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
         const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
         const std::lock_guard lock(delivering);
         engine.deliver(scene);
-        heard = received;
+        received_at = received;
       });
 
   std::optional<Error> broken;
   while (!broken && !stop.wait_for(kPoll)) {
     states.drain(engine, **output);
-    if (const std::lock_guard lock(delivering); heard && Clock::now() - *heard > kStale) {
+    if (const std::lock_guard lock(delivering); received_at && Clock::now() - *received_at > kStale) {
       engine.deliver(audio::SoundScene{});
-      heard.reset();
+      received_at.reset();
     }
     broken = watch->ended();
     if (const std::string why = (*output)->failure_reason(); !why.empty()) broken = Error{ErrorCode::unavailable, why};
   }
 
-  // The tools run down as if their motors had been switched off: no click at the end. The reader is gone from here.
+  // The tools run down as if their motors had been switched off, so there is no click at the end. The reader has ended
+  // here.
   watch.reset();
   engine.deliver(audio::SoundScene{});
   const auto end = Clock::now() + kRunDown;
@@ -187,7 +191,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   (*output)->stop();
   states.drain(engine, **output);
 
-  // All files are finished before the first error is told.
+  // All files are finished before the first error is reported.
   Result<void> outcome = broken ? Result<void>(tl::unexpected(*broken)) : Result<void>();
   const auto keep_first = [&](Result<void> result) {
     if (outcome && !result) outcome = std::move(result);
@@ -208,15 +212,15 @@ Result<void> run(const Options& options, const StopSignal& stop) {
 
 int main(int argc, char** argv) {
   Options options;
-  CLI::App app("Makes the tools of a room heard: the drill's sound follows speed, load and bone density.", kProgram);
+  CLI::App app("Plays the sound of a room's tools: it follows speed, load and bone density.", kProgram);
   app.add_option("--server", options.server, "HOST:PORT of osteon-server")->required();
   app.add_option("--room", options.room, "Name of the room; not needed where the server has one");
   app.add_option("--name", options.name, "Who you are, shown to others")->capture_default_str();
   wire::add_credential_options(app, options.credentials);
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
-  app.add_option("--wav", options.wav_file, "Record what is heard: 48 kHz, 16 bit, mono");
-  app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state came and when it sounded");
+  app.add_option("--wav", options.wav_file, "Record the sound: 48 kHz, 16 bit, mono");
+  app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state was received and when it was played");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
       ->check(CLI::Range(0.0, 3600.0))

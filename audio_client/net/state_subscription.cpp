@@ -29,7 +29,7 @@ void StateSubscription::Impl::run() {
   ended = std::move(why);
 }
 
-// Until the stream ends; says why.
+// Reads until the stream ends; returns the reason.
 Error StateSubscription::Impl::read() {
   v1::WatchCuttingRequest request;
   request.set_author(room.author.value);

@@ -1,4 +1,4 @@
-// The audio client's line to its room: the newest cutting state of every tool.
+// The audio client's subscription to its room: the newest cutting state of every tool.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -15,7 +15,7 @@ namespace osteon {
 // One reader thread from start() to the destructor.
 class StateSubscription {
  public:
-  // Called from the reader thread; `received` is taken as soon as the message is there.
+  // Called from the reader thread; `received` is taken as soon as the message has arrived.
   using OnStates =
       std::function<void(const std::vector<CuttingState>& states, std::chrono::steady_clock::time_point received)>;
 

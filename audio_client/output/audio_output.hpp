@@ -1,4 +1,5 @@
-// Where sound goes: a sound server through RtAudio, or nowhere at the same pace. Both ask one source for frames.
+// Outputs for sound: a sound server through RtAudio, or no output at the same pace. Both request frames from one
+// source.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -26,28 +27,28 @@ struct OutputParams {
   OutputKind kind = OutputKind::pulse;
   unsigned rate_hz = 48000;
   unsigned frames = 256;  // in one buffer
-  unsigned buffers = 4;   // ahead of the sound card; two were heard to leave rare gaps on PulseAudio
+  unsigned buffers = 4;   // ahead of the sound card; two left rare audible gaps on PulseAudio
 };
 
 class AudioOutput {
  public:
   virtual ~AudioOutput() = default;
   [[nodiscard]] virtual Result<void> start() = 0;
-  virtual void stop() noexcept = 0;  // render() is not called any more when it returns
+  virtual void stop() noexcept = 0;  // after it returns, render() is not called any more
 
-  // From the start of render() until its first frame leaves the buffers. RtAudio 5.2 does not report what PulseAudio
-  // really holds, so this is the upper bound: all buffers that this output asked for, full.
+  // Time from the start of render() until its first frame leaves the buffers. RtAudio 5.2 does not report what
+  // PulseAudio really holds. So this is the upper bound: all buffers that this output requested, full.
   [[nodiscard]] virtual std::chrono::nanoseconds latency() const noexcept = 0;
-  // Times that render() was called later than all buffers last, so that the sound had a gap.
+  // Number of times that render() was called later than the duration of all buffers, so that the sound had a gap.
   [[nodiscard]] virtual std::uint64_t gaps() const noexcept = 0;
-  // Empty while all is well, else why no sound comes out any more: one sentence.
+  // Why no sound is played any more, as one sentence; empty while the output works.
   [[nodiscard]] virtual std::string failure_reason() const = 0;
 };
 
-// Opens, does not start. The source must outlive the output. Error: unavailable, with the remedy.
+// Opens the output without starting it. The source must outlive the output. Error: unavailable, with the remedy.
 [[nodiscard]] Result<std::unique_ptr<AudioOutput>> open_output(const OutputParams& params, SoundSource& source);
 
-// The outputs behind open_output().
+// The outputs that open_output() makes.
 [[nodiscard]] Result<std::unique_ptr<AudioOutput>> open_pulse_output(const OutputParams& params, SoundSource& source);
 [[nodiscard]] std::unique_ptr<AudioOutput> make_paced_output(const OutputParams& params, SoundSource& source);
 

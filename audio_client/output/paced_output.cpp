@@ -1,4 +1,5 @@
-// No sound card: the same calls at the same pace, by the monotonic clock, so that recordings and logs stay true.
+// Output without a sound card: the same calls at the same pace, by the monotonic clock. So recordings and logs stay
+// correct.
 #include <atomic>
 #include <thread>
 #include <vector>
@@ -25,14 +26,14 @@ class PacedOutput final : public AudioOutput {
     if (thread_.joinable()) thread_.join();
   }
 
-  // Nothing waits behind this buffer: its first frame would leave at once.
+  // Nothing is queued behind this buffer: its first frame would leave at once.
   std::chrono::nanoseconds latency() const noexcept override { return {}; }
   std::uint64_t gaps() const noexcept override { return gaps_.load(std::memory_order_relaxed); }
   std::string failure_reason() const override { return {}; }
 
  private:
-  // After a stall it renders all that is owed at once, as a card that had the buffers would have taken it; what is
-  // later than all buffers is a gap, but still rendered, so that a recording lasts as long as the run.
+  // After a stall it renders all missing frames at once, as a card with these buffers would have requested them. A
+  // delay longer than all buffers counts as a gap, but is still rendered. So a recording lasts as long as the run.
   void run(const std::stop_token& stop) noexcept {
     try_realtime(20);
     using Clock = std::chrono::steady_clock;

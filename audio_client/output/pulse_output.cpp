@@ -1,4 +1,4 @@
-// RtAudio 5.2 on PulseAudio. Its exceptions end here.
+// RtAudio 5.2 on PulseAudio. Its exceptions are caught here.
 #include <rtaudio/RtAudio.h>
 
 #include <algorithm>
@@ -41,7 +41,7 @@ class PulseOutput final : public AudioOutput {
       to.deviceId = std::min(audio_->getDefaultOutputDevice(), devices - 1);
       to.nChannels = kChannels;
       RtAudio::StreamOptions options;
-      options.numberOfBuffers = params_.buffers;  // 0 would let PulseAudio hold 137 ms
+      options.numberOfBuffers = params_.buffers;  // 0 would let PulseAudio buffer 137 ms
       options.flags = RTAUDIO_SCHEDULE_REALTIME;
       options.priority = 20;
       options.streamName = "Osteon";
@@ -93,7 +93,8 @@ class PulseOutput final : public AudioOutput {
   }
 
   void fill(float* out, unsigned frames) noexcept {
-    // PulseAudio's underruns do not reach RtAudio 5.2; a call that comes later than all buffers last proves one.
+    // PulseAudio's underruns do not reach RtAudio 5.2. A call that comes later than the duration of all buffers proves
+    // one.
     const auto now = std::chrono::steady_clock::now();
     if (called_ && now - last_call_ > latency()) gaps_.fetch_add(1, std::memory_order_relaxed);
     called_ = true;

@@ -1,4 +1,4 @@
-// What the sound card's thread runs: takes the newest scene, renders it, records it, and notes when it was first heard.
+// Runs on the sound card's thread: takes the newest scene, renders and records it, and notes when it was first used.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -24,21 +24,21 @@ struct Sounded {
 class SoundEngine final : public SoundSource {
  public:
   explicit SoundEngine(const SynthParams& params);
-  // Records from now on; before the output starts. The recorder must outlive the engine's last render().
+  // Records from now on; call it before the output starts. The recorder must outlive the engine's last render().
   void record_to(WavRecorder& recorder) noexcept { recorder_ = &recorder; }
 
   void deliver(const SoundScene& scene) noexcept { scenes_.store(scene); }            // one thread only
   void render(std::span<float> mono) noexcept override;                               // [audio]
   bool next_sounded(Sounded& sounded) noexcept { return sounded_.try_pop(sounded); }  // one thread only
 
-  // From the start of render() to the frame that first carries the new scene, without the output's own latency.
+  // Time from the start of render() to the frame that first carries the new scene, without the output's own latency.
   [[nodiscard]] std::chrono::nanoseconds latency() const noexcept;
   [[nodiscard]] bool silent() const noexcept { return silent_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(std::memory_order_relaxed); }
   // When the first frame was rendered, steady clock; 0 before. A recording begins with that frame.
   [[nodiscard]] std::int64_t first_frame_ns() const noexcept { return first_frame_ns_.load(std::memory_order_relaxed); }
   [[nodiscard]] float peak() const noexcept { return peak_.load(std::memory_order_relaxed); }
-  // Work of one render(). Only after the output was stopped.
+  // Duration of the work of one render(). Call only after the output was stopped.
   [[nodiscard]] const DurationHistogram& work() const noexcept { return work_; }
 
  private:

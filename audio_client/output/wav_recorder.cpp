@@ -42,7 +42,7 @@ struct WavRecorder::Impl {
     int turns = 0;
     while (!stop.stop_requested()) {
       drain();
-      // A header that is right once a second keeps the recording of a killed program readable.
+      // The header is updated once a second, so that the recording of a killed program is readable.
       if (++turns % 50 == 0) sf_command(file, SFC_UPDATE_HEADER_NOW, nullptr, 0);
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }

@@ -1,4 +1,4 @@
-// Writes what is heard to a WAV file: the sound card's thread pushes into a fixed queue, a thread of its own writes.
+// Writes the rendered sound to a WAV file. The sound card's thread pushes into a fixed queue; a separate thread writes.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -11,15 +11,15 @@ namespace osteon::audio {
 
 class WavRecorder {
  public:
-  // 16-bit PCM, mono. Error: internal, naming the path.
+  // 16-bit PCM, mono. Error internal: names the path.
   [[nodiscard]] static Result<WavRecorder> open(const std::filesystem::path& file, unsigned rate_hz);
   WavRecorder(WavRecorder&&) noexcept;
   WavRecorder& operator=(WavRecorder&&) noexcept;
   ~WavRecorder();  // closes
 
-  // [audio] Never waits: what does not fit into the queue of about 5 s is left out and counted.
+  // [audio] Never waits: what does not fit into the queue of about 5 s is dropped and counted.
   void push(std::span<const float> mono) noexcept;
-  // Writes what is queued and closes. Error: internal, naming the path (a full disk shows here).
+  // Writes what is queued and closes. Error internal: names the path (a full disk is reported here).
   [[nodiscard]] Result<void> close();
   [[nodiscard]] std::uint64_t frames_written() const noexcept;
   [[nodiscard]] std::uint64_t frames_lost() const noexcept;

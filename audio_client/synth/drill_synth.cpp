@@ -35,7 +35,7 @@ void DrillSynth::aim(const SoundScene& scene) noexcept {
       aimed[static_cast<std::size_t>(same - voices_.begin())] = true;
       continue;
     }
-    if (tool.rpm == 0) continue;  // at rest: nothing to hear
+    if (tool.rpm == 0) continue;  // at rest: no sound
     const auto free = std::find_if(voices_.begin(), voices_.end(), [](const Voice& v) { return !v.sounding(); });
     if (free == voices_.end()) continue;
     free->start(handpieces_[static_cast<std::size_t>(tool.handpiece)], params_.voice, params_.rate_hz, tool,

@@ -3,20 +3,20 @@
 
 namespace osteon::audio {
 
-// A planetary set whose ring stands still: the sun drives, the planet carrier is driven.
+// A planetary set with a fixed ring: the sun drives, the planet carrier is driven.
 struct PlanetarySet {
   int ring = 1, sun = 1, planet = 1;  // teeth
 
   [[nodiscard]] constexpr double reduction() const { return 1.0 + static_cast<double>(ring) / sun; }  // (8.1)
-  // Of the planets, per turn of the carrier (8.2).
+  // Turns of the planets per turn of the carrier (8.2).
   [[nodiscard]] constexpr double planet_spin() const { return static_cast<double>(ring) / planet; }
-  // Teeth meeting per turn of the carrier (8.3); sun and ring mesh at the same frequency.
+  // Teeth that mesh per turn of the carrier (8.3); sun and ring mesh at the same frequency.
   [[nodiscard]] constexpr double mesh() const { return ring; }
 };
 
-// Two sets between motor and spindle. Table 8.1 gives only the products; these are the tooth numbers that make them:
-// mesh 48 and planet spin 3.2 of the output set with a reduction of 3.824, mesh 172.08 = 45 x 3.824 and planet spin
-// 11.472 = 3 x 3.824 of the motor's set with a reduction of 4.
+// Two sets between motor and spindle. Table 8.1 gives only the products; these tooth numbers yield them. The output
+// set: mesh 48 and planet spin 3.2, with a reduction of 3.824. The motor's set: mesh 172.08 = 45 x 3.824 and planet
+// spin 11.472 = 3 x 3.824, with a reduction of 4.
 struct Gearbox {
   PlanetarySet motor_end{.ring = 45, .sun = 15, .planet = 15};
   PlanetarySet output_end{.ring = 48, .sun = 17, .planet = 15};
@@ -29,8 +29,8 @@ struct Gearbox {
   [[nodiscard]] constexpr double motor_spin() const { return motor_end.planet_spin() * transfer(); }
 };
 
-// Segments of the drill motor's commutator (8.4). Five put the third harmonic at 5353 Hz and the first at 1784 Hz at
-// 1400 rpm, where 8.5.4 finds the motor's 5400-5500 Hz and 1800 Hz.
+// Segments of the drill motor's commutator (8.4). At 1400 rpm five segments put the third harmonic at 5353 Hz and the
+// first at 1784 Hz. There 8.5.4 finds the motor's 5400-5500 Hz and 1800 Hz.
 inline constexpr int kCommutatorSegments = 5;
 
 }  // namespace osteon::audio

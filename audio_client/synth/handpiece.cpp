@@ -8,7 +8,8 @@
 namespace osteon::audio {
 namespace {
 
-// RMS of the free-running partials at rated speed, of full scale: -32 dB leaves room for the load and for other tools.
+// RMS of the free-running partials at rated speed, relative to full scale. -32 dB leaves room for the load and for
+// other tools.
 constexpr double kFreeLevel = 0.025;
 
 Handpiece geared_drill() {
@@ -42,7 +43,7 @@ Handpiece geared_drill() {
     p.push_back({gears.motor_mesh() + side * gears.motor_spin(), Source::motor_mesh, side * side == 1 ? 0.20 : 0.08});
   }
 
-  // The flutes: what fills 0-400 Hz while cutting (8.5.4).
+  // The flutes: they fill 0-400 Hz while cutting (8.5.4).
   for (int k = 1; k <= 12; ++k) p.push_back({static_cast<double>(k * drill.teeth), Source::tooth, 1.0 / std::sqrt(k)});
   return drill;
 }
@@ -52,14 +53,14 @@ Handpiece direct_burr() {
   auto& p = burr.partials;
   const double shaft_levels[] = {1.00, 0.35, 0.20, 0.10};
   for (int k = 0; k < 4; ++k) p.push_back({k + 1.0, Source::shaft, shaft_levels[k]});
-  // A brushless motor of one pole pair steps six times a turn.
+  // A brushless motor with one pole pair steps six times per turn.
   p.push_back({6, Source::motor, 0.50});
   p.push_back({12, Source::motor, 0.15});
   // The bearings' cage turns a little slower than half of the shaft and beats with it.
   p.push_back({0.4, Source::shaft, 0.08});
   p.push_back({0.6, Source::shaft, 0.06});
   p.push_back({1.4, Source::shaft, 0.08});
-  // Flutes, uneven by one turn: sidebands at the shaft's distance.
+  // Flutes with an unevenness once per turn: sidebands at the shaft's frequency.
   for (int k = 1; k <= 4; ++k) p.push_back({static_cast<double>(k * burr.teeth), Source::tooth, 0.9 / k});
   for (const int side : {-1, 1}) p.push_back({static_cast<double>(burr.teeth + side), Source::tooth, 0.30});
   for (int k = 1; k <= 3; ++k) p.push_back({static_cast<double>(k), Source::tooth, 0.4});
@@ -78,8 +79,8 @@ Handpiece make_handpiece(HandpieceKind kind) {
   OSTEON_CHECK(piece.partials.size() <= kMaxPartials);
   double mean_square = 0;
   for (const Partial& p : piece.partials) {
-    const double heard = p.level * radiation(p.ratio * piece.rated_rpm / 60.0);
-    if (p.source != Source::tooth) mean_square += 0.5 * heard * heard;
+    const double radiated = p.level * radiation(p.ratio * piece.rated_rpm / 60.0);
+    if (p.source != Source::tooth) mean_square += 0.5 * radiated * radiated;
   }
   const double scale = kFreeLevel / std::sqrt(mean_square);
   for (Partial& p : piece.partials) p.level *= scale;

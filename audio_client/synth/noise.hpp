@@ -1,4 +1,4 @@
-// Seeded white noise and a band-pass filter whose frequency may move.
+// Seeded white noise and a band-pass filter with a variable frequency.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@ namespace osteon::audio {
 class WhiteNoise {
  public:
   explicit WhiteNoise(std::uint64_t seed = 1) noexcept : state_(seed * 0x9E3779B97F4A7C15ULL | 1U) {}
-  // Evenly spread over [-1, 1).
+  // Uniform over [-1, 1).
   float next() noexcept {
     state_ ^= state_ >> 12;
     state_ ^= state_ << 25;
@@ -24,7 +24,7 @@ class WhiteNoise {
   std::uint64_t state_;
 };
 
-// Two-pole state variable filter in the trapezoidal form, stable while its coefficients move. The gain is 1 at the
+// Two-pole state variable filter in the trapezoidal form, stable while its coefficients change. The gain is 1 at the
 // centre.
 class BandPass {
  public:

@@ -9,7 +9,7 @@
 namespace osteon::audio {
 namespace {
 
-// Load 1: half of it from the thrust, half from the power at the spindle.
+// Load 1 is the sum of two halves: from the thrust, and from the power at the spindle.
 struct LoadScale {
   double thrust_N, power_W;
 };
@@ -28,7 +28,7 @@ ToolSound tool_sound(const CuttingState& state) {
   ToolSound sound;
   sound.author = state.author.value;
   sound.state_seq = state.state_seq;
-  // A tool that this build does not know is heard as a drill.
+  // A tool that this build does not know sounds like a drill.
   sound.handpiece =
       tool && tool->kind == ToolKind::round_burr ? HandpieceKind::direct_burr : HandpieceKind::geared_drill;
   sound.rpm = within(state.spindle_rpm, kMaxRpm);
@@ -41,7 +41,7 @@ ToolSound tool_sound(const CuttingState& state) {
   sound.hardness = within(state.density_g_cm3 / kCorticalDensity_g_cm3, 1.2);
   sound.advancing = state.feed_mm_per_s > 0;
   if (state.phase == CuttingPhase::cutting) {
-    // Removed mass sets the flow; soft bone crumbles where hard bone breaks into chips that are heard.
+    // The removed mass determines the flow. Soft bone crumbles; hard bone breaks into audible chips.
     const double flow = within(state.feed_mm_per_s, 1000.0) * sound.hardness;
     sound.chips = std::min(1.5, std::sqrt(flow) * std::pow(sound.hardness, 0.7));
   }

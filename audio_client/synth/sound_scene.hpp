@@ -1,4 +1,4 @@
-// What is to be heard now: every tool in the room reduced to numbers, ready to cross into the sound card's thread.
+// What is audible now: every tool in the room as numbers, ready to be passed to the sound card's thread.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,7 +14,7 @@ struct ToolSound {
   std::uint64_t state_seq = 0;
   HandpieceKind handpiece = HandpieceKind::geared_drill;
   double rpm = 0;
-  double load = 0;         // 0 free; 1 as at the cortical reference point of the hand piece; at most 1.5
+  double load = 0;         // 0 free; 1 at the cortical reference point of the hand piece; at most 1.5
   double hardness = 0;     // density under the cutting part / 1.9 g/cm^3, 0 without contact
   double chips = 0;        // chip flow, 0 without cutting; 1 at 1 mm/s through cortical bone; at most 1.5
   bool advancing = false;  // moves into the bone
@@ -30,7 +30,7 @@ struct SoundScene {
 
 [[nodiscard]] ToolSound tool_sound(const CuttingState& state);
 
-// The first kMaxTools of them: tools beyond that are not heard.
+// Takes the first kMaxTools states; further tools are silent.
 [[nodiscard]] SoundScene sound_scene(std::span<const CuttingState> states, std::int64_t received_ns);
 
 }  // namespace osteon::audio

@@ -9,22 +9,22 @@ namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-// Partials fade out below half of the sampling rate, so that none ever folds back and none switches off with a click.
+// Partials fade out below half of the sampling rate. So none ever folds back, and none switches off with a click.
 constexpr double kFadeStart = 0.375, kFadeEnd = 0.4375;
 
 constexpr double kSilentRpm = 1.0;
 constexpr double kRecentLoad_s = 0.15;
 constexpr double kFlutter_s = 0.08;
 
-// Chips against the drill: a share of what the partials have at full load.
+// Chips against the drill: a share of the level of the partials at full load.
 constexpr double kChipLevel = 0.045;
 
-// Perforation shows as a short burst round 200 Hz (8.5.4); the second mode gives it a body.
+// Perforation is a short burst around 200 Hz (8.5.4); the second mode gives it a body.
 struct KnockMode {
   double hz, decay_s, level;
 };
 constexpr std::array<KnockMode, 2> kKnock = {{{190.0, 0.035, 0.22}, {430.0, 0.018, 0.09}}};
-constexpr double kKnockLoad = 0.25;  // a smaller load gives way unheard
+constexpr double kKnockLoad = 0.25;  // a smaller load gives way without a sound
 
 double share(double seconds, double rate_hz) { return 1.0 - std::exp(-kBlockFrames / (seconds * rate_hz)); }
 
@@ -42,7 +42,7 @@ void Voice::start(const Handpiece& handpiece, const VoiceParams& params, double 
   rate_hz_ = rate_hz;
   sounding_ = true;
   noise_ = WhiteNoise(seed);
-  // Scattered phases keep the crest low.
+  // Random phases keep the crest factor low.
   for (std::size_t i = 0; i < kMaxPartials; ++i) phase_[i] = 0.5 + 0.5 * noise_.next();
   target_.author = tool.author;
   target_.handpiece = tool.handpiece;
@@ -50,8 +50,8 @@ void Voice::start(const Handpiece& handpiece, const VoiceParams& params, double 
 }
 
 void Voice::aim(const ToolSound& tool) noexcept {
-  // A layer gives way: the load is gone from a tool that goes forward, or did so a state ago and is through. Drawn
-  // back, a tool stops first and leaves without a knock.
+  // A layer gives way: the load is gone from a tool that advances, or that advanced one state ago and is through. A
+  // tool that is drawn back stops first and leaves without a knock.
   if ((tool.advancing || target_.advancing) && recent_load_ > kKnockLoad && tool.load < 0.5 * recent_load_) {
     const auto released = static_cast<float>(recent_load_ - tool.load);
     // Adding to the real part leaves the sounding imaginary part continuous.
@@ -82,13 +82,13 @@ void Voice::advance_controls() noexcept {
   chips_ += k * (target_.chips - chips_);
   recent_load_ = std::max(target_.load, recent_load_ * (1.0 - share(kRecentLoad_s, rate_hz_)));
 
-  // The same thrust is louder in hard bone, which breaks, than in soft bone, which gives.
+  // The same thrust is louder in hard bone, which breaks, than in soft bone, which yields.
   drive_ = load_ * (0.25 + 0.75 * hardness_);
   tone_drive_ = std::sqrt(std::max(0.0, drive_));
 }
 
-// 8.5.4: both gears and motor grow with the load, and as it falls the motor falls quicker, so that free and cortical
-// are led by the motor's line and cancellous by the gears'.
+// 8.5.4: both gears and motor grow with the load. As the load falls, the motor falls faster. So free and cortical are
+// dominated by the motor's line, and cancellous by the gears'.
 double Voice::source_gain(Source source) const noexcept {
   switch (source) {
     case Source::shaft:
@@ -109,7 +109,7 @@ void Voice::add_partials(Block& block) noexcept {
   std::array<double, 5> gains;
   for (std::size_t s = 0; s < gains.size(); ++s) gains[s] = source_gain(static_cast<Source>(s));
   const double speed = rpm_ / handpiece_->rated_rpm;
-  const double tilt = 0.4 * hardness_;  // hard bone is bright: the high partials gain on the low ones
+  const double tilt = 0.4 * hardness_;  // hard bone is bright: the high partials become louder relative to the low ones
   const double spindle_hz = rpm_ / 60.0;
   const auto flutter_share = static_cast<float>(share(kFlutter_s, rate_hz_));
   // A one-pole filter leaves share / (2 - share) of the variance, 1/3, of the noise it smooths.
@@ -122,8 +122,8 @@ void Voice::add_partials(Block& block) noexcept {
     flutter_[i] += flutter_share * (noise_.next() - flutter_[i]);
     const double hz = partial.ratio * spindle_hz;
     double level = 0;
-    if (const double heard = audible(hz, rate_hz_); heard > 0 && hz > 0) {
-      level = partial.level * gains[static_cast<std::size_t>(partial.source)] * speed * radiation(hz) * heard *
+    if (const double audibility = audible(hz, rate_hz_); audibility > 0 && hz > 0) {
+      level = partial.level * gains[static_cast<std::size_t>(partial.source)] * speed * radiation(hz) * audibility *
               std::pow(std::max(hz, 100.0) / 2000.0, tilt) * (1.0 + flutter_scale * flutter_[i]);
     }
     const float from = level_[i], to = static_cast<float>(level);
@@ -153,12 +153,12 @@ void Voice::add_noise(Block& block) noexcept {
   const auto air_to = static_cast<float>(params_.noise * handpiece_->air_level * speed * (1.0 + 2.0 * drive_));
   if (chip_level_ == 0 && air_level_ == 0 && chip_to == 0 && air_to == 0) return;
 
-  // The chips of hard bone are smaller and stiffer: their noise lies higher.
+  // The chips of hard bone are smaller and stiffer, so their noise has a higher frequency.
   chip_filter_.set(900.0 + 3600.0 * hardness_, rate_hz_, 0.9);
   air_filter_.set(3500.0, rate_hz_, 0.45);
   const double tooth_turns = rpm_ / 60.0 * handpiece_->teeth / rate_hz_;
   const float chip_step = (chip_to - chip_level_) / kBlockFrames, air_step = (air_to - air_level_) / kBlockFrames;
-  // Each tooth breaks its own chips. Below 400 Hz that is heard as a rattle, above as a tone that the partials make.
+  // Each tooth breaks its own chips. Below 400 Hz this is a rattle; above, a tone that the partials make.
   const double rattle_hz = tooth_turns * rate_hz_;
   const auto depth = static_cast<float>(0.6 * std::clamp(2.0 - rattle_hz / 400.0, 0.0, 1.0));
   auto re = static_cast<float>(std::cos(kTurn * tooth_phase_)), im = static_cast<float>(std::sin(kTurn * tooth_phase_));

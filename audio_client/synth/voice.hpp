@@ -1,4 +1,4 @@
-// The sound of one tool: spindle-locked partials, chip and air noise, and the knock of a layer giving way.
+// The sound of one tool: spindle-locked partials, chip and air noise, and the knock when a layer gives way.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,9 +10,9 @@
 
 namespace osteon::audio {
 
-// Constants of the sound that are not the hand piece's.
+// Constants of the sound that do not belong to the hand piece.
 struct VoiceParams {
-  double run_up_s = 0.25;      // from rest to the speed asked for
+  double run_up_s = 0.25;      // from rest to the commanded speed
   double run_down_s = 0.45;    // and back
   double smoothing_s = 0.005;  // of speed and load: hides the steps between states
   double noise = 1.0;          // gain of all noise, 0 leaves the partials
@@ -23,7 +23,7 @@ class Voice {
  public:
   void start(const Handpiece& handpiece, const VoiceParams& params, double rate_hz, const ToolSound& tool,
              std::uint64_t seed) noexcept;
-  void aim(const ToolSound& tool) noexcept;  // what it shall sound like from now on
+  void aim(const ToolSound& tool) noexcept;  // its target sound from now on
   void release() noexcept { target_.rpm = target_.load = target_.hardness = target_.chips = 0; }  // runs down
   void add_to(Block& block) noexcept;  // the next kBlockFrames
 
@@ -46,11 +46,11 @@ class Voice {
   bool sounding_ = false;
   WhiteNoise noise_;
 
-  double span_rpm_ = 0;  // the highest speed of this run: sets how fast it runs up and down
+  double span_rpm_ = 0;  // the highest speed of this run: determines how fast it runs up and down
   double slewed_rpm_ = 0, rpm_ = 0;
   double load_ = 0, hardness_ = 0, chips_ = 0;
-  double drive_ = 0;       // load weighted by hardness: what makes it loud
-  double tone_drive_ = 0;  // its square root, for sources that answer to small loads already
+  double drive_ = 0;       // load weighted by hardness: determines the loudness
+  double tone_drive_ = 0;  // its square root, for sources that respond to small loads
 
   std::array<double, kMaxPartials> phase_{};  // turns
   std::array<float, kMaxPartials> level_{};   // at the end of the last block
@@ -59,7 +59,7 @@ class Voice {
   BandPass chip_filter_, air_filter_;
   float chip_level_ = 0, air_level_ = 0;
 
-  double recent_load_ = 0;  // falls slowly: what the tool pressed against a moment ago
+  double recent_load_ = 0;  // falls slowly: the load of a moment ago
   std::array<float, 2> knock_re_{}, knock_im_{};
 };
 

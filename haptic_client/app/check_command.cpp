@@ -13,12 +13,12 @@ namespace osteon::haptic {
 namespace {
 
 constexpr int kPriority = 80;
-// What a client with a large bone locks: the case, the cut field, bricks, queues.
+// Memory that a client with a large bone locks: the case, the cut field, bricks, queues.
 constexpr long kMemory_kib = 1024 * 1024;
 
-// How many of its ticks an empty loop missed.
+// Returns the number of ticks that an empty loop missed.
 std::uint64_t measure(double seconds) {
-  // Not on the stack: a histogram of each microsecond.
+  // Not on the stack: it is a histogram of each microsecond.
   static TickStats stats;
   bool fifo = false;
   std::thread([&] {
@@ -62,8 +62,8 @@ int run_check(int argc, char** argv) {
   const std::uint64_t missed = seconds > 0.0 ? measure(seconds) : 0;
   if (lacking == 0 && missed > 0)
     std::printf(
-        "This machine is set for the haptic loop, yet an empty one missed ticks: end what else runs, or look for what "
-        "holds up its cores (power saving, a virtual machine's host), and measure longer with --seconds.\n");
+        "This machine is set up for the haptic loop, but an empty loop missed ticks: end other programs, or look for what "
+        "delays its cores (power saving, a virtual machine's host), and measure longer with --seconds.\n");
   else if (lacking == 0)
     std::printf("This machine lacks nothing for the haptic loop.\n");
   else

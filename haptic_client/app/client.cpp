@@ -40,56 +40,56 @@ constexpr int kPriority = 80;
 constexpr auto kStall = 4ms;                // more than three periods: the force is zero by then
 constexpr std::uint64_t kLiveTicks = 1000;  // between two statistics of the haptic loop
 constexpr auto kConfirmPatience = 20s;
-constexpr auto kStopPatience = 2s;           // once it was asked to stop
-constexpr auto kJoinPatience = 30s;          // without anything from the room
-constexpr std::size_t kMostFromRoom = 4096;  // events that may wait for the replica; the network waits beyond that
-constexpr std::size_t kTickTimes = 8192;     // ticks whose wake-up time is remembered
+constexpr auto kStopPatience = 2s;           // after a stop was requested
+constexpr auto kJoinPatience = 30s;          // without a message from the room
+constexpr std::size_t kMostFromRoom = 4096;  // events that may wait for the replica; beyond that the network waits
+constexpr std::size_t kTickTimes = 8192;     // ticks whose wake-up time is stored
 
 std::int64_t ns(Clock::time_point t) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
 }
 
-// What the room sends, on its way to the replica's thread.
+// Messages of the room on their way to the replica's thread.
 struct Committed {
-  RoomSeq place;
+  RoomSeq room_seq;
   Cut cut;
 };
 struct Rejected {
-  RoomSeq place;
+  RoomSeq room_seq;
   std::uint64_t author_seq;
   std::uint64_t lease_epoch;
   std::string reason;
 };
 struct Noted {
-  RoomSeq place;  // of an event that leaves the bone as it is
+  RoomSeq room_seq;  // of an event that does not change the bone
 };
 struct SceneSet {
-  RoomSeq place;
+  RoomSeq room_seq;
   std::vector<SceneItem> items;
 };
 struct ToolNamed {
-  std::string name;  // that somebody else holds
+  std::string name;  // held by another person
 };
 struct Interrupted {
-  std::string why;  // the line to the room is down, and is being made again
+  std::string why;  // the connection to the room is down and is being made again
 };
 using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid,
                               ToolNamed, Noted, Interrupted>;
 
-// Others' tools, as they were heard of last.
+// Others' tools, as last received.
 struct Partners {
   static constexpr std::size_t kMost = 16;
   struct Partner {
     AuthorId author;  // null: none
     std::uint64_t state_seq = 0;
     Pose pose_bone_tool, pose_bone_device;
-    std::int64_t heard_ns = 0;
-    std::size_t tool = 0;  // name, hashed
+    std::int64_t received_ns = 0;
+    std::size_t tool = 0;  // hash of its name
   };
   std::array<Partner, kMost> of;
 };
 
-// The solids of tools that others hold, by their names' hashes; these stay as long as the client.
+// The solids of tools that others hold, by their names' hashes. They live as long as the client.
 struct PartnerSolids {
   static constexpr std::size_t kMost = 32;
   std::array<std::pair<std::size_t, const SolidLattice*>, kMost> of{};
@@ -107,13 +107,13 @@ GuideSeen guide_among(const Partners& partners, AuthorId guide) {
   return {};
 }
 
-// Where the bone stands on its mount; lines to the room are counted from 1.
+// Pose of the bone on its mount. Connections to the room are counted from 1.
 struct MountUpdate {
   std::uint64_t line = 0;
   MountPose seen;
 };
 
-// Where the tool is, for the replica's thread.
+// Pose of the tool, for the replica's thread.
 struct ToolPlace {
   Pose pose_bone_tool;
   int tool = 0;
@@ -171,7 +171,7 @@ class Client {
           Error{ErrorCode::unavailable, "the server has not confirmed the last " +
                                             std::to_string(outcome_.unconfirmed) + " cuts within " +
                                             std::to_string(kConfirmPatience.count()) + " s; look at the server's log"};
-    // Some of the leaves are no bone that the room ever had.
+    // Some of the leaves do not belong to any bone that the room ever had.
     if (joined_ && !changing_) outcome_.field_hash = replica_.hash();
     const std::string hash = outcome_.field_hash ? to_hex(*outcome_.field_hash) : "";
     outcome_.recording =
@@ -218,21 +218,21 @@ class Client {
       taken_.wait(lock, [this] { return from_room_.size() < kMostFromRoom || replica_over_; });
       if (replica_over_) return;
       from_room_.push_back(std::move(event));
-      heard_ns_ = ns(Clock::now());
+      received_ns_ = ns(Clock::now());
       wake_.notify_one();
     };
     RoomCallbacks events;
     events.leaf = [pass](const FieldLeaf& leaf) { pass(leaf); };
     events.complete = [pass](const RoomAtJoin& room) { pass(room); };
     events.change = [pass](BonePart&& part) { pass(std::move(part)); };
-    events.scene = [pass](RoomSeq place, const std::vector<SceneItem>& items) { pass(SceneSet{place, items}); };
-    events.noted = [pass](RoomSeq place) { pass(Noted{place}); };
-    events.committed = [pass](RoomSeq place, const Cut& cut) { pass(Committed{place, cut}); };
-    events.rejected = [pass](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
-      pass(Rejected{place, seq, lease, why});
+    events.scene = [pass](RoomSeq room_seq, const std::vector<SceneItem>& items) { pass(SceneSet{room_seq, items}); };
+    events.noted = [pass](RoomSeq room_seq) { pass(Noted{room_seq}); };
+    events.committed = [pass](RoomSeq room_seq, const Cut& cut) { pass(Committed{room_seq, cut}); };
+    events.rejected = [pass](RoomSeq room_seq, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
+      pass(Rejected{room_seq, seq, lease, why});
     };
     events.supervised = [this, pass](const HandSupervised& decided) {
-      // At once to the loop, which may not wait for what the replica has to do before.
+      // Passed to the loop at once: it must not wait for earlier work of the replica.
       oversights_.store(
           haptic_restrictions(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
       pass(decided);
@@ -242,7 +242,7 @@ class Client {
     };
     events.said = [pass](const WordsSaid& said) { pass(said); };
     events.partner = [this, pass](const CuttingState& state) {
-      hear_partner(state);
+      receive_partner(state);
       if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost &&
           named_tools_.insert(state.tool_name).second)
         pass(ToolNamed{state.tool_name});
@@ -256,23 +256,23 @@ class Client {
     room_.open(std::move(events));
   }
 
-  // On whichever thread the session passes it on; one at a time.
-  void hear_partner(const CuttingState& state) {
-    // The one heard of longest ago makes room.
-    Partners::Partner* place = &heard_partners_.of[0];
-    for (Partners::Partner& partner : heard_partners_.of) {
+  // Called on whichever thread the session uses for it; one at a time.
+  void receive_partner(const CuttingState& state) {
+    // The entry with the oldest state is replaced.
+    Partners::Partner* place = &received_partners_.of[0];
+    for (Partners::Partner& partner : received_partners_.of) {
       if (partner.author == state.author) {
         place = &partner;
         break;
       }
-      if (partner.heard_ns < place->heard_ns) place = &partner;
+      if (partner.received_ns < place->received_ns) place = &partner;
     }
     *place = {state.author,           state.state_seq,  state.pose_bone_tool,
               state.pose_bone_device, ns(Clock::now()), std::hash<std::string>{}(state.tool_name)};
-    partners_.store(heard_partners_);
+    partners_.store(received_partners_);
   }
 
-  // [haptic] What an instructor has decided and what leads the hand.
+  // [haptic] Applies an instructor's restrictions and guidance.
   void supervise() {
     HapticLoop& loop = session_.loop();
     if (oversights_.refresh()) loop.supervise(oversights_.value());
@@ -286,19 +286,19 @@ class Client {
     for (const Partners::Partner& partner : partners_.value().of)
       if (partner.author)
         felt_partners_[count++] = {partner.author.value, partner.pose_bone_tool,
-                                   line_s + 1e-9 * static_cast<double>(now_ns - partner.heard_ns),
+                                   line_s + 1e-9 * static_cast<double>(now_ns - partner.received_ns),
                                    partner_solids_.value().find(partner.tool)};
     loop.see_partners(std::span(felt_partners_).first(count));
   }
 
-  // [haptic] The bone on its mount, under what the last tick did to it.
+  // [haptic] Moves the bone on its mount under the load of the last tick.
   void move_bone() {
     if (places_of_bone_.refresh()) mounted_.see(places_of_bone_.value().line, places_of_bone_.value().seen);
     mounted_.step(session_.loop(), last_);
     if (const std::optional<MountLoad> push = mounted_.push()) pushes_.store(*push);
   }
 
-  // Spindle and force run down and the client ends with this.
+  // Spindle and force run down, and the client ends with this reason.
   void give_up(const Error& why) {
     const std::lock_guard lock(mutex_);
     if (!lost_why_) lost_why_ = why;
@@ -307,21 +307,21 @@ class Client {
   }
 
   bool wait_joined() {
-    heard_ns_ = ns(Clock::now());
+    received_ns_ = ns(Clock::now());
     while (!joined_ && link_ok_ && !stop_.wait_for(2ms))
-      if (Clock::now().time_since_epoch() - std::chrono::nanoseconds(heard_ns_) > kJoinPatience)
+      if (Clock::now().time_since_epoch() - std::chrono::nanoseconds(received_ns_) > kJoinPatience)
         give_up({ErrorCode::unavailable, "the server has sent nothing for " + std::to_string(kJoinPatience.count()) +
                                              " s while the bone was fetched; look at the server's log"});
     return joined_ && link_ok_;
   }
 
-  // [haptic] Nothing here allocates, locks, logs or waits, its own sleep apart.
+  // [haptic] Nothing here allocates, locks, logs or waits, except its own sleep.
   void haptic_thread() {
     outcome_.began_ns = ns(Clock::now());
     outcome_.realtime = try_realtime(kPriority);
     realtime_refused_ = !outcome_.realtime;
     PeriodicTimer timer(kTick, kSpin);
-    constexpr int kRunDownTicks = 500;  // after the link is lost or a stop was asked for
+    constexpr int kRunDownTicks = 500;  // after the link is lost or a stop was requested
     int down = 0;
     while (!session_.done() && down < kRunDownTicks) {
       const int periods = timer.wait(outcome_.ticks);
@@ -376,12 +376,12 @@ class Client {
     watchdog_.rest();
   }
 
-  // [watchdog] Said at most every five seconds.
+  // [watchdog] Reports at most every five seconds.
   void stalled() {
     const auto now = Clock::now();
-    if (stall_told_ && now - *stall_told_ < 5s) return;
-    stall_told_ = now;
-    log::warn("the haptic loop stands", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
+    if (stall_reported_at_ && now - *stall_reported_at_ < 5s) return;
+    stall_reported_at_ = now;
+    log::warn("the haptic loop has stalled", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
   }
 
   void replica_thread() {
@@ -395,16 +395,16 @@ class Client {
         events.swap(from_room_);
         taken_.notify_all();
       }
-      const bool heard = !events.empty();
-      // Before the queues are looked at: what was closed up to here must still be taken.
+      const bool any_received = !events.empty();
+      // Read before the queues: what was closed up to here must still be taken.
       const bool over = touching_over_;
       take_own_cuts();
       for (FromRoom& event : events) std::visit([this](auto& e) { take(e); }, event);
       events.clear();
       replica_.settle();
-      watch_room(heard);
+      watch_room(any_received);
       build_patch();
-      if (heard || replica_.unconfirmed() > 0) reserve.refill();
+      if (any_received || replica_.unconfirmed() > 0) reserve.refill();
       if (!over) continue;
       if (!waiting_since) waiting_since = Clock::now();
       const bool settled = replica_.unconfirmed() == 0 && unsent_.empty();
@@ -426,7 +426,7 @@ class Client {
       const std::int64_t closed_ns =
           tick_times_[static_cast<std::size_t>(piece.closed_tick) % kTickTimes].load(std::memory_order_relaxed);
       cut_log_.closed(piece.author_seq, closed_ns);
-      // Sent before it is felt: the room's answer is what takes longest.
+      // Sent before it is felt, because the room's answer takes longest.
       send_waiting();
       replica_.add_own(cut);
     }
@@ -444,12 +444,12 @@ class Client {
       replica_.restore(leaf);
   }
   void take(const Interrupted& interrupted) {
-    // Contact goes on with what is held; the leaves that come take its place together, so that no bone is missed
-    // meanwhile.
-    if (joined_ && !interrupted_) log::warn("the line to the server is interrupted", {{"reason", interrupted.why}});
+    // Contact continues with the present bone. The received leaves replace it all at once, so that no bone is missing
+    // in between.
+    if (joined_ && !interrupted_) log::warn("the connection to the server is interrupted", {{"reason", interrupted.why}});
     interrupted_ = joined_;
     renewed_.clear();
-    // Before that, what has come may be bone that is there again by now: it begins anew.
+    // Before joining, the received bone may have been restored since: begin anew.
     if (!joined_) replica_ = Replica(room_.bone(), BodyId{}, room_.tools());
   }
   void renew(const RoomAtJoin& room) {
@@ -459,7 +459,7 @@ class Client {
     changing_ = interrupted_ = false;
     renewed_ = {};
     ++outcome_.interruptions;
-    log::info("the line to the server stands again",
+    log::info("the connection to the server is restored",
               {{"room_seq", room.contained.value}, {"unconfirmed_cuts", replica_.unconfirmed()}});
   }
   void take(const RoomAtJoin& room) {
@@ -481,7 +481,7 @@ class Client {
     changing_ = !part.last;
     follow_lease(part.lease_epoch);
   }
-  // What is on its way was cut on the sight of other bone: the room will reject it.
+  // Cuts on their way were based on other bone: the room will reject them.
   void follow_lease(std::uint64_t epoch) {
     if (epoch <= lease_epoch_) return;
     lease_epoch_ = epoch;
@@ -491,11 +491,11 @@ class Client {
     replica_.note(decided.place);
     follow_lease(decided.lease_epoch);
     const std::string words = in_words(decided.supervision);
-    // Where a line begins and nothing holds, nothing is said.
+    // At the beginning of a connection without restrictions nothing is reported.
     if (words.empty() && !supervised_) return;
     supervised_ = !words.empty();
     const std::string what = words.empty() ? "free" : words, by = called(decided.by);
-    log::info("an instructor decides",
+    log::info("an instructor changed the restrictions",
               {{"room_seq", decided.place.value}, {"what", what}, {"by", by}, {"words", decided.supervision.words}});
     outcome_.restrictions.push_back({ns(Clock::now()), decided.place.value, what, by});
     guard_ = words.empty() ? "" : by;
@@ -507,7 +507,7 @@ class Client {
     log::info("words", {{"room_seq", said.place.value}, {"from", said.from.value}, {"words", said.words}});
     outcome_.words.push_back({ns(Clock::now()), said.place.value, said.from.value, said.words});
   }
-  // Others' tools are felt by what they are made of, as far as the room's tools say it.
+  // Others' tools are felt as solids, if the room's tools contain them.
   void take(const ToolNamed& named) {
     for (const ToolBox::Entry* entry : room_.tools()->entries()) {
       if (entry->tool.name != named.name) continue;
@@ -519,14 +519,14 @@ class Client {
       return;
     }
   }
-  void take(const Noted& noted) { replica_.note(noted.place); }
+  void take(const Noted& noted) { replica_.note(noted.room_seq); }
   void take(const SceneSet& scene) {
-    replica_.note(scene.place);
+    replica_.note(scene.room_seq);
     std::vector<PlacedGuide>& guides = guides_.writable();
     guides.clear();
     for (const SceneItem& item : scene.items)
       if (const ToolBox::Entry* entry = room_.tools()->find(item.tool)) {
-        // Made once for each definition: it takes up to a tenth of a second.
+        // Made once for each definition, because it takes up to a tenth of a second.
         std::shared_ptr<const SolidLattice>& solid = solids_[item.tool];
         if (!solid) solid = std::make_shared<const SolidLattice>(entry->tool);
         guides.push_back(placed_guide(item.id, entry->tool, item.pose_bone_item, solid));
@@ -535,22 +535,22 @@ class Client {
   }
   void take(const Committed& committed) {
     const bool own = committed.cut.author == room_.room().author;
-    if (own) cut_log_.confirm(committed.cut.author_seq, committed.place, ns(Clock::now()));
+    if (own) cut_log_.confirm(committed.cut.author_seq, committed.room_seq, ns(Clock::now()));
     if (own) rejected_in_a_row_ = 0;
-    replica_.commit(committed.place, committed.cut, own);
+    replica_.commit(committed.room_seq, committed.cut, own);
   }
   void take(const Rejected& rejected) {
     cut_log_.confirm(rejected.author_seq, RoomSeq{}, ns(Clock::now()));
-    const bool fell = replica_.reject(rejected.place, rejected.author_seq);
+    const bool fell = replica_.reject(rejected.room_seq, rejected.author_seq);
     follow_lease(rejected.lease_epoch);
-    // An instructor's word that was on its way when this was cut.
+    // An instructor's decision that was on its way when this was cut.
     const auto because = [&](Rejection reason) { return rejected.reason == sentence(reason); };
     if (because(Rejection::frozen)) return static_cast<void>(++outcome_.cuts_stopped);
     if (because(Rejection::taken)) return static_cast<void>(++outcome_.cuts_taken);
     if (because(Rejection::zone) || because(Rejection::forbidden_tool))
       return static_cast<void>(++outcome_.cuts_elsewhere);
-    if (!fell) return;  // it had fallen with an undo, or with one before it
-    // One now and then gives its bone back; a room that takes none makes further work pointless.
+    if (!fell) return;  // it was dropped by an undo, or with an earlier cut
+    // An occasional rejected cut gives its bone back. A room that rejects all cuts makes further work pointless.
     constexpr int kMostInARow = 20;
     if (rejected_in_a_row_++ == 0)
       log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
@@ -558,11 +558,11 @@ class Client {
     give_up({ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason});
   }
 
-  void watch_room(bool heard) {
+  void watch_room(bool any_received) {
     const double now_s = 1e-9 * static_cast<double>(ns(Clock::now()));
-    // Without a line everything that will be cut is unconfirmed.
+    // Without a connection everything that will be cut is unconfirmed.
     const bool silent = interrupted_ && replica_.unconfirmed() == 0;
-    const RoomHealth health = watch_.update(now_s, heard && !interrupted_, silent ? 1 : replica_.unconfirmed());
+    const RoomHealth health = watch_.update(now_s, any_received && !interrupted_, silent ? 1 : replica_.unconfirmed());
     unconfirmed_ = replica_.unconfirmed();
     const RoomHealth before = room_health_.exchange(health);
     if (health == before) return;
@@ -573,7 +573,7 @@ class Client {
     if (health == RoomHealth::lost && link_ok_)
       give_up({ErrorCode::unavailable,
                interrupted_
-                   ? "the line to the server has not come back; see whether osteon-server still runs and can be reached"
+                   ? "the connection to the server was not restored; see whether osteon-server still runs and can be reached"
                    : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
                          " cuts; see whether it runs and can be reached"});
   }
@@ -600,7 +600,7 @@ class Client {
     patch_times_.record(Clock::now() - began);
   }
 
-  // Bone removed by the steps before this one, as far as it was not noted yet.
+  // Notes the bone removed by the steps before this one, unless it was noted.
   void note_removed(std::size_t step) {
     for (; noted_steps_ < step && noted_steps_ < outcome_.removed_mm3.size(); ++noted_steps_) {
       const double removed = replica_.removed_mm3();
@@ -640,7 +640,8 @@ class Client {
     }
   }
 
-  // What the plan has left on the bone goes into the room's scene; guides come back from there and guide the tool.
+  // Enters the items that the plan has left on the bone into the room's scene. Guides come back from there and guide
+  // the tool.
   void set_items() {
     for (; items_set_ < items_left_ && link_ok_ && Clock::now() >= items_from_; ++items_set_) {
       const LeftItem& left = session_.left()[items_set_];
@@ -649,8 +650,8 @@ class Client {
       item.pose_bone_item = left.pose_bone_item;
       item.turns = left.turns;
       const Result<std::uint32_t> set = room_.set_item(item);
-      if (!set && set.error().code == ErrorCode::denied) {  // who is stopped places nothing until they may go on
-        log::warn("an item waits", {{"because", set.error().message}});
+      if (!set && set.error().code == ErrorCode::denied) {  // a stopped person places nothing until the stop is over
+        log::warn("an item cannot be placed yet", {{"because", set.error().message}});
         items_from_ = Clock::now() + 2s;
         return;
       }
@@ -670,12 +671,12 @@ class Client {
     if (!metal.empty()) log::warn("metal", {{"because", metal}});
   }
 
-  // What the loop makes of it, tick by tick: when it stopped is known to the millisecond.
+  // Notes the effects in the loop, tick by tick: the time of a stop is known to the millisecond.
   void note_oversight(const TickRow& row) {
     const LoopReport& r = row.report;
     const bool forbidden = (r.events & kForbidden) != 0, led = (r.events & kHandGuided) != 0;
     if (forbidden != was_forbidden_) loop_notes_.push_back({row.mono_ns, 0, forbidden ? "may not cut" : "may cut"});
-    if (led != was_led_) loop_notes_.push_back({row.mono_ns, 0, led ? "is led" : "is led no more"});
+    if (led != was_led_) loop_notes_.push_back({row.mono_ns, 0, led ? "is led" : "is no longer led"});
     was_forbidden_ = forbidden;
     was_led_ = led;
     outcome_.forbidden_ticks += forbidden;
@@ -721,8 +722,8 @@ class Client {
     if (health != RoomHealth::follows)
       std::printf(", held: %s, %zu cuts unconfirmed", name(health), unconfirmed_.load());
     if (live_.refresh()) {
-      const TickStats now = live_.value().since(told_);
-      told_ = live_.value();
+      const TickStats now = live_.value().since(last_ticks_);
+      last_ticks_ = live_.value();
       std::printf(", loop %.0f us (99 of 100: %.0f), late %.0f us (%.0f), %llu missed", now.work.percentile_us(50),
                   now.work.percentile_us(99), now.lateness.percentile_us(50), now.lateness.percentile_us(99),
                   static_cast<unsigned long long>(now.missed));
@@ -734,7 +735,7 @@ class Client {
   RoomSession& room_;
   const ClientOptions& options_;
   const StopSignal& stop_;
-  Session& session_;                     // haptic thread; its queue of cuts is emptied by the replica's thread
+  Session& session_;                     // haptic thread; the replica's thread empties its queue of cuts
   FeltMount mounted_;                    // haptic thread
   Replica replica_;                      // replica thread, until it is joined
   PatchBuilder builder_;                 // replica thread
@@ -747,23 +748,24 @@ class Client {
 
   TripleBuffer<Patch> patches_;                    // replica → haptic
   TripleBuffer<ToolPlace> places_;                 // haptic → replica
-  TripleBuffer<std::vector<PlacedGuide>> guides_;  // all that stands in the room's scene, replica → haptic
+  TripleBuffer<std::vector<PlacedGuide>> guides_;  // all items of the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
-  TripleBuffer<HapticRestrictions> oversights_;                   // what an instructor has decided, session → haptic
+  TripleBuffer<HapticRestrictions> oversights_;                   // an instructor's restrictions, session → haptic
   TripleBuffer<MountUpdate> places_of_bone_;                        // session → haptic
-  std::atomic<std::uint64_t> line_{1};                            // which one this is
+  std::atomic<std::uint64_t> line_{1};                            // number of the present connection
   TripleBuffer<MountLoad> pushes_;                                // haptic → reporter
-  std::atomic<std::uint64_t> stop_flag_{0};                       // the newest datagram's word on it, likewise
+  std::atomic<std::uint64_t> stop_flag_{0};                       // the newest datagram's stop flag, likewise
   TripleBuffer<Partners> partners_;                               // others' tools, session → haptic
-  Partners heard_partners_;                                       // of the session's, as the next
+  Partners received_partners_;                                       // written by the session's thread, like the next
   std::set<std::string> named_tools_;
   TripleBuffer<PartnerSolids> partner_solids_;  // replica → haptic
   PartnerSolids known_solids_;                  // replica thread
-  std::atomic<double> line_lag_s_{0};  // how old a partner's state is when it comes: both lines taken to be alike
+  // Age of a partner's state on arrival; assumes that both connections have equal delay.
+  std::atomic<double> line_lag_s_{0};
   SpscQueue<TickRow, 2048> rows_;      // haptic → reporter
   TripleBuffer<TickStats> live_;       // haptic → reporter, once a second
-  TickStats told_;                     // reporter: of the last line
-  std::optional<Clock::time_point> stall_told_;  // watchdog
+  TickStats last_ticks_;                     // reporter: of the last line
+  std::optional<Clock::time_point> stall_reported_at_;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
   std::mutex mutex_;  // guards the three below; never taken by the haptic thread
@@ -771,12 +773,12 @@ class Client {
   std::deque<FromRoom> from_room_;
   std::optional<Error> lost_why_;
   std::condition_variable wake_, taken_;
-  std::atomic<std::int64_t> heard_ns_{0};
+  std::atomic<std::int64_t> received_ns_{0};
   std::atomic<RoomHealth> room_health_{RoomHealth::follows};
   std::atomic<std::size_t> unconfirmed_{0};
   std::atomic<std::size_t> items_left_{0};  // by the plan
-  std::size_t items_set_ = 0;               // in the room; reporter thread
-  Clock::time_point items_from_{};          // not before then; reporter thread
+  std::size_t items_set_ = 0;               // in the room's scene; reporter thread
+  Clock::time_point items_from_{};          // earliest time of the next attempt; reporter thread
   std::atomic<bool> link_ok_{true}, realtime_refused_{false}, joined_{false}, touching_over_{false}, all_over_{false};
 
   // Haptic thread.
@@ -791,15 +793,15 @@ class Client {
   double force_before_n_ = 0;
   std::vector<OversightNote> loop_notes_;
   // Replica thread.
-  bool supervised_ = false;    // something was decided about this hand
+  bool supervised_ = false;    // the hand is restricted
   std::string guard_;       // by whom, as far as the room says it
-  std::uint64_t lease_epoch_;  // of the room, as far as it was heard
-  std::deque<Cut> unsent_;     // as bounded as what is unconfirmed
+  std::uint64_t lease_epoch_;  // of the room, as far as received
+  std::deque<Cut> unsent_;     // bounded like the unconfirmed cuts
   Pose built_at_;
   int built_tool_ = -1;
   int rejected_in_a_row_ = 0;
-  bool changing_ = false;     // a change of the bone has come in part
-  bool interrupted_ = false;  // since then leaves are gathered here
+  bool changing_ = false;     // part of a change of the bone has been received
+  bool interrupted_ = false;  // since then leaves are collected here
   std::vector<FieldLeaf> renewed_;
   ConfirmationMonitor watch_;
   std::size_t noted_steps_ = 0;
@@ -807,14 +809,14 @@ class Client {
   DurationHistogram patch_times_;
 
   ClientOutcome outcome_;
-  Watchdog watchdog_{kStall, kPriority + 1, [this] { stalled(); }};  // last: its thread uses the rest
+  Watchdog watchdog_{kStall, kPriority + 1, [this] { stalled(); }};  // last: its thread uses the other members
 };
 
 }  // namespace
 
 Result<ClientOutcome> run_client(RoomSession& room, Session& session, const ClientOptions& options,
                                  const StopSignal& stop) {
-  // Large: its queues are part of it.
+  // On the heap because it is large: it contains its queues.
   const auto client = std::make_unique<Client>(room, session, options, stop);
   return client->run();
 }

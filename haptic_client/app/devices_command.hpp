@@ -1,4 +1,4 @@
-// `osteon-haptic devices`: which devices there are, what of them is on this machine, what is missing and the remedy.
+// `osteon-haptic devices`: lists the devices, which of them are on this machine, what is missing, and the remedy.
 #pragma once
 #include <string>
 #include <vector>
@@ -11,7 +11,7 @@ class App;
 
 namespace osteon::haptic {
 
-// The options that name vendors' files, for every command that opens devices.
+// Adds the options that name vendors' files, for every command that opens devices.
 void add_device_options(CLI::App& app, DeviceOptions& options);
 // The list as it is printed.
 [[nodiscard]] std::string list_devices(const std::vector<DeviceLine>& lines);

@@ -58,7 +58,7 @@ std::string tools_of(const ForceLaw& law) {
 
 json span(const Span& s) { return s.lowest == 0.0 && s.highest == 0.0 ? json() : json::array({s.lowest, s.highest}); }
 
-// A whole point of a tool in bone, at a speed and a feed.
+// A tool whose whole point is in bone, at a speed and a feed.
 struct Point {
   std::string_view law, tool;
   double diameter_mm, rpm, feed_mm_per_s, density_g_cm3;
@@ -89,7 +89,7 @@ json computed(const Point& point) {
   const FeedLaw feed_law = law.feed_law(of, in);
   const double force_n = resistance_n(feed_law, point.feed_mm_per_s);
   const double torque_nmm = law.torque_nmm(of, in, force_n);
-  // Work of the torque in a turn for each volume of the hole that it makes.
+  // Work of the torque per turn, for each volume of the hole.
   const double per_turn_mm3 = 60.0 * point.feed_mm_per_s / point.rpm * of.leading_area_mm2;
   return {{"law", point.law},
           {"tool", point.tool},

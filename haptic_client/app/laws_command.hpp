@@ -4,7 +4,7 @@
 
 namespace osteon::haptic {
 
-// One paragraph for each law, which tools obey it if nothing else is chosen, and how to choose.
+// One paragraph for each law, the tools that use it by default, and how to choose another.
 [[nodiscard]] std::string laws_text();
 // {"laws": [...], "defaults": {kind: law}, "points": [...]}: the points of comparison are computed, not quoted.
 [[nodiscard]] std::string laws_json();

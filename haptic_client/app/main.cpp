@@ -1,4 +1,4 @@
-// osteon-haptic: joins a room with a tool in the hand, a person's or one with a plan, a thousand times a second.
+// osteon-haptic: joins a room and runs a tool at 1 kHz. A person or a plan moves it.
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -82,9 +82,9 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
   out["flatness_mm"] = step.site.flatness_mm;
   out["removed_mm3"] = removed_mm3;
   out["peak_force_n"] = result.peak_force_n;
-  out["asked_mm"] = step.asked_mm();  // of the tip, like what was reached
+  out["asked_mm"] = step.asked_mm();  // of the tip, like the depth reached
   out["deepest_mm"] = result.deepest_mm;
-  // A broach cuts in the ticks of its blows only: there is no force and no feed of cutting to give a mean of.
+  // A broach cuts only in the ticks of its blows. So there is no mean force or feed of cutting.
   if (step.item.kind != ToolKind::broach) out["while_cutting"] = means(result.all);
   if (drill) {
     out["near_cortex"] = means(result.near_cortex);
@@ -97,7 +97,7 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
   return out;
 }
 
-// What an instructor decided about the hand, and what became of it. Times: from the loop's first tick on.
+// An instructor's decisions about the hand, and their effects. Times: since the loop's first tick.
 json haptic_restrictions(const ClientOutcome& outcome) {
   const auto seconds = [&](std::int64_t mono_ns) { return 1e-9 * static_cast<double>(mono_ns - outcome.began_ns); };
   json notes = json::array(), words = json::array();
@@ -196,7 +196,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
   return summary;
 }
 
-// What a person should know of the devices, as it happens.
+// Reports events of the devices to the user, as they happen.
 void tell(DeviceEvent event, std::string_view device, const std::string& sentence) {
   switch (event) {
     case DeviceEvent::lost:
@@ -215,7 +215,7 @@ void tell(DeviceEvent event, std::string_view device, const std::string& sentenc
 }
 
 Result<void> check_outputs(const Options& options) {
-  // What was recorded cannot be made again, and might be what is being played.
+  // A recording cannot be made again, and may be the one that is being played.
   std::error_code ignored;
   if (!options.client.record.empty() && std::filesystem::is_regular_file(options.client.record, ignored))
     return failure(ErrorCode::exists, "there is a file " + options.client.record.string() +
@@ -227,14 +227,13 @@ Result<void> check_outputs(const Options& options) {
   return check_writable(options.summary, "the summary", "--summary");
 }
 
-// Error unavailable: the first step whose time, or whose recording, ran out. One that a signal stopped is as it should
-// be.
+// Error unavailable: the first step whose time, or whose recording, ran out. A step that a signal stopped is no error.
 Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     if (outcome.steps[i].gave_up)
       return failure(ErrorCode::unavailable, "step " + std::to_string(i + 1) + " (" + name(plan.steps[i].plan.action) +
                                                  ") did not finish: " + given_up_words(outcome.steps[i]));
-  // Without a stop nothing else leaves a step of a plan undone.
+  // Without a stop nothing else leaves a step of a plan incomplete.
   if (outcome.stopped) return {};
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
     if (!outcome.steps[i].completed && plan.steps[i].plan.action != Action::free_hand)
@@ -245,7 +244,7 @@ Result<void> all_finished(const ReadyPlan& plan, const ClientOutcome& outcome) {
 }
 
 Result<void> run(Options& options, const StopSignal& stop) {
-  // Everything that can be wrong without a server is said before one is looked for.
+  // Reports everything that can be wrong without a server before one is contacted.
   if (options.force_scale && !(*options.force_scale > 0.0 && *options.force_scale <= 1.0))
     return failure(ErrorCode::invalid_input, "--scale must be a number above 0 and at most 1");
   if (!(options.patience_s >= 0.0 && options.patience_s <= 3600.0))
@@ -275,7 +274,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   hand->disconnect();
   if (!outcome) return tl::unexpected(outcome.error());
   const ReadyPlan& plan = (*session)->plan();
-  // Both are written, whatever comes of the other, and of the session.
+  // Both files are written, whatever the result of the other and of the session.
   const Result<void> cut_log = write_cut_log(options.cut_log, outcome->cuts);
   const Result<void> summary =
       options.summary.empty()
@@ -285,7 +284,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   const std::string field = outcome->field_hash ? to_hex(*outcome->field_hash).substr(0, 12) : "unknown";
   std::string unconfirmed;
   if (outcome->unconfirmed > 0)
-    unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in what follows)";
+    unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in the following figures)";
   std::printf(
       "%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
       "field %s at %llu; %llu of %llu ms missed\n",
@@ -320,8 +319,8 @@ int main(int argc, char** argv) {
   app.add_option("--room", options.room.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, options.credentials);
   app.add_option("--name", options.room.name,
-                 "How others in the room see you called; over plain text also who you are, so that without it nobody "
-                 "is you again");
+                 "Your name for others in the room; over plain text it is also your identity, which is new each time "
+                 "without it");
   app.add_option("--plan", options.hand.plan, "JSON file with the steps of a simulated surgeon");
   app.add_option("--tool", options.hand.tool,
                  "The tool for your own hand, of the box or of the server's --tools, e.g. drill-3.2; no --plan then");
@@ -336,7 +335,7 @@ int main(int argc, char** argv) {
       "Your hand: from where you look, front (unless said otherwise), back, left, right, top or bottom of the "
       "patient, or the direction x,y,z");
   app.add_option("--at", options.hand.at,
-                 "Your hand: the place x,y,z in mm over which the tool begins; by default the bone's middle");
+                 "Your hand: the point x,y,z in mm above which the tool begins; by default the bone's middle");
   app.add_option("--rpm", options.hand.spindle_rpm, "Your hand: the spindle's full speed; by default the tool's own");
   app.add_option(
       "--law", options.hand.law,
@@ -349,13 +348,13 @@ int main(int argc, char** argv) {
   app.add_option("--session-log", options.client.session_log, "CSV with a row for each millisecond");
   app.add_option(
       "--record", options.client.record,
-      "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. A "
-      "file that is there is left alone");
+      "HDF5 file with a row for each millisecond: poses, wrenches, spindle, bone; --device recorded:FILE plays it. "
+      "An existing file is not overwritten");
   app.add_option("--cut-log", options.cut_log, "CSV with a row for each cut");
   app.add_option("--summary", options.summary, "JSON written at the end: steps, forces, loop times, field hash");
   app.add_option(
       "--udp", options.room.fast_path,
-      "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server says");
+      "HOST:PORT for the sealed datagrams beside the stream, or off; by default the port that the server names");
   app.add_option("--cache", options.room.cache, "Folder where fetched cases are kept")->capture_default_str();
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")->capture_default_str();
   app.add_flag("--status", options.client.status, "A short line on standard output each second");
@@ -365,7 +364,7 @@ int main(int argc, char** argv) {
   const StopSignal stop;
   const Result<void> outcome = run(options, stop);
   if (outcome) return 0;
-  // Asked to stop while joining: a clean stop too.
+  // A stop requested while joining is a clean stop too.
   if (outcome.error().code == ErrorCode::cancelled) return 0;
   return log::exit_with(kProgram, outcome.error());
 }

@@ -12,7 +12,7 @@ namespace {
 
 using nlohmann::json;
 
-// Thrown and caught within this file only: the sentence for a field that is wrong.
+// Thrown and caught within this file only: the message for a wrong field.
 struct Wrong : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
@@ -26,7 +26,7 @@ double number(const json& object, const char* field, double otherwise, double lo
   return value.get<double>();
 }
 
-constexpr double kFarthest = 1e5;  // mm; no bone is there, and beyond it sentences become unreadable
+constexpr double kFarthest = 1e5;  // mm; no bone is so far away, and larger numbers make messages unreadable
 
 template <std::size_t N>
 std::array<double, N> numbers(const json& object, const char* field) {
@@ -82,8 +82,8 @@ PlanEntry read_entry(const json& step) {
   return result;
 }
 
-// The force law; empty where none is named. A tool that is not of the box may be the room's own: of it only the room
-// can say whether it is there and which laws suit it.
+// The force law; empty if none is named. A tool that is not in the tool box may be the room's own. Then only the room
+// can say whether it exists and which laws suit it.
 std::string read_law(const json& object, const std::string& tool) {
   const std::string law = text(object, "law", "");
   if (const Result<void> well = check_law(tool, law); !well) throw Wrong("\"law\": " + well.error().message);

@@ -8,11 +8,11 @@
 
 namespace osteon::haptic {
 
-// What can be said of a tool's force law before a room is joined: whether the law, if one is named, is there, and suits
-// the tool if the box has it. A tool that is not of the box may be the room's own. Error invalid_input.
+// Checks a tool's force law before a room is joined, as far as possible. A named law must exist, and must suit the tool
+// if the tool box has the tool. Another tool may be the room's own. Error invalid_input.
 [[nodiscard]] Result<void> check_law(const std::string& tool, const std::string& law);
 
-// Tools are not looked for: they are the room's. Errors: not_found (no such file), invalid_input (names file, step and
+// Does not search for tools: they are the room's. Errors: not_found (no such file), invalid_input (names file, step and
 // field).
 [[nodiscard]] Result<std::vector<PlanStep>> read_plan(const std::filesystem::path& file);
 

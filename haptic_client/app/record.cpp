@@ -43,7 +43,7 @@ std::string MetalWatch::note(const ToolModel& model, const LoopReport& report) {
   const bool begins = last_seq_ == 0 || report.state_seq > last_seq_ + kApart_ticks;
   last_seq_ = report.state_seq;
   if (!begins) return {};
-  return model.tool.name + " stands on metal, which it does not cut: draw back and go round it";
+  return model.tool.name + " stands on metal, which it does not cut: draw it back and go around the metal";
 }
 
 std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
@@ -60,8 +60,8 @@ std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   const auto since = static_cast<std::int64_t>(report.state_seq - stay.last_seq);
   stay.ticks = std::max<std::int64_t>(0, stay.ticks - (since - 1)) + 1;
   stay.last_seq = report.state_seq;
-  if (stay.told || stay.ticks < kLasting_ticks) return {};
-  stay.told = true;
+  if (stay.reported || stay.ticks < kLasting_ticks) return {};
+  stay.reported = true;
   return out_of_range_sentence(*model.law, report.out_of_range);
 }
 
@@ -72,7 +72,7 @@ Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInf
   file_.open(file, std::ios::trunc);
   if (!file_)
     return failure(ErrorCode::internal,
-                   "the session log " + file.string() + " cannot be written; choose another place");
+                   "the session log " + file.string() + " cannot be written; choose another path");
   file_ << "time_s,mono_ns,state_seq,phase,tool,tip_x_mm,tip_y_mm,tip_z_mm,depth_mm,device_depth_mm,force_physical_n,"
            "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm,law_out_of_range\n";
   return {};

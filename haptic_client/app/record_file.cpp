@@ -21,32 +21,24 @@ namespace {
 static_assert(std::is_same_v<hid_t, std::int64_t>);
 
 constexpr const char* kReadme =
-    "One row for each millisecond, under `data` and in the groups of poses and wrenches; data/time holds as many rows "
-    "as are "
-    "complete. Lengths are millimetres, forces newtons, torques newton-millimetres, times seconds since 1970 (UTC). "
-    "Poses are "
-    "[x, y, z, qx, qy, qz, qw] of the tool, its tip at the origin and +z along its axis out of the tip. Frame `bone` "
-    "is the "
-    "patient's (DICOM LPS: x to the left, y to the back, z to the head); frame `device` has x to the right, y up, z to "
-    "the user. "
-    "drill_pose is the tool as the bone lets it be (the proxy), device_pose the tool as the hand holds it, handle_pose "
-    "the "
-    "device's handle; bone_pose is the bone on its mount, seen from where it rests: frame `bone` goes with it, that of "
-    "burr_change stays. Wrenches are [fx, fy, fz, tx, ty, tz] at the tip: `physical` of the bone on the tool, not "
-    "scaled; "
-    "`wrench` in drill_force_feedback as it was shown by the device, s times as strong (data/force_scale), zero where "
-    "it shows "
-    "none. burr_change has a row for each time that a tool was taken up: which, at which row, and how the device's "
-    "frame lay in "
-    "the bone's from then on. Enumerations carry their names. Bone that was removed is named by metadata/field_hash "
-    "and kept in "
-    "the room's journal.";
+    "One row for each millisecond, under `data` and in the groups of poses and wrenches. data/time has as many rows as "
+    "are complete. Lengths are millimetres, forces newtons, torques newton-millimetres, times seconds since 1970 (UTC). "
+    "Poses are [x, y, z, qx, qy, qz, qw] of the tool, its tip at the origin and +z along its axis out of the tip. "
+    "Frame `bone` is the patient's (DICOM LPS: x to the left, y to the back, z to the head). Frame `device` has x to "
+    "the right, y up, z to the user. drill_pose is the pose that the bone allows for the tool (the proxy), device_pose "
+    "the pose that the hand asks for, handle_pose the device's handle. bone_pose is the bone on its mount, relative to "
+    "its rest pose: frame `bone` moves with it, the frame of burr_change does not. Wrenches are [fx, fy, fz, tx, ty, "
+    "tz] at the tip. `physical` is of the bone on the tool, not scaled. `wrench` in drill_force_feedback is what the "
+    "device showed, s times as strong (data/force_scale), zero where it shows none. burr_change has a row for each "
+    "time that a tool was taken up: the tool, its first row, and the pose of the device's frame in the bone's frame "
+    "from then on. Enumerations carry their names. metadata/field_hash names the removed bone, which is stored in the "
+    "room's journal.";
 
 // The frames and units of columns.
 constexpr const char* kBone = "bone";
 constexpr const char* kDevice = "device";
 
-// HDF5 would print its own account of what the callers say in a sentence; it does so for each thread.
+// Switches off HDF5's own error output, because the callers report errors. The setting is per thread.
 void be_quiet() { H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr); }
 
 Hdf5Handle text_type(std::size_t size) {
@@ -57,7 +49,7 @@ Hdf5Handle text_type(std::size_t size) {
   return type;
 }
 
-// As a text of variable length, which Python's readers give as a str.
+// As a string of variable length, which Python's readers return as a str.
 bool set_text(hid_t object, const char* name, const std::string& text) {
   const Hdf5Handle type = text_type(H5T_VARIABLE), space(H5Screate(H5S_SCALAR), H5Sclose);
   const Hdf5Handle attribute(H5Acreate2(object, name, type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), H5Aclose);
@@ -83,7 +75,7 @@ Hdf5Handle make_dataset(hid_t file, const std::string& path, hid_t type, hid_t s
   return {H5Dcreate2(file, path.c_str(), type, space, links.id(), creation, H5P_DEFAULT), H5Dclose};
 }
 
-// A value that is there from the start and may be set at the end.
+// A value that exists from the start and may be set at the end.
 Hdf5Handle make_value(hid_t file, const char* path, hid_t type, const void* value) {
   const Hdf5Handle space(H5Screate(H5S_SCALAR), H5Sclose);
   Hdf5Handle dataset = make_dataset(file, path, type, space.id(), H5P_DEFAULT);
@@ -135,7 +127,7 @@ hid_t native<std::uint8_t>() {
   return H5T_NATIVE_UINT8;
 }
 
-// An array that grows by rows, and the rows of it that are not written yet.
+// An array that grows by rows, and its rows that are not written yet.
 template <class Row>
 struct Column {
   std::string path, units, frame, meaning;
@@ -155,7 +147,7 @@ void put(std::vector<std::byte>& to, const T* values, std::size_t count) {
   to.insert(to.end(), bytes, bytes + count * sizeof(T));
 }
 
-// A column of `width` values of type T, given by a function of the row that returns an array or one value.
+// A column of `width` values of type T. `get` takes the row and returns an array or one value.
 template <class T, class Row, class Get>
 Column<Row> column(const char* path, const char* units, const char* frame, const char* meaning, Get get) {
   Column<Row> made;
@@ -210,7 +202,7 @@ bool make_column(hid_t file, Column<Row>& made, hsize_t chunk_rows) {
   const hsize_t now[] = {0, width}, most[] = {H5S_UNLIMITED, width}, chunk[] = {chunk_rows, width};
   const Hdf5Handle space(H5Screate_simple(rank, now, most), H5Sclose),
       creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
-  // Compressed as its neighbours' recordings are; poses hardly change from one row to the next.
+  // Compressed, as in the recordings of similar programs; poses hardly change from one row to the next.
   if (H5Pset_chunk(creation.id(), rank, chunk) < 0 || H5Pset_shuffle(creation.id()) < 0 ||
       H5Pset_deflate(creation.id(), 1) < 0)
     return false;
@@ -279,7 +271,7 @@ struct RecordFile::Impl {
   tl::unexpected<Error> failed(const char* what);
 
   ~Impl() {
-    // HDF5 cannot close what it could not write; it is left as it is, as if the process had been killed.
+    // HDF5 cannot close what it could not write. The file is left as it is, as if the process had been killed.
     if (abandoned) abandon();
   }
   void abandon() {
@@ -303,27 +295,27 @@ tl::unexpected<Error> RecordFile::Impl::failed(const char* what) {
 void RecordFile::Impl::make_columns() {
   using R = TickRow;
   const double s = info.loop.force_scale;
-  // What the loop would show on a device that has no motors for it is shown by nobody.
+  // On a device without motors the loop's force is not shown.
   const bool forces = info.device_info.force_axes > 0, torques = info.device_info.torque_axes > 0;
   const auto add = [this](auto&& made) { columns.push_back(std::forward<decltype(made)>(made)); };
   add(column<double, R>(recording::kHandlePose, "mm, mm, mm, 1, 1, 1, 1", kDevice, "the device's handle",
                         [](const R& r) { return numbers(r.reading.pose_device_tool); }));
   add(column<double, R>("high_frequency_poses/device_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
-                        "the tool as the hand holds it",
+                        "the tool's pose that the hand asks for",
                         [](const R& r) { return numbers(r.report.pose_bone_device); }));
   add(column<double, R>("high_frequency_poses/drill_pose/pose", "mm, mm, mm, 1, 1, 1, 1", kBone,
-                        "the tool as the bone lets it be: the proxy",
+                        "the tool's pose that the bone allows: the proxy",
                         [](const R& r) { return numbers(r.report.pose_bone_proxy); }));
   add(column<double, R>(recording::kBonePose, "mm, mm, mm, 1, 1, 1, 1", "rest",
-                        "the bone on its mount, seen from where it rests",
+                        "the bone on its mount, relative to its rest pose",
                         [](const R& r) { return numbers(r.report.pose_rest_bone); }));
   add(column<float, R>("drill_force_feedback/wrench", "N, N, N, N.mm, N.mm, N.mm", kDevice,
-                       "shown by the device to the hand", [forces, torques](const R& r) {
+                       "force and torque that the device shows to the hand", [forces, torques](const R& r) {
                          return wrench(forces ? r.rendered.force_n : Vec3(Vec3::Zero()),
                                        torques ? r.rendered.torque_nmm : Vec3(Vec3::Zero()));
                        }));
   add(column<float, R>(
-      "drill_force_feedback/motor_force", "N, N, N", kDevice, "what of it is the motor's: drag, kick, vibration",
+      "drill_force_feedback/motor_force", "N, N, N", kDevice, "the motor's part of the force: drag, kick, vibration",
       [forces](const R& r) { return numbers(forces ? r.report.motor_device_n : Vec3(Vec3::Zero())); }));
   add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone,
                        "of the bone on the tool, not scaled",
@@ -337,7 +329,7 @@ void RecordFile::Impl::make_columns() {
                                [](const R& r) { return r.report.state_seq; }));
   add(column<float, R>("data/spindle_rpm", "1/min", "", "speed of the spindle",
                        [](const R& r) { return r.report.spindle_rpm; }));
-  add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal asks for",
+  add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal commands",
                         [](const R& r) { return r.commanded_rpm; }));
   add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting",
                        [](const R& r) { return r.report.feed_mm_per_s; }));
@@ -345,22 +337,22 @@ void RecordFile::Impl::make_columns() {
                        [](const R& r) { return r.report.density_g_cm3; }));
   add(column<float, R>("data/engaged", "1", "", "share of the leading area that is in bone",
                        [](const R& r) { return r.report.engaged; }));
-  add(column<float, R>("data/torque", "N.mm", "", "that the bone takes from the spindle",
+  add(column<float, R>("data/torque", "N.mm", "", "torque of the bone on the spindle",
                        [](const R& r) { return r.report.torque_nmm; }));
-  add(column<float, R>("data/cutting_work", "mJ", "", "of the law's force over the way cut in the tick",
+  add(column<float, R>("data/cutting_work", "mJ", "", "work of the law's force over the path cut in the tick",
                        [](const R& r) { return r.report.cutting_work_mj; }));
   add(column<float, R>("data/coupling_energy", "mJ", "",
-                       "given out by the coupling in this contact, less what the hand put in",
+                       "energy that the coupling gave in this contact, minus what the hand put in",
                        [](const R& r) { return r.report.energy.episode_mj; }));
   add(column<float, R>("data/offset", "mm, mm, mm", kBone,
-                       "of the hand's place: slack, and what pushing the tool away would have stretched",
+                       "of the hand's position: slack, and the extension that pushing the tool away would have caused",
                        [](const R& r) { return numbers(r.report.offset_mm); }));
-  add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the step under way",
+  add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the current step",
                        [](const R& r) { return r.depth_mm; }));
   add(column<float, R>("data/device_depth", "mm", "", "the same of the hand",
                        [](const R& r) { return r.device_depth_mm; }));
   add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));
-  add(column<float, R>("data/guide_play", "mm", "", "while guided: how far the tip may be off the opening's middle",
+  add(column<float, R>("data/guide_play", "mm", "", "while in a guide: permitted distance of the tip from the opening's middle",
                        [](const R& r) { return r.report.guide_play_mm; }));
   add(enumeration<R>("data/state", "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
@@ -368,20 +360,20 @@ void RecordFile::Impl::make_columns() {
   Names phases;
   for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i)
     phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
-  add(enumeration<R>("data/phase", "what the step under way is at", phases,
+  add(enumeration<R>("data/phase", "phase of the current step", phases,
                      [](const R& r) { return static_cast<int>(r.phase); }));
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
-  add(column<std::uint8_t, R>("data/tool", "1", "", "in hand: its place in metadata/tools",
+  add(column<std::uint8_t, R>("data/tool", "1", "", "tool in hand: its index in metadata/tools",
                               [](const R& r) { return r.report.tool; }));
-  add(column<std::uint8_t, R>("data/law", "1", "", "by which it cuts: its place in metadata/laws", [this](const R& r) {
+  add(column<std::uint8_t, R>("data/law", "1", "", "force law of the tool: its index in metadata/laws", [this](const R& r) {
     const auto tool = static_cast<std::size_t>(r.report.tool);
     return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
   }));
   add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
-                              "bits: outside of which of its limits the law was used, named in metadata/range_bits",
+                              "bits: exceeded limits of the law, named in metadata/range_bits",
                               [](const R& r) { return r.report.out_of_range; }));
   add(column<std::uint32_t, R>("data/events", "1", "",
-                               "bits: what the loop met in the tick, named in metadata/event_bits",
+                               "bits: events of the loop in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));
   add(column<std::uint32_t, R>(recording::kButtons, "1", "", "bits: 1 clutch, 2 spindle",
                                [](const R& r) { return r.reading.buttons; }));
@@ -398,9 +390,9 @@ void RecordFile::Impl::make_columns() {
 
   using T = TakeUp;
   const auto change = [this](auto&& made) { take_ups.push_back(std::forward<decltype(made)>(made)); };
-  change(column<std::uint64_t, T>("burr_change/row", "1", "", "row of data from which on the tool is in hand",
+  change(column<std::uint64_t, T>("burr_change/row", "1", "", "first row of data with this tool in hand",
                                   [](const T& t) { return t.row; }));
-  change(column<std::uint8_t, T>("burr_change/tool", "1", "", "its place in metadata/tools",
+  change(column<std::uint8_t, T>("burr_change/tool", "1", "", "its index in metadata/tools",
                                  [](const T& t) { return t.tick.report.tool; }));
   change(column<double, T>("burr_change/burr_size", "mm", "", "diameter of its cutting part",
                            [](const T& t) { return t.diameter_mm; }));
@@ -413,9 +405,9 @@ void RecordFile::Impl::make_columns() {
                            }));
   change(column<double, T>("burr_change/scale", "1", "", "mm of the tool for each mm of the handle",
                            [](const T& t) { return t.tick.mapping.scale(); }));
-  change(column<double, T>("burr_change/anchor_device", "mm, mm, mm", kDevice, "this place of the handle",
+  change(column<double, T>("burr_change/anchor_device", "mm, mm, mm", kDevice, "this position of the handle",
                            [](const T& t) { return numbers(t.tick.mapping.device_mm()); }));
-  change(column<double, T>("burr_change/anchor_bone", "mm, mm, mm", kBone, "is that place of the tip",
+  change(column<double, T>("burr_change/anchor_bone", "mm, mm, mm", kBone, "is that position of the tip",
                            [](const T& t) { return numbers(t.tick.mapping.bone_mm()); }));
   change(column<double, T>("burr_change/time_stamp", "s", "UTC, since 1970-01-01", "when",
                            [](const T& t) { return t.time_s; }));
@@ -461,7 +453,7 @@ bool RecordFile::Impl::make_metadata() {
        make_texts(file.id(), recording::kTools, tools) && make_texts(file.id(), "metadata/laws", laws) &&
        make_texts(file.id(), "metadata/event_bits", event_names()) &&
        make_texts(file.id(), "metadata/range_bits", range_names());
-  // What is known later only: there from the start, because nothing new may appear while others read.
+  // Values known only later. They exist from the start, because no new objects may appear while others read.
   const std::string nothing(64, '\0');
   const std::uint64_t zero = 0;
   const Hdf5Handle hash_type = text_type(64);
@@ -472,13 +464,13 @@ bool RecordFile::Impl::make_metadata() {
   finished = make_value(file.id(), "metadata/finished", H5T_NATIVE_UINT64, &zero);
   return ok && start_hash.ok() && hash.ok() && room_seq.ok() && rows_dropped.ok() && finished.ok() &&
          set_text(start_hash.id(), "meaning",
-                  "of the whole bone as the room was joined, SHA-256 in hexadecimal digits") &&
-         set_text(hash.id(), "meaning", "of the whole bone at room_seq, SHA-256 in hexadecimal digits") &&
+                  "hash of the whole bone when the room was joined, SHA-256 in hexadecimal digits") &&
+         set_text(hash.id(), "meaning", "hash of the whole bone at room_seq, SHA-256 in hexadecimal digits") &&
          set_text(finished.id(), "meaning",
-                  "1: the session ended as it should; 0: it goes on, its room was lost, or its writer was killed");
+                  "1: the session ended normally; 0: it continues, its room was lost, or its writer was killed");
 }
 
-// The same array under the names that each group of the layout knows it by.
+// Links the same array under the names of each group of the layout.
 bool RecordFile::Impl::make_links() {
   for (const char* group :
        {"high_frequency_poses/handle_pose", "high_frequency_poses/device_pose", "high_frequency_poses/drill_pose",
@@ -572,12 +564,12 @@ Result<void> RecordFile::append(std::span<const TickRow> rows) {
     for (Column<TickRow>& column : impl.columns) column.take(row, column.waiting);
     ++impl.seen;
     if (++impl.waiting < kChunkRows) continue;
-    // Stopped in time, the file can still be closed as it should be, and others have a little left.
+    // Stopped in time, the file can still be closed properly, and other programs have a little space left.
     struct statvfs disk {};
     if (statvfs(impl.path.c_str(), &disk) == 0 &&
         static_cast<std::uint64_t>(disk.f_bavail) * disk.f_frsize < impl.keep_free_bytes)
       return failure(ErrorCode::internal,
-                     "the recording " + impl.path.string() + " ends here: the disk is all but full");
+                     "the recording " + impl.path.string() + " ends here: the disk is almost full");
     if (!impl.write_all()) return impl.failed("continued");
   }
   return {};

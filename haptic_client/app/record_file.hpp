@@ -1,5 +1,5 @@
-// A session as an HDF5 file, laid out as recording_layout.hpp says: one row for each millisecond, in chunks, readable
-// while it grows and after the writer was killed (HDF5's single writer, many readers).
+// A session as an HDF5 file, in the layout of recording_layout.hpp: one row for each millisecond, in chunks. The file
+// is readable while it grows and after the writer was killed (HDF5's single writer, many readers).
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -13,7 +13,7 @@
 
 namespace osteon::haptic {
 
-// What stays the same for a whole session.
+// What is constant for a whole session.
 struct RecordingInfo {
   std::string device;  // as --device named it
   DeviceInfo device_info;
@@ -28,7 +28,7 @@ struct RecordingInfo {
     std::string law;  // by which it cuts
     double diameter_mm = 0;
   };
-  std::vector<Item> tools;  // by their place in the session
+  std::vector<Item> tools;  // by their index in the session
 };
 
 // Known when the session ends.
@@ -36,26 +36,28 @@ struct RecordingEnd {
   std::string field_hash;  // of the whole bone
   std::uint64_t room_seq = 0;
   std::uint64_t rows_dropped = 0;
-  bool lost = false;  // the session did not end as it should: its room was lost
+  bool lost = false;  // the session ended early: its room was lost
 };
 
 class RecordFile {
  public:
-  static constexpr std::size_t kChunkRows = 500;  // rows are written so many at a time; a killed writer loses fewer
-  static constexpr std::uint64_t kKeepFree_bytes =
-      16u << 20;  // of the disk; a recording ends before it fills the last of it
+  // Rows are written in chunks of this size; a killed writer loses fewer rows.
+  static constexpr std::size_t kChunkRows = 500;
+  // Free space left on the disk; a recording ends before it uses it.
+  static constexpr std::uint64_t kKeepFree_bytes = 16u << 20;
 
-  // Begins a recording; what was in the file is gone. Error internal: it cannot be made, and why.
+  // Begins a recording; overwrites the file. Error internal: it cannot be created; gives the reason.
   [[nodiscard]] static Result<RecordFile> create(const std::filesystem::path& file, const RecordingInfo& info,
                                                  std::uint64_t keep_free_bytes = kKeepFree_bytes);
-  ~RecordFile();  // without finish(): what was written stays, and whole chunks of it can be read
+  ~RecordFile();  // without finish(): written rows stay, and whole chunks of them can be read
   RecordFile(RecordFile&&) noexcept;
   RecordFile& operator=(RecordFile&&) noexcept;
 
-  // The field's hash of the room as it was joined, in hexadecimal digits; once, as soon as it is known. Error internal.
+  // The hash of the room's field as it was joined, in hexadecimal digits. Call once, as soon as it is known. Error
+  // internal.
   [[nodiscard]] Result<void> begin_on(const std::string& field_hash);
-  // Rows in order. After an error there is nothing more to be done: the file stays readable up to its last whole chunk.
-  // Error internal: the disk is full or fails, with the system's reason.
+  // Rows in order. After an error, stop: the file stays readable up to its last whole chunk. Error internal: the disk
+  // is full or fails, with the system's reason.
   [[nodiscard]] Result<void> append(std::span<const TickRow> rows);
   [[nodiscard]] Result<void> finish(const RecordingEnd& end);
   [[nodiscard]] std::uint64_t rows_written() const;

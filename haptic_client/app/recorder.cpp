@@ -53,7 +53,7 @@ void Recorder::run() {
         outcome_.trouble = written.error().message;
         outcome_.rows = file_->rows_written();
         file_.reset();
-        log::warn("the recording has ended, the session goes on", {{"because", outcome_.trouble}});
+        log::warn("the recording has ended; the session continues", {{"because", outcome_.trouble}});
       }
     }
     rows.clear();
@@ -74,7 +74,7 @@ Recorder::Outcome Recorder::finish(const RecordingEnd& end) {
   all.rows_dropped += dropped_;
   if (Result<void> written = file_->finish(all); !written) {
     outcome_.trouble = written.error().message;
-    log::warn("the recording has no end", {{"because", outcome_.trouble}});
+    log::warn("the recording is incomplete", {{"because", outcome_.trouble}});
   }
   outcome_.rows = file_->rows_written();
   file_.reset();

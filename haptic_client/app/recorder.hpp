@@ -1,5 +1,5 @@
-// Writes the rows of a session on a thread of its own, so that a slow disk holds up nobody: neither the haptic thread
-// nor the one that reports.
+// Writes the rows of a session on a thread of its own. So a slow disk delays neither the haptic thread nor the
+// reporting thread.
 #pragma once
 #include <condition_variable>
 #include <mutex>
@@ -13,7 +13,7 @@ namespace osteon::haptic {
 
 class Recorder {
  public:
-  // Rows that may wait for a disk that does not answer: a minute. What comes then is dropped and counted.
+  // Number of rows that may wait for a disk that does not respond: a minute. Later rows are dropped and counted.
   static constexpr std::size_t kMostWaiting = 60'000;
 
   struct Outcome {
@@ -30,21 +30,21 @@ class Recorder {
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
 
-  // Without a path nothing is recorded. Error internal: the file cannot be made.
+  // Without a path nothing is recorded. Error internal: the file cannot be created.
   [[nodiscard]] Result<void> open(const std::filesystem::path& file, const RecordingInfo& info);
   [[nodiscard]] bool recording() const { return thread_.joinable(); }
-  // Any thread but the haptic one: the field's hash of the room as it was joined, in hexadecimal digits.
+  // Any thread except the haptic one: the hash of the room's field as it was joined, in hexadecimal digits.
   void begin_on(const std::string& field_hash);
-  // Any thread but the haptic one, one at a time.
+  // Any thread except the haptic one, one at a time.
   void push(const TickRow& row);
-  // Waits until what was pushed is written, and closes the file; again: does nothing. A disk that fails ends the
-  // recording with one warning, and nothing else.
+  // Waits until all pushed rows are written, and closes the file. A second call does nothing. A disk that fails ends
+  // only the recording, with one warning.
   Outcome finish(const RecordingEnd& end);
 
  private:
   void run();
 
-  std::optional<RecordFile> file_;  // of the thread while it runs
+  std::optional<RecordFile> file_;  // used by the thread only, while it runs
   std::thread thread_;
   Outcome outcome_;
 

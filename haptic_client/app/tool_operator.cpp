@@ -18,7 +18,7 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, Devi
     choice.simulated_ = *simulated;
     if (options.plan.empty())
       return failure(ErrorCode::invalid_input, "--device " + options.device +
-                                                   " has a hand of our own making, which needs a --plan; name a device "
+                                                   " has a simulated hand, which needs a --plan; name a device "
                                                    "for your own hand (osteon-haptic devices lists them) or give one");
   } else {
     Result<std::unique_ptr<CombinedDevice>> device = make_devices(options.device, options.devices);
@@ -30,7 +30,7 @@ Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, Devi
                    options.plan.empty()
                        ? "--tool is missing; name the tool for your hand, e.g. drill-3.2, or give a --plan"
                        : "--tool is for a hand without a plan; leave out --tool or --plan");
-  // A plan's steps say all this themselves.
+  // A plan's steps specify all this themselves.
   const std::pair<const char*, bool> said[] = {{"--law", options.law.has_value()},
                                                {"--wear", options.wear.has_value()},
                                                {"--view", options.view.has_value()},
@@ -74,7 +74,7 @@ Result<void> ToolOperator::take_tool() {
   }
   if (!(free_.spindle_rpm >= 0.0 && free_.spindle_rpm <= 200000.0))
     return failure(ErrorCode::invalid_input, "--rpm must be from 0 to 200000");
-  // One that is not of the box may be the room's own.
+  // A tool that is not in the tool box may be the room's own.
   if (const Result<Tool> tool = find_tool(free_.tool))
     if (const Result<void> held = check_held(*tool); !held)
       return failure(held.error().code, "--tool: " + held.error().message);
@@ -118,8 +118,8 @@ Result<std::unique_ptr<Session>> ToolOperator::on(const Case& bone, const ToolBo
       return tl::unexpected(played.error());
     if (recorded_->session().start_hash.empty())
       log::warn("the recording does not say what bone it began on",
-                {{"remedy", "see that the room's is as it was then"}});
-    // What a hand did against one force it would not have done against another.
+                {{"remedy", "make sure that the room's bone is in the same state as then"}});
+    // The recorded hand reacted to a certain force; another force would not match it.
     if (force_scale == 0.0) force_scale = recorded_->session().force_scale;
   }
   if (options_.plan.empty()) {

@@ -1,5 +1,5 @@
-// Who holds the tool: the simulated hand with a plan, a recording of one, or a person at a device, as the command line
-// says.
+// Makes the tool operator that the command line names: the simulated hand with a plan, a recording of one, or a person
+// at a device.
 #pragma once
 #include <memory>
 #include <optional>
@@ -16,9 +16,9 @@ namespace osteon::haptic {
 
 struct ToolOperatorOptions {
   std::string device = "simulated";
-  std::filesystem::path plan;  // a simulated hand's, or a recording's
-  std::string tool;            // a person's, or of a person's recording
-  // A person's; where nothing was said: from the front, over the bone's middle, the tool's own speed and law, sharp.
+  std::filesystem::path plan;  // of a simulated hand or a recording
+  std::string tool;            // of a person, or of a person's recording
+  // Of a person. Defaults: from the front, above the bone's middle, the tool's own speed and law, sharp.
   std::optional<std::string> view, at;  // read_view(), read_point()
   std::optional<double> spindle_rpm;
   std::optional<std::string> law;
@@ -28,28 +28,28 @@ struct ToolOperatorOptions {
 
 class ToolOperator {
  public:
-  // Checks what can be checked without a room, opens the person's devices and keeps them connected from then on. Errors
+  // Checks what can be checked without a room. Opens the person's devices and keeps them connected from then on. Errors
   // are sentences with the remedy.
   [[nodiscard]] static Result<ToolOperator> make(const ToolOperatorOptions& options, DeviceNotice notice);
 
-  // The session on a bone, with tools of `tools`, all that the room has; `force_scale` 0: from the device, or as it was
-  // recorded. Lives no longer than this choice. Errors: there is no such tool, its law does not suit it, plan or tool
-  // does not suit the bone, the recording is of another bone, tool or plan.
+  // Makes the session on a bone, with tools of `tools`, all that the room has. `force_scale` 0: from the device, or as
+  // it was recorded. The session must not outlive this object. Errors: there is no such tool; its law does not suit it;
+  // plan or tool does not suit the bone; the recording is of another bone, tool or plan.
   [[nodiscard]] Result<std::unique_ptr<Session>> on(const Case& bone, const ToolBox& tools, double force_scale);
 
-  // What moves the handle, where that is a recording; else none.
+  // The recording that moves the handle, if any.
   [[nodiscard]] const RecordedDevice* recorded() const { return recorded_.get(); }
   [[nodiscard]] std::string_view device_name() const;
-  // How often devices were lost.
+  // Number of times that devices were lost.
   [[nodiscard]] int losses() const;
-  // Force and devices end.
+  // Ends force and closes the devices.
   void disconnect() noexcept { connections_.clear(); }
 
  private:
   ToolOperator() = default;
-  // Checks what a hand without a plan was told.
+  // Checks the options of a hand without a plan.
   Result<void> take_tool();
-  // What the plan does, or the person's hand.
+  // The plan's steps, or those of the person's hand.
   Result<ReadyPlan> ready_on(const Case& bone, const ToolFinder& find) const;
   // Opens a person's devices.
   Result<void> connect(const DeviceNotice& notice);
@@ -60,7 +60,7 @@ class ToolOperator {
   FreeHandOptions free_;
   std::unique_ptr<RecordedDevice> recorded_;
   std::unique_ptr<CombinedDevice> person_;
-  std::vector<std::unique_ptr<DeviceConnection>> connections_;  // end before the devices
+  std::vector<std::unique_ptr<DeviceConnection>> connections_;  // destroyed before the devices
 };
 
 }  // namespace osteon::haptic

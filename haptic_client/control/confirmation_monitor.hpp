@@ -1,5 +1,5 @@
-// Whether the room follows what this client cuts. Bone that only this client has seen go must stay little, so that a
-// server that is slow or gone cannot take much of it back.
+// Watches whether the room still confirms the cuts of this client. The amount of bone that only this client has removed
+// must stay small. Then a slow or lost server cannot give much of it back.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -9,8 +9,8 @@ namespace osteon::haptic {
 enum class RoomHealth : std::uint8_t {
   follows,
   behind,  // too many own cuts are unconfirmed
-  silent,  // nothing has come for a while although cuts are unconfirmed
-  lost,    // and for so long that waiting makes no sense
+  silent,  // nothing was received for a while although cuts are unconfirmed
+  lost,    // silent for so long that waiting makes no sense
 };
 
 [[nodiscard]] inline const char* name(RoomHealth health) {
@@ -30,13 +30,14 @@ enum class RoomHealth : std::uint8_t {
 class ConfirmationMonitor {
  public:
   static constexpr std::size_t kMostUnconfirmed = 512;
-  static constexpr std::size_t kFewUnconfirmed = 256;  // cutting goes on from here
+  static constexpr std::size_t kFewUnconfirmed = 256;  // cutting continues from here
   static constexpr double kSilence_s = 2.0;
-  static constexpr double kLost_s = 20.0;  // its connection waits longer: common/wire/room_client.cpp
+  static constexpr double kLost_s = 20.0;  // the connection itself waits longer: common/wire/room_client.cpp
 
-  // `heard`: something has come from the room since the last call. `now_s`: of a clock that never goes back.
-  RoomHealth update(double now_s, bool heard, std::size_t unconfirmed) noexcept {
-    if (heard || unconfirmed == 0) waiting_since_s_ = now_s;
+  // `any_received`: something was received from the room since the last call. `now_s`: time of a clock that never goes
+  // back.
+  RoomHealth update(double now_s, bool any_received, std::size_t unconfirmed) noexcept {
+    if (any_received || unconfirmed == 0) waiting_since_s_ = now_s;
     const double silence_s = now_s - waiting_since_s_;
     behind_ = unconfirmed > (behind_ ? kFewUnconfirmed : kMostUnconfirmed);
     return silence_s > kLost_s      ? RoomHealth::lost
@@ -46,7 +47,7 @@ class ConfirmationMonitor {
   }
 
  private:
-  double waiting_since_s_ = 0;  // for an answer to what is unconfirmed
+  double waiting_since_s_ = 0;  // start of the present wait for a confirmation
   bool behind_ = false;
 };
 

@@ -1,5 +1,5 @@
-// One pass over many points. The loops are written once (contact_rows.inl) for registers of 4, 8 and 16 floats; the
-// processor's widest is chosen when the program runs.
+// One pass over many points. The loops are written once (contact_rows.inl) for registers of 4, 8 and 16 floats. The
+// program chooses the processor's widest when it runs.
 #include "haptic_client/control/contact.hpp"
 
 #include <algorithm>
@@ -18,18 +18,19 @@
 namespace osteon::haptic {
 namespace {
 
-// Corners of lanes that have none.
+// Corners for lanes without a brick.
 alignas(64) constexpr float kNothing[kBrickSamples * kBrickSamples + kBrickSamples + 2] = {};
 
-// A grid as seen from the origin of the evaluation.
+// A grid relative to the origin of the evaluation.
 struct GridPlace {
   const float* const* bricks = nullptr;
   std::int32_t dims[3] = {0, 0, 0};
   float inverse_pitch = 1;
-  float shift[3] = {0, 0, 0};  // samples from the grid's first one to the origin, and a brick
+  float shift[3] = {0, 0, 0};  // samples from the grid's first one to the origin, plus a brick
 };
 
-// Of ContactSums, in its order; plain, as the loops for wide registers must not instantiate anything that others share.
+// Sums of ContactSums, in its order. A plain struct, because the loops for wide registers must not instantiate anything
+// that others share.
 constexpr int kTotals = 13;
 struct Totals {
   double sum[kTotals] = {};
@@ -57,7 +58,7 @@ struct Task {
     if (i < 0 || j < 0 || k < 0 || i >= clear_dims[0] || j >= clear_dims[1] || k >= clear_dims[2]) return 0.0f;
     return clearance[(i * clear_dims[1] + j) * clear_dims[2] + k];
   }
-  // Of every point of a group, from below; zero where nothing is said.
+  // Lower bound for every point of a group; zero where it is unknown.
   [[nodiscard]] float bound(const ContactSet::Ball& ball) const noexcept {
     if (!clearance) return 0.0f;
     const float(&r)[9] = rotation;
@@ -145,7 +146,8 @@ GridPlace placed(const BrickGrid& grid, const Vec3& origin_mm) noexcept {
   return place;
 }
 
-// Halves at a multiple of a group's size across the longest side, again and again: what comes to lie together is near.
+// Halves the list repeatedly across its longest side, at a multiple of a group's size. So neighbours in the list are
+// near each other in space.
 void order(std::span<ContactPoint> points) {
   if (points.size() <= static_cast<std::size_t>(kGroupPoints)) return;
   Box box;

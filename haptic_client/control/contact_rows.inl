@@ -1,9 +1,9 @@
-// Part of contact.cpp, which includes it once for each width of the processor's registers: kLanes points at a time.
-// Each lane does the same operations in the same order for every width.
+// Part of contact.cpp, which includes it once for each width of the processor's registers. It processes kLanes points
+// at a time. Each lane does the same operations in the same order for every width.
 
 typedef float Row __attribute__((vector_size(kLanes * 4)));
 typedef std::int32_t RowInt __attribute__((vector_size(kLanes * 4)));
-typedef double Pairs __attribute__((vector_size(kLanes * 4)));  // two neighbouring samples in each
+typedef double Pairs __attribute__((vector_size(kLanes * 4)));  // each holds two neighbouring samples
 
 OSTEON_INLINE Row splat(float x) { return x - Row{}; }
 OSTEON_INLINE RowInt splat_int(std::int32_t x) { return x - RowInt{}; }
@@ -23,7 +23,7 @@ OSTEON_INLINE double pair_at(const float* from) {
   return two;
 }
 
-// The samples at an offset from each lane's corner, and those above them: two at a time, then told apart.
+// Loads the samples at an offset from each lane's corner, and the samples above them: two at a time, then separated.
 OSTEON_INLINE void two_rows(const float* const* at, int offset, Row& first, Row& second) {
 #define OSTEON_P(i) pair_at(at[i] + offset)
 #if OSTEON_LANES == 4
@@ -53,7 +53,7 @@ OSTEON_INLINE void two_rows(const float* const* at, int offset, Row& first, Row&
 
 struct Cell {
   RowInt brick;    // index in the grid's table
-  RowInt inside;   // all bits where the table has it
+  RowInt inside;   // all bits set where the table contains it
   RowInt corner;   // sample of the brick
   Row tx, ty, tz;  // 0 to 1 in the cell
 };
@@ -63,7 +63,7 @@ OSTEON_INLINE Cell cell_of(const GridPlace& grid, Row px, Row py, Row pz) {
   const Row x = px * inverse + splat(grid.shift[0]), y = py * inverse + splat(grid.shift[1]),
             z = pz * inverse + splat(grid.shift[2]);
   const RowInt cx = trunc_to_int(x), cy = trunc_to_int(y), cz = trunc_to_int(z);
-  // The table begins one brick in, so that what lies just below it does not round up into it.
+  // The table begins one brick in, so that a position just below it does not round up into it.
   const RowInt bx = (cx >> 3) - 1, by = (cy >> 3) - 1, bz = (cz >> 3) - 1;
   Cell cell;
   cell.inside = (bx >= 0) & (by >= 0) & (bz >= 0) & (bx < grid.dims[0]) & (by < grid.dims[1]) & (bz < grid.dims[2]);
@@ -75,7 +75,8 @@ OSTEON_INLINE Cell cell_of(const GridPlace& grid, Row px, Row py, Row pz) {
   return cell;
 }
 
-// Where the lanes' corners are; those without a brick point to nothing that is used. Returns the bits of those missing.
+// Finds the lanes' corners. Lanes without a brick keep their pointer to unused values. Returns the bits of the missing
+// lanes.
 OSTEON_INLINE unsigned corners_of(const GridPlace& grid, const Cell& cell, unsigned wanted, const float** at) {
   unsigned missing = 0;
   alignas(64) std::int32_t brick[kLanes], inside[kLanes], corner[kLanes];
@@ -239,7 +240,7 @@ static void evaluate(const ContactSet& set, const Task& task, ContactValues& val
         gy *= inverse;
         gz *= inverse;
         if (unknown) {
-          // Free by the case's clearance, or not known at all.
+          // Free by the case's clearance, or unknown.
           for (int lane = 0; lane < kLanes; ++lane) {
             if (!(unknown >> lane & 1u)) continue;
             const float bound = task.clearance_at(px[lane], py[lane], pz[lane]);

@@ -8,9 +8,9 @@
 namespace osteon::haptic {
 namespace {
 
-constexpr double kBleed = 0.1;  // of the handle's free motion
-constexpr double kLeastToLetGo_n =
-    3.0;  // a burr leaves bone a hundred times a second with less; nobody feels that plunge [A]
+constexpr double kBleed = 0.1;  // share of the handle's free motion
+// With less force a burr leaves bone a hundred times a second; nobody feels that plunge [A].
+constexpr double kLeastToLetGo_n = 3.0;
 constexpr double kNothing_mm = 1e-9;
 
 }  // namespace
@@ -64,7 +64,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   const auto stored_mj = [&](double extension_mm) {
     return 0.5 * k * moment.energy_scale * extension_mm * extension_mm;
   };
-  // Of the turn's spring: what the device cannot show is not stored either.
+  // Energy of the rotation's spring. What the device cannot show is not stored either.
   const auto turned_mj = [&](const Vec3& turn_rad) {
     const double size_rad = turn_rad.norm(), k_turn = moment.stiffness_nmm_per_rad;
     const double shown_rad = k_turn > 0.0 ? std::min(size_rad, moment.limit_nmm / k_turn) : 0.0;
@@ -84,7 +84,8 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     return force;
   }
 
-  // Only bone that came back moves the proxy away from the handle, but for what that lets its turn come nearer.
+  // Only bone that came back moves the proxy away from the handle. The exception is the distance that a release of the
+  // rotation's spring pays for.
   const double now_turned_mj = turned_mj(moment.turn_rad);
   const double relaxed_mj = turned_mj(moment.turn_before_rad) - now_turned_mj;
   const double before_mm =
@@ -94,7 +95,7 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     let_go(returned_mm_, e_mm, e_mm * (before_mm / e_mm.norm()));
     force.returned = true;
   }
-  // Slack: more than the device can show, and all of it where the bone has given way.
+  // Slack: the part that the device cannot show, and all of it where the bone has given way.
   const double most_mm = moment.limit_n / k;
   if (e_mm.norm() > most_mm) {
     let_go(slack_mm_, e_mm, e_mm * (most_mm / e_mm.norm()));
@@ -104,13 +105,13 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
     let_go(slack_mm_, e_mm, Vec3::Zero());
     force.breakthrough = true;
   }
-  // Where less was shown than the spring says (missed ticks, the ramp, the monitor) the hand goes on without paying.
-  // That stretch would push it with less than it says, and cut by less, for good: it is let go.
+  // Where less force was shown than the spring's (missed ticks, the ramp, the monitor), the hand moves on without
+  // paying. That extension would permanently show less force than the spring says, and cut less. So it is released.
   const double size_mm = e_mm.norm(), paid_mm = ledger.paid_mm(k * moment.energy_scale, cutting_mj);
   if (moment.fell_short && size_mm > paid_mm) let_go(slack_mm_, e_mm, e_mm * (paid_mm / size_mm));
   ledger.settle(cutting_mj, stored_mj(e_mm.norm()) + now_turned_mj, now_turned_mj);
 
-  // Returned bone is let press again as the damping pays for it.
+  // Returned bone may press again as far as the damping pays for it.
   const double returned_mm = returned_mm_.norm();
   if (returned_mm > kNothing_mm && ledger.report().tank_mj > 0.0) {
     const double most_step_mm = std::min(returned_mm, kBleed * (moment.handle_mm - handle_mm_).norm());
@@ -120,8 +121,8 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
   }
 
   force.spring_n = -k * e_mm;
-  // A sampled spring needs k·T, and what a filter of the cutting force holds back by tau comes too late by as much as
-  // k·tau pays for; never more than the spring, so that it cannot pull.
+  // A sampled spring needs k·T. The force that a filter holds back by tau arrives too late by as much as k·tau pays
+  // for. The damping is never more than the spring's force, so that it cannot pull.
   force.damping_n = clamped(-std::max(1.0, smooth_s / dt_s) * k * (e_mm - extension_mm_), force.spring_n.norm());
 
   force.turn_spring_nmm = clamped(-moment.stiffness_nmm_per_rad * moment.turn_rad, moment.limit_nmm);
@@ -129,8 +130,8 @@ CouplingForce Coupling::step(const CouplingMoment& moment, const ProxyStep& prox
       clamped(-std::max(1.0, smooth_s / dt_s) * moment.stiffness_nmm_per_rad * (moment.turn_rad - turn_rad_),
               force.turn_spring_nmm.norm());
 
-  // (7.15), EWMA, on the cutting force alone and only while it goes on: where cutting begins or ends the rest of the
-  // coupling takes over at once, and a filter between them would pull.
+  // (7.15), EWMA, on the cutting force alone and only while cutting continues. Where cutting begins or ends, the rest
+  // of the coupling takes over at once. A filter between them would pull.
   const Vec3& cutting_n = proxy.cutting_force_n;
   if (proxy.cutting && cutting_)
     smooth_.step(cutting_n, dt_s, smooth_s);

@@ -31,7 +31,7 @@ void CutRecorder::begin(const Pose& pose_bone_tool, double cutting_length_mm) no
 
 void CutRecorder::add(const Pose& pose_bone_tool) noexcept {
   ++ticks_;
-  // A full buffer keeps its first and newest poses: the caller closes long before.
+  // A full buffer keeps its first and newest poses; the caller closes long before that.
   if (count_ == kMostPoses) --count_;
   poses_[static_cast<std::size_t>(count_++)] = pose_bone_tool;
 }

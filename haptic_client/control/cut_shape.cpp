@@ -57,12 +57,12 @@ CutShape::CutShape(const Tool& tool, bool open_behind) : open_behind_(open_behin
       narrowest = std::min(narrowest, kQuantum_mm * a.r);
       const double er = kQuantum_mm * (b.r - a.r), ez = kQuantum_mm * (b.z - a.z), length = std::hypot(er, ez);
       if (!(length > 0.0) || (a.r == 0 && b.r == 0)) continue;  // the axis is no face
-      if (open_behind && !(-er > kSideways)) continue;          // looks back or to the side
+      if (open_behind && !(-er > kSideways)) continue;          // points back or sideways
       add({ez / length, 0.0, -er / length}, (ez * kQuantum_mm * a.r - er * kQuantum_mm * a.z) / length);
     }
     if (open_behind) {
       add({1, 0, 0}, widest);
-      if (narrowest > 0.0) add({-1, 0, 0}, -narrowest);  // hollow: what stands in the middle is left
+      if (narrowest > 0.0) add({-1, 0, 0}, -narrowest);  // hollow: the core in the middle stays
       add({0, 0, -1}, tool.cutting_length_mm);
     }
   }

@@ -5,7 +5,8 @@
 
 namespace osteon::haptic {
 
-// Who has held still surprises little: else a slow, light feed would be held back for good.
+// Assumes a small acceleration of a hand that has held still. Otherwise a slow, light feed would be held back
+// permanently.
 void EnergyLedger::Going::see(const Vec3& now_mm, const EnergyParams& params) noexcept {
   const double seen = params.wary * (now_mm - moved_mm).norm() / (params.dt_s * params.dt_s);
   const double fading = surprise_mm_per_s2 * std::exp(-params.dt_s / params.lately_s);
@@ -13,7 +14,7 @@ void EnergyLedger::Going::see(const Vec3& now_mm, const EnergyParams& params) no
   moved_mm = now_mm;
 }
 
-// The handle goes on as it did, give or take what it can accelerate.
+// The handle continues its motion, changed at most by the assumed acceleration.
 double EnergyLedger::Going::most_mj(const Vec3& force_n, double dt_s) const noexcept {
   const double size_n = force_n.norm();
   return size_n > 0.0 ? size_n * (moved_mm.dot(force_n) / size_n + surprise_mm_per_s2 * dt_s * dt_s) : 0.0;
@@ -46,8 +47,8 @@ void EnergyLedger::settle(double cutting_mj, double stored_mj, double turned_mj)
   account_mj_ -= cutting_mj;
   report_.episode_mj += cutting_mj;
   report_.stored_mj = stored_mj;
-  // The tank holds what damping took, as far as sampling has not given it back already. What the spring lost otherwise,
-  // by cutting, sliding or slack, is gone: it may not be given back later.
+  // The tank holds what damping took, minus what sampling has already given back. What the spring lost in other ways,
+  // by cutting, sliding or slack, must not be given back later.
   report_.tank_mj = std::min({report_.tank_mj + filled_mj_, std::max(0.0, account_mj_ - stored_mj), params_.tank_mj});
   account_mj_ = std::min(account_mj_, stored_mj + report_.tank_mj);
 }
@@ -80,7 +81,7 @@ Wrench EnergyLedger::limited(const Wrench& wanted, const Wrench& damping, bool t
     ++report_.episodes;
     report_.generated_mj += std::max(0.0, report_.episode_mj);
     report_.worst_mj = std::max(report_.worst_mj, report_.episode_mj);
-    // A contact that gave a little goes on paying in the next one, so that a thousand of them do not add up.
+    // A contact that gave a little pays for it in the next one, so that a thousand of them do not add up.
     account_mj_ = std::clamp(0.5 * account_mj_, -0.5 * params_.allowance_mj, 0.0);
     report_.episode_mj = report_.tank_mj = report_.stored_mj = turned_mj_ = 0.0;
     return shown_;

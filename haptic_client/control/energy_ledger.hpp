@@ -1,7 +1,7 @@
-// What the coupling between handle and tool takes from the hand and gives back, by its moves and by its turns: an
-// account for each contact, and the last monitor before the device. Time-domain passivity after Hannaford and Ryu
-// (2002), made predictive: force is held for a tick, so what it may give away is bounded before it is written, not
-// mended after.
+// The account of the energy that the coupling takes from the hand and gives back, by translation and by rotation. There
+// is one account for each contact. It is the last monitor before the device. Time-domain passivity after Hannaford and
+// Ryu (2002), made predictive: force is held for a tick, so the energy that it may give away is bounded before it is
+// written, not corrected afterwards.
 #pragma once
 #include <cstdint>
 
@@ -11,12 +11,14 @@ namespace osteon::haptic {
 
 struct EnergyParams {
   double dt_s = 1e-3;
-  double allowance_mj = 0.008;          // that one contact may give more than it got
-  double tank_mj = 2.0;                 // most of the damping's work that is kept for later
-  double surprise_mm_per_s2 = 10000.0;  // a hand and its device are taken to accelerate less than this [A]
-  double calm_mm_per_s2 = 2000.0;  // and less than this, or `wary` times what they did lately, while that is less [A]
+  double allowance_mj = 0.008;          // energy that one contact may give beyond what it got
+  double tank_mj = 2.0;                 // largest part of the damping's work that is saved for later
+  double surprise_mm_per_s2 = 10000.0;  // assumed largest acceleration of a hand and its device [A]
+  // Smallest assumed acceleration. Where `wary` times the recent acceleration is larger, that is assumed, up to
+  // surprise_mm_per_s2. [A]
+  double calm_mm_per_s2 = 2000.0;
   double wary = 2.0, lately_s = 0.2;  // [A]
-  double turn_arm_mm = 20.0;          // at this arm a turn is taken to surprise as a move does [A]
+  double turn_arm_mm = 20.0;          // at this arm, a rotation's acceleration is assumed to equal a translation's [A]
 };
 
 // Force at the handle's tip, and torque about it.
@@ -24,22 +26,22 @@ struct Wrench {
   Vec3 force_n = Vec3::Zero(), torque_nmm = Vec3::Zero();
 };
 
-// Energies at the handle, mJ: force shown to the hand times the way of the handle, and torque times its turn: N·mm·rad.
+// Energies at the handle, mJ: force shown to the hand times the handle's path, and torque times its rotation: N·mm·rad.
 struct EnergyReport {
-  double episode_mj =
-      0;  // given to the hand and to cutting in this contact, less what the hand put in; negative: dissipated
+  // Given to the hand and to cutting in this contact, minus what the hand put in. Negative: dissipated.
+  double episode_mj = 0;
   double stored_mj = 0;        // in the coupling's springs
-  double tank_mj = 0;          // of damping's work, at hand for material that comes back
-  double ended_mj = 0;         // of the contact that ended in this tick; zero in others
-  double generated_mj = 0;     // over all contacts that ended above zero, from the start
+  double tank_mj = 0;          // damping's work that is available for material that comes back
+  double ended_mj = 0;         // of the contact that ended in this tick; zero in other ticks
+  double generated_mj = 0;     // sum over all contacts that ended above zero, from the start
   double worst_mj = 0;         // the most that one contact has generated
-  std::uint64_t episodes = 0;  // that have ended
+  std::uint64_t episodes = 0;  // number of contacts that have ended
   bool ended = false;
   bool held_back = false;  // the monitor cut the force
 };
 
-// One tick: observe(), paid_n_per_mm(), settle(), draw(), limited(), in this order; all [haptic]. Vectors in one frame
-// of any orientation, lengths of the handle's own motion.
+// One tick calls observe(), paid_n_per_mm(), settle(), draw(), limited(), in this order; all [haptic]. All vectors are
+// in one frame of any orientation. Lengths are those of the handle's own motion.
 class EnergyLedger {
  public:
   explicit EnergyLedger(const EnergyParams& params = {})
@@ -47,34 +49,36 @@ class EnergyLedger {
         moves_{.surprise_mm_per_s2 = params.surprise_mm_per_s2},
         turns_{.surprise_mm_per_s2 = params.surprise_mm_per_s2} {}
 
-  // Another tool, or the clutch: what was stored is gone.
+  // Another tool or the clutch: the stored energy is discarded.
   void reset() noexcept;
-  // The handle's tip moved and the handle turned by this (axis times angle) under what the last limited() gave. Where
-  // no torque is shown turning does no work.
+  // The handle's tip moved and the handle turned by this (axis times angle) under the force of the last limited().
+  // Where no torque is shown, rotation does no work.
   void observe(const Vec3& handle_moved_mm, const Vec3& handle_turned_rad = Vec3::Zero()) noexcept;
-  // Cutting too must be paid for: the spring, at most this stiff and this long, as stiff as what the hand has put into
-  // it. It falls short of the real one in the first millisecond of a contact, before the hand has felt any of it.
+  // Cutting must be paid for too. Returns the stiffness of a spring of this extension that holds the energy the hand
+  // has put in, at most `stiffness_n_per_mm`. It is less than the real stiffness in the first millisecond of a contact,
+  // before the hand has felt any of it.
   [[nodiscard]] double paid_n_per_mm(double stiffness_n_per_mm, double extension_mm) const noexcept;
-  // How long a spring of that stiffness would be that the hand had paid for, when this much more has gone into cutting.
+  // Extension of a spring of that stiffness that the hand would have paid for, after this much more energy went into
+  // cutting.
   [[nodiscard]] double paid_mm(double stiffness_n_per_mm, double cutting_mj) const noexcept;
-  // What the proxy did then: the law's force times the way cut, and the springs' energy as it is now. `turned_mj`: what
-  // of it is in the spring of the turn, which cuts nothing.
+  // What the proxy then did: the law's force times the path cut, and the springs' energy now. `turned_mj`: the part of
+  // it in the spring of the rotation, which cuts nothing.
   void settle(double cutting_mj, double stored_mj, double turned_mj = 0.0) noexcept;
-  // Raises the stored energy by at most this, out of the tank; what it may be raised by.
+  // Raises the stored energy by at most this much, out of the tank. Returns the permitted increase.
   [[nodiscard]] double draw(double wanted_mj) noexcept;
-  // What to show in the next tick, force and torque held back by one share of `wanted`; `damping`: its part that is
-  // damping. The contact lasts as long as `touching`, also where safety asks for no force.
+  // The wrench to show in the next tick. Force and torque are reduced by one share of `wanted`. `damping`: the part of
+  // `wanted` that is damping. The contact lasts as long as `touching`, even where safety asks for no force.
   [[nodiscard]] Wrench limited(const Wrench& wanted, const Wrench& damping, bool touching) noexcept;
 
   [[nodiscard]] const EnergyReport& report() const noexcept { return report_; }
 
  private:
-  // How the handle goes on, as far as that can be foreseen.
+  // The handle's motion, as far as it can be predicted.
   struct Going {
-    Vec3 moved_mm = Vec3::Zero();  // in the last tick; of a turn, at the arm
-    double surprise_mm_per_s2;     // that is reckoned with now
+    Vec3 moved_mm = Vec3::Zero();  // in the last tick; of a rotation, at the arm
+    double surprise_mm_per_s2;     // acceleration that is assumed now
     void see(const Vec3& now_mm, const EnergyParams& params) noexcept;
-    // Most that this force gives the hand, held for a tick.
+    // Largest energy that this force gives the hand when it is held for a tick.
     [[nodiscard]] double most_mj(const Vec3& force_n, double dt_s) const noexcept;
   };
 
@@ -82,9 +86,9 @@ class EnergyLedger {
   EnergyReport report_;
   Wrench shown_, damping_;  // held since the last tick
   Going moves_, turns_;
-  double account_mj_ = 0;  // put in by the hand and still there: in the spring, or in the tank
+  double account_mj_ = 0;  // put in by the hand and not spent: in the spring or in the tank
   double filled_mj_ = 0;   // by damping, in this tick
-  double turned_mj_ = 0;   // of what is stored, in the spring of the turn
+  double turned_mj_ = 0;   // the part of the stored energy in the spring of the rotation
   bool open_ = false;      // a contact is under way
 };
 

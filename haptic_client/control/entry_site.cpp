@@ -31,7 +31,7 @@ double thickness_mm(const Case& bone, const EntrySite& site) {
   return last_bone_mm;
 }
 
-// Direction of the surface round the entry: the plane through where lines beside it meet bone.
+// Direction of the surface around the entry: the plane through the points where parallel lines beside it meet bone.
 void refine(const Case& bone, EntrySite& site) {
   std::vector<Vec3> hits;
   constexpr double kBack_mm = 4.0;
@@ -64,7 +64,7 @@ double distance_to_bone_mm(const Case& bone, const Vec3& from_mm, const Vec3& ax
     const Vec3 point = from_mm + at * axis;
     const double distance = bone.surface_mm(point);
     if (distance < 0.0) {
-      // Between the last point outside and this one.
+      // Bisects between the last point outside and this one.
       double low = before, high = at;
       for (int i = 0; i < 30; ++i) {
         const double middle = 0.5 * (low + high);

@@ -5,7 +5,7 @@
 namespace osteon::haptic {
 namespace {
 
-// Between two pushes, and between two words of a hand that does not push.
+// Time between two loads sent, and between two messages of a hand that does not push.
 constexpr double kPush_s = 8e-3, kIdle_s = 96e-3;
 
 }  // namespace
@@ -36,7 +36,7 @@ void FeltMount::step(HapticLoop& loop, const LoopReport& last) noexcept {
   const Shift shift = shown_.shift();
   most_mm_ = std::max(most_mm_, shift.place_mm.norm());
   most_rad_ = std::max(most_rad_, shift.turn_rad.norm());
-  // The end of a push is told as soon as one is.
+  // The end of a push is sent as promptly as a push.
   const bool pushes = !load_.force_n.isZero() || !load_.moment_nmm.isZero();
   until_push_s_ = std::min(until_push_s_ - dt_s, pushes == pushed_ ? kIdle_s : kPush_s);
 }

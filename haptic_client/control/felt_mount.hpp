@@ -1,5 +1,6 @@
-// The bone on its mount as one hand feels it: what the room tells comes in, the loop's last force moves it, what is to
-// be told goes out. Of a room without a mount nothing comes, and the bone rests.
+// The bone on its compliant mount as the user of one haptic client feels it. It takes the poses received from the room.
+// It moves the bone by the loop's last force, and makes the loads to be sent. Without a mount in the room nothing is
+// received, and the bone rests.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -9,31 +10,31 @@
 
 namespace osteon::haptic {
 
-// What the tool in hand did to the bone in that tick, about the mount's centre; axes of the bone's rest. It is the
-// force that the loop's ledger accounts for, unscaled: the coupling's. The motor's passes the account by, and so the
-// mount.
+// The load of the tool in hand on the bone in that tick, about the mount's centre; axes of the bone at rest. It is the
+// coupling's force, which the loop's ledger accounts for, unscaled. The motor's force bypasses that account, and
+// therefore the mount too.
 [[nodiscard]] Load load_on_bone(const HapticLoop& loop, const LoopReport& report, const Pose& pose_rest_bone,
                                 const Vec3& centre_now_mm) noexcept;
 
-// All [haptic] but the constructor; nothing allocates.
+// All [haptic] except the constructor; nothing allocates.
 class FeltMount {
  public:
   explicit FeltMount(const MountParams& mount) : mount_(mount), shown_({.mount = mount}) {}
 
-  // A place that the room has told. `line`: rises with every session, as numbers of places begin anew with it.
+  // A pose received from the room. `line` rises with every session, because pose numbers restart with it.
   void see(std::uint64_t line, const MountPose& seen) noexcept;
-  // Before each tick: moves the bone by what it was told, and by what the last tick did to it, and tells the loop.
+  // Before each tick: moves the bone by the received poses and by the last tick's load, and passes its pose to the
+  // loop.
   void step(HapticLoop& loop, const LoopReport& last) noexcept;
-  // The push that is to be told now, about 120 times a second while there is one.
+  // The load to be sent now, about 120 times a second while there is one.
   [[nodiscard]] std::optional<MountLoad> push() noexcept;
 
   [[nodiscard]] bool there() const noexcept { return line_ > 0; }  // the room has a mount
   [[nodiscard]] const MountFollower& shown() const noexcept { return shown_; }
   [[nodiscard]] const Load& load() const noexcept { return load_; }
   [[nodiscard]] const Pose& pose_rest_bone() const noexcept { return pose_; }
-  [[nodiscard]] double most_mm() const noexcept {
-    return most_mm_;
-  }  // that its middle was ever away from where it rests
+  // Largest distance of the bone's middle from its rest position so far, mm.
+  [[nodiscard]] double most_mm() const noexcept { return most_mm_; }
   [[nodiscard]] double most_rad() const noexcept { return most_rad_; }
 
  private:
@@ -44,7 +45,7 @@ class FeltMount {
   std::uint64_t line_ = 0;
   double most_mm_ = 0, most_rad_ = 0;
   double until_push_s_ = 0;
-  bool pushed_ = false;  // as was told last
+  bool pushed_ = false;  // the last load sent was not zero
 };
 
 }  // namespace osteon::haptic

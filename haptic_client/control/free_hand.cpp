@@ -9,9 +9,9 @@ namespace osteon::haptic {
 namespace {
 
 constexpr double kStandOff_mm = 10.0;
-constexpr double kMostDepth_mm = 60.0, kRoom_mm = 15.0;  // that the handle must reach without the clutch
+constexpr double kMostDepth_mm = 60.0, kRoom_mm = 15.0;  // depth and room that the handle must reach without the clutch
 
-// What is limited and shown on a device that shows no force: as on one as strong as the drilling of bone.
+// Limits for a device without force: those of one that is strong enough for the drilling of bone.
 DeviceLimits shown(DeviceLimits limits) {
   if (limits.peak_n > 0.0) return limits;
   limits.peak_n = 60.0;
@@ -20,8 +20,8 @@ DeviceLimits shown(DeviceLimits limits) {
   return limits;
 }
 
-// Looking along `toward` with the patient's head up, or its front up where one looks along the body: x right, y up, z
-// to the user.
+// The view along `toward` with the patient's head up, or the patient's front up when looking along the body. x right, y
+// up, z to the user.
 Eigen::Quaterniond view_along(const Vec3& toward) {
   Eigen::Matrix3d view;
   view.col(2) = -toward;
@@ -31,7 +31,7 @@ Eigen::Quaterniond view_along(const Vec3& toward) {
   return Eigen::Quaterniond(view).normalized();
 }
 
-constexpr double kFarthest = 1e5;  // mm; no bone is there
+constexpr double kFarthest = 1e5;  // mm; no bone is so far away
 
 bool read_numbers(std::string_view text, Vec3& v) {
   for (int i = 0; i < 3; ++i) {
@@ -73,7 +73,7 @@ Result<Vec3> read_point(std::string_view text, std::string_view option) {
   Vec3 v;
   if (!read_numbers(text, v))
     return failure(ErrorCode::invalid_input,
-                   std::string(option) + " must be a place x,y,z in millimetres, not \"" + std::string(text) + '"');
+                   std::string(option) + " must be a point x,y,z in millimetres, not \"" + std::string(text) + '"');
   return v;
 }
 
@@ -122,8 +122,8 @@ void FreeHandSession::take_up(const DeviceReading& reading, SurgeonOrder& order)
   const ReadyStep& step = plan_.steps[0];
   const LoopParams& params = loop_.params();
   const Vec3 start_mm = step.site.entry_mm - step.stand_off_mm * step.site.axis;
-  // Bone mm for each mm of the handle: one where the device can show the coupling's whole stiffness and reaches far
-  // enough.
+  // Bone mm for each mm of the handle. It is one where the device can show the coupling's whole stiffness and reaches
+  // far enough.
   const double stiff_enough = limits_.stiffness_n_per_mm / (params.force_scale * params.stiffness_n_per_mm);
   const double reach_mm = std::max(step.stand_off_mm, std::min(step.site.thickness_mm, kMostDepth_mm) + kRoom_mm);
   WorkspaceMapping mapping;
@@ -143,7 +143,7 @@ SessionTick FreeHandSession::tick(const Patch& patch, RoomLink room, int periods
   const DeviceReading reading = device_.read();
   if (const Pose* bone = device_.pose_rest_bone()) loop_.see_bone(*bone);
   const bool usable = reading.usable();
-  // Before the device is calibrated there is no place for a tool to be.
+  // Before the device is calibrated the tool has no known position.
   if (!taken_up_ && usable) take_up(reading, result.order);
   result.order.phase = taken_up_ ? SurgeonPhase::free_hand : SurgeonPhase::wait;
   LoopInput input;

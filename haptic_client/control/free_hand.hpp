@@ -1,5 +1,6 @@
-// A person's own hand at a device: no plan, the handle drives the tool, its pedal or button the spindle, its clutch
-// moves the handle without the tool. While the device is not there the tool waits where it is, as under a held clutch.
+// A person's own hand at a device, without a plan. The handle drives the tool. Its pedal or button drives the spindle.
+// Its clutch moves the handle without the tool. While the device is missing, the tool waits where it is, as with a held
+// clutch.
 #pragma once
 #include <optional>
 
@@ -9,35 +10,35 @@ namespace osteon::haptic {
 
 struct FreeHandOptions {
   std::string tool;
-  double spindle_rpm = 0;  // with the pedal all the way down; 0: the tool's own
+  double spindle_rpm = 0;  // with the pedal fully down; 0: the tool's own
   double wear = 1;
   std::string law = {};       // force law by which the tool resists; empty: the tool's own
-  Vec3 toward{0, 1, 0};       // where the user looks, patient's frame: from the front unless said otherwise
-  std::optional<Vec3> at_mm;  // the tool waits over this place; none: over the bone's middle
+  Vec3 toward{0, 1, 0};       // viewing direction of the user, patient's frame: from the front unless given otherwise
+  std::optional<Vec3> at_mm;  // the tool waits above this point; none: above the bone's middle
 };
 
-// "front", "back", "left", "right", "top", "bottom", of the patient, from where the user looks; or "x,y,z", where to.
-// Error invalid_input: what may be said.
+// "front", "back", "left", "right", "top", "bottom" of the patient: where the user looks from. Or "x,y,z": the viewing
+// direction. Error invalid_input: lists the permitted values.
 [[nodiscard]] Result<Vec3> read_view(std::string_view text);
-// "x,y,z" in millimetres. Error invalid_input; `option` is named in it.
+// "x,y,z" in millimetres. Error invalid_input: names `option`.
 [[nodiscard]] Result<Vec3> read_point(std::string_view text, std::string_view option);
 
-// Whether a person's hand can do anything with a tool. Error invalid_input: it takes no bone, and what it is for.
+// Whether a person can use this tool by hand. Error invalid_input: the tool takes no bone; says what it is for.
 [[nodiscard]] Result<void> check_held(const Tool& tool);
 
-// A plan of one step without end: the tool, and where it is taken up. Error invalid_input or not_found.
+// A plan of one endless step: the tool, and where it is taken up. Error invalid_input or not_found.
 [[nodiscard]] Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bone,
                                                const ToolFinder& find = find_tool);
 
 class FreeHandSession final : public Session {
  public:
-  // `plan`: of make_free_hand(). `device`: open, outlives the session. A device without force is used as one that shows
-  // all of it, and shown none.
+  // `plan`: from make_free_hand(). `device`: open, outlives the session. A device without force is treated as one that
+  // shows all force, but is sent none.
   FreeHandSession(ReadyPlan plan, HapticDevice& device, double force_scale);
 
   SessionTick tick(const Patch& patch, RoomLink room, int periods = 1,
                    const std::vector<PlacedGuide>* room_guides = nullptr) noexcept override;
-  // When its device is over; a person goes on until asked to stop.
+  // True when its device has ended; a person continues until asked to stop.
   [[nodiscard]] bool done() const noexcept override { return device_.over(); }
   [[nodiscard]] bool endless() const noexcept override { return true; }
   [[nodiscard]] HapticLoop& loop() noexcept override { return loop_; }

@@ -28,7 +28,7 @@ void GuidanceSpring::see(const GuideSeen& seen) noexcept {
   silent_s_ += params_.dt_s;
   if (seen.there && (!known_ || seen.state_seq != state_seq_)) {
     raw_mm_ = seen.place_mm;
-    // After a silence the other may be anywhere: what lies between is made up as at the beginning.
+    // After a silence the other may be anywhere. The distance is closed as at the beginning.
     if (!fresh()) first_mm_ = second_mm_ = raw_mm_, placed_ = false;
     state_seq_ = seen.state_seq;
     silent_s_ = 0.0;
@@ -43,7 +43,7 @@ void GuidanceSpring::see(const GuideSeen& seen) noexcept {
 void GuidanceSpring::move_far_end(const GuideMoment& moment) noexcept {
   far_mm_ += clamped(moment.guide_mm - guide_mm_, params_.most_mm_per_s * params_.dt_s);
   far_mm_ += clamped(moment.guide_mm - far_mm_, params_.closing_mm_per_s * params_.dt_s);
-  // A hand that holds back takes the far end along.
+  // A hand that holds back pulls the far end along.
   const double most_mm = params_.most_n / params_.stiffness_n_per_mm;
   far_mm_ = moment.handle_mm + clamped(far_mm_ - moment.handle_mm, most_mm);
 }
@@ -57,7 +57,7 @@ Vec3 GuidanceSpring::step(const GuideMoment& moment) noexcept {
   const bool pull = fresh() && whole > 0.0;
   if (!placed_) {
     if (!pull && !(k_n_per_mm_ > 0.0)) return force_n_;
-    // A pull that was fading goes on from the force that there is.
+    // A pull that was fading continues from its present force.
     if (!(k_n_per_mm_ > 0.0)) far_mm_ = handle_mm_ = moment.handle_mm;
     guide_mm_ = moment.guide_mm;
     placed_ = true;
@@ -67,7 +67,7 @@ Vec3 GuidanceSpring::step(const GuideMoment& moment) noexcept {
   const auto stored_mj = [&] { return 0.5 * k_n_per_mm_ * (far_mm_ - moment.handle_mm).squaredNorm(); };
   const double before_mj = stored_mj();
 
-  // It becomes firmer without becoming longer in energy, and softer by losing some.
+  // Raising the stiffness does not raise the energy; lowering it loses some.
   const double firmer = std::min(params_.stiffness_n_per_mm * params_.dt_s / params_.ramp_s, whole - k_n_per_mm_);
   if (pull && firmer > 0.0) {
     far_mm_ = moment.handle_mm + std::sqrt(k_n_per_mm_ / (k_n_per_mm_ + firmer)) * (far_mm_ - moment.handle_mm);

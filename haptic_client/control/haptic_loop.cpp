@@ -76,14 +76,16 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (!may_work) report.events |= kForbidden;
   const bool works = follows && may_work;
 
-  // The spring hangs at handle + offset. Seen from the bone that place moves also where a bone that turns leaves the
-  // offset behind; were it to turn along, a hand with much slack would get, or lose, work that nobody reckons.
+  // The spring is attached at handle + offset. Relative to the bone, that point also moves when the bone turns, because
+  // the offset does not turn with it. If it did, a hand with much slack would get or lose work that nobody accounts
+  // for.
   const Vec3 offset_before_mm = coupling_.offset_mm();
   if (bone_.rotation.coeffs() != bone_before_.rotation.coeffs())
     coupling_.turn(bone_.rotation.conjugate() * bone_before_.rotation);
   const Vec3 left_behind_mm = coupling_.offset_mm() - offset_before_mm;
 
-  // While the clutch is held the tool stays; letting go ties the handle to the tool where it now is, without force.
+  // While the clutch is held the tool stays. Releasing the clutch ties the handle to the tool at its present position,
+  // without force.
   if (clutched_ && !input.clutch)
     mapping_.anchor(input.pose_device_tool.position_mm, bone_.point(proxy_.pose().position_mm));
   clutched_ = input.clutch;
@@ -105,7 +107,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   hand.move_mm += left_behind_mm;
   ledger_.observe(hand.move_mm / mapping_.scale(), hand.turn_rad);
 
-  // A guide lets the tool go only where its opening does; the hand feels the guide as the way that it is kept from.
+  // A guide lets the tool go only where its opening permits. The hand feels the guide as the motion that it prevents.
   Pose pose_bone_wanted = pose_bone_device;
   pose_bone_wanted.position_mm += coupling_.offset_mm();
   bool held_back = false;
@@ -119,10 +121,11 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   spindle_.step(model.spindle, works && placed_ ? input.spindle_rpm : 0.0, torque_nmm_, params_.dt_s);
   if (spindle_.stalled) report.events |= kStalled;
 
-  // Of the force that is felt and cut with, as physical force.
+  // Limit of the force that is felt and cut with, as physical force.
   const double s = params_.force_scale;
   const double device_n = (input.device_warm ? params_.continuous_n : params_.peak_n) / s;
-  // A limit comes down from all that is felt: from the contact's alone it would leave nothing to the pull at once.
+  // A decreasing limit starts from all that is felt. Starting from the contact's force alone would at once leave
+  // nothing to the guidance spring.
   const double felt_n = shown_.force_n.norm() + guide_pull_.force_n().norm() + partner_n_.norm();
   const double limit_n = guard_.limit_n(device_n, felt_n / s, slow_n(input) / s);
 
@@ -148,7 +151,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (step.heel_contact) report.events |= kHeelContact;
   if (step.on_metal) report.events |= kOnMetal;
 
-  // What comes back is not taken again by a path that is still open, and in it the spindle stands.
+  // A path that is still open must not remove returned bone again, and the spindle stands in that bone.
   if (step.returned && recorder_.recording()) {
     recorder_.end();
     proxy_.end_sweep();
@@ -174,7 +177,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
                  : spindle_.rpm > 1.0 ? CuttingPhase::free
                                       : CuttingPhase::idle;
 
-  // The coupling's spring, as far as the device could ever show it.
+  // The coupling's spring, as far as the device could show it.
   CouplingMoment moment;
   moment.handle_mm = pose_bone_device.position_mm;
   moment.proxy_before_mm = proxy_before.position_mm;
@@ -184,7 +187,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   moment.energy_scale = s / mapping_.scale();
   moment.fell_short = fell_short_;
   moment.touching = (step.contact || step.breakthrough || held_back) && step.covered && !input.clutch;
-  // A torque goes to the handle as the work of a force does, so that one store holds both: where the workspace is
+  // Torque is scaled to the handle as the work of a force is, so that one store holds both. Where the workspace is
   // larger than the bone, levers seem longer.
   moment.stiffness_nmm_per_rad = turn_arm_mm_ * turn_arm_mm_ * coupling_n_per_mm_;
   moment.limit_nmm =
@@ -203,8 +206,9 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()));
   if (moment.touching) report.torque_physical_nmm = step.contact_torque_nmm;
 
-  // The spring of the turn is the coupling's. The moment of the cut is not: the bone turns back a spindle, and presses
-  // on faces beside the tip; whoever gives way to it gets the motor's work, not what the hand has put in.
+  // The spring of the rotation belongs to the coupling. The moment of the cut does not: the bone turns a spindle back
+  // and presses on faces beside the tip. Whoever yields to this moment gets the motor's work, not what the hand has put
+  // in.
   Vec3 cut_nmm = Vec3::Zero();
   if (step.cutting && moment.touching)
     cut_nmm = step.contact_torque_nmm + paid_n_per_mm * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm * step.turn_rad;
@@ -226,7 +230,7 @@ void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, co
   moment.torque_nmm = step.torque_nmm;
   moment.advance_mm = model.axial ? step.moved_mm.dot(axis) : step.feed_mm_per_s * params_.dt_s;
   moment.push_n = -spring_n.dot(axis);
-  // A hand that presses a blade to one side presses its plate on the kerf: the plate's normal is y.
+  // A hand that presses a blade to one side presses its plate on the kerf. The plate's normal is y.
   if (step.engaged > 0.0) moment.kerf_pressure_n = std::abs(spring_n.dot(proxy_.pose().direction(Vec3::UnitY())));
   effects_[static_cast<std::size_t>(tool_)].step(moment, params_.dt_s);
 }
@@ -234,7 +238,7 @@ void HapticLoop::wear_and_clog(const ToolModel& model, const ProxyStep& step, co
 double HapticLoop::load_nmm(const ProxyStep& step, double pressed_n) noexcept {
   const double cutting_n = step.cutting_force_n.norm();
   if (step.cutting && cutting_n > 0.0) torque_per_n_ = step.torque_nmm / cutting_n;
-  // Stuck in bone: to turn there it would take the torque of the thrust that still presses.
+  // Stuck in bone: turning there would take the torque of the thrust that still presses.
   const bool stuck = !step.cutting && spindle_.unloaded_rpm > 1.0 && spindle_.rpm < kMinCuttingRpm;
   return stuck ? torque_per_n_ * pressed_n : step.torque_nmm;
 }
@@ -248,16 +252,16 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   ramp_ = std::clamp(input.room == RoomLink::over ? ramp_ - ramp : ramp_ + ramp, 0.0, 1.0);
   if (ramp_ < 1.0) report.events |= kRamping;
 
-  // The hand's own movement may raise the force as fast as it moves, spring and damping; everything else only slowly.
-  // Of a turn, as much at its arm.
+  // The hand's own motion may raise the force as fast as it moves, by spring and damping. Everything else raises it
+  // only slowly. A rotation counts at its arm.
   Motion hand = between(device_, report.pose_bone_device);
-  // What moves the bone is not the hand: it counts from where the bone rests.
+  // The bone's motion is not the hand's: the motion counts from where the bone rests.
   if (moved_) hand = between(bone_before_ * device_, bone_ * report.pose_bone_device);
   const double hand_mm = norm_mm(hand, turn_arm_mm_);
   const double by_hand_n = 2.0 * s * coupling_n_per_mm_ * hand_mm;
   const double slow = slow_n(input);
   const Vec3 before_n = shown_.force_n;
-  // Safety zeros and free air come at once.
+  // A force set to zero for safety, and free air, take effect at once.
   const Vec3 turn_nmm = moment.energy_scale * (coupling.turn_spring_nmm + coupling.turn_damping_nmm);
   Wrench wanted;
   if (moment.touching && safe) {
@@ -274,8 +278,9 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
       share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
   shown_ = ledger_.limited(wanted, damping, moment.touching);
   report.energy = ledger_.report();
-  // From a missed tick, the ramp or the monitor on until what is shown has come up again: not where the spring grows
-  // faster than force may, as on a point that skates; a hand that presses there would sink.
+  // Begins with a missed tick, the ramp or the monitor, and lasts until the shown force has come up again. It does not
+  // begin where the spring grows faster than force may, as on a point that skates: a hand that presses there would
+  // sink.
   constexpr double kClearly = 0.9;  // the filter's lag is less
   fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.energy.held_back) &&
                 shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
@@ -283,7 +288,7 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   report.coupling_device_n = to_device(shown_.force_n);
   report.coupling_device_nmm = to_device(shown_.torque_nmm);
 
-  // The motor's port, beside the ledger, in what the limit leaves.
+  // The motor port, outside the ledger, within what the limit leaves.
   MotorMoment motor;
   motor.pedal = input.spindle_rpm > 0.0 && input.room == RoomLink::follows && !(report.events & kForbidden) && safe;
   motor.spindle_rpm = spindle_.rpm;
@@ -298,15 +303,15 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   if (!params_.motor_effects || !safe) motor_n.setZero();
   motor_n = clamped(motor_n, std::max(0.0, limit_n - shown_.force_n.norm()));
   report.motor_device_n = to_device(motor_n);
-  // What the contact leaves of the growth that nobody's hand causes is the pull's.
+  // The contact leaves part of the growth that no hand causes. The guidance spring gets that part.
   const double grown_n = growth(shown_.force_n, before_n).norm() - by_hand_n;
   const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
   lead(input, meet(input, {room_n, std::clamp(slow - grown_n, 0.0, slow), by_hand_n + slow}, report), report);
   together_n_ = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
   report.force_device_n = together_n_ + report.motor_device_n;
 
-  // So too the moment of the cut, never a force: no more than the force shown would be at the arm of a turn, and no
-  // faster than force grows that the hand did not cause.
+  // The same for the moment of the cut, never a force. It is at most what the shown force would be at the arm of a
+  // rotation. It grows no faster than force grows that the hand did not cause.
   const double most_nmm = std::min(turn_arm_mm_ * shown_.force_n.norm() / mapping_.scale(),
                                    std::max(0.0, limit_nmm - shown_.torque_nmm.norm()));
   Vec3 motor_nmm = Vec3::Zero();
@@ -328,8 +333,8 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
     partner_n_.setZero();
     return left;
   }
-  // A hand whose tool is held by somebody has none that others could push: whoever holds it may do so from a console
-  // and have a hand of another number. And whoever leads this hand is where it is.
+  // A hand whose tool is held by another person has no tool that others could push. That person may hold it from a
+  // console and have a hand with another number. And the guiding hand is where this hand is.
   std::array<PartnerTool, PartnerContact::kMost> others;
   std::size_t count = 0;
   const HapticRestrictions& oversight = guard_.now();
@@ -388,8 +393,8 @@ void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopRepor
     return;
   }
   if (!recorder_.recording()) return;
-  // A tool that stands rubs with its points, its faces a little within the bone: that is no cut.
-  // Nor is what the room would refuse.
+  // A tool that stands rubs with its points, and its faces are a little within the bone: that is no cut. A path that
+  // the room would reject is not recorded either.
   const bool taken = step.may_cut && !stands && guard_.takes(proxy_.cut_pose().position_mm);
   if (taken) recorder_.add(proxy_.cut_pose());
   quiet_ticks_ = step.near_bone ? 0 : quiet_ticks_ + 1;
@@ -402,7 +407,7 @@ void HapticLoop::record(const ToolModel& model, const ProxyStep& step, LoopRepor
     piece.tool = tool_;
     piece.spindle_rpm = static_cast<std::uint32_t>(spindle_.rpm);
     piece.closed_tick = static_cast<std::int64_t>(ticks_);
-    // There is room: nothing is cut while the queue is nearly full.
+    // There is room, because nothing is cut while the queue is nearly full.
     if (pieces_.try_push(piece)) {
       ++cuts_closed_;
       proxy_.closed(model, piece.author_seq);

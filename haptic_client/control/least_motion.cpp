@@ -11,7 +11,7 @@ using Vec6 = Eigen::Matrix<double, 6, 1>;
 
 constexpr double kNothing_mm = 1e-10;
 constexpr double kMostPushedOut_mm = 1.2e-4;  // what a point on its way out asks for, and rounding
-// Conditions whose normal is nearly along a direction that may not be gone say nothing about what is left.
+// Conditions whose normal is nearly along a forbidden direction say nothing about the remaining motion.
 constexpr double kLeastNormal2 = 1e-3;
 
 Vec6 row_of(const Condition& condition, const MotionLimits& limits) noexcept {
@@ -39,13 +39,13 @@ struct Problem {
   bool solve(Vec6& x, bool& pressed) const noexcept;
 };
 
-// The conditions that press, as an orthonormal base of their rows and what makes rows of it: row_j = sum_i base_i
-// upper(i, j).
+// The active conditions, as an orthonormal base of their rows and the factors that make the rows of it: row_j = sum_i
+// base_i upper(i, j).
 class Pressing {
  public:
   [[nodiscard]] int count() const noexcept { return count_; }
   [[nodiscard]] double pressure(int i) const noexcept { return pressure_[i]; }
-  // What of a row the others leave, and how their pressures fall when it presses by one.
+  // The part of a row that the others leave, and the decrease of their pressures when it presses by one.
   [[nodiscard]] Vec6 left_of(const Vec6& row, Vec6& falls) const noexcept {
     Vec6 left = row, along = Vec6::Zero();
     for (int pass = 0; pass < 2; ++pass)  // twice is exact
@@ -97,8 +97,9 @@ class Pressing {
   int count_ = 0;
 };
 
-// Goldfarb and Idnani's dual method: the condition that is broken most is made to press, those that it relieves let go.
-// Six unknowns: at most six press at once. False: some contradict each other, or it takes too long; x breaks some then.
+// Goldfarb and Idnani's dual method: the condition that is violated most becomes active, and those that it relieves are
+// dropped. There are six unknowns, so at most six are active at once. False: some contradict each other, or it takes
+// too long; x then violates some.
 bool Problem::solve(Vec6& x, bool& pressed) const noexcept {
   constexpr int kMostSteps = 40;
   constexpr double kDependent2 = 1e-9;
@@ -122,7 +123,7 @@ bool Problem::solve(Vec6& x, bool& pressed) const noexcept {
     const Vec6& n = row[static_cast<std::size_t>(broken)];
     Vec6 falls = Vec6::Zero();
     const Vec6 way = pressing.left_of(n, falls);
-    // As far as one of the others still presses.
+    // Go only as far as each of the others still presses.
     constexpr double kEndless = 1e300;
     double until = kEndless;
     int lets_go = -1;
@@ -189,7 +190,7 @@ Motion least_motion(const Motion& wanted, const Conditions& conditions, const Mo
   Vec6 x = goal;
   bool pressed = false;
   if (!problem.solve(x, pressed) || x.norm() > goal.norm() + kMostPushedOut_mm) {
-    // What asks to be let out on two sides at once stays where it is: then standing still breaks nothing.
+    // A tool that is pushed out on two sides at once stays where it is: then standing still violates nothing.
     for (double& least : std::span(problem.least).first(static_cast<std::size_t>(problem.count)))
       least = std::min(0.0, least);
     x = goal;

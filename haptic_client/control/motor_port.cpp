@@ -21,10 +21,10 @@ Vec3 MotorPort::step(const MotorMoment& moment, double dt_s) noexcept {
 
   const Vec3 out = moment.normal_n / normal_n;
   const double most_n = params_.friction * normal_n;
-  // What comes as often as teeth bite or the stroke turns round, without a mean.
+  // The part that oscillates with the teeth or the stroke, with zero mean.
   const double fade = std::clamp((params_.most_hz - bite_hz) / (0.2 * params_.most_hz), 0.0, 1.0);
   const double wave = fade * std::sin(2.0 * std::numbers::pi * phase_);
-  // The bone holds back the flank that slides over it; at the pole, and under a drill's point, nothing slides to one
+  // The bone holds back the flank that slides over it. At the pole, and under a drill's point, nothing slides to one
   // side.
   const Vec3 across = saws ? Vec3(wave * moment.stroke) : moment.axis.cross(out);
   const double kick_n = moment.cutting ? params_.kick * params_.friction * std::max(0.0, normal_n - usual_n_) : 0.0;

@@ -1,20 +1,22 @@
-// What the tool's motor does to the hand: drag, kick and vibration. While the tool cuts, its drag is the force of its
-// law across the feed; while it rubs, friction. Of what turns it goes one way, of a saw to and fro with the stroke.
+// The forces of the tool's motor on the hand: drag, kick and vibration. While the tool cuts, its drag is the force of
+// its law across the feed. While it rubs, the drag is friction. The drag of a turning tool has one direction; that of a
+// saw alternates with the stroke.
+//
 // These forces are active, unlike the coupling's: they may put energy into the hand as a real motor does. So they go
-// through a port of their own, whose force is bounded by friction times the normal force and which is shut soon after
-// the pedal.
+// through a port of their own. Its force is bounded by friction times the normal force. The port closes soon after the
+// pedal.
 #pragma once
 #include "common/geometry/pose.hpp"
 
 namespace osteon::haptic {
 
 struct MotorPortParams {
-  double friction = 0.3;    // mu: the bound of all motor forces over the normal force [A]
-  double drag = 0.6;        // of the bound: how hard a flank that rubs pulls sideways, and the law's force at most [A]
-  double kick = 0.8;        // how much of a sudden rise of the normal force pulls too [A]
-  double vibration = 0.15;  // of the bound, at the rate at which teeth bite [A]
-  double kick_s = 0.03;     // a rise slower than this is no kick [A]
-  double most_hz = 300.0;   // faster vibration is beyond a 1 kHz loop: it averages out, sound carries it
+  double friction = 0.3;    // mu: bound of all motor forces, relative to the normal force [A]
+  double drag = 0.6;        // of the bound: the sideways pull of a rubbing flank, and the largest force of the law [A]
+  double kick = 0.8;        // share of a sudden rise of the normal force that pulls too [A]
+  double vibration = 0.15;  // of the bound, at the rate at which the teeth bite [A]
+  double kick_s = 0.03;     // a slower rise is no kick [A]
+  double most_hz = 300.0;   // faster vibration is beyond a 1 kHz loop: it averages out, and sound represents it
   double on_s = 0.02, off_s = 0.01;  // after the pedal
 };
 
@@ -23,10 +25,10 @@ struct MotorMoment {
   double spindle_rpm = 0;
   int teeth = 0;
   Vec3 normal_n = Vec3::Zero();  // of the bone on the tool, physical
-  Vec3 axis = Vec3::UnitZ();     // of the tool, out of its tip; it turns clockwise as its holder sees it
+  Vec3 axis = Vec3::UnitZ();     // of the tool, out of its tip; the tool turns clockwise as its holder sees it
   bool cutting = false;
   double across_n = 0;         // while it cuts: the law's force across the feed, physical, as ForceLaw::across_n says
-  Vec3 stroke = Vec3::Zero();  // of a saw, the unit vector along which its teeth go to and fro; zero: the tool turns
+  Vec3 stroke = Vec3::Zero();  // of a saw: unit vector along which its teeth oscillate; zero: the tool turns
   double pull_n = 0;           // of a drill that breaks through, along the axis out of its tip; within the same bound
 };
 
@@ -35,17 +37,17 @@ class MotorPort {
   explicit MotorPort(const MotorPortParams& params = {}) : params_(params) {}
   void reset() noexcept;
   // [haptic] Force on the tool, physical, N, in the frame of the moment's vectors. Its size is at most friction times
-  // that of the normal force, and zero from off_s after the pedal on.
+  // that of the normal force. It is zero from off_s after the pedal on.
   [[nodiscard]] Vec3 step(const MotorMoment& moment, double dt_s) noexcept;
-  // [haptic] 0 … 1: how much of what the motor does comes through now; zero from off_s after the pedal on.
+  // [haptic] 0 … 1: the share of the motor's force that passes now; zero from off_s after the pedal on.
   [[nodiscard]] double open() const noexcept { return open_; }
   [[nodiscard]] const MotorPortParams& params() const noexcept { return params_; }
 
  private:
   MotorPortParams params_;
   double open_ = 0;     // 0 … 1
-  double usual_n_ = 0;  // normal force, slowly followed
-  double phase_ = 0;    // of the teeth, or of a saw's stroke, turns
+  double usual_n_ = 0;  // normal force, followed slowly
+  double phase_ = 0;    // of the teeth, or of a saw's stroke, in turns
 };
 
 }  // namespace osteon::haptic

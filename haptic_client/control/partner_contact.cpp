@@ -7,7 +7,7 @@ namespace osteon::haptic {
 
 TouchPoints::TouchPoints(const Tool& tool, int most) {
   std::vector<SamplePoint> samples = sample_points(tool, std::max(1, most / 2));
-  // Every n-th where a long shank has many more than its cutting part: neighbours follow each other.
+  // Takes every n-th point where a long shank has many more than its cutting part; neighbours follow each other.
   const auto room = static_cast<std::size_t>(std::max(1, most));
   const std::size_t every = std::max<std::size_t>(1, (samples.size() + room - 1) / room);
   Box box;
@@ -44,7 +44,8 @@ Pose PartnerContact::felt(const PartnerTool& partner) const noexcept {
   return partner.pose_bone_tool;
 }
 
-// Where and which way: the mean over all points inside, by their depth, so that neither jumps from point to point.
+// Position and direction of the contact: the mean over all points inside, weighted by their depth. So neither jumps
+// from point to point.
 PartnerContact::Touch PartnerContact::touch(const TouchPoints& own, const Pose& pose_bone_own,
                                             const SolidLattice& solid, const Pose& pose_bone_partner) noexcept {
   Touch touch;
@@ -62,7 +63,7 @@ PartnerContact::Touch PartnerContact::touch(const TouchPoints& own, const Pose& 
     outward -= distance_mm * gradient;
     whole_mm -= distance_mm;
   }
-  // Right through the middle there is no way out: no force is better than one that flickers.
+  // Right through the middle there is no way out: no force is better than a force that flickers.
   constexpr double kLeast = 0.05;
   if (whole_mm <= 0.0 || outward.norm() < kLeast * whole_mm) return {};
   touch.at_mm /= whole_mm;
@@ -73,7 +74,7 @@ PartnerContact::Touch PartnerContact::touch(const TouchPoints& own, const Pose& 
 PartnerForce PartnerContact::step(const TouchPoints& own, const Pose& pose_bone_own,
                                   std::span<const PartnerTool> partners, double dt_s) noexcept {
   const Pose before = placed_ ? pose_bone_own_ : pose_bone_own;
-  // What the force of the last step has done meanwhile.
+  // The work of the last step's force since then.
   const Eigen::Quaterniond turned = pose_bone_own.rotation * before.rotation.conjugate();
   const Vec3 turn_rad = (turned.w() < 0.0 ? -2.0 : 2.0) * turned.vec();  // of a tick: small
   const double given_mj = force_n_.dot(pose_bone_own.position_mm - before.position_mm) + torque_nmm_.dot(turn_rad);
@@ -91,7 +92,7 @@ PartnerForce PartnerContact::step(const TouchPoints& own, const Pose& pose_bone_
     k->pose_bone_tool.position_mm += share * (partner.pose_bone_tool.position_mm - k->pose_bone_tool.position_mm);
     k->pose_bone_tool.rotation = k->pose_bone_tool.rotation.slerp(share, partner.pose_bone_tool.rotation).normalized();
 
-    // A spring that stiffens while it is pressed makes energy: while tools touch it only gets softer.
+    // A spring that stiffens while it is pressed makes energy. While tools touch, it only becomes softer.
     const Touch t = touch(own, pose_bone_own, *partner.solid, k->pose_bone_tool);
     const double stable_n_per_mm = std::min(
         params_.most_n_per_mm, params_.damping_n_s_per_mm / (std::max(0.0, partner.lag_s) + params_.low_pass_s + dt_s));
@@ -113,7 +114,7 @@ PartnerForce PartnerContact::step(const TouchPoints& own, const Pose& pose_bone_
   for (Known& k : known_)
     if (!k.seen) k = {};
 
-  // Force and torque are of one contact: what limits the one limits the other.
+  // Force and torque belong to one contact: a limit of one limits the other.
   const double size_n = wanted_n.norm();
   const double most_n = std::min(params_.most_n, force_n_.norm() + params_.most_n_per_s * dt_s);
   const double part = size_n > most_n ? most_n / size_n : 1.0;

@@ -1,5 +1,6 @@
-// The bone round the tool as the haptic loop feels it: fine bricks at the pitch of the tool's cuts round its cutting
-// part, coarse ones at h round the whole tool. Built by PatchBuilder on another thread, read-only afterwards.
+// The bone around the tool as the haptic loop feels it. Fine bricks, at the pitch of the tool's cuts, surround its
+// cutting part. Coarse bricks, at h, surround the whole tool. PatchBuilder builds it on another thread; afterwards it
+// is read-only.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,19 +13,19 @@
 
 namespace osteon::haptic {
 
-// Samples of 8³ cells with an apron of one on the upper sides, so that every point in the cells can be interpolated.
+// Samples of 8³ cells with an apron of one sample on the upper sides. So every point in the cells can be interpolated.
 inline constexpr int kBrickCells = 8;
 inline constexpr int kBrickSamples = kBrickCells + 1;
 struct Brick {
   std::array<float, kBrickSamples * kBrickSamples * kBrickSamples> values;  // z fastest
 };
 
-// A box of bricks of one level; places without a brick are unknown.
+// A box of bricks of one level; positions without a brick are unknown.
 class BrickGrid {
  public:
-  // Bricks `first` to `last`, both included, in bricks of this pitch; all unknown. Keeps its memory.
+  // Covers bricks `first` to `last`, both included, counted in bricks of this pitch; all unknown. Its memory is reused.
   void reset(double pitch_mm, Coord first, Coord last);
-  // The owners are the patches that hold a brick and the builder's store; the haptic thread owns none.
+  // A brick is owned by the patches that hold it and by the builder's store; the haptic thread owns none.
   void set(Coord brick, std::shared_ptr<const Brick> values);
   [[nodiscard]] double pitch_mm() const { return pitch_mm_; }
   [[nodiscard]] Coord first() const { return first_; }
@@ -41,13 +42,13 @@ class BrickGrid {
   std::vector<const float*> tables_;
 };
 
-// Lower bound of the distance to bone, for every point of cells as wide as a brick at h: from the case, whose bone cuts
-// only take away. It reaches farther than the bricks do.
+// Lower bound of the distance to bone, for every point of cells as wide as a brick at h. It comes from the case; cuts
+// only remove its bone. It reaches farther than the bricks do.
 struct Clearance {
-  Digest bone;  // of the case that it is of
+  Digest bone;  // hash of the case
   CoordBox cells;
   double cell_mm = 0;
-  std::vector<float> mm;  // z fastest; zero: nothing is said
+  std::vector<float> mm;  // z fastest; zero: unknown
 };
 
 struct Patch {
@@ -55,13 +56,13 @@ struct Patch {
   BrickGrid coarse;        // f
   BrickGrid density;       // g/cm³, at h, of the same bricks as `coarse`
   BrickGrid metal;         // at h, where metal is near: 1 at its samples and in the air beside them, else 0
-  bool has_metal = false;  // any brick of these is there
+  bool has_metal = false;  // any metal brick is present
   Clearance clearance;
-  std::uint64_t own_cuts = 0;  // own cuts up to this number are in it
-  RoomSeq room_seq;            // committed events that are in it
+  std::uint64_t own_cuts = 0;  // own cuts up to this number are included
+  RoomSeq room_seq;            // committed events up to this one are included
   std::uint64_t version = 0;   // 0: never filled
 
-  // f at a point, fine where there is a fine brick; false where the patch does not reach.
+  // f at a point, from a fine brick where there is one. Returns false where the patch does not reach.
   [[nodiscard]] bool solid(const Vec3& point_mm, double& solid_mm) const noexcept {
     return fine.sample(point_mm, solid_mm) || coarse.sample(point_mm, solid_mm);
   }

@@ -25,7 +25,7 @@ Vec3 brick_centre_mm(Coord index, double pitch_mm) {
   return (kBrickCells * pitch_mm) * Vec3(index.x + 0.5, index.y + 0.5, index.z + 0.5);
 }
 
-// Box of a part of the tool between two places on its axis.
+// Box of a part of the tool between two positions on its axis.
 Box tool_box(const ToolModel& model, const Pose& pose, double from_z_mm, double to_z_mm) {
   const Box& solid = model.solid.bounds;
   Box box;
@@ -47,7 +47,7 @@ void for_each(const CoordBox& box, const Visit& visit) {
 void PatchBuilder::changed(double pitch_mm, int level, const std::vector<Coord>& leaf_origins) {
   const double leaf_pitch = level_pitch_mm(pitch_mm, level);
   for (const Coord& origin : leaf_origins) {
-    // One sample more on every side: interpolation reaches there.
+    // One more sample on every side, because interpolation reaches there.
     const Box box{position_mm(origin - Coord{1, 1, 1}, leaf_pitch),
                   position_mm(origin + Coord{kLeafSize, kLeafSize, kLeafSize}, leaf_pitch)};
     const auto forget = [&](Store& store, double pitch) {
@@ -105,7 +105,7 @@ std::shared_ptr<const Brick> PatchBuilder::metal_brick(const Case& bone, Coord i
   auto made = std::make_shared<Brick>();
   std::size_t i = 0;
   for_each(samples, [&](Coord at) {
-    // What lies between metal and air is metal up to the surface; what lies between metal and bone is so up to the
+    // Between metal and air, everything is metal up to the surface. Between metal and bone, it is metal up to the
     // middle.
     bool metal = bone.tissue(at) == Tissue::metal;
     if (!metal && bone.tissue(at) == Tissue::none)
@@ -122,7 +122,7 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
   const Tool& tool = model.tool;
   if (fine_level_ != model.cut_level || fine_.size() > kMostKeptBricks) fine_.clear();
   if (coarse_.size() > kMostKeptBricks) coarse_.clear(), density_.clear(), metal_.clear();
-  // A body that came or went changed the bone all over it.
+  // An added or removed body changed the bone everywhere.
   if (!std::ranges::equal(bodies_, bodies)) {
     fine_.clear();
     coarse_.clear();
@@ -131,8 +131,8 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
   fine_level_ = model.cut_level;
   const Pose pose_tool_bone = pose.inverse();
 
-  // Bricks whose centre is farther from the tool's surface than the margin and half their diagonal are left out, and so
-  // are those deep inside it.
+  // Leaves out bricks whose centre is farther from the tool's surface than the margin and half their diagonal. Leaves
+  // out those deep inside the tool too.
   const auto fill = [&](BrickGrid& grid, const CoordBox& bricks, double pitch, double margin_mm, const auto& make) {
     grid.reset(pitch, bricks.min, bricks.max);
     const double half_diagonal_mm = 0.5 * std::sqrt(3.0) * kBrickCells * pitch;
@@ -168,7 +168,7 @@ void PatchBuilder::build(std::span<const CutField* const> bodies, const ToolMode
       return made;
     });
 
-  // What the case says never changes: it is asked for again only where the tool has gone on to other cells.
+  // The case's clearance never changes. It is computed again only when the tool has moved to other cells.
   const CoordBox cells = bricks_in(tool_box(model, pose, 0.0, -tool.reach_mm()).grown(params_.clearance_margin_mm), h);
   Clearance& clearance = patch.clearance;
   if (clearance.mm.empty() || clearance.cells != cells || clearance.bone != bone.hash()) {

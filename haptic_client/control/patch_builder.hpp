@@ -1,5 +1,5 @@
-// Gathers patches from the replica of the cut field. Bricks are kept between patches and made again only where a cut
-// changed them, so that a patch costs what the last cuts touched.
+// Builds patches from the replica of the cut field. Bricks are reused between patches, and remade only where a cut
+// changed them. So the cost of a patch depends on what the last cuts touched.
 #pragma once
 #include <memory>
 #include <span>
@@ -13,9 +13,9 @@
 namespace osteon::haptic {
 
 struct PatchParams {
-  double fine_margin_mm = 1.5;        // of fine bricks round the cutting part
-  double coarse_margin_mm = 4.0;      // of coarse bricks round the whole tool
-  double clearance_margin_mm = 12.0;  // of what is known to be free round the whole tool
+  double fine_margin_mm = 1.5;        // of fine bricks around the cutting part
+  double coarse_margin_mm = 4.0;      // of coarse bricks around the whole tool
+  double clearance_margin_mm = 12.0;  // of the clearance around the whole tool
   int fine_samples = 160;             // along an axis, at most
 };
 
@@ -23,10 +23,10 @@ class PatchBuilder {
  public:
   explicit PatchBuilder(const PatchParams& params = {}) : params_(params) {}
 
-  // Forgets bricks that contain samples of these leaves (origins at `level`) of a field with this h.
+  // Discards bricks that contain samples of these leaves (origins at `level`) of a field with this h.
   void changed(double pitch_mm, int level, const std::vector<Coord>& leaf_origins);
-  // Fills `patch` round the tool at this pose, from all bodies of the bone, at least one: solid is the least of theirs.
-  // Cuts and room_seq of the patch are the caller's to set.
+  // Fills `patch` around the tool at this pose, from all bodies of the bone, at least one. Its solid distance is the
+  // least of theirs. The caller sets own_cuts and room_seq of the patch.
   void build(std::span<const CutField* const> bodies, const ToolModel& model, const Pose& pose_bone_tool, Patch& patch);
   void build(const CutField& field, const ToolModel& model, const Pose& pose_bone_tool, Patch& patch) {
     const CutField* const one = &field;
@@ -45,7 +45,7 @@ class PatchBuilder {
   PatchParams params_;
   int fine_level_ = -1;
   Store fine_, coarse_, density_, metal_;
-  std::vector<const CutField*> bodies_;  // of the last patch, to see when one comes or goes
+  std::vector<const CutField*> bodies_;  // of the last patch, to detect added or removed bodies
   std::shared_ptr<const Brick> air_;     // shared by every brick far from bone
   std::size_t bricks_made_ = 0;
 };

@@ -11,24 +11,25 @@
 namespace osteon::haptic {
 namespace {
 
-// Free travel along a direction of cutting in one tick: 2 m/s. A device that moves faster is followed a little later.
+// Free travel along a direction of cutting in one tick: 2 m/s. The tool follows a faster device a little later.
 constexpr double kMostTravel_mm = 2.0;
-constexpr int kMostSubSteps = 24;     // of what is cut
-constexpr int kMostTravelSteps = 10;  // of what is not
-constexpr int kMostTries = 12;        // places tried in a tick; a tool that is wedged gets there a little later
+constexpr int kMostSubSteps = 24;     // of motion that cuts
+constexpr int kMostTravelSteps = 10;  // of motion that does not
+constexpr int kMostTries = 12;        // poses tried in a tick; a wedged tool gets there a little later
 constexpr double kNothing_mm = 1e-6;
-// A point may be so deep in bone without being inside: what a step's own linearity leaves, far below what a hand feels.
+// Depth in bone at which a point still counts as outside: the error of a linear step, far below what a hand feels.
 constexpr double kSkin_mm = 1e-4;
 constexpr double kNoise_mm = 1e-5;  // of distances in floats
-constexpr double kFlatField = 0.3;  // a gradient shorter than this says nothing: samples are clipped there
-// A drill's point holds on a slope up to this much force aside for each newton along its axis [A]: 17 degrees. Beyond
-// it skates, until most of its point is in bone.
+constexpr double kFlatField = 0.3;  // a shorter gradient means nothing: samples are clipped there
+// On a slope, a drill's point holds up to this much sideways force for each newton along its axis [A]: 17 degrees.
+// Beyond that it skates, until most of its point is in bone.
 constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
 constexpr double kSkiveSpeed_mm_per_s = 30.0;
 constexpr double kMostSkive_mm = 3.0;
-constexpr double kHand_n_per_mm = 20.0;  // by which a hand, and the other beside it, hold the point against that [A]
-// Play of a tool in its own hole, in insets: points that stand round it some millimetres apart let it go a little
-// farther between them.
+// Stiffness with which a hand, and the other beside it, hold the point against that. [A]
+constexpr double kHand_n_per_mm = 20.0;
+// Play of a tool in its own hole, in insets. Points that stand some millimetres apart around it permit a little more
+// between them.
 constexpr double kPlay = 1.5;
 constexpr std::int32_t kNoSweep = -1;
 constexpr double kDrawnOut_mm = 1.0;  // in a tick, of a tool that is locked in bone
@@ -41,7 +42,7 @@ bool is_real(const ToolModel& model, int i) noexcept {
   const int first = model.contact.first_passive();
   return i < first ? i < model.contact.active : i - first < model.contact.passive;
 }
-// Along its axis a tool is followed by walls that are no wider than what cuts; those that are wider meet bone.
+// Walls no wider than the cutting part follow a tool along its axis; wider walls meet bone.
 bool walls_meet_bone(const ToolModel& model) noexcept {
   return !model.axial || model.tool.shank_diameter_mm > model.tool.diameter_mm ||
          model.tool.kind == ToolKind::outside_reamer;
@@ -50,7 +51,7 @@ bool skives(ToolKind kind) noexcept {
   return kind == ToolKind::drill || kind == ToolKind::pin || kind == ToolKind::end_drill;
 }
 
-// Where a hole's axis goes when the tool in it has moved: two points of the axis, each with this much play across it.
+// The hole's axis after the tool in it has moved: two points of the axis, each with this much play across it.
 Pose with_play(const Pose& hole, const Pose& tool, double arm_mm, double play_mm) noexcept {
   const Vec3 axis = tool.direction(Vec3::UnitZ());
   const auto followed = [&](const Vec3& from, const Vec3& to) {
@@ -65,7 +66,7 @@ Pose with_play(const Pose& hole, const Pose& tool, double arm_mm, double play_mm
   return {tip, (Eigen::Quaterniond::FromTwoVectors(axis, along) * tool.rotation).normalized()};
 }
 
-// A group's points, taken out of the tool along their normals. Tool frame.
+// A group's points, moved out of the tool along their normals. Tool frame.
 void places_of(const ContactSet& set, int group, float lift_mm, Lanes (&p)[3]) noexcept {
   const auto from = static_cast<std::size_t>(group * kGroupPoints);
   for (std::size_t i = 0; i < kGroupPoints; ++i) {
@@ -202,7 +203,7 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
     evaluate_contact(tick.patch, set, query, values);
     values.covered &= covered;
   }
-  // What was cut since the patch was built is gone.
+  // Bone that was cut since the patch was built is gone.
   const float near_mm = static_cast<float>(0.75 * model.fine_pitch_mm);
   if (sweep_count_ > 0) see_sweeps(model, pose, *sight.sweeps);
   std::fill_n(sight.by.get(), groups * kGroupPoints, kNoSweep);
@@ -232,13 +233,14 @@ void Proxy::look(const Tick& tick, const Pose& pose, Against against, Sight& sig
 }
 
 void Proxy::see_scene(const Tick& tick, const Pose& pose, Against, Sight& sight) const noexcept {
-  constexpr float kWithin_mm = 0.25f;  // deeper than this the item was set where the tool already was: it is let out
+  // Deeper than this the item was placed where the tool already was: the tool is let out.
+  constexpr float kWithin_mm = 0.25f;
   const ToolModel& model = tick.model;
   ContactValues& values = sight.values;
   for (const PlacedGuide& item : tick.around.items) {
     if (!item.solid || (item.id != 0 && item.id == tick.around.guide)) continue;
     const Pose pose_item_tool = item.pose_bone_guide.inverse() * pose;
-    // Twice at most: first whether the tool is in it.
+    // At most twice: the first pass finds whether the tool is inside the item.
     for (const bool let_out : {true, false}) {
       bool within = false;
       for (int group = 0; group < model.contact.groups() && !within; ++group) {
@@ -276,7 +278,7 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
                            bool broken_only) noexcept {
   const ToolModel& model = tick.model;
   const int groups = model.contact.groups();
-  // How deep each may be: nowhere, or where it is already, a little on its way out.
+  // Permitted depth of each point: none, or its present depth, a little on its way out.
   const auto floor_mm = [&](int i) {
     const double now = static_cast<double>(here_.values.distance_mm[static_cast<std::size_t>(i)]);
     return now >= 0.0 ? 0.0 : now + std::min(-now, kSkin_mm);
@@ -296,7 +298,7 @@ void Proxy::add_conditions(const Tick& tick, const Sight& sight, const Pose& pos
         if (is_real(model, i) && asked(i)) see(i);
     }
   };
-  // Evenly over all of them where they are more than there is room for.
+  // Takes them evenly spaced where they are more than there is room for.
   constexpr int kMostAtOnce = Conditions::kMost / 4;
   int found = 0, seen = 0;
   visit([&](int) { ++found; });
@@ -352,8 +354,8 @@ Motion Proxy::allowed(const Tick& tick, const Motion& piece, Against against, co
     const Pose there = moved(pose_, motion);
     ++tries_;
     look(tick, there, against, there_);
-    // Not known there: the tool waits for its patch, at the edge of what is. A patch is about the tool, so a tool that
-    // did not go a part of the way would wait for ever.
+    // The patch does not reach there, so the tool waits for its patch, at the patch's edge. A patch is centred on the
+    // tool. So a tool that did not go part of the way would wait for ever.
     if (!there_.values.covered) {
       if (attempt == kMostHere) return {};
       motion = 0.5 * motion;
@@ -386,8 +388,8 @@ void Proxy::travel(const Tick& tick, const Pose& wanted, const Vec3* across, boo
     if (!move_too) left.move_mm.setZero();
     if (across) left.move_mm -= left.move_mm.dot(*across) * *across;
     if (norm_mm(left, limits.arm_mm) < kNothing_mm) return;
-    // First what is left of it once all that is near has had its say, so that what is pressed in does not slow what
-    // slides.
+    // First applies all conditions that are near, and takes what they leave of the motion. So what is pressed in does
+    // not slow what slides.
     bool held = false;
     conditions_->clear();
     add_conditions(tick, here_, pose_, Motion{}, 1.25 * tick.model.fine_pitch_mm, false);
@@ -410,8 +412,8 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
   query.direction_bone = direction;
   query.least_facing = model.least_facing;
   query.strength = &model.strength;
-  // From the inset point along the direction until a quarter pitch ahead of the face: never beyond the wall of the
-  // tool's own hole. Sides that cut though they hardly look ahead ask before their own face.
+  // Tests from the inset point along the direction to a quarter pitch ahead of the face. This is never beyond the wall
+  // of the tool's own hole. Sides that cut but hardly face forward are tested in front of their own face.
   const double ahead_mm = 0.25 * model.fine_pitch_mm;
   if (model.tool.kind == ToolKind::broach) {
     query.lift_mm = model.inset + ahead_mm;
@@ -449,7 +451,7 @@ Proxy::Engagement Proxy::engagement(const Tick& tick, const Vec3& direction) noe
         const ContactPoint& point = model.active[p];
         const double facing = point.outward.dot(toward);
         const Vec3 tool_mm = point.inset_mm + query.lift_mm * point.outward;
-        // Gone since the patch was built: it does not count.
+        // This bone is gone since the patch was built: it does not count.
         any = true;
         values.distance_mm[p] = left_mm;
         const double area = point.area_mm2 * facing, density = static_cast<double>(values.density_g_cm3[p]),
@@ -527,8 +529,8 @@ void Proxy::note_forces(const Tick& tick, const Engagement& now, const Vec3& dir
 }
 
 void Proxy::note_slope(const Tick& tick, const Vec3& direction, double thrust_n) noexcept {
-  // What bone is met pushes out along its own normal: where that is not against the feed, the point is pushed down the
-  // slope, as far as a hand lets it.
+  // Bone that is met pushes out along its own normal. Where that is not against the feed, it pushes the point down the
+  // slope, as far as a hand permits.
   const ContactSet& set = tick.model.contact;
   const ContactValues& values = ahead_.values;
   Vec3 out = Vec3::Zero();
@@ -561,12 +563,12 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
   double cut_mm = 0.0;
   for (int i = 0; i < kMostSubSteps && extension_mm > 0.0 && left_s > 0.0; ++i) {
     const Engagement now = engagement(tick, direction);
-    if (!now.covered) break;  // not known ahead: the tool waits for its patch
+    if (!now.covered) break;  // unknown ahead: the tool waits for its patch
     const bool engaged = now.sums.engaged_mm2 > 1e-3 * now.sums.area_mm2;
     double step_mm = 0.0;
     FeedSolution feed;
     if (!engaged) {
-      // A point that skates leaves the slope and meets it again: it has not come through anything.
+      // A point that skates leaves the slope and meets it again: it has not broken through.
       if ((report.cutting || cut_before_) && !skates_) {
         report.breakthrough = true;
         bitten_ = false;
@@ -584,7 +586,7 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       else if (skives(model.tool.kind))
         note_slope(tick, direction, tick.stiffness_n_per_mm * extension_mm);
       if (!tick.may_cut) break;
-      // As on steel: the coupling's stretch is the force, and no law is asked.
+      // As on steel: the coupling's extension is the force, and no law applies.
       if (now.metal) {
         report.on_metal = true;
         break;
@@ -594,15 +596,15 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
       const FeedSolution solution = solve_feed(law, tick.stiffness_n_per_mm, extension_mm, left_s);
       if (!(solution.feed_mm_per_s > 0.0)) break;
       feed = solution;
-      // Engagement is asked again before the face has moved half a pitch.
+      // Engagement is evaluated again before the face has moved half a pitch.
       step_mm = std::min(solution.feed_mm_per_s * left_s, 0.5 * model.fine_pitch_mm);
       left_s -= step_mm / solution.feed_mm_per_s;
       if (left_s < 1e-9) left_s = 0.0;
     }
-    // Walls and the scene block even where the cutting part goes on.
+    // Walls and the scene block even where the cutting part continues.
     bool blocked = false;
     if (walls || tick.scene) {
-      // The walls are seen already from the way here.
+      // The step to here has already evaluated the walls.
       if (!seen && tick.scene)
         look(tick, pose_, against, here_);
       else if (!seen)
@@ -640,7 +642,7 @@ bool Proxy::advance(const Tick& tick, const Vec3& direction, double distance_mm,
 void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexcept {
   const ToolModel& model = tick.model;
   if (model.feed == Feeding::along) {
-    // Across its axis it only blocks; along it, it feeds.
+    // Across its axis the tool only blocks; along it, it feeds.
     const Vec3 before = pose_.direction(Vec3::UnitZ());
     Pose beside = wanted;
     const double most_mm = kSkiveSpeed_mm_per_s * tick.dt_s;
@@ -667,9 +669,9 @@ void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexc
     }
     return;
   }
-  // What turns it, and of a blade what moves it across its flat, only goes as far as bone lets it. Its path takes what
-  // its faces reach, so here the faces themselves block, not the points a little within: else it would creep on through
-  // bone.
+  // Rotation, and the motion of a blade across its flat, goes only as far as bone permits. The path removes what the
+  // tool's faces reach. So here the faces themselves block, not the points a little within. Otherwise the tool would
+  // creep on through bone.
   if (!(tick.lift_mm > 0.0)) {
     tick.lift_mm = model.inset;
     look(tick, pose_, Against::all, here_);
@@ -690,7 +692,7 @@ void Proxy::cut_towards(Tick& tick, const Pose& wanted, ProxyStep& report) noexc
   const double distance_mm = away_mm.norm();
   const bool went = distance_mm > kNothing_mm && advance(tick, away_mm / distance_mm, distance_mm, report);
   if (report.cutting || report.breakthrough) return;
-  // It rubs: along the surface it goes where it is led.
+  // It rubs: it follows the surface.
   if (went) look(tick, pose_, Against::all, here_);
   travel(tick, wanted, nullptr, true, report);
 }
@@ -705,7 +707,7 @@ bool Proxy::bone_returned(const Tick& tick, const Pose& wanted, ProxyStep& repor
   locked_ |= deepest_mm <= -0.99 * kBandVoxels * pitch_mm;
   report.locked = locked_;
   if (!locked_) return false;
-  // Where it is deeper than the band nothing says which way is out; every tool comes out along its shank.
+  // Deeper than the band nothing says which way is out. Every tool comes out along its shank.
   const Vec3 axis = pose_.direction(Vec3::UnitZ());
   const double along_mm = (wanted.position_mm - pose_.position_mm).dot(axis);
   if (along_mm < 0.0) {
@@ -760,8 +762,8 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
   Tick tick{model, patch, around, stiffness_n_per_mm, spindle_rpm, false, dt_s};
   for (const PlacedGuide& item : around.items) tick.scene |= item.solid && !(item.id != 0 && item.id == around.guide);
 
-  // A tool that cuts wherever it is led is asked for by its faces. Where those are not deep, what is within them is
-  // neither.
+  // A tool that cuts in any direction is tested at its faces. Where those are not deep, what is within them is not deep
+  // either.
   const bool turns = may_cut && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
   tick.lift_mm = turns && model.feed != Feeding::along && !returned_ ? model.inset : 0.0;
   look(tick, pose_, Against::all, here_);
@@ -786,7 +788,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
     travel(tick, pose_bone_device, nullptr, true, report);
   }
   if (tick.may_cut)
-    update_sweep(model);  // else it would creep on through bone by what its points are inset, without turning
+    update_sweep(model);  // else it would creep on through bone by the points' inset, without turning
   cut_before_ = report.cutting && !report.breakthrough;
 
   note_pushed_back(report);

@@ -41,16 +41,16 @@ void Replica::add_own(const Cut& cut) {
   pending_.push_back({cut, predict(cut)});
 }
 
-void Replica::commit(RoomSeq place, const Cut& cut, bool own) {
-  // An answer that was given again: the bone has had this cut, and may have lost it to an undo since.
-  if (place <= room_seq_) return;
-  room_seq_ = place;
+void Replica::commit(RoomSeq seq, const Cut& cut, bool own) {
+  // A repeated answer: the bone has had this cut, and may have lost it to an undo since.
+  if (seq <= room_seq_) return;
+  room_seq_ = seq;
   for (auto& [id, held] : bodies_) held.committed.apply(cut);
   if (own) {
-    // The prediction holds it already: applying it again would change nothing.
+    // The prediction contains it already: applying it again would change nothing.
     const auto found = std::ranges::find(pending_, cut.author_seq, [](const Pending& p) { return p.cut.author_seq; });
     if (found != pending_.end()) {
-      if (again_) predict(cut);  // leaves that were set meanwhile do not
+      if (again_) predict(cut);  // leaves that were set since do not contain it
       pending_.erase(found);
       return;
     }
@@ -62,8 +62,8 @@ void Replica::fall(const Pending& pending) {
   for (const Coord origin : pending.changed) undone_.insert({pending.cut.level, origin});
 }
 
-bool Replica::reject(RoomSeq place, std::uint64_t author_seq) {
-  note(place);
+bool Replica::reject(RoomSeq seq, std::uint64_t author_seq) {
+  note(seq);
   ++rejected_;
   const auto found = std::ranges::find(pending_, author_seq, [](const Pending& p) { return p.cut.author_seq; });
   if (found == pending_.end()) return false;
@@ -102,15 +102,15 @@ void Replica::renew(RoomSeq contained, std::span<const BodyId> bodies, std::span
     }
   std::erase_if(pending_, [&](const Pending& pending) {
     if (pending.cut.author_seq > decided) return false;
-    fall(pending);  // what of it was taken is committed now, and comes back from there
+    fall(pending);  // what it removed is committed now, and is restored from there
     return true;
   });
 }
 
-void Replica::change(RoomSeq place, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
-  note(place);
+void Replica::change(RoomSeq seq, std::span<const BodyId> bodies, std::span<const FieldLeaf> leaves) {
+  note(seq);
   for (const BodyId id : bodies) {
-    again_ |= !bodies_.contains(id);  // what is pending is not in a new one
+    again_ |= !bodies_.contains(id);  // a new body does not contain the pending cuts
     body(id);
   }
   for (auto held = bodies_.begin(); held != bodies_.end();) {
@@ -142,7 +142,7 @@ void Replica::settle() {
   }
   undone_.clear();
   again_ = false;
-  // A pending cut may have found its bone gone already, by one that fell: now it is the one that takes it.
+  // A dropped cut may have removed the bone before this pending cut did. Now the pending cut removes it.
   for (Pending& pending : pending_) {
     ++cut_again_;
     const std::vector<Coord> changed = predict(pending.cut);
@@ -175,7 +175,7 @@ Digest Replica::hash() const {
 }
 
 double Replica::removed_mm3() const {
-  // A body lacks what was cut and what is in the others.
+  // Each body lacks what was cut and what is in the other bodies.
   double removed_mm3 = -static_cast<double>(bodies_.size() - 1) * bone_.volume_mm3();
   for (const CutField* field : bodies()) removed_mm3 += field->removed_mm3();
   return removed_mm3;

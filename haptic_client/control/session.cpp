@@ -33,12 +33,12 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
     if (result.order.take_up) {
       const DeviceLimits limits = device_.limits();
       const LoopParams& params = loop_.params();
-      // Bone mm for each mm of the handle at which even this device can show the coupling's whole stiffness.
+      // Bone mm for each mm of the handle at which this device can show the coupling's whole stiffness.
       const double stiff_enough = limits.stiffness_n_per_mm / (params.force_scale * params.stiffness_n_per_mm);
       const WorkspaceMapping mapping = Surgeon::mapping_for(step, limits.workspace_radius_mm, stiff_enough);
       const Pose pose_bone_tool{result.order.hand.target_mm, step.rotation};
       loop_.take_up(step.tool, pose_bone_tool, mapping);
-      // On a device that shows less than the physical force the whole hand is that much lighter.
+      // On a device that shows less than the physical force, the whole hand is scaled down by the same factor.
       const HandParams hand = scaled(Surgeon::hand_for(step.plan), params.force_scale, mapping.scale());
       device_.take(hand, mapping.pose_device_tool(pose_bone_tool).position_mm);
     }

@@ -1,5 +1,5 @@
-// How fast a force on the hand may grow that the hand does not cause. Lessening what there is comes at once: growth is
-// the way from the nearest part of it.
+// Limits the growth of a force on the hand that the hand does not cause. A decrease takes effect at once. Growth is the
+// distance from the nearest part of the present force.
 #pragma once
 #include <algorithm>
 
@@ -7,15 +7,16 @@
 
 namespace osteon::haptic {
 
-// What of `wanted` is growth from `now`; any unit, both in one frame.
+// The part of `wanted` that is growth from `now`; any unit, both in one frame.
 [[nodiscard]] inline Vec3 growth(const Vec3& wanted, const Vec3& now) noexcept {
   const double square = now.squaredNorm();
   return wanted - (square > 0.0 ? std::clamp(wanted.dot(now) / square, 0.0, 1.0) : 0.0) * now;
 }
 
-// Forces that each grow slowly may add up to one that does not, where one lessens at once that held another back: a
-// hand is led against bone, and the bone gives way. What `part_n` is to be so that the whole, `rest_n` besides it,
-// grows by no more than that from `before_n`; the whole is never larger by it than it would be, or was.
+// Forces that each grow slowly may have a sum that grows fast, when a force that held another back decreases at once.
+// Example: a hand is led against bone, and the bone gives way. Returns the value of `part_n` with which the whole,
+// including `rest_n`, grows by at most `most_n` from `before_n`. It never makes the whole larger than it would be, or
+// was.
 [[nodiscard]] inline Vec3 held_to(double most_n, const Vec3& part_n, const Vec3& rest_n,
                                   const Vec3& before_n) noexcept {
   const Vec3 grown_n = growth(rest_n + part_n, before_n);

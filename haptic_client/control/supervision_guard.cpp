@@ -4,10 +4,10 @@
 
 namespace osteon::haptic {
 
-HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq place, std::uint64_t lease_epoch,
+HapticRestrictions haptic_restrictions(const Restrictions& supervision, RoomSeq room_seq, std::uint64_t lease_epoch,
                                        std::span<const ToolModel> tools) {
   HapticRestrictions out;
-  out.room_seq = place;
+  out.room_seq = room_seq;
   out.lease_epoch = lease_epoch;
   out.stopped = supervision.stopped;
   out.taken_by = supervision.taken_by;

@@ -9,18 +9,18 @@ namespace osteon::haptic {
 namespace {
 
 constexpr double kStandOff_mm = 12.0;  // where a tool is taken up, above the surface
-constexpr double kNear_mm = 1.5;       // from here the surface is sought slowly
+constexpr double kNear_mm = 1.5;       // from here the surface is approached slowly
 constexpr double kCarrySpeed_mm_per_s = 25.0;
 constexpr double kSeekSpeed_mm_per_s = 4.0;
-constexpr double kBeyondGone_mm = 1.0;    // sought so far past the far side where there is no bone any more
-constexpr double kCorticalDensity = 1.1;  // g/cm³; what is denser counts as cortex in the means
+constexpr double kBeyondGone_mm = 1.0;    // search distance past the far side where the bone is already gone
+constexpr double kCorticalDensity = 1.1;  // g/cm³; denser bone counts as cortex in the means
 constexpr double kBurrTilt_rad = 30.0 * std::numbers::pi / 180.0;  // the pole of a burr does not cut
 constexpr double kPass_mm = 0.6;                                   // depth of a burr's pass
-constexpr double kFollows_s =
-    0.25;  // a hand is where it should be after some of its time constants, B/K of 0.04 to 0.07 s
-constexpr double kLastDwell_s = 1.0;  // and at the end it presses on until bone hardly gives way any more
-constexpr double kGrown_mm = 0.01;    // a tip that comes less deeper than this in such a time comes no deeper
-constexpr double kEnough = 0.9;       // part of the depth asked with which a window counts as done
+// After some of its time constants, B/K of 0.04 to 0.07 s, a hand has reached its target.
+constexpr double kFollows_s = 0.25;
+constexpr double kLastDwell_s = 1.0;  // and at the end the hand presses on until bone hardly yields any more
+constexpr double kGrown_mm = 0.01;    // a tip that gets deeper by less than this in such a time is at its depth
+constexpr double kEnough = 0.9;       // share of the wanted depth with which a window counts as done
 
 double depth_mm(const ReadyStep& step, const Vec3& tip_mm) { return (tip_mm - step.site.entry_mm).dot(step.site.axis); }
 
@@ -38,9 +38,10 @@ Result<EntrySite> find_site(const Case& bone, const PlanEntry& entry, const Entr
                  "entry is missing; give {\"toward\": [x, y, z]} or {\"point_mm\": [...], \"axis\": [...]}");
 }
 
-constexpr double kTremorArm_mm = 80.0;  // from the tip to where the hand holds the tool: a stray hand also tilts it
+// From the tip to where the hand holds the tool: a hand that strays also tilts it.
+constexpr double kTremorArm_mm = 80.0;
 
-// A slow wander and the 9 Hz of a trembling hand, together at most 1 in size.
+// A slow drift and the 9 Hz of a trembling hand, together at most 1 in size.
 struct Stray {
   double u = 0, v = 0;
 };
@@ -52,15 +53,14 @@ Stray stray(double time_s, double phase) {
   return {wave(phase + 0.8) / std::numbers::sqrt2, wave(phase + 2.5) / std::numbers::sqrt2};
 }
 
-// How far a rig goes: through the bone, or until the tool is as deep as it should be, however far the coupling
-// stretches on the way.
+// How far a rig goes: through the bone, or until the tool is at its depth, however far the coupling extends on the way.
 double feed_end_mm(const ReadyStep& step) {
   constexpr double kMostStretch_mm = 15.0;
   return step.plan.to_mm > 0.0 ? step.plan.to_mm + kMostStretch_mm : step.site.thickness_mm + step.plan.beyond_mm;
 }
 
-// The time that a phase may take. What moves by its own clock gets twice that and a margin; the rest, what waits for
-// bone or spindle, as long as any bone could ask for.
+// The time that a phase may take. Motion by its own clock gets twice its time and a margin. A phase that waits for bone
+// or spindle gets as long as any bone could need.
 double most_s(const ReadyStep& step, SurgeonPhase phase) {
   constexpr double kMargin_s = 10.0, kMostPush_s = 60.0;
   switch (phase) {
@@ -84,7 +84,7 @@ double most_s(const ReadyStep& step, SurgeonPhase phase) {
 void plan_sweep(const Case& bone, const Tool& tool, ReadyStep& step) {
   const EntrySite& site = step.site;
   const double radius = 0.5 * tool.diameter_mm;
-  // Tilted about v, so that the flank cuts; the sphere stays where it is.
+  // Tilted about v, so that the flank cuts; the sphere stays in place.
   const Eigen::Quaterniond upright = pose_along(Vec3::Zero(), site.axis).rotation;
   step.rotation = (Eigen::Quaterniond(Eigen::AngleAxisd(kBurrTilt_rad, site.across_v)) * upright).normalized();
   const Vec3 tip_from_centre = radius * (step.rotation * Vec3::UnitZ());
@@ -129,12 +129,12 @@ bool is_guide(ToolKind kind) {
   return kind == ToolKind::drill_sleeve || kind == ToolKind::distal_block || kind == ToolKind::four_in_one_block;
 }
 
-// Whether the tool is one for this action.
+// Whether the tool fits this action.
 Result<void> suits(const Tool& tool, Action action) {
   if (action == Action::place && !is_guide(tool.kind))
     return failure(ErrorCode::invalid_input,
                    sentence(tool, "is not a guide; choose a drill sleeve or a cutting block"));
-  // Saws are plunged: they go along their axis too.
+  // Saws plunge: they go along their axis too.
   const bool plunges = feeds_along_axis(tool.kind) || feeding(tool.kind) == Feeding::in_plane;
   if (action == Action::drill && (!plunges || tool.kind == ToolKind::screw))
     return failure(ErrorCode::invalid_input,
@@ -148,14 +148,14 @@ Result<void> suits(const Tool& tool, Action action) {
   return {};
 }
 
-// A guide with its face on the bone at a site, its z axis into the bone, x and y along the site's.
+// Places a guide with its face on the bone at a site, its z axis into the bone, x and y along the site's.
 PlacedGuide stand(const Tool& guide, const EntrySite& site, std::uint32_t id) {
   Eigen::Matrix3d axes;
   axes << site.across_u, site.across_v, site.axis;
   return placed_guide(id, guide, {site.entry_mm, Eigen::Quaterniond(axes).normalized()});
 }
 
-// The first hole of the guide that takes the tool.
+// The first hole of the guide that accepts the tool.
 const GuideBore* hole_for(const PlacedGuide& guide, const Tool& tool) {
   const std::size_t bores = guide.shape.bores.size(), holes = bores + guide.shape.pin_holes.size();
   for (std::size_t i = 0; i < holes; ++i)
@@ -177,7 +177,7 @@ Result<EntrySite> find_site_through(const Case& bone, const std::vector<PlacedGu
                       pose.direction(hole->direction));
 }
 
-// One step with its site found. `last`: the site of the step before, or null.
+// Prepares one step with its site. `last`: the site of the step before, or null.
 Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolFinder& find, const EntrySite* last,
                              ReadyPlan& ready) {
   ReadyStep step;
@@ -211,7 +211,7 @@ Result<ReadyStep> make_ready(const PlanStep& plan, const Case& bone, const ToolF
   step.rotation = pose_along(Vec3::Zero(), step.site.axis).rotation;
   step.item = *tool;
   if (plan.action == Action::screw) {
-    // Turned by a driver that follows the thread, one pitch in a turn, until the head is on the bone.
+    // A driver turns it and follows the thread, one pitch per turn, until the head is on the bone.
     step.plan.leave = true;
     step.plan.hand = HandKind::rig;
     step.plan.feed_mm_per_s = tool->thread_pitch_mm * step.spindle_rpm / 60.0;
@@ -267,7 +267,7 @@ Digest plan_digest(const ReadyPlan& plan) {
                                p.feed_mm_per_s, p.beyond_mm, p.to_mm, p.window_u_mm, p.window_v_mm, p.depth_mm,
                                p.sweep_mm_per_s, p.wear, p.tremor_mm, p.seconds})
       hasher.number(value);
-    // Plans of before it was there keep their digest.
+    // Plans without this value keep their digest.
     if (p.hand_across_n_per_mm > 0.0) hasher.text("across"), hasher.number(p.hand_across_n_per_mm);
     for (const Vec3& v : {step.site.entry_mm, step.site.axis})
       for (const double value : v) hasher.number(value);
@@ -278,18 +278,18 @@ Digest plan_digest(const ReadyPlan& plan) {
 const char* given_up_words(SurgeonPhase phase) {
   switch (phase) {
     case SurgeonPhase::take_up:
-      return "the bone round the tool was not known in time; look at the server's log";
+      return "the bone around the tool was not known in time; look at the server's log";
     case SurgeonPhase::spin_up:
       return "the spindle did not come up to its speed";
     case SurgeonPhase::seek:
-      return "the tool did not meet the bone; look whether something is in its way";
+      return "the tool did not meet the bone; check whether something is in its way";
     case SurgeonPhase::push:
       return "the bone did not give way; press harder (\"push_n\"), or take another tool or a sharper one";
     case SurgeonPhase::feed:
-      return "the tool did not come as deep as asked; feed it more slowly (\"feed_mm_per_s\"), or take a device that "
+      return "the tool did not reach the wanted depth; feed it more slowly (\"feed_mm_per_s\"), or take a device that "
              "shows more force";
     case SurgeonPhase::sweep:
-      return "the bur did not come as deep as asked; take a sharper one, or hold it more stiffly "
+      return "the bur did not reach the wanted depth; take a sharper one, or hold it more stiffly "
              "(\"hand_stiffness_n_per_mm\")";
     case SurgeonPhase::retract:
       return "the tool did not come out of the bone";
@@ -386,7 +386,7 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
     }
   }
   if (!step.feeds()) return;
-  // The cone has left the far surface where it was last engaged; from there on the tip only plunges.
+  // The cone has left the far surface where it was last engaged. From there on the tip only plunges.
   if (depth <= step.site.thickness_mm || phase_ == SurgeonPhase::retract) return;
   if (report.engaged > 0.0) {
     last_engaged_mm_ = depth;
@@ -409,14 +409,14 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
       } else {
         carry_to_depth(step, step.site.thickness_mm + kBeyondGone_mm, kSeekSpeed_mm_per_s, dt_s);
         if (force_n > 0.3) enter(SurgeonPhase::push);
-        // Nothing was met all the way: the hole is there already.
+        // Nothing was met on the whole way: the hole exists already.
         else if (depth > (to_mm > 0.0 ? to_mm : step.site.thickness_mm))
           enter(SurgeonPhase::retract);
       }
       break;
     case SurgeonPhase::feed:
-      // At its end the rig stays and presses on until the tool is there or the time is up: a device that cannot show
-      // all the force lets the tool fall behind by any way (slack).
+      // At its end the rig stays and presses on until the tool is at its depth or the time is over. On a device that
+      // cannot show all the force, the tool may fall behind by any distance (slack).
       if (const bool at_end = carry_to_depth(step, feed_end_mm(step), step.plan.feed_mm_per_s, dt_s);
           to_mm > 0.0 ? depth >= to_mm : at_end)
         finish_feed(step, report);
@@ -428,7 +428,7 @@ void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s
         finish_feed(step, report);
         break;
       }
-      // The lips are in the far cortex and the resistance has gone: the bone gives way.
+      // The lips are in the far cortex and the resistance is gone: the bone gives way.
       if (depth > step.site.thickness_mm && force_n < 0.5 * step.plan.push_n) {
         hand_.mode = HandMode::release;
         enter(SurgeonPhase::react);
@@ -576,7 +576,7 @@ SurgeonOrder Surgeon::act(const LoopReport& report, double dt_s) noexcept {
     finished = in_phase_s_ >= step.plan.seconds;
   } else if (phase_ == SurgeonPhase::take_up) {
     if (in_phase_s_ <= 1.5 * dt_s) {
-      // Above the first place that the tool goes to, along the axis of the site.
+      // Above the first position of the tool, along the axis of the site.
       const Vec3 first = step.sweep_mm.empty() ? step.site.entry_mm : step.sweep_mm.front();
       hand_ = {HandMode::carry, first - step.stand_off_mm * step.site.axis, step.site.axis};
       target_depth_mm_ = depth_mm(step, hand_.target_mm);

@@ -24,12 +24,12 @@ SweepView::SweepView(const Sweep& sweep, const Sweep* before, const Pose& pose_b
   };
   add(sweep.to);
   if (shape_->open_behind()) {
-    // The hole before it began is older: that tool may have stood elsewhere in its play.
+    // The hole before it began is older, and the tool may have had another position in its play then.
     const double along_mm = (sweep.from.position_mm - sweep.to.position_mm).dot(sweep.to.direction(Vec3::UnitZ()));
     began_mm_ = static_cast<float>(along_mm - shape_->behind_mm());
     return;
   }
-  // Where it began the sweep before ended; a short one leaves hardly more than its end does.
+  // The sweep before ended where this one began. A short sweep leaves hardly more than its end does.
   const double turned_mm = shape_->behind_mm() * sweep.from.rotation.angularDistance(sweep.to.rotation);
   if ((sweep.from.position_mm - sweep.to.position_mm).norm() + turned_mm < short_mm) return;
   add(sweep.middle);

@@ -13,7 +13,7 @@ namespace {
 
 bool is_saw(ToolKind kind) { return kind == ToolKind::oscillating_saw || kind == ToolKind::reciprocating_saw; }
 
-// Points so near each other that bone does not slip between them where it matters: about three pitches.
+// Number of points: so near each other that bone does not slip between them where it matters, about three pitches.
 int points_for(const Tool& tool, double pitch_mm) {
   constexpr int kFewest = 240, kMost = 800, kOfSaw = 320;
   if (tool.kind == ToolKind::drill) return kFewest;
@@ -23,7 +23,7 @@ int points_for(const Tool& tool, double pitch_mm) {
   return static_cast<int>(std::clamp(face_mm2 / (9.0 * pitch_mm * pitch_mm), double{kFewest}, double{kMost}));
 }
 
-// A saw's teeth are met at any place of their stroke: what touches is the box that they sweep, as in its cuts.
+// A saw's teeth may be at any position of their stroke. So the box that they sweep touches, as in its cuts.
 Tool at_stroke_ends(const Tool& tool) {
   Tool swept = tool;
   if (tool.kind == ToolKind::oscillating_saw) swept.width_mm += 2.0 * tool.pivot_mm * std::sin(0.5 * tool.swing_rad);
@@ -31,15 +31,15 @@ Tool at_stroke_ends(const Tool& tool) {
   return swept;
 }
 
-// Z edges over a ring of radius r and width dr are Z dr long, on an area of 2 pi r dr: so the cutting edge of a turned
-// tool is shared among its points by their area over their distance from the axis, of what goes along its axis by the
-// area as seen along it. All of the faces that look into the usual feed, wholly in bone, have the edge that LawTool
-// counts.
+// Z edges over a ring of radius r and width dr are Z dr long, on an area of 2 pi r dr. So each point of a turned tool
+// gets a share of the cutting edge by its area divided by its distance from the axis. For a tool that goes along its
+// axis, the area is as seen along it. All faces that point into the usual feed, wholly in bone, have the edge that
+// LawTool counts.
 void share_edge(const ToolModel& model, std::vector<ContactPoint>& active) {
   const Vec3 feed = model.axial ? Vec3::UnitZ() : Vec3::UnitX();
   double whole = 0.0;
   for (ContactPoint& point : active) {
-    // A point on the axis stands for a disc about it.
+    // A point on the axis represents a disc about it.
     const double arm_mm = std::max(point.axis_distance_mm, 0.5 * std::sqrt(point.area_mm2 / std::numbers::pi));
     if (arm_mm > 0.0) point.edge = point.area_mm2 / arm_mm * (model.axial ? point.outward.z() : 1.0);
     if (point.outward.dot(feed) >= model.least_facing) whole += point.edge;
@@ -47,9 +47,8 @@ void share_edge(const ToolModel& model, std::vector<ContactPoint>& active) {
   for (ContactPoint& point : active) point.edge *= whole > 0.0 ? model.law_tool.edge_length_mm / whole : 0.0;
 }
 
-// A saw's teeth as a row of points along its toothed edge over the whole stroke, each with so many of them as are there
-// on average: the blade comes to the ends of its stroke for a part of the time only. They stand for no area, which is
-// the faces'.
+// A saw's teeth as points along its toothed edge over the whole stroke. Each point has the mean number of teeth there,
+// because the blade reaches the ends of its stroke only part of the time. These points have no area; the faces have it.
 void add_teeth(const ToolModel& model, std::vector<ContactPoint>& active) {
   constexpr double kApart_mm = 0.5;
   const Tool& tool = model.tool;
@@ -143,12 +142,12 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
       law(&by) {
   inset = 0.5 * fine_pitch_mm + kQuantum_mm;
   law_tool = osteon::law_tool(tool);
-  // A broach's sides look forward by their taper only, and cut all the same.
+  // A broach's sides face forward by their taper only, but they cut.
   const bool sides_cut = tool.kind == ToolKind::broach;
   if (sides_cut) least_facing = 0.5 * std::sin(tool.taper_rad);
   for (const SamplePoint& p : points_of(tool, points > 0 ? points : points_for(tool, fine_pitch_mm))) {
     const double axis_mm = std::hypot(p.position_mm.x(), p.position_mm.y());
-    // A screw's thread presses into the wall of its hole, which is its core: it does not hold it back.
+    // A screw's thread presses into the wall of its hole, which is its core: it does not hold the screw back.
     if (tool.kind == ToolKind::screw && p.position_mm.z() > -tool.cutting_length_mm &&
         axis_mm > 0.5 * tool.core_diameter_mm + kQuantum_mm)
       continue;
@@ -162,12 +161,12 @@ ToolModel::ToolModel(const Tool& definition, double pitch_mm, double blunt, int 
     add_teeth(*this, active);
   else if (tool.kind != ToolKind::broach && tool.kind != ToolKind::mesh)
     share_edge(*this, active);
-  // The very point of what has one, which stands for no area: rings leave it out.
+  // The tip of a tool with a point. It has no area, and rings leave it out.
   if (point_height_mm(tool) > 0.0) active.push_back({Vec3::Zero(), {0, 0, -inset}, Vec3::UnitZ(), 0.0, 0.0});
   const MillingParams milling{.diameter_mm = tool.diameter_mm};
   contact = contact_set(active, passive, milling.pole_radius * 0.5 * tool.diameter_mm);
   OSTEON_CHECK(contact.groups() * kGroupPoints <= kMostContactPoints);
-  // Far out, where the arm is not held up by the pole's; resistance goes with one over it.
+  // Far out, where the pole does not limit the arm; resistance is proportional to one over the arm.
   constexpr double kFar_mm = 1e3;
   for (std::size_t i = 0; i < strength.size(); ++i)
     strength[i] =

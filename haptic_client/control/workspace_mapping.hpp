@@ -1,5 +1,6 @@
-// Where the tool is for a place of the device's handle: aligned with the view, scaled, re-anchored by the clutch, so
-// that a small device reaches a large bone. Device frame: x right, y up, z towards the user; bone frame: the patient's.
+// Maps the pose of the device's handle to the pose of the tool. The mapping is aligned with the view, scaled, and
+// re-anchored by the clutch, so that a small device reaches a large bone. Device frame: x right, y up, z towards the
+// user. Bone frame: the patient's.
 #pragma once
 #include "common/geometry/pose.hpp"
 
@@ -13,7 +14,7 @@ class WorkspaceMapping {
     scale_ = scale;
     anchor(device_mm, bone_mm);
   }
-  // From now on this place of the device is that place in the bone's frame: what letting go of the clutch does.
+  // From now on this position of the device is that position in the bone's frame. Releasing the clutch calls this.
   void anchor(const Vec3& device_mm, const Vec3& bone_mm) noexcept {
     device_mm_ = device_mm;
     bone_mm_ = bone_mm;
@@ -28,11 +29,11 @@ class WorkspaceMapping {
     return {device_mm_ + back * (pose_bone_tool.position_mm - bone_mm_) / scale_,
             (back * pose_bone_tool.rotation).normalized()};
   }
-  // Directions and forces; these are turned but not scaled.
+  // For directions and forces: these are rotated but not scaled.
   [[nodiscard]] Vec3 to_device(const Vec3& bone) const noexcept { return view_.conjugate() * bone; }
   [[nodiscard]] Vec3 to_bone(const Vec3& device) const noexcept { return view_ * device; }
   [[nodiscard]] double scale() const noexcept { return scale_; }
-  // What it is made of: align() with these gives the same mapping to the last bit.
+  // The parameters of the mapping: align() with these gives the same mapping to the last bit.
   [[nodiscard]] const Eigen::Quaterniond& view() const noexcept { return view_; }
   [[nodiscard]] const Vec3& device_mm() const noexcept { return device_mm_; }
   [[nodiscard]] const Vec3& bone_mm() const noexcept { return bone_mm_; }

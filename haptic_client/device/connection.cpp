@@ -38,7 +38,7 @@ void DeviceConnection::tell_advice() {
 }
 
 void DeviceConnection::keep() {
-  std::string told;  // why it could not be opened again, so that it is said once
+  std::string last_error;  // why it could not be reopened, so that the reason is reported once
   while (true) {
     {
       std::unique_lock lock(mutex_);
@@ -54,13 +54,13 @@ void DeviceConnection::keep() {
       connected_ = false;
       ++losses_;
       advice_.clear();
-      told.clear();
+      last_error.clear();
       notice_(DeviceEvent::lost, device_.name(), well.error().message);
     } else {
       const Result<void> opened = device_.open();
       if (!opened) {
-        if (opened.error().message != told && losses_ > 0)
-          notice_(DeviceEvent::advice, device_.name(), told = opened.error().message);
+        if (opened.error().message != last_error && losses_ > 0)
+          notice_(DeviceEvent::advice, device_.name(), last_error = opened.error().message);
         continue;
       }
       connected_ = true;

@@ -1,5 +1,6 @@
-// Keeps a device connected, on a thread of its own: opens it, tends it, closes it when it is lost and opens it again
-// when it is back. The haptic thread knows nothing of it: it reads the device, which is absent meanwhile.
+// Keeps a device connected, on a thread of its own. It opens and tends the device, closes it when it is lost, and opens
+// it again when it is back. The haptic thread does not take part: it reads the device, which is absent during that
+// time.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -14,7 +15,7 @@
 namespace osteon::haptic {
 
 enum class DeviceEvent : std::uint8_t { lost, back, advice, ready };
-// A sentence about a device, for a person. Called on the connection's thread.
+// Receives a sentence about a device, for a person. Called on the connection's thread.
 using DeviceNotice = std::function<void(DeviceEvent event, std::string_view device, const std::string& sentence)>;
 
 struct ConnectionPace {
@@ -26,12 +27,12 @@ class DeviceConnection {
  public:
   // The device must outlive the connection.
   DeviceConnection(HapticDevice& device, DeviceNotice notice, const ConnectionPace& pace = {});
-  ~DeviceConnection();  // stops: the device is closed then
+  ~DeviceConnection();  // stops the thread and closes the device
   DeviceConnection(const DeviceConnection&) = delete;
   DeviceConnection& operator=(const DeviceConnection&) = delete;
 
-  // Opens the device on the calling thread, so that its limits are known after, and keeps it from then on. Error: that
-  // of the device; nothing is kept then.
+  // Opens the device on the calling thread, so that its limits are known afterwards. Keeps it connected from then on.
+  // Error: that of the device; nothing is kept connected then.
   [[nodiscard]] Result<void> start();
   void stop() noexcept;
   [[nodiscard]] bool connected() const noexcept { return connected_; }
@@ -50,7 +51,7 @@ class DeviceConnection {
   bool stopping_ = false;
   std::atomic<bool> connected_{false};
   std::atomic<int> losses_{0};
-  std::string advice_;  // last told
+  std::string advice_;  // reported last
 };
 
 }  // namespace osteon::haptic

@@ -1,5 +1,5 @@
-// Between a device's own I/O thread and the haptic thread: readings one way, forces the other, neither ever waits.
-// A force whose writer falls silent ends by itself, and so does the trust in readings that no longer change.
+// Exchanges readings and forces between a device's own I/O thread and the haptic thread. Neither ever waits. A force
+// ends by itself when its writer stops writing. A reading that no longer changes becomes a fault.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -12,9 +12,9 @@ namespace osteon::haptic {
 class DeviceExchange {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  // Three ticks of the haptic thread: a frame of the device that comes after the third one missed shows no force.
+  // Three ticks of the haptic thread: a frame of the device that comes after the third missed tick shows no force.
   static constexpr std::chrono::milliseconds kForceHeld{3};
-  static constexpr int kReadsWithoutSample = 20;  // [A] then the device counts as silent
+  static constexpr int kReadsWithoutSample = 20;  // [A] after this number of reads the device counts as silent
 
   DeviceExchange() { go_absent(); }
 
@@ -24,7 +24,7 @@ class DeviceExchange {
     last_.sample = ++samples_;
     readings_.store(last_);
   }
-  // [as publish] From now on the reading is absent or fault, where it was.
+  // [as publish] From now on the reading is absent or fault, at its last pose.
   void go(DeviceStatus status) noexcept {
     last_.status = status;
     last_.buttons = 0;
@@ -32,15 +32,14 @@ class DeviceExchange {
     publish(last_);
   }
   void go_absent() noexcept { go(DeviceStatus::absent); }
-  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. What counts is
-  // when it was written, so a force also ends on time that this thread, having been late itself, sees for the first
-  // time.
+  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. The time of
+  // writing counts. So a force also ends on time when this thread was late and sees it for the first time.
   [[nodiscard]] DeviceOutput demanded(Time now) noexcept {
     if (outputs_.refresh()) any_written_ = true;
     const Written& last = outputs_.value();
     return any_written_ && now - last.at < kForceHeld ? last.output : DeviceOutput{};
   }
-  // [I/O or connection thread, while no I/O thread runs] Nothing that was written before counts any more.
+  // [I/O or connection thread, while no I/O thread runs] Discards everything that was written before.
   void forget_output() noexcept {
     outputs_.refresh();
     any_written_ = false;

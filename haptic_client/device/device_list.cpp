@@ -87,14 +87,14 @@ std::string all_names() {
   return names;
 }
 
-// `text`: one of the names that were joined in `whole`.
+// `text`: one of the names that are joined in `whole`.
 Made make_one(std::string_view text, std::string_view whole, const DeviceOptions& options) {
   const std::size_t colon = text.find(':');
   const std::string_view name = text.substr(0, colon);
   const std::string argument(colon == std::string_view::npos ? std::string_view{} : text.substr(colon + 1));
-  const std::string told = "--device " + std::string(whole) + ": ";
+  const std::string prefix = "--device " + std::string(whole) + ": ";
   if (name == "recorded" && text != whole)
-    return failure(ErrorCode::invalid_input, told + "a recording is played alone; name nothing beside it");
+    return failure(ErrorCode::invalid_input, prefix + "a recording is played alone; name no other device");
   for (const Kind& kind : kKinds) {
     if (kind.name != name) continue;
     if (kind.argument.empty() && colon != std::string_view::npos)
@@ -104,16 +104,16 @@ Made make_one(std::string_view text, std::string_view whole, const DeviceOptions
   }
   if (find_simulated_device(name))
     return failure(ErrorCode::invalid_input,
-                   told + std::string(name) + " has a hand of our own making; name it alone, with a --plan");
+                   prefix + std::string(name) + " has a simulated hand; name it alone, with a --plan");
   const std::string what = name.empty() ? "a name is missing" : "there is no device \"" + std::string(name) + '"';
-  return failure(ErrorCode::not_found, told + what + "; choose among " + all_names() + ", joined by \"+\"");
+  return failure(ErrorCode::not_found, prefix + what + "; choose among " + all_names() + ", joined by \"+\"");
 }
 
 }  // namespace
 
 Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, const DeviceOptions& options) {
   std::vector<std::unique_ptr<HapticDevice>> parts;
-  // A recording's path may hold any letter, so it stands alone.
+  // A recording's path may contain any character, so it stands alone.
   const std::string_view whole = names;
   const bool alone = names.starts_with("recorded:");
   while (true) {
@@ -130,7 +130,7 @@ Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, con
 std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
   std::vector<DeviceLine> lines;
   lines.push_back({"simulated",
-                   "a hand of our own making, as strong as the drilling of bone; needs a plan",
+                   "a simulated hand, strong enough for the drilling of bone; needs a plan",
                    {{"always there"}, ""}});
   lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
   for (const Kind& kind : kKinds) lines.push_back({kind.name, kind.what, kind.look(options)});

@@ -1,4 +1,4 @@
-// The devices that --device can name, what of them is on this machine, and how to put several together.
+// The devices that --device can name, which of them are on this machine, and how several are combined.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -9,15 +9,15 @@
 
 namespace osteon::haptic {
 
-// What the user gives beside a device's name.
+// Options besides a device's name.
 struct DeviceOptions {
-  std::filesystem::path libhd, libdhd;    // vendors' libraries; empty: where the dynamic linker finds them
-  std::filesystem::path falcon_firmware;  // the vendor's image; none is shipped
+  std::filesystem::path libhd, libdhd;    // vendors' libraries; empty: searched by the dynamic linker
+  std::filesystem::path falcon_firmware;  // the vendor's image; Osteon ships none
 };
 
-// `names`: one device for the hand, and what is to be added to it, joined by "+": "phantom", "falcon+spacemouse+pedal",
-// "phantom:NAME" (as in the vendor's setup), "force-dimension:1", "pedal-axis:z:inverted", "recorded:FILE". Nothing is
-// opened. Errors: not_found, invalid_input; each tells what may be named.
+// `names`: one device for the hand and what is added to it, joined by "+". Examples: "phantom",
+// "falcon+spacemouse+pedal", "phantom:NAME" (as in the vendor's setup), "force-dimension:1", "pedal-axis:z:inverted",
+// "recorded:FILE". Opens nothing. Errors: not_found, invalid_input; each lists the possible names.
 [[nodiscard]] Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names,
                                                                    const DeviceOptions& options);
 
@@ -25,7 +25,7 @@ struct DeviceLine {
   std::string_view name, what;
   DeviceFinding finding;
 };
-// Every kind of device, with what a look at this machine shows of it. May take seconds.
+// Every kind of device, with what was found of it on this machine. May take seconds.
 [[nodiscard]] std::vector<DeviceLine> look_for_devices(const DeviceOptions& options);
 
 }  // namespace osteon::haptic

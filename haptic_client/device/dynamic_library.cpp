@@ -13,7 +13,7 @@ Result<DynamicLibrary> DynamicLibrary::load(const LibraryWanted& wanted) {
     if (!std::filesystem::exists(wanted.file, ignored))
       return failure(ErrorCode::not_found, "there is no file " + wanted.file.string() + " to load " + wanted.what +
                                                " from; correct the path, or " + wanted.remedy);
-    // Without a slash the dynamic linker would look elsewhere.
+    // Without a slash the dynamic linker would search elsewhere.
     names.push_back(std::filesystem::absolute(wanted.file).string());
   } else {
     names.assign(wanted.names.begin(), wanted.names.end());
@@ -26,8 +26,8 @@ Result<DynamicLibrary> DynamicLibrary::load(const LibraryWanted& wanted) {
     if (library.handle_) return library;
     const char* why = ::dlerror();
     const std::string text = why ? why : "it cannot be loaded";
-    // "NAME: cannot open ..." is said of the library itself; of anything else it says that it is there and lacks
-    // something.
+    // The linker says "NAME: cannot open ..." when the library itself is missing. Any other text means that the library
+    // is present but something it needs is missing.
     const bool absent = text.starts_with(name + ": cannot open shared object file");
     if (!absent && wrong.empty()) wrong = text;
   }

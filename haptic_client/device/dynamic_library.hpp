@@ -1,4 +1,4 @@
-// A vendor's library that is loaded when it is needed and never unloaded: some of them cannot be loaded twice.
+// A vendor's library. It is loaded when it is needed and never unloaded: some of them cannot be loaded twice.
 #pragma once
 #include <filesystem>
 #include <map>
@@ -10,7 +10,7 @@
 
 namespace osteon::haptic {
 
-// How a library is looked for, and what to tell the user who does not have it.
+// How to search for a library, and the remedy for a user who does not have it.
 struct LibraryWanted {
   std::string what;                    // e.g. "OpenHaptics"
   std::filesystem::path file;          // given by the user; empty: `names` are tried in order
@@ -21,11 +21,11 @@ struct LibraryWanted {
 class DynamicLibrary {
  public:
   DynamicLibrary() = default;
-  // Errors: not_found (no such library), unsupported (it is there but is no library for this machine, or needs another
-  // one that is missing). Sentences with the remedy.
+  // Errors: not_found (no such library); unsupported (the file is no library for this machine, or needs a library that
+  // is missing). The errors are sentences with the remedy.
   [[nodiscard]] static Result<DynamicLibrary> load(const LibraryWanted& wanted);
 
-  // Sets `function` to a function of the library; false where the library has none of that name.
+  // Sets `function` to a function of the library; returns false if it has none of that name.
   template <class F>
   [[nodiscard]] bool find(const char* name, F*& function) const noexcept {
     function = reinterpret_cast<F*>(symbol(name));
@@ -46,13 +46,13 @@ struct VendorLibrary {
   Api call{};
 };
 
-// Loads it once for the process and keeps it. `bind(call, need)` asks for each function: need("its name", call.member).
-// Errors: those of DynamicLibrary::load; unsupported, it is another library: `is_not` says than which.
+// Loads the library once for the process. `bind(call, need)` requests each function: need("its name", call.member).
+// Errors: those of DynamicLibrary::load; unsupported (it is another library than the one named by `is_not`).
 template <class Api, class Bind>
 [[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryWanted& wanted, const std::string& is_not,
                                                             Bind bind) {
   static std::mutex mutex;
-  static std::map<std::filesystem::path, VendorLibrary<Api>> loaded;  // nodes stay where they are
+  static std::map<std::filesystem::path, VendorLibrary<Api>> loaded;  // nodes keep their addresses
   const std::lock_guard lock(mutex);
   if (const auto known = loaded.find(wanted.file); known != loaded.end()) return &known->second;
   Result<DynamicLibrary> library = DynamicLibrary::load(wanted);

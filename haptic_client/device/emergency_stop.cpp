@@ -26,11 +26,11 @@ void stop_all() noexcept {
 }
 
 void on_end(int number) {
-  // A motor that cannot be stopped must not keep the process: the alarm ends it.
+  // A motor that cannot be stopped must not keep the process alive: the alarm ends it.
   ::signal(SIGALRM, SIG_DFL);
   ::alarm(1);
   stop_all();
-  // SA_RESETHAND has put the default back.
+  // SA_RESETHAND has restored the default.
   ::raise(number);
 }
 
@@ -41,7 +41,7 @@ void install_once() {
     for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGQUIT, SIGHUP, SIGXCPU}) {
       struct sigaction before {};
       ::sigaction(number, nullptr, &before);
-      if (before.sa_handler != SIG_DFL) continue;  // another's: a sanitizer, a debugger
+      if (before.sa_handler != SIG_DFL) continue;  // another's handler: a sanitizer, a debugger
       struct sigaction action {};
       action.sa_handler = on_end;
       action.sa_flags = SA_RESETHAND | SA_NODEFER;

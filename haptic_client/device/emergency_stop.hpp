@@ -1,13 +1,13 @@
-// The last resort for motors: what stops them is called when the process ends in any way that it can notice: a normal
-// exit, a failed check, a crash, a hang-up. SIGINT and SIGTERM are orderly stops and not the concern of this file;
-// SIGKILL and a power cut cannot be noticed, against those stands the device's own watchdog.
+// The last resort to stop motors. The stop function is called when the process ends in any way that it can notice: a
+// normal exit, a failed check, a crash, a hang-up. SIGINT and SIGTERM are orderly stops and not handled here. SIGKILL
+// and a power cut cannot be noticed; the device's own watchdog protects against them.
 #pragma once
 
 namespace osteon::haptic {
 
 // While it lives, `stop(what)` is called once if the process ends. On a signal it runs in the handler, so it may only
-// do what ends the motors; whatever it does, the process is gone a second later. At most eight live at a time; more are
-// a broken promise.
+// do what stops the motors. In any case the process ends a second later. At most eight may live at a time; more are a
+// programming error.
 class EmergencyStop {
  public:
   using Stop = void (*)(void* what);

@@ -20,7 +20,7 @@ using Clock = std::chrono::steady_clock;
 
 // continuous_n [A]: see make_falcon().
 const DeviceLimits kLimits{.peak_n = 8.0, .continuous_n = 4.5, .stiffness_n_per_mm = 3.0, .workspace_radius_mm = 40.0};
-constexpr auto kRunsPatience = 200ms;     // for firmware that ran before
+constexpr auto kRunsPatience = 200ms;     // for firmware that is already running
 constexpr auto kStartsPatience = 2000ms;  // for firmware just loaded
 constexpr auto kFramePatience = 20ms, kSilencePatience = 300ms;
 constexpr std::uintmax_t kLargestImage = 256 * 1024;  // [A] several times the memory of its processor
@@ -100,28 +100,28 @@ class Falcon final : public HapticDevice {
   void run() {
     if (options_.priority > 0) (void)try_realtime(options_.priority);
     FalconCommand command{.homing = true, .lights = kFalconRed};
-    auto heard = Clock::now();
+    auto received_at = Clock::now();
     while (!stopping_) {
       const Result<std::optional<FalconState>> state = usb_->exchange(command, kFramePatience);
       const auto now = Clock::now();
       if (!state) return lose(state.error());
       if (!*state) {
-        // Whatever the device still shows, it shall stop.
+        // Stops any force that the device still shows.
         command.motors = {};
         exchange_.go(DeviceStatus::fault);
-        if (now - heard > kSilencePatience)
+        if (now - received_at > kSilencePatience)
           return lose(
               {ErrorCode::unavailable,
                "the Falcon has stopped answering; unplug it, switch its power off and on, and plug it in again"});
         continue;
       }
-      heard = now;
+      received_at = now;
       command = follow(**state, now);
     }
     (void)usb_->exchange({}, kFramePatience);  // without force, lights out
   }
 
-  // Tells the haptic thread what the device says and gives what the device is to do.
+  // Publishes the device's state to the haptic thread and returns the next command for the device.
   FalconCommand follow(const FalconState& state, Clock::time_point now) {
     const DeviceOutput wanted = exchange_.demanded(now);
     const bool homed = (state.homed & kFalconAllHomed) == kFalconAllHomed;

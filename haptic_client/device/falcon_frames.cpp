@@ -38,7 +38,7 @@ std::optional<FalconCounts> counts_of(const FalconFrame& frame) {
   return counts;
 }
 
-// (request, value) of an FTDI chip: 0 reset and purge, 1 modem lines, 2 flow control, 3 baud rate, 4 framing, 9
+// (request, value) of an FTDI chip. 0: reset and purge, 1: modem lines, 2: flow control, 3: baud rate, 4: framing, 9:
 // latency.
 constexpr FalconSetting kGreetingSettings[] = {{0, 1}, {0, 2},     {9, 16},    {3, 0x4138}, {4, 8},
                                                {2, 0}, {1, 0x200}, {1, 0x100}, {1, 0x101}};

@@ -23,14 +23,14 @@ constexpr std::array kLegs{rad(105.0), rad(-15.0), rad(-135.0)};
 constexpr double kAngleAtZero_rad = rad(35.0), kAngleOfCount_rad = rad(0.036435);
 constexpr double kMotorCountsPerNm = -1e4;
 
-// A leg in its own plane: its arm starts at (0, 0), the parallelogram's far end is at (across, up), and both are turned
-// by the arm's angle and `second`. `length` is the parallelogram as it is seen in the plane.
+// A leg in its own plane. Its arm starts at (0, 0), and the parallelogram's far end is at (across, up). Both are
+// rotated by the arm's angle and `second`. `length` is the parallelogram's length as seen in the plane.
 struct Leg {
   double across, up, length;
-  Vector3d d_across, d_length;  // by the grip's place; `up` is the grip's z
+  Vector3d d_across, d_length;  // by the grip's position; `up` is the grip's z
 };
 
-// Empty where the grip is further along the leg's tangent than the parallelogram is long.
+// Empty where the grip is further along the leg's tangent than the length of the parallelogram.
 std::optional<Leg> leg_at(int i, const Vector3d& p) {
   const double cos = std::cos(kLegs[i]), sin = std::sin(kLegs[i]);
   const double u = p.x() * cos + p.y() * sin - kR;
@@ -42,7 +42,7 @@ std::optional<Leg> leg_at(int i, const Vector3d& p) {
   return Leg{u + kC, p.z(), kD + kE + seen, Vector3d(cos, sin, 0.0), -lean / seen * Vector3d(-sin, cos, 0.0)};
 }
 
-// What is left of the closure L² = (across − a cos θ)² + (up − a sin θ)², and its derivatives.
+// The residual of the closure L² = (across − a cos θ)² + (up − a sin θ)², and its derivatives.
 struct Closure {
   double residual, by_angle;
   Vector3d by_place;
@@ -58,7 +58,7 @@ Closure closure(const Leg& leg, double angle) {
   return out;
 }
 
-// Below this, m², the arm and the parallelogram lie in one line, about half a degree.
+// Below this value, m², the arm and the parallelogram are in one line, within about half a degree.
 constexpr double kStretched_m2 = 1e-2 * 2.0 * kA * kB;
 
 }  // namespace
@@ -102,7 +102,7 @@ std::optional<Vector3d> falcon_place(const Vector3d& angles_rad, const Vector3d&
     if (far > kLongestStep_m) move *= kLongestStep_m / far;
     p += move;
     if (far < kDone_m) {
-      // Behind the device, or with a knee bent inwards, are solutions too, but no places of the grip.
+      // Solutions behind the device or with a knee bent inwards exist too, but the grip cannot be there.
       if (p.z() > 0.0 && knees_out) return p;
       return std::nullopt;
     }

@@ -25,7 +25,7 @@ constexpr std::size_t kPacket = 64;
 constexpr milliseconds kSettingPatience = 500ms, kAnswerPatience = 50ms, kEchoPatience = 1000ms,
                        kCancelPatience = 500ms;
 constexpr milliseconds kStopPatience = 100ms;
-constexpr int kFailuresInARow = 3;  // of transfers, then the device counts as lost
+constexpr int kFailuresInARow = 3;  // of transfers; then the device counts as lost
 constexpr const char* kReplug = "unplug it, switch its power off and on, and plug it in again";
 
 tl::unexpected<Error> unavailable(std::string message) { return failure(ErrorCode::unavailable, std::move(message)); }
@@ -70,7 +70,7 @@ std::string serial_of(libusb_device* device, libusb_device_handle* handle) {
                   : std::string();
 }
 
-// A transfer that is submitted again and again.
+// A transfer that is submitted repeatedly.
 struct Transfer {
   libusb_transfer* raw = nullptr;
   std::array<std::uint8_t, kPacket> bytes{};
@@ -110,9 +110,9 @@ int code_of(libusb_transfer_status status) {
 struct FalconUsb::Wire {
   libusb_context* context = nullptr;
   libusb_device_handle* handle = nullptr;
-  int node = -1;  // the device's file, libusb's own; -1: not known
+  int node = -1;  // the device's file, libusb's own; -1: unknown
   FalconFrame without_force = encode(FalconCommand{});
-  std::atomic<bool> stopped{false};  // no frame goes out any more
+  std::atomic<bool> stopped{false};  // no frame is sent any more
   Transfer out, in;
   FalconFrameReader reader;
   std::string serial;
@@ -141,7 +141,7 @@ struct FalconUsb::Wire {
     libusb_handle_events_timeout_completed(context, &wait, nullptr);
   }
 
-  // Of the files that libusb waits for, the one device's is the only one that it waits to write to.
+  // libusb waits for several files. The device's file is the only one that it waits to write to.
   void find_node() {
     const libusb_pollfd** files = libusb_get_pollfds(context);
     for (const libusb_pollfd** file = files; file != nullptr && *file != nullptr; ++file)
@@ -149,7 +149,7 @@ struct FalconUsb::Wire {
     libusb_free_pollfds(files);
   }
 
-  // No transfer may be under way when its memory goes.
+  // No transfer may be under way when its memory is freed.
   void cancel() {
     for (Transfer* transfer : {&out, &in})
       if (transfer->pending) libusb_cancel_transfer(transfer->raw);
@@ -178,7 +178,7 @@ struct FalconUsb::Wire {
     return {};
   }
 
-  // Up to `most` bytes of data within `patience`; fewer when it says no more.
+  // Up to `most` bytes of data within `patience`; fewer when the device sends no more.
   Result<std::size_t> receive(std::span<std::uint8_t> into, milliseconds patience) {
     const auto deadline = Clock::now() + patience;
     std::size_t have = 0;
@@ -198,7 +198,8 @@ struct FalconUsb::Wire {
     return have;
   }
 
-  // A failed transfer now and then is the cable's; several without a frame in between, or the device gone, are told.
+  // An occasional failed transfer is the cable's fault. Several without a frame in between, or a disconnected device,
+  // are reported.
   Result<void> check(const std::string& doing, int code) {
     if (code == 0) return {};
     if (code == LIBUSB_ERROR_PIPE) {
@@ -217,9 +218,9 @@ FalconUsb::~FalconUsb() = default;
 
 const std::string& FalconUsb::serial() const noexcept { return wire_->serial; }
 
-// Past libusb, whose locks the thread that has crashed may hold: the kernel's own synchronous transfer is one system
-// call, which a handler may make, and queues behind what is under way. A frame that the I/O thread is just submitting
-// may come between the flag and the first transfer; the second is behind that too.
+// Bypasses libusb, whose locks the crashed thread may hold. The kernel's own synchronous transfer is one system call,
+// which a handler may make. It queues behind transfers under way. The I/O thread may be submitting a frame between the
+// flag and the first transfer; the second transfer comes after that frame too.
 void FalconUsb::stop_motors() noexcept {
   Wire& wire = *wire_;
   wire.stopped = true;
@@ -292,37 +293,37 @@ Result<bool> FalconUsb::runs(milliseconds patience) {
   wire_->reader.reset();
   const auto deadline = Clock::now() + patience;
   do {
-    // Without force or homing: a frame that firmware of any state may take.
-    const Result<std::optional<FalconState>> heard = exchange({}, kAnswerPatience);
-    if (!heard) return tl::unexpected(heard.error());
-    if (heard->has_value()) return true;
+    // Without force or homing: a frame that firmware in any state may receive.
+    const Result<std::optional<FalconState>> state = exchange({}, kAnswerPatience);
+    if (!state) return tl::unexpected(state.error());
+    if (state->has_value()) return true;
   } while (Clock::now() < deadline);
   return false;
 }
 
 Result<void> FalconUsb::load(std::span<const std::uint8_t> image) {
   Wire& wire = *wire_;
-  wire.cancel();  // the answer to a frame that no firmware heard
+  wire.cancel();  // the answer to a frame that no firmware has received
   if (Result<void> set = wire.set(falcon_greeting_settings()); !set) return set;
   bool greeted = false;
   for (int i = 0; i < kFalconGreetings && !greeted; ++i) {
     if (Result<void> sent = wire.send(kFalconGreeting); !sent) return sent;
-    // Some systems give a zero byte before the answer.
+    // Some systems send a zero byte before the answer.
     std::array<std::uint8_t, kFalconGreetingAnswer.size() + 1> answer{};
     const Result<std::size_t> size = wire.receive(answer, kAnswerPatience);
     if (!size) return tl::unexpected(size.error());
-    const auto heard = std::span(answer).first(*size);
-    const auto said = heard.subspan(!heard.empty() && heard[0] == 0 ? 1 : 0);
-    greeted = std::equal(said.begin(), said.end(), kFalconGreetingAnswer.begin(), kFalconGreetingAnswer.end());
+    const auto bytes = std::span(answer).first(*size);
+    const auto reply = bytes.subspan(!bytes.empty() && bytes[0] == 0 ? 1 : 0);
+    greeted = std::equal(reply.begin(), reply.end(), kFalconGreetingAnswer.begin(), kFalconGreetingAnswer.end());
   }
   if (!greeted) return unavailable(std::string("the Falcon's boot loader does not answer; ") + kReplug);
 
   if (Result<void> set = wire.set(falcon_loading_settings()); !set) return set;
   if (Result<void> sent = wire.send(std::span(&kFalconReady, 1)); !sent) return sent;
   std::uint8_t ready = 0;
-  const Result<std::size_t> heard = wire.receive(std::span(&ready, 1), kEchoPatience);
-  if (!heard) return tl::unexpected(heard.error());
-  if (*heard != 1 || ready != kFalconReady)
+  const Result<std::size_t> echoed = wire.receive(std::span(&ready, 1), kEchoPatience);
+  if (!echoed) return tl::unexpected(echoed.error());
+  if (*echoed != 1 || ready != kFalconReady)
     return unavailable(std::string("the Falcon is not ready for its firmware; ") + kReplug);
 
   for (std::size_t at = 0; at < image.size(); at += kFalconPiece) {

@@ -1,5 +1,5 @@
-// Novint Falcon: its wire, by libusb. Everything here blocks, within its stated patience, and belongs to one thread at
-// a time: the connection's until the device runs, then the device's I/O thread.
+// Novint Falcon: its USB transfer, by libusb. Every function blocks, at most for its stated time. Only one thread at a
+// time may use an object: the connection's thread until the device runs, then the device's I/O thread.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -16,8 +16,8 @@ namespace osteon::haptic {
 
 class FalconUsb {
  public:
-  // The first Falcon on this machine that no other program has. Errors: not_found, unavailable (in use, no permission),
-  // internal.
+  // Opens the first Falcon on this machine that no other program uses. Errors: not_found, unavailable (in use, no
+  // permission), internal.
   [[nodiscard]] static Result<FalconUsb> open();
   [[nodiscard]] static DeviceFinding look();
   FalconUsb(FalconUsb&&) noexcept;
@@ -26,19 +26,19 @@ class FalconUsb {
 
   [[nodiscard]] const std::string& serial() const noexcept;
 
-  // Sets the wire for frames; true when firmware runs and answers one within `patience`. Error: unavailable.
+  // Sets up the connection for frames. True: firmware runs and answers one frame within `patience`. Error: unavailable.
   [[nodiscard]] Result<bool> runs(std::chrono::milliseconds patience);
-  // Hands the boot loader an image; runs() tells whether it works. Errors: unavailable (no answer, or it went away),
-  // unsupported (the device did not take the image as it is).
+  // Sends an image to the boot loader; runs() says whether it works. Errors: unavailable (no answer, or the device was
+  // disconnected), unsupported (the device did not accept the image as it is).
   [[nodiscard]] Result<void> load(std::span<const std::uint8_t> image);
 
-  // One frame out and the newest one back; empty when there was none within `patience`. Error: unavailable (it went
-  // away or fails again and again).
+  // Sends one frame and returns the newest received one; empty when there was none within `patience`. Error:
+  // unavailable (the device was disconnected or fails repeatedly).
   [[nodiscard]] Result<std::optional<FalconState>> exchange(const FalconCommand& command,
                                                             std::chrono::milliseconds patience);
 
-  // The last of all, for a process that ends: sends a frame without force, and after it none goes out. Any thread, also
-  // in a signal's handler, whatever the other calls are doing.
+  // The last call, for a process that ends: sends a frame without force; after it none is sent. Any thread, even in a
+  // signal handler, whatever the other calls are doing.
   void stop_motors() noexcept;
 
  private:

@@ -19,12 +19,12 @@ constexpr std::uint16_t kSwitchVendor = 0x05f3, kSwitchModel = 0x00ff;
 constexpr std::uint16_t kDesktop = 1, kSimulation = 2, kJoystick = 4;
 constexpr std::size_t kSwitchReport = 2;
 constexpr std::uint8_t kSwitches = 7;
-constexpr auto kPause = 5ms;  // the haptic thread wants to hear from the device more often than it reports
+constexpr auto kPause = 5ms;  // the haptic thread needs readings more often than the device reports
 struct Axis {
   std::string_view name;
   HidUsage usage;
 };
-// As pedals are wired.
+// The usages of common pedals.
 constexpr std::array<Axis, 10> kAxes{{{"accelerator", {kSimulation, 0xc4}},
                                       {"brake", {kSimulation, 0xc5}},
                                       {"throttle", {kSimulation, 0xbb}},
@@ -105,13 +105,13 @@ class FootPedal final : public HapticDevice {
   Result<void> tend() override { return reader_.health(); }
   [[nodiscard]] std::string advice() const override {
     if (armed_) return "";
-    if (!elsewhere_) return "let the foot pedal go once; until then it turns nothing";
+    if (!elsewhere_) return "release the foot pedal once; until then the spindle does not turn";
     return std::string(
-               "the foot pedal was down when it was first heard of and turns nothing; if nobody pressed it, it rests "
+               "the foot pedal was down at its first reading, so the spindle does not turn; if nobody pressed it, it rests "
                "at "
                "the other end of its axis: ") +
            (options_.axis.inverted ? "leave out \"inverted\"" : "name it pedal-axis:inverted") +
-           "; else let it go and plug it in again";
+           "; else release it and plug it in again";
   }
 
   DeviceReading read() noexcept override { return exchange_.read(); }
@@ -146,7 +146,7 @@ class FootPedal final : public HapticDevice {
                    .pedals = true,
                    .force_axes = 0};
   DeviceExchange exchange_;
-  HidReader reader_;  // last: its thread ends before what it uses
+  HidReader reader_;  // last: its thread ends before the members that it uses
 };
 
 }  // namespace

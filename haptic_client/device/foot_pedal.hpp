@@ -1,4 +1,4 @@
-// Foot pedals for the spindle by hidapi: a switch, or the axis of a joystick as a proportional one.
+// Foot pedals for the spindle by hidapi: a switch, or a joystick's axis as a proportional pedal.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -11,19 +11,21 @@
 
 namespace osteon::haptic {
 
-// Which of a three-pedal switch are down: bits 1 left, 2 middle, 4 right. Empty when it is no report of one.
+// Which pedals of a three-pedal switch are down: bits 1 left, 2 middle, 4 right. Empty when it is no report of such a
+// switch.
 [[nodiscard]] std::optional<std::uint8_t> take_pedal_report(std::span<const std::uint8_t> report) noexcept;
 
 struct PedalAxisParams {
-  bool inverted = false;  // rests at the axis' upper end
-  double play = 0.05;     // [A] of the way at either end that counts as the end
-  double near = 0.25;     // [A] of the way from its rest within which a pedal that nobody presses is first heard of
+  bool inverted = false;  // the pedal's rest is the axis' upper end
+  double play = 0.05;     // [A] share of the range at either end that counts as the end
+  // [A] share of the range from its rest within which the first reading of an unpressed pedal must lie.
+  double near = 0.25;
 };
 
-// A pedal's way from its rest to down. It gives nothing until it was seen at rest, so that a foot never starts a
-// spindle just by being there when the device is plugged in. One that is first heard of far from its rest gives nothing
-// at all: a stick that rests in the middle, or a pedal that rests at the other end, would be at rest when it is pressed
-// and turn the spindle when it is let go.
+// The travel of a pedal from its rest to fully down. Its value is zero until the pedal was seen at rest. So a foot that
+// is on the pedal when the device is plugged in never starts a spindle. A pedal whose first reading is far from its
+// rest stays at zero. Examples are a stick that rests in the middle, or a pedal that rests at the other end. These
+// would be at rest when pressed, and would turn the spindle when released.
 class PedalAxis {
  public:
   explicit PedalAxis(const PedalAxisParams& params = {}) : params_(params) {}
@@ -31,9 +33,8 @@ class PedalAxis {
   void forget() noexcept { rest_ = Rest::unknown, armed_ = false, value_ = 0.0; }
   [[nodiscard]] double value() const noexcept { return value_; }  // 0 … 1
   [[nodiscard]] bool armed() const noexcept { return armed_; }
-  [[nodiscard]] bool elsewhere() const noexcept {
-    return rest_ == Rest::elsewhere;
-  }  // first heard of far from its rest
+  // The first reading was far from its rest.
+  [[nodiscard]] bool elsewhere() const noexcept { return rest_ == Rest::elsewhere; }
 
  private:
   enum class Rest : std::uint8_t { unknown, here, elsewhere };
@@ -46,20 +47,20 @@ class PedalAxis {
 
 struct FootPedalOptions {
   bool proportional = false;
-  std::uint8_t switches = 7;  // which pedals of the switch turn the spindle: bits as of take_pedal_report()
+  std::uint8_t switches = 7;  // which pedals of the switch drive the spindle: bits as of take_pedal_report()
   PedalAxisParams axis = {};
-  std::optional<HidUsage> axis_usage = {};  // empty: the first of those that a pedal has
+  std::optional<HidUsage> axis_usage = {};  // empty: the first usage that a pedal can have
 };
 
-// What follows "pedal:" on the command line: left, middle or right; and "pedal-axis:", joined by colons: inverted, and
-// an axis by its name (accelerator, brake, throttle, slider, x, y, z, rx, ry, rz) or usage of the generic desktop page,
-// e.g. 0x32. Error invalid_input: what may be said.
+// The text after "pedal:" on the command line: left, middle or right. The text after "pedal-axis:", joined by colons:
+// inverted, and an axis. The axis is given by its name (accelerator, brake, throttle, slider, x, y, z, rx, ry, rz) or
+// by its usage of the generic desktop page, e.g. 0x32. Error invalid_input: lists the permitted values.
 [[nodiscard]] Result<FootPedalOptions> read_pedal_switch(std::string_view argument);
 [[nodiscard]] Result<FootPedalOptions> read_pedal_axis(std::string_view argument);
 
-// As a device it only reads a spindle: no place, no force.
+// As a device it reads only a spindle: no position, no force.
 [[nodiscard]] std::unique_ptr<HapticDevice> make_foot_pedal(const FootPedalOptions& options = {});
-// Of one kind: switches, or joysticks whose axis could be a pedal.
+// Looks for one kind: switches, or joysticks whose axis could be a pedal.
 [[nodiscard]] DeviceFinding look_for_foot_pedals(bool proportional = false);
 
 }  // namespace osteon::haptic

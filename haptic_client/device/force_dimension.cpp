@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// libdrd holds all of libdhd too.
+// libdrd includes all of libdhd.
 constexpr const char* kNames[] = {"libdhd.so", "libdhd.so.3", "libdrd.so", "libdrd.so.3"};
 constexpr const char* kRemedy = "install the vendor's Force Dimension SDK, or name the library with --libdhd";
 constexpr int kBadCyclesToLose = 20;  // [A]
@@ -50,8 +50,8 @@ Result<const Library*> load(const std::filesystem::path& file) {
                                "a Force Dimension library of version 3", bind);
 }
 
-// The library does not tell a device's limits; these are the vendor's figures for its kinds, as published programs use
-// them. What a kind can hold for long is not published: a third of its peak. [A]
+// The library does not report a device's limits. These are the vendor's figures for its kinds, as published programs
+// use them. The continuous force of a kind is not published: a third of its peak is assumed. [A]
 std::optional<DeviceLimits> limits_of(int type) {
   DeviceLimits limits;
   switch (type) {
@@ -175,7 +175,7 @@ class ForceDimension final : public HapticDevice {
     advice_ = calibrated ? ""
                          : "move the device's handle gently to all ends of its range until its light stops blinking, "
                            "or run the vendor's HapticInit";
-    // Motors are on once the device knows where it is.
+    // Motors are enabled once the device knows its position.
     if (calibrated && !force_on_) {
       if (call_->enable_force(1, id_) < 0)
         return failure(ErrorCode::unavailable,
@@ -209,19 +209,19 @@ class ForceDimension final : public HapticDevice {
   }
 
   [[nodiscard]] bool look_calibrated() const noexcept {
-    std::array<int, 2 * dhd::kMostStatus> status{};  // newer libraries may say more
+    std::array<int, 2 * dhd::kMostStatus> status{};  // newer libraries may write more
     return call_->status(status.data(), id_) >= 0 && status[dhd::kReset] == 1;
   }
 
   void cycle_thread() {
     TickStats stats;
     const bool paced = options_.period.count() > 0;
-    if (paced) try_realtime(kPriority);  // one that never sleeps would take the core for itself
+    if (paced) try_realtime(kPriority);  // a thread that never sleeps would occupy the core
     PeriodicTimer timer(paced ? std::chrono::nanoseconds(options_.period) : 1ms);
     int bad = 0;
     for (std::uint64_t cycle = 0; !stopping_; ++cycle) {
       if (paced) timer.wait(stats);
-      // What is slow to change is asked for ten times a second.
+      // Slowly changing values are read ten times a second.
       if (cycle % 100 == 99) calibrated_ = look_calibrated();
       if (exchange_once()) {
         bad = 0;
@@ -233,7 +233,7 @@ class ForceDimension final : public HapticDevice {
     }
   }
 
-  // One reading and one force; false when the device did not take part.
+  // Exchanges one reading and one force; returns false when the device did not take part.
   bool exchange_once() noexcept {
     DeviceReading reading = last_;
     double x = 0, y = 0, z = 0;
@@ -245,8 +245,8 @@ class ForceDimension final : public HapticDevice {
     const Vec3 place(x, y, z);
     bool good = got >= 0 && place.allFinite() && axes.allFinite() && std::abs(axes.determinant() - 1.0) < 0.05;
     if (good) {
-      // The handle's −x is taken for where its tip is, its frame the device's where it points away. (Unverified on a
-      // device.)
+      // The handle's −x is assumed to point to its tip. Its frame is assumed to be the device's when it points away.
+      // (Unverified on a device.)
       Eigen::Matrix3d ours;
       for (int column = 0; column < 3; ++column)
         ours.col(column) = from_force_dimension(axes * to_force_dimension(Vec3::Unit(column)));
@@ -255,14 +255,14 @@ class ForceDimension final : public HapticDevice {
       const unsigned buttons = call_->button_mask(id_);
       reading.buttons = (buttons & 1 ? kSpindlePedal : 0u) | (buttons & 2 ? kClutchButton : 0u);
     }
-    // Ready once its motors are on, so that no force waits for them.
+    // Ready once its motors are enabled, so that no force waits for them.
     const bool calibrated = calibrated_ && force_on_;
     DeviceOutput output;
     if (good && calibrated) output = exchange_.demanded(std::chrono::steady_clock::now());
     if (!output.force_n.allFinite() || !output.torque_nmm.allFinite()) output = {};
     const Vec3 force = to_force_dimension(clamped(output.force_n, limits_.peak_n));
     const Vec3 torque = 1e-3 * to_force_dimension(clamped(output.torque_nmm, limits_.peak_nmm));
-    // A positive answer tells that a motor is at its limit, or that the library waited: both are as they should be.
+    // A positive answer says that a motor is at its limit, or that the library waited: both are normal.
     good &= call_->set_force_and_torque(force.x(), force.y(), force.z(), torque.x(), torque.y(), torque.z(), id_) >= 0;
     reading.status = good ? DeviceStatus::ok : DeviceStatus::fault;
     if (!good) reading.buttons = 0;
@@ -278,7 +278,7 @@ class ForceDimension final : public HapticDevice {
   };
 
   ForceDimensionOptions options_;
-  // Connection thread; its own thread only reads them.
+  // Connection thread; the device's own thread only reads them.
   const dhd::Api* call_ = nullptr;
   char id_ = -1;
   bool open_ = false;
@@ -288,11 +288,11 @@ class ForceDimension final : public HapticDevice {
   Stop stop_{};
   std::optional<EmergencyStop> emergency_;
   std::thread thread_;
-  // Both.
+  // Both threads.
   std::atomic<bool> stopping_{false}, lost_{false}, calibrated_{false}, force_on_{false};
   std::atomic<int> error_{0};
   DeviceExchange exchange_;
-  // Its own thread.
+  // The device's own thread.
   DeviceReading last_;
 };
 

@@ -1,5 +1,5 @@
 // Force Dimension's devices (omega, sigma, delta) through the vendor's libdhd, loaded at run time. The library's calls
-// wait for the device, so a thread of its own makes them; the haptic thread meets it in a DeviceExchange only.
+// wait for the device, so a separate thread makes them. It shares only a DeviceExchange with the haptic thread.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -10,19 +10,20 @@
 namespace osteon::haptic {
 
 struct ForceDimensionOptions {
-  std::filesystem::path library;           // empty: libdhd.so where the dynamic linker finds it
-  int number = 0;                          // of the devices that are connected
+  std::filesystem::path library;           // empty: libdhd.so, searched by the dynamic linker
+  int number = 0;                          // among the connected devices
   std::chrono::microseconds period{1000};  // of its thread; 0: as fast as the device answers
 };
 
 [[nodiscard]] std::unique_ptr<HapticDevice> make_force_dimension(const ForceDimensionOptions& options);
-// Opens each device that is free for a moment, without its motors.
+// Opens each free device for a moment, without its motors.
 [[nodiscard]] DeviceFinding look_for_force_dimension(const ForceDimensionOptions& options);
 
 // The sentence for an error of the library, with the remedy.
 [[nodiscard]] Error force_dimension_error(int code, const char* vendors_text);
 
-// Device coordinates of the vendor (x to the user, y right, z up) in ours; also forces and torques, in any unit.
+// Converts the vendor's device coordinates (x to the user, y right, z up) to ours. Also for forces and torques, in any
+// unit.
 [[nodiscard]] inline Vec3 from_force_dimension(const Vec3& v) { return {v.y(), v.z(), v.x()}; }
 [[nodiscard]] inline Vec3 to_force_dimension(const Vec3& v) { return {v.z(), v.x(), v.y()}; }
 

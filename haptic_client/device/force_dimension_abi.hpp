@@ -1,12 +1,12 @@
-// The part of Force Dimension's libdhd that is used, declared anew from published uses of its C API (3.x). Lengths are
-// metres, torques newton-metres; the device's x points to the user, y to the right, z up. Nothing here was tried on a
-// device; what rests on other programs' use alone is marked unverified where it is used.
+// The used part of Force Dimension's libdhd, declared anew from published uses of its C API (3.x). Lengths are metres,
+// torques newton-metres; the device's x points to the user, y to the right, z up. Nothing here was tested on a device.
+// Facts that only other programs' use supports are marked unverified where they are used.
 #pragma once
 
 namespace osteon::haptic::dhd {
 
 inline constexpr int kMostStatus = 16;
-// Places in the status.
+// Indices in the status.
 inline constexpr int kPower = 0, kConnected = 1, kReset = 3, kErrorStatus = 9;
 // System types.
 inline constexpr int kOmega = 32, kOmega3 = 33, kOmega6 = 34, kOmega7 = 35, kOmega6Left = 36, kOmega7Left = 37,

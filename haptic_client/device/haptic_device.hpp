@@ -1,12 +1,14 @@
-// What the loop needs of any device that a hand holds: where the hand is, what it presses, and force to show it.
-// Device frame: x right, y up, z to the user; millimetres, newtons, newton-millimetres. A handle's own frame is a
-// tool's: its tip at the origin, +z out of the tip.
+// The interface of any device that a hand holds: it gives the hand's pose and buttons, and shows force. Device frame: x
+// right, y up, z to the user; millimetres, newtons, newton-millimetres. A handle's own frame is a tool's: its tip at
+// the origin, +z out of the tip.
 //
-// Two threads use a device. The connection thread (connection.hpp) opens, tends, closes and opens again; the haptic
-// thread reads and writes at any time, also while the other opens or closes: a device that is not there reads as absent
-// and takes forces to nowhere. So a device keeps between its own I/O thread and the haptic thread a DeviceExchange
-// (device_exchange.hpp), which also takes the force away when the haptic thread is late.
-// A kind of device has in its header `std::unique_ptr<HapticDevice> make_X(options)` and `DeviceFinding look_for_X()`.
+// Two threads use a device. The connection thread (connection.hpp) opens, tends, closes and reopens it. The haptic
+// thread reads and writes at any time, even while the other opens or closes. A missing device reads as absent and
+// ignores forces. So a device has a DeviceExchange (device_exchange.hpp) between its own I/O thread and the haptic
+// thread. It also removes the force when the haptic thread is late.
+//
+// The header of each kind of device has `std::unique_ptr<HapticDevice> make_X(options)` and `DeviceFinding
+// look_for_X()`.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -18,13 +20,13 @@
 
 namespace osteon::haptic {
 
-// Read from the device itself where it tells them.
+// Read from the device itself where it reports them.
 struct DeviceLimits {
   double peak_n = 0;  // 0: shows no force
   double continuous_n = 0;
   double stiffness_n_per_mm = 0;
   double workspace_radius_mm = 0;
-  double damping_n_s_per_mm = 0;  // most that may be rendered; 0: the device does not say
+  double damping_n_s_per_mm = 0;  // largest damping that may be rendered; 0: the device does not say
   double peak_nmm = 0;            // torque; 0: shows none
   double continuous_nmm = 0;
   Vec3 workspace_middle_mm = Vec3::Zero();
@@ -32,15 +34,15 @@ struct DeviceLimits {
 
 enum class DeviceStatus : std::uint8_t {
   ok,
-  warm,    // motors are warm: only the continuous force may be asked for
-  fault,   // broken or silent: no force, and what was read is old
-  absent,  // not opened, or unplugged: no force, and what was read is old
+  warm,    // motors are warm: only the continuous force may be commanded
+  fault,   // broken or silent: no force, and the reading is old
+  absent,  // not opened, or unplugged: no force, and the reading is old
 };
 
-// No force is shown before `done`. A device that needs none is always done.
+// No force is shown before `done`. A device without calibration is always done.
 enum class Calibration : std::uint8_t {
   done,
-  pending,  // the device or its driver is at it, or waits for the hand: HapticDevice::advice() says what is to be done
+  pending,  // in progress, or waits for the user: HapticDevice::advice() says what to do
 };
 
 enum DeviceButton : std::uint32_t {
@@ -56,14 +58,14 @@ struct DeviceReading {
   double pedal = 0;          // of a proportional pedal, 0 … 1 of the tool's speed
   std::uint64_t sample = 0;  // counts the device's own samples
 
-  // Of the spindle's full speed, by pedal or button.
+  // Share of the spindle's full speed, by pedal or button.
   [[nodiscard]] double spindle() const noexcept { return buttons & kSpindlePedal ? 1.0 : pedal; }
   [[nodiscard]] bool usable() const noexcept {
     return (status == DeviceStatus::ok || status == DeviceStatus::warm) && calibration == Calibration::done;
   }
 };
 
-// Held until the next write. A device without torque shows the force alone: torque never becomes force.
+// Held until the next write. A device without torque shows only the force: torque never becomes force.
 struct DeviceOutput {
   Vec3 force_n = Vec3::Zero(), torque_nmm = Vec3::Zero();
 
@@ -71,15 +73,16 @@ struct DeviceOutput {
   DeviceOutput(const Vec3& force, const Vec3& torque = Vec3::Zero()) : force_n(force), torque_nmm(torque) {}
 };
 
-// Known once open() has succeeded; what kind of device it is (places, turns, pedals, axes) as far as possible before.
+// Known once open() has succeeded. The kind of device (places, turns, pedals, axes) is known before, as far as
+// possible.
 struct DeviceInfo {
-  std::string model, serial, driver;  // as the device and its library name themselves; empty: it does not
+  std::string model, serial, driver;  // as the device and its library report them; empty: not reported
   bool places = true, turns = true;   // what it reads: position, rotation
-  bool pedals = false;  // it is there for the spindle: another device's spindle button becomes a second clutch
+  bool pedals = false;  // it drives the spindle: another device's spindle button becomes a second clutch
   int force_axes = 3, torque_axes = 0;  // what it shows: 0 or 3 of each
 };
 
-// The rotation of a handle that has none of its own: a tool that points away from the user.
+// The rotation for a handle without rotation: a tool that points away from the user.
 [[nodiscard]] inline Eigen::Quaterniond pointing_away() { return {0.0, 1.0, 0.0, 0.0}; }
 
 class HapticDevice {
@@ -88,39 +91,39 @@ class HapticDevice {
   [[nodiscard]] virtual std::string_view name() const = 0;  // as --device names it
 
   // [connection] May take seconds. Errors: not_found (no such device or library), unavailable (in use, no permission,
-  // no answer), unsupported (a library of the wrong kind), internal. Each a sentence that ends in the remedy.
+  // no answer), unsupported (a library of the wrong kind), internal. Each is a sentence that ends in the remedy.
   [[nodiscard]] virtual Result<void> open() { return {}; }
-  // [connection] Force ends at once. May be called at any time, also twice or after an open() that failed.
+  // [connection] Ends force at once. May be called at any time, even twice or after a failed open().
   virtual void close() noexcept {}
-  // [connection] While open, ten times a second: what is too slow for a haptic thread (temperature, calibration). An
-  // error says that the device is lost: it is closed then, and opened again when it can be.
+  // [connection] Called ten times a second while open. Does what is too slow for a haptic thread (temperature,
+  // calibration). An error says that the device is lost. It is then closed, and reopened when possible.
   [[nodiscard]] virtual Result<void> tend() { return {}; }
-  // [connection] What the user should do now, a sentence; empty: nothing.
+  // [connection] What the user should do now, as a sentence; empty: nothing.
   [[nodiscard]] virtual std::string advice() const { return {}; }
 
-  // [connection] Or any thread while the connection thread does not open or close.
+  // [connection] Or any thread while the connection thread neither opens nor closes.
   [[nodiscard]] virtual DeviceLimits limits() const = 0;
   [[nodiscard]] virtual DeviceInfo info() const { return {}; }
 
   // [haptic]
   [[nodiscard]] virtual DeviceReading read() noexcept = 0;
-  // [haptic] Of a recording: where the bone stood on its mount at the last reading, seen from where it rests, and so it
-  // stands for whoever plays it. Null: nobody says, and the bone is where the room has it.
+  // [haptic] Of a recording: pose of the bone on its mount at the last reading, relative to its rest pose. It also
+  // applies to whoever plays the recording. Null: not recorded; the room gives the bone's pose.
   [[nodiscard]] virtual const Pose* pose_rest_bone() const noexcept { return nullptr; }
-  // [haptic] It has given its last reading for good, as a recording does at its end.
+  // [haptic] It has given its last reading, as a recording does at its end.
   [[nodiscard]] virtual bool over() const noexcept { return false; }
-  // [haptic] Never more than the device's limits reaches the motors.
+  // [haptic] Never sends more than the device's limits to the motors.
   virtual void write(const DeviceOutput& output) noexcept = 0;
 };
 
-// What a look at the machine shows of one kind of device.
+// What was found on the machine of one kind of device.
 struct DeviceFinding {
-  std::vector<std::string> found;  // one line for each device that is there, e.g. "Phantom Omni, serial 50415500155"
-  std::string missing;             // a sentence: what is not there or does not work, and the remedy; empty: nothing
-  bool wrong_file = false;         // a file that the user named for it cannot be used; `missing` tells why
+  std::vector<std::string> found;  // one line for each present device, e.g. "Phantom Omni, serial 50415500155"
+  std::string missing;             // a sentence: what is missing or does not work, and the remedy; empty: nothing
+  bool wrong_file = false;         // a file that the user named for it cannot be used; `missing` says why
 };
 
-// Within `most`, same direction.
+// `v` shortened to at most `most`, same direction.
 [[nodiscard]] inline Vec3 clamped(const Vec3& v, double most) noexcept {
   const double size = v.norm();
   return size > most ? Vec3(v * (most / size)) : v;

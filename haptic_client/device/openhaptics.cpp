@@ -21,8 +21,8 @@ constexpr const char* kNames[] = {"libHD.so", "libHD.so.3.4", "libHD.so.3.3", "l
 constexpr const char* kRemedy =
     "install the vendor's OpenHaptics for Linux and the driver of your device, or name the library with --libhd";
 constexpr int kWarmSamples = 2000;        // [A] after a warning the motors count as warm for two seconds
-constexpr double kHottest = 0.9;          // [A] of the motors' temperature, 1 being too hot
-constexpr int kTemperatureSamples = 100;  // between two looks at it
+constexpr double kHottest = 0.9;          // [A] of the motors' temperature; 1 is too hot
+constexpr int kTemperatureSamples = 100;  // between two readings of it
 constexpr int kBadFramesToLose = 50;      // [A] without a good one between them
 constexpr int kMostErrors = 16;           // taken off the library's stack at a time
 
@@ -53,7 +53,7 @@ Result<const Library*> load(const std::filesystem::path& file) {
   return load_vendor<hd::Api>({"OpenHaptics (libHD.so)", file, kNames, kRemedy}, "OpenHaptics' libHD", bind);
 }
 
-// The library's errors, newest first; the first that is not kNoError is the one to tell.
+// Takes the library's errors, newest first. Returns the first that is not kNoError; that one is reported.
 unsigned take_error(const hd::Api& call) {
   unsigned first = hd::kNoError;
   for (int i = 0; i < kMostErrors; ++i) {
@@ -88,7 +88,7 @@ class OpenHaptics final : public HapticDevice {
       return failure(ErrorCode::exists, "a PHANToM is already open in this program; name one only");
     owns_ = true;
     call_ = &(*library)->call;
-    take_error(*call_);  // of whoever used the library before
+    take_error(*call_);  // left by an earlier user of the library
     device_ = call_->init_device(options_.device.empty() ? nullptr : options_.device.c_str());
     if (const unsigned code = take_error(*call_); code != hd::kNoError || device_ == hd::kNoDevice) {
       const Error why = sentence(code == hd::kNoError ? hd::kDeviceFault : code);
@@ -112,7 +112,7 @@ class OpenHaptics final : public HapticDevice {
       return;
     }
     if (running_) {
-      // The force ends in the next frame; where no frame comes any more, there is none to end.
+      // The force ends in the next frame. Where no frame comes any more, there is no force to end.
       closing_ = true;
       const std::uint64_t frames = frames_;
       for (int i = 0; i < 50 && frames_ < frames + 2; ++i) std::this_thread::sleep_for(1ms);
@@ -160,9 +160,9 @@ class OpenHaptics final : public HapticDevice {
     info_.model = text_of(*call_, hd::kModel);
     info_.serial = text_of(*call_, hd::kSerial);
     info_.driver = text_of(*call_, hd::kDriverVersion);
-    info_.torque_axes =
-        0;  // the few with six motors are driven as if they had three: nothing published tells their torque
-    // Arrays longer than any the library fills, should a device have more motors than we know of.
+    // The few devices with six motors are driven as if they had three: their torque is not published.
+    info_.torque_axes = 0;
+    // Arrays longer than any that the library fills, in case a device has more motors than we know of.
     std::array<double, 16> value{};
     const auto number = [&](hd::Enum what) {
       value.fill(0.0);
@@ -191,8 +191,8 @@ class OpenHaptics final : public HapticDevice {
         !sensible(limits_.workspace_radius_mm, 2000.0))
       return failure(
           ErrorCode::unsupported,
-          "the PHANToM \"" + info_.model + "\" does not tell its force, stiffness and workspace; update its driver");
-    // One that does not say what it can hold is taken at a quarter of its peak. [A]
+          "the PHANToM \"" + info_.model + "\" does not report its force, stiffness and workspace; update its driver");
+    // For a device that does not report its continuous force, a quarter of its peak is assumed. [A]
     if (!sensible(limits_.continuous_n, limits_.peak_n)) limits_.continuous_n = 0.25 * limits_.peak_n;
     return {};
   }
@@ -208,8 +208,8 @@ class OpenHaptics final : public HapticDevice {
     call_->enable(hd::kForceOutput);
     call_->enable(hd::kForceClamping);
     call_->enable(hd::kForceRamping);
-    // Before anything can go wrong: motors must not outlive us, and a scheduler that was never stopped leaves some
-    // devices in error 0x0303.
+    // Before anything can go wrong: motors must not outlive us. A scheduler that was never stopped leaves some devices
+    // in error 0x0303.
     emergency_.emplace([](void* call) { static_cast<const hd::Api*>(call)->stop_scheduler(); },
                        const_cast<hd::Api*>(call_));
     scheduled_ = call_->schedule_asynchronous([](void* self) { return static_cast<OpenHaptics*>(self)->servo(); }, this,
@@ -225,7 +225,7 @@ class OpenHaptics final : public HapticDevice {
     return {};
   }
 
-  // [connection] Whether it is calibrated; what it can do by itself it does, for the rest there is advice().
+  // [connection] Checks the calibration. Calibrates what the device can do by itself; for the rest there is advice().
   void calibrate() {
     call_->make_current_device(device_);
     hd::Enum state = call_->check_calibration();
@@ -244,7 +244,7 @@ class OpenHaptics final : public HapticDevice {
     else if (state == hd::kNeedsManual)
       advice_ = "hold the PHANToM's arms at right angles, as in its manual, and press the front button";
     else
-      advice_ = "move the PHANToM's handle slowly until it has found its place";
+      advice_ = "move the PHANToM's handle slowly until it has found its position";
     calibrated_ = state == hd::kCalibrated;
   }
 
@@ -280,7 +280,7 @@ class OpenHaptics final : public HapticDevice {
       const unsigned code = call_->get_error().code;
       if (code == hd::kNoError) break;
       if (code >= hd::kWarmMotors && code <= hd::kForceErrorsEnd) {
-        // Motors warm, or more force than the library wants: the continuous force is safe for both.
+        // The motors are warm, or the force is more than the library wants. The continuous force is safe in both cases.
         warm_left_ = kWarmSamples;
         continue;
       }
@@ -294,7 +294,7 @@ class OpenHaptics final : public HapticDevice {
 
   void publish(unsigned buttons, const std::array<double, 16>& matrix) noexcept {
     DeviceReading reading = last_;
-    // Column-major: three columns of the handle's axes, then its place.
+    // Column-major: three columns of the handle's axes, then its position.
     Eigen::Matrix3d axes;
     for (int column = 0; column < 3; ++column)
       for (int row = 0; row < 3; ++row) axes(row, column) = matrix[static_cast<std::size_t>(4 * column + row)];
@@ -329,7 +329,7 @@ class OpenHaptics final : public HapticDevice {
   std::uint64_t frames_seen_ = 0;
   int silent_ = 0;
   std::optional<EmergencyStop> emergency_;
-  // Both.
+  // Both threads.
   std::atomic<bool> closing_{false}, calibrated_{false}, reset_pressed_{false};
   std::atomic<unsigned> lost_{hd::kNoError};
   std::atomic<std::uint64_t> frames_{0};

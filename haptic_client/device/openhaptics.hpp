@@ -1,5 +1,5 @@
-// PHANToM devices (Omni, Touch, Desktop, Premium) through the vendor's OpenHaptics, loaded at run time.
-// Its own scheduler calls us a thousand times a second; the haptic thread meets it in a DeviceExchange only.
+// PHANToM devices (Omni, Touch, Desktop, Premium) through the vendor's OpenHaptics, loaded at run time. Its own
+// scheduler calls us a thousand times a second. It shares only a DeviceExchange with the haptic thread.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -10,13 +10,13 @@
 namespace osteon::haptic {
 
 struct OpenHapticsOptions {
-  std::filesystem::path library;  // empty: libHD.so where the dynamic linker finds it
+  std::filesystem::path library;  // empty: libHD.so, searched by the dynamic linker
   std::string device;             // as named in the vendor's setup program; empty: its default device
 };
 
-// One device of this kind can be open at a time: the vendor's scheduler serves the whole process.
+// One device of this kind can be open at a time, because the vendor's scheduler serves the whole process.
 [[nodiscard]] std::unique_ptr<HapticDevice> make_openhaptics(const OpenHapticsOptions& options);
-// Opens the device for a moment, without its motors, where it is not open in this process.
+// Opens the device for a moment, without its motors, unless it is open in this process.
 [[nodiscard]] DeviceFinding look_for_openhaptics(const OpenHapticsOptions& options);
 
 // The sentence for an error of the library, with the remedy.

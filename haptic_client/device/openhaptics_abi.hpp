@@ -1,5 +1,5 @@
-// The part of OpenHaptics' HDAPI that is used, declared anew: types as the vendor's library passes them, numbers of its
-// parameters and errors. Facts: published uses of HDAPI 3.x. The vendor's library is loaded, never linked.
+// The used part of OpenHaptics' HDAPI, declared anew: types as the vendor's library passes them, and numbers of its
+// parameters and errors. Source: published uses of HDAPI 3.x. The vendor's library is loaded, never linked.
 #pragma once
 #include <cstdint>
 
@@ -23,14 +23,14 @@ inline constexpr Handle kNoDevice = 0xFFFFFFFFu;
 inline constexpr CallbackCode kDone = 0, kContinue = 1;
 inline constexpr unsigned short kHighestPriority = 65535;
 
-// To read.
+// Parameters to read.
 inline constexpr Enum kButtons = 0x2000, kTransform = 0x2052, kModel = 0x2501, kDriverVersion = 0x2502,
                       kSerial = 0x2504, kUsableWorkspace = 0x2551, kCalibrationStyle = 0x2555, kMaxStiffness = 0x2602,
                       kMaxForce = 0x2603, kMaxContinuousForce = 0x2604, kMotorTemperature = 0x2605,
                       kMaxDamping = 0x2609;
-// To write.
+// Parameters to write.
 inline constexpr Enum kForce = 0x2700;
-// To enable.
+// Capabilities to enable.
 inline constexpr Enum kForceOutput = 0x4000, kForceClamping = 0x4001, kForceRamping = 0x4002;
 // Calibration: states, and bits of the styles.
 inline constexpr Enum kCalibrated = 0x5000, kNeedsUpdate = 0x5001, kNeedsManual = 0x5002;
@@ -41,7 +41,7 @@ inline constexpr unsigned kNoError = 0, kWarmMotors = 0x0200, kForceExceeded = 0
                           kCommunicationSetup = 0x0303, kTimer = 0x0304, kBadHandle = 0x0104, kSchedulerFull = 0x0501,
                           kLicence = 0x0600;
 
-// The functions, as found in the library.
+// The functions of the library.
 struct Api {
   Handle (*init_device)(const char* name);
   void (*make_current_device)(Handle);

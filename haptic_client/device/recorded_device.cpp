@@ -11,7 +11,7 @@
 namespace osteon::haptic {
 namespace {
 
-// A recording being read, and the sentence of the first thing that was wrong with it.
+// A recording being read, and the message of the first error in it.
 class Reader {
  public:
   explicit Reader(const std::filesystem::path& file) : path_(file), name_("the recording " + file.string()) {}
@@ -23,8 +23,8 @@ class Reader {
       return wrong(ErrorCode::not_found, "there is no file " + path_.string() + "; give one that --record wrote");
     if (H5Fis_hdf5(path_.c_str()) <= 0)
       return wrong(ErrorCode::invalid_input, path_.string() + " is not an HDF5 file; give one that --record wrote");
-    // One that is being written, or whose writer was killed, opens only so; one of another program perhaps only
-    // otherwise.
+    // A file that is being written, or whose writer was killed, opens only in this mode. A file of another program
+    // perhaps opens only in the other mode.
     file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY | H5F_ACC_SWMR_READ, H5P_DEFAULT), H5Fclose);
     if (!file_.ok()) file_ = Hdf5Handle(H5Fopen(path_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
     if (!file_.ok())
@@ -67,7 +67,7 @@ class Reader {
     return H5Oexists_by_name(file_.id(), path, H5P_DEFAULT) > 0;
   }
 
-  // A list of texts of one length.
+  // A list of strings of one length.
   std::vector<std::string> texts(const char* path) {
     const Hdf5Handle dataset = find_dataset(path);
     if (!dataset.ok()) return {};
@@ -91,7 +91,7 @@ class Reader {
     return texts;
   }
 
-  // A hash; empty where it is not there, or was not set.
+  // A hash; empty if it is missing or was not set.
   [[nodiscard]] std::string digits(const char* path) const {
     const Hdf5Handle dataset(H5Dopen2(file_.id(), path, H5P_DEFAULT), H5Dclose), type(H5Tcopy(H5T_C_S1), H5Tclose);
     char digits[65] = {};
@@ -102,7 +102,7 @@ class Reader {
     return digits;
   }
 
-  // The rows that are complete: as many as have their time.
+  // Number of complete rows: those that have their time.
   std::size_t rows() {
     const Hdf5Handle dataset = find_dataset(recording::kTime);
     if (!dataset.ok()) return 0;
@@ -111,7 +111,7 @@ class Reader {
     return count > 0 ? static_cast<std::size_t>(count) : 0;
   }
 
-  // The first `rows` of a dataset with `width` values a row.
+  // The first `rows` rows of a dataset with `width` values in a row.
   template <class T>
   std::vector<T> values(const char* path, hid_t type, std::size_t rows, std::size_t width) {
     const Hdf5Handle dataset = find_dataset(path);
@@ -131,7 +131,7 @@ class Reader {
     }
     const hsize_t from[] = {0, 0}, count[] = {rows, width};
     const Hdf5Handle memory(H5Screate_simple(rank, count, nullptr), H5Sclose);
-    // Enumerations are stored as small integers under names; here they are wanted as integers.
+    // Enumerations are stored as small integers with names; here they are read as integers.
     const bool named = H5Tget_class(stored.id()) == H5T_ENUM;
     std::vector<T> read(rows * width);
     if (H5Sselect_hyperslab(space.id(), H5S_SELECT_SET, from, nullptr, count, nullptr) < 0 ||
@@ -194,7 +194,8 @@ bool good(const Pose& pose) {
   return pose.position_mm.allFinite() && std::abs(pose.rotation.squaredNorm() - 1.0) < 1e-6;
 }
 
-// The readings tick by tick, and the bone's places; a gap in the ticks' numbers is filled by what was read before it.
+// Reads the readings tick by tick, and the bone's poses. A gap in the ticks' numbers is filled with the preceding
+// reading.
 void read_rows(Reader& reader, RecordedSession& session) {
   std::vector<DeviceReading>& readings = session.readings;
   const std::size_t rows = reader.rows();
@@ -322,7 +323,7 @@ Result<void> check_played_on(const RecordedDevice& recorded, std::string_view fi
   return failure(ErrorCode::invalid_input,
                  "--device " + std::string(recorded.name()) + " began on bone in another state (field " +
                      began_on.substr(0, 12) + ") than the room's (field " + std::string(field_hash.substr(0, 12)) +
-                     "); start osteon-server anew on the case, or with the --resume that it then had");
+                     "); restart osteon-server on the case, or with the --resume that it had then");
 }
 
 Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file) {

@@ -1,7 +1,6 @@
-// A device that does again what another did: plays the handle's poses and buttons of a recording, a row for each tick.
-// Force goes nowhere. On the same bone with the same plan it makes the same cuts, bit for bit where time is virtual;
-// what differs in either is refused by check_played(). A bone that stood on a mount moves again as it did, whatever the
-// room's does.
+// A device that plays a recording: the handle's poses and buttons, one row for each tick. It ignores force. On the same
+// bone with the same plan it makes the same cuts, bit for bit where time is virtual. check_played() rejects another
+// bone or plan. A bone that stood on a mount moves again as it did, whatever the room's bone does.
 #pragma once
 #include <filesystem>
 #include <memory>
@@ -12,32 +11,31 @@
 
 namespace osteon::haptic {
 
-// What a recording says of the session that it is of.
+// What a recording says about its session.
 struct RecordedSession {
   std::string device, device_model;
   std::string case_hash, case_title;  // of the bone; the hash in hexadecimal digits
-  std::string plan_digest;            // of what was done with which tools, likewise; empty: the recording does not say
-  std::vector<std::string> tools;     // names, by their place in the session
-  std::string start_hash;             // of the bone as it was found; empty: the recording does not say
-  std::string field_hash;             // of the bone as it was left; empty: the recording has no end
+  std::string plan_digest;            // of the plan and its tools, likewise; empty: the recording does not say
+  std::vector<std::string> tools;     // names, by their index in the session
+  std::string start_hash;             // of the bone at the beginning; empty: the recording does not say
+  std::string field_hash;             // of the bone at the end; empty: the recording has no end
   double force_scale = 0;             // s
   DeviceLimits limits;
   DeviceInfo info;
-  std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row shows the one before
-  // Of each reading: where the bone stood, seen from where it rests. Empty: it never moved, or the recording does not
-  // say.
+  std::vector<DeviceReading> readings;  // one for each tick from the first row on; a lost row repeats the one before
+  // For each reading: the bone's pose relative to its rest pose. Empty: it never moved, or the recording does not say.
   std::vector<Pose> pose_rest_bone;
 };
 
-// Whether a recording can be played in a session: only the same bone, tools and plan make sense of its handle. `name`:
-// of the recording, for the sentence. Errors: invalid_input, which says what differs and what to give.
+// Whether a recording can be played in a session. Its handle makes sense only with the same bone, tools and plan.
+// `name`: of the recording, for the message. Error invalid_input: says what differs and which options to give.
 [[nodiscard]] Result<void> check_played(const RecordedSession& recorded, std::string_view name,
                                         std::string_view case_hash, const std::vector<std::string>& tools,
                                         std::string_view plan_digest);
 
-// Reads a recording, also one that goes on or whose writer was killed: as far as it is complete. Errors: not_found (no
-// such file), invalid_input (no HDF5 file, no recording, a dataset missing or of the wrong kind, no row, a number that
-// is none), unsupported (another version of the format).
+// Reads a recording, as far as it is complete. It may still be growing, or its writer may have been killed. Errors:
+// not_found (no such file), invalid_input (no HDF5 file, no recording, a dataset missing or of the wrong kind, no row,
+// a value that is not a number), unsupported (another version of the format).
 [[nodiscard]] Result<RecordedSession> read_recording(const std::filesystem::path& file);
 
 class RecordedDevice final : public HapticDevice {
@@ -47,7 +45,7 @@ class RecordedDevice final : public HapticDevice {
   [[nodiscard]] std::string_view name() const override { return name_; }
   [[nodiscard]] DeviceLimits limits() const override { return session_.limits; }  // of the device that was recorded
   [[nodiscard]] DeviceInfo info() const override { return session_.info; }
-  // After the last row the device is absent, as if it had been unplugged there.
+  // After the last row the device is absent, as if it had been unplugged.
   [[nodiscard]] DeviceReading read() noexcept override;
   [[nodiscard]] const Pose* pose_rest_bone() const noexcept override;
   void write(const DeviceOutput&) noexcept override {}
@@ -61,12 +59,12 @@ class RecordedDevice final : public HapticDevice {
   std::size_t next_ = 0;  // haptic thread
 };
 
-// Whether the room's bone is as it was when the recording began: a handle that cut bone goes through air where it was
-// cut before, and is pushed out of bone that was not yet. `field_hash`: of the room as it was joined, in hexadecimal
-// digits. Error invalid_input. A recording that does not say plays on any.
+// Whether the room's bone is as it was when the recording began. On other bone, the recorded handle moves through air
+// where bone was cut before, and is pushed out of bone that was not yet cut. `field_hash`: of the room as it was
+// joined, in hexadecimal digits. Error invalid_input. A recording without this hash plays on any bone.
 [[nodiscard]] Result<void> check_played_on(const RecordedDevice& recorded, std::string_view field_hash);
 
-// `recorded:FILE` after its colon. Errors: those of read_recording().
+// The text of `recorded:FILE` after its colon. Errors: those of read_recording().
 [[nodiscard]] Result<std::unique_ptr<RecordedDevice>> make_recorded_device(const std::filesystem::path& file);
 
 }  // namespace osteon::haptic

@@ -1,10 +1,11 @@
-// Where things are in a recording: what haptic_client/app writes and the recorded device and h5py read.
+// Names in a recording, which haptic_client/app writes and the recorded device and h5py read.
 //
-// The groups are those of the recordings of FIVRS, the volumetric drilling simulator on AMBF (github.com/
-// LCSR-SICKKIDS/volumetric_drilling, its recording script and the description of its format): `metadata`, `data`,
-// `high_frequency_poses`, `drill_force_feedback`, `burr_change`, each sample with its `time_stamp`, poses as
-// [x, y, z, qx, qy, qz, qw], wrenches as [fx, fy, fz, tx, ty, tz]. Unlike there, lengths are millimetres; every array
-// names its unit and its frame. Bone that was removed is in the room's journal, so there is no `voxels_removed`.
+// The groups are those of the recordings of FIVRS, the volumetric drilling simulator on AMBF. Source:
+// github.com/LCSR-SICKKIDS/volumetric_drilling, its recording script and the description of its format. The groups are
+// `metadata`, `data`, `high_frequency_poses`, `drill_force_feedback`, `burr_change`. Each sample has its `time_stamp`.
+// Poses are [x, y, z, qx, qy, qz, qw], wrenches are [fx, fy, fz, tx, ty, tz]. Unlike there, lengths are millimetres.
+// Every array names its unit and its frame. The room's journal contains the removed bone, so there is no
+// `voxels_removed`.
 #pragma once
 
 namespace osteon::haptic::recording {
@@ -16,23 +17,23 @@ inline constexpr const char* kVersionName = "version";
 inline constexpr int kVersion = 1;
 
 // One row for each millisecond.
-inline constexpr const char* kTime = "data/time";  // written last: what it lacks is not complete
+inline constexpr const char* kTime = "data/time";  // written last: rows beyond its end are not complete
 inline constexpr const char* kTick = "data/state_seq";
 inline constexpr const char* kHandlePose = "high_frequency_poses/handle_pose/pose";
-// Of a bone on its mount; recordings of before it was written have none.
+// Of a bone on its mount; older recordings have none.
 inline constexpr const char* kBonePose = "high_frequency_poses/bone_pose/pose";
 inline constexpr const char* kButtons = "data/buttons";
 inline constexpr const char* kPedal = "data/pedal";
 inline constexpr const char* kDeviceStatus = "data/device_status";
 inline constexpr const char* kCalibration = "data/calibration";
 
-// Attributes of the group `metadata`: of the device as DeviceLimits and DeviceInfo have them.
+// Attributes of the group `metadata`: the device's DeviceLimits and DeviceInfo.
 inline constexpr const char* kMetadata = "metadata";
 inline constexpr const char* kDevice = "device";
 inline constexpr const char* kModel = "device_model";
 inline constexpr const char* kCaseHash = "case_hash";
 inline constexpr const char* kCaseTitle = "case_title";
-inline constexpr const char* kPlanDigest = "plan_digest";  // recordings of before it was written have none
+inline constexpr const char* kPlanDigest = "plan_digest";  // older recordings have none
 inline constexpr const char* kForceScale = "force_scale";
 inline constexpr const char* kPeak = "device_peak_n";
 inline constexpr const char* kContinuous = "device_continuous_n";
@@ -46,9 +47,9 @@ inline constexpr const char* kMiddleY = "device_workspace_middle_y_mm";
 inline constexpr const char* kMiddleZ = "device_workspace_middle_z_mm";
 inline constexpr const char* kForceAxes = "device_force_axes";
 inline constexpr const char* kTorqueAxes = "device_torque_axes";
-// Names of the tools that the session had, by their place in it.
+// Names of the session's tools, by their index in it.
 inline constexpr const char* kTools = "metadata/tools";
-// Set when the room was joined; recordings of before it was written have none.
+// Set when the room was joined; older recordings have none.
 inline constexpr const char* kStartHash = "metadata/field_hash_at_start";
 // Set at the end.
 inline constexpr const char* kFieldHash = "metadata/field_hash";

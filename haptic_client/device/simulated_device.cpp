@@ -3,7 +3,8 @@
 namespace osteon::haptic {
 
 Result<SimulatedDeviceParams> find_simulated_device(std::string_view name) {
-  // Force, stiffness and workspace of a PHANToM Omni, as its vendor gives them; its motors are taken never to be warm.
+  // Force, stiffness and workspace of a PHANToM Omni, as its vendor gives them. Its motors are assumed never to be
+  // warm.
   static const SimulatedDeviceParams kDevices[] = {
       {},
       {"simulated-3.3N",

@@ -1,4 +1,4 @@
-// A device of our own making with a hand on it: time passes when step() is called, and the hand really is pushed back.
+// A simulated device with a simulated hand on it. Time passes when step() is called, and the force moves the hand.
 #pragma once
 #include <string>
 
@@ -8,12 +8,12 @@
 
 namespace osteon::haptic {
 
-// Unless named otherwise, as strong as the drilling of bone, so that physical force is shown unscaled.
+// Unless named otherwise, strong enough for the drilling of bone, so that physical force is shown unscaled.
 struct SimulatedDeviceParams {
   std::string name = "simulated";
   DeviceLimits limits{.peak_n = 60.0, .continuous_n = 30.0, .stiffness_n_per_mm = 60.0, .workspace_radius_mm = 120.0};
 };
-// The simulated devices by name. Error not_found: names them.
+// Finds a simulated device by name. Error not_found: lists the names.
 [[nodiscard]] Result<SimulatedDeviceParams> find_simulated_device(std::string_view name);
 
 class SimulatedDevice final : public HapticDevice {
@@ -25,12 +25,12 @@ class SimulatedDevice final : public HapticDevice {
   [[nodiscard]] DeviceReading read() noexcept override;
   void write(const DeviceOutput& output) noexcept override;
 
-  // [haptic] What the hand means to do from now on; device frame.
+  // [haptic] What the hand is to do from now on; device frame.
   void command(const HandCommand& command, const Eigen::Quaterniond& rotation_device_tool,
                std::uint32_t buttons) noexcept;
-  // [haptic] Another hand takes the handle at a place.
+  // [haptic] Another hand takes the handle at a position.
   void take(const HandParams& hand, const Vec3& at_mm) noexcept;
-  // [haptic] Time passes.
+  // [haptic] Advances the time.
   void step(double dt_s) noexcept;
   [[nodiscard]] const Hand& hand() const noexcept { return hand_; }
 

@@ -11,7 +11,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr double kLongestStep_s = 0.02;  // after a stall of this machine the tool does not leap
+constexpr double kLongestStep_s = 0.02;  // after a stall of this machine the tool does not jump
 
 class SpaceMouse final : public HapticDevice {
  public:
@@ -63,11 +63,11 @@ class SpaceMouse final : public HapticDevice {
   }
 
   const SpaceMouseOptions options_;
-  RateControl rate_;  // reading thread, while it runs; keeps its place when the device comes back
+  RateControl rate_;  // reading thread, while it runs; keeps its pose when the device comes back
   Clock::time_point stepped_;
   DeviceInfo info_{.model = "SpaceMouse", .serial = {}, .driver = "hidapi", .force_axes = 0};
   DeviceExchange exchange_;
-  SpaceMousePort cap_;  // last: its thread ends before what it uses
+  SpaceMousePort cap_;  // last: its thread ends before the members that it uses
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// SpaceMouse as a device for the hand: six degrees of freedom without force. Its cap is the velocity of a tool.
+// SpaceMouse as a device for the hand: six degrees of freedom without force. Its cap sets the velocity of a tool.
 #pragma once
 #include <memory>
 
@@ -12,7 +12,7 @@ struct SpaceMouseOptions {
   bool light = true;  // its LED, while it is open
 };
 
-// Shows no force: its limits are zero. Of its buttons the first is the spindle's, any other the clutch.
+// Shows no force: its limits are zero. The first button works the spindle, any other the clutch.
 [[nodiscard]] std::unique_ptr<HapticDevice> make_space_mouse(const SpaceMouseOptions& options = {});
 [[nodiscard]] DeviceFinding look_for_space_mouse();
 

@@ -11,7 +11,7 @@ namespace {
 using Time = std::chrono::nanoseconds;
 using namespace std::chrono_literals;
 
-constexpr int kMostInAEntry = 64;  // datagrams received before one is sent
+constexpr int kMostInARow = 64;  // datagrams received before one is sent
 constexpr Time kLongestWait = 100ms;
 
 // The clock of all links of this process.
@@ -58,7 +58,7 @@ bool FastPath::send(const Cut& cut) {
   bool goes = false;
   {
     const std::lock_guard lock(mutex_);
-    // One that went before and is sent again was not acknowledged: it is the stream's turn.
+    // A cut that was sent before and is sent again was not acknowledged: now the stream sends it.
     if (cut.author_seq > pushed_) {
       pushed_ = cut.author_seq;
       goes = link_.push(cut) && link_.alive(now_of_links());
@@ -139,7 +139,7 @@ void FastPath::run() {
     {
       const std::lock_guard lock(mutex_);
       if (end_) return;
-      for (int i = 0; i < kMostInAEntry; ++i) {
+      for (int i = 0; i < kMostInARow; ++i) {
         const std::optional<Datagram> datagram = port_->receive(buffer);
         if (!datagram) break;
         link_.receive(datagram->bytes, now_of_links());
@@ -156,7 +156,7 @@ void FastPath::run() {
       died = was_alive && !link_.alive(now);
       was_alive = link_.alive(now);
     }
-    // Before all that may have to wait.
+    // Before all calls that may have to wait.
     if ((frozen != was_frozen || epoch != was_epoch) && events_.stop_flag) events_.stop_flag(epoch, frozen);
     was_frozen = frozen;
     was_epoch = epoch;

@@ -1,4 +1,4 @@
-// The client's end of the fast path on a real socket: a thread that sends and receives sealed datagrams beside the
+// The client's end of the fast path, with a real socket. A thread sends and receives sealed datagrams beside the
 // stream.
 #pragma once
 #include <cstdint>
@@ -19,18 +19,18 @@
 
 namespace osteon {
 
-// What a fast path calls, on its own thread.
+// Functions that a fast path calls, on its own thread.
 struct FastPathEvents {
-  std::function<void(wire::IndexedEntry)> entry;  // of the session, in order
-  // Datagrams do not get through any more, so that what went only in them has to go over the stream.
+  std::function<void(wire::IndexedEntry)> entry;  // a log entry of the session, in order
+  // Datagrams no longer get through. What was sent only in them has to be sent over the stream.
   std::function<void()> dead;
-  std::function<void(const CuttingState&)> partner{};  // a newer state of another's tool
-  std::function<void(const MountPose&)> bone{};        // a newer place of the bone on its mount
-  // Whether the newest datagram says that the hand may not cut, where that has changed or the lease's epoch has.
+  std::function<void(const CuttingState&)> partner{};  // a newer state of a partner's tool
+  std::function<void(const MountPose&)> bone{};        // a newer pose of the bone on its mount
+  // Whether the newest datagram says that the hand may not cut. Called when that or the lease's epoch has changed.
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
 };
 
-// One for each stream: keys and numbers begin anew with it. Any thread, except from within what it calls.
+// One for each stream: keys and numbers begin anew with it. Any thread, except from within the functions that it calls.
 class FastPath {
  public:
   // Error: not_found (the server's name), unavailable (no socket).
@@ -38,16 +38,16 @@ class FastPath {
                                                               const SessionKeys& keys, std::uint64_t first_author_seq,
                                                               FastPathEvents events);
   ~FastPath();  // stops
-  // Nothing is called any more once it returns; not from within what is called.
+  // After it returns nothing is called any more. Do not call it from within a called function.
   void stop();
   FastPath(const FastPath&) = delete;
   FastPath& operator=(const FastPath&) = delete;
 
-  // Every cut in order, and again where it was not decided. False: it has to go over the stream.
+  // Sends every cut in order, and again while it is undecided. False: it has to be sent over the stream.
   [[nodiscard]] bool send(const Cut& cut);
   [[nodiscard]] bool send(const CuttingState& state);
   [[nodiscard]] bool send(const MountLoad& push);
-  // What came over the stream: an entry, and the newest own cut that is decided.
+  // What was received over the stream: a log entry, and the newest own cut that is decided.
   void heard(std::uint64_t index);
   void decided(std::uint64_t author_seq);
   void know_tool(std::uint32_t number, const Digest& tool);
@@ -57,7 +57,7 @@ class FastPath {
   FastPath(std::unique_ptr<UdpPort> port, const Endpoint& server, const SessionKeys& keys,
            std::uint64_t first_author_seq, FastPathEvents events);
   void run();
-  // What of others' tools is newer than what was told of them.
+  // Collects states of partners' tools that are newer than those already passed on.
   void take_partners(wire::ClientLink::Time now, std::vector<CuttingState>& newer);
 
   const std::unique_ptr<UdpPort> port_;
@@ -66,7 +66,8 @@ class FastPath {
   mutable std::mutex mutex_;
   wire::ClientLink link_;
   std::uint64_t pushed_;                        // newest cut that the link was given
-  std::map<AuthorId, std::uint64_t> partners_;  // state_seq of what was told of each; of its thread
+  // state_seq of each partner's last state passed on; used by the thread only.
+  std::map<AuthorId, std::uint64_t> partners_;
   bool end_ = false;
   std::thread thread_;
 };

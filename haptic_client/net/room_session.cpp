@@ -32,21 +32,21 @@ using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
 constexpr auto kCloseTime = 1s;
-constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a wait that a server asks for
+constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a waiting time that a server requests
 constexpr auto kPushesApart = 33ms;                        // over the stream
-constexpr auto kAcknowledgeEvery = 250ms;                         // between two words on how far this client has come
+constexpr auto kAcknowledgeEvery = 250ms;  // between two acknowledgements of what this client has received
 constexpr auto kCaseSilence = 60s;                         // a whole case takes no longer on one machine
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
   return {ErrorCode::internal,
-          "cannot keep the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
+          "cannot store the case in the cache: " + path.string() + ": " + why + "; give another folder with --cache"};
 }
 
 std::span<const std::uint8_t> bytes_of(const std::string& text) {
   return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-// Writes the case's files as they come. A correct server sends these names and no others.
+// Writes the case's files as they are received. A correct server sends these names and no others.
 Result<void> receive_case(const wire::JoinedRoom& room, const fs::path& folder, const std::function<bool()>& stop) {
   v1::GetCaseRequest request;
   request.set_case_hash(wire::to_wire(room.case_hash));
@@ -83,7 +83,7 @@ Result<void> receive_case(const wire::JoinedRoom& room, const fs::path& folder, 
   return {};
 }
 
-// The folder that a case is fetched into, removed unless it was moved to its place.
+// The folder into which a case is fetched. It is removed unless it was moved to its final path.
 class PartialFolder {
  public:
   explicit PartialFolder(fs::path path) : path_(std::move(path)) {}
@@ -116,7 +116,7 @@ Result<Case> fetch_case(const wire::JoinedRoom& room, const fs::path& cache, con
     return failure(ErrorCode::invalid_input, "the server sent the case " + to_hex(fetched->hash()) + " where " +
                                                  to_hex(room.case_hash) + " was announced");
 
-  // A broken folder gives way; one that another client has put there meanwhile is as good as ours.
+  // A damaged folder is replaced. A folder that another client has put there in the meantime is as good as ours.
   fs::rename(part.path(), place, error);
   if (error) {
     if (const Result<Case> other = Case::load(place); other && other->hash() == room.case_hash) return fetched;
@@ -131,7 +131,7 @@ Result<void> fetch_tools(const wire::JoinedRoom& room, ToolBox& tools) {
   constexpr auto kPatience = 10s;
   const auto stub = v1::RoomService::NewStub(room.channel);
   const auto lost = [](const grpc::Status& status) {
-    return failure(ErrorCode::unavailable, "the server does not say which tools it has: " + status.error_message() +
+    return failure(ErrorCode::unavailable, "the server does not list its tools: " + status.error_message() +
                                                "; see whether osteon-server still runs");
   };
   v1::ListToolsRequest list;
@@ -177,14 +177,14 @@ struct RoomSession::Impl {
   };
 
   void run();
-  // Reads until the stream ends; why it did.
+  // Reads until the stream ends; returns the reason.
   grpc::Status serve(Line& line, std::optional<Error>& broken);
   void write(Line& line);
-  // What a stream brings for the session itself; under read_mutex.
+  // Handles what a stream sends for the session itself; under read_mutex.
   void follow(const v1::SessionResponse& response);
   void open_fast_path(std::uint64_t decided);
   void close_fast_path();
-  // Until it succeeds or the session is closed. Error: the server answers, and refuses.
+  // Tries until it succeeds or the session is closed. Error: the server answers and refuses.
   Result<void> join_again();
   [[nodiscard]] std::shared_ptr<FastPath> fast_path() const {
     const std::lock_guard lock(fast_mutex);
@@ -203,28 +203,29 @@ struct RoomSession::Impl {
 
   std::unique_ptr<v1::CuttingService::Stub> stub;
   std::thread thread;
-  // Of that thread.
+  // Used by that thread only.
   wire::JoinedRoom joined;             // newest
-  std::optional<v1::LinkOffer> offer;  // of the present stream, as the next two
-  std::string redial_why;              // of a server that stops in good order
+  std::optional<v1::LinkOffer> offer;  // of the present stream, like the next two
+  std::string redial_why;              // the reason that a draining server gives
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools;
 
   // Order: read_mutex, then mutex, then fast_mutex.
-  std::mutex read_mutex;  // what comes is passed on by one thread at a time
+  std::mutex read_mutex;  // received messages are passed on by one thread at a time
   std::optional<SessionReader> reader;
   mutable std::mutex fast_mutex;
-  std::shared_ptr<FastPath> fast;  // of the present stream; held by those who use it just now
+  std::shared_ptr<FastPath> fast;  // of the present stream; held by those who use it at the moment
 
-  std::atomic<std::uint64_t> heard{0};    // place of the newest event that was passed on, over the present stream
-  std::atomic<bool> heard_leaves{false};  // no datagram says that these have come
+  // Sequence number of the newest event that was passed on, over the present stream.
+  std::atomic<std::uint64_t> passed_on{0};
+  std::atomic<bool> received_leaves{false};  // no datagram acknowledges the leaves
 
   mutable std::mutex mutex;
   std::condition_variable wake;
   Line* line = nullptr;  // the open one
   CutsUnderway underway{kMaxWaitingCuts};
-  std::optional<MountLoad> push;  // for the stream
+  std::optional<MountLoad> push;  // to be sent over the stream
   std::chrono::steady_clock::time_point next_push{};
-  std::optional<std::chrono::milliseconds> redial;  // the server stops in good order: when to come again
+  std::optional<std::chrono::milliseconds> redial;  // the server drains: when to connect again
   bool closing = false, over = false;
 };
 
@@ -238,16 +239,15 @@ void RoomSession::Impl::write(Line& open) {
   std::optional<Cut> cut;
   std::optional<CuttingState> state;
   std::optional<MountLoad> push_now;
-  std::uint64_t told = 0;
-  auto tell_at = std::chrono::steady_clock::now();
+  std::uint64_t acknowledged = 0;
+  auto acknowledge_at = std::chrono::steady_clock::now();
   while (written) {
     {
       std::unique_lock lock(mutex);
-      wake.wait_until(lock, tell_at, [&] {
+      wake.wait_until(lock, acknowledge_at, [&] {
         return underway.something_to_send() || push || closing || over || line != &open || redial;
       });
-      // A server that is about to stop decides what it has been sent and no more: the rest goes when the session goes
-      // on.
+      // A draining server decides what it has received and no more. The rest is sent when the session continues.
       if (over || line != &open || redial) break;
       cut = underway.take_cut();
       state = cut ? std::nullopt : underway.take_state();
@@ -259,12 +259,12 @@ void RoomSession::Impl::write(Line& open) {
       if (written = open.stream->Write(request); !written) break;
     }
     const std::shared_ptr<FastPath> path = fast_path();
-    // Datagrams say themselves which entries have come.
-    if (const auto now = std::chrono::steady_clock::now(); now >= tell_at) {
-      tell_at = now + kAcknowledgeEvery;
-      const bool leaves = heard_leaves.exchange(false);
-      if (const std::uint64_t place = heard; place != told && (leaves || !(path && path->health().alive))) {
-        request.mutable_acknowledged()->set_room_seq(told = place);
+    // Datagrams themselves acknowledge the received log entries.
+    if (const auto now = std::chrono::steady_clock::now(); now >= acknowledge_at) {
+      acknowledge_at = now + kAcknowledgeEvery;
+      const bool leaves = received_leaves.exchange(false);
+      if (const std::uint64_t newest = passed_on; newest != acknowledged && (leaves || !(path && path->health().alive))) {
+        request.mutable_acknowledged()->set_room_seq(acknowledged = newest);
         if (written = open.stream->Write(request); !written) break;
       }
     }
@@ -298,7 +298,7 @@ void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (path && response.index() != 0) path->heard(response.index());
 }
 
-// Where there is none, the stream carries all.
+// Where there is no fast path, the stream carries everything.
 void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
   if (!offer || options.fast_path == "off") return;
   const std::optional<SealKey> up = key_of(bytes_of(offer->key_up())), down = key_of(bytes_of(offer->key_down()));
@@ -315,7 +315,7 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                           [this](wire::IndexedEntry entry) {
                             const std::lock_guard lock(read_mutex);
                             (void)reader->take(std::move(entry));
-                            heard = reader->place().value;
+                            passed_on = reader->place().value;
                           },
                       .dead =
                           [this] {
@@ -342,7 +342,7 @@ void RoomSession::Impl::close_fast_path() {
     const std::lock_guard lock(fast_mutex);
     closing_path = std::move(fast);
   }
-  // Before it is let go: whoever else holds it for a moment may be its own thread.
+  // Stop it before it is released: another owner at this moment may be its own thread.
   if (closing_path) closing_path->stop();
 }
 
@@ -358,8 +358,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   {
     const std::lock_guard lock(read_mutex);
     reader->begin();
-    heard = 0;
-    heard_leaves = false;
+    passed_on = 0;
+    received_leaves = false;
   }
   offer.reset();
   redial_why.clear();
@@ -372,19 +372,19 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       if (over) break;
     }
     const Result<void> delivered = [&] {
-      // As one, so that no entry of a datagram comes between: it may name a tool that only its path knows yet, or follow
-      // leaves that are not all there.
+      // Under one lock, so that no log entry of a datagram comes between. Such an entry may name a tool that only the
+      // fast path knows yet, or follow leaves that are not complete.
       const std::lock_guard lock(read_mutex);
       follow(response);
       const bool complete = response.has_complete();
       Result<void> taken = reader->take(std::move(response));
-      heard = reader->place().value;
-      if (complete) heard_leaves = true;
+      passed_on = reader->place().value;
+      if (complete) received_leaves = true;
       return taken;
     }();
     if (!delivered) {
       broken =
-          Error{delivered.error().code, "the server sent what no correct server sends: " + delivered.error().message};
+          Error{delivered.error().code, "the server sent an invalid message: " + delivered.error().message};
       open.context.TryCancel();
     }
   }
@@ -394,14 +394,14 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     wake.notify_all();
   }
   close_fast_path();
-  // Finish waits for the status, which comes once the writer has stopped.
+  // Finish waits for the status, which is received once the writer has stopped.
   writer.join();
   return open.stream->Finish();
 }
 
 namespace {
 
-// A line that broke can be made again; what the server says itself stands.
+// A broken connection can be made again. A decision of the server itself is final.
 bool may_come_again(const grpc::Status& status) {
   switch (status.error_code()) {
     case grpc::StatusCode::OK:
@@ -515,7 +515,7 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
 void RoomSession::open(RoomCallbacks events) {
   OSTEON_CHECK(!impl_->stub);
   Impl& impl = *impl_;
-  // By datagram and by stream: one at a time.
+  // Called for datagrams and for the stream: one at a time.
   if (events.bone)
     events.bone = [this_one = std::make_shared<std::mutex>(), tell = std::move(events.bone)](const MountPose& seen) {
       const std::lock_guard lock(*this_one);
@@ -571,9 +571,9 @@ void RoomSession::close() {
   {
     std::unique_lock lock(impl_->mutex);
     impl_->closing = true;
-    impl_->underway.again();  // what went only in datagrams, too
+    impl_->underway.again();  // including what was sent only in datagrams
     impl_->wake.notify_all();
-    // The server ends the stream when it has decided what was sent; one that does not is not waited for.
+    // The server ends the stream when it has decided what was sent. A server that does not is not waited for.
     impl_->wake.wait_for(lock, kCloseTime, [&] { return impl_->over; });
     impl_->over = true;
     impl_->wake.notify_all();

@@ -1,5 +1,5 @@
-// The haptic client's line to its room: joins, fetches the case once, then carries cuts and states up and the field,
-// everyone's committed cuts and rejections down.
+// The haptic client's connection to its room. It joins and fetches the case once. Then it sends cuts and states, and
+// receives the field, everyone's committed cuts, and rejections.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -26,54 +26,55 @@ namespace osteon {
 
 struct RoomSessionOptions {
   std::string address;  // HOST:PORT
-  std::string room{};   // which of the server's; empty: the only one that is open
+  std::string room{};   // name of the server's room; empty: the only one that is open
   wire::ClientCredentials credentials{};
-  std::string name{};  // shown to others, and over plain text who one is; empty: somebody else each time
+  std::string name{};  // shown to others, and the identity over plain text; empty: a new identity each time
   std::chrono::milliseconds patience{5000};
   std::filesystem::path cache = default_case_cache();  // one folder per case, named by its hash
-  // Sealed datagrams beside the stream: to the port that the server says, to this HOST:PORT instead, or "off".
+  // Sealed datagrams beside the stream: to the port that the server names, to this HOST:PORT instead, or "off".
   std::string fast_path{};
 };
 
-// How the fast path fares.
+// State of the fast path.
 struct FastPathHealth {
   bool offered = false, alive = false;
-  double round_trip_ms = 0, loss = 0;  // loss: on the way up
+  double round_trip_ms = 0, loss = 0;  // loss: from client to server
   std::uint64_t packets_sent = 0, bytes_sent = 0, packets_received = 0, bytes_received = 0;
 };
 
 class RoomSession {
  public:
-  // Cuts that may wait for the network before send() refuses more.
+  // Number of undecided cuts from which send() refuses more.
   static constexpr std::size_t kMaxWaitingCuts = 1024;
 
-  // Joins, fetches the case unless the cache has it, and the tools that the room knows and this program does not.
-  // Errors: those of wire::join_room; what Case::load says of a fetched case; internal (the cache cannot be written).
+  // Joins, and fetches the case unless it is cached. Also fetches the tools that the room knows and this program does
+  // not. Errors: those of wire::join_room; those of Case::load for a fetched case; internal (the cache cannot be
+  // written).
   [[nodiscard]] static Result<RoomSession> join(const RoomSessionOptions& options, const std::function<bool()>& stop);
   ~RoomSession();  // closes
   RoomSession(RoomSession&&) noexcept;
   RoomSession& operator=(RoomSession&&) noexcept;
 
-  [[nodiscard]] const wire::JoinedRoom& room()
-      const;  // as first joined: the author of all cuts and states, epochs, bounds
+  // As first joined: the author of all cuts and states, epochs, bounds.
+  [[nodiscard]] const wire::JoinedRoom& room() const;
   [[nodiscard]] const Case& bone() const;
-  [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // that the room knows; grows with its events
+  [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // known to the room; grows with its events
   // Sets an item of the room's scene, id 0 for a new one, and returns its id. Waits for the answer. Errors:
   // invalid_input, denied (the hand is stopped, or its tool taken), unavailable.
   [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item);
 
-  // Opens the stream; once. From now on `events` are called.
+  // Opens the stream; call it once. From now on `events` are called.
   void open(RoomCallbacks events);
-  // Any thread but the haptic and audio ones: these lock and allocate.
-  // In order of the calls. False when kMaxWaitingCuts are not decided yet or the session is lost; the cut is then not
-  // taken.
+  // Any thread except the haptic and audio ones: these functions lock and allocate.
+  // Sends cuts in the order of the calls. Returns false, and does not take the cut, when kMaxWaitingCuts are undecided
+  // or the session is lost.
   [[nodiscard]] bool send(const Cut& cut);
-  // Newest wins: a state that is still waiting is replaced. Cuts that are waiting go first.
+  // Newest wins: a waiting state is replaced. Waiting cuts are sent first.
   void send(const CuttingState& state);
-  // Newest wins; of a room without a mount nothing comes of it. Where datagrams do not get through, 30 a second go.
+  // Newest wins; has no effect in a room without a mount. Where datagrams do not get through, 30 a second are sent.
   void send(const MountLoad& push);
   [[nodiscard]] FastPathHealth fast_path() const;
-  // Ends the stream after what is waiting was sent, at most a second, and joins the thread. Again: does nothing.
+  // Sends what is waiting, for at most a second, ends the stream, and joins the thread. A second call does nothing.
   void close();
 
  private:

@@ -35,7 +35,7 @@ void SessionReader::begin() {
 }
 
 Result<void> SessionReader::take(v1::SessionResponse response) {
-  // An answer outside the order: what it tells of is in the leaves, or came before.
+  // An answer outside the order: its event is in the leaves, or was received before.
   if (response.index() == 0 && response.has_committed())
     return decided_(response.committed().cut().author_seq()), Result<void>{};
   if (response.index() == 0 && response.has_rejected())
@@ -47,7 +47,7 @@ Result<void> SessionReader::take(v1::SessionResponse response) {
 }
 
 Result<void> SessionReader::take(wire::IndexedEntry entry) {
-  // What it stands for comes over the stream; and a tool that is not known yet, too.
+  // The stream sends what such an entry stands for. It also sends a cut whose tool is not known yet.
   if (entry.entry.kind == wire::SessionEntryKind::streamed) return {};
   if (entry.entry.kind == wire::SessionEntryKind::committed && !cuts(entry.entry.cut)) return {};
   entries_.offer(entry.index, std::move(entry.entry));
@@ -67,7 +67,7 @@ bool SessionReader::cuts(const Cut& cut) const {
 }
 
 void SessionReader::take(const CuttingState& partner) {
-  // Whichever way the newer one comes.
+  // The newer state counts, whichever way it arrives.
   std::uint64_t& newest = partners_[partner.author];
   if (partner.author == own_ || partner.state_seq <= newest) return;
   newest = partner.state_seq;
@@ -80,17 +80,17 @@ void SessionReader::supervised(const HandSupervised& decided) {
   if (events_.supervised) events_.supervised(decided);
 }
 
-void SessionReader::committed(RoomSeq place, const Cut& cut) {
-  place_ = std::max(place_, place);
+void SessionReader::committed(RoomSeq seq, const Cut& cut) {
+  place_ = std::max(place_, seq);
   if (cut.author == own_) decided_(cut.author_seq);
-  if (events_.committed) events_.committed(place, cut);
+  if (events_.committed) events_.committed(seq, cut);
 }
 
-void SessionReader::rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch,
+void SessionReader::rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch,
                              const std::string& reason) {
-  place_ = std::max(place_, place);
+  place_ = std::max(place_, seq);
   decided_(author_seq);
-  if (events_.rejected) events_.rejected(place, author_seq, lease_epoch, reason);
+  if (events_.rejected) events_.rejected(seq, author_seq, lease_epoch, reason);
 }
 
 Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
@@ -115,10 +115,10 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const v1::FieldComplete& entry = response.complete();
       complete_(entry.decided_author_seq());
       RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(), entry.decided_author_seq()};
-      for (const std::uint64_t place : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{place});
+      for (const std::uint64_t seq : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{seq});
       if (events_.complete) events_.complete(room);
       place_ = std::max(place_, RoomSeq{entry.room_seq()});
-      // Nothing was said of this hand: what held over an earlier stream is over.
+      // Nothing was sent about this hand: the restrictions of an earlier stream are over.
       if (!supervised_) supervised({RoomSeq{}, {}, entry.lease_epoch(), {}});
       return {};
     }
@@ -153,7 +153,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
           return failure(ErrorCode::invalid_input, "scene.items names a tool that was not sent");
         items.push_back(*item);
       }
-      // Without a number it goes before the leaves, which have not come.
+      // Without an index it precedes the leaves, which have not arrived.
       if (response.index() != 0) place_ = std::max(place_, RoomSeq{response.scene().room_seq()});
       if (events_.scene) events_.scene(RoomSeq{response.scene().room_seq()}, items);
       return {};
@@ -173,7 +173,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kKept: {
       const Result<Digest> chain = wire::digest_from_wire(response.kept().chain());
       if (!chain) return tl::unexpected(chain.error());
-      // A server of before there were seals sends none.
+      // An older server sends no seal.
       const Result<Digest> seal = wire::digest_from_wire(response.kept().seal());
       kept_ = {RoomSeq{response.kept().room_seq()}, *chain, seal ? *seal : Digest{}};
       return {};

@@ -1,4 +1,4 @@
-// Turns what comes from a room, over its stream and over the fast path, into one order of events.
+// Merges what a room sends over its stream and over the fast path into one order of events.
 #pragma once
 #include <functional>
 #include <map>
@@ -16,29 +16,30 @@
 
 namespace osteon {
 
-// Every entry after the leaves comes over the stream; rejections, supervision and cuts of anyone may come sooner over the
-// fast path. Whichever is first counts. Not synchronised.
+// Every log entry after the leaves is sent over the stream. Rejections, restrictions and anyone's cuts may arrive
+// earlier over the fast path. The first to arrive counts. Not synchronised.
 class SessionReader {
  public:
-  // `decided`: own cuts up to a number are decided; `complete`: the same, and from here on cuts may be sent. Both are
+  // `decided`: own cuts up to a number are decided. `complete`: the same, and cuts may be sent from here on. Both are
   // called before the event itself.
   SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
                 std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete);
 
-  // A stream begins: its leaves and entries count anew, and so does place(), as the server may have lost the end of what
-  // an earlier one told. What was said to be kept stays: it is what shows such a loss.
+  // A stream begins. Its leaves and log entries are counted anew. place() restarts too, because the server may have
+  // lost the newest events of an earlier stream. What was acknowledged as durable stays: it reveals such a loss.
   void begin();
-  // Error: the server sent what no correct server sends; nothing more of the stream is to be taken.
+  // Error: the server sent what no correct server sends; take nothing more from this stream.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
-  // An entry of the fast path that belongs to the present stream.
+  // A log entry of the fast path that belongs to the present stream.
   [[nodiscard]] Result<void> take(wire::IndexedEntry entry);
-  // Every entry up to this one was passed on.
+  // Every log entry up to this one was passed on.
   [[nodiscard]] std::uint64_t taken() const { return entries_.acknowledged(); }
-  // Another's tool, heard of over the fast path.
+  // A partner's tool state that was received over the fast path.
   void take(const CuttingState& partner);
-  // The newest event of the present stream that was passed on, or that its leaves contain once all of them have come.
+  // Sequence number of the newest event of the present stream that was passed on. Once all leaves have arrived, the
+  // newest that they contain.
   [[nodiscard]] RoomSeq place() const { return place_; }
-  // The newest that the room has said is kept.
+  // The newest event that the room has acknowledged as durable.
   [[nodiscard]] const std::optional<wire::DurableSeq>& kept() const { return kept_; }
 
  private:
@@ -47,9 +48,9 @@ class SessionReader {
   [[nodiscard]] Result<void> deliver(const v1::SessionResponse& response);
   [[nodiscard]] Result<void> deliver(const wire::SessionEntry& entry);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
-  void committed(RoomSeq place, const Cut& cut);
+  void committed(RoomSeq seq, const Cut& cut);
   void supervised(const HandSupervised& decided);
-  void rejected(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
+  void rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
 
   const AuthorId own_;
   const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
@@ -58,8 +59,8 @@ class SessionReader {
   ReceiveWindow<Entry> entries_;
   std::optional<wire::DurableSeq> kept_;
   RoomSeq place_;
-  bool supervised_ = false;                     // of the present stream, before its leaves are complete
-  std::map<AuthorId, std::uint64_t> partners_;  // newest state_seq of each
+  bool supervised_ = false;  // restrictions of the present stream were passed on, before its leaves are complete
+  std::map<AuthorId, std::uint64_t> partners_;  // newest state_seq of each partner
 };
 
 }  // namespace osteon

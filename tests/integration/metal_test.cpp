@@ -39,7 +39,7 @@ TEST(Metal, IsLeftByRigAndServer) {
   EXPECT_THAT(haptic.err(), HasSubstr("step 1 (drill) did not finish: the tool stands on metal"));
   EXPECT_THAT(haptic.out(), HasSubstr("on metal, which it does not cut"));
   // Once for the whole contact.
-  const std::string said = "drill-3.2 stands on metal, which it does not cut: draw back and go round it";
+  const std::string said = "drill-3.2 stands on metal, which it does not cut: draw it back and go around the metal";
   const std::string all = haptic.out() + haptic.err();
   const auto first = all.find(said);
   ASSERT_NE(first, std::string::npos) << all;

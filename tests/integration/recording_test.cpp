@@ -155,7 +155,7 @@ TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   ASSERT_EQ(haptic.wait(120s), 0) << haptic.err();
   const json summary = read_json(stage / "full.json");
   EXPECT_THAT(summary["recording"]["trouble"].get<std::string>(), testing::HasSubstr("the disk is full"));
-  EXPECT_THAT(haptic.err(), testing::HasSubstr("the session goes on"));
+  EXPECT_THAT(haptic.err(), testing::HasSubstr("the session continues"));
   EXPECT_EQ(summary["steps"][0]["completed"], true);
   EXPECT_EQ(ask(stage / "full.h5", "n"), summary["recording"]["entries"]);
   EXPECT_GE(summary["recording"]["entries"].get<int>(), 500);

@@ -411,7 +411,7 @@ TEST(Trouble, AHapticClientStopsCleanlyInTheMiddleOfWork) {
     std::this_thread::sleep_for(50ms);
   }
   EXPECT_EQ(haptic.terminate(), 0);
-  EXPECT_NE(haptic.err().find("the haptic loop stands"), std::string::npos) << haptic.err();
+  EXPECT_NE(haptic.err().find("the haptic loop has stalled"), std::string::npos) << haptic.err();
   // What it had cut is in the bone, and its own record agrees with the server's.
   EXPECT_EQ(stage.server().terminate(), 0);
   auto work = read_json(stage / "work.json");

@@ -183,7 +183,7 @@ TEST(Recording, BeganOnBoneInOneState) {
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message,
               testing::HasSubstr("a.h5 began on bone in another state (field aaaaaaaaaaaa) than the "
-                                 "room's (field bbbbbbbbbbbb); start osteon-server anew"));
+                                 "room's (field bbbbbbbbbbbb); restart osteon-server"));
   const auto done = python(
       "import sys, h5py\nf = h5py.File(sys.argv[1], 'r+')\n"
       "assert f['metadata/field_hash_at_start'].attrs['meaning']\n"
@@ -664,7 +664,7 @@ TEST(Recording, LeavesALittleOfTheDisk) {
     ASSERT_FALSE(appended);
     EXPECT_EQ(i, RecordFile::kChunkRows);
     EXPECT_EQ(appended.error().message,
-              "the recording " + (temp / "a.h5").string() + " ends here: the disk is all but full");
+              "the recording " + (temp / "a.h5").string() + " ends here: the disk is almost full");
   }
   const auto read = python(
       "import sys, h5py\nf = h5py.File(sys.argv[1], 'r')\nassert len(f['data/time']) == 0 and "

@@ -179,7 +179,7 @@ TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   ASSERT_TRUE(
       wait_until([&] { return usb_.command("unread joystick") == "0" && !pedal->advice().empty(); }, kPatience));
   EXPECT_EQ(pedal->read().spindle(), 0.0);
-  EXPECT_EQ(pedal->advice(), "let the foot pedal go once; until then it turns nothing");
+  EXPECT_EQ(pedal->advice(), "release the foot pedal once; until then the spindle does not turn");
   usb_.report("joystick", {0, 0, 0, 0});
   ASSERT_TRUE(wait_until([&] { return pedal->advice().empty(); }, kPatience));
   usb_.report("joystick", {0, 0, 0x00, 0x01});  // 256 of 1023; z comes before x where both are there
