@@ -82,8 +82,8 @@ std::string_view method_of() {
   static const CallRow* const entry = [] {
     const std::string_view request = Request::descriptor()->name();
     const std::string end = "/" + std::string(request.substr(0, request.size() - std::string_view("Request").size()));
-    const auto found = std::ranges::find_if(call_entries(), [&](const CallRow& one) { return one.method.ends_with(end); });
-    OSTEON_CHECK(found != call_entries().end());
+    const auto found = std::ranges::find_if(call_rows(), [&](const CallRow& one) { return one.method.ends_with(end); });
+    OSTEON_CHECK(found != call_rows().end());
     return &*found;
   }();
   return entry->method;

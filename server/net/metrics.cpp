@@ -89,7 +89,7 @@ double bytes_of(const fs::path& journal) {
 }
 
 void add_room(Page& page, OpenRoom& room, bool draining) {
-  const RuntimeHealth health = room.host().health();
+  const RuntimeHealth health = room.runtime().health();
   const auto with = [&](const char* name = nullptr, const std::string& value = {}) {
     Labels labels{{"room", room.name}};
     if (name) labels.push_back({name, value});

@@ -156,7 +156,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (!opened_) return close(invalid("the first SessionRequest must be open"));
     switch (request->message_case()) {
       case v1::SessionRequest::kAcknowledged:
-        return hear(RoomSeq{request->heard().room_seq()});
+        return hear(RoomSeq{request->acknowledged().room_seq()});
       case v1::SessionRequest::kCut:
         return queue(request->cut());
       case v1::SessionRequest::kState:

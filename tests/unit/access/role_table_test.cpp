@@ -61,7 +61,7 @@ TEST(RoleTable, HasARowForEveryCallOfTheProtocolAndNoOther) {
   const Names compiled = compiled_calls();
   ASSERT_GT(compiled.size(), 30u);
   Names entries;
-  for (const CallRow& entry : call_entries())
+  for (const CallRow& entry : call_rows())
     EXPECT_TRUE(entries.insert(std::string(entry.method)).second) << entry.method << " has two entries";
   for (const std::string& call : compiled)
     EXPECT_TRUE(entries.contains(call)) << call << " has no entry in common/access/role_table.cpp";

@@ -203,8 +203,8 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   verify_is_sound();
 
   EXPECT_EQ(shown({"--person", "anna"}).size(), 1u);
-  command({"forget", journal, "--person", "1"});
-  EXPECT_EQ(shown().back()["action"], "forget");
+  command({"erase-person", journal, "--person", "1"});
+  EXPECT_EQ(shown().back()["action"], "erase-person");
   EXPECT_EQ(shown({"--person", "anna"}).size(), 0u);
   EXPECT_THAT(content(rooms() / "audit.people"), Not(HasSubstr("anna")));
   EXPECT_THAT(audit({"show", log()}).out,
@@ -236,7 +236,7 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
 // What only some may do is recorded, but for what is in the room's own journal or says nothing of anybody.
 TEST(AuditedCalls, AreAllThatOnlyInstructorsOrOperatorsMayMake) {
   const std::set<std::string_view> without{"Annotate", "ListRooms", "ListCases"};
-  for (const CallRow& entry : call_entries()) {
+  for (const CallRow& entry : call_rows()) {
     const bool is_everybodys = entry.roles.has(Role::trainee);
     if (!is_everybodys && !without.contains(call_name(entry.method))) EXPECT_TRUE(is_audited(entry.method)) << entry.method;
   }
