@@ -1,5 +1,5 @@
-// The instructor's console: a command a line, a line of answer each, so that a person or a script can supervise a room
-// without a window.
+// The instructor's console: a person or a script supervises a room without a window. One command per line, one line of
+// answer for each.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -14,21 +14,21 @@
 
 namespace osteon {
 
-// The words of a line; what stands in double quotes is one word. Error invalid_input: a quote without its end.
+// Splits a line into words. Text in double quotes is one word. Error invalid_input: a quote without its end.
 [[nodiscard]] Result<std::vector<std::string>> words_of_line(std::string_view line);
 
-// One thread.
+// For one thread.
 class Console {
  public:
-  // The room must outlive it.
+  // `room` must outlive it.
   explicit Console(SupervisionClient& room) : room_(room) {}
 
-  // What there is to say to a line, "ok ..." or "error ...", without its end; nothing for an empty line and for one
-  // that begins with #. May wait for the room.
+  // The answer to a line: "ok ..." or "error ...", without a line end. Nothing for an empty line and for one that
+  // begins with #. May wait for the room.
   [[nodiscard]] std::optional<std::string> answer(std::string_view line);
-  // It was told to quit.
+  // The quit command was given.
   [[nodiscard]] bool over() const { return over_; }
-  [[nodiscard]] static const char* help();  // every command, a line each
+  [[nodiscard]] static const char* help();  // every command, one per line
 
  private:
   using Words = std::vector<std::string>;
@@ -40,7 +40,7 @@ class Console {
   [[nodiscard]] std::string name_of(AuthorId author) const;
   [[nodiscard]] std::string tool_name(const Digest& tool) const;
   [[nodiscard]] std::string text_of(const PersonSeen& person) const;
-  // Changes what holds for one hand, or for all, and waits until the room has said so.
+  // Changes the restrictions of one person or of all, and waits until the room has published the change.
   [[nodiscard]] Answer supervise(const std::string& name, const std::function<void(Restrictions&)>& change);
   [[nodiscard]] Answer draw(AnnotationKind kind, const Words& words, std::size_t first);
 
@@ -70,7 +70,7 @@ class Console {
   [[nodiscard]] Answer quit(const Words& words);
 
   SupervisionClient& room_;
-  mutable std::vector<std::pair<std::string, Digest>> tools_;  // that the room was last known to have
+  mutable std::vector<std::pair<std::string, Digest>> tools_;  // the newest list received from the room
   bool over_ = false;
 };
 

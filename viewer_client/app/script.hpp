@@ -1,4 +1,4 @@
-// The viewer's script: one command a line, so that a person, a test or the demo can direct the camera.
+// The viewer's script. One command per line directs the camera, for a person, a test or the demo.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -49,12 +49,12 @@ struct WaitForDrawn {
   std::size_t count = 0;
 };
 
-// Of the people of the room; WHO is a name or #NUMBER.
+// Commands about the people of the room. WHO is a name or #NUMBER.
 struct LookAs {
   std::string who;
 };
 struct Follow {
-  std::string who;  // empty: nobody any more
+  std::string who;  // empty: follow nobody
 };
 struct Draw {
   AnnotationKind kind = AnnotationKind::pointer;
@@ -62,14 +62,15 @@ struct Draw {
   std::string words;
 };
 struct WipeOff {
-  std::uint32_t annotation = 0;  // 0: all own ones
+  std::uint32_t annotation = 0;  // 0: all of one's own
 };
 struct Say {
-  std::string who;    // "all", a name or #NUMBER; or a first word that nobody is called, which then is said as well
-  std::string words;  // after it
+  // "all", a name or #NUMBER. If nobody has this name, it is the first word of the text, sent to all.
+  std::string who;
+  std::string words;  // the rest of the text
 };
 
-// What is asked of the room; obeyed when its event is drawn.
+// Requests to the room. Each is done when its event is drawn.
 struct UndoLast {
   std::uint32_t count = 1;
 };
@@ -90,7 +91,7 @@ struct PlaceTool {
   ItemPlace where;
   BodyId body;
 };
-// An item that stands, by the number that the room gave it.
+// Commands about a placed item. The room gave it its number.
 struct MoveItem {
   std::uint32_t item = 0;
   ItemPlace where;
@@ -107,7 +108,7 @@ struct RemoveItem {
   std::uint32_t item = 0;
 };
 struct SaveBone {
-  std::string file_name;  // empty: the server's own
+  std::string file_name;  // empty: the server chooses the name
 };
 using RoomRequest = std::variant<UndoLast, RedoLast, UndoTo, MarkMoment, TakeAway, PlaceTool, MoveItem, TurnItem,
                                  SeatItem, RemoveItem, SaveBone>;
@@ -116,29 +117,29 @@ using Command =
     std::variant<WaitForSurface, WaitForSeq, WaitForBodies, WaitForItems, LookAtWhole, LookFrom, LookAtTool, ShowTool,
                  SaveScreenshot, SaveStatus, RoomRequest, WaitForDrawn, LookAs, Follow, Draw, WipeOff, Say, Quit>;
 
-// Null for an empty line and for one that begins with #. Error invalid_input, naming the form expected.
+// Null for an empty line and for one that begins with #. Error invalid_input: names the expected form.
 [[nodiscard]] Result<std::optional<Command>> parse_command(std::string_view line);
 
-// Lines of a file or of standard input as they come, without waiting for them.
+// Reads the lines of a file or of standard input as they arrive. Does not block.
 class ScriptReader {
  public:
-  // "-" is standard input. Error not_found, naming the file.
+  // "-" is standard input. Error not_found: names the file.
   [[nodiscard]] static Result<ScriptReader> open(const std::string& file);
-  // A script in the program itself.
+  // A script that is part of the program.
   [[nodiscard]] static ScriptReader of(std::string text);
   ScriptReader(ScriptReader&& other) noexcept;
   ScriptReader& operator=(ScriptReader&&) = delete;
   ~ScriptReader();
 
-  // The next whole line, if one has come.
+  // The next whole line, if one has arrived.
   [[nodiscard]] std::optional<std::string> next();
-  // The end was reached and every line taken.
+  // The end was reached and every line was taken.
   [[nodiscard]] bool ended() const;
 
  private:
   ScriptReader() = default;
-  int descriptor_ = -1;  // -1: none is open, or its end was reached
-  std::string text_;     // come, not taken
+  int descriptor_ = -1;  // -1: no file is open, or its end was reached
+  std::string text_;     // received, but not yet taken
 };
 
 }  // namespace osteon

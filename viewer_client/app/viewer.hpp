@@ -1,5 +1,5 @@
-// The render loop: takes what the network brought, rebuilds the regions that changed, draws when the picture did,
-// and obeys the script between pictures.
+// The render loop. It takes the data that the network threads received and rebuilds the regions that changed. It draws
+// when the picture changed, and runs script commands between pictures.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -26,14 +26,15 @@ struct ViewerOptions {
   std::string case_title;
   Box bounds;                                     // of the bone
   std::filesystem::path frame_log;                // empty: none
-  bool answers = false;                           // say ok or error on standard output after each command
-  bool stop_at_error = false;                     // a command that fails ends the run
-  std::function<void(const CameraView&)> looked;  // hears after every turn where the window looks
-  std::function<SpaceMouseState()> cap;  // moves the camera; its first button shows the whole, its second the tool
-  // Asks the room and waits for its answer.
+  bool answers = false;                           // print ok or error on standard output after each command
+  bool stop_at_error = false;                     // a failed command ends the run
+  std::function<void(const CameraView&)> looked;  // called after every turn with the window's view
+  std::function<SpaceMouseState()> cap;  // moves the camera; first button: overview, second button: tool
+  // Sends a request to the room and waits for its answer.
   std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
-  SupervisionClient* people = nullptr;  // of the room, must outlive the viewer; null: neither seen nor drawn for
-  std::string hand;                     // who sits before this window with a hand, a name or #NUMBER; empty: nobody
+  // of the room; must outlive the viewer. Null: people are neither shown nor drawn for.
+  SupervisionClient* people = nullptr;
+  std::string hand;                     // the tool operator at this window, a name or #NUMBER; empty: nobody
 };
 
 // [render]
@@ -44,11 +45,11 @@ class Viewer {
                                            std::optional<ScriptReader> script);
 
   enum class State { running, finished };
-  // One turn of the loop; waits at most some milliseconds for something to happen. `interrupted`: the connection is
-  // being made anew. Error: what ends the run.
+  // One turn of the loop. Waits at most a few milliseconds for something to happen. `interrupted`: the client is
+  // reconnecting. Error: the reason that the run ends.
   [[nodiscard]] Result<State> turn(bool interrupted);
 
-  // Blocks, triangles, hash, place in the room's order and times as JSON.
+  // Blocks, triangles, hash, sequence number and times as JSON.
   [[nodiscard]] std::string summary_json() const;
 
  private:
@@ -65,12 +66,12 @@ class Viewer {
   void draw_now();
   void log_shown(std::int64_t rendered_mono_ns);
   [[nodiscard]] Result<State> obey_script();
-  // Null: not yet, ask again in the next turn.
+  // Null: not done yet; call again in the next turn.
   [[nodiscard]] std::optional<Result<void>> obey(const Command& command);
   [[nodiscard]] std::optional<Result<void>> obey_room(const RoomRequest& request);
   [[nodiscard]] std::optional<Result<void>> obey_people(const Command& command);
   [[nodiscard]] Result<void> look_as(const std::string& who);
-  // Which annotation it is.
+  // The annotation's number.
   [[nodiscard]] Result<std::uint32_t> draw_for_all(AnnotationKind kind, const std::vector<Vec3>& points_mm,
                                                    const std::string& words);
   [[nodiscard]] Result<void> say(const Say& say);
@@ -81,18 +82,18 @@ class Viewer {
   RenderQueue* queue_;
   std::optional<ScriptReader> script_;
   std::ofstream frame_log_;
-  std::chrono::steady_clock::time_point capped_;  // when the cap was last asked
+  std::chrono::steady_clock::time_point capped_;  // when the SpaceMouse was last read
   std::uint32_t cap_buttons_ = 0;
 
   SurfaceScene scene_;
   std::vector<CuttingState> states_;
   std::vector<SceneItem> items_;
   std::vector<BodyId> bodies_;
-  std::optional<RoomAnswer> asked_;  // of the pending command
+  std::optional<RoomAnswer> asked_;  // the answer to the pending command
   bool tool_shown_ = true;
   bool interrupted_ = false;
-  bool surface_complete_ = false;  // the whole surface has come
-  bool surface_shown_ = false;     // and was drawn
+  bool surface_complete_ = false;  // the whole surface was received
+  bool surface_shown_ = false;     // and drawn
   std::size_t snapshot_blocks_ = 0, snapshot_received_ = 0;
   RoomSeq received_seq_, shown_seq_;
   std::vector<Arrival> not_logged_;
@@ -103,7 +104,7 @@ class Viewer {
   std::map<AuthorId, std::string> names_;
   std::vector<std::string> said_;
   std::string holding_;
-  std::string followed_;  // who moves the camera; empty: nobody
+  std::string followed_;  // whose view the camera follows; empty: nobody
   std::optional<ViewFrustum> look_taken_;
 
   struct Pending {

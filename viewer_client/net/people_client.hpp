@@ -1,4 +1,4 @@
-// An instructor's connection to a room: hears of its people and asks for what they may decide.
+// An instructor's connection to a room. It receives the state of the people and sends the instructor's requests.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -15,23 +15,24 @@ namespace osteon {
 
 struct PeopleClientOptions {
   std::string address;  // host:port
-  std::string room{};   // empty: the only one that is open
+  std::string room{};   // empty: the only open room
   wire::ClientCredentials credentials{};
   std::string name = "console";  // shown to others
   std::chrono::milliseconds patience{5000};
-  // The newest join of a window that is in the room already: people are heard of under its identity. None: joins by
-  // itself, as a console.
+  // The newest join of a window that is already in the room. The state of the people is then received under that
+  // window's identity. None: the client joins by itself, as a console.
   std::function<wire::JoinedRoom()> window{};
 };
 
-// Any thread. It has one thread, which reads; a lost connection is made again until the room refuses it.
+// Any thread may call it. It has one reader thread. That thread reconnects after a lost connection, until the room
+// refuses it.
 class PeopleClient final : public SupervisionClient {
  public:
-  // Joins, and waits for the first news. Errors: those of wire::join_room.
+  // Joins, and waits for the first state. Errors: those of wire::join_room.
   [[nodiscard]] static Result<std::unique_ptr<PeopleClient>> start(const PeopleClientOptions& options,
                                                                    std::function<bool()> stop);
   ~PeopleClient() override;
-  // What went wrong for good.
+  // The error that ended the connection for good.
   [[nodiscard]] std::optional<Error> failure_seen() const;
 
   AuthorId self() const override;

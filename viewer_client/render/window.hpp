@@ -1,5 +1,5 @@
-// The picture: one window with the bone, the tools and a line of gauges. VTK stays behind this page.
-// All functions: [render], the thread that opened the window.
+// One window with the bone, the tools and a line of gauges. It hides VTK from the rest of the program. All functions:
+// [render], the thread that opened the window.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -26,7 +26,7 @@ struct WindowOptions {
   std::string title = "Osteon";
 };
 
-// Pixels as one sees them, rows from the top.
+// Pixels as they are seen; rows from the top.
 struct Image {
   int width_px = 0;
   int height_px = 0;
@@ -36,10 +36,10 @@ struct Image {
   }
 };
 
-// What the user did in the window since it was last asked.
+// The user's actions in the window since the last call of events().
 struct WindowEvents {
   bool closed = false;
-  bool redraw = false;          // the camera moved or the window was uncovered or resized
+  bool redraw = false;          // the camera moved, or the window was uncovered or resized
   bool wants_overview = false;  // key O
   bool wants_tool = false;      // key T
   bool wants_wipe = false;      // key X
@@ -49,39 +49,41 @@ struct WindowEvents {
 
 class BoneWindow {
  public:
-  // Error not_found: no X display, one that cannot be reached, or one without OpenGL.
+  // Error not_found: there is no X display, it cannot be reached, or it has no OpenGL.
   [[nodiscard]] static Result<std::unique_ptr<BoneWindow>> open(const WindowOptions& options);
   ~BoneWindow();
 
-  // The region's whole mesh, bone frame; an empty mesh takes the region out of the picture.
+  // The region's whole mesh, bone frame. An empty mesh removes the region from the picture.
   void show_region(const RegionKey& region, const Mesh& mesh);
-  // The tools of the room; those not in the list vanish. A translucent ghost stands where the hand is, if not there.
+  // The tools of the room. Tools that are not in the list vanish. A translucent ghost shows the pose of the user's hand
+  // where it differs from the tool.
   void show_tools(std::span<const CuttingState> states);
-  // A tool that is not built in, as the room defines it; from now on states and items may name it.
+  // Adds a tool that is not built in, as the room defines it. From then on states and items may name it.
   void learn_tool(const Tool& tool);
-  // What stands on the bone; what is not in the list vanishes.
+  // The items on the bone. Items that are not in the list vanish.
   void show_items(std::span<const SceneItem> items);
   void show_text(const std::string& gauges, const std::string& notice);
-  // What people have drawn; what is not in the list vanishes.
+  // The annotations of the room. Annotations that are not in the list vanish.
   void show_annotations(std::span<const Annotation> drawn);
-  // Each tool is named by its person.
+  // Each tool shows the name of its person.
   void show_names(std::map<AuthorId, std::string> names);
-  // Who said what, one after the other; and what holds for one's own hand, in lines.
+  // What was said, one line for each person's text, and the restrictions of one's own hand, in lines.
   void show_words(const std::vector<std::string>& said, const std::string& holding);
 
-  // What of the bone is seen at a pixel, columns from the left and rows from the top; bone frame.
+  // The point of the bone at a pixel, bone frame. Columns from the left, rows from the top.
   [[nodiscard]] std::optional<Vec3> surface_at(int x_px, int y_px) const;
 
   void look(const CameraView& view);
   [[nodiscard]] CameraView camera() const;
 
   void draw();
-  // Draws once more with soft shadows in hollows, which a live picture in software has no time for, and saves that.
+  // Draws once more with soft shadows in hollows, and saves that picture. A live picture in software has no time for
+  // such shadows.
   [[nodiscard]] Result<void> save_png(const std::filesystem::path& file);
-  // What the last draw() made.
+  // The picture of the last draw().
   [[nodiscard]] Image image() const;
 
-  // Handles what the window system has sent.
+  // Handles the events that the window system has sent.
   [[nodiscard]] WindowEvents events();
 
  private:

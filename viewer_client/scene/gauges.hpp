@@ -1,4 +1,4 @@
-// What the viewer writes beside the picture about a tool.
+// The text that the viewer shows beside the picture about a tool.
 #pragma once
 #include <string>
 
@@ -6,7 +6,7 @@
 
 namespace osteon {
 
-// Lines: tool and what it does, spindle speed, physical force, depth, metal in its way, density where it touches.
+// Lines: the tool and its activity, spindle speed, physical force, depth, metal in its way, density at the contact.
 [[nodiscard]] std::string gauge_text(const CuttingState& state);
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// Everything that a window shows of the people of a room, as far as the room has told.
+// All that a window shows of the people of a room, as received from the room.
 #pragma once
 #include <vector>
 
@@ -9,7 +9,7 @@ namespace osteon {
 struct PeopleSeen {
   std::vector<PersonSeen> people{};
   std::vector<Annotation> annotations{};
-  std::vector<WordsSeen> words{};  // said lately, oldest first
+  std::vector<WordsSeen> words{};  // the newest texts, oldest first
 };
 
 }  // namespace osteon

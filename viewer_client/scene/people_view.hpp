@@ -1,4 +1,4 @@
-// What a window shows of the people: notices that pass, what holds for a hand, what is drawn, who is called what.
+// What a window shows of the people: temporary notices, the restrictions of a hand, annotations and names.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -13,11 +13,11 @@
 
 namespace osteon {
 
-// The text in lines of at most `columns` characters, broken at blanks where there are some; after `most` lines it is
+// Wraps the text into lines of at most `columns` characters, at blanks where there are any. Text after `most` lines is
 // cut off.
 [[nodiscard]] std::string wrapped(std::string_view text, std::size_t columns, std::size_t most);
 
-// In which somebody draws: red, green, blue. Those who come one after the other have different ones.
+// The colour of a person's annotations: red, green, blue. Consecutive authors have different colours.
 [[nodiscard]] std::uint32_t colour_of(AuthorId author);
 
 // [render]
@@ -27,27 +27,28 @@ class PeopleView {
   static constexpr std::chrono::seconds kShown{12};
   static constexpr std::size_t kMostNotices = 5;
 
-  // `hand`: who sits before this window with a hand, by name or as #NUMBER; empty: nobody.
+  // `hand`: the tool operator at this window, by name or as #NUMBER; empty: nobody.
   explicit PeopleView(std::string hand = {}) : hand_(std::move(hand)) {}
 
-  // `self`: this window's own identity; what is said to it is said "to you".
+  // `self`: this window's own identity. Words to it are shown as said "to you".
   void take(const PeopleSeen& seen, AuthorId self, Clock::time_point now);
 
-  // A notice of the program's own.
+  // A notice of the program itself.
   void tell(std::string text, Clock::time_point now);
 
-  // By name, or by # and the author's number. Of several of one name - a person's hand and their window - those who fit
-  // better, then those who are here, then the newest. Error not_found, naming those who are here.
+  // By name, or by # and the author's number. Several can have one name, for example a person's hand and their window.
+  // Then the better fit comes first, then those who are here, then the newest. Error not_found: names those who are
+  // here.
   enum class Fit { anybody, looking, hand };
   [[nodiscard]] Result<PersonSeen> find(std::string_view who, Fit fit = Fit::anybody) const;
-  // "Ada", or "#3" for somebody without a name.
+  // "Ada", or "#3" for a person without a name.
   [[nodiscard]] std::string name_of(AuthorId author) const;
   [[nodiscard]] std::map<AuthorId, std::string> names() const;
   [[nodiscard]] const std::vector<Annotation>& annotations() const { return annotations_; }
 
-  // Who said what and what was decided lately, oldest first.
+  // The newest words and decisions, oldest first.
   [[nodiscard]] std::vector<std::string> notices(Clock::time_point now) const;
-  // What holds for the hand as long as it does, in lines; empty: nothing.
+  // The restrictions of the hand while they are in force, in lines. Empty: none.
   [[nodiscard]] std::string holding() const;
 
  private:
@@ -56,7 +57,7 @@ class PeopleView {
     std::string text;
   };
   [[nodiscard]] bool is_hand(const PersonSeen& person) const;
-  [[nodiscard]] std::string guard(const PersonSeen& person) const;  // who decided last about them
+  [[nodiscard]] std::string guard(const PersonSeen& person) const;  // who last decided about them
   void notice_decision(const PersonSeen& person, const Restrictions& before, Clock::time_point now);
 
   std::string hand_;

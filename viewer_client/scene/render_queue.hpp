@@ -1,4 +1,5 @@
-// What the network threads hand to the render thread. Bounded by the surface: of each block only the newest waits.
+// Passes data from the network threads to the render thread. The surface bounds its size: only the newest version of
+// each block waits.
 #pragma once
 #include <chrono>
 #include <condition_variable>
@@ -14,16 +15,16 @@
 
 namespace osteon {
 
-// When a committed event's picture data came in; CLOCK_MONOTONIC.
+// When the picture data of a committed event was received; CLOCK_MONOTONIC.
 struct Arrival {
   RoomSeq room_seq;
   std::int64_t received_mono_ns = 0;
 };
 
-// Everything that came since the last take().
+// All data received since the last take().
 struct Delivery {
-  bool snapshot_begun = false;     // a new stream: the blocks here belong to its snapshot or come after it
-  bool snapshot_complete = false;  // the whole surface has come
+  bool snapshot_begun = false;     // a new stream: these blocks belong to its snapshot or come after it
+  bool snapshot_complete = false;  // the whole surface was received
   std::uint32_t snapshot_blocks = 0;
   std::map<BlockKey, ReceivedBlock> blocks;
   std::vector<Arrival> arrivals;  // oldest first
@@ -33,13 +34,13 @@ struct Delivery {
   std::vector<CuttingState> states;
   std::vector<SceneItem> items;  // with any_states
   std::vector<BodyId> bodies;    // with any_states
-  std::vector<Tool> tools;       // that this program did not know
+  std::vector<Tool> tools;       // that this program did not have
 };
 
-// Any thread may call any function; one mutex, held for a few moves at a time.
+// Any thread may call any function. One mutex, held only for a few moves.
 class RenderQueue {
  public:
-  // A stream begins: what waits of the stream before it is void.
+  // A stream begins. Waiting data of the stream before it is dropped.
   void begin_stream();
   void put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
                 std::uint32_t snapshot_blocks, std::int64_t received_mono_ns);
@@ -47,7 +48,7 @@ class RenderQueue {
   void put_tool(Tool tool);
 
   [[nodiscard]] Delivery take();
-  // Returns early when something waits.
+  // Returns early if data is waiting.
   void wait_for(std::chrono::milliseconds time);
 
  private:

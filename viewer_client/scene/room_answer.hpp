@@ -1,4 +1,4 @@
-// The room's answer to what a viewer asks of it.
+// The room's answer to a viewer's request.
 #pragma once
 #include <optional>
 #include <string>
@@ -8,9 +8,9 @@
 namespace osteon {
 
 struct RoomAnswer {
-  RoomSeq place;              // of the event that follows; contained in the file where the bone was saved
-  std::optional<int> events;  // that an undo or redo reached: fewer than asked where there are no more
-  std::string said = {};      // where an item that was set stands now
+  RoomSeq place;              // of the event that follows; for a saved bone, the newest event in the file
+  std::optional<int> events;  // undone or redone; fewer than asked for if there are no more
+  std::string said = {};      // where a placed item stands now
 };
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// The people of a room as somebody who supervises them sees them, and what they may ask of the room: plain data, no gRPC.
+// The people of a room and the requests that a supervisor may send. Plain data, no gRPC.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -20,14 +20,15 @@ namespace osteon {
 
 struct PersonSeen {
   AuthorId author;
-  std::string name;  // empty: nobody's
+  std::string name;  // empty: no name
   Role role = Role::none;
   bool here = false, hand = false;
-  Restrictions supervision;  // what holds for the hand
-  RoomSeq decided, heard;    // the place of what was decided last, null for nothing; the newest that their client has
-  AuthorId decided_by;       // who decided it; null: nobody knows
-  std::optional<ViewFrustum> look;  // from where they look, where somebody knows
-  std::uint32_t cuts = 0;           // that were taken
+  Restrictions supervision;  // what is in force for the hand
+  // sequence numbers: of the newest decision (null: none), and the newest that their client acknowledged
+  RoomSeq decided, heard;
+  AuthorId decided_by;       // who decided it; null: unknown
+  std::optional<ViewFrustum> look;  // their view, if it is known
+  std::uint32_t cuts = 0;           // accepted
   [[nodiscard]] bool pending() const { return decided && heard < decided; }
 };
 
@@ -47,10 +48,10 @@ struct RoomSeen {
   std::vector<std::pair<RoomSeq, std::string>> marks;
 };
 
-// One of them.
+// Exactly one of them is set.
 struct WhatToUndo {
   std::uint32_t count = 0;
-  AuthorId of{};  // with count; null: of all
+  AuthorId of{};  // with count; null: of all people
   RoomSeq to{};
   std::chrono::milliseconds newest{};
   bool all = false;
@@ -58,33 +59,34 @@ struct WhatToUndo {
 
 struct WhatToDemonstrate {
   std::string room;      // empty: this one
-  AuthorId of{};         // null: everyone's
+  AuthorId of{};         // null: of all people
   RoomSeq from{}, to{};  // null: its beginning, its end
   double speed = 1.0;
 };
 
-// What is asked waits for the answer. Errors: invalid_input, not_found, denied, unavailable.
+// Requests wait for the answer. Errors: invalid_input, not_found, denied, unavailable.
 class SupervisionClient {
  public:
   virtual ~SupervisionClient() = default;
   [[nodiscard]] virtual AuthorId self() const = 0;
-  // As far as the room has told.
+  // As received from the room.
   [[nodiscard]] virtual std::vector<PersonSeen> people() const = 0;
   [[nodiscard]] virtual std::vector<Annotation> annotations() const = 0;
   [[nodiscard]] virtual std::vector<WordsSeen> words() const = 0;
-  // Until `done`, which is asked after every news. False: the patience was over, or the program is to stop.
+  // Waits until `done` returns true; it is called after every update. False: `patience` is over, or the program is to
+  // stop.
   [[nodiscard]] virtual bool wait(const std::function<bool()>& done, std::chrono::milliseconds patience) const = 0;
 
-  // Place of the event, of the last where there are several. `subject` null: every hand that can be supervised.
+  // The sequence number of the event, or of the last of several. `subject` null: every hand that can be supervised.
   [[nodiscard]] virtual Result<RoomSeq> supervise(AuthorId subject, const Restrictions& supervision) = 0;
   [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> undo(
-      const WhatToUndo& what) = 0;  // and how many events
+      const WhatToUndo& what) = 0;  // and the number of events
   [[nodiscard]] virtual Result<std::pair<RoomSeq, std::size_t>> redo(std::uint32_t count) = 0;
   [[nodiscard]] virtual Result<RoomSeq> mark(const std::string& label) = 0;
-  [[nodiscard]] virtual Result<std::uint32_t> draw(const Annotation& drawn) = 0;         // which it is
-  [[nodiscard]] virtual Result<void> wipe_off(std::uint32_t annotation) = 0;             // 0: all own ones
+  [[nodiscard]] virtual Result<std::uint32_t> draw(const Annotation& drawn) = 0;         // its number
+  [[nodiscard]] virtual Result<void> wipe_off(std::uint32_t annotation) = 0;             // 0: all of one's own
   [[nodiscard]] virtual Result<RoomSeq> say(AuthorId to, const std::string& words) = 0;  // null: to all
-  // The demonstrator, and how many cuts there are to see.
+  // The demonstrator, and the number of cuts to be shown.
   [[nodiscard]] virtual Result<std::pair<AuthorId, std::size_t>> demonstrate(const WhatToDemonstrate& what) = 0;
   [[nodiscard]] virtual Result<void> end_demonstration(AuthorId demonstrator) = 0;
   [[nodiscard]] virtual Result<std::vector<std::pair<std::string, Digest>>> tools() = 0;  // by name

@@ -1,4 +1,4 @@
-// The surface as received from the server: blocks, the newest of each, in regions that are rebuilt one at a time.
+// The surface as received from the server: the newest version of each block, in regions that are rebuilt one by one.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -11,7 +11,7 @@
 
 namespace osteon {
 
-// One block as the network thread hands it over: decoded and checked against its hash. No triangles: no surface left.
+// One block from the network thread, decoded and checked against its hash. No triangles: no surface is left.
 struct ReceivedBlock {
   BlockKey key;
   std::uint64_t version = 0;
@@ -19,8 +19,8 @@ struct ReceivedBlock {
   Mesh mesh;
 };
 
-// 4³ blocks of one level, drawn as one object. Fine blocks have regions of their own, so a cut with a small tool
-// rebuilds a region of 64 h / 4 at most, never the bone around it.
+// 4³ blocks of one level, drawn as one object. Fine blocks have their own regions. A cut with a small tool therefore
+// rebuilds a region of at most 64 h / 4, never the bone around it.
 inline constexpr int kRegionShift = 2;
 
 struct RegionKey {
@@ -35,30 +35,31 @@ struct RegionKey {
 // [render]
 class SurfaceScene {
  public:
-  // Takes a block unless a version at least as new is held; true when the picture changes.
+  // Takes a block unless its version is not newer than the present one. True if the picture changes.
   bool replace(ReceivedBlock block);
 
-  // A stream begins with the whole surface. After it was interrupted, versions may have started anew (another
-  // server) and blocks may have gone: between the two calls every block is taken as new, and what the snapshot did
-  // not contain is dropped at its end.
+  // A stream begins with the whole surface. After an interruption, versions may restart (another server) and blocks may
+  // be gone. Between these two calls every block is taken as new. At the end, blocks that the snapshot did not contain
+  // are dropped.
   void begin_snapshot();
   void end_snapshot();
 
   // Regions changed since the last call, each once, in order.
   [[nodiscard]] std::vector<RegionKey> take_dirty();
-  // All triangles of a region as one mesh, blocks in the order of their keys; empty where nothing is left.
+  // All triangles of a region as one mesh, blocks in the order of their keys. Empty if nothing is left.
   [[nodiscard]] Mesh region_mesh(const RegionKey& region) const;
 
   [[nodiscard]] std::size_t blocks() const { return drawn_blocks_; }  // with triangles
   [[nodiscard]] std::size_t triangles() const { return triangles_; }
   [[nodiscard]] std::size_t regions() const;  // with triangles
-  // SHA-256 over the sorted (key, mesh_hash) of all blocks with triangles: equal in every viewer of one surface.
+  // SHA-256 over the sorted (key, mesh_hash) of all blocks with triangles. All viewers of one surface get the same
+  // hash.
   [[nodiscard]] Digest hash() const;
 
  private:
   struct Block {
     std::uint64_t version = 0;
-    std::uint64_t snapshot = 0;  // in which it came last
+    std::uint64_t snapshot = 0;  // in which it was last received
     Digest mesh_hash;
     Mesh mesh;
   };

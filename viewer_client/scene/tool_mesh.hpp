@@ -1,5 +1,5 @@
-// A tool to look at, made from its definition: drills and round burs as surfaces of revolution carved by flutes, every
-// other by its implicit solid.
+// A mesh to draw a tool, made from its definition. Drills and round burs are surfaces of revolution with flutes. All
+// other tools are made from their implicit solid.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -16,7 +16,8 @@ struct ToolMesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-// On the tool's solid or, in flutes, inside of it. Closed; corners on sharp edges are there once for each face.
+// Vertices lie on the tool's solid or, in flutes, inside it. The mesh is closed. A corner on a sharp edge has one
+// vertex for each face.
 [[nodiscard]] ToolMesh tool_mesh(const Tool& tool);
 
 }  // namespace osteon
