@@ -13,7 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr std::chrono::milliseconds kUntilSaid{5000};  // until what was decided is seen in the list of people
+constexpr std::chrono::milliseconds kUntilSaid{5000};  // until the people's state shows the decision
 constexpr double kAcknowledgePatience_s = 30.0;
 
 tl::unexpected<Error> bad(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
@@ -28,7 +28,7 @@ std::optional<T> number(std::string_view word) {
   return value;
 }
 
-std::string at(RoomSeq place) { return "at " + std::to_string(place.value); }
+std::string at(RoomSeq seq) { return "at " + std::to_string(seq.value); }
 
 std::string text_of(double value) {
   char text[32];
@@ -38,14 +38,14 @@ std::string text_of(double value) {
 
 std::string text_of(const Vec3& v) { return text_of(v.x()) + " " + text_of(v.y()) + " " + text_of(v.z()); }
 
-// Names, labels and words keep the answer on its line.
+// Quotes names, labels and words, so that the answer stays on its line.
 std::string quoted(std::string_view words) {
   std::string out = "\"";
   for (const char c : words) out += c == '"' ? '\'' : static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
   return out + '"';
 }
 
-// In steps of 2^-10 mm. Error invalid_input: a kilometre away.
+// In steps of 2^-10 mm. Error invalid_input: more than about a kilometre away.
 Result<std::int32_t> steps(double mm) {
   const double steps = std::round(mm / kQuantum_mm);
   if (std::abs(steps) > 1 << 30) return bad(text_of(mm) + " mm is too far away");
@@ -70,7 +70,7 @@ std::string joined(const std::vector<std::string>& words, std::size_t first) {
   return out;
 }
 
-// The word behind `key`, which is taken out of the words with it.
+// Removes `key` and the word behind it, and returns that word.
 std::optional<std::string> take_pair(std::vector<std::string>& words, std::string_view key) {
   const auto found = std::ranges::find(words, key);
   if (found == words.end() || found + 1 == words.end()) return std::nullopt;
@@ -113,36 +113,38 @@ struct Console::Command {
 
 const std::vector<Console::Command>& Console::commands() {
   static const std::vector<Command> kCommands{
-      {"people", &Console::people, "people", "who is there, what holds for whom, and who has not heard of it yet"},
-      {"freeze", &Console::freeze, "freeze NAME|all [WORDS]", "the hand cuts no more; its person is shown the words"},
-      {"free", &Console::free, "free NAME|all", "it may cut again"},
-      {"take", &Console::take, "take NAME [WORDS]", "its tool is yours"},
-      {"give-back", &Console::give_back, "give-back NAME", "and its own again"},
+      {"people", &Console::people, "people", "who is here, what restricts whom, and who has not acknowledged it yet"},
+      {"freeze", &Console::freeze, "freeze NAME|all [WORDS]",
+       "stops the person's hand: it cannot cut; they see the words"},
+      {"free", &Console::free, "free NAME|all", "ends the stop: the hand may cut again"},
+      {"take", &Console::take, "take NAME [WORDS]", "takes over the person's tool"},
+      {"give-back", &Console::give_back, "give-back NAME", "gives the tool back to the person"},
       {"guide", &Console::guide, "guide NAME along NAME [share 0..1]",
-       "pulls the hand along another's tool, as firmly as said"},
-      {"unguide", &Console::unguide, "unguide NAME", "lets it go"},
+       "pulls the hand along another person's tool; share: how firmly"},
+      {"unguide", &Console::unguide, "unguide NAME", "ends the guidance"},
       {"limit", &Console::limit, "limit force NAME N|none | zone NAME X Y Z R|none | tools NAME TOOL,TOOL|none",
-       "newtons that it feels and cuts with; a ball in which it may cut; tools that it may cut with"},
+       "largest force in newtons; the ball in which the hand may cut; the tools that may cut"},
       {"undo", &Console::undo, "undo N s | undo to MARK | undo all | undo N [of NAME]",
-       "the last N seconds; what came after a mark, by its number or label; everything; the newest N events"},
-      {"redo", &Console::redo, "redo [N]", "what the newest N undos took back"},
+       "the last N seconds; all after a mark (its number or label); everything; the newest N events"},
+      {"redo", &Console::redo, "redo [N]", "repeats what the newest N undos took back"},
       {"mark", &Console::mark, "mark LABEL", "gives this moment a name"},
       {"point", &Console::point, "point X Y Z [WORDS]",
-       "an arrow to there, in millimetres of the bone's frame; replaces your last"},
-      {"draw", &Console::line, "draw X Y Z X Y Z ...", "a line"},
+       "an arrow to this point, mm in the bone's frame; replaces your last arrow"},
+      {"draw", &Console::line, "draw X Y Z X Y Z ...", "a line through these points"},
       {"label", &Console::label, "label X Y Z WORDS", "words at a point"},
-      {"wipe", &Console::wipe, "wipe ID|all", "a drawing, or all of yours"},
-      {"drawn", &Console::drawn, "drawn", "the drawings by their numbers"},
-      {"say", &Console::say, "say [NAME|all] WORDS", "to one, or to all"},
-      {"said", &Console::said, "said", "the words of late"},
-      {"view", &Console::view, "view NAME", "from where they look at what, in millimetres of the bone's frame"},
+      {"wipe", &Console::wipe, "wipe ID|all", "removes one annotation, or all of yours"},
+      {"drawn", &Console::drawn, "drawn", "lists the annotations and their numbers"},
+      {"say", &Console::say, "say [NAME|all] WORDS", "sends words to one person, or to all"},
+      {"said", &Console::said, "said", "lists the newest words"},
+      {"view", &Console::view, "view NAME", "the eye and the target of the person's view, mm in the bone's frame"},
       {"demonstrate", &Console::demonstrate, "demonstrate [ROOM] [of NAME] [from A] [to B] [speed S]",
-       "what was cut there happens again here, by events A to B"},
+       "repeats the cuts of a room here, from event A to event B"},
       {"end-demonstration", &Console::end_demonstration, "end-demonstration ID",
-       "by the number that `demonstrate` said"},
-      {"wait", &Console::wait, "wait acknowledged NAME [SECONDS]", "until they have heard what was decided about them"},
+       "by the number that `demonstrate` printed"},
+      {"wait", &Console::wait, "wait acknowledged NAME [SECONDS]",
+       "until they have acknowledged the newest decision about them"},
       {"status", &Console::status, "status", "the room's newest event, the hash of its bone, its marks"},
-      {"quit", &Console::quit, "quit", "as does the end of the input"},
+      {"quit", &Console::quit, "quit", "ends the console; so does the end of the input"},
   };
   return kCommands;
 }
@@ -150,7 +152,7 @@ const std::vector<Console::Command>& Console::commands() {
 const char* Console::help() {
   static const std::string kHelp = [] {
     std::string out =
-        "Commands of --console, one a line, each answered by `ok ...` or `error ...` on standard output.\n"
+        "Commands of --console, one per line, each answered by `ok ...` or `error ...` on standard output.\n"
         "NAME: a name, in quotes where it has spaces, or #3 for author 3.\n";
     for (const Command& command : commands())
       out += "  " + std::string(command.form) + "\n      " + command.what + "\n";
@@ -188,7 +190,7 @@ Result<PersonSeen> Console::find(const std::string& name) const {
   std::erase_if(all, [&](const PersonSeen& one) { return one.name != name; });
   if (all.empty())
     return failure(ErrorCode::not_found, "there is nobody called " + quoted(name) + "; `people` says who there is");
-  // Somebody's hand rather than their viewer, and who is here rather than who was.
+  // Prefer somebody's hand to their viewer, and those who are here to those who left.
   for (const auto& better : {&PersonSeen::hand, &PersonSeen::here})
     if (std::ranges::any_of(all, better)) std::erase_if(all, [&](const PersonSeen& one) { return !(one.*better); });
   if (all.size() > 1) {
@@ -245,24 +247,25 @@ Console::Answer Console::people(const Words& words) {
 }
 
 Console::Answer Console::supervise(const std::string& name, const std::function<void(Restrictions&)>& change) {
-  // Later commands go out from what this one has made.
-  const auto said = [&](RoomSeq place) {
+  // Wait until the change is published, so that later commands start from it.
+  const auto said = [&](RoomSeq seq) {
     const auto seen = [&] {
-      return std::ranges::any_of(room_.people(), [&](const PersonSeen& one) { return one.decided >= place; });
+      return std::ranges::any_of(room_.people(), [&](const PersonSeen& one) { return one.decided >= seq; });
     };
     (void)room_.wait(seen, kUntilSaid);
-    return at(place);
+    return at(seq);
   };
   if (name != "all") {
     const Result<PersonSeen> person = find(name);
     if (!person) return tl::unexpected(person.error());
     Restrictions word = person->supervision;
     change(word);
-    const Result<RoomSeq> place = room_.supervise(person->author, word);
-    if (!place) return tl::unexpected(place.error());
-    return said(*place);
+    const Result<RoomSeq> seq = room_.supervise(person->author, word);
+    if (!seq) return tl::unexpected(seq.error());
+    return said(*seq);
   }
-  // In one go, where the same is to hold for all; else one by one, so that each keeps what else holds for them.
+  // One request if the same restrictions result for all. Else one request each, so that everyone keeps their other
+  // restrictions.
   std::vector<PersonSeen> hands = room_.people();
   std::erase_if(hands, [&](const PersonSeen& one) {
     return !one.hand || one.role == Role::instructor || one.author == room_.self();
@@ -275,15 +278,15 @@ Console::Answer Console::supervise(const std::string& name, const std::function<
   const bool same =
       std::ranges::all_of(hands, [&](const PersonSeen& one) { return changed(one) == changed(hands.front()); });
   if (hands.empty() || same) {
-    const Result<RoomSeq> place = room_.supervise({}, hands.empty() ? Restrictions{} : changed(hands.front()));
-    if (!place) return tl::unexpected(place.error());
-    return said(*place);
+    const Result<RoomSeq> seq = room_.supervise({}, hands.empty() ? Restrictions{} : changed(hands.front()));
+    if (!seq) return tl::unexpected(seq.error());
+    return said(*seq);
   }
   RoomSeq last;
   for (const PersonSeen& one : hands) {
-    const Result<RoomSeq> place = room_.supervise(one.author, changed(one));
-    if (!place) return tl::unexpected(place.error());
-    last = *place;
+    const Result<RoomSeq> seq = room_.supervise(one.author, changed(one));
+    if (!seq) return tl::unexpected(seq.error());
+    last = *seq;
   }
   return said(last);
 }
@@ -306,7 +309,7 @@ Console::Answer Console::free(const Words& words) {
 
 Console::Answer Console::take(const Words& words) {
   if (words.size() < 2 || words[1] == "all") return bad("");
-  // Who has a hand here themselves takes it into that one.
+  // A person who has a hand in this room takes the tool into that hand.
   const std::vector<PersonSeen> all = room_.people();
   const auto self = std::ranges::find(all, room_.self(), &PersonSeen::author);
   const Result<PersonSeen> subject = find(words[1]);
@@ -359,7 +362,7 @@ Console::Answer Console::limit(const Words& words) {
     if (words.size() != 4 || !newtons || *newtons < 0) return bad("");
     if (*newtons > 0.01 * kMostForceLimit)
       return bad("the most that can be said is " + osteon::text_of(0.01 * kMostForceLimit) + " N");
-    // Not even nothing is no limit.
+    // A limit of 0 N must not become "no limit".
     const int hundredths = none ? 0 : std::max(1, static_cast<int>(std::lround(100 * *newtons)));
     return supervise(name, [&](Restrictions& word) { word.force_limit = hundredths; });
   }
@@ -401,9 +404,9 @@ Console::Answer Console::undo(const Words& words) {
     const Result<RoomSeen> seen = room_.status();
     if (!seen) return tl::unexpected(seen.error());
     const std::string label = joined(words, 2);
-    // Of several with one label the newest.
-    for (const auto& [place, known] : seen->marks)
-      if (known == label || std::to_string(place.value) == label) what.to = place;
+    // If several marks have this label, the newest counts.
+    for (const auto& [seq, known] : seen->marks)
+      if (known == label || std::to_string(seq.value) == label) what.to = seq;
     if (!what.to) return failure(ErrorCode::not_found, "the room has no mark " + quoted(label));
   } else {
     const bool seconds = words.size() == 3 && words[2] == "s";
@@ -441,9 +444,9 @@ Console::Answer Console::redo(const Words& words) {
 
 Console::Answer Console::mark(const Words& words) {
   if (words.size() < 2) return bad("");
-  const Result<RoomSeq> place = room_.mark(joined(words, 1));
-  if (!place) return tl::unexpected(place.error());
-  return at(*place);
+  const Result<RoomSeq> seq = room_.mark(joined(words, 1));
+  if (!seq) return tl::unexpected(seq.error());
+  return at(*seq);
 }
 
 Console::Answer Console::draw(AnnotationKind kind, const Words& words, std::size_t points) {
@@ -515,7 +518,7 @@ Console::Answer Console::say(const Words& words) {
     first = 2;
   } else if (words.size() > 2) {
     const Result<PersonSeen> person = find(words[1]);
-    // Words to all may begin with any word; a number or a name that several have is meant as one.
+    // Words to all may begin with any word. A number, or a name that several people have, always means a person.
     if (!person && (person.error().code != ErrorCode::not_found || words[1].starts_with('#')))
       return tl::unexpected(person.error());
     if (person) {
@@ -523,12 +526,12 @@ Console::Answer Console::say(const Words& words) {
       first = 2;
     }
   }
-  const Result<RoomSeq> place = room_.say(to, joined(words, first));
-  if (!place) return tl::unexpected(place.error());
+  const Result<RoomSeq> seq = room_.say(to, joined(words, first));
+  if (!seq) return tl::unexpected(seq.error());
   (void)room_.wait(
-      [&] { return std::ranges::any_of(room_.words(), [&](const WordsSeen& one) { return one.place >= *place; }); },
+      [&] { return std::ranges::any_of(room_.words(), [&](const WordsSeen& one) { return one.place >= *seq; }); },
       kUntilSaid);
-  return at(*place) + " to " + (to ? name_of(to) : "all");
+  return at(*seq) + " to " + (to ? name_of(to) : "all");
 }
 
 Console::Answer Console::said(const Words& words) {
@@ -542,7 +545,7 @@ Console::Answer Console::said(const Words& words) {
 
 Console::Answer Console::view(const Words& words) {
   if (words.size() != 2) return bad("");
-  // Who looks is somebody's viewer, which has no hand.
+  // The view belongs to the person's viewer, which has no hand.
   std::optional<ViewFrustum> look;
   const Result<PersonSeen> person = find(words[1]);
   if (!person) return tl::unexpected(person.error());
@@ -561,15 +564,15 @@ Console::Answer Console::demonstrate(const Words& words) {
     const Result<PersonSeen> person = find(*name);
     const auto author =
         name->starts_with('#') ? number<std::uint64_t>(std::string_view(*name).substr(1)) : std::nullopt;
-    // In another room somebody else may have the number.
+    // In another room the number may belong to somebody else.
     if (!person && !author) return tl::unexpected(person.error());
     what.of = author ? AuthorId{*author} : person->author;
   }
-  for (const auto& [key, place] : {std::pair("from", &what.from), std::pair("to", &what.to)})
+  for (const auto& [key, seq] : {std::pair("from", &what.from), std::pair("to", &what.to)})
     if (const auto said = take_pair(rest, key)) {
       const auto value = number<std::uint64_t>(*said);
       if (!value) return bad("");
-      *place = RoomSeq{*value};
+      *seq = RoomSeq{*value};
     }
   if (const auto said = take_pair(rest, "speed")) {
     const auto speed = number<double>(*said);
@@ -580,7 +583,7 @@ Console::Answer Console::demonstrate(const Words& words) {
   if (!rest.empty()) what.room = rest.front();
   const auto shown = room_.demonstrate(what);
   if (!shown) return tl::unexpected(shown.error());
-  // Hands are guided along it by its number, which the list of people may have later than this answer.
+  // A later command guides hands by this number. The list of people may contain it later than this answer.
   const auto seen = [&] {
     return std::ranges::any_of(room_.people(), [&](const PersonSeen& one) { return one.author == shown->first; });
   };
@@ -600,18 +603,18 @@ Console::Answer Console::end_demonstration(const Words& words) {
 
 Console::Answer Console::wait(const Words& words) {
   const auto patience_s = words.size() == 4 ? number<double>(words[3]) : std::optional(kAcknowledgePatience_s);
-  if (words.size() < 3 || words.size() > 4 || words[1] != "heard" || !patience_s || *patience_s < 0 ||
+  if (words.size() < 3 || words.size() > 4 || words[1] != "acknowledged" || !patience_s || *patience_s < 0 ||
       *patience_s > 1e6)
     return bad("");
-  const auto heard = [&] {
+  const auto acknowledged = [&] {
     const Result<PersonSeen> person = find(words[2]);
     return !person || !person->pending();
   };
-  const bool in_time = room_.wait(heard, std::chrono::milliseconds(std::llround(1000 * *patience_s)));
+  const bool in_time = room_.wait(acknowledged, std::chrono::milliseconds(std::llround(1000 * *patience_s)));
   const Result<PersonSeen> person = find(words[2]);
   if (!person) return tl::unexpected(person.error());
   if (!in_time)
-    return failure(ErrorCode::unavailable, name_of(person->author) + " has not heard of event " +
+    return failure(ErrorCode::unavailable, name_of(person->author) + " has not acknowledged event " +
                                                std::to_string(person->decided.value) + " yet");
   return at(person->heard);
 }
@@ -623,7 +626,7 @@ Console::Answer Console::status(const Words& words) {
   std::string out = "room " + quoted(seen->name) + " " + at(seen->room_seq) + " hash " + to_hex(seen->field_hash) +
                     " removed " + osteon::text_of(seen->removed_mm3) + " mm3 rejected " +
                     std::to_string(seen->rejected) + " bodies " + std::to_string(seen->bodies.size());
-  for (const auto& [place, label] : seen->marks) out += " mark " + std::to_string(place.value) + " " + quoted(label);
+  for (const auto& [seq, label] : seen->marks) out += " mark " + std::to_string(seq.value) + " " + quoted(label);
   return out;
 }
 

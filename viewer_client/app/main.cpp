@@ -24,42 +24,46 @@ using namespace osteon;
 constexpr const char* kProgram = "osteon-viewer";
 
 constexpr const char* kScriptHelp =
-    "Script commands, one a line, each answered by `ok ...` or `error ...` on standard output:\n"
+    "Script commands, one per line, each answered by `ok ...` or `error ...` on standard output:\n"
     "  wait surface                          until the whole surface is drawn\n"
     "  wait seq N                            until the room's event N is drawn\n"
-    "  wait bodies N                         until the room has so many bodies\n"
-    "  wait items N                          until so many guides, pins, screws and implants stand\n"
-    "  undo N, redo N                        the newest N events of all; N undo events; says how many there were\n"
-    "  mark LABEL                            gives this moment a name; says its number\n"
-    "  undo to MARK                          all that came after the mark of that number\n"
-    "  take-away BODY                        a sawn-off piece\n"
-    "  place TOOL near X Y Z [WAY] [on BODY] a guide, pin, screw or implant, on the surface nearest to there\n"
-    "  place TOOL at X Y Z WAY [on BODY]     the same, just there; WAY: along X Y Z (into the bone) [across X Y Z]\n"
-    "  move ITEM near X Y Z [WAY]            what stands, by the number that `place` said\n"
+    "  wait bodies N                         until the room has N bodies\n"
+    "  wait items N                          until N guides, pins, screws and implants are placed\n"
+    "  undo N, redo N                        the newest N events of all; N undo events; prints how many\n"
+    "  mark LABEL                            gives this moment a name; prints its number\n"
+    "  undo to MARK                          all events after the mark with that number\n"
+    "  take-away BODY                        removes a sawn-off piece\n"
+    "  place TOOL near X Y Z [WAY] [on BODY] a guide, pin, screw or implant, on the nearest surface\n"
+    "  place TOOL at X Y Z WAY [on BODY]     the same, exactly there\n"
+    "                                        (WAY: along X Y Z (into the bone) [across X Y Z])\n"
+    "  move ITEM near X Y Z [WAY]            an item, by the number that `place` printed\n"
     "  move ITEM at X Y Z WAY                pins along their axis only, guides unless pins fix them\n"
-    "  turn ITEM TURNS                       a screw by its thread, in or (negative) out, until its head is on bone\n"
-    "  seat ITEM [MOST_MM]                   an implant along its axis until bone stops it, 20 mm at most unless said\n"
-    "  remove ITEM                           what stands, but no guide that pins fix\n"
-    "                                        (the answers say where it stands now; `seated`: a guide held by two "
-    "pins,\n"
-    "                                        a screw with its head on bone, an implant with half of it on bone)\n"
+    "  turn ITEM TURNS                       a screw by its thread, in or (negative) out,\n"
+    "                                        until its head is on bone\n"
+    "  seat ITEM [MOST_MM]                   an implant along its axis until bone stops it,\n"
+    "                                        at most MOST_MM, 20 unless given\n"
+    "  remove ITEM                           an item, except a guide that pins fix\n"
+    "                                        (the answers give the item's position; `seated`: a guide\n"
+    "                                        held by two pins, a screw with its head on bone, an\n"
+    "                                        implant with half of it on bone)\n"
     "  save [NAME.vdb]                       the cut fields, on the server beside its --save\n"
     "  look overview                         the whole bone\n"
     "  look at X Y Z from X Y Z up X Y Z     millimetres in the bone's frame (x left, y back, z up)\n"
     "  look tool DIST_MM                     the tip of the tool from this distance\n"
-    "  look as WHO, follow WHO, follow off   from where a participant looks, by name or #NUMBER: now, or from now on\n"
-    "  point X Y Z [WORDS]                   an arrow for all to see, yours alone; says its number\n"
+    "  look as WHO, follow WHO, follow off   the view of a person, by name or #NUMBER: once, or always\n"
+    "  point X Y Z [WORDS]                   an arrow for all to see, one per person; prints its number\n"
     "  draw X Y Z X Y Z ...                  a line through all points\n"
     "  label X Y Z WORDS                     words at a point\n"
-    "  wipe NUMBER|all                       takes it off again; all: what you drew\n"
-    "  wait drawn N                          until so many arrows, lines and labels are shown\n"
-    "  say [WHO|all] WORDS                   to one participant, or to all; \"A NAME\" with blanks in quotes\n"
+    "  wipe NUMBER|all                       removes an annotation; all: all that you drew\n"
+    "  wait drawn N                          until N arrows, lines and labels are shown\n"
+    "  say [WHO|all] WORDS                   to one person, or to all; \"A NAME\" with blanks in quotes\n"
     "  tool on|off                           draw the tool and its gauges\n"
     "  screenshot FILE.png\n"
     "  status FILE.json                      blocks, triangles, hash and times so far\n"
-    "  quit                                  as does the script's end\n"
-    "Mouse: left turns, middle or shift-left shifts, right or wheel goes nearer. Keys: O overview, T tool, Q quit;\n"
-    "P then a click: point there, L then a drag: draw a line, X: wipe off what you drew, Esc: not after all.\n"
+    "  quit                                  ends the viewer; so does the end of the script\n"
+    "Mouse: left rotates, middle or shift-left shifts, right or wheel zooms.\n"
+    "Keys: O overview, T tool, Q quit; P then a click: point there, L then a drag: draw a line,\n"
+    "X: remove what you drew, Esc: cancel.\n"
     "SpaceMouse (--spacemouse): the bone follows the cap; first button overview, second tool.";
 
 struct Arguments {
@@ -84,7 +88,7 @@ Result<WindowOptions> window_options(const std::string& size) {
                  "--size " + size + " is not a size: give WIDTHxHEIGHT in pixels, each 64 to 8192, as in 1280x720");
 }
 
-// Commands as they come, until the input ends.
+// Answers commands as they arrive, until the input ends.
 Result<void> run_console(const Arguments& arguments) {
   StopSignal stop;
   const Result<wire::ClientCredentials> credentials = wire::client_credentials(arguments.credentials);
@@ -116,7 +120,7 @@ Result<void> run(const Arguments& arguments) {
   if (arguments.console) return run_console(arguments);
   StopSignal stop;
 
-  // What can be wrong with the arguments is told before anything is started.
+  // Report wrong arguments before anything starts.
   const Result<wire::ClientCredentials> credentials = wire::client_credentials(arguments.credentials);
   if (!credentials) return tl::unexpected(credentials.error());
   auto window_size = window_options(arguments.size);
@@ -152,13 +156,13 @@ Result<void> run(const Arguments& arguments) {
     return tl::unexpected(watch.error());
   }
 
-  // A server that tells nothing of its people shows its bone all the same.
+  // If the server sends nothing about its people, the bone is shown all the same.
   PeopleClientOptions people_options;
   people_options.address = arguments.server;
   people_options.patience = watch_options.patience;
   people_options.window = [&watch = **watch] { return watch.joined(); };
   const auto people = PeopleClient::start(people_options, [&stop] { return stop.requested(); });
-  if (!people) log::warn("nothing is heard of the people", {{"reason", people.error().message}});
+  if (!people) log::warn("people of the room are not shown", {{"reason", people.error().message}});
 
   ViewerOptions options;
   if (people) options.people = people->get();
@@ -208,7 +212,7 @@ Result<void> run(const Arguments& arguments) {
     }
   }
 
-  // A script that asks for more than a picture may want that one too: the last picture of the run.
+  // With --script and --screenshot both: save the last picture of the run.
   if (outcome && !arguments.script.empty() && !arguments.screenshot.empty()) {
     outcome = (*window)->save_png(arguments.screenshot);
   }
@@ -228,7 +232,7 @@ int main(int argc, char** argv) {
   app.add_option("--server,--connect", arguments.server, "Address of the server, HOST:PORT")->required();
   app.add_option("--name", arguments.name, "Who you are, shown to others");
   app.add_option("--supervise-for", arguments.hand,
-                 "Whose hand works before this window, NAME or #NUMBER: shows what is decided about it");
+                 "The tool operator at this window, NAME or #NUMBER: shows the restrictions of that hand");
   app.add_flag("--console", arguments.console, "No window: supervise the room by commands on standard input");
   app.add_option("--room", arguments.room, "Name of the room; not needed where the server has one");
   wire::add_credential_options(app, arguments.credentials);

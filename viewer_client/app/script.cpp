@@ -126,7 +126,7 @@ Parsed parse_place(const std::vector<std::string_view>& words) {
   return Command(RoomRequest(PlaceTool{std::string(words[1]), *where, BodyId{*body}}));
 }
 
-// move, turn, seat, remove: of an item by its number.
+// move, turn, seat, remove: an item by its number.
 Parsed parse_item_command(const std::vector<std::string_view>& words) {
   const std::string_view verb = words[0];
   const auto item = words.size() > 1 ? number<std::uint32_t>(words[1]) : std::nullopt;
@@ -196,7 +196,7 @@ Parsed parse_wipe(const std::vector<std::string_view>& words) {
   return Command(WipeOff{*id});
 }
 
-// Who is meant turns out when it is obeyed: only the room knows who there is.
+// Who is meant is found out when the command runs: only the room knows its people.
 Parsed parse_say(std::string_view line, const std::vector<std::string_view>& words) {
   const std::string text = rest_of(line, words[0]);
   const bool quoted = text.starts_with('"');
@@ -305,7 +305,7 @@ ScriptReader::~ScriptReader() {
 }
 
 std::optional<std::string> ScriptReader::next() {
-  // Reads what is there, up to a page at a time, until a line is whole.
+  // Reads what has arrived, up to a page at a time, until a line is whole.
   while (text_.find('\n') == std::string::npos && descriptor_ >= 0) {
     pollfd input{descriptor_, POLLIN, 0};
     if (::poll(&input, 1, 0) <= 0) return std::nullopt;

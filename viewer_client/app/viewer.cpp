@@ -19,10 +19,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds kFramePeriod{33};
-// How long a turn waits for the network; mouse and script are asked as often.
+// How long a turn waits for the network. Mouse and script are polled once per turn.
 constexpr std::chrono::milliseconds kTurn{10};
 constexpr double kToolKeyDistance_mm = 120.0;
-// How often it is asked what there is new of the people.
+// How often the state of the people is read.
 constexpr std::chrono::milliseconds kMeetings{50};
 
 std::int64_t mono_ns(Clock::time_point at) { return std::chrono::nanoseconds(at.time_since_epoch()).count(); }
@@ -123,7 +123,7 @@ void Viewer::receive() {
     surface_complete_ = true;
     dirty_ = true;
   }
-  // Until the whole surface has come the picture shows the one before it, or how far the first one is.
+  // Until the whole surface was received, the picture shows the surface before it, or the progress of the first one.
   if (surface_complete_) {
     rebuild();
   } else {
@@ -149,7 +149,7 @@ void Viewer::meet_people() {
   people_.take({room.people(), room.annotations(), room.words()}, room.self(), now);
   show_people(now);
   if (followed_.empty()) return;
-  // Who went or does not look any more leaves the camera where it is.
+  // If the followed person left or closed the viewer, the camera stays where it is.
   const Result<PersonSeen> person = people_.find(followed_, PeopleView::Fit::looking);
   if (!person || !person->look || person->look == look_taken_) return;
   look_taken_ = person->look;
@@ -180,7 +180,7 @@ void Viewer::show_people(Clock::time_point now) {
 void Viewer::draw_by_hand(const WindowEvents& events) {
   const auto told = [this](const Result<void>& outcome) {
     if (!outcome) people_.tell(outcome.error().message, Clock::now());
-    next_meeting_ = {};  // seen at once
+    next_meeting_ = {};  // show the change at once
   };
   const auto only_outcome = [](const auto& result) { return result ? Result<void>{} : tl::unexpected(result.error()); };
   if (events.pointed) told(only_outcome(draw_for_all(AnnotationKind::pointer, {*events.pointed}, {})));
@@ -199,7 +199,7 @@ std::string Viewer::notice() const {
 
 void Viewer::draw_if_due(bool at_once) {
   if (dirty_ && (at_once || Clock::now() >= next_draw_)) draw_now();
-  // What came without changing the picture is shown by the picture that is there.
+  // Events that did not change the picture are already shown by the present picture.
   if (!dirty_ && surface_shown_ && !not_logged_.empty()) log_shown(mono_ns(Clock::now()));
 }
 
@@ -213,7 +213,7 @@ void Viewer::draw_now() {
 
   dirty_ = false;
   ++frames_;
-  // Where drawing is slow, the other programs of this machine still get a fifth of the time.
+  // Where drawing is slow, leave a fifth of the time to the other programs of this machine.
   next_draw_ = std::max(begin + kFramePeriod, end + (end - begin) / 4);
   if (!surface_complete_) return;
   frame_times_.record(end - begin);
@@ -392,7 +392,7 @@ std::optional<Result<void>> Viewer::obey_room(const RoomRequest& request) {
         options_.ask ? options_.ask(request) : failure(ErrorCode::unavailable, "this viewer has no room to ask");
     if (!answer) return Result<void>(tl::unexpected(answer.error()));
     if (std::holds_alternative<SaveBone>(request)) return Result<void>{};
-    if (std::holds_alternative<MarkMoment>(request)) {  // of which nothing is to be seen
+    if (std::holds_alternative<MarkMoment>(request)) {  // a mark is not visible in the picture
       pending_->line += ": " + answer->said;
       return Result<void>{};
     }

@@ -40,7 +40,7 @@ Error error_of(const grpc::Status& status) {
   }
 }
 
-// A server from before consoles were a kind of their own refuses them by their kind.
+// An old server does not know the kind "console" and refuses it.
 Error console_refused(const Error& why, const PeopleClientOptions& options) {
   if (options.window || why.code != ErrorCode::invalid_input || !why.message.starts_with("kind ")) return why;
   return {ErrorCode::unsupported, "the server at " + options.address +
@@ -87,7 +87,7 @@ struct PeopleClient::Impl {
   std::deque<WordsSeen> words;
   bool complete = false;
   std::optional<Error> failure;
-  std::shared_ptr<grpc::ClientContext> stream;  // shared with the thread that reads, so that it can be cancelled
+  std::shared_ptr<grpc::ClientContext> stream;  // shared with the reader thread, so that it can be cancelled
 
   std::thread reader;
 
@@ -108,7 +108,7 @@ struct PeopleClient::Impl {
   void read_beside_window();
   grpc::Status read_stream();
 
-  // One question to a service and its answer.
+  // One request to a service and its answer.
   template <class Service, class Response, class Request>
   Result<Response> ask(grpc::Status (Service::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                        const Request& request) const {
@@ -144,7 +144,8 @@ Result<void> PeopleClient::Impl::take(const v1::WatchPeopleResponse& news) {
   for (Annotation& one : drawn) annotations[one.id] = std::move(one);
   for (const std::uint32_t gone : news.wiped()) annotations.erase(gone);
   for (const v1::Words& said : news.words()) {
-    if (!words.empty() && said.room_seq() <= words.back().place.value) continue;  // told before the connection was lost
+    // already received before the connection was lost
+    if (!words.empty() && said.room_seq() <= words.back().place.value) continue;
     words.push_back({RoomSeq{said.room_seq()}, AuthorId{said.from()}, AuthorId{said.to()}, said.words()});
     if (words.size() > kMostWords) words.pop_front();
   }
@@ -170,12 +171,12 @@ grpc::Status PeopleClient::Impl::read_stream() {
     if (const Result<void> taken = take(news); !taken) {
       context->TryCancel();
       (void)reads->Finish();
-      return {grpc::StatusCode::INTERNAL, "the server sent what it must not: " + taken.error().message};
+      return {grpc::StatusCode::INTERNAL, "the server sent invalid data: " + taken.error().message};
     }
   return reads->Finish();
 }
 
-// A window that lost its room says so itself, or joins again; until then what is refused here means nothing.
+// A window that lost its room reports this itself, or joins again. Until then a refusal here means nothing.
 void PeopleClient::Impl::read_beside_window() {
   while (!stopping()) {
     {

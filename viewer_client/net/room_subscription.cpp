@@ -31,7 +31,7 @@ std::int64_t mono_ns() { return std::chrono::nanoseconds(Clock::now().time_since
 // Decodes and checks one block.
 Result<ReceivedBlock> receive(const v1::MeshBlock& wire_block, double pitch_mm) {
   const Result<BlockKey> key = wire::key_from_wire(wire_block);
-  if (!key) return failure(ErrorCode::invalid_input, "the server sent what it must not: " + key.error().message);
+  if (!key) return failure(ErrorCode::invalid_input, "the server sent invalid data: " + key.error().message);
   ReceivedBlock block;
   block.key = *key;
   block.version = wire_block.version();
@@ -52,7 +52,7 @@ Result<ReceivedBlock> receive(const v1::MeshBlock& wire_block, double pitch_mm) 
   return block;
 }
 
-// One question to the room and its answer.
+// One request to the room and its answer.
 template <class Response, class Request>
 Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
                      grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
@@ -79,7 +79,7 @@ Result<RoomAnswer> answered(const Response& response, std::optional<int> events 
   return RoomAnswer{RoomSeq{response.room_seq()}, events, {}};
 }
 
-// The item as it stands in the room now.
+// The item's present state in the room.
 Result<SceneItem> standing_item(const std::shared_ptr<grpc::Channel>& channel, std::uint32_t id) {
   const auto status = ask(channel, &v1::RoomService::Stub::GetStatus, v1::GetStatusRequest{});
   if (!status) return tl::unexpected(status.error());
@@ -88,7 +88,8 @@ Result<SceneItem> standing_item(const std::shared_ptr<grpc::Channel>& channel, s
   return failure(ErrorCode::not_found, "item " + std::to_string(id) + " does not stand in the scene");
 }
 
-// A pose, or what the server needs to find one on its bone. `before`: keeps the sides of an item that stands.
+// Sets a pose, or what the server needs to find a pose on its bone. `before`: a placed item keeps its orientation about
+// the axis.
 void put(const ItemPlace& where, const Pose& before, v1::SetSceneItemRequest& request) {
   const Vec3 across = where.across.value_or(before.direction(Vec3::UnitX()));
   if (!where.on_bone) {
@@ -101,7 +102,7 @@ void put(const ItemPlace& where, const Pose& before, v1::SetSceneItemRequest& re
   *request.mutable_onto_bone()->mutable_across() = wire::to_wire(across);
 }
 
-// A request that leaves an item as it stands.
+// A request that changes nothing of an item.
 v1::SetSceneItemRequest request_for(const SceneItem& standing, std::uint64_t author) {
   v1::SetSceneItemRequest request;
   request.set_author(author);
@@ -109,7 +110,7 @@ v1::SetSceneItemRequest request_for(const SceneItem& standing, std::uint64_t aut
   return request;
 }
 
-// `more`: what there is to say of the answer besides where the item stands now.
+// `more`: text for the answer in addition to the item's position.
 template <class More>
 Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const v1::SetSceneItemRequest& request,
                             More more) {
@@ -124,7 +125,7 @@ Result<RoomAnswer> set_item(const std::shared_ptr<grpc::Channel>& channel, const
   return set_item(channel, request, [](const auto&, const auto&) { return std::string(); });
 }
 
-// The tools that the window can draw without being sent them.
+// The tools that the window can draw already, without a request to the server.
 class KnownTools {
  public:
   KnownTools() {
@@ -136,7 +137,7 @@ class KnownTools {
   }
   [[nodiscard]] bool has(const std::string& name) const { return names_.contains(name); }
   [[nodiscard]] bool has(const Digest& hash) const { return hashes_.contains(hash); }
-  // True the first time only: a room is not asked again and again for a tool that it does not know itself.
+  // True only the first time: a room is not asked repeatedly for a tool that it does not have.
   bool miss(const std::string& name) { return !has(name) && missed_names_.insert(name).second; }
   bool miss(const Digest& hash) { return !has(hash) && missed_hashes_.insert(hash).second; }
 
@@ -155,11 +156,11 @@ struct RoomSubscription::Impl {
   std::atomic<bool> ending{false};
   std::atomic<bool> interrupted{false};
 
-  // Guards what both readers and the owner touch; never held over a call to the server.
+  // Guards what both readers and the owner use. Never held during a call to the server.
   mutable std::mutex mutex;
   std::condition_variable changed;
   wire::JoinedRoom joined;
-  std::uint64_t joins = 0;  // rises with every join, so that the second reader knows that the first has rejoined
+  std::uint64_t joins = 0;  // rises with every join; shows the second reader that the first has rejoined
   grpc::ClientContext* mesh_context = nullptr;
   grpc::ClientContext* cutting_context = nullptr;
   grpc::ClientContext* look_context = nullptr;
@@ -179,7 +180,7 @@ struct RoomSubscription::Impl {
   void say_looks();
   Result<void> read_mesh_stream();
   void fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author, KnownTools& known);
-  // The same question to the room by the viewer's author.
+  // The same request in the name of the viewer's author.
   template <class Response, class Request>
   Result<Response> ask_as_author(grpc::Status (v1::RoomService::Stub::*call)(grpc::ClientContext*, const Request&,
                                                                              Response*),
@@ -209,7 +210,7 @@ Result<void> RoomSubscription::Impl::join(std::chrono::milliseconds patience) {
   return {};
 }
 
-// After the connection was lost: a new join, because a server that was started anew knows no authors of the old one.
+// Joins anew after the connection was lost, because a restarted server does not know the authors of the old one.
 Result<void> RoomSubscription::Impl::rejoin() {
   const Digest case_before = joined.case_hash;
   do {
@@ -224,7 +225,7 @@ Result<void> RoomSubscription::Impl::rejoin() {
   return failure(ErrorCode::cancelled, "stopped");
 }
 
-// A stream's context is known to the destructor, which cancels it; false where that has already begun.
+// Gives the stream's context to the destructor, which cancels it. False: the destructor has already begun.
 bool RoomSubscription::Impl::enter(grpc::ClientContext*& slot, grpc::ClientContext& context) {
   const std::lock_guard lock(mutex);
   if (ending) return false;
@@ -237,7 +238,7 @@ void RoomSubscription::Impl::leave(grpc::ClientContext*& slot) {
   slot = nullptr;
 }
 
-// Returns when the stream ends: without error when the server ended it or went, with one for what it must not send.
+// Returns when the stream ends. No error: the server ended it or is gone. Error: the server sent invalid data.
 Result<void> RoomSubscription::Impl::read_mesh_stream() {
   grpc::ClientContext context;
   if (!enter(mesh_context, context)) return {};
@@ -277,7 +278,7 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
   leave(mesh_context);
   if (outcome && !stopping()) {
     log::warn("mesh stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
-    // Coming again would push out whoever took this viewer's place, or be refused for ever.
+    // A retry would push out whoever replaced this viewer, or be refused forever.
     if (ended.error_code() == grpc::StatusCode::PERMISSION_DENIED ||
         ended.error_code() == grpc::StatusCode::UNAUTHENTICATED)
       return failure(ErrorCode::denied, "the server ended the session: " + ended.error_message());
@@ -285,7 +286,7 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
   return outcome;
 }
 
-// [mesh thread] This thread alone rejoins; the other follows.
+// [mesh thread] Only this thread rejoins; the other follows.
 void RoomSubscription::Impl::read_mesh() {
   const auto give_up = [this](Error error) {
     const std::lock_guard lock(mutex);
@@ -308,7 +309,7 @@ void RoomSubscription::Impl::read_mesh() {
   }
 }
 
-// [cutting thread] Those that the room knows and this program does not.
+// [cutting thread] Fetches the tools that the room has and this program does not.
 void RoomSubscription::Impl::fetch_tools(const std::shared_ptr<grpc::Channel>& channel, std::uint64_t author,
                                          KnownTools& known) {
   v1::ListToolsRequest list;
@@ -340,7 +341,7 @@ void RoomSubscription::Impl::read_cutting() {
     std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
     v1::WatchCuttingRequest request;
     {
-      // A stream that ended is opened again with the same join at most every pause, with a new one at once.
+      // A stream that ended is reopened with the same join after a pause, and with a new join at once.
       std::unique_lock lock(mutex);
       changed.wait_for(lock, of_join == 0 ? std::chrono::milliseconds(0) : kRetryPause,
                        [&] { return ending.load() || joins != of_join; });
@@ -348,7 +349,7 @@ void RoomSubscription::Impl::read_cutting() {
       of_join = joins;
       channel = joined.channel;
       request.set_author(joined.author.value);
-      request.set_most_hz(60);  // of what can be drawn
+      request.set_most_hz(60);  // more cannot be drawn
     }
     if (interrupted) continue;
     grpc::ClientContext context;
@@ -359,7 +360,7 @@ void RoomSubscription::Impl::read_cutting() {
     while (reader->Read(&message)) {
       std::vector<CuttingState> states;
       for (const v1::CuttingState& wire_state : message.states()) {
-        // A state that cannot be read is left out: the next one comes within 10 ms.
+        // An unreadable state is left out: the next one comes within 10 ms.
         if (Result<CuttingState> state = wire::from_wire(wire_state)) states.push_back(std::move(*state));
       }
       std::vector<SceneItem> items;
@@ -378,7 +379,7 @@ void RoomSubscription::Impl::read_cutting() {
   }
 }
 
-// [look thread] What cannot be said now is said by the next mesh stream.
+// [look thread] A view that cannot be sent now is sent by the next mesh stream.
 void RoomSubscription::Impl::say_looks() {
   while (true) {
     v1::LookFromRequest request;

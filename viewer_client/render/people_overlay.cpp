@@ -31,12 +31,12 @@ namespace osteon {
 
 namespace {
 
-// Of the screen, in pixels.
+// Screen sizes, pixels.
 constexpr double kArrow = 92.0, kTube = 2.8, kDot = 5.5, kBeside = 14.0, kAlongTool = 110.0;
 constexpr int kLabelText = 16, kNameText = 15, kSaidText = 19, kHoldingText = 22, kHintText = 16;
 // Characters of the font are about half as wide as high.
 constexpr double kCharacter = 0.52;
-// What lies behind the bone shows through it this much.
+// Opacity of what lies behind the bone.
 constexpr double kThrough = 0.22;
 constexpr std::uint32_t kStroke = 0xffd040;
 
@@ -68,7 +68,7 @@ vtkSmartPointer<vtkActor> actor_of(vtkAlgorithmOutput* shape, std::uint32_t colo
   const Rgb c = rgb(colour);
   vtkProperty* paint = actor->GetProperty();
   paint->SetColor(c[0], c[1], c[2]);
-  // Much of it its own light: the colour says who drew it.
+  // Mostly ambient light, because the colour shows who drew it.
   paint->SetAmbient(0.55);
   paint->SetDiffuse(0.5);
   paint->SetOpacity(opacity);
@@ -90,9 +90,9 @@ struct PeopleOverlay::Impl {
     Annotation annotation;
     std::vector<Vec3> points_mm;
     vtkSmartPointer<vtkTubeFilter> tube;       // of a line
-    vtkSmartPointer<vtkActor> solid, through;  // the same shape, among the bone and over it
+    vtkSmartPointer<vtkActor> solid, through;  // the same shape: hidden by the bone, and drawn over it
     vtkSmartPointer<vtkTextActor> words;
-    std::optional<Vec3> normal;  // of a pointer's point
+    std::optional<Vec3> normal;  // at a pointer's point
   };
   std::map<std::uint32_t, Drawn> drawn;
   std::optional<Drawn> stroke;
@@ -104,7 +104,7 @@ struct PeopleOverlay::Impl {
   std::map<AuthorId, Tool> tools;
   vtkSmartPointer<vtkTextActor> said = text_actor(kSaidText, kLight), holding = text_actor(kHoldingText, kWarning),
                                 hint = text_actor(kHintText, kLight);
-  std::vector<std::array<int, 4>> taken;  // by texts of this picture: left, right, bottom, top
+  std::vector<std::array<int, 4>> taken;  // rectangles of this picture's texts: left, right, bottom, top
 
   Impl(vtkRenderer& b, vtkRenderWindow& w, NormalAt n) : bone(b), window(w), normal_at(std::move(n)) {}
 
@@ -114,7 +114,7 @@ struct PeopleOverlay::Impl {
   void place(Drawn& one);
   [[nodiscard]] std::string words_of(const Annotation& annotation) const;
 
-  // At a point's distance from the eye; not positive: behind it.
+  // Millimetres per pixel at a point's distance from the eye. Not positive: the point is behind the eye.
   [[nodiscard]] double mm_per_px(const Vec3& point_mm) const;
   [[nodiscard]] std::array<double, 2> on_screen(const Vec3& point_mm);  // from the lower left
   void put_beside(vtkTextActor* text, const Vec3& point_mm);
@@ -157,7 +157,7 @@ PeopleOverlay::PeopleOverlay(vtkRenderer& bone, vtkRenderWindow& window, NormalA
 PeopleOverlay::~PeopleOverlay() { impl_->window.RemoveRenderer(impl_->above); }
 
 std::string PeopleOverlay::Impl::words_of(const Annotation& annotation) const {
-  // An author has one arrow: it says whose it is.
+  // Each author has one arrow, so its text names the author.
   const auto name = names.find(annotation.author);
   if (annotation.kind != AnnotationKind::pointer || name == names.end()) return annotation.words;
   return annotation.words.empty() ? name->second : name->second + ": " + annotation.words;
@@ -261,7 +261,7 @@ void PeopleOverlay::show_words(const std::vector<std::string>& said, const std::
   std::string lines;
   for (const std::string& one : said) lines += (lines.empty() ? "" : "\n") + wrapped(one, columns(kSaidText), 3);
   show(impl_->said, lines);
-  // Its own line breaks stay.
+  // Keep the text's own line breaks.
   lines.clear();
   for (std::size_t at = 0; at < holding.size();) {
     const std::size_t end = std::min(holding.find('\n', at), holding.size());
@@ -286,7 +286,7 @@ std::array<double, 2> PeopleOverlay::Impl::on_screen(const Vec3& point_mm) {
   return {bone.GetDisplayPoint()[0], bone.GetDisplayPoint()[1]};
 }
 
-// To the right of the point; where another text is there already, nearer to the picture's middle row.
+// To the right of the point. If another text is there already, it moves towards the picture's middle row.
 void PeopleOverlay::Impl::put_beside(vtkTextActor* text, const Vec3& point_mm) {
   const auto [x, y] = on_screen(point_mm);
   const int* size = window.GetSize();
@@ -323,7 +323,7 @@ void PeopleOverlay::Impl::place(Drawn& one) {
     beside = one.points_mm.back();
     const Vec3& middle = one.points_mm[one.points_mm.size() / 2];
     const double radius_mm = kTube * std::max(1e-6, mm_per_px(middle));
-    // Made anew only where one sees the difference.
+    // Rebuilt only if the difference is visible.
     if (std::abs(one.tube->GetRadius() / radius_mm - 1.0) > 0.1) one.tube->SetRadius(radius_mm);
   } else if (one.annotation.kind == AnnotationKind::label) {
     for (int i = 0; i < 3; ++i) {
@@ -331,7 +331,7 @@ void PeopleOverlay::Impl::place(Drawn& one) {
       matrix->SetElement(i, 3, at[i]);
     }
   } else {
-    // From outside and from above, so that it is long on the screen even where one looks along the normal.
+    // From outside and from above, so that the arrow is long on the screen even if the view is along the normal.
     if (!one.normal) one.normal = normal_at(at);
     const Vec3 sight(bone.GetActiveCamera()->GetDirectionOfProjection());
     const Vec3 normal = one.normal.value_or(-sight);

@@ -55,20 +55,21 @@ using Colour = std::array<std::uint8_t, 3>;
 
 constexpr Colour kBone{241, 226, 196};     // dry ivory
 constexpr Colour kCutBone{219, 143, 117};  // fresh bone with marrow in it
-constexpr Colour kMetal{126, 150, 184};    // bluer and darker than tools, so that it is no tool
+constexpr Colour kMetal{126, 150, 184};    // bluer and darker than tools, to differ from them
 constexpr Colour kEnamel{250, 250, 255};
 constexpr Colour kCutEnamel{236, 214, 232};
-constexpr std::array<Colour, 3> kPieces{{{214, 226, 200}, {200, 214, 236}, {236, 206, 214}}};  // sawn-off, by turns
+// sawn-off pieces, in turn
+constexpr std::array<Colour, 3> kPieces{{{214, 226, 200}, {200, 214, 236}, {236, 206, 214}}};
 constexpr Colour kSteel{222, 227, 234};
 constexpr Colour kCuttingSteel{205, 205, 202};
 
 constexpr std::array<double, 3> kBackground{0.115, 0.140, 0.170};
 
-// Beyond this the hand is visibly elsewhere than the tool.
+// Beyond this distance the hand is visibly apart from the tool.
 constexpr double kGhostFrom_mm = 0.15;
 constexpr double kGhostOpacity = 0.28;
 
-// Soft shadows in hollows, for saved pictures: of hollows up to this size.
+// Soft shadows in hollows up to this size, for saved pictures.
 constexpr double kShadowRadius_mm = 6.0;
 constexpr int kShadowSamples = 48;
 
@@ -80,7 +81,7 @@ vtkSmartPointer<vtkFloatArray> vectors(const std::vector<std::array<float, 3>>& 
   return to;
 }
 
-// `marked` says of each vertex which of the colours it has.
+// `marked` gives the colour of each vertex.
 vtkSmartPointer<vtkPolyData> poly_data(const std::vector<std::array<float, 3>>& positions,
                                        const std::vector<std::array<float, 3>>& normals,
                                        const std::vector<std::uint8_t>& marked,
@@ -96,7 +97,7 @@ vtkSmartPointer<vtkPolyData> poly_data(const std::vector<std::array<float, 3>>& 
     std::memcpy(colours->GetPointer(static_cast<vtkIdType>(3 * i)), palette[marked[i]].data(), 3);
   }
 
-  // 32-bit connectivity is a copy of our own array; offsets of triangles are multiples of three.
+  // 32-bit connectivity is a copy of our own array. Offsets of triangles are multiples of three.
   vtkNew<vtkTypeInt32Array> corners, offsets;
   corners->SetNumberOfValues(static_cast<vtkIdType>(3 * triangles.size()));
   if (!triangles.empty())
@@ -152,7 +153,7 @@ bool same_place(const Pose& a, const Pose& b) {
   return (a.position_mm - b.position_mm).norm() < kGhostFrom_mm && a.rotation.angularDistance(b.rotation) < 0.02;
 }
 
-// A light that goes with the camera; `place` in units of the eye's distance: right, up, towards the eye.
+// A light that moves with the camera. Position in units of the eye's distance: right, up, towards the eye.
 void add_light(vtkRenderer* renderer, double x, double y, double z, double intensity, double r, double g, double b) {
   vtkNew<vtkLight> light;
   light->SetLightTypeToCameraLight();
@@ -163,14 +164,14 @@ void add_light(vtkRenderer* renderer, double x, double y, double z, double inten
   renderer->AddLight(light);
 }
 
-// The trackball, with our own keys in place of VTK's many; after P or L the left button draws once instead of turning.
+// VTK's trackball, with our own keys instead of VTK's. After P or L the left button draws once instead of rotating.
 class BoneStyle : public vtkInteractorStyleTrackballCamera {
  public:
   static BoneStyle* New();
   vtkTypeMacro(BoneStyle, vtkInteractorStyleTrackballCamera);
   enum class Pen { up, pointer, line };
   WindowEvents pending;
-  std::function<std::optional<Vec3>(int x, int y)> surface_at;  // of VTK's display: rows from the bottom
+  std::function<std::optional<Vec3>(int x, int y)> surface_at;  // in VTK's display coordinates: rows from the bottom
 
   [[nodiscard]] Pen pen() const { return pen_; }
   [[nodiscard]] std::vector<Vec3> stroke() const {
@@ -214,7 +215,7 @@ class BoneStyle : public vtkInteractorStyleTrackballCamera {
   void OnLeftButtonDown() override {
     if (pen_ == Pen::up) return vtkInteractorStyleTrackballCamera::OnLeftButtonDown();
     const std::optional<Vec3> at = under_mouse();
-    if (!at) return;  // beside the bone: the pen stays down
+    if (!at) return;  // not on the bone: the pen stays active
     if (pen_ == Pen::pointer) {
       pending.pointed = at;
       take(Pen::up);
@@ -247,7 +248,7 @@ class BoneStyle : public vtkInteractorStyleTrackballCamera {
   }
 
   Pen pen_ = Pen::up;
-  std::optional<Stroke> stroke_;  // between the button's going down and up
+  std::optional<Stroke> stroke_;  // while the button is down
 };
 vtkStandardNewMacro(BoneStyle);
 
@@ -256,8 +257,8 @@ struct CloseDisplay {
 };
 using OpenDisplay = std::unique_ptr<Display, CloseDisplay>;
 
-// Asks the X server itself, because VTK ends the process where there is none. The connection stays open as long as the
-// window: an X server without any starts afresh, and refuses the next one for that moment.
+// Connects to the X server directly, because VTK ends the process if there is none. The connection stays open as long
+// as the window. An X server without clients restarts, and refuses the next client for that moment.
 Result<OpenDisplay> open_display() {
   const char* name = std::getenv("DISPLAY");
   if (name == nullptr || *name == '\0') {
@@ -266,7 +267,7 @@ Result<OpenDisplay> open_display() {
                    "`xvfb-run -a`");
   }
   OpenDisplay display(XOpenDisplay(name));
-  // A server that has just lost its last client may need a moment.
+  // An X server that has just lost its last client may need a moment.
   for (int attempt = 0; !display && attempt < 10; ++attempt) {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
     display.reset(XOpenDisplay(name));
@@ -305,8 +306,8 @@ struct BoneWindow::Impl {
     vtkSmartPointer<vtkActor> body, ghost;
   };
   std::map<AuthorId, DrawnTool> tools;
-  std::map<std::string, vtkSmartPointer<vtkPolyData>> tool_data;  // null: no such tool
-  std::map<Digest, std::string> tool_names;                       // of all tools that can be drawn
+  std::map<std::string, vtkSmartPointer<vtkPolyData>> tool_data;  // null: there is no such tool
+  std::map<Digest, std::string> tool_names;                       // all tools that can be drawn
   std::map<std::uint32_t, vtkSmartPointer<vtkActor>> items;
 
   std::unique_ptr<PeopleOverlay> people;
@@ -335,7 +336,7 @@ vtkSmartPointer<vtkPolyData> BoneWindow::Impl::data_of(const Tool& tool) {
 }
 
 std::optional<Vec3> BoneWindow::Impl::surface_at(int x, int y) const {
-  // Only of the bone: neither tools nor what is drawn.
+  // Picks only the bone, neither tools nor annotations.
   vtkNew<vtkCellPicker> picker;
   picker->SetTolerance(0.0);
   picker->PickFromListOn();
@@ -344,7 +345,7 @@ std::optional<Vec3> BoneWindow::Impl::surface_at(int x, int y) const {
   return Vec3(picker->GetPickPosition());
 }
 
-// The mean normal of the vertices round a point.
+// The mean normal of the vertices near a point.
 std::optional<Vec3> BoneWindow::Impl::normal_at(const Vec3& point_mm) const {
   constexpr double kNear_mm = 2.5;
   Vec3 sum = Vec3::Zero();
@@ -364,8 +365,8 @@ std::optional<Vec3> BoneWindow::Impl::normal_at(const Vec3& point_mm) const {
   return sum.normalized();
 }
 
-// Regions that are equally near are drawn in the order of their keys, however they came, so that one surface gives one
-// picture even where two triangles lie in one place.
+// Regions at the same distance are drawn in the order of their keys, not of their arrival. One surface then gives one
+// picture, even where two triangles coincide.
 void BoneWindow::Impl::add_in_order() {
   for (const auto& [key, actor] : regions) renderer->RemoveActor(actor);
   for (const auto& [author, tool] : tools) {
@@ -385,7 +386,7 @@ BoneWindow::BoneWindow(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 BoneWindow::~BoneWindow() {
   impl_->people.reset();
-  // The window must go before the style and renderer that it still points to.
+  // The window still points to the style and the renderer, so it must go first.
   impl_->interactor->SetInteractorStyle(nullptr);
   impl_->window->Finalize();
 }
@@ -441,7 +442,7 @@ Result<std::unique_ptr<BoneWindow>> BoneWindow::open(const WindowOptions& option
   impl->interactor = vtkSmartPointer<vtkRenderWindowInteractor>::New();
   impl->interactor->SetRenderWindow(window);
   impl->interactor->SetInteractorStyle(impl->style);
-  // The interactor must not draw by itself: the program draws, at its own rate.
+  // The interactor must not draw: the program draws at its own rate.
   impl->interactor->EnableRenderOff();
   vtkNew<vtkCallbackCommand> redraw, closed;
   redraw->SetClientData(impl->style);
@@ -456,11 +457,12 @@ Result<std::unique_ptr<BoneWindow>> BoneWindow::open(const WindowOptions& option
   impl->interactor->AddObserver(vtkCommand::ExitEvent, closed);
   impl->interactor->Initialize();
 
-  // Near regions first, so that the lighting of what they hide is not computed: a quarter of a close frame in software.
+  // Draws near regions first, so that hidden regions need no lighting. This saves a quarter of a close frame in
+  // software.
   if (auto* culler = vtkFrustumCoverageCuller::SafeDownCast(renderer->GetCullers()->GetLastItem())) {
     culler->SetSortingStyleToFrontToBack();
   }
-  // Smooth edges cost a graphics card nothing and a processor a sixth of the frame; saved pictures always have them.
+  // Smooth edges cost a graphics card nothing, but a processor a sixth of the frame. Saved pictures always have them.
   const std::string capabilities = window->ReportCapabilities();
   impl->smooth =
       capabilities.find("llvmpipe") == std::string::npos && capabilities.find("softpipe") == std::string::npos;
@@ -495,7 +497,7 @@ void BoneWindow::show_region(const RegionKey& region, const Mesh& mesh) {
   bone->SetDiffuse(0.88);
   bone->SetSpecular(0.13);
   bone->SetSpecularPower(22.0);
-  // A closed surface hides its back faces; not drawing them saves a third of a frame in software.
+  // A closed surface hides its back faces. Not drawing them saves a third of a frame in software.
   bone->SetBackfaceCulling(1);
   impl_->regions.emplace(region, actor);
   impl_->add_in_order();
@@ -524,12 +526,12 @@ void BoneWindow::show_tools(std::span<const CuttingState> states) {
       tool.ghost->GetProperty()->SetBackfaceCulling(1);
     }
     set_pose(tool.body, state.pose_bone_tool);
-    // The hand mostly pushes along the axis: a thinner ghost hides in the tool instead of sharing its surface.
+    // The hand pushes mostly along the axis. A thinner ghost hides inside the tool instead of sharing its surface.
     set_pose(tool.ghost, state.pose_bone_device, 0.95);
     tool.ghost->SetVisibility(same_place(state.pose_bone_tool, state.pose_bone_device) ? 0 : 1);
     shown.emplace(state.author, std::move(tool));
   }
-  // What is left belongs to tools that went or changed.
+  // The rest belongs to tools that left or changed.
   for (const auto& [author, tool] : impl_->tools) {
     impl_->renderer->RemoveActor(tool.body);
     impl_->renderer->RemoveActor(tool.ghost);

@@ -6,9 +6,9 @@ namespace osteon {
 
 namespace {
 
-constexpr double kLeastSight_mm = 1e-6;  // nearer than this one looks nowhere
+constexpr double kLeastSight_mm = 1e-6;  // below this distance there is no direction of view
 
-// The direction's part across `axis` as a unit vector; `otherwise` where the direction runs along the axis.
+// The unit vector of the direction's part across `axis`. `otherwise` if the direction runs along the axis.
 Vec3 across(const Vec3& direction, const Vec3& axis, const Vec3& otherwise) {
   const Vec3 part = direction - direction.dot(axis) * axis;
   return part.norm() > 0.1 * direction.norm() ? part.normalized() : otherwise;
@@ -42,7 +42,7 @@ CameraView looking_as(const ViewFrustum& look, const CameraView& now) {
 CameraView overview(const Box& bone) {
   CameraView view;
   view.target_mm = 0.5 * (bone.min_mm + bone.max_mm);
-  // The sphere round the box fits the vertical angle; bones are seldom boxes, so come a little closer than that.
+  // The sphere round the box fits into the vertical angle. Bones are seldom boxes, so the camera comes slightly closer.
   const double radius_mm = 0.5 * (bone.max_mm - bone.min_mm).norm();
   const double distance_mm = 0.72 * radius_mm / std::sin(0.5 * view.view_angle_rad);
   const Vec3 towards_eye = Vec3(0.62, -0.72, 0.30).normalized();
@@ -53,7 +53,7 @@ CameraView overview(const Box& bone) {
 
 CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm) {
   const Vec3 back = -pose_bone_tool.direction(Vec3::UnitZ());
-  // Aside: towards the patient's front where the axis allows it, which is where the overview looks from.
+  // Towards the patient's front if the axis allows it, because the overview looks from there.
   const Vec3 aside = across(-Vec3::UnitY(), back, across(Vec3::UnitX(), back, Vec3::UnitX()));
   const double off_axis_rad = 0.66;
   CameraView view;

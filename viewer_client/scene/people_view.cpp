@@ -75,7 +75,7 @@ std::string wrapped(std::string_view text, std::size_t columns, std::size_t most
 }
 
 std::uint32_t colour_of(AuthorId author) {
-  // Apart from bone, steel and each other, for most who tell colours badly as well (after Okabe and Ito 2008).
+  // Distinct from bone, steel and each other, also for most colour-blind people (after Okabe and Ito 2008).
   constexpr std::array<std::uint32_t, 6> kColours{0xf0e442, 0x56b4e9, 0x1ecc8a, 0xff7a1a, 0xe377c2, 0x2f7fff};
   return kColours[author.value % kColours.size()];
 }
@@ -108,7 +108,7 @@ bool PeopleView::is_hand(const PersonSeen& person) const {
   return ours && ours->author == person.author;
 }
 
-// Where the room does not say who decided what, and one alone is an instructor, they did.
+// If the room does not say who decided, and there is only one instructor, it was that instructor.
 std::string PeopleView::guard(const PersonSeen& person) const {
   if (person.decided_by) return name_of(person.decided_by);
   std::set<std::string> names;

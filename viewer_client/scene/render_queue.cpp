@@ -5,7 +5,7 @@
 namespace osteon {
 
 namespace {
-// Arrivals are figures for the log; a render thread that stands still for half a minute keeps the newest of them.
+// Arrivals are measurements for the log. If the render thread stalls for half a minute, the newest ones are kept.
 constexpr std::size_t kMostArrivals = 1024;
 }  // namespace
 

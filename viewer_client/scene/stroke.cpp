@@ -16,7 +16,7 @@ double distance_mm(const Vec3& point, const Vec3& from, const Vec3& to) {
   return (point - from - part * way).norm();
 }
 
-// Marks what is kept of the points between two that are.
+// Marks the points to keep between two points that are kept.
 void keep_between(const std::vector<Vec3>& points, std::size_t first, std::size_t last, double tolerance_mm,
                   std::vector<bool>& kept) {
   double most_mm = tolerance_mm;
@@ -68,7 +68,7 @@ std::vector<Vec3> Stroke::line(std::size_t most) const {
   std::vector<Vec3> all = points_;
   if (!all.empty() && last_ != all.back()) all.push_back(last_);
   if (all.size() < 2) return {};
-  // A line on a curved surface shall not dive into it by more than one sees.
+  // A line on a curved surface must not dive into it visibly.
   double tolerance_mm = 0.05;
   std::vector<Vec3> line = simplified(all, tolerance_mm);
   while (line.size() > most) line = simplified(all, tolerance_mm *= 2.0);

@@ -20,7 +20,7 @@ bool SurfaceScene::replace(ReceivedBlock received) {
   auto [place, fresh] = regions_[region].try_emplace(received.key);
   Block& block = place->second;
 
-  // Within a stream a higher version replaces a lower one. What an earlier stream brought yields to a snapshot.
+  // Within a stream a higher version replaces a lower one. A snapshot replaces everything from an earlier stream.
   const bool from_earlier_stream = in_snapshot_ && block.snapshot != snapshot_;
   if (!fresh && !from_earlier_stream && received.version <= block.version) return false;
   block.version = received.version;
@@ -100,7 +100,7 @@ std::size_t SurfaceScene::regions() const {
 }
 
 Digest SurfaceScene::hash() const {
-  // The regions are a grouping of this program only.
+  // Not in the order of regions: these are a grouping of this program only.
   std::map<BlockKey, Digest> hashes;
   for (const auto& [region, blocks] : regions_)
     for (const auto& [key, block] : blocks)

@@ -22,7 +22,8 @@ using Patch = std::function<Vec3(double u, double angle_rad)>;
 void add_strip(ToolMesh& mesh, const Patch& at, int steps, bool cutting) {
   const auto first = static_cast<std::uint32_t>(mesh.positions_mm.size());
   for (int i = 0; i <= steps; ++i) {
-    // Where the strip shrinks to a point its derivative round the axis vanishes: look a little beside it.
+    // Where the strip shrinks to a point, its derivative round the axis vanishes. The normal is taken slightly beside
+    // it.
     const double u = static_cast<double>(i) / steps;
     const double u_normal = std::clamp(u, 1e-3, 1.0 - 1e-3);
     for (int j = 0; j < kAround; ++j) {
@@ -48,7 +49,7 @@ void add_strip(ToolMesh& mesh, const Patch& at, int steps, bool cutting) {
   }
 }
 
-// How deep a flute is at an angle from the middle of a land: 0 on the land, 1 at the flute's bottom.
+// Depth of a flute at an angle from the middle of a land: 0 on the land, 1 at the flute's bottom.
 double flute_depth(double angle_rad, int flutes, double land_share) {
   const double turn = angle_rad * flutes / (2.0 * kPi);
   const double phase = turn - std::floor(turn);
@@ -70,7 +71,7 @@ void add_drill(ToolMesh& mesh, const Tool& tool) {
   const double radius = 0.5 * tool.diameter_mm;
   const double tip = tool.point_angle_rad > 0.0 ? radius / std::tan(0.5 * tool.point_angle_rad) : 0.0;
   const double end = tool.cutting_length_mm;
-  // Two helical flutes of 27 degrees, as a twist drill has; they fade out before the shank.
+  // Two helical flutes of 27 degrees, as on a twist drill. They fade out before the shank.
   const double helix = std::tan(27.0 * kPi / 180.0) / radius;
   const double fade = std::min(2.0 * tool.diameter_mm, 0.3 * end);
   const auto carved = [=](double full_radius, double a, double back_mm) {
@@ -91,11 +92,11 @@ void add_drill(ToolMesh& mesh, const Tool& tool) {
 
 void add_burr(ToolMesh& mesh, const Tool& tool, double neck_radius) {
   const double radius = 0.5 * tool.diameter_mm;
-  // The ball from its tip to where the shank leaves it.
+  // The ball from its tip to the point where the shank begins.
   const double last = kPi - std::asin(std::min(1.0, neck_radius / radius));
   const auto ball = [=](double u, double a) {
     const double polar = u * last;
-    // Eight slanted flutes, fading towards the tip where they would meet and towards the shank.
+    // Eight slanted flutes. They fade towards the tip, where they would meet, and towards the shank.
     const double fade = std::min({1.0, std::sin(polar) * 1.4, 6.0 * (1.0 - u)});
     const double r = radius * (1.0 - 0.10 * fade * flute_depth(a - 0.7 * polar, 8, 0.35));
     return ring_point(r * std::sin(polar), a, -radius + r * std::cos(polar));
@@ -103,12 +104,12 @@ void add_burr(ToolMesh& mesh, const Tool& tool, double neck_radius) {
   add_strip(mesh, ball, 48, true);
 }
 
-// About so many triangles draw a tool, unless it has something thin.
+// Approximate number of triangles of a tool without thin parts.
 constexpr double kTriangles = 16000.0;
-// Where a face turns away from its corner's normal by more than this (cosine), the corner is sharp.
+// A corner is sharp where a face's normal differs from the corner's normal by more than this (cosine).
 constexpr double kSharp = 0.9;
 
-// Any tool by its implicit solid. Corners on sharp edges are drawn once for each face, with that face's normal.
+// Any tool by its implicit solid. A corner on a sharp edge is drawn once for each face, with that face's normal.
 ToolMesh surface_mesh(const Tool& tool) {
   const Implicit solid = tool_solid(tool), part = cutting_part(tool);
   const Vec3 size = solid.bounds.size_mm();

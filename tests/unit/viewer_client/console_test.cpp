@@ -273,7 +273,7 @@ TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   desk.people_[1].decided = RoomSeq{9};
   desk.people_[1].decided_by = AuthorId{1};
   EXPECT_NE(say("people").find(" pending decided by #1"), std::string::npos) << say("people");
-  EXPECT_EQ(say("wait acknowledged Ben 2"), "error #2 \"Ben\" has not heard of event 9 yet");
+  EXPECT_EQ(say("wait acknowledged Ben 2"), "error #2 \"Ben\" has not acknowledged event 9 yet");
   EXPECT_EQ(desk.patience_, 2s);
   desk.people_[1].heard = RoomSeq{12};
   EXPECT_EQ(say("wait acknowledged Ben"), "ok at 12");
