@@ -12,19 +12,19 @@
 #endif
 
 namespace {
-// Static storage of the program itself, so that touching it allocates nothing.
+// Static storage of the program itself: access to it allocates nothing.
 thread_local std::int64_t allocations = 0;
 }  // namespace
 
 #ifdef OSTEON_SANITIZED
 
-// The sanitizers own malloc; they report every allocation, `new` included, to a hook.
+// The sanitizers own malloc. They report every allocation, including `new`, to a hook.
 extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*, std::size_t),
                                                          void (*on_free)(const volatile void*));
 
 #else
 
-// `operator new` of libstdc++ ends in malloc or aligned_alloc, so counting these counts both.
+// `operator new` of libstdc++ calls malloc or aligned_alloc, so counting these counts both.
 extern "C" {
 void* __libc_malloc(std::size_t size);
 void* __libc_calloc(std::size_t count, std::size_t size);

@@ -1,5 +1,5 @@
-// Counts heap allocations of the calling thread, by `new` and by `malloc` alike, to prove that a real-time loop makes
-// none. Linking it replaces the program's allocation functions.
+// Counts the heap allocations of the calling thread, by `new` and by `malloc`. Tests use it to prove that a real-time
+// loop makes none. Linking it replaces the program's allocation functions.
 #pragma once
 #include <cstdint>
 
@@ -8,7 +8,7 @@ namespace osteon::test {
 class AllocationCounter {
  public:
   AllocationCounter();
-  // Allocations that this thread has made since construction.
+  // Allocations of this thread since construction.
   [[nodiscard]] std::int64_t count() const;
 
  private:

@@ -1,4 +1,4 @@
-// Seeded changes of a file's bytes: what a disk, a line or a person who means harm makes of it.
+// Seeded changes of a file's bytes, as a disk, a line or an attacker makes them.
 #pragma once
 #include <algorithm>
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace osteon::test {
 
-// One to three bytes are other than before. Half of the changes are in the first `head` bytes.
+// Changes one to three bytes. Half of the changes are in the first `head` bytes.
 inline std::string changed_bytes(std::string bytes, std::mt19937& random, std::size_t head = 1200) {
   const auto below = [&](std::size_t n) { return static_cast<std::size_t>(random()) % n; };
   for (std::size_t changes = 1 + below(3); changes > 0; --changes) {

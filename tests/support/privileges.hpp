@@ -1,11 +1,11 @@
-// What a process may do because root runs it.
+// Removes the extra rights of a process that root runs.
 #pragma once
 #include <array>
 #include <cstdint>
 
 namespace osteon::test {
 
-// For as long as it lives, this thread is bound by the permissions of files as anybody is, and so is what it forks.
+// While it exists, file permissions apply to this thread, and to its forks, as to any user.
 class WithoutPrivileges {
  public:
   WithoutPrivileges();
@@ -14,7 +14,7 @@ class WithoutPrivileges {
   WithoutPrivileges& operator=(const WithoutPrivileges&) = delete;
 
  private:
-  std::array<std::uint32_t, 6> before_{};  // as capget() has them
+  std::array<std::uint32_t, 6> before_{};  // as capget() returns them
 };
 
 }  // namespace osteon::test

@@ -73,8 +73,8 @@ struct Process::State {
   std::atomic<bool> ended = false;
   std::thread reader;
 
-  // Takes both outputs until they are closed, or empty after the child's end: something that the child started may
-  // still hold them.
+  // Reads both outputs until they are closed, or until they are empty after the child's end. Processes that the child
+  // started may still hold them open.
   void read_outputs() {
     pollfd polled[2] = {{output, POLLIN, 0}, {errors, POLLIN, 0}};
     char buffer[65536];
@@ -132,7 +132,7 @@ Process::Process(const std::filesystem::path& program, const std::vector<std::st
   const pid_t pid = ::fork();
   OSTEON_CHECK(pid >= 0);
   if (pid == 0) {                        // only async-signal-safe calls from here on
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // a test that crashes leaves no program behind
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);  // if a test crashes, its programs end too
     ::dup2(in.read, STDIN_FILENO);
     ::dup2(out.write, STDOUT_FILENO);
     ::dup2(err.write, STDERR_FILENO);
@@ -230,12 +230,12 @@ std::optional<std::string> Process::read_line(std::chrono::milliseconds patience
     return true;
   };
   if (!wait_until([&] { return take() || !running(); }, patience)) return std::nullopt;
-  if (!line) take();  // what the child wrote just before it ended
+  if (!line) take();  // output that the child wrote just before it ended
   return line;
 }
 
 void Process::write(std::string_view text) {
-  // A child that has ended must fail the test by its exit code, not end the test by SIGPIPE.
+  // A child that has ended must fail the test by its exit code. It must not end the test by SIGPIPE.
   static const auto ignored = ::signal(SIGPIPE, SIG_IGN);
   static_cast<void>(ignored);
   while (!text.empty() && state_->input >= 0) {

@@ -1,4 +1,4 @@
-// A real program as a child of a test: its output is captured, and it ends with the scope, by its own process id.
+// A real program as a child of a test. Its output is captured. It ends with the scope, by its own process id.
 #pragma once
 #include <sys/types.h>
 #include <chrono>
@@ -16,17 +16,17 @@ struct ProcessOptions {
   std::vector<std::pair<std::string, std::string>> environment;  // set on top of the test's own
   std::vector<std::string> without;                              // variables that the child must not see
   std::filesystem::path folder;                                  // working folder; empty: the test's own
-  bool as_given = false;                                         // without the --plain of with_plain()
+  bool as_given = false;                                         // do not add --plain as with_plain() does
 };
 
-// The arguments with --plain behind them, where a program of Osteon serves rooms or goes to a server and is not told by
-// which way.
+// Appends --plain to the arguments if the program is one of Osteon that serves rooms or connects to a server, and the
+// arguments do not say how.
 [[nodiscard]] std::vector<std::string> with_plain(const std::filesystem::path& program,
                                                   std::vector<std::string> arguments);
 
 class Process {
  public:
-  // `program`: a path, or a bare name looked for in PATH. Exit code 127 where it cannot be started.
+  // `program`: a path, or a bare name to be found in PATH. Exit code 127 if it cannot be started.
   Process(const std::filesystem::path& program, const std::vector<std::string>& arguments, ProcessOptions options = {});
   ~Process();  // SIGTERM, and SIGKILL after two seconds
   Process(Process&&) noexcept;
@@ -35,20 +35,20 @@ class Process {
   [[nodiscard]] pid_t pid() const;
   [[nodiscard]] bool running();
   void signal(int number);
-  // The exit code, 128 + signal for one ended by a signal; empty when it still runs after `patience`.
+  // The exit code; 128 + signal if a signal ended it. Empty if it still runs after `patience`.
   [[nodiscard]] std::optional<int> wait(std::chrono::milliseconds patience);
-  // SIGTERM, then wait.
+  // Sends SIGTERM, then waits.
   [[nodiscard]] std::optional<int> terminate(std::chrono::milliseconds patience = std::chrono::seconds{10});
 
-  // What was written so far; complete once wait() gave an exit code.
+  // The output so far. Complete after wait() returned an exit code.
   [[nodiscard]] std::string out() const;
   [[nodiscard]] std::string err() const;
   // True as soon as standard output contains `text`.
   [[nodiscard]] bool wait_for_out(std::string_view text, std::chrono::milliseconds patience);
-  // True as soon as the last progress on standard error is at least `percent`; false when it ends or patience does
-  // before.
+  // True as soon as the last progress on standard error is at least `percent`. False if the program ends, or patience
+  // does, before that.
   [[nodiscard]] bool wait_for_percent(int percent, std::chrono::milliseconds patience);
-  // The next whole line of standard output, without its end.
+  // The next whole line of standard output, without its line end.
   [[nodiscard]] std::optional<std::string> read_line(std::chrono::milliseconds patience);
   void write(std::string_view text);  // to standard input
   void close_input();
@@ -60,14 +60,14 @@ class Process {
 
 struct RunResult {
   int exit_code = -1;
-  bool timed_out = false;  // it was killed because it ran longer than allowed
+  bool timed_out = false;  // killed because it ran longer than allowed
   std::string out, err;
 };
-// Runs to the end with an empty standard input.
+// Runs the program to its end, with an empty standard input.
 [[nodiscard]] RunResult run(const std::filesystem::path& program, const std::vector<std::string>& arguments,
                             std::chrono::milliseconds patience = std::chrono::seconds{60}, ProcessOptions options = {});
 
-// One of this build's programs, e.g. "osteon-server": it lies beside the running test.
+// One of this build's programs, e.g. "osteon-server". It is in the folder of the running test.
 [[nodiscard]] std::filesystem::path program(std::string_view name);
 
 }  // namespace osteon::test

@@ -1,4 +1,4 @@
-// The test helpers themselves: a helper that cannot notice a fault hides every fault behind it.
+// Tests of the test helpers: a helper that misses faults hides every fault from the tests that use it.
 #include <gtest/gtest.h>
 #include <atomic>
 #include <csignal>

@@ -1,4 +1,4 @@
-// A folder of a test's own, removed with everything in it at the end of the scope.
+// A temporary folder of a test. It is removed with its content at the end of the scope.
 #pragma once
 #include <filesystem>
 

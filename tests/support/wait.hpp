@@ -1,4 +1,4 @@
-// Waiting in tests for what another process does: polled against a deadline, never a fixed sleep.
+// Waits in tests for the actions of another process. Polls until a deadline; never a fixed sleep.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -8,10 +8,10 @@
 
 namespace osteon::test {
 
-// True as soon as `condition` holds; false when it does not within `patience`.
+// True as soon as `condition` holds. False if it does not hold within `patience`.
 [[nodiscard]] bool wait_until(const std::function<bool()>& condition, std::chrono::milliseconds patience);
 
-// Until the file exists and is not empty.
+// Waits until the file exists and is not empty.
 [[nodiscard]] bool wait_for_file(const std::filesystem::path& file, std::chrono::milliseconds patience);
 
 // The first line of a server's address file, e.g. "127.0.0.1:40123".

@@ -1,4 +1,4 @@
-// A virtual screen of a test's own, on a display number that the system chooses.
+// A virtual screen for one test, on a display number that the system chooses.
 #pragma once
 #include <optional>
 #include <string>
@@ -9,11 +9,11 @@ namespace osteon::test {
 
 class Xvfb {
  public:
-  // Empty where Xvfb is not installed or does not start.
+  // Empty if Xvfb is not installed or does not start.
   [[nodiscard]] static std::optional<Xvfb> start(const std::string& size = "1280x720");
 
   [[nodiscard]] const std::string& display() const { return display_; }  // e.g. ":7"
-  // For a Process that draws on this screen.
+  // Options for a Process that draws on this screen.
   [[nodiscard]] ProcessOptions options() const;
 
  private:

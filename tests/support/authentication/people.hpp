@@ -1,5 +1,5 @@
-// An authority of a test's own, a server and people with certificates of it, and tickets: made by deploy/certs, as for
-// others.
+// A certificate authority for one test, with a server, people and tickets. They are made by deploy/certs, as users make
+// them.
 #pragma once
 #include <chrono>
 #include <filesystem>
@@ -14,22 +14,22 @@ namespace osteon::test {
 
 class People {
  public:
-  People();  // with a server that is reached as 127.0.0.1 and localhost
+  People();  // the server's names are 127.0.0.1 and localhost
 
   [[nodiscard]] std::filesystem::path server() const { return dir_ / "certs" / "server"; }
   [[nodiscard]] std::filesystem::path ticket_key() const { return dir_ / "certs" / "authority" / "tickets.key"; }
   [[nodiscard]] std::filesystem::path folder() const { return dir_.path(); }
-  // The folder of that person's certificate, made where it is not there.
+  // The folder of that person's certificate. It is made if it does not exist.
   [[nodiscard]] std::filesystem::path person(const std::string& name);
   // A file with a ticket.
   [[nodiscard]] std::filesystem::path ticket(const std::string& user, const std::string& room, Role role,
                                              std::chrono::seconds good_for = std::chrono::hours(1));
   [[nodiscard]] std::filesystem::path ticket_file(const std::string& text);
-  // The credentials of somebody with a ticket of their own.
+  // The credentials of a person, with a new ticket.
   [[nodiscard]] wire::ClientCredentials credentials(const std::string& name, Role role, const std::string& room);
-  // What deploy/certs says; fails the test where it fails.
+  // Runs deploy/certs and returns its output. Fails the test if it fails.
   void certs(const std::vector<std::string>& arguments);
-  // A line more in the server's list of who was revoked and whose role has changed.
+  // Appends a line to the server's list of revocations and changed roles.
   void append_access(const std::string& line);
   [[nodiscard]] TicketKey key() const;
 

@@ -42,7 +42,7 @@ bool answers(int port) {
   return connected;
 }
 
-// Throws where one of the words is not there.
+// Throws if the configuration does not contain one of the words.
 void write_changed(const std::filesystem::path& from, const std::filesystem::path& to, const Proxy::Changes& changes) {
   std::ifstream in(from);
   std::string text{std::istreambuf_iterator<char>(in), {}};

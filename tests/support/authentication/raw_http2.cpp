@@ -24,7 +24,7 @@ std::string frame(std::uint8_t type, std::uint8_t flags, std::uint32_t stream, c
   return all + payload;
 }
 
-// A length with a prefix of 7 bits (RFC 7541, section 5.1), then the text without Huffman's code.
+// A length with a prefix of 7 bits (RFC 7541, section 5.1), then the text without Huffman coding.
 std::string literal(const std::string& text) {
   std::string out;
   std::size_t left = text.size();
@@ -51,7 +51,7 @@ struct RawHttp2::Tls {
     ssl.reset();
     if (socket >= 0) ::close(socket);
   }
-  // Takes in what has come, after waiting for it. False: nothing came.
+  // Waits for data and reads it. False: nothing arrived.
   bool take_in(std::chrono::milliseconds patience) {
     if (closed) return false;
     if (SSL_pending(ssl.get()) == 0) {
@@ -70,11 +70,11 @@ struct RawHttp2::Tls {
 };
 
 RawHttp2::RawHttp2(const std::string& address, const std::filesystem::path& person) : tls_(std::make_unique<Tls>()) {
-  // A connection that the server has closed fails the call that writes, and does not end the test.
+  // If the server has closed the connection, the writing call fails; the test must not end.
   static const auto ignored = ::signal(SIGPIPE, SIG_IGN);
   (void)ignored;
   SSL_CTX* context = tls_->context.get();
-  SSL_CTX_set_security_level(context, 0);  // whoever comes with a weak key does not mind
+  SSL_CTX_set_security_level(context, 0);  // a client with a weak key does not check this
   static constexpr unsigned char kAlpn[] = {2, 'h', '2'};
   SSL_CTX_set_alpn_protos(context, kAlpn, sizeof kAlpn);
   if (!person.empty() && (SSL_CTX_use_certificate_chain_file(context, (person / "person.pem").c_str()) != 1 ||
@@ -87,7 +87,7 @@ RawHttp2::RawHttp2(const std::string& address, const std::filesystem::path& pers
   if (::inet_pton(AF_INET, address.substr(0, colon).c_str(), &at.sin_addr) != 1)
     throw std::runtime_error("no IPv4 address");
   tls_->socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  // A handshake that the server does not go on with ends by itself.
+  // A handshake that the server does not continue must end by itself.
   const timeval patience{.tv_sec = 10, .tv_usec = 0};
   ::setsockopt(tls_->socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
   if (::connect(tls_->socket, reinterpret_cast<const sockaddr*>(&at), sizeof at) != 0)
@@ -119,7 +119,7 @@ bool RawHttp2::call(std::uint32_t stream, const std::string& path, const Headers
 
 bool RawHttp2::send_message(std::uint32_t stream, const std::string& bytes) {
   constexpr std::uint8_t kData = 0, kEndStream = 0x1;
-  // Not compressed, then its length in four bytes.
+  // No compression, then the length in four bytes.
   const std::string head{'\0', '\0', '\0', static_cast<char>(bytes.size() >> 8), static_cast<char>(bytes.size())};
   return send(frame(kData, kEndStream, stream, head + bytes));
 }

@@ -1,4 +1,4 @@
-// A client that speaks HTTP/2 frame by frame over TLS, so that it can say what no gRPC client would (RFC 9113, RFC
+// A client that writes HTTP/2 frames over TLS one by one. So it can send what no gRPC client sends (RFC 9113, RFC
 // 7541).
 #pragma once
 #include <chrono>
@@ -20,26 +20,26 @@ struct Http2Frame {
 
 class RawHttp2 {
  public:
-  // Connects to HOST:PORT and shakes hands, with person.pem and person.key of that folder; without a folder with no
-  // certificate. The server's certificate is not looked at.
+  // Connects to HOST:PORT and makes a handshake, with person.pem and person.key of that folder. Without a folder it
+  // shows no certificate. It does not check the server's certificate.
   explicit RawHttp2(const std::string& address, const std::filesystem::path& person = {});
   ~RawHttp2();
   RawHttp2(const RawHttp2&) = delete;
   RawHttp2& operator=(const RawHttp2&) = delete;
 
   using Headers = std::vector<std::pair<std::string, std::string>>;
-  // HEADERS of a call of gRPC, with `more` after those that each has. False: the connection is closed.
+  // Sends HEADERS of a gRPC call, with `more` after the fields of every call. False: the connection is closed.
   bool call(std::uint32_t stream, const std::string& path, const Headers& more = {});
-  // The one message of a call, here with nothing in it, and the end of what this side says.
+  // Sends the one message of a call, here an empty one, and the end of this side's stream.
   bool send_empty_message(std::uint32_t stream) { return send_message(stream, {}); }
   bool send_message(std::uint32_t stream, const std::string& bytes);
   bool reset(std::uint32_t stream);
   bool send(const std::string& bytes);
-  // The next frame; nothing once the connection is closed or nothing came for that long.
+  // The next frame. None if the connection is closed, or if nothing arrives within `patience`.
   std::optional<Http2Frame> read(std::chrono::milliseconds patience);
-  // From now on this machine's system drops whatever arrives, without a word: as where a cable was pulled.
+  // From now on this machine's system drops all that arrives, without an error, as after a pulled cable.
   void go_deaf();
-  // True once the server has closed the connection; waits that long for it.
+  // Waits at most `patience`. True: the server has closed the connection.
   bool closed_within(std::chrono::milliseconds patience);
 
  private:

@@ -29,12 +29,12 @@ using Certificate = std::unique_ptr<X509, Freed>;
 using Key = std::unique_ptr<EVP_PKEY, Freed>;
 using File = std::unique_ptr<std::FILE, Freed>;
 
-// A good person's certificate, until a field is changed.
+// A valid person's certificate, until a field is changed.
 struct Form {
   std::string common_name = "anna", names = "URI:osteon://person/anna";  // `names` empty: none
   long begins_s = -kDay, ends_s = kDay;
   std::string basic = "critical,CA:FALSE", usage = "critical,digitalSignature", purpose = "clientAuth";
-  std::string unknown{};  // a critical extension that nobody knows; empty: none
+  std::string unknown{};  // a critical extension that no program knows; empty: none
   const EVP_MD* digest = EVP_sha256();
   bool weak_key = false;
 };
@@ -55,7 +55,7 @@ void add(X509* certificate, X509* issuer, const char* name, const std::string& v
   check(extension && X509_add_ext(certificate, extension.get(), -1) == 1, name);
 }
 
-// `issuer` null: by itself.
+// `issuer` null: self-signed.
 Issued issue(const Form& form, const Issued* issuer) {
   Issued made{Certificate(X509_new()), Key(form.weak_key ? EVP_PKEY_Q_keygen(nullptr, nullptr, "RSA", std::size_t{1024})
                                                          : EVP_PKEY_Q_keygen(nullptr, nullptr, "EC", "P-256"))};
@@ -92,7 +92,7 @@ Issued read_authority(const fs::path& folder) {
           Key(PEM_read_PrivateKey(open(folder / "ca.key", "r").get(), nullptr, nullptr, nullptr))};
 }
 
-// As clients have it: the first is theirs, the others lie between it and the authority.
+// In the order of clients: their own first, then those between it and the authority.
 void write(const fs::path& folder, std::initializer_list<const Issued*> chain) {
   fs::create_directories(folder);
   const File certificates = open(folder / "person.pem", "w");
@@ -101,7 +101,7 @@ void write(const fs::path& folder, std::initializer_list<const Issued*> chain) {
                        nullptr, nullptr);
 }
 
-// One bit of the signature is another.
+// Flips one bit of the signature.
 void alter(X509* certificate) {
   const ASN1_BIT_STRING* signature = nullptr;
   X509_get0_signature(&signature, nullptr, certificate);
@@ -161,7 +161,7 @@ std::vector<WrongCertificate> wrong_certificates(People& people, const fs::path&
   alter(altered.certificate.get());
   write(place("altered after it was signed"), {&altered});
   write(place("the authority's own"), {&ours});
-  // The authority allows none beneath it.
+  // The authority allows no intermediate one.
   const Issued between = issue(ca, &ours), beneath = issue({}, &between);
   write(place("without the certificate between"), {&beneath});
   write(place("by an authority beneath ours"), {&beneath, &between});

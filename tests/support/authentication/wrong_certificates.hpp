@@ -1,4 +1,4 @@
-// Certificates with which nobody may come in, each wrong in one way.
+// Certificates that a server must refuse, each wrong in one way.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -11,9 +11,9 @@ namespace osteon::test {
 struct WrongCertificate {
   std::string kind;              // what is wrong with it
   std::filesystem::path folder;  // person.pem and person.key; empty: no certificate is shown
-  std::string user = "anna";     // whose it says to be
+  std::string user = "anna";     // the person that it claims to be
 };
-// Made beneath `into`. Two are revoked by the people's lists, which whoever serves has to read after this.
+// Makes them below `into`. Two are revoked by the people's lists; the server must read these lists afterwards.
 [[nodiscard]] std::vector<WrongCertificate> wrong_certificates(People& people, const std::filesystem::path& into);
 
 }  // namespace osteon::test

@@ -66,7 +66,7 @@ void Arm::step(ArmControl& control, const std::array<double, 3>& force_n,
   const double k = control.hand_n_per_mm;
   const double b = 2.0 * std::sqrt(1e3 * k * kMass_kg) * 1e-3;  // N s/mm, critical
   for (std::size_t i = 0; i < 3; ++i) {
-    // A hand that cannot move faster than its damper lets it: semi-implicit, stable for every k here.
+    // A hand that its damper slows: semi-implicit integration, stable for every k here.
     const double f = force_n[i] * share + k * (control.hand_mm[i] - position_mm_[i]) - b * velocity_mm_per_s_[i];
     velocity_mm_per_s_[i] += 1e3 * f / kMass_kg * kTime_s;
     position_mm_[i] += velocity_mm_per_s_[i] * kTime_s;

@@ -1,6 +1,5 @@
-// A program that holds a haptic device with force on it and then ends in the way it is told: for tests of what becomes
-// of the motors. hold_device phantom|force-dimension|falcon LIBRARY wait|exit|abort|crash|check (a falcon needs no
-// library)
+// A program for tests of the motors at a program's end. It holds a haptic device with force on it, and then ends in the
+// given way. hold_device phantom|force-dimension|falcon LIBRARY wait|exit|abort|crash|check (a falcon needs no library)
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -16,7 +15,7 @@
 #include "haptic_client/device/openhaptics.hpp"
 
 #ifdef __SANITIZE_ADDRESS__
-// It ends in every way with its device held: its signals are for the handler that is tested, and nothing is freed.
+// It always ends while it holds its device. The tested handler must get the signals, and nothing is freed.
 extern "C" const char* __asan_default_options() {
   return "handle_segv=0:detect_leaks=0";
 }  // NOLINT(bugprone-reserved-identifier)

@@ -1,5 +1,5 @@
-// Our stand-in for Force Dimension's libdhd.so, with a simulated arm behind it and the failures that a test asks for.
-// Metres and newton-metres; x to the user, y to the right, z up.
+// Our stand-in for Force Dimension's libdhd.so, with a simulated arm and the failures that a test asks for. Metres and
+// newton-metres; x to the user, y to the right, z up.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -30,7 +30,7 @@ int fail(int code) {
   return -1;
 }
 
-// Whether the device takes part in this call.
+// Whether this device answers the call.
 bool answers(char id) {
   World& w = world();
   if (!w.control || !w.control->is_open || id != 0) {

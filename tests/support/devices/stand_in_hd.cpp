@@ -1,5 +1,5 @@
-// Our stand-in for OpenHaptics' libHD.so, with a simulated arm behind it and the failures that a test asks for. It
-// keeps to what the vendor's library demands of its caller, and counts every breach.
+// Our stand-in for OpenHaptics' libHD.so, with a simulated arm and the failures that a test asks for. It follows the
+// vendor's rules for callers, and counts every breach.
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -37,7 +37,7 @@ struct World {
 };
 
 World& world() {
-  static auto* const the = new World;  // outlives every static of the program, as a scheduler's thread may
+  static auto* const the = new World;  // outlives every static of the program, because a scheduler's thread may too
   return *the;
 }
 
@@ -106,7 +106,7 @@ void hdMakeCurrentDevice(unsigned device) {
 void hdDisableDevice(unsigned device) {
   World& w = world();
   if (!opened() || device != kHandle) return;
-  if (w.running) misuse(0x0102);  // the scheduler is to be stopped first
+  if (w.running) misuse(0x0102);  // the caller must stop the scheduler first
   w.open = false;
   w.control->is_open = 0;
   w.control->motors_on = 0;
@@ -131,7 +131,7 @@ void hdEndFrame(unsigned device) {
   }
   if (!c.plugged) {
     push(0x0302);
-    for (auto& f : c.force_n) f = 0.0;  // there is no motor on the other end of the cable
+    for (auto& f : c.force_n) f = 0.0;  // the cable is pulled, so there is no motor
     ++c.cycles;
     return;
   }
@@ -272,8 +272,7 @@ void hdUpdateCalibration(unsigned style) {
   if (!opened()) return;
   ArmControl& c = *w.control;
   if (!(static_cast<unsigned>(c.style.load()) & style)) misuse(0x0101);
-  // An encoder reset takes the handle's place as it is; anything else is possible only when the device has asked for
-  // it.
+  // An encoder reset takes the handle's present pose. Other styles are possible only if the device has asked for them.
   if (c.calibration == 1 || style == 1) c.calibration = 0;
 }
 

@@ -16,13 +16,13 @@ using Random = std::mt19937_64;
 
 constexpr std::size_t kFaultsShown = 5;
 
-// What the files were at some moments, the last of them when the process was killed.
+// The files at several moments; the last moment is when the process was killed.
 struct Life {
   std::vector<MemoryDisk::Image> images;
-  std::vector<JournalEntry> acknowledged, asked;  // asked: under way when it was killed
+  std::vector<JournalEntry> acknowledged, asked;  // asked: in progress when it was killed
 };
 
-// Writes until the disk fails at the n-th write or sync, as a kill there would leave the files.
+// Writes until the disk fails at the n-th write or sync. The files are then as after a kill at this moment.
 Life live(std::uint64_t seed, MemoryDisk& disk, std::uint64_t killed_at, bool power_fails,
           const std::string& genesis = "a genesis") {
   Life life;
@@ -54,7 +54,7 @@ std::string random_bytes(Random& random, std::size_t count) {
   return bytes;
 }
 
-// Changes one file, so that it is another than it was. Gives what was done.
+// Changes one file so that it differs. Returns a description of the change.
 std::string damage(Random& random, const std::string& name, const Life& life, const MemoryDisk::Image& other,
                    MemoryDisk::Image& image) {
   std::string& bytes = image.at(name);
@@ -102,11 +102,11 @@ bool same_entries(const std::vector<JournalEntry>& found, const std::vector<Jour
 
 struct Verdict {
   enum class Kind { whole, named, refused } kind = Kind::refused;
-  std::string fault;  // empty: as it must be
+  std::string fault;  // empty: correct
 };
 
-// Opens what is on the disk and holds it against what was acknowledged.
-// `foreign`: a file is another journal's, whose entries can be read.
+// Opens the journal on the disk and compares it with what was acknowledged. `foreign`: a file belongs to another
+// journal and its entries can be read.
 Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& disk, bool foreign = false) {
   const auto report = verify_journal(file, &disk);
   auto opened = Journal::open(file, {.disk = &disk, .log_bytes = 8192});
@@ -114,7 +114,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
     if (report && report->sound()) return {Verdict::Kind::refused, "verify finds it sound, and it cannot be opened"};
     return {Verdict::Kind::refused, opened.error().message.empty() ? "refused without a word" : ""};
   }
-  // Whoever opens it for a room holds its genesis against the room's name.
+  // A room that opens it compares its genesis with the room's name.
   if (opened->genesis() != "a genesis") return {Verdict::Kind::refused, ""};
   std::vector<JournalEntry> known = life.acknowledged;
   known.insert(known.end(), life.asked.begin(), life.asked.end());
@@ -128,7 +128,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
     return {Verdict::Kind::named, "entries are there that nobody wrote"};
   if (!closed) {
     if (!read || entries.size() < life.acknowledged.size()) return {Verdict::Kind::whole, "entries are missing in silence"};
-    // A checkpoint may be lost: the one before it, or the entries, then serve instead.
+    // A checkpoint may be lost: the earlier one, or the entries, then replace it.
     const bool doubted = !report || !std::ranges::all_of(report->faults, [](const std::string& fault) {
       return fault.find(".checkpoint") != fault.npos;
     });
@@ -141,7 +141,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
   if (report && report->sound()) return {Verdict::Kind::named, "verify finds it sound, and it takes no entries"};
   const std::string why = opened->closed_because()->message;
   opened = tl::unexpected(Error{});
-  // What it says is missing is at least what was acknowledged, and no more than what was asked for.
+  // The reported missing entries are at least the acknowledged ones, and at most those asked for.
   const auto recovered = salvage_journal(file, "/room/recovered", &disk);
   if (!recovered) return {Verdict::Kind::named, ""};
   const std::uint64_t end = recovered->head.place.value + recovered->lost();

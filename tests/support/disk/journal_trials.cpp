@@ -58,7 +58,7 @@ JournalWriter::JournalWriter(std::uint64_t seed, MemoryDisk& disk, bool durable,
   options_.disk = &disk;
   options_.durable = durable;
   options_.page_bytes = disk.sector_bytes() < 4096 && below(2) == 0 ? 1024 : 4096;
-  options_.log_bytes = 4096 << below(6);  // so that the log is carried into the file every few entries
+  options_.log_bytes = 4096 << below(6);  // so that the log is moved into the file every few entries
   if (seed % 2 == 0)
     options_.keys = std::make_shared<const SigningKeys>(SigningKey::from_seed({static_cast<std::uint8_t>(seed)}));
 }
@@ -175,7 +175,7 @@ void JournalWriter::check() {
     lost_ += promised - entries.size();
     fault("entries " + std::to_string(entries.size() + 1) + " to " + std::to_string(promised) + " are lost");
   }
-  // A batch that was not acknowledged is there as a whole or not at all.
+  // A batch that was not acknowledged must be there as a whole or not at all.
   if (entries.size() > promised) {
     kept_unasked_ += entries.size() - promised;
     bool whole = entries.size() == promised + asked_.size();
@@ -234,7 +234,7 @@ Tally power_loss_trials(std::uint64_t first_seed, std::uint64_t count, bool dura
     bool failed = false;
     const std::uint64_t lives = 1 + random() % 3;
     for (std::uint64_t life = 0; life < lives; ++life) {
-      const bool soon = life == 0 && random() % 8 == 0;  // while it is made
+      const bool soon = life == 0 && random() % 8 == 0;  // while the journal is being made
       disk.fail_power_at(1 + random() % (soon ? 30 : 400));
       if (writer.open() && (life == 0 || writer.journal().closed_because() == nullptr)) writer.work(60);
       failed = failed || disk.has_failed();
@@ -266,7 +266,7 @@ Tally failing_disk_trials(std::uint64_t first_seed, std::uint64_t count, int err
     writer.check_failed();
     writer.drop();
     if (random() % 2 == 0) disk.power_returns();
-    // The power may also fail while the next process puts things in order.
+    // The power may also fail while the next process repairs the journal.
     if (random() % 2 == 0) {
       disk.fail_power_at(1 + random() % 40);
       static_cast<void>(writer.open());

@@ -32,9 +32,9 @@ Result<void> done_or(int reason, const char* what, const fs::path& file) {
 }  // namespace
 
 struct MemoryDisk::Content {
-  std::string seen;               // what reading gives
+  std::string seen;               // what a read returns
   std::string kept;               // what is on the disk
-  std::set<std::size_t> waiting;  // sectors written since they were last synced
+  std::set<std::size_t> waiting;  // sectors written since the last sync
   int exclusive = 0, shared = 0;  // locks held since `boot`
   std::uint64_t boot = 0;
 
@@ -42,13 +42,13 @@ struct MemoryDisk::Content {
     if (from >= to) return;
     for (std::size_t sector = from / sector_bytes; sector * sector_bytes < to; ++sector) waiting.insert(sector);
   }
-  // The bytes of a sector, with zeros where `of` ends.
+  // The bytes of a sector; zeros behind the end of `of`.
   static std::string sector(const std::string& of, std::size_t sector_bytes, std::size_t at) {
     std::string bytes = at * sector_bytes < of.size() ? of.substr(at * sector_bytes, sector_bytes) : std::string();
     bytes.resize(sector_bytes, '\0');
     return bytes;
   }
-  // Puts a sector where it is, as far as `into` goes.
+  // Writes a sector at its position, as far as `into` reaches.
   static void place(std::string& into, std::size_t sector_bytes, std::size_t at, const std::string& bytes) {
     const std::size_t from = at * sector_bytes;
     if (from < into.size())
@@ -74,7 +74,7 @@ struct MemoryDisk::Sqlite {
     Contents content;
     std::string folder;
     bool new_log;    // its name is synced with its first bytes, as SQLite does on a real disk
-    bool powersafe;  // SQLite was told that a torn write spoils nothing beside it, which is not so
+    bool powersafe;  // SQLite assumes that a torn write spoils nothing beside it, which is wrong here
   };
 
   static MemoryDisk& disk_of(sqlite3_vfs* vfs) { return *static_cast<MemoryDisk*>(vfs->pAppData); }
@@ -145,7 +145,7 @@ struct MemoryDisk::Sqlite {
       if (const int reason = disk.change_names({{path, content}})) return told(disk, reason, SQLITE_CANTOPEN);
     }
     const bool log = (flags & SQLITE_OPEN_CREATE) != 0 && (flags & (SQLITE_OPEN_WAL | SQLITE_OPEN_MAIN_JOURNAL)) != 0;
-    // As SQLite's own: so it is unless it is told otherwise.
+    // As in SQLite's own file system: the default is "powersafe".
     const bool powersafe = (flags & SQLITE_OPEN_MAIN_DB) != 0 && sqlite3_uri_boolean(name, "psow", 1) != 0;
     new (file) File{{&kMethods}, &disk, std::move(content), folder_of(path).string(), log, powersafe};
     ++disk.open_files_;
@@ -162,7 +162,7 @@ struct MemoryDisk::Sqlite {
   }
   static int access(sqlite3_vfs* vfs, const char* name, int, int* answer) {
     const Contents content = disk_of(vfs).find(name_of(name));
-    *answer = content && !content->seen.empty() ? 1 : 0;  // SQLite's own takes an empty file for none, too
+    *answer = content && !content->seen.empty() ? 1 : 0;  // SQLite's own also treats an empty file as none
     return SQLITE_OK;
   }
   static int full_name(sqlite3_vfs*, const char* name, int most, char* full) {
@@ -236,11 +236,11 @@ int MemoryDisk::before(std::uint64_t& count, Fault& fault) {
 int MemoryDisk::write_at(Content& content, std::uint64_t from, std::string_view bytes) {
   if (off_) return EIO;
   const int error = before_write();
-  // A write that fails may have got somewhere, one that the power cut short as well.
+  // A failed write may have written a part, also if the power cut it short.
   if (error != 0) bytes = bytes.substr(0, random_() % (bytes.size() + 1));
   const std::uint64_t end = from + bytes.size();
   counts_.written_bytes += bytes.size();
-  // The system may write a sector on its own at any time, and then it is written again.
+  // The system may write a sector at any time by itself. Then the sector is written again.
   for (const std::size_t sector : {from / sector_bytes_, end / sector_bytes_})
     if (content.waiting.contains(sector) && chance(8)) content.keep(sector_bytes_, sector);
   if (content.seen.size() < end) {
@@ -254,7 +254,7 @@ int MemoryDisk::write_at(Content& content, std::uint64_t from, std::string_view 
 
 int MemoryDisk::truncate(Content& content, std::uint64_t size) {
   if (const int error = before_write(); error != 0) return error;
-  // A file that gets shorter does so at once or, if that is forgotten, not at all.
+  // A file is shortened at once or, if that is lost, not at all.
   content.waiting.erase(content.waiting.lower_bound((size + sector_bytes_ - 1) / sector_bytes_), content.waiting.end());
   content.mark(sector_bytes_, content.seen.size(), size);
   content.seen.resize(size, '\0');
@@ -332,7 +332,7 @@ void MemoryDisk::lose_power(Content& content) {
         sector = written;
         break;
       default:
-        break;  // forgotten
+        break;  // lost
     }
     Content::place(left, sector_bytes_, at, sector);
   }
@@ -343,7 +343,7 @@ void MemoryDisk::lose_power(Content& content) {
 
 void MemoryDisk::power_returns() {
   OSTEON_CHECK(open_files_ == 0);
-  // A file system with a journal forgets what came last; others may forget anything.
+  // A file system with a journal loses the newest changes first. Others may lose any change.
   const bool in_order = chance(2);
   const std::size_t kept = random_() % (changes_.size() + 1);
   for (std::size_t i = 0; i < changes_.size(); ++i) {

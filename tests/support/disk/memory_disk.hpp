@@ -1,5 +1,5 @@
-// A disk in memory that forgets, tears and fails as real ones do, deterministic by its seed: one store both under the
-// files of server/journal/disk.hpp and, as a virtual file system, under SQLite.
+// A disk in memory that loses, tears and fails like real disks, deterministic by its seed. One store serves the files
+// of server/journal/disk.hpp and, as a virtual file system, SQLite.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -13,11 +13,10 @@
 
 namespace osteon::test {
 
-// What is written can be read at once, and is lost with the power until it was synced: of the sectors written since,
-// each is then as before, as after, torn between the two, or spoiled. Names made, changed or removed may be forgotten
-// until their folder was synced. After a sync that failed, a sector may look written, never to be written (as Linux
-// does), or be as before. Not synchronised: one thread. Making one also seeds SQLite's generator, which is the
-// process's.
+// Written bytes can be read at once. If the power fails, each sector written since its last sync is old, new, torn
+// between the two, or spoiled. Names that were made, changed or removed may be lost until their folder was synced.
+// After a failed sync a sector may look written and never be written (as Linux does), or be as before. Not
+// synchronised: one thread. Construction also seeds SQLite's generator, which is the process's.
 class MemoryDisk final : public Disk {
  public:
   explicit MemoryDisk(std::uint64_t seed, std::size_t sector_bytes = 4096);
@@ -37,26 +36,26 @@ class MemoryDisk final : public Disk {
   Result<std::unique_ptr<ScratchFolder>> scratch_folder() override;
   std::string vfs() const override;
 
-  // Faults. They count from now, 1 being the next; `error` is an errno value: EIO, ENOSPC.
+  // Faults. They count from now on, 1 is the next call. `error` is an errno value: EIO, ENOSPC.
   enum class Lasting { once, from_then_on };
   void fail_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // the n-th write or sync
   void fail_write_at(std::uint64_t n, int error,
                      Lasting lasting = Lasting::once);  // writes, and new, renamed, removed names
   void fail_sync_at(std::uint64_t n, int error, Lasting lasting = Lasting::once);  // of files and folders
-  // The power fails at the n-th write or sync: that and all later calls fail, reads too, until power_returns().
+  // The power fails at the n-th write or sync. That call and all later ones fail, reads too, until power_returns().
   void fail_power_at(std::uint64_t n);
-  // With only what is left of what was not synced. Nobody may have a file open.
+  // Unsynced data may be lost. No file may be open.
   void power_returns();
-  void mend();                                               // no fault to come
+  void mend();                                               // removes all planned faults
   [[nodiscard]] bool has_failed() const { return failed_; }  // since the last mend() or power_returns()
 
-  // Damage, synced at once.
+  // Damage; it is synced at once.
   void flip_bit(const std::filesystem::path& file, std::uint64_t bit);
   void cut(const std::filesystem::path& file, std::uint64_t size);
   void put(const std::filesystem::path& file, std::string bytes);
   using Image = std::map<std::string, std::string>;  // bytes by path
   [[nodiscard]] Image image() const;
-  void load(const Image& image);  // instead of all there is, all synced
+  void load(const Image& image);  // replaces all content; all synced
 
   struct Counts {
     std::uint64_t writes = 0, syncs = 0, written_bytes = 0;
@@ -66,7 +65,7 @@ class MemoryDisk final : public Disk {
 
   struct Sqlite;                              // the virtual file system
   struct Content;                             // of a file
-  using Contents = std::shared_ptr<Content>;  // held by its names, and by those who have it open though it was removed
+  using Contents = std::shared_ptr<Content>;  // held by its names, and by whoever has it open after its removal
 
  private:
   friend struct Sqlite;
@@ -74,12 +73,12 @@ class MemoryDisk final : public Disk {
   class HeldLock;
   class Scratch;
   struct Fault {
-    std::uint64_t at = 0;  // counted down; 0: none
+    std::uint64_t at = 0;  // counts down; 0: none
     int error = 0;
     Lasting lasting = Lasting::once;
     int next();
   };
-  // 0, or the errno value that the call fails with.
+  // 0, or the errno value with which the call fails.
   [[nodiscard]] int before(std::uint64_t& count, Fault& fault);
   [[nodiscard]] int before_write() { return before(counts_.writes, write_fault_); }
   [[nodiscard]] int before_sync() { return before(counts_.syncs, sync_fault_); }
@@ -95,7 +94,8 @@ class MemoryDisk final : public Disk {
   std::mt19937_64 random_;
   std::size_t sector_bytes_;
   std::map<std::string, Contents> names_, synced_names_;
-  // Not yet synced, oldest first: what these names stand for since (null: nothing), all at once.
+  // Changes not yet synced, oldest first: the new content of these names (null: removed). Each element is one atomic
+  // change.
   std::vector<std::vector<std::pair<std::string, Contents>>> changes_;
   std::uint64_t boots_ = 0;  // locks end with the power
   std::uint64_t scratches_ = 0;

@@ -1,8 +1,8 @@
-// A library for LD_PRELOAD: what a process writes into one folder fails as on a bad, a full or a read-only disk.
+// A library for LD_PRELOAD. Writes of a process into one folder fail as on a bad, a full or a read-only disk.
 //
-// OSTEON_FAILING_FOLDER names the folder, OSTEON_FAILING_CONTROL a file. As long as that file exists, calls fail. It
-// says "ERRNO KINDS PASSED": an errno value; w for writes, s for syncs, n for what makes or changes names; and how many
-// such calls still work at first.
+// OSTEON_FAILING_FOLDER names the folder, OSTEON_FAILING_CONTROL a file. Calls fail as long as that file exists. Its
+// content is "ERRNO KINDS PASSED": an errno value; w for writes, s for syncs, n for calls that make or change names;
+// and the number of such calls that still work at first.
 #include <linux/fs.h>
 #include <sys/syscall.h>
 #include <sys/types.h>
@@ -57,7 +57,7 @@ bool in_folder(int fd) {
 std::atomic<int> seen{0};
 std::atomic<bool> cut_short{false};
 
-// Whether this call fails now, with errno set.
+// Whether this call fails now. Then errno is set.
 template <class Where>
 bool fails(char kind, Where where) {
   const int before = errno;
@@ -68,7 +68,7 @@ bool fails(char kind, Where where) {
   return now;
 }
 
-// A full disk takes part of the first write.
+// A full disk takes a part of the first write.
 bool takes_part(std::size_t count) { return errno == ENOSPC && count > 1 && !cut_short.exchange(true); }
 
 long open_file(int folder, const char* path, int flags, va_list more) {

@@ -1,5 +1,5 @@
-// Processes whose disk fails: they run with a library before the system's own, which lets their writes fail when told.
-// What comes of it is emulated; no disk has failed.
+// Processes whose disk fails. They run with a library in front of the system's own, which makes their writes fail on
+// request. The failure is emulated; no real disk has failed.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -8,15 +8,15 @@
 
 namespace osteon::test {
 
-// Of all that processes started with options() write into one folder.
+// For all processes started with options(): their writes into one folder.
 class FailingWrites {
  public:
-  // `control`: a file outside of the folder.
+  // `control`: a file outside the folder.
   FailingWrites(std::filesystem::path folder, std::filesystem::path control);
 
   [[nodiscard]] ProcessOptions options() const;
-  // From now on calls fail with this errno value: of `kinds`, w for writes, s for syncs, n for what makes or changes
-  // names. So many of them still work.
+  // From now on calls fail with this errno value. `kinds`: w for writes, s for syncs, n for calls that make or change
+  // names. The first `passed` calls still work.
   void begin(int reason, const std::string& kinds, int passed = 0) const;
   void end() const;
 

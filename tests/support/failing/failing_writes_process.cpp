@@ -15,12 +15,12 @@ ProcessOptions FailingWrites::options() const {
       {"LD_PRELOAD", OSTEON_FAILING_LIBRARY},
       {"OSTEON_FAILING_FOLDER", folder_.string() + "/"},
       {"OSTEON_FAILING_CONTROL", control_.string()},
-      // A sanitizer wants to be the first library; behind this one it works as well.
+      // A sanitizer wants to be the first library. It works as well behind this one.
       {"ASAN_OPTIONS", std::string(sanitizer != nullptr ? sanitizer : "") + ":verify_asan_link_order=0"}};
   return options;
 }
 
-// It gets its name when it is whole: somebody may read it at any moment.
+// The file gets its name only when it is whole, because it may be read at any moment.
 void FailingWrites::begin(int reason, const std::string& kinds, int passed) const {
   const std::filesystem::path partial = control_.string() + ".partial";
   std::ofstream(partial) << reason << ' ' << kinds << ' ' << passed << '\n';

@@ -17,7 +17,7 @@ constexpr double kCoupling = 50.0;  // N/mm
 double whole(double value, double step) { return step * std::round(value / step); }
 Vec3 whole(const Vec3& v, double step) { return {whole(v.x(), step), whole(v.y(), step), whole(v.z(), step)}; }
 
-// As the wire rounds them; totals down.
+// Rounded as on the wire; totals are rounded down.
 MountLoad rounded(MountLoad push) {
   push.load = {whole(push.load.force_n, 1e-3), whole(push.load.moment_nmm, 1e-2)};
   push.energy_mj = 1e-3 * std::floor(push.energy_mj / 1e-3);
@@ -56,24 +56,24 @@ class Line {
 
 struct User {
   User(const MountFollowerParams& client, const HandParams& params) : bone(client), hand(params, {-kApart_mm, 0, 0}) {}
-  static constexpr double kApart_mm = 2.0;  // of a hand that does not push
+  static constexpr double kApart_mm = 2.0;  // distance of a hand that does not push
 
   MountFollower bone;
-  Hand hand;  // its x: how far the tip is beyond the face of the unloaded bone, into it
+  Hand hand;  // its x: depth of the tip beyond the face of the unloaded bone
   Line<MountLoad> up;
   Line<MountPose> down;
-  double side = 1.0;  // it pushes along x or against it
-  Vec3 face_mm;       // where it touches, bone frame
+  double side = 1.0;  // pushes along x or against it
+  Vec3 face_mm;       // contact point, bone frame
   double push_mm = 0, from_s = 0, ramp_s = 0;
   double force_n = 0, face_x_mm = 0;
   Load load;
   double put_in_mj = 0;
 
-  // How far the place of the face has gone along the push.
+  // Motion of the face along the push.
   double face_now_mm() const { return side * (bone.pose_world_bone().point(face_mm).x() - face_mm.x()); }
 };
 
-// Where the hand's rest place is, of a push that begins at from_s of the cycle and is over after 7/8 of it.
+// Rest position of the hand, for a push that begins at from_s of the cycle and ends after 7/8 of it.
 double wanted_mm(const User& user, double in_cycle_s, double cycle_s) {
   const double up = std::clamp((in_cycle_s - user.from_s) / user.ramp_s, 0.0, 1.0);
   const double down = std::clamp((in_cycle_s - 0.875 * cycle_s) / 0.2, 0.0, 1.0);
@@ -120,7 +120,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
   double server_s = 0.0, cycle_end_s = 0.0, error_sum = 0.0;
   for (long tick = 0; tick < run.ticks; ++tick) {
     const double now_s = kDt * static_cast<double>(tick), in_cycle_s = run.cycle_s - (cycle_end_s - now_s);
-    // Another push: against each other or side by side, quick or slow, together or not.
+    // A new push: against each other or side by side, quick or slow, together or not.
     if (now_s >= cycle_end_s) {
       cycle_end_s = now_s + run.cycle_s;
       for (User& user : users) {
@@ -146,7 +146,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
       result.held_back += user.bone.held_back();
       result.slowest_low_pass_s = std::max(result.slowest_low_pass_s, user.bone.low_pass_s());
 
-      // The coupling with the damping that a sampled spring needs; it does not pull.
+      // The coupling with the damping that a sampled spring needs. It does not pull.
       HandCommand command;
       command.axis = Vec3::UnitX();
       command.target_mm.x() = in_cycle_s < 0.0 ? -User::kApart_mm : wanted_mm(user, in_cycle_s, run.cycle_s);
@@ -181,7 +181,7 @@ TwoUsersResult push_each_other(const TwoUsersRun& run) {
       }
     }
 
-    // The end of a push, where the closed form has both in touch.
+    // The end of a push. There the closed form has both in contact.
     const double measured_s = 0.875 * run.cycle_s;
     if (!run.shaken && in_cycle_s < measured_s && in_cycle_s + kDt >= measured_s) {
       const AtRest rest = at_rest(run, users, k);

@@ -6,7 +6,7 @@ namespace osteon::test {
 
 std::vector<Impairment::Copy> Impairment::pass(Time now, std::size_t bytes) {
   ++counts_.given;
-  // Everything is drawn for every datagram, so that a change of one share leaves the fate of the others' as it was.
+  // All random numbers are drawn for every datagram. So a change of one share does not change the fate by the others.
   const bool lost = random_.unit() < quality_.loss, held_back = random_.unit() < quality_.reorder,
              twice = random_.unit() < quality_.duplicate, spoiled = random_.unit() < quality_.corrupt;
   const Time delay = std::max(Time{}, quality_.delay - quality_.jitter + up_to(2 * quality_.jitter));

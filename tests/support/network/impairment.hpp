@@ -1,5 +1,5 @@
-// What a bad path does to datagrams, decided by a seed: the same for a simulated network and for the relay between real
-// sockets. Pure: time is a parameter.
+// The effects of a bad path on datagrams, decided by a seed. A simulated network and the relay between real sockets use
+// it. Pure: time is a parameter.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -10,7 +10,7 @@
 
 namespace osteon::test {
 
-// One direction of a path. Shares are of datagrams, 0 to 1, each drawn on its own.
+// One direction of a path. Shares are of datagrams, 0 to 1, each drawn independently.
 struct PathQuality {
   double loss = 0;
   double duplicate = 0;               // arrive a second time, up to `reorder_by` later
@@ -18,9 +18,9 @@ struct PathQuality {
   double corrupt = 0;                 // arrive with 1 to 3 bits flipped
   std::chrono::nanoseconds delay{};   // one way
   std::chrono::nanoseconds jitter{};  // delay is between delay - jitter and delay + jitter; keeps the order
-  std::chrono::nanoseconds reorder_by = std::chrono::milliseconds(30);  // held back so long at most
+  std::chrono::nanoseconds reorder_by = std::chrono::milliseconds(30);  // longest time that one is held back
   double bytes_per_s = 0;                                               // 0: no limit
-  std::size_t queue_bytes = 64 * 1024;  // waiting for their turn at the limit; what comes beyond is lost
+  std::size_t queue_bytes = 64 * 1024;  // waiting at the limit; more than that is lost
 };
 
 struct ImpairmentCounts {
@@ -39,7 +39,7 @@ class Impairment {
     Time at;       // of arrival
     bool spoiled;  // apply spoil() to it
   };
-  // What becomes of a datagram given now: none, one or two copies.
+  // The fate of a datagram given now: none, one or two copies.
   [[nodiscard]] std::vector<Copy> pass(Time now, std::size_t bytes);
   void spoil(std::span<std::uint8_t> bytes);
   [[nodiscard]] const ImpairmentCounts& counts() const { return counts_; }
@@ -51,7 +51,7 @@ class Impairment {
 
   PathQuality quality_;
   Random random_, flips_;
-  Time busy_until_{};    // the limited stretch sends until then
+  Time busy_until_{};    // the limited link sends until then
   Time last_arrival_{};  // of those that keep the order
   ImpairmentCounts counts_;
 };

@@ -20,7 +20,7 @@ TEST(VirtualTime, RunsInOrderOfTimeAndOfPosting) {
   time.post(10ms, [&] {
     ran += 'a';
     time.post_in(0ms, [&] { ran += 'x'; });
-    time.post(5ms, [&] { ran += 'y'; });  // has passed: at once, after what was posted before
+    time.post(5ms, [&] { ran += 'y'; });  // is in the past: runs at once, after what was posted before
     time.post(30ms, [&] { ran += 'd'; });
   });
   time.post(10ms, [&] { ran += 'b'; });
@@ -35,7 +35,7 @@ TEST(VirtualTime, RunsInOrderOfTimeAndOfPosting) {
   EXPECT_EQ(ran, "abxycd");
 }
 
-// What arrived: which, when, from whom.
+// What arrived: which datagram, when, from where.
 struct Arrival {
   std::string text;
   Time at;
@@ -96,7 +96,7 @@ TEST(SimNetwork, ASeedGivesTheSameFateAndAnotherAnother) {
   EXPECT_NE(run(7), run(8));
 }
 
-// Shares within 4 standard deviations of those asked for, delays within their bounds.
+// Shares within 4 standard deviations of those requested, delays within their bounds.
 TEST(SimNetwork, DoesToDatagramsWhatItWasAskedTo) {
   VirtualTime time;
   SimNetwork network(time, 3);

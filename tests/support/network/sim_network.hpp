@@ -1,4 +1,4 @@
-// A network on virtual time: loses, delays, repeats, reorders and spoils datagrams by a seed. One thread.
+// A network on virtual time. It loses, delays, repeats, reorders and spoils datagrams by a seed. One thread.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -22,7 +22,7 @@ namespace osteon::test {
 struct NetworkCounts {
   std::uint64_t sent = 0, sent_bytes = 0;
   std::uint64_t cut_off = 0;      // lost to a partition
-  std::uint64_t unreachable = 0;  // nobody at that endpoint when they arrived
+  std::uint64_t unreachable = 0;  // no socket at that endpoint when they arrived
   std::uint64_t crowded_out = 0;  // the receiver had too many waiting
   std::uint64_t delivered = 0;
   ImpairmentCounts paths;  // of all directions together
@@ -34,12 +34,13 @@ class SimNetwork {
  public:
   using Time = VirtualTime::Time;
 
-  // `time` must outlive the network, and the network what is posted by then is run.
+  // `time` must outlive the network. The network must exist until everything posted before is run.
   SimNetwork(VirtualTime& time, std::uint64_t seed) : time_(time), seed_(seed) {}
   SimNetwork(const SimNetwork&) = delete;
   SimNetwork& operator=(const SimNetwork&) = delete;
 
-  // A socket there, closed by its destructor; must not outlive the network. One at a time for each endpoint.
+  // A socket at that endpoint, closed by its destructor. It must not outlive the network. One at a time for each
+  // endpoint.
   [[nodiscard]] std::unique_ptr<SimPort> open(const Endpoint& at);
 
   void set_quality(const PathQuality& everywhere);
@@ -73,7 +74,7 @@ class SimNetwork {
 
 class SimPort final : public DatagramPort {
  public:
-  static constexpr std::size_t kMostWaiting = 4096;  // datagrams that arrived and were not taken
+  static constexpr std::size_t kMostWaiting = 4096;  // datagrams that have arrived and were not read
 
   SimPort(SimNetwork& network, const Endpoint& at);
   ~SimPort() override;
@@ -83,7 +84,7 @@ class SimPort final : public DatagramPort {
   void send(const Endpoint& to, std::span<const std::uint8_t> bytes) override { network_.send(local_, to, bytes); }
   std::optional<Datagram> receive(std::span<std::uint8_t> into) override;
   [[nodiscard]] Endpoint local() const override { return local_; }
-  // Called after each arrival, at its time; what it does may send and receive.
+  // Called after each arrival, at its time. The function may send and receive.
   void on_arrival(std::function<void()> wake) { wake_ = std::move(wake); }
 
  private:

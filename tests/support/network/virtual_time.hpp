@@ -1,4 +1,4 @@
-// A clock that only moves when told to, and what is to happen at its times: the one loop of a simulation.
+// A clock that moves only on request, with actions posted for its times. It is the only loop of a simulation.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -10,15 +10,15 @@ namespace osteon::test {
 
 class VirtualTime {
  public:
-  using Time = std::chrono::nanoseconds;  // since the simulation's start
+  using Time = std::chrono::nanoseconds;  // since the start of the simulation
 
   [[nodiscard]] Time now() const { return now_; }
-  // Runs at that time, what was posted first going first; at once (in the next run) for a time that has passed.
+  // Runs the action at that time, in the order of posting. At once (in the next run) if the time is in the past.
   void post(Time at, std::function<void()> action);
   void post_in(Time later, std::function<void()> action) { post(now_ + later, std::move(action)); }
-  // The next of what is posted, and the clock with it; false when nothing is.
+  // Runs the next action and moves the clock to its time. False: there is none.
   bool run_next();
-  // All that is posted up to `until`, with what that posts; the clock stands at `until` afterwards.
+  // Runs all actions up to `until`, including those that they post. Then the clock is at `until`.
   void run_until(Time until);
   [[nodiscard]] std::size_t posted() const { return events_.size(); }
   [[nodiscard]] std::optional<Time> next_at() const {

@@ -1,4 +1,4 @@
-// osteon-impair: stands between programs on one machine and makes their network a bad one. See relay.hpp.
+// osteon-impair: stands between programs on one machine and impairs their network. See relay.hpp.
 #include <CLI/CLI.hpp>
 
 #include <cstdio>

@@ -10,13 +10,14 @@ namespace osteon::test {
 
 class ImpairProcess {
  public:
-  // `arguments`: all but --addresses, e.g. {"--udp", "127.0.0.1:4711", "--loss", "0.3"}. It listens when this returns.
+  // `arguments`: all but --addresses, e.g. {"--udp", "127.0.0.1:4711", "--loss", "0.3"}. It is listening when this
+  // returns.
   explicit ImpairProcess(std::vector<std::string> arguments);
 
-  // HOST:PORT to reach the n-th server of that kind through it; empty where it did not start.
+  // HOST:PORT to reach the n-th server of that kind through it. Empty if it did not start.
   [[nodiscard]] std::string udp(std::size_t n = 0) const { return address("udp ", n); }
   [[nodiscard]] std::string tcp(std::size_t n = 0) const { return address("tcp ", n); }
-  // One command of relay.hpp, and its answer; "no answer" where none came.
+  // Sends one command of relay.hpp and returns its answer; "no answer" if none came.
   std::string command(const std::string& line);
   [[nodiscard]] Process& process() { return process_; }
 

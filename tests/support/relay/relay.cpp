@@ -38,7 +38,7 @@ constexpr Time kRetransmission = 200ms, kSignalPartition = 3s;
 
 std::string error_of(const std::string& what, const asio::error_code& error) { return what + ": " + error.message(); }
 
-// What happens later: virtual time driven by the real clock.
+// Delayed actions: virtual time driven by the real clock.
 class Later {
  public:
   explicit Later(asio::io_context& io) : timer_(io), start_(std::chrono::steady_clock::now()) {}
@@ -54,7 +54,7 @@ class Later {
     if (!next) return;
     timer_.expires_at(start_ + *next);
     timer_.async_wait([this](const asio::error_code& error) {
-      if (error) return;  // set anew
+      if (error) return;  // the timer was set again
       events_.run_until(now());
       arm();
     });
@@ -71,7 +71,7 @@ struct Relay::Impl {
   struct UdpSide {
     udp::socket socket;
     udp::endpoint server;
-    udp::endpoint from;  // of the datagram that is being received
+    udp::endpoint from;  // of the datagram being received
     std::array<char, 65536> buffer;
     struct Client {
       explicit Client(asio::io_context& io) : socket(io) {}
@@ -79,7 +79,7 @@ struct Relay::Impl {
       udp::endpoint client;
       std::array<char, 65536> buffer;
     };
-    std::map<udp::endpoint, std::shared_ptr<Client>> clients;  // shared with what was posted for later
+    std::map<udp::endpoint, std::shared_ptr<Client>> clients;  // shared with actions posted for later
   };
 
   struct TcpLink : std::enable_shared_from_this<TcpLink> {
@@ -89,7 +89,7 @@ struct Relay::Impl {
       std::array<char, 16384> buffer;
       std::deque<std::string> arrived;  // to be written; an empty one ends the stream
       std::size_t pending = 0;          // bytes read and not yet written
-      Time last{};                      // when the newest arrives
+      Time last{};                      // arrival of the newest
       bool reading = false, writing = false, ended = false;
     };
     std::array<Direction, 2> directions;
@@ -108,7 +108,8 @@ struct Relay::Impl {
   std::list<UdpSide> udp_sides;
   std::list<TcpSide> tcp_sides;
   std::list<std::weak_ptr<TcpLink>> links;
-  // Of datagrams and of pieces of streams, each towards the server and back, so that none's numbers move another's.
+  // Of datagrams and of chunks of streams, each towards the server and back. Each has its own random numbers,
+  // independent of the others.
   std::array<Impairment, 2> fates, tcp_fates;
   Time partition_until{};
   std::uint64_t connections = 0, resets = 0;
@@ -186,7 +187,7 @@ struct Relay::Impl {
         asio::error_code ignored;
         client->socket.close(ignored);
       }
-      side.clients.clear();  // made anew for the next datagram
+      side.clients.clear();  // made again for the next datagram
     }
   }
 
@@ -291,7 +292,7 @@ struct Relay::Impl {
 
   void read_commands() {
     asio::async_read_until(input, lines, '\n', [this](const asio::error_code& error, std::size_t) {
-      if (error) return;  // nobody has more to say; signals still work
+      if (error) return;  // the input has ended; signals still work
       std::istream in(&lines);
       std::string line;
       std::getline(in, line);
@@ -425,7 +426,7 @@ std::string Relay::command(const std::string& line) { return impl_->command(line
 void Relay::run() {
   asio::error_code error;
   impl_->input.assign(::dup(STDIN_FILENO), error);
-  if (!error) impl_->read_commands();  // a file is no stream that can be waited for: then there are the signals
+  if (!error) impl_->read_commands();  // a file cannot be waited for as a stream: then only signals work
   impl_->wait_for_signals();
   impl_->io.run();
 }

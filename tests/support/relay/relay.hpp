@@ -1,4 +1,4 @@
-// Stands between real programs and does to their traffic what a bad network does: the inside of osteon-impair.
+// Stands between real programs and impairs their traffic like a bad network. The core of osteon-impair.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -17,9 +17,9 @@ struct RelayOptions {
   std::uint64_t seed = 1;
 };
 
-// UDP: each client has a socket of its own towards the server, as behind a router, so that answers find back. TCP stays
-// in order and loses nothing: what would be lost comes 200 ms later, as after a retransmission, and all behind it too.
-// What is sent in a partition is lost (UDP) or waits for its end (TCP).
+// UDP: each client has its own socket towards the server, as behind a router, so that answers find the way back. TCP
+// stays in order and loses nothing: a lost segment comes 200 ms later, as after a retransmission, and all behind it
+// too. During a partition UDP data is lost, and TCP data waits for its end.
 class Relay {
  public:
   // Listens on ports of 127.0.0.1 that the system chooses. Errors: invalid_input (a target), unavailable (no socket).
@@ -28,14 +28,14 @@ class Relay {
 
   // "udp 127.0.0.1:PORT" or "tcp 127.0.0.1:PORT", in the order of the options, UDP first.
   [[nodiscard]] std::vector<std::string> addresses() const;
-  // Until a command or a signal ends it: SIGTERM and SIGINT do; SIGUSR1 is a partition of 3 s. Commands are lines of
-  // standard input, each answered by a line on standard output, "ok" or what is wrong:
+  // Runs until a command or a signal ends it: SIGTERM and SIGINT do. SIGUSR1 is a partition of 3 s. Commands are lines
+  // of standard input. Each is answered by a line on standard output: "ok" or the fault:
   //   partition MS | reset | rebind | loss P | reorder P | duplicate P | delay MS [JITTER_MS] | kbit N | good | counts
   //   | quit
-  // reset breaks all TCP connections; rebind gives the UDP clients new ports towards the server; good ends all
-  // impairment; counts answers "ok udp GIVEN LOST TWICE HELD_BACK tcp CONNECTIONS RESET".
+  // reset breaks all TCP connections. rebind gives the UDP clients new ports towards the server. good ends all
+  // impairment. counts answers "ok udp GIVEN LOST TWICE HELD_BACK tcp CONNECTIONS RESET".
   void run();
-  // One command, as above.
+  // Runs one command, as above.
   std::string command(const std::string& line);
 
  private:

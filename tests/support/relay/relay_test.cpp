@@ -1,4 +1,4 @@
-// Counts, never times: how long things take here is the machine's business.
+// Checks counts, never times: durations depend on the machine.
 #include <gtest/gtest.h>
 #include <asio/connect.hpp>
 #include <asio/io_context.hpp>
@@ -46,7 +46,7 @@ void send(UdpPort& from, const Endpoint& to, const std::string& bytes) {
   from.send(to, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
 }
 
-// All that arrives until nothing has for a while: numbers in order of arrival, and from whom the last came.
+// All that arrives until nothing has arrived for a while: numbers in order of arrival, and the sender of the last.
 struct Arrived {
   std::vector<std::uint32_t> numbers;
   Endpoint from;
@@ -80,7 +80,7 @@ TEST(Impair, ForwardsDatagramsAndTheirAnswers) {
   send(*server, client_seen, numbered(10));
   EXPECT_EQ(drain(*client).numbers, std::vector<std::uint32_t>{10});
   EXPECT_EQ(drain(*other).numbers, std::vector<std::uint32_t>{20});
-  // Behind new ports: the server sees another address, and answers to it find the client.
+  // Behind new ports the server sees another address, and its answers still find the client.
   EXPECT_EQ(relay.command("rebind"), "ok");
   send(*client, there, numbered(3));
   const Endpoint moved = drain(*server).from;
@@ -137,7 +137,7 @@ TEST(Impair, LosesAllInAPartitionAndNothingAfter) {
   EXPECT_EQ(relay.process().terminate(), 0);
 }
 
-// A server that sends back what it gets.
+// A server that sends back what it receives.
 class Echo {
  public:
   Echo() : acceptor_(io_, {asio::ip::address_v4::loopback(), 0}), thread_([this] { run(); }) {}
@@ -191,7 +191,7 @@ TEST(Impair, AStreamStaysWholeAndInOrder) {
   asio::read(socket, asio::buffer(back));
   writer.join();
   EXPECT_TRUE(back == sent);
-  // A stall: what is sent in a partition comes when it is over.
+  // A stall: data sent in a partition arrives after it.
   EXPECT_EQ(relay.command("good"), "ok");
   EXPECT_EQ(relay.command("partition 300"), "ok");
   asio::write(socket, asio::buffer("after", 5));

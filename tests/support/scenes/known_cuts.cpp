@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 constexpr int kLevel = 2;
-// A vertex nearer than this to another face may lie on the rounded edge between the two.
+// A vertex nearer than this to another face may be on the rounded edge between the two.
 constexpr double kEdgePitches = 2.0;
 
 double density(const Vec3&) { return 1.9; }
@@ -32,7 +32,7 @@ Cut pose_cut(const Tool& tool, const std::vector<Pose>& path) {
   return cut;
 }
 
-// Lengths of a tool travel in whole quanta: the closed forms are those of the tool that everybody has.
+// Lengths of a tool are sent in whole quanta. The closed forms use the tool that everybody has.
 double in_quanta(double mm) { return std::round(mm / kQuantum_mm) * kQuantum_mm; }
 
 // A direction at most `angle` from +z.
@@ -88,7 +88,8 @@ KnownCut kerf_through_shaft(const Tool& saw, double pitch_mm, Random& random) {
   const double half_length = shaft * std::tan(kPi / 7.2) + 2.0 * kerf + 5.0 * h;
   const Vec3 half{shaft, shaft, half_length};
   const auto distance = [=](const Vec3& p) { return std::hypot(p.x() - middle.x(), p.y() - middle.y()) - shaft; };
-  // The blade's plane has its normal (the tool's y) near the shaft's axis, and the blade comes from anywhere in it.
+  // The blade's plane has its normal (the tool's y) near the shaft's axis. The direction of the blade in that plane is
+  // random.
   const Vec3 normal = near_z(random, kPi / 7.2);
   const Vec3 any = random.direction();
   const Vec3 into = (any - any.dot(normal) * normal).normalized();
@@ -98,7 +99,7 @@ KnownCut kerf_through_shaft(const Tool& saw, double pitch_mm, Random& random) {
   axes.col(0) = normal.cross(into);
   const Eigen::Quaterniond rotation(axes);
   const double way = shaft / normal.z() + 6.0 * pitch_mm;
-  // The teeth enter beside the shaft and leave well behind it, as far as the corners of a swinging blade trail.
+  // The teeth enter beside the shaft and leave well behind it, because the corners of a swinging blade trail.
   const double trail =
       0.5 * saw.width_mm * std::tan(0.5 * saw.swing_rad) + saw.pivot_mm * (1.0 - std::cos(0.5 * saw.swing_rad));
   const Cut cut =

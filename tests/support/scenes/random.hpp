@@ -1,4 +1,4 @@
-// Random numbers that are the same with every compiler and library, for scenes.
+// Random numbers for scenes, equal with every compiler and library.
 #pragma once
 #include <cmath>
 #include <cstdint>
@@ -22,7 +22,7 @@ class Random {
     const double x = between(-half, half), y = between(-half, half), z = between(-half, half);
     return {x, y, z};
   }
-  // Evenly spread over the sphere of directions.
+  // Uniform over the sphere of directions.
   Vec3 direction() {
     const double z = between(-1.0, 1.0), angle = between(0.0, 2.0 * std::numbers::pi);
     const double r = std::sqrt(1.0 - z * z);

@@ -47,14 +47,14 @@ std::vector<Cut> grazing_cuts(std::size_t count, Random& random) {
     const SamplePoint& point = cutter.active[random.index(cutter.active.size())];
     const Vec3 out = random.direction();
     const double depth = i % 200 == 7 ? random.between(1.0, 2.5) : random.between(-0.3, 0.35);
-    // The tool's inward normal there along the bone's outward one, any turn about it.
+    // The tool's inward normal is along the bone's outward normal; any rotation about it.
     const Eigen::Quaterniond facing =
         Eigen::AngleAxisd(random.between(0.0, 6.283), out) * Eigen::Quaterniond::FromTwoVectors(point.inward, out);
     const auto pose = [&](const Eigen::Quaterniond& rotation, const Vec3& contact) {
       return Pose{contact - rotation * point.position_mm, rotation};
     };
     const Vec3 contact = (kRadius_mm - depth) * out;
-    // Along the surface and a little about the point of contact, as a hand moves within some milliseconds.
+    // Along the surface and slightly about the contact point, as a hand moves within some milliseconds.
     const Vec3 way = random.in_cube(0.4);
     const Vec3 moved = contact + way - way.dot(out) * out;
     const Eigen::Quaterniond turned = Eigen::AngleAxisd(random.between(-0.01, 0.01), random.direction()) * facing;

@@ -1,5 +1,5 @@
-// A room behind a slow network, on virtual time: it commits cuts in the order in which they arrive, takes some of them
-// back, and every word takes its time both ways.
+// A room behind a slow network, on virtual time. It commits cuts in the order of their arrival and undoes some of them.
+// Every message is delayed both ways.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -15,12 +15,12 @@ class DelayedRoom {
  public:
   DelayedRoom(const Case& bone, int delay_ticks);
 
-  // What happens in this tick: the client's cut leaves it, another's is committed at once, the last `count` commits are
-  // taken back.
+  // Actions in this tick: the client sends its cut; another's cut is committed at once; the last `count` commits are
+  // undone.
   void send(const Cut& own);
   void commit_other(Cut cut);
   void undo(int count);
-  // A tick passes: what arrives at the room is decided, what arrives at the client goes into its replica.
+  // Advances one tick. The room decides what has arrived. The client's replica gets what has arrived there.
   void tick(haptic::Replica& client);
 
   [[nodiscard]] std::uint64_t lease_epoch() const { return client_epoch_; }  // as the client knows it
@@ -52,7 +52,7 @@ class DelayedRoom {
   int delay_ticks_;
   std::int64_t now_ = 0;
   CutField field_;
-  std::vector<Cut> cuts_;  // that stand
+  std::vector<Cut> cuts_;  // not undone
   std::deque<std::pair<std::int64_t, Cut>> to_room_;
   std::deque<ToClient> to_client_;
   std::uint64_t room_seq_ = 0, epoch_ = 0, client_epoch_ = 0, undone_ = 0, others_ = 0;

@@ -19,12 +19,12 @@ namespace {
 using namespace haptic;
 
 constexpr double kPitch_mm = 0.5;
-constexpr double kRound_s = 10.0;   // then a new hand, new bone
+constexpr double kRound_s = 10.0;   // then a new hand and a new bone
 constexpr double kPatch_s = 0.008;  // between two patches
 constexpr double kStallEvery_s = 1.7, kStall_s = 0.006;
 constexpr double kThinWall_mm = 1.0;
 constexpr double kCavity_mm = 5.0;      // radius of a hollow 4 mm deep
-constexpr double kTorqueArm_mm = 50.0;  // of a device that shows torque: its largest torque over its continuous force
+constexpr double kTorqueArm_mm = 50.0;  // for a device with torque: its largest torque over its continuous force
 
 // A block 16 mm wide, entered along +z through z = 0.
 Case scene_bone(StabilityScene scene) {
@@ -39,7 +39,7 @@ Case scene_bone(StabilityScene scene) {
   return make_bone({{-10, -10, -4}, {10, 10, thick + 6.0}}, kPitch_mm, distance, density);
 }
 
-// How the hand means to go: smooth, in and out of contact, with pauses, and a tremor on top.
+// The intended motion of the hand: smooth, in and out of contact, with pauses and a tremor.
 struct Gesture {
   double across_hz[2], press_hz, phase[3], across_mm, off_mm, deep_mm, tremor_mm;
 
@@ -50,7 +50,7 @@ struct Gesture {
     for (double& p : phase) p = random.between(0.0, 6.28);
     across_mm = scene == StabilityScene::cavity ? 2.0 : scene == StabilityScene::drill ? 0.0 : 4.0;
     off_mm = scene == StabilityScene::drill ? 1.0 : random.between(0.2, 1.0);
-    // A soft hand means to go deeper than it gets.
+    // A soft hand aims deeper than it gets.
     const double force_n = random.between(2.0, 25.0);
     deep_mm = rig ? force_n / stiffness_n_per_mm : force_n / 5.5;
     if (scene == StabilityScene::drill) deep_mm += 10.0, press_hz = 0.12;
@@ -63,14 +63,14 @@ struct Gesture {
     const Vec3 tremor(wave(9.0, phase[0]), wave(8.3, phase[1]), wave(9.7, phase[2]));
     const double u = wave(across_hz[0], phase[0]), v = wave(across_hz[1], phase[1]);
     if (!hollow) return Vec3(across_mm * u, across_mm * v, press) + tremor_mm * tremor;
-    // Round the inside of a hollow, pressing outwards: the burr's middle is half as far out as the wall.
+    // Round the inside of a hollow, pressing outwards. The burr's middle is half as far out as the wall.
     return Vec3(0, 0, -1.0) + (kCavity_mm - 2.5 + press) * Vec3(0.9 * u, 0.9 * v, 1.0).normalized() +
            tip_from_middle_mm + tremor_mm * tremor;
   }
 };
 
-// How a hand that turns means to tilt: about two axes by up to 15 degrees together, and a little about a third. It
-// gives way to torque as a wrist does, with some inertia, damping and stiffness [A].
+// The intended tilt of a turning hand: about two axes by up to 15 degrees together, and slightly about a third. It
+// yields to torque as a wrist does, with some inertia, damping and stiffness [A].
 class Wrist {
  public:
   Wrist(Random& random, double strength) : strength_(strength) {
@@ -78,11 +78,11 @@ class Wrist {
     for (double& p : phase_) p = random.between(0.0, 6.28);
     most_rad_ = random.between(0.03, 0.26);
   }
-  // Turned from upright, bone frame, after a tick under this torque; a rig does not give way.
+  // Rotation from upright, bone frame, after a tick under this torque. A rig does not yield.
   Eigen::Quaterniond step(double walked_s, double in, bool rig, const Vec3& torque_nmm, double dt_s) {
     constexpr double kInertia_nmm_s2 = 3.0, kDamping_nmm_s = 150.0, kStiffness_nmm = 3000.0;
     const auto wave = [&](int i) { return std::sin(2.0 * std::numbers::pi * hz_[i] * walked_s + phase_[i]); };
-    const Vec3 wish_rad = in * most_rad_ * Vec3(0.7 * wave(0), 0.7 * wave(1), 0.14 * wave(2));  // no longer than 1
+    const Vec3 wish_rad = in * most_rad_ * Vec3(0.7 * wave(0), 0.7 * wave(1), 0.14 * wave(2));  // norm at most 1
     if (!rig) {
       speed_ += dt_s / kInertia_nmm_s2 * (torque_nmm / strength_ - kDamping_nmm_s * speed_ - kStiffness_nmm * off_rad_);
       off_rad_ += dt_s * speed_;
@@ -96,7 +96,7 @@ class Wrist {
   Vec3 off_rad_ = Vec3::Zero(), speed_ = Vec3::Zero();
 };
 
-// Energy and steps, from what crosses the handle alone.
+// Energy and steps, from forces and motions at the handle alone.
 class Observer {
  public:
   Observer(StabilityResult& result, const LoopParams& params, double scale, double coupling_n_per_mm)
@@ -105,7 +105,7 @@ class Observer {
   void see(const LoopReport& report, const Pose& handle, bool pedal) {
     const Vec3& handle_mm = handle.position_mm;
     const Vec3 moved_mm = first_ ? Vec3(Vec3::Zero()) : Vec3(handle_mm - handle_mm_);
-    // A device that shows no torque takes no work from a turn.
+    // A device without torque takes no work from a turn.
     Vec3 turned_rad = Vec3::Zero();
     if (!first_ && params_.peak_nmm > 0.0) {
       const Eigen::AngleAxisd turn(handle.rotation * rotation_.conjugate());
@@ -129,8 +129,8 @@ class Observer {
     else
       open_ = true;
 
-    // The hand's motion raises spring and damping: k for each millimetre of this tick, b/T for what it went faster than
-    // in the last.
+    // The hand's motion raises spring and damping: k for each millimetre of this tick, b/T for the increase in speed
+    // since the last one.
     const double k = s * coupling_n_per_mm_ * scale_;
     const double at_arm_mm = Proxy::kTurnArm_mm / scale_;  // of a turn, at the handle
     const double moved_by_mm = std::hypot(moved_mm.norm(), at_arm_mm * turned_rad.norm());
@@ -148,7 +148,7 @@ class Observer {
       result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
     }
     if (moved_by_mm < 1e-12 && moved_before_mm_ < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
-    // A turn's spring at its arm is the move's at the handle; the slew limit is at the tool's arm.
+    // A turn's spring at its arm is the move's at the handle. The slew limit is at the tool's arm.
     const double turn_step_nmm = grown(torque_nmm, torque_nmm_);
     result_.turn_step_over_n =
         std::max(result_.turn_step_over_n, (turn_step_nmm - at_arm_mm * by_hand_n) / Proxy::kTurnArm_mm - slew_n);
@@ -209,7 +209,7 @@ class Observer {
   bool open_ = false, first_ = true;
 };
 
-// One hand at one piece of bone.
+// One hand at one bone.
 class Round {
  public:
   Round(const StabilityRun& run, int number, StabilityResult& result)
@@ -224,7 +224,7 @@ class Round {
         number / 2 % 2 ? *find_simulated_device("simulated-3.3N") : SimulatedDeviceParams{};
     LoopParams params = loop_params(device.limits, 0.0);
     params.dt_s = run.dt_s;
-    // Fifty millimetres for each newton that it can hold, as sigma.7 and omega.7 have it.
+    // Fifty millimetres for each newton that it can hold, like sigma.7 and omega.7.
     if (run.six_axes) params.peak_nmm = kTorqueArm_mm * device.limits.continuous_n;
     const char* const tool = run.scene == StabilityScene::drill       ? "drill-3.2"
                              : run.scene == StabilityScene::thin_wall ? "burr-round-3.2"
@@ -265,7 +265,7 @@ class Round {
                       (run_.scene == StabilityScene::cavity && t > 0.5 * kRound_s);
     const bool pedal = cuts && std::fmod(t, 4.0) < 3.3;
 
-    // From where it was taken up into the gesture within half a second.
+    // Blends from the start pose into the gesture within half a second.
     const double in = std::min(1.0, 2.0 * t);
     if (wrist_)
       rotation_ = wrist_->step(walked_s_, in, rig_, loop_->mapping().to_bone(torque_nmm_), run_.dt_s) * upright_;
@@ -284,7 +284,7 @@ class Round {
     LoopInput input;
     input.pose_device_tool = reading.pose_device_tool;
     input.spindle_rpm = pedal ? full_rpm_ : 0.0;
-    // Now and then the machine stops the loop for some milliseconds.
+    // Sometimes the machine stops the loop for some milliseconds.
     if (std::fmod(t, kStallEvery_s) < kStall_s) input.periods = 4;
     const AllocationCounter heap;
     const LoopReport report = loop_->tick(input, patch_);
@@ -300,7 +300,7 @@ class Round {
     follow(report, i);
   }
 
-  // Replica and patch, as their thread would, and the others.
+  // Updates replica and patch, as their thread would, and lets the others cut.
   void follow(const LoopReport& report, std::int64_t i) {
     CutPiece piece;
     while (loop_->take_piece(piece)) {
@@ -311,7 +311,7 @@ class Round {
     const auto every = [&](double seconds) {
       return i % std::max<std::int64_t>(1, std::llround(seconds / run_.dt_s)) == 0;
     };
-    // A thin wall that others open is no wall any more.
+    // If others open a thin wall, it is no wall any more.
     if (run_.others && run_.scene != StabilityScene::thin_wall) {
       if (every(0.4)) {
         const Tool other = *find_tool("burr-round-3.2");
@@ -345,7 +345,7 @@ class Round {
   std::unique_ptr<SimulatedDevice> device_;
   std::unique_ptr<Gesture> gesture_;
   std::unique_ptr<Observer> observer_;
-  std::unique_ptr<Wrist> wrist_;  // of a hand that turns
+  std::unique_ptr<Wrist> wrist_;  // of a turning hand
   Eigen::Quaterniond upright_, rotation_;
   Vec3 torque_nmm_ = Vec3::Zero();
   double full_rpm_ = 0, walked_s_ = 0;

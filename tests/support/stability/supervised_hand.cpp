@@ -63,7 +63,7 @@ OverseenHand::OverseenHand(const OverseenRun& run)
 }
 
 void OverseenHand::decide(const Restrictions& supervision) {
-  // As the room does: a lease is granted anew where the hand may cut from now on, or may no more.
+  // As in the room: a new lease where the hand may now cut again, or may not cut any more.
   if (now_.stopped != supervision.stopped || now_.taken_by != supervision.taken_by) room_.undo(0), ++epoch_;
   now_ = supervision;
   decided_.push_back({ticks_ + run_.delay_ms, supervision, epoch_});
@@ -92,8 +92,8 @@ void OverseenHand::hear() {
   for (; !undone_due_.empty() && undone_due_.front() <= ticks_; undone_due_.pop_front()) ++count.undone;
 }
 
-// What the lines bring, a millisecond of the bone, and what goes out. The hand's work is reckoned from the force that
-// the device showed and the way of the place that the tool stands at.
+// The messages that arrive, one millisecond of the bone, and the messages to send. The hand's work is computed from the
+// force that the device showed and the motion of the tool's position.
 void OverseenHand::move_bone() {
   if (!yielding_) return;
   Yielding& bone = *yielding_;
@@ -169,13 +169,13 @@ void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   const LoopParams& params = loop_->params();
   const Vec3 moved_mm = seen_ ? Vec3(handle_mm - handle_mm_) : Vec3(Vec3::Zero());
   // The hand's motion raises the coupling's spring and damping, and nothing else. It feels the sum: where one force
-  // lessens at once another that it held back would come at once.
+  // falls at once, another force that it held back would rise at once.
   const double k = params.force_scale * loop_->coupling_n_per_mm() * loop_->mapping().scale();
   const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_);
   const Vec3 together_n = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
   const double grown_n =
       std::max(growth(report.coupling_device_n, coupling_n_).norm(), growth(together_n, together_n_).norm());
-  // Against what is meant to be the limit, whatever the loop was told.
+  // Against the intended limit, whatever limit the loop was given.
   constexpr double kSlew_n = 0.5;
   crossed_.step_over_slew = std::max(crossed_.step_over_slew, (grown_n - by_hand_n) / kSlew_n);
   crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.force_device_n.norm());

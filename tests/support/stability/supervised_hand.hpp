@@ -1,6 +1,6 @@
-// A simulated hand at the haptic loop while an instructor decides about it: stopped, taken over, led, limited, its cuts
-// taken back, all as late as a line makes it; and what crosses its handle meanwhile. The bone stands still, or on a
-// mount on which this hand and another user push it.
+// A simulated hand at the haptic loop under an instructor's decisions: stopped, taken over, guided, limited, its cuts
+// undone, all with the delay of a line. It measures what crosses its handle. The bone stands still, or is on a mount
+// that this hand and another user push.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -19,26 +19,27 @@ namespace osteon::test {
 
 struct OverseenRun {
   const char* tool = "burr-round-5";
-  int delay_ms = 0;            // of everything, each way
+  int delay_ms = 0;            // of all messages, each way
   bool weak = false;           // a device of 3.3 N with half of its stiffness, on a workspace of another size
   double slew_n_per_ms = 0.5;  // of the loop
   bool mount = false;          // the bone yields
 };
 
-// How often something took hold of the hand while its tool touched bone.
+// Number of interventions while the tool touched bone.
 struct InContact {
   int stopped = 0, taken = 0, given_back = 0, led = 0, let_go = 0, limited = 0, undone = 0;
 };
 
-// Of what crossed the handle.
+// Measured at the handle.
 struct Crossed {
-  // Largest growth in a tick of the coupling, or of it with pull and others' tools, the hand's own motion apart.
+  // Largest growth of the coupling in a tick, or of the coupling with guidance and others' tools, without the hand's
+  // own motion.
   double step_over_slew = 0;
-  double worst_mj = 0;    // most that one contact has given the hand, the cut and a bone that yields beyond what it got
-  double led_mj = 0;      // the same of the pull, beyond what its far end's motion has paid
+  double worst_mj = 0;    // most that one contact has given the hand, the cut and a yielding bone beyond its input
+  double led_mj = 0;      // the same of the guidance, beyond what its far end's motion has paid
   double fall_n = 0;      // largest fall of the whole force in a tick
-  double made_mj = 0;     // most that a bone on its mount ever gave the hand and the other user beyond what both put in
-  double carried_mm = 0;  // way of such a bone under the tool while that touched it
+  double made_mj = 0;     // most that a bone on its mount ever gave the hand and the other user beyond their input
+  double carried_mm = 0;  // motion of such a bone under the tool while they were in contact
   InContact in_contact;
   std::int64_t allocations = 0, cutting = 0, touching = 0;
 };
@@ -47,22 +48,22 @@ class OverseenHand {
  public:
   explicit OverseenHand(const OverseenRun& run);
 
-  // The room decides; the hand hears of it after the delay, and so late its cuts come to be refused.
+  // The room decides. The hand receives the decision after the delay, and its cuts are refused as late.
   void decide(const Restrictions& supervision);
   void undo(int count);
 
-  // A millisecond. Command, place and force in the bone's frame, as everything here.
+  // One millisecond. Command, position and force are in the bone's frame, as everywhere here.
   haptic::LoopReport tick();
-  // So many; the most and least force of the device meanwhile may be asked of `each`.
+  // Runs this number of ticks. `each` is called after each of them.
   void run(int ticks, const std::function<void(const haptic::LoopReport&)>& each = {});
   HandCommand command;
   bool pedal = false;
-  Load other;  // of the other user on a bone that yields; held until it is set anew
+  Load other;  // of the other user on a yielding bone; held until it is set again
   haptic::GuideSeen guide;
   std::vector<haptic::PartnerTool> partners;
 
   [[nodiscard]] const Crossed& crossed() const { return crossed_; }
-  [[nodiscard]] const std::vector<Cut>& cuts() const { return cuts_; }  // that the loop has closed
+  [[nodiscard]] const std::vector<Cut>& cuts() const { return cuts_; }  // closed by the loop
   [[nodiscard]] const haptic::Replica& replica() const { return replica_; }
   [[nodiscard]] haptic::HapticLoop& loop() { return *loop_; }
   [[nodiscard]] const haptic::LoopReport& last() const { return last_; }
@@ -75,7 +76,7 @@ class OverseenHand {
   void hear();
   void move_bone();
 
-  // A bone that yields: the server's, as this hand is shown it and as the other user is, and the lines between.
+  // A yielding bone: the server's, as shown to this hand and to the other user, and the lines between.
   struct Yielding {
     explicit Yielding(const MountParams& params) : mine(params), other({.mount = params}), server({.mount = params}) {}
     haptic::FeltMount mine;
@@ -92,8 +93,8 @@ class OverseenHand {
     };
     std::deque<Push> up;
     std::deque<Seen> down;
-    double put_in_mj = 0;   // by both, reckoned here
-    double by_hand_mj = 0;  // of it in this tick by the hand
+    double put_in_mj = 0;   // by both, computed here
+    double by_hand_mj = 0;  // the hand's part in this tick
   };
 
   OverseenRun run_;
@@ -113,8 +114,8 @@ class OverseenHand {
   };
   std::deque<Decided> decided_;
   std::deque<std::int64_t> undone_due_;
-  std::unique_ptr<Yielding> yielding_;  // null: the bone stands
-  Restrictions now_, heard_;            // as the room has decided, and as the hand knows it
+  std::unique_ptr<Yielding> yielding_;  // null: the bone stands still
+  Restrictions now_, heard_;            // as the room has decided, and as the hand has received
   std::uint64_t decisions_ = 0, epoch_ = 0;
   std::int64_t ticks_ = 0;
   Eigen::Quaterniond rotation_;

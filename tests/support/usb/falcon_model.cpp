@@ -33,7 +33,7 @@ void FalconModel::set(int request, int value) {
   if (request != kSetBaud) return;
   baud_ = value;
   line_.clear();
-  // Resetting by its line makes the boot loader begin anew.
+  // A reset by its line restarts the boot loader.
   if (value == kBoot) forget_image();
   if (value == kRun)
     loaded_ = std::string_view(reinterpret_cast<const char*>(image_.data()), image_.size()).starts_with(kRunningImage);

@@ -1,6 +1,5 @@
-// A Novint Falcon as its USB wire shows it: the serial chip's settings, the boot loader, and firmware that exchanges
-// frames. Knows the protocol by itself, independent of the driver that is tested against it. The image is a made-up
-// one.
+// A Novint Falcon on its USB wire: the serial chip's settings, the boot loader, and firmware that exchanges frames. It
+// implements the protocol by itself, independently of the tested driver. The firmware image is a made-up one.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,30 +11,31 @@
 
 namespace osteon::test {
 
-// What an image must begin with to run; all else loads and then says nothing.
+// An image must begin with this to run. Any other image loads and then does not answer.
 inline constexpr std::string_view kRunningImage = "emulated falcon firmware";
 
 class FalconModel {
  public:
-  // A power-on: the boot loader waits, unless firmware is there already.
+  // Power-on: the boot loader waits, unless firmware is loaded already.
   explicit FalconModel(bool loaded = false);
 
   // A control transfer of type 0x40, without data.
   void set(int request, int value);
-  // What arrives at OUT, and what waits for IN.
+  // Bytes that arrive at OUT, and bytes that wait for IN.
   void take(std::span<const std::uint8_t> bytes);
   std::deque<std::uint8_t> waiting;
 
-  // The world outside: encoders, buttons, which axes have found their ends (−1: each after some frames of homing).
+  // The world outside: encoders, buttons, and the axes that have found their ends (−1: each after some frames of
+  // homing).
   std::array<std::int16_t, 3> encoders{};
   int buttons = 0, homed = -1;
-  // Trouble: it says nothing; it spoils a byte of so many frames; it misses so many greetings; it echoes falsely from a
-  // byte on.
+  // Faults: it does not answer; it spoils a byte in this number of frames; it misses this number of greetings; it
+  // echoes wrongly from a byte on.
   bool silent = false;
   int spoil = 0, deaf = 0;
   long false_echo_at = -1;
 
-  // What it was told last.
+  // What it last received.
   struct Told {
     std::array<std::int16_t, 3> motors{};
     int control = 0;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr const char* kNode = "/dev/bus/usb/001/005";
 constexpr const char* kSysPath = "/sys/devices/pci0000:00/0000:00:14.0/usb1/1-3";
-// Device, configuration, interface and two bulk endpoints of 64 bytes, as a full-speed serial chip has them.
+// Device, configuration, interface and two bulk endpoints of 64 bytes, like a full-speed serial chip.
 constexpr const char* kDescription =
     "P: /devices/pci0000:00/0000:00:14.0/usb1/1-3\n"
     "N: bus/usb/001/005\n"
@@ -30,7 +30,7 @@ constexpr const char* kDescription =
     "07058102400000"
     "07050202400000\n\n";
 constexpr std::string_view kSerial = "EMULATED-1";
-constexpr guint kLatency_ms = 16;  // of the serial chip: then it sends its status, data or not
+constexpr guint kLatency_ms = 16;  // of the serial chip: then it sends its status, with or without data
 constexpr std::array<std::uint8_t, 2> kModemStatus{0x01, 0x60};
 constexpr std::size_t kPacket = 64;
 
@@ -42,7 +42,7 @@ std::string description() {
   return text;
 }
 
-// Memory of the client that a place in other memory points to; null where the client has died meanwhile.
+// The client's memory behind a pointer in other client memory. Null if the client has died.
 UMockdevIoctlData* resolve(UMockdevIoctlData* data, gsize at, gsize size) {
   return umockdev_ioctl_data_resolve(data, at, size, nullptr);
 }
@@ -127,7 +127,7 @@ void MockFalcon::submit(Call* call) {
   answer_reads(false);
 }
 
-// The kernel's synchronous transfer: only out, as the driver uses it.
+// The kernel's synchronous transfer. Only out, because the driver uses only that.
 void MockFalcon::bulk(Call* call) {
   UMockdevIoctlData* data = resolve(umockdev_ioctl_client_get_arg(call), 0, sizeof(usbdevfs_bulktransfer));
   if (data == nullptr) return complete(call, -1, ENODEV);

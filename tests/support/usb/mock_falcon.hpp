@@ -1,4 +1,4 @@
-// A Falcon on the emulated USB: its node answers what libusb asks of Linux' usbfs, and passes bytes to a FalconModel.
+// A Falcon on the emulated USB. Its node answers libusb's calls to Linux' usbfs, and passes bytes to a FalconModel.
 #pragma once
 #include <deque>
 #include <memory>
@@ -16,14 +16,14 @@ class MockFalcon {
   MockFalcon& operator=(const MockFalcon&) = delete;
 
   FalconModel model;
-  int failing = 0;  // so many bulk transfers end with an error of the bus
+  int failing = 0;  // this number of bulk transfers end with a bus error
   std::uint64_t transfers = 0;
 
  private:
-  // A request block of the client, in its memory and here.
+  // A request block of the client, in the client's memory and here.
   struct Block {
     UMockdevIoctlData* urb;
-    UMockdevIoctlData* buffer;  // null without one
+    UMockdevIoctlData* buffer;  // null if there is none
     std::uint64_t address;
   };
   void ioctl(Call* call);

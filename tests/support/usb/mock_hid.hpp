@@ -1,4 +1,4 @@
-// An HID device on the emulated USB, seen through its hidraw node: reports that we queue, output reports that we keep.
+// A HID device on the emulated USB, seen through its hidraw node. We queue input reports and keep the output reports.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -14,8 +14,8 @@ struct HidKind {
   std::uint16_t vendor = 0, model = 0;
   std::string name;
   std::vector<std::uint8_t> descriptor;
-  int port = 0;  // where it is plugged in
-  int node = 0;  // N of /dev/hidrawN; a testbed takes each but once
+  int port = 0;  // the port that it is plugged into
+  int node = 0;  // N of /dev/hidrawN; a testbed accepts each only once
 };
 
 class MockHid {

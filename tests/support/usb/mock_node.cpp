@@ -19,7 +19,7 @@ namespace {
   std::exit(2);
 }
 
-// A call may be on its way in while its node goes.
+// A call may arrive while its node is being removed.
 std::set<void*>& nodes() {
   static std::set<void*> all;
   return all;
@@ -75,14 +75,14 @@ MockNode::~MockNode() {
   nodes().erase(this);
   umockdev_testbed_detach_ioctl(testbed_, path_.c_str(), nullptr);
   g_signal_handlers_disconnect_by_data(base_, this);
-  // Clients that are still there are told that the device is gone.
+  // Remaining clients get the error that the device is gone.
   const auto gone = +[](UMockdevIoctlBase*, Call* call, gpointer) -> gboolean {
     complete(call, -1, ENODEV);
     return TRUE;
   };
   for (const char* signal : {"handle-ioctl", "handle-read", "handle-write"})
     g_signal_connect(base_, signal, G_CALLBACK(gone), nullptr);
-  // The handler stays as long as clients use it: it is left to the process' end.
+  // The handler stays as long as clients use it. It is freed only at the process' end.
   close(master_);
   close(slave_);
 }
@@ -122,7 +122,7 @@ void unplug(UMockdevTestbed* testbed, const std::string& path) {
   g_free(folder);
   std::error_code ignored;
   fs::remove_all(root / path.substr(1), ignored);
-  // What pointed to it, or to a device below it, points nowhere now.
+  // Links to it, or to a device below it, now lead nowhere.
   std::vector<fs::path> dangling;
   for (const char* place : {"sys/bus", "sys/class", "sys/dev"}) {
     if (!fs::exists(root / place)) continue;

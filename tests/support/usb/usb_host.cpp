@@ -1,9 +1,15 @@
-// osteon-usb-host: plays the USB devices of a machine for a program under libumockdev-preload. Prints the folder of its
-// testbed, then takes commands on standard input and answers each with one line; ends with its input.
+// osteon-usb-host: plays the USB devices of a machine for a program under libumockdev-preload. It prints the folder of
+// its testbed. Then it takes commands on standard input and answers each with one line. It ends with its input. Commands
+// (DEVICE: falcon, spacemouse, switch, joystick; ids in hex):
 //
-//   plug falcon [loaded] | plug DEVICE [VENDOR PRODUCT]     unplug DEVICE       (spacemouse, switch, joystick; ids in
-//   hex) report DEVICE HEX…                                      written DEVICE      unread DEVICE falcon encoders A B
-//   C | buttons N | homed N | silent N | spoil N | deaf N | fail N | false-echo AT | power-cut falcon told
+//   plug falcon [loaded]
+//   plug DEVICE [VENDOR PRODUCT]
+//   unplug DEVICE
+//   report DEVICE HEX…
+//   written DEVICE
+//   unread DEVICE
+//   falcon encoders A B C | buttons N | homed N | silent N | spoil N | deaf N | fail N | false-echo AT | power-cut
+//   falcon told
 #include <glib-unix.h>
 #include <umockdev.h>
 
@@ -21,7 +27,7 @@ namespace {
 
 using namespace osteon::test;
 
-// A cap with six axes of 16 bits in one report; two buttons.
+// A cap with six axes of 16 bits in one report, and two buttons.
 const std::vector<std::uint8_t> kCap{0x05, 0x01, 0x09, 0x08, 0xa1, 0x01, 0x85, 0x01, 0x16, 0xa2, 0xfe, 0x26, 0x5e, 0x01,
                                      0x75, 0x10, 0x95, 0x06, 0x09, 0x30, 0x09, 0x31, 0x09, 0x32, 0x09, 0x33, 0x09, 0x34,
                                      0x09, 0x35, 0x81, 0x02, 0x85, 0x03, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15, 0x00,
@@ -30,7 +36,7 @@ const std::vector<std::uint8_t> kCap{0x05, 0x01, 0x09, 0x08, 0xa1, 0x01, 0x85, 0
 const std::vector<std::uint8_t> kSwitch{0x05, 0x0c, 0x09, 0x03, 0xa1, 0x01, 0x05, 0x09, 0x19,
                                         0x01, 0x29, 0x03, 0x15, 0x00, 0x25, 0x01, 0x75, 0x01,
                                         0x95, 0x03, 0x81, 0x02, 0x95, 0x0d, 0x81, 0x03, 0xc0};
-// Two buttons and six bits of nothing, then x of 8 bits and z of 10, both from zero.
+// Two buttons and six unused bits, then x of 8 bits and z of 10, both from zero.
 const std::vector<std::uint8_t> kJoystick{
     0x05, 0x01, 0x09, 0x04, 0xa1, 0x01, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15, 0x00, 0x25, 0x01, 0x75, 0x01, 0x95,
     0x02, 0x81, 0x02, 0x95, 0x06, 0x81, 0x03, 0x05, 0x01, 0x09, 0x30, 0x26, 0xff, 0x00, 0x75, 0x08, 0x95, 0x01, 0x81,

@@ -19,7 +19,7 @@ constexpr std::chrono::seconds kPatience{20};
 
 void write_image(const std::filesystem::path& file, std::string_view beginning, std::size_t size) {
   std::string image(beginning);
-  // Every byte value, in an order that does not repeat with the pieces in which it is sent.
+  // Every byte value, in an order that does not repeat with the chunks in which it is sent.
   for (std::size_t i = image.size(); i < size; ++i) image += static_cast<char>((i * 7 + i / 251) & 0xff);
   std::ofstream(file, std::ios::binary) << image;
 }
@@ -31,11 +31,11 @@ void enter_usb_emulation(char** argv) {
   if (now != nullptr && std::string_view(now).find("umockdev") != std::string_view::npos) return;
   setenv("LD_PRELOAD", (std::string(kLibrary) + (now != nullptr && *now != 0 ? std::string(":") + now : "")).c_str(),
          1);
-  // A sanitizer wants to be the first library; behind this one it works as well.
+  // A sanitizer wants to be the first library. It works as well behind this one.
   const char* options = std::getenv("ASAN_OPTIONS");
   setenv("ASAN_OPTIONS", (std::string(options != nullptr ? options : "") + ":verify_asan_link_order=0").c_str(), 1);
   unsetenv("UMOCKDEV_DIR");
-  // The library sleeps for "0 µs" after every call, which is the timer's slack.
+  // The library sleeps for "0 µs" after every call. The real duration is the timer's slack.
   prctl(PR_SET_TIMERSLACK, 1);
   execv("/proc/self/exe", argv);
   std::perror("execv");

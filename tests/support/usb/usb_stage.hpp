@@ -1,5 +1,6 @@
-// A machine's USB for one test: a testbed played by osteon-usb-host, seen by this process through libumockdev-preload,
-// with the real libusb and hidapi in between. What is measured here is emulated, never a device.
+// The USB of a machine for one test: a testbed served by osteon-usb-host. This process sees it through
+// libumockdev-preload, with the real libusb and hidapi in between. All measurements here are of an emulation, never of
+// a device.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,7 +13,7 @@
 
 namespace osteon::test {
 
-// First in main(): runs this program again under the preloaded library unless it is already.
+// Call it first in main(). Runs this program again under the preloaded library, unless it already is.
 void enter_usb_emulation(char** argv);
 
 class UsbStage {
@@ -22,7 +23,7 @@ class UsbStage {
   UsbStage(const UsbStage&) = delete;
   UsbStage& operator=(const UsbStage&) = delete;
 
-  // One command of osteon-usb-host (see there); its answer. Fails the program when the host has died.
+  // Sends one command to osteon-usb-host (see there) and returns its answer. Fails the program if the host has died.
   std::string command(const std::string& line);
 
   struct Told {
@@ -39,7 +40,7 @@ class UsbStage {
   std::unique_ptr<Process> host_;
 };
 
-// Made-up images: one that the emulated Falcon runs, one that it takes and that then says nothing.
+// Made-up images: one that the emulated Falcon runs, and one that it accepts and then does not answer.
 void write_running_image(const std::filesystem::path& file, std::size_t size);
 void write_other_image(const std::filesystem::path& file, std::size_t size);
 
