@@ -52,7 +52,7 @@ void expect_held(Stage& stage) {
 
   Process again = stage.start_haptic("again", plan, "Ben");
   const auto held = [&] {
-    return ada.person(kAgain).find("frozen force 3.000 words \"wait for me\" heard") != std::string::npos;
+    return ada.person(kAgain).find("frozen force 3.000 words \"wait for me\" acknowledged") != std::string::npos;
   };
   ASSERT_TRUE(wait_until(held, 60s)) << ada.person(kAgain) << again.err();
   std::this_thread::sleep_for(1s);

@@ -150,7 +150,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   // One is stopped and the other goes on.
   const std::uint64_t frozen_at = console.decide("freeze #2 look at me");
   EXPECT_TRUE(console.ask("wait acknowledged #2 10").starts_with("ok"));
-  EXPECT_NE(console.person(kFirst).find("frozen words \"look at me\" heard decided by #1"), std::string::npos)
+  EXPECT_NE(console.person(kFirst).find("frozen words \"look at me\" acknowledged decided by #1"), std::string::npos)
       << console.person(kFirst);
   const std::uint64_t cut_by_first = console.cuts(kFirst), cut_by_second = console.cuts(kSecond);
   ASSERT_TRUE(wait_until([&] { return console.cuts(kSecond) >= cut_by_second + 20; }, 60s));

@@ -1,4 +1,4 @@
-// Larger rooms in the worst networks: drills, pieces that come apart, undo under load.
+// Larger rooms in the worst networks: drills, pieces that separate, undo under load.
 #include "tests/simulation/seeds.hpp"
 
 namespace osteon {

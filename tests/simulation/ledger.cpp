@@ -42,9 +42,9 @@ std::optional<EventKind> kind_of(const LogEntry& entry) {
 
 }  // namespace
 
-// Who has come with a hand, what holds for it, and what was cut.
+// The authors that have joined with a hand, their restrictions, and the cuts.
 struct Ledger::Hands {
-  std::map<AuthorId, std::uint32_t> persons;  // of those that cut, in the order in which they came
+  std::map<AuthorId, std::uint32_t> persons;  // of those that cut, in the order of their joins
   std::map<AuthorId, Restrictions> held;
   std::map<RoomSeq, const Cut*> cuts;
 
@@ -106,7 +106,7 @@ void Ledger::told(RoomSeq place, const Told& what) {
   told_up_to(place);
   const auto [at, first] = told_.emplace(place, what);
   check(first || at->second == what, Invariant::acknowledged,
-        "place " + number(place) + " was told twice, as different events");
+        "sequence number " + number(place) + " was sent twice, as different events");
 }
 
 void Ledger::told_committed(RoomSeq place, const Cut& cut) {
@@ -118,7 +118,7 @@ void Ledger::told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_
 void Ledger::told_event(RoomSeq place, EventKind kind) { told(place, {kind, false, {}, 0, {}}); }
 void Ledger::told_up_to(RoomSeq place) {
   check(place <= kept_, Invariant::acknowledged,
-        "place " + number(place) + " was told while the entries were kept up to " + number(kept_));
+        "sequence number " + number(place) + " was sent while the entries were durable up to " + number(kept_));
   furthest_ = std::max(furthest_, place);
 }
 void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
@@ -129,7 +129,7 @@ void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
 void Ledger::told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq) {
   const std::vector<Cut>& own = made_[author];
   if (author_seq == 0 || author_seq > own.size())
-    return fault(Invariant::acknowledged, whose(author, author_seq) + " has a place, and was never made");
+    return fault(Invariant::acknowledged, whose(author, author_seq) + " has a sequence number, and was never made");
   if (place)
     told_committed(place, own[author_seq - 1]);
   else
@@ -147,7 +147,7 @@ void Ledger::check_author(const LogEntry& entry, AuthorId author, std::uint64_t 
     return fault(Invariant::author_order,
                  "entry " + number(entry.place) + " is " + whose(author, author_seq) + ", who never made it");
   check(cut_digest(own[author_seq - 1]) == bytes, Invariant::author_order,
-        "entry " + number(entry.place) + " is " + whose(author, author_seq) + ", with other bytes than he made");
+        "entry " + number(entry.place) + " is " + whose(author, author_seq) + ", with other bytes than were made");
 }
 
 void Ledger::check_held(const LogEntry& entry, const Hands& hands) {
@@ -178,7 +178,7 @@ void Ledger::check_cut(const LogEntry& entry, const Hands& hands, AuthorId by, c
     if (!lies_in(*now.zone, knot.position)) return forbidden("might not cut there");
 }
 
-// Whoever starts their program again is held as they were, from the next entry on.
+// A person who restarts their program has the same restrictions, from the next entry on.
 void Ledger::check_carried(std::span<const LogEntry> entries, std::size_t join, Hands& hands) {
   const auto& joined = std::get<JoinEntry>(entries[join].what);
   Restrictions before;
@@ -197,7 +197,7 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
     fault(Invariant::acknowledged, "the room was said to stand at " + number(furthest_) + ", and " +
                                        std::to_string(entries.size()) + " entries are kept");
   std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
-  std::map<RoomSeq, bool> of_bone;  // places of events that can be undone: whether bone comes back with them
+  std::map<RoomSeq, bool> of_bone;  // events that can be undone: whether bone comes back with them
   Hands hands;
   const auto lease_of = [&](AuthorId author) {
     const auto found = lease.find(author);
@@ -206,7 +206,7 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const LogEntry& entry = entries[i];
     check(entry.place.value == i + 1, Invariant::replay,
-          "entry " + std::to_string(i + 1) + " has the place " + number(entry.place));
+          "entry " + std::to_string(i + 1) + " has the sequence number " + number(entry.place));
     Told kept{*kind_of(entry), false, {}, 0, {}};
     bool bone_back = false;
     check_held(entry, hands);
@@ -258,7 +258,7 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
       for (auto& [author, epoch] : lease) epoch = entry.place.value + 1;
     const auto told = told_.find(entry.place);
     check(told == told_.end() || told->second == kept, Invariant::acknowledged,
-          "entry " + number(entry.place) + " is another event than was told");
+          "entry " + number(entry.place) + " is another event than was sent");
   }
   for (const auto& [author, author_seq] : decided_)
     check(newest[author] >= author_seq, Invariant::acknowledged,

@@ -1,5 +1,5 @@
-// What a simulated room has promised, noted where it was heard, and what is wrong with its journal in the light of
-// that.
+// What a simulated room has promised, recorded from the messages that clients received. It finds faults in the room's
+// journal by these promises.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -15,21 +15,21 @@
 
 namespace osteon::test {
 
-// Which promise was broken.
+// The promise that was broken.
 enum class Invariant {
-  one_bone,      // after quiet all hold the same
-  set_of_cuts,   // any order and repetition of the standing cuts gives that bone
-  acknowledged,  // what anyone was told is in the journal: when they hear of it, and after every crash
+  one_bone,      // after quiet all have the same bone
+  set_of_cuts,   // any order and repetition of the cuts not undone gives that bone
+  acknowledged,  // what any client received is in the journal: at the time of receipt, and after every crash
   replay,        // replay = live = checkpoint and tail
   lease,         // nothing of a stale lease is committed
-  bounds,        // queues stay within them
+  bounds,        // queues stay within their bounds
   author_order,  // no gap, duplicate or foreign cut of an author
-  felt,          // a hand feels those of its cuts that may still be taken, and no others
-  decided,       // every cut of a client that is there is decided
-  served,        // nobody is turned away, and what must work works
-  datagrams,     // only what a peer has sealed is taken, once, and it says what the stream says
-  supervised,      // what an instructor forbids is not committed, and after quiet each hand knows what holds for it
-  settled,       // after quiet all is decided and told within two seconds
+  felt,          // a hand feels those of its own cuts that may still be accepted, and no others
+  decided,       // every cut of a present client is decided
+  served,        // no client is refused, and what must work works
+  datagrams,     // a receiver accepts only what a peer has sealed, once, and it agrees with the stream
+  supervised,      // nothing that an instructor forbids is committed, and after quiet each hand knows its restrictions
+  settled,       // after quiet all is decided and sent within two seconds
 };
 [[nodiscard]] std::string_view name(Invariant invariant);
 
@@ -45,25 +45,26 @@ class Ledger {
     if (!holds) fault(invariant, sentence);
   }
 
-  // An author's cuts as he made them; numbered from 1.
+  // An author's cuts as they were made; numbered from 1.
   void made(const Cut& cut, std::chrono::nanoseconds now);
-  // So long ago; none where there is no such cut.
+  // The age of a cut. None if there is no such cut.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> age(const Cut& cut, std::chrono::nanoseconds now) const;
-  void kept_up_to(RoomSeq place) { kept_ = std::max(kept_, place); }  // what anyone may be told of
-  // What a client heard, or was answered.
+  void kept_up_to(RoomSeq place) { kept_ = std::max(kept_, place); }  // entries that are durable and may be sent
+  // What a client received, in a stream or as an answer.
   void told_committed(RoomSeq place, const Cut& cut);
   void told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq);
   void told_event(RoomSeq place, EventKind kind);
-  void told_up_to(RoomSeq place);                                // the room was said to stand there
+  void told_up_to(RoomSeq place);                                // newest sequence number that the room reported
   void told_decided(AuthorId author, std::uint64_t author_seq);  // up to this one
-  // Where the room has put an author's cut, as it says to whoever comes back; null: it rejected the cut.
+  // The room's decision about an author's cut, as sent to a returning client: its sequence number. Null: it rejected
+  // the cut.
   void told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq);
 
-  // Everything that the entries of a journal can be held against.
+  // Checks everything that the entries of a journal must satisfy.
   void check_entries(std::span<const LogEntry> entries);
-  // What holds for each hand of whom anything was decided.
+  // The restrictions of each hand about which anything was decided.
   [[nodiscard]] static std::map<AuthorId, Restrictions> held(std::span<const LogEntry> entries);
-  // Cuts that no undo has taken back; nothing when pieces came apart.
+  // Cuts that are not undone. Nothing if pieces have separated.
   [[nodiscard]] static std::optional<std::vector<Cut>> standing(std::span<const LogEntry> entries);
 
   [[nodiscard]] const std::vector<Fault>& faults() const { return faults_; }
@@ -79,8 +80,8 @@ class Ledger {
     friend bool operator==(const Told&, const Told&) = default;
   };
   void told(RoomSeq place, const Told& what);
-  // What an instructor forbids, in this page's own words: of a cut, made or done again by `by`, and of all else that
-  // changes bone or scene.
+  // What an instructor forbids, implemented here independently of the room: of a cut, made or redone by `by`, and of
+  // all else that changes bone or scene.
   struct Hands;
   void check_held(const LogEntry& entry, const Hands& hands);
   void check_cut(const LogEntry& entry, const Hands& hands, AuthorId by, const Cut& cut);
@@ -92,7 +93,7 @@ class Ledger {
   std::map<AuthorId, std::vector<std::chrono::nanoseconds>> made_at_;
   std::map<RoomSeq, Told> told_;
   std::map<AuthorId, std::uint64_t> decided_;
-  std::set<std::pair<AuthorId, std::uint64_t>> rejected_;  // that a room said to whoever came back
+  std::set<std::pair<AuthorId, std::uint64_t>> rejected_;  // as a room reported to a returning client
   RoomSeq furthest_, kept_;
   std::vector<Fault> faults_;
 };

@@ -1,4 +1,4 @@
-// Many small rooms: what matters is who said what when, not how much bone there is.
+// Many small rooms. The order of messages matters here, not the amount of bone.
 #include <map>
 #include <optional>
 #include <utility>
@@ -28,7 +28,7 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
     sum.datagrams.cuts += one.datagrams.cuts, sum.datagrams.entries += one.datagrams.entries;
     sum.datagrams.moves += one.datagrams.moves;
   }
-  // The trouble was there.
+  // The planned faults did happen.
   EXPECT_GT(sum.committed, 5000u);
   EXPECT_GT(sum.rejected, 300u);
   EXPECT_GT(sum.undone, 100u);
@@ -62,20 +62,20 @@ TEST(Simulation, IsTheSameForTheSameSeed) {
   }
 }
 
-// What is broken on purpose is found.
-TEST(Simulation, FindsRowsInAnotherOrder) { EXPECT_GT(found(Breakage::ordering, 40), 0u); }
-TEST(Simulation, FindsRowsThatAreLeftOut) { EXPECT_GT(found(Breakage::skipping, 40), 0u); }
+// Deliberate defects are found.
+TEST(Simulation, FindsEntriesInAnotherOrder) { EXPECT_GT(found(Breakage::ordering, 40), 0u); }
+TEST(Simulation, FindsEntriesThatAreLeftOut) { EXPECT_GT(found(Breakage::skipping, 40), 0u); }
 TEST(Simulation, FindsCutsThatAreTakenTwice) { EXPECT_GT(found(Breakage::dedup, 40), 0u); }
 TEST(Simulation, FindsAReplicaThatDoesNotComeBackRight) { EXPECT_GT(found(Breakage::replica, 40), 0u); }
 TEST(Simulation, FindsAJournalThatWaitsForNoDisk) { EXPECT_GT(found(Breakage::forgetful, 40), 0u); }
 
-TEST(Simulation, FindsASessionThatIsToldTooSoon) { EXPECT_GT(found(Breakage::hasty, 150), 0u); }
+TEST(Simulation, FindsASessionThatReceivesTooSoon) { EXPECT_GT(found(Breakage::hasty, 150), 0u); }
 
-TEST(Simulation, FindsAHandThatIsNotTold) { EXPECT_GT(found(Breakage::unsaid, 40), 0u); }
+TEST(Simulation, FindsAHandThatReceivesNothing) { EXPECT_GT(found(Breakage::unsaid, 40), 0u); }
 
-// Rows of a room that heeds nothing: what is found in them goes by no room's judgement.
-struct Rows {
-  Rows() {
+// Entries of a room that enforces nothing. The ledger must find the violations without a room's decisions.
+struct Entries {
+  Entries() {
     join(1, 7);
     join(2, 8);
   }
@@ -108,7 +108,7 @@ const Digest kBurr = find_tool("burr-round-3.2").value().hash(), kDrill = find_t
 
 TEST(Ledger, FindsCutsThatWereForbidden) {
   const auto found = [](const Restrictions& word) {
-    Rows all;
+    Entries all;
     all.hold(2, word);
     all.cut(2, word.may_cut() ? 1 : 4);
     return all.supervised();
@@ -125,7 +125,7 @@ TEST(Ledger, FindsCutsThatWereForbidden) {
 
 TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
   const auto found = [](std::uint64_t by, const Restrictions& word, bool again) {
-    Rows all;
+    Entries all;
     all.cut(2);
     if (again) all.add(1, UndoEntry{{RoomSeq{3}}});
     all.hold(2, word);
@@ -147,7 +147,7 @@ TEST(Ledger, FindsWhatAHeldHandTookBackOrDidAgain) {
 
 TEST(Ledger, FindsAHandThatIsLetGoByComingAgain) {
   const auto found = [](std::uint32_t person, std::optional<Restrictions> carried) {
-    Rows all;
+    Entries all;
     all.hold(2, {.stopped = true});
     all.join(3, person);
     if (carried) all.hold(3, *carried);
@@ -160,7 +160,7 @@ TEST(Ledger, FindsAHandThatIsLetGoByComingAgain) {
   EXPECT_EQ(found(0, {}), 0u) << "nobody knows who that is";
 }
 
-TEST(Simulation, FindsRowsThatDatagramsLose) { EXPECT_GT(found(Breakage::pruning, 150), 0u); }
+TEST(Simulation, FindsEntriesThatDatagramsLose) { EXPECT_GT(found(Breakage::pruning, 150), 0u); }
 
 }  // namespace
 }  // namespace osteon

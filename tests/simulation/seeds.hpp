@@ -1,4 +1,4 @@
-// Seeds as a test runs them.
+// Runs seeds for tests.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 namespace osteon::test {
 
-// What a room or a journal logs of the trouble that it is given is no news.
+// Hides the log of a room or journal: the faults in it are planned.
 inline SimulationReport simulate_quietly(std::uint64_t seed, const SimulationOptions& options = {}) {
   static const bool open = (log::open("simulation"), true);
   (void)open;
@@ -25,7 +25,7 @@ inline void expect_no_faults(const SimulationReport& report, const char* option)
                   << "\n  again: osteon-simulate --verbose --seeds " << report.seed << option;
 }
 
-// The first of the first seeds in which something so broken is found; 0: none.
+// The first of the first `seeds` seeds that finds this defect. 0: none.
 inline std::uint64_t found(Breakage breakage, std::uint64_t seeds) {
   for (std::uint64_t seed = 1; seed <= seeds; ++seed)
     if (!simulate_quietly(seed, {.full = false, .breakage = breakage}).faults.empty()) return seed;

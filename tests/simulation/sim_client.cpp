@@ -17,7 +17,7 @@ constexpr auto kCutTime = 8ms;
 constexpr auto kFirstAnswer = 5s, kLaterAnswers = 1s;  // common/wire/room_client.cpp
 constexpr std::size_t kWindowBytes = 64 * 1024;        // of HTTP/2
 
-// What a program may be told that ends it without a fault: its user begins again.
+// Messages that end a program without a fault: its user starts it again.
 bool may_be_told(const std::string& why) {
   return why.starts_with("the server stops") || why.starts_with("the room takes no more cuts") ||
          why.find("takes no more entries") != std::string::npos;  // of the journal
@@ -91,11 +91,11 @@ void SimClient::later(Time in, Call call) {
   });
 }
 
-// One request and its answer. Error unavailable: none came, and any other: the server's own.
+// One request and its answer. Error unavailable: no answer came. Any other error: the server's own.
 template <class Answer>
 void SimClient::ask(std::function<void(std::function<void(const Result<Answer>&)>)> request, Time patience,
                     std::function<void(const Result<Answer>&)> heard) {
-  const auto over = std::make_shared<bool>(false);  // shared by what may come first
+  const auto over = std::make_shared<bool>(false);  // shared by everything that may finish first
   const auto finish = [this, over, life = life_, heard = std::move(heard)](const Result<Answer>& answer) {
     if (!std::exchange(*over, true) && life == life_) heard(answer);
   };
@@ -110,7 +110,7 @@ void SimClient::ask(std::function<void(std::function<void(const Result<Answer>&)
     if (!server_.up()) return back(failure(ErrorCode::unavailable, "nobody answers"));
     request([back](const Result<Answer>& answer) {
       if (answer || answer.error().code != ErrorCode::unavailable) return back(answer);
-      back(failure(ErrorCode::unsupported, answer.error().message));  // FAILED_PRECONDITION, the server's own word
+      back(failure(ErrorCode::unsupported, answer.error().message));  // FAILED_PRECONDITION: the server's decision
     });
   });
 }
@@ -121,7 +121,7 @@ void SimClient::start() {
   stream_.reset();
   underway_.emplace(kMostUnderway);
   backoff_.emplace(random_.index(1 << 30), BackoffBounds{.least = 20ms, .most = 2s});
-  tools_ = std::make_shared<ToolBox>();  // the room says which it has
+  tools_ = std::make_shared<ToolBox>();  // the room says which tools it has
   replica_.emplace(bone_, BodyId{0}, tools_);
   watch_ = {};
   health_ = haptic::RoomHealth::follows;
@@ -155,7 +155,7 @@ void SimClient::leave() {
 }
 
 void SimClient::join() {
-  // Who has a name has it again when the program is started again; nobody knows the others.
+  // A person with a name has the same name after a restart. The others have none.
   if (!user_) user_ = random_.unit() < 0.7 ? "user " + std::to_string(number_) : "";
   const std::string user = *user_;
   const SimServer::JoinRequest request{.name = user, .resume = {}, .secret = {}, .kept = {}};
@@ -250,7 +250,7 @@ void SimClient::send() {
   }
 }
 
-// What a stream brings for the session itself.
+// Messages of a stream for the session itself.
 void SimClient::follow(const v1::SessionResponse& response) {
   if (response.has_link()) offer_ = response.link();
   if (response.has_tool() && response.tool().tool_number() != 0)
@@ -336,7 +336,7 @@ RoomEvents SimClient::events() {
     ledger_.told_up_to(room.contained);
     const std::size_t places = room.decided_places.size();
     ledger_.check(places == std::min<std::size_t>(room.decided_author_seq, kMostUnderway), Invariant::served,
-                  "a session begins with the places of " + std::to_string(places) + " cuts");
+                  "a session begins with the sequence numbers of " + std::to_string(places) + " cuts");
     for (std::uint64_t seq = 1; seq <= room.decided_author_seq; ++seq)
       if (const std::optional<RoomSeq> place = room.place_of(seq)) ledger_.told_place(*place, room_->author, seq);
     pass(room);
@@ -403,7 +403,7 @@ void SimClient::take(const FieldLeaf& leaf) {
 void SimClient::take(const Interrupted&) {
   interrupted_ = bone_is_here_;
   renewed_.clear();
-  // What has come may be bone that is there again by now.
+  // The leaves received so far may be out of date: bone may have come back since.
   if (!bone_is_here_) replica_.emplace(bone_, BodyId{0}, tools_);
 }
 
@@ -443,7 +443,7 @@ void SimClient::take(const BonePart& part) {
   follow_lease(part.lease_epoch);
 }
 
-// The lease of what held before the leaves comes with them.
+// If restrictions arrive before the leaves, their lease comes with the leaves.
 void SimClient::take(const HandSupervised& decided) {
   held_ = decided.supervision;
   if (!decided.place) return;
@@ -480,11 +480,11 @@ std::string SimClient::standing() const {
   if (!room_) return "not joined";
   return "author " + std::to_string(room_->author.value) + ", " + (bone_is_here_ ? "" : "without its bone, ") +
          (interrupted_ ? "interrupted, " : "") + std::to_string(underway_->undecided()) + " cuts undecided, " +
-         std::to_string(replica_->unconfirmed()) + " unconfirmed, at place " +
+         std::to_string(replica_->unconfirmed()) + " unconfirmed, at sequence number " +
          std::to_string(replica_->room_seq().value);
 }
 
-// The hand's loop: a run of cuts, a pause, perhaps something else.
+// The hand's loop: a run of cuts, a pause, sometimes another action.
 void SimClient::move_hand() {
   watch();
   if (resting_ || cuts_left_ <= 0) return later(250ms, [this] { move_hand(); });
@@ -513,7 +513,7 @@ void SimClient::cut(int left) {
   one.level = std::min(one.level, hand_.level);
   one.path_us = 8000;
   if (random_.unit() < hand_.beyond / 4) {
-    // One that no room takes.
+    // A cut that no room accepts.
     if (random_.unit() < 0.5)
       one.path.back().position[0] += 1 << 20;
     else
@@ -557,7 +557,7 @@ void SimClient::do_something_else() {
   if (chance(hand_.supervise)) return supervise();
   if (chance(hand_.say)) return change([](Room& room, AuthorId by) { return room.say(by, {}, "well done"); });
   if (chance(hand_.again) && stream_ && underway_->may_go() && stream_->writable(SimStream::client)) {
-    // Sent again although it is decided: the answer was lost, for all the server knows.
+    // Sent again although it is decided: for the server, the answer may have been lost.
     const std::size_t sent = own_.size() - underway_->undecided();
     if (sent == 0) return;
     v1::SessionRequest request;
@@ -566,7 +566,8 @@ void SimClient::do_something_else() {
   }
 }
 
-// Everybody is an instructor here, and nobody heeds what they are told: their cuts go on, for the room to refuse.
+// Every client is an instructor here, and no client obeys restrictions. Their cuts go on, so that the room must refuse
+// them.
 void SimClient::supervise() {
   Restrictions word;
   const double which = random_.unit();
@@ -579,7 +580,7 @@ void SimClient::supervise() {
   if (which < 0.6) word.words = "as I say";
   const std::uint64_t pick = random_.index(1000);
   change([word, pick](Room& room, AuthorId by) -> Result<RoomEvent> {
-    // Of those who came last: others may have gone.
+    // One of the newest authors: older ones may have left.
     const AuthorId subject{room.authors() - pick % std::min<std::uint64_t>(room.authors(), 4)};
     Restrictions said = word;
     if (said.taken_by == subject) said.taken_by = {};

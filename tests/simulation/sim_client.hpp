@@ -1,5 +1,5 @@
-// A haptic client on virtual time: joins, cuts with a seeded hand, keeps a replica, comes back when its line breaks.
-// Between SimStream and the replica are the parts that osteon-haptic has there.
+// A haptic client on virtual time. It joins, cuts with a seeded hand, keeps a replica, and reconnects when its
+// connection breaks. Between SimStream and the replica it uses the same parts as osteon-haptic.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -27,18 +27,18 @@ struct HandPlan {
   std::vector<Tool> tools;
   int level = 0;                                                         // of every cut, at most
   double reach_mm = 3.0;                                                 // from the middle of the block's upper face
-  int cuts = 30;                                                         // in all
-  int run = 8;                                                           // cuts behind each other, at most
+  int cuts = 30;                                                         // in total
+  int run = 8;                                                           // consecutive cuts, at most
   std::chrono::nanoseconds pause_most = std::chrono::milliseconds(800);  // between two runs
-  // Between two runs, with these chances:
+  // Probabilities between two runs:
   double undo = 0.12, redo = 0.10, mark = 0.05, again = 0.15, beyond = 0.08, supervise = 0.35, say = 0.05;
 };
 
-// How a client's datagrams fare.
+// Conditions of a client's datagrams.
 struct DatagramPlan {
-  bool wanted = false;                            // it takes the fast path that it is offered
+  bool wanted = false;                            // it uses the fast path if it is offered
   PathQuality quality;                            // both ways
-  bool up_blocked = false, down_blocked = false;  // for good: something on the way lets none through
+  bool up_blocked = false, down_blocked = false;  // permanently: something on the way blocks all
   wire::LinkOptions link;
   std::chrono::nanoseconds clock_ahead{};
 };
@@ -50,35 +50,35 @@ class SimClient {
 
   SimClient(VirtualTime& time, Ledger& ledger, SimServer& server, Datagrams& datagrams, std::uint64_t number,
             std::uint64_t seed, const Case& bone, const HandPlan& hand, const DatagramPlan& plan, Breakage breakage);
-  void start();  // the program; its hand begins when the bone is there
+  void start();  // starts the program; its hand begins when it has the bone
   void rest() { resting_ = true; }
-  void leave();  // for good
+  void leave();  // permanently
   void break_line(const std::string& why) {
     if (stream_) stream_->break_off(why);
   }
   [[nodiscard]] SimPath& path() { return path_; }
-  // Datagrams go from another address, as where a router forgets which was whose.
+  // Sends datagrams from another address, as after a router has dropped its mapping.
   void move();
-  // In this time none gets through, on the way up, down or both.
+  // In this time no datagram gets through, on the way up, down or both.
   void stop_datagrams(bool up, bool down, Time from, Time until);
-  // From now on, for good.
+  // From now on, permanently.
   void block_datagrams(bool up, bool down);
   void heal();  // all ways that are not blocked are good from now on
 
   [[nodiscard]] bool here() const { return !gone_; }
   [[nodiscard]] bool settled() const;
-  // It is on the line or gone, and what the network has held back until now has come, its requests as well.
+  // It is connected or gone, and all that the network held back until now has arrived, its requests too.
   [[nodiscard]] bool connected() const;
   [[nodiscard]] std::string standing() const;  // for messages
   [[nodiscard]] AuthorId author() const { return room_ ? room_->author : AuthorId{}; }
-  [[nodiscard]] const Restrictions& held() const { return held_; }  // for its hand, as it was told
+  [[nodiscard]] const Restrictions& held() const { return held_; }  // for its hand, as it received them
   [[nodiscard]] Digest hash() const { return replica_->hash(); }
   [[nodiscard]] RoomSeq room_seq() const { return replica_->room_seq(); }
   [[nodiscard]] std::uint64_t cuts() const { return cuts_made_; }
-  [[nodiscard]] std::uint64_t denied() const { return denied_; }  // of what it has asked for while it was held
+  [[nodiscard]] std::uint64_t denied() const { return denied_; }  // requests that were refused because of restrictions
   [[nodiscard]] std::uint64_t resumed() const { return resumed_; }
   [[nodiscard]] std::uint64_t programs() const { return programs_; }
-  // Milliseconds from others' cuts until the replica had them, by what brought them.
+  // Milliseconds from others' cuts until the replica had them, for each way of delivery.
   [[nodiscard]] const std::vector<float>& felt_by_datagram_ms() const { return felt_by_datagram_ms_; }
   [[nodiscard]] const std::vector<float>& felt_by_stream_ms() const { return felt_by_stream_ms_; }
 
@@ -117,7 +117,7 @@ class SimClient {
   void open_fast_path(std::uint64_t decided);
   void set_ways();  // of the present address
   void hear_entry(wire::IndexedEntry entry);
-  void compare(const v1::SessionResponse& response);  // with what a datagram has said of the same entry
+  void compare(const v1::SessionResponse& response);  // compares with what a datagram has said of the same entry
   [[nodiscard]] RoomEvents events();
 
   void pass(FromRoom event);
@@ -161,14 +161,14 @@ class SimClient {
 
   // Of the running program.
   std::optional<SimServer::Joined> room_;
-  std::shared_ptr<SimStream> stream_;  // shared with what is under way on it
+  std::shared_ptr<SimStream> stream_;  // shared with actions in progress on it
   std::optional<CutsUnderway> underway_;
   std::optional<SessionReader> reader_;
   std::optional<v1::LinkOffer> offer_;  // of the present stream
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools_;
   std::unique_ptr<SimFastPath> fast_;
   std::map<std::uint64_t, wire::SessionEntry> said_;  // by datagrams: entries of the present stream by index
-  bool by_datagram_ = false;                        // what is being heard
+  bool by_datagram_ = false;                        // how the present entry arrived
   std::uint64_t state_seq_ = 0;
   Time requests_there_{}, held_back_until_{};
   std::optional<Backoff> backoff_;
@@ -182,7 +182,7 @@ class SimClient {
   bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;
   std::uint64_t lease_epoch_ = 0;
   Restrictions held_;
-  std::map<std::uint64_t, std::uint64_t> felt_;  // own cuts that must be predicted: their leases
+  std::map<std::uint64_t, std::uint64_t> felt_;  // own cuts that must be predicted, with their leases
   QuantisedPose at_;
 };
 

@@ -73,7 +73,7 @@ void Datagrams::opened(Way way, std::span<const std::uint8_t> bytes) {
                 "a datagram was taken for authentic that nobody has sealed, or that had come before");
 }
 
-// One that was seen on its way is sent again, perhaps changed, perhaps from or to where it never was.
+// Sends a datagram again that was seen on its way. It may be changed, or have another sender or receiver.
 void Datagrams::forge(const Endpoint& from, const Endpoint& to, std::vector<std::uint8_t> bytes) {
   ++counts_.forged;
   const auto flip = [&](std::size_t first, std::size_t end) {
@@ -81,7 +81,7 @@ void Datagrams::forge(const Endpoint& from, const Endpoint& to, std::vector<std:
   };
   switch (random_.index(6)) {
     case 0:
-      break;  // as it was
+      break;  // unchanged
     case 1:
       flip(0, bytes.size());
       break;
@@ -95,7 +95,7 @@ void Datagrams::forge(const Endpoint& from, const Endpoint& to, std::vector<std:
       for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random_.index(256));
       break;
     default:
-      return network_.send(to, from, bytes);  // back to whoever has sent it
+      return network_.send(to, from, bytes);  // back to its sender
   }
   const bool own_name = random_.unit() < 0.5;
   if (own_name && to == node(kServer)) from_forger_bytes_ += bytes.size();
@@ -246,7 +246,7 @@ void SimFastPath::turn() {
   Ledger& ledger = datagrams_.ledger();
   ledger.check(link_.half().counts().malformed == 0, Invariant::datagrams, "the room's datagram makes no sense");
   if (const std::optional<ClockReading> clock = link_.clock(now()))
-    // Times travel in microseconds.
+    // Times are sent in microseconds.
     ledger.check(std::chrono::abs(clock->offset + ahead_) <= clock->error + 2us, Invariant::datagrams,
                  "the server's clock is not where it was measured");
   std::vector<wire::IndexedEntry> entries;

@@ -1,5 +1,5 @@
-// The fast path on virtual time: what haptic_client/net/fast_path.cpp and server/net/link_server.cpp do between sockets
-// and the two links, over a simulated network, with somebody on the way who forges.
+// The fast path on virtual time. It does what haptic_client/net/fast_path.cpp and server/net/link_server.cpp do between
+// sockets and the two links, over a simulated network with a forger on the way.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -19,7 +19,7 @@
 
 namespace osteon::test {
 
-// Rings once, at the earliest of the times it was set to since it rang last.
+// Rings once, at the earliest time that was set since it last rang.
 class Alarm {
  public:
   using Time = VirtualTime::Time;
@@ -32,23 +32,23 @@ class Alarm {
  private:
   VirtualTime& time_;
   const std::function<void()> ring_;
-  std::shared_ptr<Time> at_ = std::make_shared<Time>(Time::max());  // shared with what is posted
+  std::shared_ptr<Time> at_ = std::make_shared<Time>(Time::max());  // shared with posted actions
 };
 
 struct DatagramCounts {
   std::uint64_t sent = 0, opened = 0, forged = 0;
-  std::uint64_t entries = 0, cuts = 0;  // that datagrams have brought
-  std::uint64_t moves = 0;           // addresses that were proven
+  std::uint64_t entries = 0, cuts = 0;  // delivered by datagrams
+  std::uint64_t moves = 0;           // addresses that were verified
 };
 
-// All datagrams of a simulation. Whatever an end takes for authentic must be what the other end has sealed, and only
-// once.
+// All datagrams of a simulation. Whatever an end accepts as authentic must be something that the other end has sealed,
+// and only once.
 class Datagrams {
  public:
   enum Way { up, down };
   static constexpr std::uint64_t kServer = 1000, kForger = 666;  // nodes
 
-  // `forged`: share of the datagrams that somebody sees, and sends on in some other way.
+  // `forged`: share of the datagrams that the forger sees and sends on in another way.
   Datagrams(VirtualTime& time, Ledger& ledger, std::uint64_t seed, double forged);
 
   [[nodiscard]] VirtualTime& time() { return time_; }
@@ -82,7 +82,7 @@ class SimLinks {
   using Receiver = SessionLink::Receiver;
   class Link;
 
-  // `silent`: the process runs no more, though it is not gone yet.
+  // `silent`: the process does not run any more, though it is not gone yet.
   SimLinks(Datagrams& datagrams, std::uint64_t seed, const wire::LinkOptions& options, std::function<bool()> silent);
   [[nodiscard]] std::shared_ptr<Link> add(AuthorId author, std::uint64_t first_author_seq, Receiver& sink);
   void remove(const std::shared_ptr<Link>& link);
@@ -100,19 +100,19 @@ class SimLinks {
   Alarm alarm_;
 };
 
-// Of one session.
+// The link of one session.
 class SimLinks::Link {
  public:
   Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& sink);
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
   void offer(const Cut& cut);
-  // False: it goes over the stream only, since it does not fit or the client cannot be reached.
+  // False: it is sent over the stream only, because it does not fit or the client cannot be reached.
   bool tell(std::uint64_t index, const wire::SessionEntry& entry);
   void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
 
  private:
   friend class SimLinks;
-  std::size_t say_news();  // so many cuts of it
+  std::size_t say_news();  // number of cuts in it
 
   SimLinks& links_;
   const SessionKeys keys_;
@@ -121,7 +121,7 @@ class SimLinks::Link {
   std::uint64_t arrived_ = 0, moves_ = 0, state_seq_ = 0;
 };
 
-// The client's end, of one stream: FastPath.
+// The client's end for one stream: FastPath.
 class SimFastPath {
  public:
   using Time = VirtualTime::Time;

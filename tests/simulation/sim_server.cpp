@@ -35,7 +35,7 @@ std::shared_ptr<ToolBox> few_tools() {
   return box;
 }
 
-// What SessionStream of server/net/session_service.cpp does between gRPC and the runtime.
+// Does what SessionStream of server/net/session_service.cpp does between gRPC and the runtime.
 class SimServer::Session final : public SessionSubscriber,
                                  public std::enable_shared_from_this<Session>,
                                  private SessionLink::Receiver {
@@ -146,8 +146,8 @@ class SimServer::Session final : public SessionSubscriber,
     Result<Cut> cut = wire::from_wire(message);
     if (!cut) return close({true, cut.error().message});
     if (cut->author != author_) return close({true, "cut.author is not the author who opened the session"});
-    // One that was taken before is answered with its first outcome; one ahead of its turn may follow others that come
-    // in datagrams.
+    // A cut that was accepted before is answered with its first decision. A cut ahead of its turn may follow others
+    // that come in datagrams.
     if (link_ && cut->author_seq > taken_)
       link_->offer(*cut);
     else
@@ -156,7 +156,7 @@ class SimServer::Session final : public SessionSubscriber,
     if (paused_) stream_->stop_reading(SimStream::server);
   }
 
-  // In order of their author_seq, over whichever way they came.
+  // In order of their author_seq, on whichever way they came.
   void take(Cut cut) override {
     if (closing_ || done_) return;
     taken_ = std::max(taken_, cut.author_seq);
@@ -223,7 +223,7 @@ class SimServer::Session final : public SessionSubscriber,
     stream_->finish(*closing_);
     gone();
   }
-  // The runtime is told from outside of its calls, as gRPC does.
+  // Notifies the runtime from outside of its calls, as gRPC does.
   void gone() {
     if (std::exchange(done_, true)) return;
     server_.time_.post_in(0ns, [self = shared_from_this(), life = server_.life_] {
@@ -237,7 +237,7 @@ class SimServer::Session final : public SessionSubscriber,
   std::shared_ptr<SimStream> stream_;
   AuthorId author_;
   SessionSendQueue send_queue_;
-  std::shared_ptr<SimLinks::Link> link_;  // with the server's links
+  std::shared_ptr<SimLinks::Link> link_;  // shared with the server's links
   struct HeldBack {
     RoomSeq place;
     Bytes entry;
@@ -283,7 +283,7 @@ void SimServer::boot() {
   ++life_;
   Result<PersistedRoom> kept = RoomStore::open(file_, bone_, options());
   if (kept && kept->store->server_epoch() == 0) {
-    // Closed to entries: that is for the operator.
+    // Closed to entries: the operator must act.
     ledger_.check(disk_has_failed_, Invariant::served, "a journal on a sound disk takes no entries");
     kept = failure(ErrorCode::unavailable, "closed");
     disk_.mend();
@@ -314,7 +314,7 @@ void SimServer::boot() {
 }
 
 std::vector<LogEntry> SimServer::entries() {
-  // Of a copy: the journal itself is in use.
+  // Reads a copy, because the journal itself is in use.
   MemoryDisk copy(1, condition_.sector_bytes);
   copy.load(disk_.image());
   JournalOptions journal = options().journal;
@@ -367,7 +367,7 @@ Digest SimServer::reopened(bool with_checkpoint) {
   links_.reset();
   ++life_;
   runtime_->stop();
-  sessions_.clear();  // which the runtime's thread that shows tools has told of until now
+  sessions_.clear();  // until now the runtime's thread that publishes tools used them
   if (with_checkpoint) checkpoint();
   runtime_.reset();
   if (with_checkpoint) {
@@ -496,7 +496,7 @@ void SimServer::after_tick() {
   } else if (disk_fails_ && !std::exchange(operator_comes_, true)) {
     ++disk_failures_;
     disk_has_failed_ = true;
-    // Nothing is kept any more, so nothing may be decided any more.
+    // Nothing becomes durable any more, so nothing may be decided any more.
     time_.post_in(drawn(random_, 300ms, 2s), [this, life = life_] {
       if (life == life_) crash(random_.unit() < 0.5);
     });

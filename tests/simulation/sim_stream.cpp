@@ -31,7 +31,7 @@ void SimStream::write(End from, std::string message) {
   const std::optional<Time> at = path_.arrival();
   side.under_way += message.size();
   if (!at) {
-    // TCP gives up: until then nobody knows.
+    // TCP gives up; until then neither end knows.
     path_.time().post_in(SimPath::kPatience,
                          [self = shared_from_this()] { self->lose("the connection has timed out"); });
     side.last = Time::max();
@@ -100,7 +100,7 @@ void SimStream::leave(End end) {
   ends_[end].hears = {};
   Random& random = path_.random();
   const Time now = path_.time().now();
-  // A killed process' system closes its connections at once; one whose power failed says nothing.
+  // When a process is killed, its system closes its connections at once. After a power failure it sends nothing.
   const Time heard = random.unit() < 0.5 ? path_.delay() : drawn(random, 0ns, 2s);
   tell_ended(other(end), now + heard, {false, "the connection was closed"});
   if (random.unit() < 0.5) ends_[other(end)].lost_from = now + drawn(random, 0ns, 100ms);
@@ -117,7 +117,7 @@ void SimStream::lose(const std::string& why) {
   Random& random = path_.random();
   const Time now = path_.time().now();
   for (const End end : {client, server}) {
-    // What was under way may come through after the other end has given up.
+    // Data in transit may still arrive after the other end has given up.
     if (random.unit() < 0.7) ends_[end].lost_from = now + drawn(random, 0ns, 50ms);
     const Time most = random.unit() < 0.5 ? Time{50ms} : end == client ? Time{3s} : Time{12s};
     tell_ended(end, now + drawn(random, 0ns, most), {false, why});

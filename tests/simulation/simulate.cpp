@@ -17,10 +17,10 @@ namespace {
 using namespace std::chrono_literals;
 using Time = VirtualTime::Time;
 
-constexpr Time kSettling =
-    60s;  // at most, after all trouble, until everyone is on the line and all is decided and told
-constexpr double kSettled_s = 2;  // of that, once everyone is on the line
-constexpr Time kQuiet = 2s;       // then, before all must hold the same
+// At most, after all faults, until all clients are connected and all is decided and sent.
+constexpr Time kSettling = 60s;
+constexpr double kSettled_s = 2;  // of that, once all clients are connected
+constexpr Time kQuiet = 2s;       // then, before all must be equal
 
 double cpu_ms() {
   timespec now{};
@@ -49,7 +49,7 @@ class Simulation {
         datagrams_(time_, ledger_, link_random_.index(1u << 30), link_random_.unit() < 0.5 ? 0.05 : 0.0),
         server_(time_, ledger_, datagrams_, random_.index(1u << 30), bone_, server_condition()) {
     const std::size_t clients = 2 + random_.index(2);
-    for (std::size_t i = 0; i <= clients; ++i) {  // and one that comes late
+    for (std::size_t i = 0; i <= clients; ++i) {  // and one that joins late
       const bool late = i == clients;
       ways_.push_back(way());
       clients_.push_back(std::make_unique<SimClient>(time_, ledger_, server_, datagrams_, i + 1,
@@ -71,7 +71,7 @@ class Simulation {
     settled_s_ = std::chrono::duration<double>(time_.now() - quiet).count();
     back_s_ = std::chrono::duration<double>(quiet - began).count();
     ledger_.check(settled_s_ <= kSettled_s || !connected(), Invariant::settled,
-                  "what was left took " + std::to_string(settled_s_) + " s to be decided and told");
+                  "what was left took " + std::to_string(settled_s_) + " s to be decided and sent");
     for (const auto& client : clients_)
       if (client->here())
         ledger_.check(client->settled(), Invariant::decided, "a client is not settled: " + client->standing());
@@ -118,9 +118,9 @@ class Simulation {
   }
 
  private:
-  static constexpr std::uint64_t kLinks = 0x6c696e6b73;  // so that a seed's other trouble is the same without datagrams
+  static constexpr std::uint64_t kLinks = 0x6c696e6b73;  // so that a seed's other events are the same without datagrams
 
-  // What both ways of a client's have in common.
+  // What both directions of a client's path have in common.
   struct Way {
     Time delay{}, jitter{};
     double loss = 0;
@@ -135,7 +135,7 @@ class Simulation {
     return way;
   }
 
-  // Keys last for seconds here, at both ends alike.
+  // Keys last for seconds here, at both ends.
   SealRules seal() {
     SealRules rules;
     if (link_random_.unit() < 0.5) rules.rekey_after = drawn(link_random_, 700ms, 5s);
@@ -159,7 +159,7 @@ class Simulation {
 
   ServerCondition server_condition() {
     ServerCondition condition;
-    // Half of them with bounds over time as osteon-server sets; these hands cut too briefly to come near its second.
+    // Half of them have limits over time, as osteon-server sets them. These hands cut too briefly to reach its second.
     if (random_.unit() < 0.5)
       condition.limits = {.time_slack = random_.unit() < 0.5 ? 40ms : 1s, .swept_voxels_per_s = 5e8};
     condition.sector_bytes = random_.unit() < 0.5 ? 512 : 4096;
@@ -175,7 +175,7 @@ class Simulation {
     plan.tools = {find_tool("burr-round-3.2").value()};
     plan.cuts = late ? 4 : 8 + static_cast<int>(random_.index(10));
     plan.level = random_.unit() < 0.3 ? 1 : 0;
-    plan.pause_most = drawn(random_, 500ms, 4s);  // so that there is work through all the trouble
+    plan.pause_most = drawn(random_, 500ms, 4s);  // so that there is work during all events
     if (!options_.full) return plan;
     plan.tools.push_back(find_tool("drill-3.2").value());
     plan.cuts = late ? 20 : 60 + static_cast<int>(random_.index(60));
@@ -186,7 +186,7 @@ class Simulation {
   }
 
   Time some_time() { return drawn(random_, 300ms, trouble_ends_); }
-  // At so many times at most, evenly drawn.
+  // At most this number of times, uniformly drawn.
   template <class Call>
   void now_and_then(std::size_t most, Call call) {
     for (std::size_t n = random_.index(most + 1); n > 0; --n) time_.post(some_time(), call);
@@ -198,7 +198,7 @@ class Simulation {
     for (std::size_t i = 0; i < clients_.size(); ++i) {
       SimClient& client = *clients_[i];
       const bool late = i + 1 == clients_.size();
-      // A stream is late for more than its segments that are lost: it fills the queues on its way, and slows down.
+      // A stream is delayed by more than its lost segments: it fills the queues on its way, and slows down.
       const Time behind = fast_path_ && link_random_.unit() < 0.7 ? drawn(link_random_, 5ms, 150ms) : 0ms;
       client.path().set({.delay = ways_[i].delay + behind, .jitter = ways_[i].jitter, .loss = ways_[i].loss});
       time_.post(late ? some_time() : drawn(random_, 0ms, 800ms), [&client] { client.start(); });
@@ -233,7 +233,7 @@ class Simulation {
     });
   }
 
-  // What happens to datagrams alone.
+  // Events of datagrams only.
   void plan_datagrams(SimClient& client) {
     if (!fast_path_) return;
     const auto time = [this] { return drawn(link_random_, 300ms, trouble_ends_); };
@@ -249,7 +249,7 @@ class Simulation {
     }
   }
 
-  // As a saw would.
+  // Cuts like a saw.
   void part_the_bone() {
     const int at = static_cast<int>(random_.index(16)) - 8;
     const bool debris = random_.unit() < 0.2;

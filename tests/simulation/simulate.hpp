@@ -1,4 +1,4 @@
-// A room that is simulated: a server, its clients and all that happens to them, from one seed.
+// Simulates a room from one seed: a server, its clients and all their events.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -10,7 +10,7 @@
 namespace osteon::test {
 
 struct SimulationOptions {
-  bool full = false;  // a larger bone with pieces that come apart and the worst networks, instead of many small runs
+  bool full = false;  // a larger bone with pieces that separate and the worst networks, instead of many small runs
   Breakage breakage = Breakage::none;
 };
 
@@ -19,20 +19,22 @@ struct SimulationReport {
   std::vector<Fault> faults;
   std::uint64_t cuts = 0;                                                       // made
   std::uint64_t entries = 0, committed = 0, rejected = 0, undone = 0, splits = 0;  // in the journal
-  std::uint64_t decisions = 0, forbidden = 0;  // about hands, and cuts that were refused for them
-  std::uint64_t denied = 0, carried = 0;       // undo and redo that were, and hands that were held when they came again
-  std::uint64_t acknowledged = 0;              // entries that someone was told of
+  std::uint64_t decisions = 0, forbidden = 0;  // about hands, and cuts that were refused because of them
+  // undo and redo that were refused, and hands that were still restricted after a restart
+  std::uint64_t denied = 0, carried = 0;
+  std::uint64_t acknowledged = 0;              // entries that any client received
   std::uint64_t crashes = 0, disk_failures = 0, breaks = 0, resumed = 0, programs = 0;
   double virtual_s = 0;
-  double settled_s = 0;    // from when the trouble is over and everyone on the line until every cut is decided and told
-  double back_s = 0;       // from the end of all trouble until then
+  // from the end of all faults, with all clients connected, until every cut is decided and sent
+  double settled_s = 0;
+  double back_s = 0;       // from the end of all faults until then
   bool fast_path = false;  // offered
   DatagramCounts datagrams;
   std::vector<float> felt_by_datagram_ms, felt_by_stream_ms;  // from a cut until a partner's replica has it
   double cpu_ms = 0;
 };
 
-// The same for the same seed and options, on every machine.
+// Equal for equal seed and options, on every machine.
 [[nodiscard]] SimulationReport simulate(std::uint64_t seed, const SimulationOptions& options = {});
 
 }  // namespace osteon::test

@@ -231,7 +231,7 @@ std::string Console::text_of(const PersonSeen& person) const {
   }
   for (std::size_t i = 0; i < word.tools.size(); ++i) out += (i == 0 ? " tools " : ",") + tool_name(word.tools[i]);
   if (!word.words.empty()) out += " words " + quoted(word.words);
-  if (person.decided) out += person.pending() ? " pending" : " heard";
+  if (person.decided) out += person.pending() ? " pending" : " acknowledged";
   if (person.decided && person.decided_by) out += " decided by #" + std::to_string(person.decided_by.value);
   if (person.hand) out += " cuts " + std::to_string(person.cuts);
   return out;
