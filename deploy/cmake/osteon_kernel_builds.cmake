@@ -1,7 +1,8 @@
-# The cut kernel alone, built as others may build it: by gcc and clang, unoptimised and not, with and without AVX. An
-# object among a program's sources replaces the library's kernel at link time; all of them must give the same bytes.
+# Builds the cut kernel alone, as others may build it: by gcc and clang, unoptimised and optimised, with and without
+# AVX. An object among a program's sources replaces the library's kernel at link time. All of them must give the same
+# bytes.
 
-# Sets `names` to those builds that this machine can make and run, and ${name}_object to the object of each. The objects
+# Sets `names` to the builds that this machine can make and run, and ${name}_object to the object of each. The objects
 # belong to the calling folder.
 function(osteon_kernel_builds names)
   set(made)

@@ -1,4 +1,4 @@
-# Finds what deploy/packages.txt installs and gives each library one target name.
+# Finds the packages of deploy/packages.txt, and gives each library one target name.
 
 find_package(PkgConfig REQUIRED)
 find_package(Threads REQUIRED)
@@ -31,7 +31,7 @@ pkg_check_modules(rtaudio REQUIRED IMPORTED_TARGET rtaudio)
 pkg_check_modules(sndfile REQUIRED IMPORTED_TARGET sndfile)
 pkg_check_modules(kissfft REQUIRED IMPORTED_TARGET kissfft-float)
 
-# Debian's OpenVDB ships its find module beside the library instead of a package file.
+# Debian's OpenVDB has its find module beside the library instead of a package file.
 list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenVDB)
 find_package(OpenVDB 10 REQUIRED)
 
@@ -39,5 +39,5 @@ include(GoogleTest)
 find_package(GTest REQUIRED)
 find_package(benchmark REQUIRED)
 
-# Debian's own Python, which has the packages of deploy/packages.txt; another one in PATH may not.
+# Debian's own Python has the packages of deploy/packages.txt. Another python3 in PATH may not have them.
 find_program(OSTEON_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)

@@ -1,4 +1,4 @@
-# How every Osteon target is declared: one library per folder, sources listed, headers in a FILE_SET.
+# Declares every Osteon target in one way: one library per folder, sources listed, headers in a FILE_SET.
 #
 #   osteon_library(tools SOURCES drill.cpp HEADERS drill.hpp DEPS osteon::geometry)
 #   osteon_program(osteon-server SOURCES main.cpp DEPS osteon::room)
@@ -7,15 +7,15 @@
 set(CMAKE_CXX_STANDARD 20)
 set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
-# Lets tests/architecture compile every header alone; not part of the normal build.
+# Lets tests/architecture compile every header alone. Not part of the normal build.
 set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
-# All programs and tests of a build lie in one folder, so that they find each other wherever the build is.
+# All programs and tests of a build are in one folder, so that they find each other wherever the build is.
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 
 set(OSTEON_SANITIZE "" CACHE STRING "Sanitizers to build with, as given to -fsanitize=")
 
 add_library(osteon_flags INTERFACE)
-# Contraction off everywhere: the same source gives the same numbers on every compiler and processor.
+# Contraction is off everywhere: the same source gives the same numbers on every compiler and processor.
 target_compile_options(osteon_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -ffp-contract=off)
 target_include_directories(osteon_flags INTERFACE ${PROJECT_SOURCE_DIR})
 if(OSTEON_SANITIZE)
@@ -45,7 +45,7 @@ function(osteon_program name)
   target_link_libraries(${name} PRIVATE osteon_flags ${arg_DEPS})
 endfunction()
 
-# A GoogleTest program, registered with ctest case by case. LABELS name the kind of test.
+# A GoogleTest program. Each of its cases is registered with ctest. LABELS name the kind of test.
 function(osteon_test name)
   cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;DEPS;LABELS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})

@@ -1,4 +1,4 @@
-"""deploy/demo after installing and building: imports the case, runs a session, writes its report."""
+"""The part of deploy/demo after installation and build: imports the case, runs a session, writes its report."""
 import argparse
 import hashlib
 import shutil
@@ -18,7 +18,7 @@ from session import ROOT, Session, case_info, save
 
 EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
 
-# A desktop device that can hold 3.3 N, so that the rendered force is what such a one would show.
+# A desktop device that can hold 3.3 N. The rendered force is what such a device would show.
 DEVICE = "simulated-3.3N"
 
 
@@ -34,7 +34,7 @@ def example_skull():
 
 
 def fingerprint(source: Path, importer: Path):
-    """Names an import: the same files read by the same importer give the same case."""
+    """A name for an import: the same files and the same importer give the same name."""
     files = sorted(source.rglob("*")) if source.is_dir() else [source]
     digest = hashlib.sha256()
     for file in [importer, *files]:
@@ -45,7 +45,7 @@ def fingerprint(source: Path, importer: Path):
 
 
 def prepare_case(source: Path, programs: Path, title):
-    """The case to work on: a case as it is, anything else imported once and then found again."""
+    """The case to work on. A case is used as it is. Anything else is imported once and then reused."""
     if (source / "case.json").exists():
         return source
     importer = programs / "osteon-import"
@@ -56,7 +56,7 @@ def prepare_case(source: Path, programs: Path, title):
     case.parent.mkdir(parents=True, exist_ok=True)
     say(f"Importing {source}")
     started = time.monotonic()
-    # In a session of its own, so that Ctrl-C reaches it once, through this process.
+    # In its own process session, so that Ctrl-C reaches it only once, through this process.
     process = subprocess.Popen([importer, "ct", source, "--out", case, *title], stdin=subprocess.DEVNULL, text=True,
                                stderr=None if sys.stderr.isatty() else subprocess.PIPE, start_new_session=True)
     try:
@@ -73,7 +73,7 @@ def prepare_case(source: Path, programs: Path, title):
 
 
 def run_on_some_side(programs, case, directions, out):
-    """The session; a bone that does not lie along one direction is tried from the next."""
+    """Runs the session. If there is no bone along one direction, the next direction is tried."""
     for direction in directions:
         try:
             return Session(programs, case, plans.drill_and_window(direction), out, say, device=DEVICE).run()

@@ -1,9 +1,9 @@
-"""What the simulated surgeon does."""
+"""Plans of the simulated surgeon."""
 
 # Towards the left parietal bone of a skull in the patient's frame: x left, y back, z up.
 LEFT_PARIETAL = [0.75, 0.25, 0.65]
 RIGHT_PARIETAL = [-0.75, 0.25, 0.65]
-# Where the bone is not known: from above, then from each side, until one meets bone.
+# For an unknown bone: from above, then from each side, until one direction meets bone.
 ANY_SIDE = [[0, 0, 1], [1, 0, 0], [-1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1]]
 
 
@@ -19,7 +19,7 @@ def drill_and_window(toward):
 
 
 def drill(hand, toward=(0, 0, 1), **more):
-    """One hole through whatever lies along the way, by the rig or by a hand."""
+    """One hole through all bone along the way, by the rig or by a hand."""
     step = {"action": "drill", "tool": "drill-3.2", "spindle_rpm": 1000, "hand": hand,
             "entry": {"toward": list(toward)}}
     return {"steps": [{**step, **more}, {"action": "wait", "seconds": 0.5}]}

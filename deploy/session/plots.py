@@ -1,4 +1,4 @@
-"""The pictures that a session's report shows of its force and its sound."""
+"""Plots of force and sound for a session's report."""
 import os
 from pathlib import Path
 
@@ -21,13 +21,13 @@ plt.rcParams.update({
 
 
 def thinned(table, most=6000):
-    """The table with at most about `most` rows; a plot cannot show more."""
+    """The table, thinned to about `most` rows at most. A plot cannot show more."""
     step = max(1, len(table["time_s"]) // most)
     return {name: values[::step] for name, values in table.items()}
 
 
 def force_and_depth(session, file: Path):
-    """Over time: force, feed, depth. Beside it, for each tool, force over depth."""
+    """Force, feed and depth over time. Beside it, for each tool, force over depth."""
     stretches = record.stretches(session)
     rows = thinned(session)
     time = rows["time_s"]
@@ -73,7 +73,7 @@ def force_and_depth(session, file: Path):
 
 
 def spectrogram(wav: Path, file: Path):
-    """The session's sound: its level over time and which frequencies it has."""
+    """The session's sound: its level over time and its frequencies."""
     rate, samples = record.read_wav(wav)
     figure, (level, spectrum) = plt.subplots(2, 1, figsize=(12, 5), sharex=True, height_ratios=[1, 2.4],
                                              constrained_layout=True)

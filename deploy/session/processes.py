@@ -1,4 +1,4 @@
-"""The programs of a session as children: started, watched, and ended by their own ids; their last words are kept."""
+"""Runs the programs of a session as child processes: starts and watches them, ends them by id, keeps their logs."""
 import collections
 import ctypes
 import os
@@ -11,7 +11,7 @@ from pathlib import Path
 
 
 class Failure(Exception):
-    """What ends a session early, as one sentence for a person; `detail` may hold the last lines of a log."""
+    """The error that ends a session early, as one sentence. `detail` may hold the last lines of a log."""
 
     def __init__(self, sentence, detail=""):
         super().__init__(sentence)
@@ -19,17 +19,17 @@ class Failure(Exception):
 
 
 class Child:
-    """One program. Its standard error goes to a log file; its standard output comes line by line."""
+    """One program. Its standard error goes to a log file. Its standard output is read line by line."""
 
     def __init__(self, name, command, logs: Path, environment, takes_input=False):
         self.name = name
-        self.may_end = False  # set when its end is expected
+        self.may_end = False  # true when its end is expected
         self.log = logs / f"{name}.log"
         self._lines = queue.Queue()
         self._recent = collections.deque(maxlen=20)
         with open(self.log, "wb") as log:
-            # The kernel ends the child if this process is killed; a terminal's Ctrl-C reaches only this process,
-            # which then ends the children in order.
+            # If this process is killed, the kernel ends the child. A terminal's Ctrl-C reaches only this process, which
+            # then ends the children in order.
             self._process = subprocess.Popen(
                 ["setpriv", "--pdeathsig", "TERM", *map(str, command)],
                 stdin=subprocess.PIPE if takes_input else subprocess.DEVNULL,
@@ -49,18 +49,18 @@ class Child:
 
     @property
     def exit_code(self):
-        """None while it runs; minus the signal's number where one ended it."""
+        """None while it runs. Minus the signal's number if a signal ended it."""
         return self._process.poll()
 
     def new_lines(self):
-        """What it printed since the last call."""
+        """Its output since the last call."""
         lines = []
         while not self._lines.empty():
             lines.append(self._lines.get())
         return lines
 
     def next_line(self, patience_s):
-        """The next printed line; None when it ended first or said nothing for so long."""
+        """The next printed line. None if it ended first, or if nothing came in this time."""
         deadline = time.monotonic() + patience_s
         while time.monotonic() < deadline:
             try:
@@ -75,10 +75,10 @@ class Child:
             self._process.stdin.write(line + "\n")
             self._process.stdin.flush()
         except (OSError, ValueError):
-            pass  # it has ended; whoever waits for the answer says so
+            pass  # it has ended; the wait for the answer reports this
 
     def last_words(self, count=6):
-        """The end of its log, or of what it printed where the log is empty."""
+        """The end of its log, or of its output if the log is empty."""
         text = self.log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
         return "\n".join(f"  {line}" for line in (text or list(self._recent))[-count:])
 
@@ -89,7 +89,7 @@ class Child:
             return None
 
     def end(self, patience_s=10.0):
-        """SIGTERM, and SIGKILL to one that does not listen; returns the exit code."""
+        """Sends SIGTERM, and SIGKILL if that does not end it. Returns the exit code."""
         if self.exit_code is None:
             self._process.send_signal(signal.SIGTERM)
             if self.wait(patience_s) is None:
@@ -103,7 +103,7 @@ class Child:
 
 
 class Household:
-    """All children of a session. Leaving the block ends what still runs, the newest first."""
+    """All children of a session. The end of the block ends those that still run, the newest first."""
 
     def __init__(self, logs: Path):
         self.logs = logs
@@ -123,7 +123,7 @@ class Household:
         return child
 
     def check(self):
-        """Failure when a child has died that nobody asked to end."""
+        """Raises Failure if a child has ended without a request."""
         for child in self.children:
             if child.exit_code is not None and not child.may_end:
                 raise self.died(child)
@@ -144,7 +144,7 @@ class Household:
 
 
 def start_screen(household: Household, size="1280x720"):
-    """The environment to draw in: the caller's display, or a virtual one of this session. Says which."""
+    """The environment to draw in and its name: the caller's display, or a virtual one of this session."""
     environment = dict(os.environ)
     if environment.get("DISPLAY") and display_opens():
         return environment, "a window on your display"
@@ -160,7 +160,7 @@ def start_screen(household: Household, size="1280x720"):
 
 
 def display_opens():
-    """Whether the display that DISPLAY names takes us: it may be left over, or refuse."""
+    """Whether the display in DISPLAY accepts us. It may be stale, or refuse."""
     try:
         x11 = ctypes.CDLL("libX11.so.6")
     except OSError:
@@ -174,7 +174,7 @@ def display_opens():
 
 
 def has_sound_server():
-    """Whether sound can be heard here: a PulseAudio server answers, or one starts when asked."""
+    """Whether sound can be played here: a PulseAudio server answers, or starts on request."""
     try:
         return subprocess.run(["pactl", "info"], stdin=subprocess.DEVNULL, capture_output=True, timeout=5,
                               check=False).returncode == 0

@@ -1,4 +1,4 @@
-"""Reads what the programs of a session wrote, and computes the numbers that need more than one of them."""
+"""Reads the files of a session's programs. Computes the numbers that need files of several programs."""
 import csv
 import json
 import platform
@@ -11,7 +11,7 @@ from processes import Failure
 
 
 def read_table(file: Path):
-    """A CSV log as {column: array}; numbers where every entry is one, texts elsewhere."""
+    """A CSV log as {column: array}. Numbers if every entry is a number, else texts."""
     if not file.exists():
         raise Failure(f"{file.name} was not written, although the session ended")
     with open(file, newline="", encoding="utf-8") as lines:
@@ -42,7 +42,7 @@ def read_json(file: Path):
 
 
 def spread(values_ms):
-    """Median, 99th percentile and count of durations in ms; None for what cannot be said."""
+    """Median, 99th percentile and count of durations in ms. None for a value that cannot be computed."""
     values = np.asarray(values_ms, dtype=float)
     if values.size == 0:
         return {"p50": None, "p99": None, "max": None, "count": 0}
@@ -51,10 +51,10 @@ def spread(values_ms):
 
 
 def after_cut_ms(cuts, frames, moment):
-    """For each cut: from its closing in the haptic client to the first frame's `moment` that contains it."""
+    """For each cut: the time from its end in the haptic client to `moment` of the first frame that contains it."""
     order = np.argsort(frames["room_seq"], kind="stable")
     seqs, times = frames["room_seq"][order], frames[moment][order]
-    # The earliest moment at which any row holds this seq or a later one.
+    # The earliest moment of a row with this seq or a later one.
     earliest = np.minimum.accumulate(times[::-1])[::-1]
     first = np.searchsorted(seqs, cuts["room_seq"], side="left")
     seen = first < len(seqs)
@@ -62,7 +62,7 @@ def after_cut_ms(cuts, frames, moment):
 
 
 def after_state_ms(session, states, moment):
-    """For each cutting state that was sounded: from its making in the haptic client."""
+    """For each cutting state that was played: the time since it was made in the haptic client."""
     seqs, first = np.unique(session["state_seq"], return_index=True)
     made = dict(zip(seqs.tolist(), session["mono_ns"][first].tolist()))
     return np.array([(t - made[s]) / 1e6 for s, t in zip(states["state_seq"].tolist(), states[moment].tolist())
@@ -70,7 +70,7 @@ def after_state_ms(session, states, moment):
 
 
 def latencies(folder: Path):
-    """The session's latencies in ms. All logs carry CLOCK_MONOTONIC of one host, so they can be subtracted."""
+    """The session's latencies in ms. All logs have CLOCK_MONOTONIC of one host, so they can be subtracted."""
     cuts = read_table(folder / "cuts.csv")
     committed = {name: values[cuts["room_seq"] > 0] for name, values in cuts.items()}
     result = {"cut_to_commit": spread((committed["confirmed_mono_ns"] - committed["closed_mono_ns"]) / 1e6)}
@@ -85,7 +85,7 @@ def latencies(folder: Path):
 
 
 def stretches(session):
-    """Where in the session's rows each tool was cutting, from its first to its last cut: [(tool, first, last)]."""
+    """The rows of the session in which each tool was cutting, from its first to its last cut: [(tool, first, last)]."""
     result = []
     tools = session["tool"]
     changes = np.flatnonzero(np.r_[True, tools[1:] != tools[:-1]])
@@ -97,7 +97,7 @@ def stretches(session):
 
 
 def read_wav(file: Path):
-    """Samples per second and the sound as one channel of floats; PCM of 16, 24 or 32 bits or 32-bit float."""
+    """Samples per second, and the sound as one channel of floats. PCM of 16, 24 or 32 bits or 32-bit float."""
     data = file.read_bytes()
     if data[:4] != b"RIFF" or data[8:12] != b"WAVE":
         raise Failure(f"{file} is not a WAV file")
@@ -107,7 +107,7 @@ def read_wav(file: Path):
         name, size = data[at:at + 4], struct.unpack_from("<I", data, at + 4)[0]
         if name == b"fmt ":
             kind, channels, rate, _, _, bits = struct.unpack_from("<HHIIHH", data, at + 8)
-            if kind == 0xFFFE:  # extensible: the kind stands first in the sub-format
+            if kind == 0xFFFE:  # extensible: the format is at the start of the sub-format
                 kind = struct.unpack_from("<H", data, at + 8 + 24)[0]
         elif name == b"data" and channels:
             raw = data[at + 8:at + 8 + size]
@@ -127,7 +127,7 @@ def read_wav(file: Path):
 
 
 def machine():
-    """The machine in words that name no host."""
+    """A description of the machine without its host name."""
     model = platform.machine()
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():

@@ -1,4 +1,4 @@
-"""The page that shows a session: pictures, force, sound and numbers, with an explanation in plain language."""
+"""The report page of a session: pictures, force, sound and numbers, with an explanation in plain language."""
 import base64
 import html
 import json
@@ -55,7 +55,7 @@ def ms(value):
 
 
 def cutting_steps(numbers):
-    """The steps of the plan that cut bone, as the haptic client reports them."""
+    """The plan's steps that cut bone, as the haptic client reports them."""
     return [step for step in numbers["programs"]["haptic"]["steps"] if "while_cutting" in step]
 
 
@@ -110,7 +110,7 @@ def program_tables(numbers):
 
 
 def write(folder: Path, numbers, title):
-    """Writes report.html into the session's folder; pictures are inside the page, the sound lies beside it."""
+    """Writes report.html into the session's folder. Pictures are inside the page, the sound is a file beside it."""
     latency, agreement = numbers["latency_ms"], numbers["agreement"]
     removed = numbers["programs"]["server"].get("removed_mm3")
     same = "identical" if agreement["field_hash_equal"] and not agreement["mesh_differences"] else "NOT identical"

@@ -1,4 +1,4 @@
-"""One session of all programs on this machine: starts them, lets the simulated surgeon work, ends them in order."""
+"""Runs one session of all programs on this machine: starts them, runs the simulated surgeon, ends them in order."""
 import json
 import subprocess
 import time
@@ -15,7 +15,7 @@ QUIET_PATIENCE_S = 60.0
 
 
 class Viewer:
-    """osteon-viewer, driven line by line over its standard input."""
+    """osteon-viewer, controlled line by line over its standard input."""
 
     def __init__(self, household, child):
         self._household, self._child = household, child
@@ -45,7 +45,7 @@ class Viewer:
 
 
 class Session:
-    """What one session needs; `say` gets its live status. Results lie in `out`."""
+    """One session. `say` gets its live status. Results are in `out`."""
 
     def __init__(self, programs: Path, case: Path, plan, out: Path, say=print, pictures=True, late_viewer=False,
                  device="simulated", size="1280x720"):
@@ -55,7 +55,7 @@ class Session:
         self.info = case_info(programs, case)
 
     def run(self):
-        """Runs it and returns its numbers; raises Failure."""
+        """Runs the session and returns its numbers. Raises Failure."""
         self.out.mkdir(parents=True, exist_ok=True)
         plan_file = self.out / "plan.json"
         plan_file.write_text(json.dumps(self.plan, indent=2) + "\n", encoding="utf-8")
@@ -93,7 +93,7 @@ class Session:
         return address
 
     def _new_journal(self):
-        """Of this session: one of the session before would be gone on with."""
+        """A new journal. The server would continue an old one from the session before."""
         for file in self.out.glob("session.journal*"):
             file.unlink()
         return self.out / "session.journal"
@@ -104,13 +104,13 @@ class Session:
         return Viewer(self.household, child)
 
     def _overview(self):
-        """The camera command for the whole bone, from the side where the work will be."""
+        """The camera command for the whole bone, from the side of the work."""
         box = self.info["bounds_mm"]
         low, high = np.array(box["min"]), np.array(box["max"])
         entry = next((step["entry"] for step in self.plan["steps"] if "toward" in step.get("entry", {})), None)
         if entry is None:
             return "look overview"
-        # A little from the front, so that one sees what one looks at.
+        # Slightly from the front, so that the bone is easy to recognise.
         eye_side = unit(unit(np.array(entry["toward"], dtype=float)) + np.array([0.0, -0.75, -0.15]))
         up = np.array([0.0, 0.0, 1.0]) if abs(eye_side[2]) < 0.95 else np.array([0.0, -1.0, 0.0])
         centre = 0.5 * (low + high)
@@ -127,10 +127,10 @@ class Session:
         self.household.start("osteon-audio", command)
 
     def _work(self, viewer, address, plan_file):
-        """The surgeon's work: a status line every second, the camera follows the tool."""
+        """The surgeon's work. Prints a status line every second; the camera follows the tool."""
         cache = ROOT / "build" / "case-cache"
         cache.mkdir(parents=True, exist_ok=True)
-        # osteon-haptic writes over no recording; this one is of the session before, unless it is what is played now.
+        # osteon-haptic overwrites no recording. This one is of the session before, unless it is to be played now.
         if str(self.out / "session.h5") not in self.device:
             (self.out / "session.h5").unlink(missing_ok=True)
         haptic = self.household.start("osteon-haptic", [
@@ -175,7 +175,7 @@ class Session:
         viewer.do(f"screenshot {self.out / 'after.png'}")
 
     def _end_all(self):
-        """Ends the programs, clients first; every one must have ended cleanly."""
+        """Ends the programs, clients first. Each must end with exit code 0."""
         codes = {}
         order = ("osteon-haptic", "late viewer", "osteon-viewer", "osteon-audio", "osteon-server")
         children = {child.name: child for child in self.household.children}
@@ -223,7 +223,7 @@ def look(target, eye, up):
 
 
 def close_up(step):
-    """The camera command for a look at a step's site from outside, a little from the side, so that walls can be seen."""
+    """The camera command for a step's site from outside, slightly from the side, so that its walls are visible."""
     axis, target = unit(np.array(step["axis"])), np.array(step["entry_mm"])
     aside = np.cross(axis, [0.0, 0.0, 1.0])
     aside = unit(aside) if np.linalg.norm(aside) > 0.1 else np.array([1.0, 0.0, 0.0])
@@ -231,7 +231,7 @@ def close_up(step):
 
 
 def check_journal(programs, journal, case):
-    """What osteon-server says of a journal that no server has open, and of the bone that its events make again."""
+    """The result of osteon-server verify for a journal that no server has open, and of the replayed bone."""
     result = subprocess.run([programs / "osteon-server", "verify", journal, "--case", case,
                              "--key", journal.parent / "signing.key"], capture_output=True, text=True, check=False)
     said = dict(line.split(":", 1) for line in result.stdout.splitlines() if ":" in line)
@@ -242,7 +242,7 @@ def check_journal(programs, journal, case):
 
 
 def case_info(programs, case):
-    """What the case says of itself; Failure with the importer's sentence for one that cannot be read."""
+    """The case's description. Failure with the importer's sentence if the case cannot be read."""
     result = subprocess.run([programs / "osteon-import", "info", case, "--json"], capture_output=True, text=True,
                             check=False)
     if result.returncode != 0:
@@ -251,13 +251,13 @@ def case_info(programs, case):
 
 
 def agreement(numbers):
-    """Whether everyone held the same bone at the end, from what each program says of itself."""
+    """Whether all programs had the same bone at the end, from their summaries."""
     programs, meshes = numbers["programs"], numbers["mesh_hashes"]
     server, haptic = programs["server"].get("field_hash"), programs["haptic"].get("field_hash")
     return {
         "field_hash_server": server,
         "field_hash_haptic": haptic,
         "field_hash_equal": bool(server) and server == haptic,
-        # Viewers, those that saw every change and those that came late, whose surface is not the server's.
+        # Viewers whose surface differs from the server's; they saw every change, or joined late.
         "mesh_differences": sum(mesh != meshes[0] for mesh in meshes),
     }

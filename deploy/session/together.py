@@ -1,4 +1,4 @@
-"""deploy/demo --together: two simulated surgeons and an instructor on one bone, over mutual TLS, and who did what when."""
+"""deploy/demo --together: two simulated surgeons and an instructor on one bone, over mutual TLS, and a log of it."""
 import html
 import json
 import re
@@ -20,22 +20,22 @@ ROOM = "theatre"
 TRAINEES = {"anna": "trainee", "ben": "trainee"}
 INSTRUCTOR = "berg"
 OBSERVER = "class"
-# Most that force on the device may grow in a millisecond without the hand having moved, and the stiffest coupling.
+# Largest growth of the device's force in a millisecond without motion of the hand, and the stiffest coupling.
 SLEW_N_PER_MS = 0.5
 COUPLING_N_PER_MM = 50.0
-ROUNDING_N = 2e-3  # of forces that are recorded as single floats
+ROUNDING_N = 2e-3  # of forces recorded as single floats
 PATIENCE_S = 60.0
-# After the work, so that each still hears what the other does at last.
+# Stay after the work, so that each hand receives the last changes of the other.
 STAYS_S = 12.0
 
 
 class Hand(typing.NamedTuple):
-    number: str  # by which the console knows it
-    cuts: int    # of it that were taken
+    number: str  # its name in the console
+    cuts: int    # its accepted cuts
 
 
 class Console:
-    """osteon-viewer --console: one line each way."""
+    """osteon-viewer --console: one line for each command, one for its answer."""
 
     def __init__(self, household, child, say):
         self._household, self._child, self._say = household, child, say
@@ -54,11 +54,11 @@ class Console:
         return answer
 
     def hands(self):
-        """The hands that the room knows, by the names of their persons."""
+        """The hands in the room, by the names of their persons."""
         self._child.say("people")
         answer = self._child.next_line(10.0) or ""
         found = {}
-        # What an instructor says to somebody stands between quotes of its own, whatever it is.
+        # Words of an instructor are in quotes of their own, whatever they contain.
         for number, name, more in re.findall(r'(#\d+) "((?:[^"\\]|\\.)*)"(.*?)(?=; #\d+ "|$)', answer):
             count = re.search(r" cuts (\d+)$", more)
             if count:
@@ -67,7 +67,7 @@ class Console:
 
 
 class Certificates:
-    """A local authority, a server's certificate, and everybody's own with a ticket for the room."""
+    """A local authority, the server's certificate, and for each person a certificate and a ticket for the room."""
 
     def __init__(self, programs, folder):
         self._programs, self._folder = programs, folder / "certs"
@@ -164,7 +164,7 @@ class Together:
             "--cache", cache])
 
     def _from_side(self, turn):
-        """The whole bone, from above the work of both."""
+        """The camera command for the whole bone, from above the work of both."""
         box = self.info["bounds_mm"]
         low, high = np.array(box["min"]), np.array(box["max"])
         side = unit(unit(np.array(self.sides[0], dtype=float)) + unit(np.array(self.sides[1], dtype=float)) + np.array([turn, -0.5, 0.2]))
@@ -219,7 +219,7 @@ class Together:
         for name in TRAINEES:
             self._wait(f"that {name} is done", lambda hand=hands[name]: hand.exit_code is not None, 240.0)
         for name, hand in hands.items():
-            if hand.exit_code not in (0, 1):  # 1: a step that was stopped did not come to its end
+            if hand.exit_code not in (0, 1):  # 1: a stopped step was not completed
                 raise self.household.died(hand)
         time.sleep(0.5)
 
@@ -260,25 +260,25 @@ class Together:
         return numbers
 
     def _events(self):
-        """Everything in the journal but cuts, which are counted, as (seconds, who, what)."""
+        """All events of the journal as (seconds, who, what). Cuts are only counted."""
         server, exported = self.programs / "osteon-server", self.out / f"{ROOM}.jsonl"
         subprocess.run([server, "export", self.journal, exported], capture_output=True, check=True)
         people = subprocess.run([server, "people", self.journal], capture_output=True, text=True, check=True).stdout
         with open(exported, encoding="utf-8") as lines:
-            return told(map(json.loads, lines), names_by_pseudonym(people))
+            return described(map(json.loads, lines), names_by_pseudonym(people))
 
 
 def names_by_pseudonym(listing):
-    """Of lines such as `1  2026-11-22  anna`."""
+    """Names by number, from lines such as `1  2026-11-22  anna`."""
     parts = (line.split(None, 2) for line in listing.splitlines())
     return {int(part[0]): part[2].strip() for part in parts if len(part) == 3 and part[0].isdigit()}
 
 
-def told(rows, names):
-    """The journal's rows in words."""
+def described(entries, names):
+    """The journal's log entries in words."""
     who, events, cuts = {0: "the room"}, [], {}
-    for row in rows:
-        event, at = row["event"], round(float(row["at_s"]), 2)
+    for entry in entries:
+        event, at = entry["event"], round(float(entry["at_s"]), 2)
         author = int(event.get("author", 0))
         if "join" in event:
             person = int(event["join"].get("person", 0))
@@ -308,23 +308,25 @@ def decided(what, who):
     if int(what.get("taken_by", 0)):
         words.append("tool taken")
     if int(what.get("guide", 0)):
-        words.append(f"led along {who.get(int(what['guide']), '?')}, share {what.get('guide_share', 0) / 1000:g}")
+        words.append(f"guided along {who.get(int(what['guide']), '?')}, share {what.get('guide_share', 0) / 1000:g}")
     if what.get("words"):
         words.append(f"“{what['words']}”")
     return ", ".join(words) or "free"
 
 
 def force_steps(force_n, handle_mm, mono_ns, stiffness_n_per_mm):
-    """How the force on a hand, of three components, grows from row to row, and what of it neither the hand's own movement nor the
-    slew limit explains: the spring and its damping each follow a handle that moves, all else grows by at most the limit.
+    """The growth of the force on a hand (three components) from row to row, and the part of it that is not explained.
+
+    The hand's own motion and the slew limit explain growth: the spring and its damping each follow a moving handle, and
+    all other force grows by at most the limit.
     """
     now, wanted = force_n[:-1], force_n[1:]
-    # Lessening what there is comes at once: growth is the way from the nearest part of it.
+    # Force may fall at once. So growth is the distance from the nearest fraction of the present force.
     square = np.sum(now * now, axis=1)
     part = np.clip(np.sum(wanted * now, axis=1) / np.where(square > 0, square, 1.0), 0.0, 1.0)
     growth = np.linalg.norm(wanted - part[:, None] * now, axis=1)
     by_hand = 2.0 * stiffness_n_per_mm * np.linalg.norm(np.diff(handle_mm, axis=0), axis=1)
-    # A tick that came late, or the one after it, stands for the periods that passed.
+    # A late tick, or the one after it, counts for all periods that have passed.
     apart_ms = np.diff(mono_ns) / 1e6
     late = np.abs(apart_ms - 1.0) > 0.3
     late[1:] |= late[:-1].copy()
@@ -336,7 +338,7 @@ def force_steps(force_n, handle_mm, mono_ns, stiffness_n_per_mm):
 
 
 def recorded_steps(file: Path):
-    """The same of what a hand recorded; the vibration, drag and kick of the motor are the tool's and not judged."""
+    """The same for a hand's recording. The motor's vibration, drag and kick belong to the tool and are left out."""
     if not file.exists():
         raise Failure(f"{file.name} was not written, although the session ended")
     with h5py.File(file, "r") as rows:
@@ -352,7 +354,7 @@ def recorded_steps(file: Path):
 
 
 def led_mm(events, names, handle_mm):
-    """How far a handle went at most from where it was when another's hand began to lead it, and was led."""
+    """The largest distance that a handle moved under guidance, from its position at the start of the guidance."""
     led = (events >> names.index("hand guided")) & 1
     edges = np.flatnonzero(np.diff(np.concatenate(([0], led, [0]))))
     return round(max((float(np.linalg.norm(handle_mm[begin:end] - handle_mm[begin], axis=1).max())
@@ -382,15 +384,15 @@ def plot(out: Path, numbers, file: Path):
 
 def write_report(out: Path, numbers, title):
     plot(out, numbers, out / "forces.png")
-    journal, told_of = numbers["journal"], numbers["events"]
-    rows = "".join(f"<tr><td class=n>{at:.2f}</td><td>{html.escape(who)}</td><td>{html.escape(what)}</td></tr>" for at, who, what in told_of["events"])
-    hands = "".join(f"<tr><td>{html.escape(name)}</td><td class=n>{told_of['cuts'].get(name, 0)}</td>"
+    journal, log = numbers["journal"], numbers["events"]
+    rows = "".join(f"<tr><td class=n>{at:.2f}</td><td>{html.escape(who)}</td><td>{html.escape(what)}</td></tr>" for at, who, what in log["events"])
+    hands = "".join(f"<tr><td>{html.escape(name)}</td><td class=n>{log['cuts'].get(name, 0)}</td>"
                     f"<td class=n>{force['most_n']:.2f}</td><td class=n>{force['most_growth_n_per_ms']:.3f}</td>"
                     f"<td class=n>{force['steps_beyond_slew']}</td><td class=n>{force['led_mm']:.1f}</td></tr>"
                     for name, force in numbers["forces"].items())
     facts = [
         report.fact("one bone" if numbers["one_bone"] else "DIFFERENT bones", "in server, hands, viewer, console and journal at the end (hashes)"),
-        report.fact(numbers["cuts_while_frozen"], "cuts of the stopped hand that were taken"),
+        report.fact(numbers["cuts_while_frozen"], "accepted cuts of the stopped hand"),
         report.fact(sum(force["steps_beyond_slew"] for force in numbers["forces"].values()),
                     f"steps of force on the three hands beyond {SLEW_N_PER_MS:g} N in a millisecond that no movement of the hand explains"),
         report.fact(journal["events"], "events in the room's journal"),
@@ -399,8 +401,8 @@ def write_report(out: Path, numbers, title):
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
 <title>{html.escape(title)} – together</title><style>{report.STYLE}</style></head><body><main>
 <h1>{html.escape(title)}: two surgeons and their instructor</h1>
-<p class=lead>Anna and Ben, trainees, work on one bone. Dr. Berg watches, stops Anna, takes her tool, shows her with his own
-hand while hers is led along, takes back the last five seconds, and gives everything back. Every program is a process of its
+<p class=lead>Anna and Ben, trainees, work on one bone. Dr. Berg watches, stops Anna, takes her tool, and guides
+her hand along his own. He undoes the last five seconds and gives everything back. Every program is a process of its
 own; they prove who they are by certificates and tickets.</p>
 <span class=badge>simulated devices: no person and no haptic hardware took part</span>
 <div class=facts>{''.join(facts)}</div>
@@ -414,7 +416,7 @@ own; they prove who they are by certificates and tickets.</p>
 <p>Force that no hand causes grows by at most {SLEW_N_PER_MS:g} N in a millisecond; a hand that moves into bone may raise it faster.</p>
 {report.picture(out, 'forces.png', 'Force on each hand over time', wide=True)}
 <table><tr><th>hand</th><th class=n>cuts</th><th class=n>largest force, N</th><th class=n>largest growth in 1 ms, N</th>
-<th class=n>steps beyond the limit</th><th class=n>way of the handle while led by another's hand, mm</th></tr>{hands}</table>
+<th class=n>steps beyond the limit</th><th class=n>motion of the handle under guidance, mm</th></tr>{hands}</table>
 <p class=lead>All numbers are in <a href="session.json">session.json</a>.</p>
 </main></body></html>
 """
@@ -427,11 +429,11 @@ def run(programs, case, sides, out, say, device, title):
     write_report(out, numbers, title)
     for at, who, what in numbers["events"]["events"]:
         say(f"{at:8.2f} s  {who}: {what}")
-    say(f"Cuts taken from the stopped hand: {numbers['cuts_while_frozen']} (simulated hands)")
-    say("Server, hands, viewer, console and journal hold " + ("the same bone" if numbers["one_bone"] else "DIFFERENT bones") + " at the end.")
+    say(f"Accepted cuts of the stopped hand: {numbers['cuts_while_frozen']} (simulated hands)")
+    say("Server, hands, viewer, console and journal have " + ("the same bone" if numbers["one_bone"] else "DIFFERENT bones") + " at the end.")
     for name, force in numbers["forces"].items():
         say(f"{name} felt at most {force['most_n']:.1f} N; {force['steps_beyond_slew']} of {force['rows']} steps in a millisecond were "
             f"larger than the hand's movement and the slew limit allow, by {force['most_beyond_slew_n']:.3f} N at most"
-            + (f"; while another's hand led it, it went {force['led_mm']:.1f} mm" if force["led_mm"] > 0.0 else ""))
+            + (f"; under guidance it moved {force['led_mm']:.1f} mm" if force["led_mm"] > 0.0 else ""))
     say(f"Report: {out / 'report.html'}")
     return 0 if numbers["one_bone"] and numbers["cuts_while_frozen"] == 0 and is_gentle(numbers["forces"]) else 1
