@@ -178,14 +178,14 @@ void Viewer::show_people(Clock::time_point now) {
 }
 
 void Viewer::draw_by_hand(const WindowEvents& events) {
-  const auto told = [this](const Result<void>& outcome) {
+  const auto report = [this](const Result<void>& outcome) {
     if (!outcome) people_.tell(outcome.error().message, Clock::now());
     next_meeting_ = {};  // show the change at once
   };
   const auto only_outcome = [](const auto& result) { return result ? Result<void>{} : tl::unexpected(result.error()); };
-  if (events.pointed) told(only_outcome(draw_for_all(AnnotationKind::pointer, {*events.pointed}, {})));
-  if (!events.drawn.empty()) told(only_outcome(draw_for_all(AnnotationKind::line, events.drawn, {})));
-  if (events.wants_wipe) told(*obey_people(WipeOff{}));
+  if (events.pointed) report(only_outcome(draw_for_all(AnnotationKind::pointer, {*events.pointed}, {})));
+  if (!events.drawn.empty()) report(only_outcome(draw_for_all(AnnotationKind::line, events.drawn, {})));
+  if (events.wants_wipe) report(*obey_people(WipeOff{}));
 }
 
 std::string Viewer::notice() const {

@@ -229,13 +229,13 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
   impl->joined = std::move(*joined);
   std::unique_ptr<PeopleClient> client(new PeopleClient(std::move(impl)));
   client->impl_->reader = std::thread([inside = client->impl_.get()] { inside->read(); });
-  const auto heard = [&] {
+  const auto received = [&] {
     const std::lock_guard lock(client->impl_->mutex);
     return client->impl_->complete || client->impl_->failure;
   };
-  const bool told = client->wait(heard, options.patience);
+  const bool in_time = client->wait(received, options.patience);
   if (const auto failed = client->failure_seen()) return tl::unexpected(*failed);
-  if (!told)
+  if (!in_time)
     return failure(ErrorCode::unavailable, "the server at " + options.address + " does not say who is in the room");
   return client;
 }

@@ -90,7 +90,7 @@ TEST(Impair, ForwardsDatagramsAndTheirAnswers) {
   EXPECT_EQ(relay.command("counts"), "ok udp 6 0 0 0 tcp 0 0");
 }
 
-TEST(Impair, LosesRepeatsAndReordersAsItIsTold) {
+TEST(Impair, LosesRepeatsAndReordersAsConfigured) {
   const auto server = port(), client = port();
   ImpairProcess relay({"--udp", to_string(server->local()), "--loss", "0.3", "--duplicate", "0.05", "--reorder", "0.1",
                        "--delay-ms", "5", "--jitter-ms", "2", "--seed", "7"});
