@@ -1,6 +1,6 @@
 // osteon-usb-host: plays the USB devices of a machine for a program under libumockdev-preload. It prints the folder of
-// its testbed. Then it takes commands on standard input and answers each with one line. It ends with its input. Commands
-// (DEVICE: falcon, spacemouse, switch, joystick; ids in hex):
+// its testbed. Then it takes commands on standard input and answers each with one line. It ends with its input.
+// Commands (DEVICE: falcon, spacemouse, switch, joystick; ids in hex):
 //
 //   plug falcon [loaded]
 //   plug DEVICE [VENDOR PRODUCT]
