@@ -150,7 +150,8 @@ def summarise(numbers, out, seconds):
         " at the end.")
     journal = numbers["journal"]
     say(f"The room's journal, {journal['events']} events in {journal['bytes'] / 1e6:.1f} MB, makes " +
-        ("the same bone" if journal["field_hash"] == numbers["agreement"]["field_hash_server"] else "ANOTHER bone") + " again.")
+        ("the same bone" if journal["field_hash"] == numbers["agreement"]["field_hash_server"] else "ANOTHER bone")
+        + " again.")
     say(f"Session of {seconds:.0f} s. Report: {out / 'report.html'}")
 
 

@@ -26,9 +26,11 @@ figcaption { padding: 8px 14px; color: var(--soft); font-size: 14px; }
 figure.wide { margin-top: 12px; padding: 10px 10px 0; }
 audio { width: 100%; margin: 12px 0 0; }
 table { border-collapse: collapse; width: 100%; background: white; border: 1px solid var(--line); margin-top: 10px; }
-th, td { text-align: left; padding: 6px 12px; border-bottom: 1px solid var(--line); font-size: 14px; vertical-align: top; }
+th, td { text-align: left; padding: 6px 12px; border-bottom: 1px solid var(--line); font-size: 14px;
+  vertical-align: top; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
-.scroll { overflow-x: auto; } details { margin-top: 14px; } pre { overflow: auto; font-size: 12.5px; background: white; border: 1px solid var(--line);
+.scroll { overflow-x: auto; } details { margin-top: 14px; }
+pre { overflow: auto; font-size: 12.5px; background: white; border: 1px solid var(--line);
   padding: 12px; border-radius: 8px; }
 """
 
@@ -67,16 +69,20 @@ def step_rows(numbers):
         plunge = f"{step['plunge_mm']:.1f}" if step.get("broke_through") else "–"
         cells = (f"{step['thickness_mm']:.1f}", f"{step['deepest_mm']:.1f}", f"{mean['seconds']:.1f}",
                  f"{mean['feed_mm_per_s']:.1f}", f"{mean['density_g_cm3']:.2f}", f"{mean['force_n']:.1f}",
-                 f"{step['peak_force_n']:.1f}", f"{scale * step['peak_force_n']:.2f}", plunge, f"{step['removed_mm3']:.0f}")
-        rows.append(f"<tr><td>{text(step['tool'])}</td>" + "".join(f"<td class=n>{cell}</td>" for cell in cells) + "</tr>")
+                 f"{step['peak_force_n']:.1f}", f"{scale * step['peak_force_n']:.2f}", plunge,
+                 f"{step['removed_mm3']:.0f}")
+        rows.append(f"<tr><td>{text(step['tool'])}</td>" +
+                    "".join(f"<td class=n>{cell}</td>" for cell in cells) + "</tr>")
     return "".join(rows)
 
 
 LATENCIES = {
-    "cut_to_commit": ("cut to confirmation", "from the end of a cut in the haptic client until the server has ordered and applied it, and said so"),
+    "cut_to_commit": ("cut to confirmation",
+                      "from the end of a cut in the haptic client until the server acknowledges the applied cut"),
     "cut_to_mesh": ("cut to mesh", "from the end of a cut until the viewer has received the new surface"),
     "cut_to_picture": ("cut to picture", "from the end of a cut until the viewer has drawn it"),
-    "cut_to_sound": ("cut to sound", "from a cutting state of the haptic loop until the audio client has put it into its sound"),
+    "cut_to_sound": ("cut to sound",
+                     "from a cutting state of the haptic loop until the audio client has put it into its sound"),
 }
 
 
@@ -104,7 +110,8 @@ def flattened(tree, prefix=""):
 def program_tables(numbers):
     parts = []
     for name, summary in numbers["programs"].items():
-        rows = "".join(f"<tr><td>{text(key)}</td><td class=n>{text(value)}</td></tr>" for key, value in flattened(summary))
+        rows = "".join(f"<tr><td>{text(key)}</td><td class=n>{text(value)}</td></tr>"
+                       for key, value in flattened(summary))
         parts.append(f"<details><summary>osteon-{name}</summary><table>{rows}</table></details>")
     return "".join(parts)
 
@@ -115,10 +122,12 @@ def write(folder: Path, numbers, title):
     removed = numbers["programs"]["server"].get("removed_mm3")
     same = "identical" if agreement["field_hash_equal"] and not agreement["mesh_differences"] else "NOT identical"
     journal = numbers["journal"]
-    kept = "the same bone" if journal["sound"] and journal["field_hash"] == agreement["field_hash_server"] else "NOT the same bone"
+    replayed = journal["sound"] and journal["field_hash"] == agreement["field_hash_server"]
+    kept = "the same bone" if replayed else "NOT the same bone"
     facts = [
         fact(f"{removed:.0f} mm³" if isinstance(removed, (int, float)) else "–", "bone removed"),
-        fact(f"{max((step['peak_force_n'] for step in cutting_steps(numbers)), default=0):.1f} N", "largest force of the bone on a tool"),
+        fact(f"{max((step['peak_force_n'] for step in cutting_steps(numbers)), default=0):.1f} N",
+             "largest force of the bone on a tool"),
         fact(ms(latency.get("cut_to_picture", {}).get("p50")), "from a cut to its picture (median)"),
         fact(ms(latency.get("cut_to_sound", {}).get("p50")), "from the cutting to its sound (median)"),
         fact(same, "bone in server, haptic client and viewer at the end (hashes)"),
@@ -143,41 +152,46 @@ receives only the blocks of surface that changed. Cut faces have a colour of the
 <div class=pair>{picture(folder, 'before.png', 'Before')}{picture(folder, 'after.png', 'After')}</div>
 
 <h2>The cuts from near</h2>
-<div class=pair>{picture(folder, 'hole.png', 'The drilled hole')}{picture(folder, 'window.png', 'The window made with a round burr')}</div>
+<div class=pair>{picture(folder, 'hole.png', 'The drilled hole')}
+{picture(folder, 'window.png', 'The window made with a round burr')}</div>
 {picture(folder, 'during.png', 'At work: the tool where the bone lets it be, as the viewer showed it', wide=True)}
 
 <h2>Force, feed and depth</h2>
-<p>Pushing harder drills faster, and dense bone takes more force than spongy bone. The hand pushes with about the same
-force all the while, so the <b>feed</b> tells where the drill is: slow in the dense outer table of the skull, faster in
-the spongy layer below it, slow again in the inner table. When that gives way nothing holds the tool back, and it plunges
-until the hand has reacted. <b>Physical</b> force is what the bone does to the tool; <b>rendered</b> force is what a device
-puts on the hand: the same, scaled by {numbers['programs']['haptic']['force_scale']:g} to what the device can do. Shaded:
-between a tool's first and last cut.</p>
+<p>Pushing harder drills faster, and dense bone needs more force than spongy bone. The hand pushes with nearly constant
+force. So the <b>feed</b> shows where the drill is: slow in the dense outer table of the skull, faster in the spongy
+layer below it, slow again in the inner table. When the inner table breaks, nothing holds the tool back. It plunges
+until the hand has reacted. <b>Physical</b> force is the force of the bone on the tool. <b>Rendered</b> force is the
+force of a device on the hand: physical force, scaled by {numbers['programs']['haptic']['force_scale']:g} to the range
+of the device. Shaded: between a tool's first and last cut.</p>
 {picture(folder, 'force_depth.png', 'Force, feed and depth over time; force over depth for each tool', wide=True)}
-<div class=scroll><table><tr><th>tool</th><th class=n>bone here, mm</th><th class=n>deepest, mm</th><th class=n>cutting, s</th>
+<div class=scroll><table><tr><th>tool</th><th class=n>bone here, mm</th>
+<th class=n>deepest, mm</th><th class=n>cutting, s</th>
 <th class=n>feed, mm/s</th><th class=n>density, g/cm³</th><th class=n>mean force, N</th><th class=n>peak, N</th>
-<th class=n>peak rendered, N</th><th class=n>plunge, mm</th><th class=n>removed, mm³</th></tr>{step_rows(numbers)}</table></div>
+<th class=n>peak rendered, N</th><th class=n>plunge, mm</th><th class=n>removed, mm³</th></tr>
+{step_rows(numbers)}</table></div>
 
 <h2>Sound</h2>
-<p>The sound is made from the same cutting states: its pitch follows the spindle and drops under load, its level and
-colour follow how much bone of what density is being cut.</p>
+<p>The sound is made from the same cutting states. Its pitch follows the spindle and drops under load. Its level and
+colour follow the amount and the density of the bone being cut.</p>
 <audio controls preload="none" src="sound.wav"></audio>
 {picture(folder, 'spectrogram.png', 'Level and spectrogram of the sound', wide=True)}
 
-<h2>How quickly everyone learns of a cut</h2>
-<table><tr><th>latency</th><th class=n>median</th><th class=n>99 %</th><th class=n>events</th></tr>{latency_rows(numbers)}</table>
+<h2>Latency of a cut</h2>
+<table><tr><th>latency</th><th class=n>median</th><th class=n>99 %</th><th class=n>events</th></tr>
+{latency_rows(numbers)}</table>
 <p class=lead>Measured on {text(machine['processor'])}, {machine['cores']} cores, with all programs on it.
 Picture: {text(numbers['picture'])}{drawn_by}.</p>
 
 <h2>Everything else</h2>
 <p>Field hash of the server: <code>{text((agreement['field_hash_server'] or '–')[:16])}…</code>, of the haptic client:
 <code>{text((agreement['field_hash_haptic'] or '–')[:16])}…</code>. The complete numbers are in
-<a href="session.json">session.json</a>; the 1 kHz record is
-<a href="session.h5">session.h5</a> (HDF5, which <code>--device recorded:session.h5</code> plays again), and as a shorter
-table <a href="session.csv">session.csv</a>. The room itself is kept in <code>session.journal</code>: <code>osteon-server
---case CASE --journal session.journal</code> goes on with it.</p>
+<a href="session.json">session.json</a>. The 1 kHz record is <a href="session.h5">session.h5</a>
+(HDF5, which <code>--device recorded:session.h5</code> plays again). A shorter table is
+<a href="session.csv">session.csv</a>. The room itself is in <code>session.journal</code>:
+<code>osteon-server --case CASE --journal session.journal</code> continues it.</p>
 {program_tables(numbers)}
-<details><summary>What the surgeon was told to do</summary><pre>{text(json.dumps(numbers['plan'], indent=2))}</pre></details>
+<details><summary>The surgeon's plan</summary>
+<pre>{text(json.dumps(numbers['plan'], indent=2))}</pre></details>
 </main></body></html>
 """
     (folder / "report.html").write_text(page, encoding="utf-8")

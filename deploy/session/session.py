@@ -29,8 +29,8 @@ class Viewer:
             if answer is None:
                 self._household.check()
                 if time.monotonic() > deadline:
-                    raise Failure(f"osteon-viewer did not answer '{command}' within {patience_s:.0f} s; its last lines:",
-                                  self._child.last_words())
+                    raise Failure(f"osteon-viewer did not answer '{command}' within {patience_s:.0f} s; "
+                                  "its last lines:", self._child.last_words())
         if not answer.startswith("ok"):
             raise Failure(f"osteon-viewer could not '{command}': {answer}")
         return answer
@@ -99,8 +99,9 @@ class Session:
         return self.out / "session.journal"
 
     def _start_viewer(self, address, name, *options):
-        child = self.household.start(name, [self.programs / "osteon-viewer", "--server", address, "--plain", "--size", self.size,
-                                            "--script", "-", *options], self.screen, takes_input=True)
+        child = self.household.start(name, [
+            self.programs / "osteon-viewer", "--server", address, "--plain", "--size", self.size, "--script", "-",
+            *options], self.screen, takes_input=True)
         return Viewer(self.household, child)
 
     def _overview(self):
@@ -134,8 +135,9 @@ class Session:
         if str(self.out / "session.h5") not in self.device:
             (self.out / "session.h5").unlink(missing_ok=True)
         haptic = self.household.start("osteon-haptic", [
-            self.programs / "osteon-haptic", "--server", address, "--plain", "--plan", plan_file, "--device", self.device,
-            "--session-log", self.out / "session.csv", "--record", self.out / "session.h5", "--cut-log", self.out / "cuts.csv",
+            self.programs / "osteon-haptic", "--server", address, "--plain", "--plan", plan_file,
+            "--device", self.device, "--session-log", self.out / "session.csv",
+            "--record", self.out / "session.h5", "--cut-log", self.out / "cuts.csv",
             "--summary", self.out / "haptic.json", "--cache", cache, "--status"])
         haptic.may_end = True
         began = time.monotonic()
@@ -190,7 +192,8 @@ class Session:
         return codes
 
     def _numbers(self, codes):
-        summaries = {name: record.read_json(self.out / f"{name}.json") for name in ("server", "haptic", "viewer", "audio")}
+        summaries = {name: record.read_json(self.out / f"{name}.json")
+                     for name in ("server", "haptic", "viewer", "audio")}
         statuses = [record.read_json(file) for file in sorted(self.out.glob("*viewer_status.json"))]
         numbers = {
             "device": self.device,
@@ -200,7 +203,8 @@ class Session:
             "seconds_of_work": round(self.worked_s, 1),
             "latency_ms": record.latencies(self.out),
             "exit_codes": codes,
-            "mesh_hashes": [summaries["server"].get("mesh_hash"), *(status.get("scene_mesh_hash") for status in statuses)],
+            "mesh_hashes": [summaries["server"].get("mesh_hash"),
+                            *(status.get("scene_mesh_hash") for status in statuses)],
             "programs": summaries,
             "plan": self.plan,
         }

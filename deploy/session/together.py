@@ -46,8 +46,8 @@ class Console:
         while (answer := self._child.next_line(0.2)) is None:
             self._household.check()
             if time.monotonic() > deadline:
-                raise Failure(f"the instructor's console did not answer '{command}' within {patience_s:.0f} s; its last lines:",
-                              self._child.last_words())
+                raise Failure(f"the instructor's console did not answer '{command}' within {patience_s:.0f} s; "
+                              "its last lines:", self._child.last_words())
         if not answer.startswith("ok"):
             raise Failure(f"the instructor's console could not '{command}': {answer}")
         self._say(f"       Dr. Berg: {command}")
@@ -77,7 +77,8 @@ class Certificates:
 
     def person(self, name, role, room=ROOM):
         self._run(ROOT / "deploy" / "certs", "--into", self._folder, "person", name)
-        ticket = self._run(self._programs / "osteon-server", "ticket", "--key", self._folder / "authority" / "tickets.key",
+        ticket = self._run(self._programs / "osteon-server", "ticket",
+                           "--key", self._folder / "authority" / "tickets.key",
                            "--room", room, "--user", name, "--role", role, "--hours", "1")
         file = self._folder / "people" / name / "ticket"
         file.write_text(ticket, encoding="utf-8")
@@ -120,12 +121,12 @@ class Together:
             address = self._start_server()
             berg = self.certificates.person(INSTRUCTOR, "instructor")
             viewer = Viewer(household, household.start("osteon-viewer", [
-                self.programs / "osteon-viewer", "--server", address, *self.certificates.person(OBSERVER, "observer"), "--name", "The class",
-                "--room", ROOM,
+                self.programs / "osteon-viewer", "--server", address, *self.certificates.person(OBSERVER, "observer"),
+                "--name", "The class", "--room", ROOM,
                 "--size", self.size, "--script", "-", "--summary", self.out / "viewer.json"], screen, takes_input=True))
             console = Console(household, household.start("console", [
-                self.programs / "osteon-viewer", "--console", "--server", address, *berg, "--name", "Dr. Berg", "--room", ROOM],
-                takes_input=True), self.say)
+                self.programs / "osteon-viewer", "--console", "--server", address, *berg,
+                "--name", "Dr. Berg", "--room", ROOM], takes_input=True), self.say)
             viewer.wait_for_surface()
             viewer.do(self._from_side(0.0))
             viewer.do(f"screenshot {self.out / 'before.png'}")
@@ -159,15 +160,17 @@ class Together:
         cache.mkdir(parents=True, exist_ok=True)
         return self.household.start(name, [
             self.programs / "osteon-haptic", "--server", address, *credentials, "--room", ROOM, "--name", name,
-            "--plan", self.out / f"{name}-plan.json", "--device", self.device, "--session-log", self.out / f"{name}.csv",
-            "--record", self.out / f"{name}.h5", "--cut-log", self.out / f"{name}-cuts.csv", "--summary", self.out / f"{name}.json",
+            "--plan", self.out / f"{name}-plan.json", "--device", self.device,
+            "--session-log", self.out / f"{name}.csv", "--record", self.out / f"{name}.h5",
+            "--cut-log", self.out / f"{name}-cuts.csv", "--summary", self.out / f"{name}.json",
             "--cache", cache])
 
     def _from_side(self, turn):
         """The camera command for the whole bone, from above the work of both."""
         box = self.info["bounds_mm"]
         low, high = np.array(box["min"]), np.array(box["max"])
-        side = unit(unit(np.array(self.sides[0], dtype=float)) + unit(np.array(self.sides[1], dtype=float)) + np.array([turn, -0.5, 0.2]))
+        side = unit(unit(np.array(self.sides[0], dtype=float)) + unit(np.array(self.sides[1], dtype=float))
+                    + np.array([turn, -0.5, 0.2]))
         up = np.array([0.0, -1.0, 0.0]) if abs(side[2]) > 0.9 else np.array([0.0, 0.0, 1.0])
         centre = 0.5 * (low + high)
         return look(centre, centre + 1.42 * float(np.linalg.norm(high - low)) * side, up)
@@ -187,7 +190,8 @@ class Together:
     def _work(self, address, viewer, console, berg):
         hands = {}
         for (name, role), side in zip(TRAINEES.items(), self.sides):
-            hands[name] = self._start_hand(address, name, self.certificates.person(name, role), burr_window(side, [18, 12], then_s=STAYS_S))
+            hands[name] = self._start_hand(address, name, self.certificates.person(name, role),
+                                           burr_window(side, [18, 12], then_s=STAYS_S))
             hands[name].may_end = True
         self._wait("that both surgeons cut", lambda: all(self._cuts(console, name) > 100 for name in TRAINEES), 120.0)
         console.do("say all I am watching you both")
@@ -201,7 +205,8 @@ class Together:
         frozen = self._cuts(console, "anna")
         time.sleep(2.0)
         console.do("take anna")
-        hands["berg"] = self._start_hand(address, INSTRUCTOR, berg, burr_window(list(np.array(self.sides[0]) + [0.0, 0.3, 0.0]), [8, 6], then_s=0.5))
+        beside_anna = list(np.array(self.sides[0]) + [0.0, 0.3, 0.0])
+        hands["berg"] = self._start_hand(address, INSTRUCTOR, berg, burr_window(beside_anna, [8, 6], then_s=0.5))
         hands["berg"].may_end = True
         self._wait("that the instructor's hand cuts", lambda: self._cuts(console, INSTRUCTOR) > 20, 120.0)
         console.do(f"guide anna along {console.hands()[INSTRUCTOR].number} share 0.6")
@@ -240,7 +245,8 @@ class Together:
         hands = {name: record.read_json(self.out / f"{name}.json") for name in ("anna", "ben", "berg")}
         events = self._events()
         numbers = {
-            "device": self.device, "picture": self.picture, "machine": record.machine(), "case": self.info, "exit_codes": codes,
+            "device": self.device, "picture": self.picture, "machine": record.machine(), "case": self.info,
+            "exit_codes": codes,
             "field_hash_server": server.get("field_hash"),
             "field_hashes": {name: hands[name].get("field_hash") for name in TRAINEES},
             "field_hash_console": next((word for word in status.split() if len(word) == 64), None),
@@ -255,8 +261,10 @@ class Together:
         held = [numbers["field_hash_server"], numbers["journal"]["field_hash"], *numbers["field_hashes"].values()]
         if numbers["field_hash_console"]:
             held.append(numbers["field_hash_console"])
-        numbers["one_bone"] = None not in held and len(set(held)) == 1 and numbers["mesh_hash_server"] == numbers["mesh_hash_viewer"]
-        (self.out / "session.json").write_text(json.dumps(numbers, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        numbers["one_bone"] = (None not in held and len(set(held)) == 1
+                               and numbers["mesh_hash_server"] == numbers["mesh_hash_viewer"])
+        (self.out / "session.json").write_text(json.dumps(numbers, indent=2, ensure_ascii=False) + "\n",
+                                               encoding="utf-8")
         return numbers
 
     def _events(self):
@@ -290,7 +298,8 @@ def described(entries, names):
             cuts[author] = cuts.get(author, 0) + 1
         elif "supervision" in event:
             subject = who.get(int(event["supervision"]["subject"]), "?")
-            events.append((at, who.get(author, "?"), f"{subject}: {decided(event['supervision'].get('supervision', {}), who)}"))
+            events.append((at, who.get(author, "?"),
+                           f"{subject}: {decided(event['supervision'].get('supervision', {}), who)}"))
         elif "words" in event:
             to = who.get(int(event["words"].get("to", 0)), "all") if int(event["words"].get("to", 0)) else "all"
             events.append((at, who.get(author, "?"), f"to {to}: “{event['words']['words']}”"))
@@ -334,7 +343,8 @@ def force_steps(force_n, handle_mm, mono_ns, stiffness_n_per_mm):
     beyond = growth - by_hand - SLEW_N_PER_MS * periods
     return {"rows": len(force_n), "most_n": round(float(np.linalg.norm(force_n, axis=1).max(initial=0.0)), 2),
             "most_growth_n_per_ms": round(float(growth.max(initial=0.0)), 3),
-            "most_beyond_slew_n": round(max(0.0, float(beyond.max(initial=0.0))), 4), "steps_beyond_slew": int(np.sum(beyond > ROUNDING_N))}
+            "most_beyond_slew_n": round(max(0.0, float(beyond.max(initial=0.0))), 4),
+            "steps_beyond_slew": int(np.sum(beyond > ROUNDING_N))}
 
 
 def recorded_steps(file: Path):
@@ -345,8 +355,10 @@ def recorded_steps(file: Path):
         count = len(rows["data/time"])
         about = rows["metadata"].attrs
         scale = float(np.min(rows["burr_change/scale"][:], initial=1.0))
-        stiffness = min(float(about["force_scale"]) * COUPLING_N_PER_MM, float(about["device_stiffness_n_per_mm"]) / scale)
-        force = rows["drill_force_feedback/wrench"][:count, :3].astype(float) - rows["drill_force_feedback/motor_force"][:count]
+        stiffness = min(float(about["force_scale"]) * COUPLING_N_PER_MM,
+                        float(about["device_stiffness_n_per_mm"]) / scale)
+        force = (rows["drill_force_feedback/wrench"][:count, :3].astype(float)
+                 - rows["drill_force_feedback/motor_force"][:count])
         handle_mm = rows["high_frequency_poses/device_pose/pose"][:count, :3]
         names = [name.decode() for name in rows["metadata/event_bits"][:]]
         led = led_mm(rows["data/events"][:count].astype(np.int64), names, handle_mm)
@@ -373,9 +385,11 @@ def plot(out: Path, numbers, file: Path):
     starts = {name: record.read_table(out / f"{name}.csv") for name in ("anna", "ben", "berg")}
     first = min(int(table["mono_ns"][0]) for table in starts.values() if len(table["mono_ns"]))
     for axis, (name, table) in zip(axes, starts.items()):
-        rows = plots.thinned({"time_s": (table["mono_ns"] - first) / 1e9, "force": table["force_rendered_n"], "cutting": table["phase"] == "cutting"})
+        rows = plots.thinned({"time_s": (table["mono_ns"] - first) / 1e9, "force": table["force_rendered_n"],
+                              "cutting": table["phase"] == "cutting"})
         axis.plot(rows["time_s"], rows["force"], color=plots.STEEL, lw=0.8)
-        axis.fill_between(rows["time_s"], 0, 1, where=rows["cutting"], transform=axis.get_xaxis_transform(), color=plots.BONE, alpha=0.15, lw=0)
+        axis.fill_between(rows["time_s"], 0, 1, where=rows["cutting"], transform=axis.get_xaxis_transform(),
+                          color=plots.BONE, alpha=0.15, lw=0)
         axis.set_ylabel(f"{name}\nforce on the hand, N")
     axes[-1].set_xlabel("time, s (shaded: cutting)")
     figure.savefig(file, dpi=110)
@@ -385,16 +399,19 @@ def plot(out: Path, numbers, file: Path):
 def write_report(out: Path, numbers, title):
     plot(out, numbers, out / "forces.png")
     journal, log = numbers["journal"], numbers["events"]
-    rows = "".join(f"<tr><td class=n>{at:.2f}</td><td>{html.escape(who)}</td><td>{html.escape(what)}</td></tr>" for at, who, what in log["events"])
+    rows = "".join(f"<tr><td class=n>{at:.2f}</td><td>{html.escape(who)}</td><td>{html.escape(what)}</td></tr>"
+                   for at, who, what in log["events"])
     hands = "".join(f"<tr><td>{html.escape(name)}</td><td class=n>{log['cuts'].get(name, 0)}</td>"
                     f"<td class=n>{force['most_n']:.2f}</td><td class=n>{force['most_growth_n_per_ms']:.3f}</td>"
                     f"<td class=n>{force['steps_beyond_slew']}</td><td class=n>{force['led_mm']:.1f}</td></tr>"
                     for name, force in numbers["forces"].items())
     facts = [
-        report.fact("one bone" if numbers["one_bone"] else "DIFFERENT bones", "in server, hands, viewer, console and journal at the end (hashes)"),
+        report.fact("one bone" if numbers["one_bone"] else "DIFFERENT bones",
+                    "in server, hands, viewer, console and journal at the end (hashes)"),
         report.fact(numbers["cuts_while_frozen"], "accepted cuts of the stopped hand"),
         report.fact(sum(force["steps_beyond_slew"] for force in numbers["forces"].values()),
-                    f"steps of force on the three hands beyond {SLEW_N_PER_MS:g} N in a millisecond that no movement of the hand explains"),
+                    f"steps of force on the three hands beyond {SLEW_N_PER_MS:g} N in a millisecond that no movement "
+                    "of the hand explains"),
         report.fact(journal["events"], "events in the room's journal"),
     ]
     page = f"""<!doctype html>
@@ -408,12 +425,14 @@ own; they prove who they are by certificates and tickets.</p>
 <div class=facts>{''.join(facts)}</div>
 <h2>Before and after</h2>
 <div class=pair>{report.picture(out, 'before.png', 'Before')}{report.picture(out, 'after.png', 'After')}</div>
-<div class=pair>{report.picture(out, 'both.png', 'Both at work')}{report.picture(out, 'guided.png', 'The instructor shows it')}</div>
+<div class=pair>{report.picture(out, 'both.png', 'Both at work')}
+{report.picture(out, 'guided.png', 'The instructor shows it')}</div>
 <h2>Who did what when</h2>
 <p>From the room's journal, in seconds since the room was made. Cuts are left out here and counted below.</p>
 <div class=scroll><table><tr><th class=n>s</th><th>who</th><th>what</th></tr>{rows}</table></div>
 <h2>What the hands felt</h2>
-<p>Force that no hand causes grows by at most {SLEW_N_PER_MS:g} N in a millisecond; a hand that moves into bone may raise it faster.</p>
+<p>Force that no hand causes grows by at most {SLEW_N_PER_MS:g} N in a millisecond. A hand that moves into bone may
+raise it faster.</p>
 {report.picture(out, 'forces.png', 'Force on each hand over time', wide=True)}
 <table><tr><th>hand</th><th class=n>cuts</th><th class=n>largest force, N</th><th class=n>largest growth in 1 ms, N</th>
 <th class=n>steps beyond the limit</th><th class=n>motion of the handle under guidance, mm</th></tr>{hands}</table>
@@ -430,10 +449,12 @@ def run(programs, case, sides, out, say, device, title):
     for at, who, what in numbers["events"]["events"]:
         say(f"{at:8.2f} s  {who}: {what}")
     say(f"Accepted cuts of the stopped hand: {numbers['cuts_while_frozen']} (simulated hands)")
-    say("Server, hands, viewer, console and journal have " + ("the same bone" if numbers["one_bone"] else "DIFFERENT bones") + " at the end.")
+    say("Server, hands, viewer, console and journal have "
+        + ("the same bone" if numbers["one_bone"] else "DIFFERENT bones") + " at the end.")
     for name, force in numbers["forces"].items():
-        say(f"{name} felt at most {force['most_n']:.1f} N; {force['steps_beyond_slew']} of {force['rows']} steps in a millisecond were "
-            f"larger than the hand's movement and the slew limit allow, by {force['most_beyond_slew_n']:.3f} N at most"
+        say(f"{name} felt at most {force['most_n']:.1f} N; {force['steps_beyond_slew']} of {force['rows']} steps in a "
+            f"millisecond were larger than the hand's movement and the slew limit allow, "
+            f"by {force['most_beyond_slew_n']:.3f} N at most"
             + (f"; under guidance it moved {force['led_mm']:.1f} mm" if force["led_mm"] > 0.0 else ""))
     say(f"Report: {out / 'report.html'}")
     return 0 if numbers["one_bone"] and numbers["cuts_while_frozen"] == 0 and is_gentle(numbers["forces"]) else 1
