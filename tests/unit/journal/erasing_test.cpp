@@ -105,7 +105,7 @@ TEST_F(ErasingTest, WhatStandsInPlaceOfARowIsSealed) {
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{3});
   sql("UPDATE rows SET bytes = CAST('-' AS BLOB) WHERE place = 3; UPDATE registers SET value = CAST('' AS BLOB) WHERE "
-      "name = 'erased entries'");
+      "name = 'erased rows'");
   EXPECT_FALSE(verify_journal(file_)->sound());
 }
 
