@@ -33,17 +33,18 @@ class SendRate {
 
   explicit SendRate(SendRateParams params = {}) : params_(params), tokens_(static_cast<double>(params.burst_bytes)) {}
 
-  // When the next packet may go, at `now` or later. `wanted`: when there will be something to say, `now` or earlier for
-  // at once, Time::max() for nothing; then it is one that keeps the session alive. `needed_bytes`: the least budget()
-  // that it is worth going with, such as for one long item. `fresh`: it was never sent before.
+  // When the next packet may go, at `now` or later. `wanted`: when there will be something to send; `now` or earlier
+  // means at once. Time::max() means nothing; then the next packet only keeps the session alive. `needed_bytes`: the
+  // least budget() that makes a packet useful, for example for one long item. `fresh`: the content was never sent
+  // before.
   [[nodiscard]] Time next(Time now, Time wanted, std::size_t needed_bytes = 0, bool fresh = false) const;
-  // Largest whole datagram that may go now, at most kMostDatagramBytes; 0 where next() is later.
+  // Largest whole datagram that may go now, at most kMostDatagramBytes. 0 if next() is later.
   [[nodiscard]] std::size_t budget(Time now, bool fresh = false) const;
   // A datagram of this many bytes was sent.
   void sent(Time now, std::size_t bytes);
 
-  // What the other end says of our packets in each of its own: the newest counter that it has seen and how many have
-  // come in all, repeats of the network not counted. Anything that does not move forward is ignored.
+  // What each packet of the other end reports about our packets: the newest counter that it has seen, and how many
+  // packets arrived, repeats of the network not counted. Values that do not advance are ignored.
   void heard(std::uint64_t newest_counter, std::uint64_t received);
   void set_round_trip(Time round_trip) { round_trip_ = round_trip; }
   // Share of packets lost lately, 0 to 1, smoothed over about 64 packets. 0.1 before the first packet.

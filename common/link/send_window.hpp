@@ -61,7 +61,7 @@ class SendWindow {
 
   struct Picked {
     std::vector<std::uint64_t>
-        numbers;            // rising; every item's predecessor in its run is there, or its head is paid for
+        numbers;            // rising; every item's predecessor in its run is included, or its head is counted
     std::size_t bytes = 0;  // with heads; at most the budget
   };
   // Chooses the items of the packet that goes now, as far as there is room, in this order. First the oldest item once
