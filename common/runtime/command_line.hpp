@@ -1,4 +1,4 @@
-// The start of every program's main: its arguments, or what to say of them.
+// Parses the arguments of a program, as every main does first.
 #pragma once
 #include <optional>
 
@@ -8,8 +8,8 @@ class App;
 
 namespace osteon {
 
-// Parses into what `app` was told of. An exit code when main must return at once: 0 after printing the help that was
-// asked for, 1 after one sentence on what is wrong with the arguments.
+// Parses the options of `app`. Returns an exit code if main must return at once: 0 after printing the requested help, 1
+// after one sentence about wrong arguments.
 [[nodiscard]] std::optional<int> parse_arguments(CLI::App& app, int argc, const char* const* argv);
 
 }  // namespace osteon
