@@ -14,7 +14,7 @@ class CellMap {
   CellMap() = default;
   CellMap(const CoordBox& bounds_samples, const std::vector<Coord>& origins);
   [[nodiscard]] std::int32_t find(Coord origin) const;  // index among `origins`, or -1
-  // For each cell whether it, or one of the 26 around it, is marked.
+  // For each cell, whether the cell or one of its 26 neighbours is marked.
   [[nodiscard]] std::vector<std::uint8_t> dilated(std::span<const std::uint8_t> marked) const;
   [[nodiscard]] std::size_t size() const { return count_; }
 
@@ -25,7 +25,7 @@ class CellMap {
   std::size_t count_ = 0;
 };
 
-// Samples of a level in a cell.
+// The samples of a level in a cell.
 [[nodiscard]] CoordBox cell_box(Coord origin, int level);
 // The finest level of the cuts that reached the cell.
 [[nodiscard]] int cut_level(const CutField& field, Coord origin);
