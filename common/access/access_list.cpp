@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uintmax_t kMostFileBytes = 4 * 1024 * 1024;
 
-// Upper case, without colons and leading zeros: 0A:1f and a1f are one number. Empty: it is none.
+// Upper case, without colons and leading zeros, so that 0A:1f and a1f are the same number. Empty: not a number.
 std::string number_of(std::string_view text) {
   std::string number;
   for (const char c : text) {
@@ -103,7 +103,7 @@ Result<bool> AccessFile::refresh() {
   if (error || !in)
     return failure(ErrorCode::not_found, file_.string() + " cannot be read; what it said before goes on to hold");
   if (text_ == text) return false;
-  text_ = text;  // one that is wrong is said once
+  text_ = text;  // so that a faulty text is reported only once
   Result<AccessList> read = AccessList::parse(text, file_.string());
   if (!read) return tl::unexpected(read.error());
   list_ = std::move(*read);

@@ -13,14 +13,14 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
 }
 
 constexpr double kMostOfATool =
-    1e6;  // of its force in N, its speed in 1/min and so on: beyond it the steps of packets end
+    1e6;  // limits a tool's force in N, its speed in 1/min and so on: the steps of packets end there
 bool all_of_a_tool(std::initializer_list<double> values) {
   return std::ranges::all_of(values,
-                             [](double v) { return std::abs(v) <= kMostOfATool; });  // also not where it is no number
+                             [](double v) { return std::abs(v) <= kMostOfATool; });  // also false for NaN
 }
 
-constexpr double kFurthest_mm = 1e5;  // no bone is there, and beyond it the steps of packets end
-// Of what is up in a picture: how far its length may be from 1, and the sine of the least angle to the line of sight.
+constexpr double kFurthest_mm = 1e5;  // no bone is farther away, and the steps of packets end there
+// For the up direction of a picture: tolerance of its length, and sine of the smallest angle to the line of sight.
 constexpr double kUnitWithin = 1e-3, kLeastAcross = 0.01;
 
 bool is_up(const Vec3& up, const Vec3& sight) {
@@ -105,7 +105,7 @@ v1::FieldLeaf to_wire(const FieldLeaf& leaf) {
   out.set_level(static_cast<std::uint32_t>(leaf.level));
   *out.mutable_origin() = to_wire(leaf.origin);
   std::string* bytes = out.mutable_values();
-  // Most leaves of a piece's field are gone throughout.
+  // Most leaves of a fragment's field are wholly cut away.
   const bool constant = std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == leaf.values.front(); });
   bytes->resize(2 * (constant ? 1 : leaf.values.size()));
   for (std::size_t i = 0; 2 * i < bytes->size(); ++i) {
@@ -336,7 +336,7 @@ Result<Restrictions> from_wire(const v1::Restrictions& supervision) {
   out.stopped = supervision.stopped();
   out.taken_by = {supervision.taken_by()};
   out.guide = {supervision.guide()};
-  // What is beyond 31 bits is beyond every limit, too.
+  // A value beyond 31 bits exceeds every limit, too.
   out.guide_share = static_cast<int>(std::min<std::uint32_t>(supervision.guide_share(), INT32_MAX));
   out.force_limit = static_cast<int>(std::min<std::uint32_t>(supervision.force_limit(), INT32_MAX));
   if (supervision.has_zone()) {

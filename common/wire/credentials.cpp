@@ -17,7 +17,7 @@ constexpr const char* kWays =
     "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on "
     "this machine";
 
-// Without the line's end. Empty: there is nothing, or it cannot be read.
+// Without the end of line. Empty: there is nothing, or it cannot be read.
 std::string first_word(const std::filesystem::path& file) {
   std::error_code unknown;
   std::string text;
@@ -25,7 +25,7 @@ std::string first_word(const std::filesystem::path& file) {
   return text;
 }
 
-// gRPC ends the process of whoever sends other bytes in a header.
+// gRPC aborts the process if a header contains other bytes.
 bool is_ascii(const std::string& text) {
   return std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
 }
@@ -64,7 +64,7 @@ Result<ClientCredentials> client_credentials(const CredentialArguments& argument
 
 bool is_loopback(const std::string& host) {
   if (host == "localhost" || host == "[::1]") return true;
-  // Four numbers: a name or a longer text is not taken for an address.
+  // Exactly four numbers, so that a name or a longer text does not count as an address.
   int parts[4] = {};
   const char *at = host.data(), *last = at + host.size();
   for (int i = 0; i < 4; ++i) {
