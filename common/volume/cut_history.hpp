@@ -36,27 +36,27 @@ using Mask = std::shared_ptr<const std::vector<FieldLeaf>>;
 // writes, or several read.
 class CutHistory {
  public:
-  // Adds an event that was applied to the field. `place` is its sequence number, which must be new; later calls name
+  // Adds an event that was applied to the field. `seq` is its sequence number, which must be new; later calls name
   // the event by it. `leaves`: all leaves that the cut can change, CutReport::reached_leaves or CutField::reach(). The
   // leaves that it did change are not enough, because a cut that is undone later may have hidden the rest.
-  void add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves);
-  void add_mask(RoomSeq place, Mask mask);  // R = min(R, mask); sorted by (level, origin)
-  void add_mask(RoomSeq place, std::vector<FieldLeaf> mask);
+  void add(RoomSeq seq, const Cut& cut, const std::vector<Coord>& leaves);
+  void add_mask(RoomSeq seq, Mask mask);  // R = min(R, mask); sorted by (level, origin)
+  void add_mask(RoomSeq seq, std::vector<FieldLeaf> mask);
   // Another history with the same events, independent from here on. Earlier events are shared, so the cost does not
   // depend on their number.
   [[nodiscard]] CutHistory fork();
 
-  [[nodiscard]] bool contains(RoomSeq place) const;
-  [[nodiscard]] bool undone(RoomSeq place) const;
-  [[nodiscard]] const Cut* find_cut(RoomSeq place) const;  // null: unknown, or a mask; valid until the next add()
+  [[nodiscard]] bool contains(RoomSeq seq) const;
+  [[nodiscard]] bool undone(RoomSeq seq) const;
+  [[nodiscard]] const Cut* find_cut(RoomSeq seq) const;  // null: unknown, or a mask; valid until the next add()
   [[nodiscard]] std::size_t size() const;
 
   // Undoes events, or applies them again, and returns the leaves that changed, by level. Unknown events, and events
   // already in that state, are skipped. The field must be the one that the events were applied to.
-  std::vector<LevelLeaves> undo(CutField& field, std::span<const RoomSeq> places);
-  std::vector<LevelLeaves> redo(CutField& field, std::span<const RoomSeq> places);
+  std::vector<LevelLeaves> undo(CutField& field, std::span<const RoomSeq> seqs);
+  std::vector<LevelLeaves> redo(CutField& field, std::span<const RoomSeq> seqs);
   // The same without a field, which the caller will update later.
-  void note_undone(std::span<const RoomSeq> places, bool undone);
+  void note_undone(std::span<const RoomSeq> seqs, bool undone);
   [[nodiscard]] const RebuildCost& last_cost() const { return cost_; }
 
  private:
@@ -72,9 +72,9 @@ class CutHistory {
   };
   using Leaves = std::array<std::vector<Coord>, kLevels>;
 
-  [[nodiscard]] const Part* part_of(RoomSeq place) const;  // null: unknown
-  std::vector<LevelLeaves> rebuild(CutField& field, std::span<const RoomSeq> places, bool undone);
-  [[nodiscard]] static Leaves reached(const CutField& field, const Part& part, RoomSeq place);
+  [[nodiscard]] const Part* part_of(RoomSeq seq) const;  // null: unknown
+  std::vector<LevelLeaves> rebuild(CutField& field, std::span<const RoomSeq> seqs, bool undone);
+  [[nodiscard]] static Leaves reached(const CutField& field, const Part& part, RoomSeq seq);
   void apply_again(CutField& field, const Leaves& leaves);
 
   std::vector<std::shared_ptr<const Part>> shared_;  // shared with forks; immutable
