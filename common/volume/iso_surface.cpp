@@ -200,7 +200,7 @@ class Slab {
           if (const std::int32_t j = index(u, v, w); j != i) visit(j);
   }
 
-  // Offers a point of the surface to a sample, which keeps the nearest within the band.
+  // Offers a surface point to a sample, which stores the nearest one within the band.
   void offer_point(std::int32_t point, std::int32_t sample, const Vec3f& p) {
     const float squared = (points_[at(point)] - p).squaredNorm();
     std::int32_t& nearest = nearest_point_[at(sample)];
