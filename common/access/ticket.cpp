@@ -230,8 +230,8 @@ Result<void> check_life(const Ticket& ticket, UnixTime now, std::chrono::hours m
   constexpr std::chrono::minutes kClocksDiffer{1};
   if (most == std::chrono::hours(0) || ticket.expires <= now + most + kClocksDiffer) return {};
   const auto left = std::chrono::ceil<std::chrono::hours>(ticket.expires - now);
-  return failure(ErrorCode::unavailable, "the ticket is good for " + std::to_string(left.count()) +
-                                             " more hours, and this server takes none for more than " +
+  return failure(ErrorCode::unavailable, "the ticket is valid for " + std::to_string(left.count()) +
+                                             " more hours, but this server accepts at most " +
                                              std::to_string(most.count()) + "; ask for a shorter one");
 }
 

@@ -13,7 +13,7 @@ namespace osteon {
 
 struct UdpPortOptions {
   std::string address =
-      "127.0.0.1";         // a numeric address of this machine; "0.0.0.0" or "::" for all, "::" hears IPv4 too
+      "127.0.0.1";         // a numeric address of this machine; "0.0.0.0" or "::" for all; "::" also receives IPv4
   std::uint16_t port = 0;  // 0: the system chooses
   int receive_buffer_bytes = 1 << 21;  // holds what arrives between two turns of the loop; the system may grant less
 };

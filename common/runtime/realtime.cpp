@@ -177,15 +177,15 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
   else if (!facts.governors.empty())
     say(Finding::fine, "All cores run at full clock.");
   else
-    say(Finding::fine, "The clock of the cores is not governed from here.");
+    say(Finding::fine, "The clock of the cores is not controlled from here.");
 
   if (facts.preemption == "rt" || facts.preemption == "full")
     say(Finding::fine, facts.preemption == "rt" ? "The kernel is a real-time one." : "The kernel can be preempted.");
   else
     say(Finding::note,
         facts.preemption == "dynamic"
-            ? "The kernel's preemption was chosen at boot and is not told."
-            : "The kernel is preempted only where it offers to be (" + facts.preemption + ").",
+            ? "The kernel's preemption was chosen at boot and is unknown."
+            : "The kernel is preempted only at certain points (" + facts.preemption + ").",
         "boot with preempt=full, or install linux-image-rt-amd64");
 
   if (facts.clock_source != "tsc" && facts.clock_source != "kvm-clock" && facts.clock_source != "arch_sys_counter" &&

@@ -181,7 +181,7 @@ Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* 
     return failure(ErrorCode::invalid_input, "an item cannot become another tool; take it out and set " + name);
   if (tool.cuts() && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw && tool.kind != ToolKind::mesh)
     return failure(ErrorCode::invalid_input,
-                   name + " is a tool for the hand; guides, pins, screws and implants are left on the bone");
+                   name + " is a hand-held tool; only guides, pins, screws and implants stand on the bone");
   const Motion moved = before ? motion(before->item.pose_bone_item, item.pose_bone_item) : Motion{};
   const bool moves =
       before && (std::abs(moved.along_mm) > kAcross_mm || moved.across_mm > kAcross_mm || moved.tilt_rad > kTilt_rad ||

@@ -97,17 +97,17 @@ class Diagnosis {
     if (first.size() > 3 && first[0] == 0 && first[3] == kSettings) {
       if (is_plain()) return slow();
       return lasting(ErrorCode::invalid_input,
-                     "the server at " + address_ + " speaks plain text, and you come with a " +
+                     "the server at " + address_ + " uses plain text, but you gave a " +
                          "certificate; give --plain in place of --certificates and --ticket, " +
                          "or start the server with --certificates");
     }
     if (!first.empty()) return not_osteon();
     if (probe_.is_closed)
       return for_now("what listens at " + address_ +
-                     " closes the connection without a word; it is no Osteon server, or " +
+                     " closes the connection without an answer; it is no Osteon server, or " +
                      "one that is full: see --most-connections of the server and the limits of a proxy");
     return for_now("what listens at " + address_ +
-                   " takes the connection and says nothing; it is no Osteon server, or " +
+                   " accepts the connection and sends nothing; it is no Osteon server, or " +
                    "one that hangs: look at its log, or start it anew");
   }
 
@@ -124,7 +124,7 @@ class Diagnosis {
 
   [[nodiscard]] ConnectionFault tls_for_plain() const {
     return lasting(ErrorCode::invalid_input, "the server at " + address_ +
-                                                 " asks for a certificate, and you come with " +
+                                                 " asks for a certificate, but you gave " +
                                                  "--plain; give --certificates DIR with --ticket FILE in its place");
   }
 
@@ -183,7 +183,7 @@ class Diagnosis {
     const auto denied = [](std::string sentence) { return lasting(ErrorCode::denied, std::move(sentence)); };
     if (is_unknown_authority(fault))
       return denied("the server at " + address_ + " does not know the authority of " + own +
-                    "and takes no such certificate; ask whoever runs the server for one of its authority");
+                    "and accepts no such certificate; ask whoever runs the server for one of its authority");
     switch (fault) {
       case X509_V_ERR_CERT_HAS_EXPIRED:
         return denied(own + "has expired: it holds until " + text_of(valid.ends) +

@@ -174,15 +174,15 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   if (!tool) return failure(ErrorCode::invalid_input, "pose_bone_tool." + tool.error().message);
   const auto device = from_wire(state.pose_bone_device());
   if (!device) return failure(ErrorCode::invalid_input, "pose_bone_device." + device.error().message);
-  if (tool->position_mm.norm() > kFurthest_mm) return bad("pose_bone_tool", "is no place near the bone");
-  if (device->position_mm.norm() > kFurthest_mm) return bad("pose_bone_device", "is no place near the bone");
+  if (tool->position_mm.norm() > kFurthest_mm) return bad("pose_bone_tool", "is not near the bone");
+  if (device->position_mm.norm() > kFurthest_mm) return bad("pose_bone_device", "is not near the bone");
   out.pose_bone_tool = *tool;
   out.pose_bone_device = *device;
   out.tool_name = state.tool_name();
   out.force_physical_N = from_wire(state.force_physical_n());
   if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
                       state.torque_n_mm(), state.depth_mm(), out.force_physical_N.norm()}))
-    return bad("cutting state", "has a number that is not finite, or that no tool has");
+    return bad("cutting state", "has a number that is not finite or too large for a tool");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
   out.density_g_cm3 = state.density_g_cm3();
@@ -289,8 +289,8 @@ Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
 Result<ViewFrustum> from_wire(const v1::ViewFrustum& look) {
   ViewFrustum out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
   const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthest_mm; };
-  if (!placed(out.eye_mm)) return bad("look.eye_mm", "is no place near the bone");
-  if (!placed(out.target_mm)) return bad("look.target_mm", "is no place near the bone");
+  if (!placed(out.eye_mm)) return bad("look.eye_mm", "is not near the bone");
+  if (!placed(out.target_mm)) return bad("look.target_mm", "is not near the bone");
   if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad("look.pixel_rad", "must be between 0 and 1");
   if (!(out.view_rad > 0.0 && out.view_rad < 1.5)) return bad("look.view_rad", "must be between 0 and 1.5");
   if (!look.has_up()) return out;

@@ -133,7 +133,7 @@ Error error_of(const grpc::Status& status, const std::string& server) {
       return {ErrorCode::not_found, status.error_message()};
     case grpc::StatusCode::UNAUTHENTICATED:
     case grpc::StatusCode::PERMISSION_DENIED:
-      return {ErrorCode::denied, "the server lets you in no further: " + status.error_message()};
+      return {ErrorCode::denied, "the server denies access: " + status.error_message()};
     case grpc::StatusCode::UNIMPLEMENTED:
       return {ErrorCode::unsupported, server + " is not an Osteon server of this version"};
     default:
