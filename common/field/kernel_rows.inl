@@ -108,8 +108,8 @@ OSTEON_INLINE Row across_distance(const ToolSweep& s, const Turned& turned, Row 
                                 dot(px, py, pz, s.axis));
 }
 
-// No search is needed for samples that are at least `enough` away from even the nearest pose, or deeper than the band
-// in the middle pose.
+// No search is needed if even the nearest pose is at least `enough` away from the sample, or if the sample is deeper
+// than the band in the middle pose.
 template <bool kDome>
 OSTEON_INLINE Row oblique_distance(const ToolSweep& s, const Turned& turned, Row px, Row py, Row pz, float enough,
                                    float band) {

@@ -36,9 +36,9 @@ inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}
 
 // A marrow space is the space that a ball of `bridged_mm` cannot reach from outside the bone, if such a ball fits
 // inside it. Every hole that no path of voxels leaves is one too. So narrow clefts on the outside of a bone, such as
-// sutures and joints, stay open. A voxel is cancellous if most of its 27 voxels have `cancellous_hu` or more, it lies
-// on a straight line between two dense voxels, and it is wider than a joint. Most of the connected voxels of that
-// brightness must fulfil this too. Errors: invalid_input (no voxel reaches the threshold), cancelled.
+// sutures and joints, stay open. Cancellous bone has `cancellous_hu` or more on most of a voxel's 27 voxels. It lies on
+// a straight line between two dense voxels, and is wider than a joint. Most of the connected voxels of that brightness
+// must fulfil this too. Errors: invalid_input (no voxel reaches the threshold), cancelled.
 [[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params,
                                              const ScanEnds& ends, const KeepGoing& keep_going);
 

@@ -1,8 +1,8 @@
-// A bone on a compliant mount (mount.hpp), simulated by a server at 120 Hz and felt by the users of several clients at
-// 1 kHz, over networks that delay, lose and reorder. The server simulates the bone under the newest load of every
-// client. A client shows its user a pose that follows the newest received one, low-passed and slew limited. It never
-// gives the user energy that nobody has put in: time-domain passivity (Ryu, Artigas and Preusche 2010, with energies
-// sent in packets).
+// A bone on a compliant mount (mount.hpp). A server simulates it at 120 Hz, and the users of several clients feel it at
+// 1 kHz. The networks between them delay, lose and reorder packets. The server simulates the bone under the newest load
+// of every client. A client shows its user a pose that follows the newest received one, low-passed and slew limited. It
+// never gives the user energy that nobody has put in: time-domain passivity (Ryu, Artigas and Preusche 2010, with
+// energies sent in packets).
 //
 //   hand --load--> MountFollower --MountLoad--> MountServer --MountPose--> MountFollower --pose--> hand
 //

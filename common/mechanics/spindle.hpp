@@ -1,5 +1,5 @@
-// The tool's motor. It follows the commanded speed with a run-up, slows under load, stalls when the bone needs more
-// torque than it has, and turns again when the load is removed.
+// The tool's motor. It follows the commanded speed with a run-up and slows under load. It stalls when the bone needs
+// more torque than it has, and turns again when the load is removed.
 #pragma once
 
 namespace osteon {

@@ -39,7 +39,8 @@ class ClientLink {
   // The stream reports that cuts up to this one are decided and durable.
   void acknowledge(std::uint64_t author_seq) { half_.acknowledge(author_seq); }
   // Newest state of the tool. Call it for every state; state_seq rises. A state is sent at once if the tool has moved
-  // by more than the deadband, some 30 times a second while it touches the bone, and now and then in any case.
+  // by more than the deadband. It is sent some 30 times a second while the tool touches the bone, and now and then
+  // otherwise.
   void set_state(const CuttingState& state, std::uint32_t buttons);
   // Newest load on a bone on its mount. It is sent once, soon, unless a newer one replaces it.
   void set_push(const MountLoad& push) { push_ = push; }
