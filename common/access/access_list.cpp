@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::uintmax_t kMostFileBytes = 4 * 1024 * 1024;
 
-// Upper case, without colons and leading zeros: 0A:1f and a1f are one number. Empty: it is none.
+// Upper case, without colons and leading zeros, so that 0A:1f and a1f are the same number. Empty: not a number.
 std::string number_of(std::string_view text) {
   std::string number;
   for (const char c : text) {
@@ -53,19 +53,19 @@ Result<AccessList> AccessList::parse(std::string_view text, const std::string& n
     };
     if (first == "revoke" && rest.empty() && !third.empty()) {
       if (second == "user") {
-        if (!is_user_name(third)) return wrong("this is no name of a user");
+        if (!is_user_name(third)) return wrong("this is not a user name");
         list.users_.insert(third);
       } else if (second == "certificate" || second == "ticket") {
         const std::string which = number_of(third);
-        if (which.empty()) return wrong("this is no hexadecimal number");
+        if (which.empty()) return wrong("this is not a hexadecimal number");
         (second == "ticket" ? list.tickets_ : list.serials_).insert(which);
       } else {
         return wrong("only certificates, users and tickets can be revoked");
       }
     } else if (first == "role" && !third.empty()) {
       const std::optional<Role> role = parse_role(third);
-      if (!is_user_name(second)) return wrong("this is no name of a user");
-      if (!role) return wrong("this is no role");
+      if (!is_user_name(second)) return wrong("this is not a user name");
+      if (!role) return wrong("this is not a role");
       list.roles_[{second, rest}] = *role;
     } else {
       return wrong("this line cannot be understood");
@@ -97,13 +97,13 @@ Result<bool> AccessFile::refresh() {
   const std::uintmax_t size = std::filesystem::file_size(file_, error);
   if (!error && size > kMostFileBytes)
     return failure(ErrorCode::invalid_input,
-                   file_.string() + " is larger than 4 MiB; this is no list of who was revoked");
+                   file_.string() + " is larger than 4 MiB; this is not an access list");
   std::ifstream in(file_, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(in), {}};
   if (error || !in)
-    return failure(ErrorCode::not_found, file_.string() + " cannot be read; what it said before goes on to hold");
+    return failure(ErrorCode::not_found, file_.string() + " cannot be read; the list read before stays in force");
   if (text_ == text) return false;
-  text_ = text;  // one that is wrong is said once
+  text_ = text;  // so that a faulty text is reported only once
   Result<AccessList> read = AccessList::parse(text, file_.string());
   if (!read) return tl::unexpected(read.error());
   list_ = std::move(*read);

@@ -7,11 +7,11 @@ namespace osteon {
 namespace {
 
 constexpr RoleSet kInRoom{Role::observer, Role::trainee, Role::collaborator, Role::instructor};
-constexpr RoleSet kHands{Role::trainee, Role::collaborator, Role::instructor};
+constexpr RoleSet kCutters{Role::trainee, Role::collaborator, Role::instructor};
 constexpr RoleSet kPartners{Role::collaborator, Role::instructor};
 constexpr RoleSet kInstructor{Role::instructor};
 constexpr RoleSet kOperator{Role::operator_};
-constexpr RoleSet kOversight{Role::instructor, Role::operator_};
+constexpr RoleSet kSupervisors{Role::instructor, Role::operator_};
 
 constexpr std::array kCalls{
     CallRow{"/osteon.v1.RoomService/Join", kInRoom},
@@ -19,43 +19,44 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.RoomService/GetCase", kInRoom},
     CallRow{"/osteon.v1.RoomService/ListTools", kInRoom},
     CallRow{"/osteon.v1.RoomService/GetTool", kInRoom},
-    CallRow{"/osteon.v1.RoomService/AddTool", kHands},
-    CallRow{"/osteon.v1.RoomService/Undo", kHands},
-    CallRow{"/osteon.v1.RoomService/Redo", kHands},
-    CallRow{"/osteon.v1.RoomService/Mark", kHands},
+    CallRow{"/osteon.v1.RoomService/AddTool", kCutters},
+    CallRow{"/osteon.v1.RoomService/Undo", kCutters},
+    CallRow{"/osteon.v1.RoomService/Redo", kCutters},
+    CallRow{"/osteon.v1.RoomService/Mark", kCutters},
     CallRow{"/osteon.v1.RoomService/RemoveBody", kInstructor},
-    CallRow{"/osteon.v1.RoomService/SetSceneItem", kHands},
-    CallRow{"/osteon.v1.RoomService/RemoveSceneItem", kHands},
+    CallRow{"/osteon.v1.RoomService/SetSceneItem", kCutters},
+    CallRow{"/osteon.v1.RoomService/RemoveSceneItem", kCutters},
     CallRow{"/osteon.v1.RoomService/SaveFields", kInstructor},
-    CallRow{"/osteon.v1.CuttingService/Session", kHands},
+    CallRow{"/osteon.v1.CuttingService/Session", kCutters},
     CallRow{"/osteon.v1.WatchService/WatchMesh", kInRoom},
     CallRow{"/osteon.v1.WatchService/LookFrom", kInRoom},
     CallRow{"/osteon.v1.WatchService/WatchCutting", kInRoom},
-    // Drawings and words reach everybody; what is not for them the stream leaves out.
+    // Annotations and messages reach everybody. The stream leaves out what a role may not receive.
     CallRow{"/osteon.v1.PeopleService/WatchPeople", kInRoom},
     CallRow{"/osteon.v1.PeopleService/Supervise", kInstructor},
     CallRow{"/osteon.v1.PeopleService/Annotate", kInstructor},
-    CallRow{"/osteon.v1.PeopleService/Say", kHands},
+    CallRow{"/osteon.v1.PeopleService/Say", kCutters},
     CallRow{"/osteon.v1.PeopleService/Demonstrate", kInstructor},
     CallRow{"/osteon.v1.PeopleService/EndDemonstration", kInstructor},
-    CallRow{"/osteon.v1.RoomsService/ListRooms", kOversight},
+    CallRow{"/osteon.v1.RoomsService/ListRooms", kSupervisors},
     CallRow{"/osteon.v1.RoomsService/CreateRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/CloseRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/ResumeRoom", kOperator},
-    CallRow{"/osteon.v1.RoomsService/BranchRoom", kOversight},
-    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kOversight},  // an instructor: what they made
-    CallRow{"/osteon.v1.RoomsService/VerifyRoom", kOversight},
+    CallRow{"/osteon.v1.RoomsService/BranchRoom", kSupervisors},
+    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kSupervisors},  // an instructor: only rooms that they made
+    CallRow{"/osteon.v1.RoomsService/VerifyRoom", kSupervisors},
     CallRow{"/osteon.v1.RoomsService/BackUpRoom", kOperator},
-    CallRow{"/osteon.v1.RoomsService/ReplayRoom", kOversight},
+    CallRow{"/osteon.v1.RoomsService/ReplayRoom", kSupervisors},
     CallRow{"/osteon.v1.CaseService/UploadCase", kOperator},
-    CallRow{"/osteon.v1.CaseService/ListCases", kOversight},
+    CallRow{"/osteon.v1.CaseService/ListCases", kSupervisors},
 };
 
 // In the order of the enumerations.
-constexpr std::array<RoleSet, kDatagrams> kCarried{kHands, kHands, kHands, kHands, kHands, kHands, kHands, kHands};
-constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kHands,     kInRoom,
+constexpr std::array<RoleSet, kDatagrams> kCarried{kCutters, kCutters, kCutters, kCutters,
+                                                   kCutters, kCutters, kCutters, kCutters};
+constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kCutters, kInRoom,
                                                          kInRoom, kInstructor, kInRoom, kInstructor};
-constexpr std::array<RoleSet, kRights> kGranted{kHands, kHands, kPartners, kInstructor};
+constexpr std::array<RoleSet, kRights> kGranted{kCutters, kCutters, kPartners, kInstructor};
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Which role may do what: the one table for calls, for the datagrams of a session, and for what streams carry. What is
-// not in it is refused.
+// Which role may do what. The one table for calls, datagrams of a session and contents of streams. Anything that is not
+// in the table is refused.
 #pragma once
 #include <cstdint>
 #include <initializer_list>
@@ -22,52 +22,52 @@ class RoleSet {
   std::uint32_t bits_ = 0;
 };
 
-// A call by its full name, as HTTP/2 has it in :path.
+// A call by its full name, as in :path of HTTP/2.
 struct CallRow {
   std::string_view method;
   RoleSet roles;
 };
 [[nodiscard]] std::span<const CallRow> call_rows();
-// Null for a call that the table does not know.
+// Null if the table does not contain the call.
 [[nodiscard]] const CallRow* find_call(std::string_view method);
 [[nodiscard]] bool may_call(Role role, std::string_view method);
 
-// What a session's packets carry, up and down: proto/osteon/v1/link.proto.
+// Contents of a session's packets, up and down: proto/osteon/v1/link.proto.
 enum class DatagramContent : std::uint8_t {
   cuts,
   tool_state,
   bone_push,
-  acknowledgements,  // what became of the client's own cuts
-  committed_cuts,    // of others
-  partners,          // others' tools
-  supervision,       // what was decided about the client
+  acknowledgements,  // decisions about the client's own cuts
+  committed_cuts,    // cuts of others
+  partners,          // tools of others
+  supervision,       // decisions about the client
   bone_seen,
 };
 inline constexpr int kDatagrams = 8;
-// As sender of what goes up, as hearer of what comes down.
+// Whether the role may send what goes up, or receive what comes down.
 [[nodiscard]] bool may_carry(Role role, DatagramContent kind);
 
-// What streams tell. Of what a role may not be told the stream goes on without it.
+// Contents of streams. A stream leaves out what the role may not receive.
 enum class StreamContent : std::uint8_t {
   surface,             // blocks of the bone
   tool_states,         // of everyone
-  scene,               // what stands on the bone, and what is drawn there
+  scene,               // items on the bone, and annotations
   field,               // leaves, committed cuts
-  people,              // who is there
-  own_supervision,     // what was decided about the reader
-  others_supervision,  // what was decided about others
-  own_words,           // said to all, to the reader or by the reader
-  others_words,        // said between others
+  people,              // presence
+  own_supervision,     // decisions about the reader
+  others_supervision,  // decisions about others
+  own_words,           // messages to all, to the reader or from the reader
+  others_words,        // messages between others
 };
 inline constexpr int kStreamContents = 9;
 [[nodiscard]] bool may_receive(Role role, StreamContent content);
 
-// What a call does that its name does not say.
+// Rights that the name of a call does not determine.
 enum class Right : std::uint8_t {
   hold_a_tool,   // join as a haptic client
   undo_own,      // events of the same person
-  undo_anyones,  // those of others too, and back to a mark, but not all that others did
-  undo_all,      // that too, and back to the imported bone
+  undo_anyones,  // also events of others, and back to a mark, but not all events of others at once
+  undo_all,      // also everything, back to the imported bone
 };
 inline constexpr int kRights = 4;
 [[nodiscard]] bool has_right(Role role, Right right);

@@ -18,7 +18,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 constexpr std::string_view kPrefix = "osteon1.";
-// Signed in front of the contents, so that the key's signature on anything else is none on a ticket.
+// Signed before the contents, so that the key's signature on other data is never valid for a ticket.
 constexpr std::string_view kPurpose = "osteon join ticket 1\n";
 constexpr int kBase64 = sodium_base64_VARIANT_URLSAFE_NO_PADDING;
 constexpr std::size_t kMostNameBytes = 255;
@@ -30,9 +30,9 @@ std::string to_base64(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-// The one text that stands for these bytes; nothing for any other.
+// Accepts only the one canonical text for these bytes. Nothing for any other text.
 std::optional<Bytes> from_base64(std::string_view text) {
-  if (text.empty()) return {};  // no ticket has an empty part, and an empty vector no memory to write to
+  if (text.empty()) return {};  // no ticket has an empty part, and an empty vector has no memory to write to
   Bytes bytes(text.size());
   std::size_t size = 0;
   const char* end = nullptr;
@@ -40,12 +40,12 @@ std::optional<Bytes> from_base64(std::string_view text) {
       end != text.data() + text.size())
     return {};
   bytes.resize(size);
-  // The library reads some bytes that are no letters of base64 as if they were.
+  // The library accepts some characters that are not base64.
   if (to_base64(bytes) != text) return {};
   return bytes;
 }
 
-// id, expiry (8 bytes, little endian), role, then each name behind its length.
+// id, expiry (8 bytes, little endian), role, then each name after its length.
 Bytes contents_of(const Ticket& ticket) {
   Bytes bytes(ticket.id.begin(), ticket.id.end());
   const auto seconds = static_cast<std::uint64_t>(ticket.expires.time_since_epoch().count());
@@ -70,7 +70,7 @@ std::optional<Ticket> parse_contents(std::span<const std::uint8_t> bytes) {
   bytes = bytes.subspan(ticket.id.size());
   std::uint64_t seconds = 0;
   for (std::size_t i = 0; i < 8; ++i) seconds |= static_cast<std::uint64_t>(bytes[i]) << (8 * i);
-  // The year 9999 is far enough, and its seconds fit everywhere.
+  // The year 9999 is late enough, and its seconds fit into every type.
   if (seconds > 253'402'300'799) return {};
   ticket.expires = UnixTime{std::chrono::seconds(seconds)};
   if (bytes[8] == 0 || bytes[8] >= kRoles) return {};
@@ -211,7 +211,7 @@ Result<Ticket> open_ticket(std::string_view text, const TicketCheckKey& key) {
   const auto contents = from_base64(text.substr(0, dot)), signature = from_base64(text.substr(dot + 1));
   if (!contents || !signature || signature->size() != crypto_sign_BYTES)
     return no_ticket("it is not base64 of the right length");
-  // Nothing of the contents is looked at before they are known to be the signer's.
+  // The contents must not be read before the signature is verified.
   const Bytes said = signed_bytes(*contents);
   if (crypto_sign_verify_detached(signature->data(), said.data(), said.size(), key.bytes.data()) != 0)
     return failure(ErrorCode::invalid_input,
@@ -230,8 +230,8 @@ Result<void> check_life(const Ticket& ticket, UnixTime now, std::chrono::hours m
   constexpr std::chrono::minutes kClocksDiffer{1};
   if (most == std::chrono::hours(0) || ticket.expires <= now + most + kClocksDiffer) return {};
   const auto left = std::chrono::ceil<std::chrono::hours>(ticket.expires - now);
-  return failure(ErrorCode::unavailable, "the ticket is good for " + std::to_string(left.count()) +
-                                             " more hours, and this server takes none for more than " +
+  return failure(ErrorCode::unavailable, "the ticket is valid for " + std::to_string(left.count()) +
+                                             " more hours, but this server accepts at most " +
                                              std::to_string(most.count()) + "; ask for a shorter one");
 }
 

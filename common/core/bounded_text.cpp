@@ -5,7 +5,7 @@
 namespace osteon {
 namespace {
 
-// "Input/output error" says the system, "disk I/O error" SQLite: no paths.
+// Error texts with a slash that are not paths: "Input/output error" of the system, "disk I/O error" of SQLite.
 bool is_of_an_error_text(std::string_view word) { return word == "Input/output" || word == "I/O"; }
 
 }  // namespace
@@ -20,7 +20,7 @@ std::string bounded_text(std::string_view text, std::size_t most) {
   std::string bounded(text.substr(0, size));
   for (char& c : bounded)
     if (static_cast<unsigned char>(c) < 0x20u || c == 0x7f) c = ' ';
-  // C1 control characters, as UTF-8 has them: U+0080 to U+009F.
+  // C1 control characters in UTF-8: U+0080 to U+009F.
   for (std::size_t i = 0; i + 1 < bounded.size(); ++i)
     if (bounded[i] == '\xc2' && static_cast<unsigned char>(bounded[i + 1]) < 0xa0u) bounded[i] = bounded[i + 1] = ' ';
   return size < text.size() ? bounded + " ..." : bounded;
@@ -32,7 +32,7 @@ std::string without_paths(std::string_view text) {
   while (!text.empty()) {
     const std::size_t size = std::min(text.find_first_of(kAround), text.size());
     std::string_view word = text.substr(0, size);
-    // What ends in a slash is a folder.
+    // A word that ends in a slash is a folder.
     while (word.size() > 1 && word.ends_with('/')) word.remove_suffix(1);
     if (!is_of_an_error_text(word)) word.remove_prefix(std::min(word.rfind('/') + 1, word.size()));
     kept += word.substr(0, word.find(kPartial));

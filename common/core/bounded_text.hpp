@@ -1,4 +1,4 @@
-// Text on its way to people: into an error, a log line, a status.
+// Makes text safe to show: in an error, a log line or a status.
 #pragma once
 #include <cstddef>
 #include <string>
@@ -8,12 +8,12 @@ namespace osteon {
 
 inline constexpr std::size_t kMostErrorBytes = 4096;
 
-// The text with a space for each control character, so that it stays one line and does nothing to a terminal. What is
-// longer than `most` bytes ends in " ...", and no letter of UTF-8 is cut in halves.
+// The text with a space for each control character. So it stays one line and does nothing to a terminal. A text longer
+// than `most` bytes ends in " ...", and no UTF-8 character is split.
 [[nodiscard]] std::string bounded_text(std::string_view text, std::size_t most = kMostErrorBytes);
 
-// The text for people elsewhere: of each path its last name alone, and no process id of a file that is being written.
-// What is between two spaces and has a slash is taken for a path.
+// The text for people elsewhere. Each path is reduced to its last name, and the process id in the name of a file being
+// written is removed. A word between spaces that has a slash counts as a path.
 [[nodiscard]] std::string without_paths(std::string_view text);
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// A promise between our own functions. Always on: a broken one prints where and aborts.
+// Checks a contract between our own functions. Always on. A violation prints its position and aborts.
 #pragma once
 
 namespace osteon::core {

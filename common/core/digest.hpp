@@ -1,4 +1,4 @@
-// SHA-256, the name of cases, tools and field states.
+// SHA-256, which names cases, tools and field states.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -21,7 +21,7 @@ struct Digest {
 [[nodiscard]] std::string to_hex(const Digest& digest);
 [[nodiscard]] Result<Digest> digest_from_hex(std::string_view hex);
 
-// Feeds bytes in order; integers little endian, floats by their bit pattern, strings with their length.
+// Hashes data in order. Integers are little endian, floats are their bit pattern, strings include their length.
 class Hasher {
  public:
   Hasher();
@@ -29,7 +29,7 @@ class Hasher {
   void integer(std::uint64_t value);
   void number(double value);
   void text(std::string_view value);
-  [[nodiscard]] Digest finish();  // once; afterwards the hasher is spent
+  [[nodiscard]] Digest finish();  // call once, last
 
  private:
   alignas(16) std::array<std::byte, 128> state_;  // crypto_hash_sha256_state

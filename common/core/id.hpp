@@ -1,4 +1,4 @@
-// Distinct integer identifiers, null when zero, so that an author is never passed where a body is meant.
+// Distinct types for identifiers, null when zero. So an author is never passed where a body is meant.
 #pragma once
 #include <compare>
 #include <cstdint>
@@ -13,7 +13,7 @@ struct Id {
 };
 
 using AuthorId = Id<struct AuthorTag>;  // given by the server at every join, never reused
-using RoomSeq = Id<struct RoomSeqTag>;  // position in the room's total order; 0 is the imported bone
+using RoomSeq = Id<struct RoomSeqTag>;  // sequence number of an event in its room; 0 is the imported bone
 
 // A body's number within its room; 0 is the case's bone, so there is no null body.
 struct BodyId {

@@ -1,4 +1,4 @@
-// What a function returns when the world (file, network, device, configuration) can make it fail.
+// Return type of a function that can fail because of a file, network, device or configuration.
 #pragma once
 #include <string>
 #include <tl/expected.hpp>
@@ -10,14 +10,14 @@ enum class ErrorCode {
   not_found,      // a file, case, server or device is not there
   unsupported,    // well-formed, but of a version or kind that this program does not know
   unavailable,    // a peer or device does not answer now; trying again may help
-  cancelled,      // the user asked to stop
+  cancelled,      // the caller may not do this here
   denied,         // the caller may not do that here
   exhausted,      // more than a quota allows
-  exists,         // it is already there, or in use by another
-  internal,       // a library failed in a way that the user cannot mend
+  exists,         // it already exists, or another uses it
+  internal,       // a library failed in a way that the user cannot fix
 };
 
-// One sentence for a person: it names the file, the field and the remedy.
+// One sentence for a person. It names the file, the field and the remedy.
 struct Error {
   ErrorCode code = ErrorCode::internal;
   std::string message;

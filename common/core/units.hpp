@@ -1,5 +1,5 @@
-// Quantities of the design's units as types, so that a depth is never passed where a force is meant.
-// Inside loops plain doubles are used whose names end in the unit.
+// Types for physical quantities, so that a depth is never passed where a force is meant. Inner loops use plain doubles
+// whose names end in the unit.
 #pragma once
 #include <compare>
 

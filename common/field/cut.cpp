@@ -13,7 +13,7 @@ QuantisedPose quantise(const Pose& pose_bone_tool) {
   for (int i = 0; i < 3; ++i)
     quantised.position[static_cast<std::size_t>(i)] =
         static_cast<std::int32_t>(std::lround(pose_bone_tool.position_mm[i] / kQuantum_mm));
-  // q and −q are one rotation: w ≥ 0 keeps equal poses equal in bytes.
+  // q and −q are the same rotation. With w ≥ 0, equal poses have equal bytes.
   const double sign = pose_bone_tool.rotation.w() < 0.0 ? -1.0 : 1.0;
   const Eigen::Vector4d xyzw = sign * pose_bone_tool.rotation.normalized().coeffs();
   for (int i = 0; i < 4; ++i)

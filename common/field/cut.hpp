@@ -1,4 +1,5 @@
-// A cut: the one thing that changes a bone. Integers only, so that every program evaluates the same bytes.
+// A cut, which is the only way to remove bone with a tool. It consists of integers, so that every program evaluates the
+// same bytes.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,8 +11,8 @@
 
 namespace osteon {
 
-// pose_bone_tool in integers: position in kQuantum_mm, rotation as a quaternion (x, y, z, w) scaled by 32767.
-// The kernel renormalises the quaternion, so it need not be exactly unit.
+// pose_bone_tool in integers: position in kQuantum_mm, rotation as a quaternion (x, y, z, w) scaled by 32767. The
+// kernel renormalises the quaternion, so its length need not be exactly one.
 struct QuantisedPose {
   std::array<std::int32_t, 3> position{};
   std::array<std::int16_t, 4> rotation{0, 0, 0, 32767};
@@ -26,11 +27,11 @@ struct Cut {
   std::uint64_t author_seq = 0;  // 1, 2, 3, … for each author
   std::uint64_t lease_epoch = 0;
   BodyId body;
-  Digest tool;  // hash of the tool's definition, which names the body that cuts
+  Digest tool;  // hash of the tool's definition, which defines the cutting body
   int level = 0;
-  std::vector<QuantisedPose> path;  // at least one pose; the first is the previous cut's last
+  std::vector<QuantisedPose> path;  // at least one pose; the first is the last pose of the previous cut
   std::uint32_t spindle_rpm = 0;
-  std::uint32_t path_us = 0;  // time in which the tool went this way
+  std::uint32_t path_us = 0;  // duration of this motion
   friend bool operator==(const Cut&, const Cut&) = default;
 };
 

@@ -1,7 +1,7 @@
-// The replicated arithmetic. Everything here must give the same bytes on every compiler and processor: only + − × ÷
-// and square roots (correctly rounded by IEEE 754), comparisons, and conversions of in-range numbers to integers.
-// The loops over samples are written once (kernel_rows.inl) for registers of 4, 8 and 16 floats; the processor's widest
-// is chosen when the program runs, and each gives the same bytes.
+// The replicated arithmetic. Everything here must give the same bytes on every compiler and processor. It uses only + −
+// × ÷ and square roots (correctly rounded by IEEE 754), comparisons, and conversions of in-range numbers to integers.
+// The loops over samples are written once (kernel_rows.inl) for registers of 4, 8 and 16 floats. At run time the widest
+// that the processor has is chosen. Each width gives the same bytes.
 #include "common/field/kernel.hpp"
 
 #include <algorithm>
@@ -111,7 +111,7 @@ Rotation normalised(double x, double y, double z, double w) {
   return {x / length, y / length, z / length, w / length};
 }
 
-// Columns of the rotation matrix: where the tool's x, y and z point.
+// Columns of the rotation matrix: the directions of the tool's x, y and z.
 void columns(const Rotation& q, double turn[3][3]) {
   turn[0][0] = 1.0 - 2.0 * (q.y * q.y + q.z * q.z);
   turn[0][1] = 2.0 * (q.x * q.y + q.w * q.z);
@@ -128,7 +128,7 @@ double length_of(const double v[3]) { return root(v[0] * v[0] + v[1] * v[1] + v[
 double dot_of(const double a[3], const double b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 double mm(std::int32_t quanta) { return quanta * kQuantum_mm; }
 
-// Farthest that any point of the body is from the tip.
+// Largest distance of any point of the body from the tip.
 double reach_of(const CutBody& body) {
   double farthest = 0.0;
   if (body.kind == CutKind::turned) {
@@ -143,7 +143,7 @@ double reach_of(const CutBody& body) {
   return root(farthest);
 }
 
-// An outline with an edge that faces the axis: not convex once it is turned.
+// Whether the outline has an edge that faces the axis. Then the body is not convex when turned.
 bool is_ring(const CutBody& body) {
   for (std::size_t i = 0; i < body.profile.size(); ++i) {
     const ProfileCorner& a = body.profile[i];
@@ -155,13 +155,13 @@ bool is_ring(const CutBody& body) {
 
 void add_edge(std::vector<OutlineEdge>& edges, double r0, double s0, double r1, double s1) {
   const double dr = r1 - r0, ds = s1 - s0, length = root(dr * dr + ds * ds);
-  if (!(length > 0.0) || (r0 == 0.0 && r1 == 0.0)) return;  // what lies on the axis bounds nothing
+  if (!(length > 0.0) || (r0 == 0.0 && r1 == 0.0)) return;  // an edge on the axis bounds nothing
   const auto f = [](double x) { return static_cast<float>(x); };
   edges.push_back({f(r0), f(s0), f(dr / length), f(ds / length), f(length)});
 }
 
-// The outline when the body moves along its axis from `down` ≤ 0 to `up` ≥ 0: edges that face forwards move up, those
-// that face backwards move down, and what is between them grows.
+// The outline when the body moves along its axis from `down` ≤ 0 to `up` ≥ 0. Edges that face forwards move up, edges
+// that face backwards move down, and the part between them stretches.
 void add_outline(std::vector<OutlineEdge>& edges, const std::vector<ProfileCorner>& profile, double down, double up) {
   std::array<std::array<double, 2>, 2 * kMostProfileCorners> corners;
   std::size_t count = 0;
@@ -180,7 +180,7 @@ void add_outline(std::vector<OutlineEdge>& edges, const std::vector<ProfileCorne
   }
 }
 
-// Leaves (in units of leaves) that a sweep with its band may touch.
+// Range of leaves (in units of leaves) that a sweep with its band may touch.
 struct LeafRange {
   std::int32_t lowest[3], highest[3];
   [[nodiscard]] bool has(const std::int32_t at[3]) const {
@@ -200,14 +200,15 @@ LeafRange range_of(const ToolSweep& sweep, double pitch) {
   return range;
 }
 
-// The sweep at a leaf, by the distance of its middle.
+// A sweep and its distance from the middle of a leaf.
 struct Candidate {
   std::uint32_t sweep;
   float middle_mm;
 };
 
-// Distances change at most as fast as the place, so the distance at a leaf's middle bounds those of its samples: a
-// sweep farther than the band changes none, and one that is everywhere farther than another adds nothing to it.
+// A distance changes at most as fast as the position. So the distance at a leaf's middle bounds the distances at its
+// samples. A sweep farther than the band changes no sample. A sweep that is everywhere farther than another changes
+// nothing either.
 void plan_leaf(CutPlan& plan, Coord origin, std::span<const Candidate> candidates, float radius, float band) {
   float farthest = band;
   for (const Candidate& c : candidates) farthest = std::min(farthest, c.middle_mm + radius);
@@ -235,13 +236,13 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
   OSTEON_CHECK(body.profile.size() <= kMostProfileCorners && body.planes.size() <= kMostHullPlanes);
   const double quarter = 0.25 * level_pitch_mm_;
   const double reach = reach_of(body);
-  // The middle of a leaf is half of seven pitches from its outermost samples.
+  // The middle of a leaf is 3.5 pitches from its outermost samples along each axis.
   double slack = 0.001;
   if (body.kind == CutKind::turned) slack += 0.06 * level_pitch_mm_;
   if (body.kind == CutKind::sampled) {
     OSTEON_CHECK(sampled_ != nullptr && sampled_->box.dims().x > 1 && sampled_->box.dims().y > 1 &&
                  sampled_->box.dims().z > 1);
-    // Between samples the distance is off by less than a cell's diagonal.
+    // Between samples the error of the distance is less than a cell's diagonal.
     slack += 1.75 * mm(sampled_->pitch);
     const Coord last = sampled_->box.dims() - Coord{1, 1, 1};
     std::int32_t least = INT16_MAX;
@@ -281,9 +282,9 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
     turn_at(1.0, last_turn);
     for (int k = 0; k < 3; ++k) tilt[k] = last_turn[2][k] - first_turn[2][k];
 
-    // A turn is cut at sub-poses between which no point of the cutting part moves by more than a quarter pitch. Half
-    // the angle is the chord between the quaternions, to second order; a turned body's spin moves none of its points. A
-    // ball's centre runs on an arc, replaced by chords that leave it by less than a 32nd of a pitch.
+    // A rotation is cut at sub-poses between which no point of the cutting part moves by more than a quarter pitch.
+    // Half the angle is the chord between the quaternions, to second order. Spin of a turned body about its axis moves
+    // none of its points. A ball's centre moves on an arc, which chords replace with an error below 1/32 pitch.
     int parts = 1;
     if (body.kind == CutKind::ball) {
       parts += static_cast<int>(length_of(tilt) * root(4.0 * mm(body.radius) / level_pitch_mm_));
@@ -293,7 +294,7 @@ SweptTool::SweptTool(const Cut& cut, const CutBody& body, double pitch_mm)
       parts += static_cast<int>(2.0 * root(dx * dx + dy * dy + dz * dz + dw * dw) * reach / quarter);
     }
     if (body.kind == CutKind::sampled) {
-      // Translations by sub-poses too, both ends among them.
+      // Translations are split into sub-poses too, including both ends.
       parts += static_cast<int>(length_of(way) / quarter);
       const bool still = from[0] == to[0] && from[1] == to[1] && from[2] == to[2] && parts == 1;
       for (int part = i > 0 ? 1 : 0; part <= (still ? 0 : parts); ++part) {
@@ -346,7 +347,7 @@ void SweptTool::add_ball(const double from[3], const double to[3]) {
     sweep.min_mm[k] = std::min(from[k], to[k]) - static_cast<double>(sweep.radius);
     sweep.max_mm[k] = std::max(from[k], to[k]) + static_cast<double>(sweep.radius);
   }
-  // Below half a quantum there is no motion, and a division would lose its digits.
+  // Motion below half a quantum counts as none, because a division would lose its digits.
   const double square = dot_of(motion, motion);
   sweep.inverse_square = square > 0.25 * kQuantum_mm * kQuantum_mm ? static_cast<float>(1.0 / square) : 0.0f;
 }
@@ -357,14 +358,14 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
   const double along = dot_of(motion, axis);
   for (int k = 0; k < 3; ++k) across[k] = motion[k] - along * axis[k];
   const double sideways = length_of(across);
-  // A hand that moves straight, along or across, leaves that line only by the rounding of its poses. Then half of that
-  // rounding is put on the start.
+  // A tool that moves straight, along or across, leaves that line only by the rounding of its poses. Then half of that
+  // rounding is added to the start.
   const bool is_axial = sideways <= 2.0 * kQuantum_mm;
   const bool is_across = !is_axial && std::abs(along) <= 2.0 * kQuantum_mm;
   if (!is_axial && is_ring(body)) {
     const int steps = 1 + static_cast<int>(sideways / (0.25 * level_pitch_mm_));
     for (int step = 0; step < steps; ++step) {
-      // Each step moves along the axis, at the middle of its part of the way across.
+      // Each step moves along the axis, at the middle of its part of the motion across.
       const double t0 = static_cast<double>(step) / steps, t1 = static_cast<double>(step + 1) / steps,
                    middle = 0.5 * (t0 + t1);
       double start[3], end[3];
@@ -381,7 +382,7 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
   sweep.kind = is_axial ? SweepKind::axial : is_across ? SweepKind::across : SweepKind::oblique;
   double u[3], v[3];
   if (is_axial) {
-    // Any direction across: from the coordinate axis that is most across.
+    // Any direction across the axis, derived from the coordinate axis that is most perpendicular to it.
     const double x = std::abs(axis[0]), y = std::abs(axis[1]), z = std::abs(axis[2]);
     const int most = x <= y && x <= z ? 0 : y <= z ? 1 : 2;
     for (int k = 0; k < 3; ++k) u[k] = (k == most ? 1.0 : 0.0) - axis[most] * axis[k];
@@ -399,7 +400,7 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
     sweep.u[k] = static_cast<float>(u[k]);
     sweep.v[k] = static_cast<float>(v[k]);
     const double top = mm(body.highest[2]) * axis[k], bottom = mm(body.lowest[2]) * axis[k];
-    // A disc across the axis reaches this far in each direction.
+    // A disc perpendicular to the axis extends this far in each direction.
     const double disc = mm(body.highest[0]) * root(std::max(0.0, 1.0 - axis[k] * axis[k])) + 2.0 * kQuantum_mm;
     sweep.min_mm[k] = std::min(from[k], to[k]) + std::min(top, bottom) - disc;
     sweep.max_mm[k] = std::max(from[k], to[k]) + std::max(top, bottom) + disc;
@@ -418,7 +419,7 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
       ++sweep.search_steps;
     }
   }
-  // All that do not stretch share one outline.
+  // All sweeps that do not stretch share one outline.
   if (!is_axial && !sweeps_.empty() && sweeps_.back().kind != SweepKind::axial) {
     sweep.first = sweeps_.back().first;
     sweep.count = sweeps_.back().count;
@@ -431,9 +432,9 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
   sweeps_.push_back(sweep);
 }
 
-// p is in the swept hull when some t in [0, 1] has n_i · (p − t m) ≤ d_i for all i. Eliminating t (Fourier and Motzkin)
-// leaves: planes that face against the motion as they are, planes that face along it moved with it, and for each pair
-// of the two kinds the plane through their common direction along m.
+// p is in the swept hull if some t in [0, 1] has n_i · (p − t m) ≤ d_i for all i. Eliminating t (Fourier and Motzkin)
+// gives three kinds of planes. Planes that face against the motion stay. Planes that face along it move with it. Each
+// pair of the two kinds gives the plane through their common direction along m.
 void SweptTool::add_hull(const CutBody& body, const double from[3], const double to[3], const double turn[3][3]) {
   ToolSweep sweep{};
   sweep.kind = SweepKind::hull;
@@ -442,7 +443,7 @@ void SweptTool::add_hull(const CutBody& body, const double from[3], const double
   for (int k = 0; k < 3; ++k) motion[k] = to[k] - from[k];
 
   struct Plane {
-    double normal[3], offset, advance;  // how far the motion goes along the normal
+    double normal[3], offset, advance;  // advance of the motion along the normal
   };
   std::array<Plane, kMostHullPlanes> planes;
   const std::size_t count = body.planes.size();
@@ -470,7 +471,7 @@ void SweptTool::add_hull(const CutBody& body, const double from[3], const double
       double normal[3];
       for (int k = 0; k < 3; ++k) normal[k] = ahead.advance * behind.normal[k] - behind.advance * ahead.normal[k];
       const double length = length_of(normal);
-      // Opposite planes, as the two faces of a blade, say nothing together.
+      // Opposite planes, such as the two faces of a blade, give no condition together.
       if (length <= 0.001 * (ahead.advance - behind.advance)) continue;
       const double offset = (ahead.advance * behind.offset - behind.advance * ahead.offset) / length;
       for (int k = 0; k < 3; ++k) normal[k] = normal[k] / length;
@@ -530,7 +531,7 @@ CutPlan SweptTool::plan() const {
   plan.visited = static_cast<std::int64_t>(all.highest[0] - all.lowest[0] + 1) * (all.highest[1] - all.lowest[1] + 1) *
                  static_cast<std::int64_t>(in_line);
 
-  // Leaves line by line along z, so that a line's middles are evaluated together.
+  // Leaves are processed line by line along z, so that the middles of a line are evaluated together.
   std::vector<std::uint32_t> crossing;
   std::vector<float> middles;
   std::vector<Candidate> candidates;
@@ -606,7 +607,7 @@ LeafChange SweptTool::cut_leaf(const CutPlan& plan, const CutPlan::Leaf& leaf,
     }
     return change;
   }
-  // What is nowhere below the leaf's highest value cannot change it.
+  // A sweep that is nowhere below the leaf's highest value cannot change the leaf.
   const float enough = rows().highest(values.data());
   alignas(64) float distances[kLeafVoxels];
   const Body body = shape();

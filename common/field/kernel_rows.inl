@@ -1,5 +1,5 @@
-// Part of kernel.cpp, which includes it once for each width of the processor's registers: kLanes samples at a time.
-// Each lane does the same operations in the same order for every width.
+// A part of kernel.cpp, which includes it once for each register width: kLanes samples at a time. For every width, each
+// lane does the same operations in the same order.
 
 typedef float Row __attribute__((vector_size(kLanes * 4)));
 typedef std::int32_t RowInt __attribute__((vector_size(kLanes * 4)));
@@ -8,7 +8,7 @@ OSTEON_INLINE Row splat(float x) { return x - Row{}; }
 OSTEON_INLINE RowInt trunc_to_int(Row x) { return __builtin_convertvector(x, RowInt); }
 
 #if OSTEON_LANES == 16
-// Masked with all lanes: gcc 12 warns of the plain forms' own undefined operand.
+// Masked with all lanes, because gcc 12 warns about an undefined operand inside the plain forms.
 OSTEON_INLINE Row root(Row x) { return _mm512_maskz_sqrt_ps(0xffff, x); }
 OSTEON_INLINE Row low(Row a, Row b) { return _mm512_maskz_min_ps(0xffff, b, a); }   // b < a ? b : a
 OSTEON_INLINE Row high(Row a, Row b) { return _mm512_maskz_max_ps(0xffff, b, a); }  // a < b ? b : a
@@ -53,15 +53,15 @@ OSTEON_INLINE void store(float* to, Row x) { std::memcpy(to, &x, sizeof x); }
 OSTEON_INLINE Row clamp(Row x, float lowest, float highest) { return low(high(x, splat(lowest)), splat(highest)); }
 OSTEON_INLINE Row dot(Row x, Row y, Row z, const float* a) { return (x * a[0] + y * a[1]) + z * a[2]; }
 
-// Distance to a capsule: the ball at the foot of the point on the path of its centre.
+// Distance to a capsule: the ball at the point of the centre's path that is nearest to the sample.
 OSTEON_INLINE Row ball_distance(const ToolSweep& s, Row px, Row py, Row pz) {
   const Row t = clamp(dot(px, py, pz, s.motion_mm) * s.inverse_square, 0.0f, 1.0f);
   const Row x = px - t * s.motion_mm[0], y = py - t * s.motion_mm[1], z = pz - t * s.motion_mm[2];
   return root((x * x + y * y) + z * z) - s.radius;
 }
 
-// Distance to a convex outline at distance r from the axis and place s along it. Inside, the nearest line bounds it;
-// outside, the nearest edge does.
+// Distance to a convex outline at distance r from the axis and position s along it. Inside, the nearest line determines
+// it; outside, the nearest edge.
 OSTEON_INLINE Row outline_distance(const OutlineEdge* edges, std::uint32_t count, Row r, Row s) {
   Row inside = splat(-1e9f), outside = splat(1e18f);
   for (std::uint32_t i = 0; i < count; ++i) {
@@ -75,7 +75,7 @@ OSTEON_INLINE Row outline_distance(const OutlineEdge* edges, std::uint32_t count
   return inside > 0.0f ? root(outside) : inside;
 }
 
-// What of a turned body matters in a leaf.
+// The edges of a turned body that matter in a leaf.
 struct Turned {
   OutlineEdge edges[kMostOutlineEdges];
   std::uint32_t count;
@@ -87,8 +87,8 @@ OSTEON_INLINE Row turned_distance(const ToolSweep& s, const Turned& turned, Row 
   const Row r = root(square);
   Row distance = outline_distance(turned.edges, turned.count, r, along);
   if (kDome) {
-    // The ball's centre moves with the sweep, so along the axis it is a capsule. Where a ball and an outline miss each
-    // other they must not meet when stretched: nothing is wider than the body.
+    // The ball's centre moves with the sweep, so along the axis the ball is a capsule. If a ball and an outline do not
+    // meet, they must not meet when stretched: nothing may be wider than the body.
     const Row centre = along + s.dome;
     const Row up = centre - clamp(centre, s.down_mm, s.up_mm);
     distance = high(high(distance, root(square + up * up) - s.dome), r - s.radius);
@@ -108,8 +108,8 @@ OSTEON_INLINE Row across_distance(const ToolSweep& s, const Turned& turned, Row 
                                 dot(px, py, pz, s.axis));
 }
 
-// Samples where even the nearest pose is at least `enough` away, or the middle one deeper than the band, need no
-// search.
+// No search is needed if even the nearest pose is at least `enough` away from the sample, or if the sample is deeper
+// than the band in the middle pose.
 template <bool kDome>
 OSTEON_INLINE Row oblique_distance(const ToolSweep& s, const Turned& turned, Row px, Row py, Row pz, float enough,
                                    float band) {
@@ -118,7 +118,7 @@ OSTEON_INLINE Row oblique_distance(const ToolSweep& s, const Turned& turned, Row
     return turned_distance<kDome>(s, turned, u - t * s.across_mm, v, w - t * s.along_mm);
   };
   Row best = at(splat(0.5f));
-  // Distances change at most as fast as the pose moves: half the way from the middle.
+  // A distance changes at most as fast as the pose moves: half the motion, from the middle.
   const RowInt wanted = (best + band > 0.0f) & (best < splat(enough + 0.5f * s.length_mm + 0.001f));
   if (!any_below(splat(0.0f), wanted ? splat(1.0f) : splat(0.0f))) return best;
   constexpr float kGolden = 0.61803399f;
@@ -152,8 +152,9 @@ OSTEON_INLINE Row hull_distance(const SweptPlane* planes, std::uint32_t count, R
   return distance;
 }
 
-// Trilinear in the lattice. Outside its box: at least what the nearest point of the box has, and at least the way to
-// the box and the least that its faces have; both grow no faster than the distance itself.
+// Trilinear in the lattice. Outside its box, the distance is at least the value at the nearest point of the box. It is
+// also at least the distance to the box plus the smallest value on its faces. Neither bound grows faster than the
+// distance itself.
 OSTEON_INLINE Row sampled_distance(const ToolSweep& s, const SweptTool::Body& body, Row px, Row py, Row pz) {
   const SampledDistance& lattice = *body.sampled;
   const Coord dims = lattice.box.dims();
@@ -192,7 +193,7 @@ OSTEON_INLINE Row sampled_distance(const ToolSweep& s, const SweptTool::Body& bo
   return square > 0.0f ? high(inside, root(square) + body.sampled_outside) : inside;
 }
 
-// Distances of a sweep at points given one by one.
+// Distances of a sweep at separate points.
 inline Row distance_at(const ToolSweep& s, const SweptTool::Body& body, Row px, Row py, Row pz) {
   switch (s.kind) {
     case SweepKind::ball:
@@ -248,21 +249,22 @@ float highest(const float* values) {
   return *std::max_element(lanes, lanes + kLanes);
 }
 
-// Places of a leaf's samples from a sweep's start.
+// Positions of a leaf's samples relative to a sweep's start.
 struct LeafPlaces {
   float x[kLeafSize], y[kLeafSize], z[kLeafSize];
 };
 
-// Half of the way between the outermost samples of a bar of two rows (1 x 2 x 8 samples), in pitches.
+// Half the distance between the outermost samples of a bar of two rows of samples (1 x 2 x 8 samples), in pitches.
 constexpr float kBarRadius = 3.5356f;
 constexpr int kBars = kLeafVoxels / (2 * kLeafSize);
 
-// What a bar is spared by: its distance at the middle is known, and it can change by no more than `radius` within.
+// Limits by which a bar can be skipped. The distance at its middle is known, and it changes by at most `radius` in the
+// bar.
 struct Spare {
   float radius, enough, band;
 };
 
-// Evaluates bars of two rows. `middle` is the same distance, exact also where `distance` spares itself a search.
+// Evaluates bars of two rows of samples. `middle` is the same distance, but exact also where `distance` skips a search.
 template <class Distance, class Middle>
 OSTEON_INLINE void each_bar(const LeafPlaces& at, bool first, const Spare& spare, float* distances, Distance distance,
                             Middle middle) {
@@ -317,8 +319,8 @@ OSTEON_INLINE void each_row(const LeafPlaces& at, bool first, float* distances, 
   }
 }
 
-// Edges that can be the nearest somewhere in the leaf: those whose distance from its middle is not beyond that of the
-// nearest by twice the leaf's radius (and the way that the tool moves).
+// Edges that can be the nearest somewhere in the leaf. Their distance from its middle exceeds that of the nearest edge
+// by at most twice the leaf's radius (plus the tool's motion).
 Turned near_edges(const ToolSweep& s, const SweptTool::Body& body, const LeafPlaces& at, float radius) {
   const float px = 0.5f * (at.x[3] + at.x[4]), py = 0.5f * (at.y[3] + at.y[4]), pz = 0.5f * (at.z[3] + at.z[4]);
   const auto along = [&](const float* a) { return (px * a[0] + py * a[1]) + pz * a[2]; };
@@ -392,11 +394,11 @@ void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, dou
     at.y[i] = static_cast<float>((origin.y + i) * pitch - s.start_mm[1]);
     at.z[i] = static_cast<float>((origin.z + i) * pitch - s.start_mm[2]);
   }
-  // From a leaf's radius to a bar's: what is left of it is room for rounding and search.
+  // From a leaf's radius to a bar's. The remainder is the margin for rounding and search.
   const Spare spare{radius + (kBarRadius - 6.0621778f) * static_cast<float>(pitch), enough, band};
   if (s.kind == SweepKind::ball) {
-    // A copy: a compiler that knows that nothing written can be part of it keeps it in registers. A ball's distance
-    // costs no more than sparing it.
+    // A copy, so that the compiler knows that no store changes it, and keeps it in registers. For a ball, computing the
+    // distance costs no more than testing whether it can be skipped.
     const ToolSweep ball = s;
     each_row(at, first, distances,
              [&](Row x, Row y, Row z) OSTEON_INLINE_LAMBDA { return ball_distance(ball, x, y, z); });
@@ -415,7 +417,7 @@ void evaluate(const ToolSweep& s, const SweptTool::Body& body, Coord origin, dou
   }
 }
 
-// values = min(values, distances), clipped and rounded to the nearest quantum, halves away from zero; + 0.0f turns −0
+// values = min(values, distances), clipped and rounded to the nearest quantum, halves away from zero. + 0.0f turns −0
 // into 0.
 LeafChange take_lower(const float* distances, float band, float* values) {
   int modified = 0;

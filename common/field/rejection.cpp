@@ -9,13 +9,13 @@ std::string_view sentence(Rejection reason) {
     case Rejection::body:
       return "the room has no such body";
     case Rejection::lease:
-      return "the cut was made under a tool lease that is over";
+      return "the cut was made under a tool lease that has ended";
     case Rejection::tool:
       return "the tool is not registered in the room, or does not cut";
     case Rejection::level:
       return "the level is finer than the tool or the case allows";
     case Rejection::path:
-      return "the path has no knots or more than a cut may have";
+      return "the path has no poses or more than a cut may have";
     case Rejection::rotation:
       return "a rotation on the path is not a unit quaternion";
     case Rejection::place:
@@ -29,17 +29,17 @@ std::string_view sentence(Rejection reason) {
     case Rejection::rate:
       return "the tool sweeps more than the room can follow";
     case Rejection::power:
-      return "the tool takes more bone than any motor can";
+      return "the tool removes more bone than any motor can";
     case Rejection::frozen:
-      return "an instructor has stopped this hand";
+      return "an instructor has stopped this person";
     case Rejection::taken:
-      return "an instructor holds this hand's tool";
+      return "an instructor has taken over this person's tool";
     case Rejection::forbidden_tool:
-      return "an instructor lets this hand cut with other tools only";
+      return "an instructor allows this person only other tools";
     case Rejection::zone:
-      return "an instructor lets this hand cut in another place only";
+      return "an instructor allows this person to cut only in another place";
     case Rejection::metal:
-      return "the cut would take metal away";
+      return "the cut would remove metal";
   }
   return "the reason is unknown";
 }

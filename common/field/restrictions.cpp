@@ -11,8 +11,8 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& why) {
 
 }  // namespace
 
-// Steps fit 32 bits, so their differences fit 33 and the squares of these, added up, wrap 64 only beyond any radius:
-// sorted out first.
+// Steps have 32 bits, so their differences have 33, and the sum of their squares could overflow 64. This happens only
+// far beyond any radius, so large differences are rejected first.
 bool ZoneLimit::contains(const std::array<std::int32_t, 3>& tip) const {
   std::int64_t square = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -30,7 +30,7 @@ Result<void> check(const Restrictions& supervision) {
   if (supervision.force_limit < 0 || supervision.force_limit > kMostForceLimit)
     return bad("force_limit", "is " + std::to_string(supervision.force_limit) + " hundredths of a newton; give 0 to " +
                                   std::to_string(kMostForceLimit));
-  // 2^30 steps are a kilometre.
+  // 2^30 steps are about a kilometre.
   if (supervision.zone && (supervision.zone->radius <= 0 || supervision.zone->radius > 1 << 30))
     return bad("zone.radius", "is " + std::to_string(supervision.zone->radius) + " steps; give more than 0");
   if (supervision.tools.size() > kMostLimitedTools)

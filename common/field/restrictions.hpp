@@ -1,5 +1,5 @@
-// What an instructor has decided about one hand: all that holds, not what has changed. A row of the room; the hand's
-// own loop keeps to it as well, so that nothing is predicted that the room would refuse.
+// What an instructor has decided about one person: all that holds, not only what has changed. It is part of the room's
+// state. The person's haptic loop obeys it as well, so that nothing is predicted that the room would reject.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -25,23 +25,23 @@ struct ZoneLimit {
 
 struct Restrictions {
   bool stopped = false;  // may not cut
-  AuthorId taken_by{};   // who holds its tool; null: itself
-  AuthorId guide{};      // along whose tool the hand is pulled; null: nobody's
-  int guide_share = 0;   // how firmly, 1000: as firmly as the device may
-  int force_limit = 0;   // most that the hand is made to feel and cuts with, steps of 0.01 N; 0: no such limit
+  AuthorId taken_by{};   // who has taken over the person's tool; null: nobody
+  AuthorId guide{};      // author whose tool guides the person's tool; null: nobody
+  int guide_share = 0;   // strength of the guidance; 1000: the device's limit
+  int force_limit = 0;   // largest force that the person feels and cuts with, steps of 0.01 N; 0: no limit
   std::optional<ZoneLimit> zone{};  // where the tip must be to cut; none: anywhere
-  std::vector<Digest> tools{};      // that it may cut with, sorted; none: all
-  std::string words{};              // why, shown to the trainee
+  std::vector<Digest> tools{};      // tools that the person may cut with, sorted; none: all
+  std::string words{};              // reason, shown to the trainee
 
   [[nodiscard]] bool may_cut() const { return !stopped && !taken_by; }
   [[nodiscard]] double force_limit_n() const { return 0.01 * force_limit; }
   friend bool operator==(const Restrictions&, const Restrictions&) = default;
 };
 
-// Whose word it is, as far as that is known.
+// Who decided, if known.
 struct Decider {
-  AuthorId author{};   // null: nobody knows
-  std::string name{};  // empty: nobody knows
+  AuthorId author{};   // null: unknown
+  std::string name{};  // empty: unknown
   friend bool operator==(const Decider&, const Decider&) = default;
 };
 
@@ -49,10 +49,10 @@ inline constexpr int kWholeShare = 1000;
 inline constexpr int kMostForceLimit = 10'000;  // 100 N
 inline constexpr std::size_t kMostLimitedTools = 64, kMostSupervisionWords = 256;
 
-// Error invalid_input: a number out of range, tools unsorted or too many, words too long. Names the field.
+// Error invalid_input, naming the field: a number out of range, tools unsorted or too many, words too long.
 [[nodiscard]] Result<void> check(const Restrictions& supervision);
 
-// Why a hand under it may not make this cut: frozen, taken, forbidden_tool, zone; none: it may.
+// Why these restrictions forbid the cut: frozen, taken, forbidden_tool, zone. none: it is allowed.
 [[nodiscard]] Rejection breach(const Restrictions& supervision, const Cut& cut);
 
 }  // namespace osteon

@@ -1,11 +1,11 @@
-// What a sample of a case's bone is made of.
+// The material of a sample of a case's bone.
 #pragma once
 #include <cstdint>
 
 namespace osteon {
 
-// Enamel is all that a scan shows denser than compact bone and that is no metal. Tools cut it as compact bone. No tool
-// cuts metal.
+// Enamel is everything that a scan shows denser than compact bone and that is not metal. Tools cut it like compact
+// bone. No tool cuts metal.
 enum class Tissue : std::uint8_t { none = 0, cortical = 1, trabecular = 2, metal = 3, enamel = 4 };
 
 }  // namespace osteon

@@ -1,5 +1,5 @@
-// The voxel lattice. Sample (i, j, k) of level l lies at exactly (i, j, k) · h / 2^l millimetres in the bone's frame,
-// so coordinates come from global integers and every program computes the same position.
+// The voxel lattice. Sample (i, j, k) of level l lies at exactly (i, j, k) · h / 2^l millimetres in the bone's frame.
+// Coordinates come from global integers, so every program computes the same position.
 #pragma once
 #include <algorithm>
 #include <compare>
@@ -69,18 +69,18 @@ struct Box {
   [[nodiscard]] Box grown(double by_mm) const { return {min_mm.array() - by_mm, max_mm.array() + by_mm}; }
 };
 
-// Pitch of a level, mm; below 0 the coarser ones in which far surfaces are drawn. Halving is exact in binary, so it is
-// the same number everywhere.
+// Pitch of a level, mm. Levels below 0 are coarser and are used to draw distant surfaces. Halving is exact in binary,
+// so the number is the same everywhere.
 [[nodiscard]] constexpr double level_pitch_mm(double pitch_mm, int level) {
   return level < 0 ? pitch_mm * static_cast<double>(1 << -level) : pitch_mm / static_cast<double>(1 << level);
 }
 
-// No cut is kept finer than this, unless the case itself is.
+// No cut is stored finer than this, unless the case itself is finer.
 inline constexpr double kFinestCut_mm = 0.1;
-// The finest level that cuts of a case with pitch h may go to: 0 when h / 2 is below kFinestCut_mm already.
+// The finest level of cuts in a case with pitch h. It is 0 if h / 2 is already below kFinestCut_mm.
 [[nodiscard]] constexpr int finest_level(double pitch_mm) {
   int level = 0;
-  // A tenth of a per cent of room, so that h = 0.4 mm has its level of 0.1 mm whatever the rounding.
+  // A margin of 0.1 percent, so that h = 0.4 mm has its level of 0.1 mm despite rounding.
   while (level + 1 < kLevels && level_pitch_mm(pitch_mm, level + 1) >= 0.999 * kFinestCut_mm) ++level;
   return level;
 }
@@ -89,7 +89,7 @@ inline constexpr double kFinestCut_mm = 0.1;
   return {c.x * level_pitch, c.y * level_pitch, c.z * level_pitch};
 }
 
-// The smallest box of samples of a lattice that encloses `box`.
+// The smallest box of lattice samples that encloses `box`.
 [[nodiscard]] CoordBox covering_samples(const Box& box, double level_pitch);
 
 }  // namespace osteon

@@ -6,7 +6,7 @@
 namespace osteon {
 
 EdgeFaults edge_faults(const TriangleMesh& mesh) {
-  // (lower vertex, upper vertex) and the direction in which a triangle runs along it.
+  // (lower vertex, upper vertex), and the direction in which a triangle runs along the edge.
   std::vector<std::pair<std::uint64_t, int>> edges;
   edges.reserve(3 * mesh.triangles.size());
   for (const auto& t : mesh.triangles)
@@ -20,7 +20,7 @@ EdgeFaults edge_faults(const TriangleMesh& mesh) {
     std::size_t end = i;
     int balance = 0;
     for (; end < edges.size() && edges[end].first == edges[i].first; ++end) balance += edges[end].second;
-    // Two solids may touch in an edge, which then has four sides that balance.
+    // Two solids may touch in an edge, which then has four balanced sides.
     if (balance != 0)
       ++faults.open;
     else if (end - i > 2)

@@ -22,7 +22,7 @@ static_assert(std::endian::native == std::endian::little, "binary STL and PLY ar
 namespace fs = std::filesystem;
 using Point = std::array<float, 3>;
 
-constexpr std::size_t kHeader = 84, kFacet = 50;  // bytes of a binary STL's head and of each triangle
+constexpr std::size_t kHeader = 84, kFacet = 50;  // bytes of a binary STL's header and of each triangle
 constexpr std::size_t kMostTriangles = 100'000'000;
 
 tl::unexpected<Error> bad(const fs::path& file, const std::string& what) {
@@ -37,7 +37,7 @@ bool finite(const std::vector<Point>& corners) {
 std::vector<Point> binary_corners(std::string_view bytes, std::size_t count) {
   std::vector<Point> corners(3 * count);
   for (std::size_t i = 0; i < count; ++i)
-    // Behind its normal, which follows from the corners.
+    // Skips the normal, which follows from the corners.
     std::memcpy(&corners[3 * i], bytes.data() + kHeader + i * kFacet + 12, 36);
   return corners;
 }
@@ -64,7 +64,7 @@ class Words {
   std::size_t at_ = 0;
 };
 
-// Nothing when a number is not one; `inf` and `nan` are numbers here and are found later.
+// False if a word is not a number. `inf` and `nan` count as numbers here and are rejected later.
 bool read_point(Words& words, Point& p) {
   for (float& value : p) {
     std::string_view word = words.next();
@@ -106,10 +106,10 @@ Result<std::vector<Point>> ascii_corners(std::string_view text, const fs::path& 
 
 TriangleMesh welded(std::vector<Point> corners) {
   for (Point& p : corners)
-    for (float& value : p) value += 0.0f;  // −0 and 0 are one place
+    for (float& value : p) value += 0.0f;  // −0 and 0 are the same position
   std::vector<std::uint32_t> order(corners.size()), vertex(corners.size());
   std::iota(order.begin(), order.end(), 0u);
-  // By place, then by first use: vertices keep the order of the file.
+  // By position, then by first use, so that vertices keep the order of the file.
   std::ranges::sort(order, [&](std::uint32_t a, std::uint32_t b) {
     return corners[a] != corners[b] ? corners[a] < corners[b] : a < b;
   });
@@ -142,7 +142,7 @@ void append_number(std::string& text, float value) {
   text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
 }
 
-// Under another name first, then renamed, so that nobody meets half a file.
+// Written under another name first and then renamed, so that nobody reads an incomplete file.
 Result<void> write_whole(const fs::path& file, const std::string& bytes) {
   fs::path partial = file;
   partial += ".part" + std::to_string(::getpid());
@@ -179,7 +179,7 @@ Result<TriangleMesh> read_stl(const fs::path& file) {
 
   std::uint32_t count = 0;
   if (bytes.size() >= kHeader) std::memcpy(&count, bytes.data() + 80, 4);
-  // Some binary files begin with "solid" too, so their length decides first.
+  // Some binary files begin with "solid" too, so the length decides first.
   const bool binary = bytes.size() >= kHeader && count <= kMostTriangles && bytes.size() == kHeader + count * kFacet;
   std::vector<Point> corners;
   if (binary) {

@@ -1,4 +1,4 @@
-// Rigid placements. `pose_bone_tool` is the tool seen from the bone: it takes tool coordinates to bone coordinates.
+// Rigid transforms. `pose_bone_tool` is the tool seen from the bone. It maps tool coordinates to bone coordinates.
 #pragma once
 #include <Eigen/Core>
 #include <Eigen/Geometry>

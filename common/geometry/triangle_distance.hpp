@@ -1,4 +1,4 @@
-// The distance from a point to a triangle, also one without area.
+// Distance from a point to a triangle. The triangle may have no area.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 namespace osteon {
 
-// Squared distance from p to the segment from a to b; to a where both are one point.
+// Squared distance from p to the segment from a to b. If a and b are one point, the distance to a.
 template <class Scalar>
 [[nodiscard]] Scalar squared_distance_to_segment(const Eigen::Matrix<Scalar, 3, 1>& p,
                                                  const Eigen::Matrix<Scalar, 3, 1>& a,
@@ -22,12 +22,12 @@ template <class Scalar>
 template <class Scalar>
 struct TriangleDistance {
   Scalar squared = 0;
-  unsigned corners = 0;  // bits of the corners that span the nearest part: one a corner, two a side, three the face
+  // bits of the corners that span the nearest part: one bit for a corner, two for a side, three for the face
+  unsigned corners = 0;
 };
 
-// From p to the triangle a, b, c, in the square of their unit. Finite for finite corners: where the triangle has no
-// area the nearest of its sides counts. Regions of the plane as in Ericson 2005,
-// section 5.1.5.
+// Squared distance from p to the triangle a, b, c, in the square of their unit. Finite for finite corners: for a
+// triangle without area, the nearest side counts. Regions of the plane as in Ericson 2005, section 5.1.5.
 template <class Scalar>
 [[nodiscard]] TriangleDistance<Scalar> distance_to_triangle(const Eigen::Matrix<Scalar, 3, 1>& p,
                                                             const Eigen::Matrix<Scalar, 3, 1>& a,
@@ -50,7 +50,7 @@ template <class Scalar>
   const Scalar along = d4 - d3, beyond = d5 - d6;
   if (va <= 0 && along >= 0 && beyond >= 0 && along + beyond > 0)
     return {(bp - (c - b) * (along / (along + beyond))).squaredNorm(), kB | kC};
-  // va + vb + vc is four times the squared area; by rounding it may be anything where the corners lie in a line.
+  // va + vb + vc is four times the squared area. For corners on a line, rounding can give it any value.
   const Scalar sum = va + vb + vc;
   if (!(sum > std::sqrt(std::numeric_limits<Scalar>::epsilon()) * ab.squaredNorm() * ac.squaredNorm()))
     return {std::min({squared_distance_to_segment<Scalar>(p, a, b), squared_distance_to_segment<Scalar>(p, a, c),

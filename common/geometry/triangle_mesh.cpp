@@ -8,7 +8,7 @@ std::size_t open_edges(const TriangleMesh& mesh) { return edge_faults(mesh).open
 
 double enclosed_mm3(const TriangleMesh& mesh) {
   if (mesh.positions_mm.empty()) return 0.0;
-  // About a point of the surface: far from it large terms would cancel.
+  // Relative to a point of the surface, because large terms far from it would cancel.
   const Vec3 origin = position(mesh, 0);
   double six_volumes = 0.0;
   for (const auto& [a, b, c] : mesh.triangles)

@@ -1,4 +1,4 @@
-// A surface of triangles with shared vertices, and what one asks of a solid's surface.
+// A surface of triangles with shared vertices, and properties of a solid's surface.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -12,12 +12,12 @@ namespace osteon {
 struct TriangleMesh {
   std::vector<std::array<float, 3>> positions_mm;
   std::vector<std::array<std::uint32_t, 3>> triangles;  // counter-clockwise seen from outside
-  std::vector<std::array<float, 3>> normals;            // one for each position, or none at all
+  std::vector<std::array<float, 3>> normals;            // one for each position, or none
 };
 
-// Edges whose two sides are not one triangle each, of opposite direction: none on the closed surface of a solid.
+// Edges that do not belong to exactly one triangle in each direction. The closed surface of a solid has none.
 [[nodiscard]] std::size_t open_edges(const TriangleMesh& mesh);
-// By Gauss's theorem: positive when the triangles of a closed surface turn outwards.
+// By Gauss's theorem. Positive if the triangles of a closed surface are oriented outwards.
 [[nodiscard]] double enclosed_mm3(const TriangleMesh& mesh);
 [[nodiscard]] double area_mm2(const TriangleMesh& mesh);
 [[nodiscard]] Box bounds(const TriangleMesh& mesh);

@@ -8,11 +8,11 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr double kInside_hu = 200.0;                   // above the threshold: marrow with nothing but bone around it
-constexpr double kNearAir_hu = -200.0;                 // a neighbour below it is air, or air in part
-constexpr double kLeastPart = 0.05, kMostPart = 0.95;  // of the way between two voxels
+constexpr double kInside_hu = 200.0;                   // above the threshold: value of marrow with only bone around it
+constexpr double kNearAir_hu = -200.0;                 // a neighbour below it is air, or partly air
+constexpr double kLeastPart = 0.05, kMostPart = 0.95;  // of the distance between two voxels
 
-// How far from a marrow voxel towards an outside one the surface lies, as part of the way.
+// Position of the surface between a marrow voxel and an outside one, as a fraction of their distance.
 double crossing(double marrow_hu, double outside_hu) {
   if (outside_hu >= kNearAir_hu) return 0.5;
   const double edge_hu = 0.5 * (marrow_hu + kAir_hu);
@@ -38,7 +38,7 @@ Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, doub
         if (bones.values[i] == 0) {
           value = std::min(value, below);
         } else if (value < threshold_hu) {
-          // The mean over the outside neighbours of the value that puts the crossing in its place on the edge to each.
+          // The mean over the outside neighbours of the value that gives the crossing its position on the edge to each.
           const std::array<int, 3> at{column, row, slice};
           double sum = 0.0;
           int neighbours = 0;

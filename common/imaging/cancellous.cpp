@@ -8,11 +8,11 @@ namespace osteon::imaging {
 namespace {
 
 constexpr double kLeastBetween = 0.5;
-constexpr int kCorner = 8;  // voxels that belong to a solid round one at its corner: 2³
+constexpr int kCorner = 8;  // voxels of a solid around one at its corner: 2³
 
 Error stopped() { return {ErrorCode::cancelled, "stopped while looking for cancellous bone"}; }
 
-// How many voxels of a 3 x 3 square within the slice are at or above a value; beyond the volume none is.
+// Number of voxels at or above a value in a 3 x 3 square within the slice. Voxels beyond the volume do not count.
 void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vector<std::uint8_t>& row,
                     std::vector<std::uint8_t>& out) {
   const int columns = volume.dims[0], rows = volume.dims[1];
@@ -36,8 +36,8 @@ void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vec
     }
 }
 
-// For each voxel of a slice, how many of the 27 around it are at or above a value. Slices are asked one after the
-// other.
+// For each voxel of a slice, the number of voxels at or above a value among the 27 around it. Slices must be requested
+// in order.
 class CountAround {
  public:
   CountAround(const HuVolume& volume, double least_hu) : volume_(volume), least_hu_(least_hu) {
@@ -61,9 +61,9 @@ class CountAround {
   std::vector<std::uint8_t> row_;
 };
 
-// Voxels that may be cancellous bone: so bright on most of their 27, which takes noise out. Air voxels are not counted,
-// so that a solid in air keeps its edges; in other surroundings a voxel at an edge or corner, where fewer belong to the
-// solid, must be bright itself.
+// Voxels that may be cancellous bone. Most of their 27 voxels must be bright enough, which removes noise. Air voxels
+// are not counted, so a solid in air keeps its edges. In other surroundings a voxel at an edge or corner, where fewer
+// voxels belong to the solid, must be bright itself.
 Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, const SegmentationParams& params,
                              const KeepGoing& keep_going) {
   VoxelMask out(volume.dims);
@@ -84,7 +84,7 @@ Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, con
   return out;
 }
 
-// Takes out the components of which fewer voxels than a share are 1 in `core`, or none is. False: none is left.
+// Removes components in which the fraction of voxels in `core` is below `share`, or zero. False: none is left.
 Result<bool> keep_with_core(VoxelMask& mask, const VoxelMask& core, double share, const KeepGoing& keep_going) {
   std::bitset<256> one;
   one.set(1);
@@ -114,8 +114,8 @@ std::vector<Place> places_of(const VoxelMask& mask) {
   return places;
 }
 
-// Of the candidates those from which a straight line through candidates leads to dense bone both ways, in one of the 13
-// directions of neighbours.
+// Of the candidates, those from which a straight line through candidates leads to dense bone in both directions, along
+// one of the 13 directions of neighbours.
 Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& dense, const KeepGoing& keep_going) {
   const std::vector<Place> places = places_of(candidate);
   VoxelMask between(candidate.dims), back(candidate.dims);
@@ -147,8 +147,8 @@ Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& den
   return between;
 }
 
-// Against air the edge of cancellous bone is half way to air, far below `cancellous_hu`: adds the voxels that the bone
-// fills by more than half.
+// Against air, the edge of cancellous bone is half way to air, far below `cancellous_hu`. Adds the voxels that are more
+// than half bone.
 void add_edge_to_air(const HuVolume& volume, double air_hu, VoxelMask& found) {
   const auto [columns, rows, slices] = volume.dims;
   std::vector<std::size_t> added;
@@ -180,7 +180,7 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
                                      const KeepGoing& keep_going) {
   auto candidate = candidates(volume, dense, params, part(keep_going, 0.0, 0.3));
   if (!candidate) return candidate;
-  // A core is farther from dense bone than half of a joint's width.
+  // A core is farther from dense bone than half the width of a joint.
   auto near = within_mm(dense, volume.spacing_mm, params.bridged_mm, part(keep_going, 0.3, 0.5));
   if (!near) return near;
   const auto core_of = [&](const VoxelMask& mask) {
@@ -195,8 +195,7 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
 
   auto found = between_dense(*candidate, dense, part(keep_going, 0.6, 0.85));
   if (!found) return found;
-  // A vessel with contrast medium and chalk in its wall has a few such lines; of cancellous bone most is between dense
-  // bone.
+  // A vessel with contrast medium and calcified wall has a few such lines. Most cancellous bone is between dense bone.
   if (const auto left = keep_with_core(*candidate, *found, kLeastBetween, part(keep_going, 0.85, 0.9)); !left)
     return tl::unexpected(left.error());
   for (std::size_t i = 0; i < found->values.size(); ++i)

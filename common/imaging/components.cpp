@@ -5,7 +5,7 @@
 namespace osteon::imaging {
 namespace {
 
-// Union-find over runs. The smaller number is the root, so results do not depend on the order of unions.
+// Union-find over runs. The smallest number is the root, so the result does not depend on the order of unions.
 class Forest {
  public:
   void add() { parent_.push_back(static_cast<std::uint32_t>(parent_.size())); }
@@ -39,7 +39,7 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
   const auto [columns, rows, slices] = mask.dims;
   std::array<bool, 256> wanted{};
   for (std::size_t i = 0; i < wanted.size(); ++i) wanted[i] = of[i];
-  const std::int32_t reach = connectivity == Connectivity::corners ? 1 : 0;  // diagonals: a column more at either end
+  const std::int32_t reach = connectivity == Connectivity::corners ? 1 : 0;  // diagonals: one more column at either end
 
   Components found;
   std::vector<VoxelRun>& runs = found.runs;

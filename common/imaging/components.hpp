@@ -1,4 +1,4 @@
-// Connected components of a mask, as runs of voxels along the rows.
+// Connected components of a mask, as runs of voxels along the rows of pixels.
 #pragma once
 #include <array>
 #include <bitset>
@@ -9,7 +9,7 @@
 
 namespace osteon::imaging {
 
-// A stretch of voxels within one row; both ends are included.
+// A run of voxels within one row of pixels. Both ends are included.
 struct VoxelRun {
   std::int32_t first = 0, last = 0;
   std::int32_t row = 0, slice = 0;
@@ -17,8 +17,8 @@ struct VoxelRun {
 };
 
 enum class Connectivity {
-  faces,    // 6 neighbours: what is not bone
-  corners,  // 26 neighbours: bone
+  faces,    // 6 neighbours, for what is not bone
+  corners,  // 26 neighbours, for bone
 };
 
 struct Components {
@@ -32,7 +32,7 @@ struct Components {
 [[nodiscard]] Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>& of,
                                                  Connectivity connectivity, const KeepGoing& keep_going);
 
-// Voxels of the mask along a run that are not 0.
+// Whether any voxel of the mask along a run is not 0, and how many are not.
 [[nodiscard]] bool any_in_run(const VoxelMask& mask, const VoxelRun& run);
 [[nodiscard]] std::int64_t count_in_run(const VoxelMask& mask, const VoxelRun& run);
 void fill_run(VoxelMask& mask, const VoxelRun& run, std::uint8_t value);

@@ -9,14 +9,14 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr double kCoarse_mm = 4.0;  // voxels on which the width of a large space is measured
+constexpr double kCoarse_mm = 4.0;  // voxels for measuring the width of a large space
 
 Error stopped() { return {ErrorCode::cancelled, "stopped while looking for marrow spaces"}; }
 
-// One face of the volume as a picture: which of its free voxels are connected, within the face, to the outside.
+// One face of the volume as an image. It finds which free voxels are connected to the outside within the face.
 class Face {
  public:
-  // `fixed`: the axis that the face is normal to.
+  // `fixed`: the axis that is normal to the face.
   Face(const VoxelMask& solid, int fixed, bool last, const ScanEnds& ends)
       : solid_(solid),
         fixed_(fixed),
@@ -36,7 +36,7 @@ class Face {
     flood();
   }
 
-  // Calls with the coordinates of each voxel that is reached.
+  // Calls `visit` with the coordinates of each reached voxel.
   template <class Visit>
   void each(Visit visit) const {
     for (int v = 0; v < height_; ++v)
@@ -60,7 +60,7 @@ class Face {
     const auto c = voxel(u, v);
     return solid_.at(c[0], c[1], c[2]) == 0;
   }
-  // False at a solid voxel.
+  // False for a solid voxel.
   bool reach(int u, int v) {
     if (!free(u, v)) return false;
     if (reached_[cell(u, v)] == 0) {
@@ -69,8 +69,8 @@ class Face {
     }
     return true;
   }
-  // Both edges of the face where it meets the two faces across `axis`. An edge of the scan is open from its ends up to
-  // the first solid voxel; any other is open throughout.
+  // Both edges of the face where it meets the two faces across `axis`. An edge at the end of the scan is open from its
+  // ends up to the first solid voxel. Any other edge is completely open.
   template <class Reach>
   void edge(int axis, const ScanEnds& ends, int length, Reach reach_at) {
     for (const bool far : {false, true}) {
@@ -82,7 +82,7 @@ class Face {
       for (int i = length - 1; scan_ends && i >= 0 && is_free(i); --i) reach_at(i, far);
     }
   }
-  // Each voxel waits once, so this ends.
+  // Each voxel is queued once, so this ends.
   void flood() {
     while (!waiting_.empty()) {
       const auto [u, v] = waiting_.back();
@@ -100,7 +100,7 @@ class Face {
   std::vector<std::array<int, 2>> waiting_;
 };
 
-// 1 where a voxel of the volume's faces is connected to the outside.
+// 1 for a voxel of the volume's faces that is connected to the outside.
 VoxelMask open_faces(const VoxelMask& solid, const ScanEnds& ends) {
   VoxelMask open(solid.dims);
   for (int axis = 0; axis < 3; ++axis)
@@ -109,8 +109,8 @@ VoxelMask open_faces(const VoxelMask& solid, const ScanEnds& ends) {
   return open;
 }
 
-// Whether a sphere of `radius_mm` has room in one component. The scan's ends are no walls: what goes on beyond them may
-// be as wide as it is here. Error: cancelled.
+// Whether a sphere of `radius_mm` fits into one component. The ends of the scan are not walls, because the space beyond
+// may be as wide as it is here. Error: cancelled.
 Result<bool> has_room(const Components& spaces, std::uint32_t component, const std::array<int, 3>& dims,
                       const Vec3& spacing_mm, double radius_mm, const KeepGoing& keep_going) {
   std::array<int, 3> step{}, coarse{};
@@ -120,7 +120,7 @@ Result<bool> has_room(const Components& spaces, std::uint32_t component, const s
     coarse[axis] = (dims[axis] + step[axis] - 1) / step[axis];
     coarse_mm[static_cast<int>(axis)] = spacing_mm[static_cast<int>(axis)] * step[axis];
   }
-  // A coarse voxel is a wall unless all of it belongs to the space: walls of bone are thinner than it.
+  // A coarse voxel is a wall unless all of it belongs to the space, because walls of bone are thinner than it.
   std::vector<std::int64_t> free(VoxelMask(coarse).values.size(), 0);
   VoxelMask wall(coarse);
   for (const VoxelRun& run : spaces.runs)
@@ -139,8 +139,8 @@ Result<bool> has_room(const Components& spaces, std::uint32_t component, const s
   return std::ranges::any_of(near->values, [](std::uint8_t v) { return v == 0; });
 }
 
-// Marks the components of what is free that no open voxel of the faces belongs to and that are no wider than a marrow
-// space. `marked` gets 1 there. Error: cancelled.
+// Marks the free components that contain no open voxel of the faces and are no wider than a marrow space. `marked` gets
+// 1 there. Error: cancelled.
 Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params,
                          const ScanEnds& ends, VoxelMask& marked, const KeepGoing& keep_going) {
   std::bitset<256> free;
@@ -164,7 +164,7 @@ Result<void> mark_closed(const VoxelMask& solid, const Vec3& spacing_mm, const S
   return {};
 }
 
-// The space around each core that belongs to it: free, near a core, connected to it, and out of reach of the ball.
+// The space that belongs to each core: free, near the core, connected to it, and out of reach of the ball.
 Result<VoxelMask> grow_cores(const VoxelMask& solid, const VoxelMask& cores, const VoxelMask& within_reach,
                              const Vec3& spacing_mm, double reach_mm, const KeepGoing& keep_going) {
   auto near = within_mm(cores, spacing_mm, reach_mm, part(keep_going, 0.0, 0.5));
@@ -186,7 +186,7 @@ Result<VoxelMask> grow_cores(const VoxelMask& solid, const VoxelMask& cores, con
 
 Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, const SegmentationParams& params,
                               const ScanEnds& ends, const KeepGoing& keep_going) {
-  // Where the centre of the ball cannot be: in the bone or nearer to it than the ball's radius.
+  // Positions where the ball's centre cannot be: in the bone, or nearer to it than the ball's radius.
   auto wall = within_mm(solid, spacing_mm, params.bridged_mm, part(keep_going, 0.0, 0.15));
   if (!wall) return wall;
   VoxelMask cores(solid.dims);
@@ -206,7 +206,7 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
       if (grown->values[i] != 0) closed.values[i] = 1;
   }
   if (!keep_going(0.8)) return tl::unexpected(stopped());
-  // What is left of narrow spaces behind them, and every other hole that no path of voxels leaves.
+  // The rest of narrow spaces behind them, and every other hole that no path of voxels leaves.
   VoxelMask enclosed(solid.dims);
   if (auto marked = mark_closed(closed, spacing_mm, params, ends, enclosed, part(keep_going, 0.8, 1.0)); !marked)
     return tl::unexpected(marked.error());

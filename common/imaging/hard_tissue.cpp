@@ -6,7 +6,7 @@ namespace osteon::imaging {
 namespace {
 
 constexpr double kBlur_voxels = 2.0;
-constexpr std::size_t kOften = 1 << 20;  // voxels between two questions
+constexpr std::size_t kOften = 1 << 20;  // voxels between two calls of keep_going
 constexpr auto kMetal = static_cast<std::uint8_t>(Tissue::metal);
 constexpr auto kEnamel = static_cast<std::uint8_t>(Tissue::enamel);
 

@@ -18,7 +18,7 @@ HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::ar
   part.directions = volume.directions;
   part.origin_mm = volume.position_mm(Vec3(first[0], first[1], first[2]));
   for (std::size_t axis = 0; axis < 3; ++axis) part.dims[axis] = last[axis] - first[axis] + 1;
-  // Rows only move towards the beginning, so the memory is used again.
+  // Rows of voxels only move towards the beginning, so the memory can be reused.
   std::int16_t* to = volume.values.data();
   for (int slice = first[2]; slice <= last[2]; ++slice)
     for (int row = first[1]; row <= last[1]; ++row) {

@@ -14,7 +14,7 @@ struct HuVolume {
   std::array<int, 3> dims{};                                 // columns, rows, slices
   Vec3 spacing_mm = Vec3::Ones();                            // between neighbours along each
   Vec3 origin_mm = Vec3::Zero();                             // centre of the first voxel, LPS
-  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  // orthonormal: the way columns, rows, slices go, LPS
+  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  // orthonormal: directions of columns, rows and slices, LPS
   std::vector<std::int16_t> values;                          // columns fastest, then rows, then slices
 
   [[nodiscard]] std::size_t count() const {
@@ -27,7 +27,7 @@ struct HuVolume {
   }
   [[nodiscard]] std::int16_t at(int column, int row, int slice) const { return values[index(column, row, slice)]; }
 
-  // Voxel coordinates count voxels from the first one's centre.
+  // Voxel coordinates count voxels from the centre of the first voxel.
   [[nodiscard]] Vec3 position_mm(const Vec3& voxel) const {
     return origin_mm + directions * spacing_mm.cwiseProduct(voxel);
   }
@@ -39,15 +39,15 @@ struct HuVolume {
 // "256x256x108, 0.957x0.957x1.5 mm"
 [[nodiscard]] std::string describe(const HuVolume& volume);
 
-// The voxels from `first` to `last`, both included, as a volume of its own at the same place. Takes the memory of
+// The voxels from `first` to `last`, both included, as a separate volume at the same position. Takes over the memory of
 // `volume`.
 [[nodiscard]] HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last);
 
-// The LPS box around voxel coordinates first .. last (both included), taken at the voxels' centres.
+// The LPS box around voxel coordinates first .. last (both included), measured at the voxel centres.
 [[nodiscard]] Box enclosing_box(const HuVolume& volume, const Vec3& first, const Vec3& last);
 
-// Distance from the block of space that was scanned (whole voxels, so half a voxel beyond the outer centres);
-// negative inside it, exact inside and beside its faces.
+// Distance from the block of space that was scanned (whole voxels, so half a voxel beyond the outer centres). Negative
+// inside it, exact inside and beside its faces.
 [[nodiscard]] double outside_scan_mm(const HuVolume& volume, const Vec3& position_mm);
 
 }  // namespace osteon::imaging

@@ -1,4 +1,4 @@
-// The separate pieces of bone in a scan, and which of them are kept.
+// Finds the separate parts of bone in a scan, and numbers those that are kept.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -22,7 +22,7 @@ struct Island {
 };
 
 struct Islands {
-  std::vector<Island> list;  // largest first; among equals the first in memory. Number N is list[N - 1].
+  std::vector<Island> list;  // largest first; equal ones in memory order. Number N is list[N - 1].
   Components components;
   std::vector<int> number;  // of each component, from 1
 };
@@ -31,8 +31,8 @@ struct Islands {
 [[nodiscard]] Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone,
                                            const DensityCalibration& calibration, const KeepGoing& keep_going);
 
-// Numbers of bones, from 1: what voxels of the kept islands get in a mask of the volume's dims; others get 0. The
-// islands `kept`, by number, become bones 1, 2, 3 ... in this order, all of them bone 1 where `merge` is true. From the
+// A mask of the volume's dims with bone numbers, from 1, for voxels of the kept islands, and 0 for all others. The
+// islands `kept`, by number, become bones 1, 2, 3 ... in this order. With `merge`, all of them are bone 1. From the
 // 255th on they share the number 255.
 [[nodiscard]] VoxelMask number_bones(const Islands& islands, std::span<const int> kept, bool merge,
                                      const std::array<int, 3>& dims);

@@ -12,11 +12,11 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr float kUnshrink = 1.02f;  // μ: a little above the blur's 1, so that what should stay is not lost in 16 steps
-constexpr int kDensityReach = 2;    // voxels beyond the bone that have its density
+constexpr float kUnshrink = 1.02f;  // μ: slightly above the blur's 1, so that wanted detail survives 16 steps
+constexpr int kDensityReach = 2;    // voxels beyond the bone that get its density
 
-// work(i) for i in [0, count) on all cores; each i is done by one thread, so results do not depend on their number.
-// False when keep_going, asked from the caller's thread only, wanted it stopped.
+// Calls work(i) for i in [0, count) on all cores. One thread does each i, so results do not depend on the number of
+// threads. False if keep_going, called from the caller's thread only, returned false.
 bool each_in_parallel(int count, const std::function<void(int)>& work, const KeepGoing& keep_going) {
   std::atomic<int> next{0}, running{0};
   std::atomic<bool> stopped{false};
@@ -33,7 +33,7 @@ bool each_in_parallel(int count, const std::function<void(int)>& work, const Kee
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   for (std::thread& helper : helpers) helper.join();
-  // Also where all was done before the first question.
+  // Called also if all work was done before the first call.
   return !stopped && keep_going(1.0);
 }
 
@@ -41,7 +41,8 @@ tl::unexpected<Error> stopped_smoothing() {
   return failure(ErrorCode::cancelled, "stopped while smoothing the labels");
 }
 
-// [1 2 1]/4 on `count` rows of `width` values each, `step` apart; rows beyond the ends are as the end ones.
+// Applies [1 2 1]/4 to `count` rows of `width` values each, `step` apart. Rows of values beyond the ends equal the end
+// rows.
 void filter_rows(float* values, std::ptrdiff_t step, int count, int width, std::vector<float>& before) {
   before.assign(values, values + width);
   for (int row = 0; row < count; ++row) {
@@ -64,7 +65,7 @@ void filter_line(float* line, int count) {
   }
 }
 
-// The two voxels that a sample lies between, and how far it is from the first to the second.
+// The two voxels around a sample, and its position from the first to the second.
 struct Bracket {
   int low = 0, high = 0;
   float part = 0;
@@ -116,7 +117,7 @@ Result<DenseVolume<float>> smooth_labels(const LabelVolume& volume, const Smooth
     const auto part = [&](double begin, double end) {
       return [&, begin, end](double f) { return keep_going((step + begin + (end - begin) * f) / (2 * params.rounds)); };
     };
-    // Along y and z in planes of one x, then along x in columns of one y, where the bound is put on as well.
+    // Along y and z in planes of one x, then along x in columns of one y. The second pass also applies the bound.
     const bool first = each_in_parallel(
         n.x,
         [&](int x) {
@@ -183,13 +184,13 @@ Result<DenseVolume<float>> resample(const DenseVolume<float>& field, const Vec3&
 
 Result<DenseVolume<float>> label_density(const LabelVolume& volume, std::span<const float> density_g_cm3,
                                          const CoordBox& box, double pitch_mm, const KeepGoing& keep_going) {
-  // The largest label within reach along every axis in turn, for voxels that are not bone.
+  // For voxels that are not bone: the largest label within reach, along one axis after the other.
   const Coord n = volume.labels.box.dims();
   const std::ptrdiff_t strides[3] = {static_cast<std::ptrdiff_t>(n.y) * n.z, n.z, 1};
   const int sizes[3] = {n.x, n.y, n.z};
   std::vector<std::uint8_t> spread = volume.labels.values;
   for (int axis = 0; axis < 3; ++axis) {
-    const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;  // v has the smaller stride of the others
+    const int u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;  // v has the smaller stride of the other two
     const bool done = each_in_parallel(
         sizes[u],
         [&](int i) {

@@ -9,7 +9,7 @@
 namespace osteon::imaging {
 namespace {
 
-// The two neighbours along one axis and how far the point lies from the first to the second.
+// The two neighbours along one axis, and the position of the point from the first to the second.
 struct Bracket {
   std::ptrdiff_t low;
   std::ptrdiff_t high;
@@ -35,7 +35,7 @@ double interpolate(const HuVolume& volume, const Bracket& i, const Bracket& j, c
              mix(along_columns(j.low, k.high), along_columns(j.high, k.high), j.part), k.part);
 }
 
-// Where columns, rows and slices go along x, y and z, each bracket depends on one coordinate alone.
+// For columns, rows and slices along x, y and z. Then each bracket depends on one coordinate only.
 void resample_aligned(const HuVolume& volume, const CoordBox& box, double pitch_mm, float* out) {
   const auto brackets = [&](int axis, std::int32_t from, std::int32_t to) {
     std::vector<Bracket> made;

@@ -1,4 +1,4 @@
-// From the scanner's grid to the bone's lattice.
+// Resamples a scan from the scanner's grid to the bone's lattice.
 #pragma once
 #include <span>
 
@@ -7,12 +7,12 @@
 
 namespace osteon::imaging {
 
-// Trilinear HU at exactly (i, j, k) · pitch in LPS, for every sample of the box. Beyond the outer voxels' centres
-// the value goes on as at the nearest of them. Error: cancelled.
+// Trilinear HU at exactly (i, j, k) · pitch in LPS, for every sample of the box. Beyond the centres of the outer voxels
+// the value of the nearest one continues. Error: cancelled.
 [[nodiscard]] Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box, double pitch_mm,
                                                   const KeepGoing& keep_going);
 
-// The same of one box into memory for all its samples, z fastest.
+// The same for one box, into memory for all its samples, z fastest.
 void resample(const HuVolume& volume, const CoordBox& box, double pitch_mm, std::span<float> out);
 
 }  // namespace osteon::imaging

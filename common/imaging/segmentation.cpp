@@ -10,9 +10,9 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr double kThresholdEnd = 0.05, kCancellousEnd = 0.35, kEnclosedEnd = 0.9;  // shares of the time
-constexpr int kFewest = 3;               // voxels that say whether a space holds air; fewer are noise within bone
-constexpr double kAirEdge_voxels = 2.0;  // over which a scanner blurs the edge between air and bone
+constexpr double kThresholdEnd = 0.05, kCancellousEnd = 0.35, kEnclosedEnd = 0.9;  // fractions of the time
+constexpr int kFewest = 3;  // voxels needed to decide whether a space contains air; fewer are noise within bone
+constexpr double kAirEdge_voxels = 2.0;  // width over which a scanner blurs the edge between air and bone
 
 Error stopped() { return {ErrorCode::cancelled, "stopped while looking for the bone"}; }
 
@@ -36,7 +36,7 @@ Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, cons
   return dense;
 }
 
-// Mean HU of a voxel and its neighbours that are not dense; the air of a sinus is darker than marrow also where it is
+// Mean HU of a voxel and its neighbours that are not dense. The air of a sinus is darker than marrow even if it is
 // noisy.
 bool is_air(const HuVolume& volume, const VoxelMask& dense, std::array<int, 3> c, double air_hu) {
   double sum = 0.0;
@@ -51,7 +51,7 @@ bool is_air(const HuVolume& volume, const VoxelMask& dense, std::array<int, 3> c
   return count >= kFewest && sum < air_hu * count;
 }
 
-// Opens the spaces that hold air again, with the blurred edge around it.
+// Removes spaces that contain air from the enclosed ones, with the blurred edge around them.
 Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double air_hu, VoxelMask& enclosed,
                         const KeepGoing& keep_going) {
   VoxelMask air(volume.dims);

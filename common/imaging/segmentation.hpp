@@ -1,4 +1,4 @@
-// Which voxels of a scan are bone: those at or above a threshold, and the marrow and cancellous bone within them.
+// Finds the bone voxels of a scan: those at or above a threshold, and the marrow and cancellous bone within them.
 #pragma once
 #include <array>
 
@@ -18,26 +18,27 @@ enum class BoneVoxel : std::uint8_t {
 
 struct SegmentationParams {
   double threshold_hu = kBoneThreshold_hu;
-  // Cancellous bone that the dense bone does not close in, as at a saw cut, is at or above this. [A] Above muscle,
-  // blood and discs without contrast medium (30 to 110 HU), below healthy cancellous bone.
+  // Smallest HU of cancellous bone that dense bone does not enclose, as at a saw cut. [A] Above muscle, blood and discs
+  // without contrast medium (30 to 110 HU), below healthy cancellous bone.
   double cancellous_hu = 130.0;
-  // [A] The lengths and air's limit too.
-  double bridged_mm = 1.5;  // radius: narrower openings in dense bone, as for vessels, do not make a marrow space open
-  double widest_mm = 35.0;  // radius of the largest sphere in a marrow space; a wider one is the brain's, not marrow
-  double air_hu = -400.0;   // what is enclosed and below this on average is air, as in a sinus
-  bool hollow = false;      // only what is at or above the threshold is bone
+  // [A] The following lengths and the limit of air are assumptions too.
+  double bridged_mm = 1.5;  // radius: narrower openings in dense bone, as for vessels, do not open a marrow space
+  // radius of the largest sphere in a marrow space; a wider space contains the brain, not marrow
+  double widest_mm = 35.0;
+  double air_hu = -400.0;   // an enclosed space with a lower average is air, as in a sinus
+  bool hollow = false;      // only voxels at or above the threshold are bone
 };
 
-// On which sides the volume ends where the scan ends: columns, rows, slices; first and last. A marrow space that is cut
-// by the end of the scan counts as closed where dense bone surrounds it in the plane of that end.
+// At which sides of the volume the scan ends: columns, rows, slices; first and last. A marrow space cut by the end of
+// the scan counts as closed if dense bone surrounds it in the plane of that end.
 using ScanEnds = std::array<std::array<bool, 2>, 3>;
 inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}}};
 
-// A marrow space is what a ball of `bridged_mm` cannot reach from outside the bone, where such a ball has room within,
-// and every hole that no path of voxels leaves. So narrow clefts on the outside of a bone, as sutures and joints, stay
-// open. Cancellous bone is `cancellous_hu` or more on most of its 27 voxels, lies on a straight line between two dense
-// voxels, is wider than a joint, and is so for the most part of what is connected and as bright. Errors: invalid_input
-// (no voxel reaches the threshold), cancelled.
+// A marrow space is the space that a ball of `bridged_mm` cannot reach from outside the bone, if such a ball fits
+// inside it. Every hole that no path of voxels leaves is one too. So narrow clefts on the outside of a bone, such as
+// sutures and joints, stay open. Cancellous bone has `cancellous_hu` or more on most of a voxel's 27 voxels. It lies on
+// a straight line between two dense voxels, and is wider than a joint. Most of the connected voxels of that brightness
+// must fulfil this too. Errors: invalid_input (no voxel reaches the threshold), cancelled.
 [[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params,
                                              const ScanEnds& ends, const KeepGoing& keep_going);
 

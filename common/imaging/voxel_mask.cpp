@@ -9,8 +9,8 @@ namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
-// Squared distance along the row to the nearest voxel of the mask, mm², or kFar beyond `reach` voxels. False: the row
-// has none.
+// Squared distance along the row of voxels to the nearest voxel of the mask, mm², or kFar beyond `reach` voxels. False:
+// the row has none.
 bool along_row(const std::uint8_t* mask, int columns, float spacing_mm, int reach, float* squared) {
   const auto step = spacing_mm * spacing_mm;
   std::fill(squared, squared + columns, kFar);
@@ -31,13 +31,14 @@ bool along_row(const std::uint8_t* mask, int columns, float spacing_mm, int reac
   return true;
 }
 
-// One slice of squared distances within its plane.
+// Squared distances of one slice within its plane.
 struct Slice {
   std::vector<float> squared_mm2;
   bool any = false;
 };
 
-// The lower envelope over rows: a distance in the plane is the least of the rows' distances with the step across added.
+// The lower envelope over rows of voxels. A distance in the plane is the minimum over rows of the row's distance plus
+// the step across.
 void across_rows(const std::vector<float>& rows, const std::vector<std::uint8_t>& filled, int columns, int count,
                  float spacing_mm, int reach, Slice& out) {
   out.squared_mm2.assign(rows.size(), kFar);
@@ -63,7 +64,7 @@ Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, doubl
   const std::size_t area = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
   const auto limit = static_cast<float>(radius_mm * radius_mm * (1.0 + 1e-6));
 
-  // Only the slices that can be near the one at work are held.
+  // Only slices near the current one are in memory.
   std::vector<Slice> ring(static_cast<std::size_t>(2 * reach_z + 1));
   const auto held = [&](int slice) -> Slice& { return ring[static_cast<std::size_t>(slice % (2 * reach_z + 1))]; };
   std::vector<float> row_distances(area);

@@ -1,4 +1,4 @@
-// One byte for each voxel of a scan, and what is near it.
+// A mask with one byte for each voxel of a scan, and its neighbourhood.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -29,7 +29,7 @@ struct VoxelMask {
   [[nodiscard]] std::uint8_t& at(int column, int row, int slice) { return values[index(column, row, slice)]; }
 };
 
-// 1 for every voxel whose centre is at most `radius_mm` from the centre of a voxel of the mask, that voxel included.
+// 1 for every voxel whose centre is at most `radius_mm` from the centre of a voxel of the mask, including that voxel.
 // Exact Euclidean distances on voxels of `spacing_mm`. Error: cancelled.
 [[nodiscard]] Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm,
                                           const KeepGoing& keep_going);

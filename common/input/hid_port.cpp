@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::size_t kLargestReport = 64;
 
-// hidapi's list and its start are not for two threads at a time.
+// hidapi's enumeration and initialisation are not thread safe.
 std::mutex& library() {
   static std::mutex mutex;
   return mutex;
@@ -62,7 +62,7 @@ Error hid_open_error(const std::string& what, const std::string& path, int numbe
                  "; install deploy/udev/70-osteon-devices.rules and plug it in again");
     case ENOENT:
     case ENODEV:
-    case ENOTTY:  // the node is there for a moment yet, but no device behind it
+    case ENOTTY:  // the node still exists for a moment, but not the device
     case ENXIO:
       return say(what + " at " + path + " was unplugged; plug it in again");
     case EBUSY:

@@ -1,4 +1,4 @@
-// HID devices by hidapi: what is there, and one of them with a thread that reads it.
+// HID devices by hidapi: lists them, opens one, and reads it on a thread.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -24,22 +24,23 @@ struct HidFound {
 // Any thread.
 [[nodiscard]] std::vector<HidFound> list_hid_devices();
 
-// Why a device could not be opened, by the system's error number (errno); `what` and `path` name it. Unavailable.
+// The error for a device that could not be opened, by the system's error number (errno). `what` and `path` name the
+// device. Unavailable.
 [[nodiscard]] Error hid_open_error(const std::string& what, const std::string& path, int number);
 
 class HidPort {
  public:
-  // `what` names the device in sentences, e.g. "the SpaceMouse". Error: unavailable.
+  // `what` names the device in messages, e.g. "the SpaceMouse". Error: unavailable.
   [[nodiscard]] static Result<HidPort> open(const HidFound& found, std::string what);
   HidPort(HidPort&&) noexcept;
   HidPort& operator=(HidPort&&) noexcept;
   ~HidPort();
 
-  // The next report; 0 bytes when there is none within `patience`. Error: unavailable (it went away).
+  // The next report. 0 bytes if there is none within `patience`. Error: unavailable (the device was removed).
   [[nodiscard]] Result<std::size_t> read(std::span<std::uint8_t> into, std::chrono::milliseconds patience);
-  // An output report, id first. Error: unavailable.
+  // Sends an output report, id first. Error: unavailable.
   [[nodiscard]] Result<void> write(std::span<const std::uint8_t> report);
-  // How its reports are built; empty where the system does not tell.
+  // The report descriptor of the device. Empty if the system does not provide it.
   [[nodiscard]] std::vector<std::uint8_t> descriptor() const;
 
  private:
@@ -51,12 +52,12 @@ class HidPort {
 // Reads a port on a thread of its own.
 class HidReader {
  public:
-  // Called on the reading thread with each report, and with an empty one after each pause without any.
+  // Called on the reading thread with each report, and with an empty one after each pause without a report.
   using Take = std::function<void(std::span<const std::uint8_t>)>;
   ~HidReader() { stop(); }
 
-  // `at_end` is called on the reading thread when the device has gone, `before_close` when it is stopped and still
-  // there.
+  // `at_end` is called on the reading thread when the device was removed. `before_close` is called there when the
+  // reader is stopped and the device still exists.
   struct Calls {
     Take take;
     std::function<void()> at_end;
@@ -64,7 +65,7 @@ class HidReader {
   };
   void start(HidPort port, std::chrono::milliseconds pause, Calls calls);
   void stop() noexcept;
-  // Why it stopped reading, if it did by itself.
+  // The error that ended the reading, if it ended by itself.
   [[nodiscard]] Result<void> health() const;
 
  private:

@@ -6,7 +6,7 @@
 namespace osteon {
 namespace {
 
-// Global items hold until they change; local ones end with each main item.
+// Global items hold until they change. Local items end with each main item.
 struct Globals {
   std::uint16_t page = 0;
   std::int32_t lowest = 0, highest = 0;
@@ -32,7 +32,7 @@ std::int32_t sign_extended(std::uint32_t value, std::uint32_t bits) {
   return static_cast<std::int32_t>((value ^ sign) - sign);
 }
 
-// Tags with their type, size bits cleared.
+// Tags with their type; the size bits are cleared.
 enum Item : std::uint8_t {
   kInput = 0x80,
   kOutput = 0x90,
@@ -81,10 +81,10 @@ std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor)
   Globals globals;
   std::vector<Globals> stack;
   Locals locals;
-  std::map<std::uint8_t, std::uint32_t> ends;  // of each report's input, bits
+  std::map<std::uint8_t, std::uint32_t> ends;  // end of each report's input, bits
   for (std::size_t at = 0; at < descriptor.size();) {
     const std::uint8_t prefix = descriptor[at++];
-    if (prefix == kLong) {  // of no standard device; its size follows
+    if (prefix == kLong) {  // not used by standard devices; its size follows
       if (at >= descriptor.size()) break;
       at += 2u + descriptor[at];
       continue;
@@ -124,7 +124,7 @@ std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor)
         globals = stack.back();
         stack.pop_back();
         break;
-      // A usage of four bytes brings its own page.
+      // A usage of four bytes contains its own page.
       case kUsage:
         locals.usages.push_back(size == 4 ? data : std::uint32_t{globals.page} << 16 | data);
         break;
@@ -148,7 +148,7 @@ std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor)
                          globals.bits,
                          globals.lowest,
                          globals.highest};
-          // "0 to 255" in one byte reads as −1: the largest is not negative where the smallest is not.
+          // "0 to 255" in one byte reads as −1. The maximum is not negative if the minimum is not.
           if (field.lowest >= 0 && field.highest < field.lowest)
             field.highest = static_cast<std::int32_t>(globals.highest_unsigned);
           fields.push_back(field);

@@ -1,4 +1,4 @@
-// Where a HID device keeps a value in its reports, as its own report descriptor tells (USB HID 1.11, section 6.2.2).
+// Where a HID device stores a value in its reports, according to its report descriptor (USB HID 1.11, section 6.2.2).
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -9,21 +9,21 @@ namespace osteon {
 
 struct HidField {
   std::uint16_t page = 0, usage = 0;
-  std::uint8_t report = 0;  // its id; 0: the device numbers no reports
-  std::uint32_t bit = 0;    // from the report's first byte, behind the id if there is one
+  std::uint8_t report = 0;  // report id; 0: the device does not number its reports
+  std::uint32_t bit = 0;    // from the report's first byte, after the id if there is one
   std::uint32_t bits = 0;
   std::int32_t lowest = 0, highest = 0;
 
-  // Of a report as it was read, id included where there is one; empty when it is another report or too short.
+  // The value in a report as it was read, with its id if there is one. Nothing if it is another report or too short.
   [[nodiscard]] std::optional<std::int32_t> value(std::span<const std::uint8_t> read) const noexcept;
-  // The same as a part of its range, 0 … 1.
+  // The same as a fraction of its range, 0 … 1.
   [[nodiscard]] std::optional<double> share(std::span<const std::uint8_t> read) const noexcept;
 };
 
-// Every variable input field of a descriptor; none of what is damaged or not understood.
+// Every variable input field of a descriptor. Nothing from parts that are damaged or unknown.
 [[nodiscard]] std::vector<HidField> hid_input_fields(std::span<const std::uint8_t> descriptor);
 
-// The field of the first of these usages that the device has, e.g. of an axis.
+// The field of the first of these usages that the device has, for example of an axis.
 struct HidUsage {
   std::uint16_t page, usage;
 };

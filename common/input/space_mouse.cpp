@@ -22,9 +22,9 @@ constexpr std::array<std::uint16_t, 10> k3DconnexionModels{0xc62e, 0xc62f, 0xc63
 constexpr std::uint16_t kDesktopPage = 1, kMultiAxis = 8;
 constexpr std::array<std::uint8_t, 2> kLightOn{4, 1}, kLightOff{4, 0};
 constexpr auto kPause = 1ms;
-// A cap held out of its middle reports again and again; silence means that its reports were lost.
+// A deflected cap reports continuously. Silence means that its reports were lost.
 constexpr auto kDeflectionHeld = 500ms;
-constexpr std::chrono::milliseconds kLookAgain{1000}, kLookAfter{100};  // for one that is not there; after one that is
+constexpr std::chrono::milliseconds kLookAgain{1000}, kLookAfter{100};  // if none was found; after one was lost
 
 bool is_space_mouse(const HidFound& device) {
   const auto known = [&](const auto& models) {
@@ -32,7 +32,7 @@ bool is_space_mouse(const HidFound& device) {
   };
   const bool one = (device.vendor == kLogitech && known(kLogitechModels)) ||
                    (device.vendor == k3Dconnexion && known(k3DconnexionModels));
-  // A receiver has other collections beside the cap's; where the system tells no usage it is the only one.
+  // A receiver has other collections beside that of the cap. If the system reports no usage, it is the only one.
   return one && (device.usage_page == 0 || (device.usage_page == kDesktopPage && device.usage == kMultiAxis));
 }
 
@@ -76,7 +76,7 @@ struct SpaceMouseWatch::State {
   std::function<void(const std::string&)> say;
   TripleBuffer<SpaceMouseState> states;
   SpaceMousePort port;
-  std::mutex mutex;  // guards what follows
+  std::mutex mutex;  // guards the members below
   std::condition_variable wake;
   bool stopping = false;
   std::thread thread;

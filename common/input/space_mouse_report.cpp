@@ -9,7 +9,8 @@ namespace {
 constexpr std::uint8_t kTranslation = 1, kRotation = 2, kButtons = 3, kBattery = 0x17;
 constexpr std::size_t kThreeAxes = 1 + 6, kSixAxes = 1 + 12;
 
-// Three int16, least significant byte first, in the cap's axes; as parts of the whole way in the device frame.
+// Three int16, least significant byte first, in the cap's axes. Returned as fractions of full deflection in the device
+// frame.
 Vec3 axes(std::span<const std::uint8_t> bytes) {
   double raw[3];
   for (std::size_t i = 0; i < 3; ++i) {

@@ -13,7 +13,7 @@ Backoff::Backoff(std::uint64_t seed, const BackoffBounds& bounds)
 
 std::chrono::nanoseconds Backoff::next() {
   limit_ = std::min(2 * limit_, bounds_.most);
-  // The library's distributions differ from one library to the next; the modulus favours none by more than 1e-9.
+  // The library's distributions differ between libraries. The modulus favours no value by more than 1e-9.
   const auto span = static_cast<std::uint64_t>((limit_ - bounds_.least).count()) + 1;
   return bounds_.least + std::chrono::nanoseconds(static_cast<std::int64_t>(random_() % span));
 }

@@ -1,4 +1,4 @@
-// How long to wait before trying again to reach a server.
+// How long a client waits before it tries again to reach a server.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -11,14 +11,14 @@ struct BackoffBounds {
   std::chrono::nanoseconds most = std::chrono::seconds{5};
 };
 
-// Evenly between `least` and a limit that doubles with each failure, from twice `least` up to `most`: clients that lost
-// a server at the same moment do not come back at the same moment.
+// Waits are random and uniform between `least` and a limit. The limit starts at twice `least` and doubles with each
+// failure, up to `most`. So clients that lost a server at the same moment do not all return at the same moment.
 class Backoff {
  public:
   explicit Backoff(std::uint64_t seed, const BackoffBounds& bounds = {});
-  // After a failure: how long to wait.
+  // Called after a failure. Returns how long to wait.
   [[nodiscard]] std::chrono::nanoseconds next();
-  // After a success: the next failure is a first one.
+  // Called after a success. The next failure counts as the first.
   void reset() { limit_ = bounds_.least; }
 
  private:

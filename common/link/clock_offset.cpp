@@ -5,7 +5,7 @@
 namespace osteon {
 namespace {
 
-// About 36 years: beyond any clock's start, and far from where sums of two differences overflow.
+// About 36 years: longer than any clock has run, and small enough that sums of two differences do not overflow.
 constexpr std::chrono::nanoseconds kFarthest{std::int64_t{1} << 60};
 
 bool near(std::chrono::nanoseconds time) { return time > -kFarthest && time < kFarthest; }
@@ -19,7 +19,7 @@ bool ClockOffset::add(const ClockSample& sample) noexcept {
   if (kept < std::chrono::nanoseconds{0} || away < kept) return false;
   const auto there = sample.peer_received - sample.sent, back = sample.peer_sent - sample.received;
   const auto round_trip = away - kept;
-  // Halves are rounded down, by less than the nanosecond that the error is widened by.
+  // Halves are rounded down, by less than the nanosecond that is added to the error.
   const auto error = (round_trip + std::chrono::nanoseconds{1}) / 2;
   kept_[count_++ % kSamples] = {{(there + back) / 2, round_trip, error}, sample.received};
   return true;

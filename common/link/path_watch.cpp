@@ -9,7 +9,7 @@ PathWatch::PathWatch(FillRandom random, const PathRules& rules) : random_(std::m
 void PathWatch::heard(const Endpoint& from, bool newest, std::size_t bytes, std::chrono::nanoseconds now) {
   forget_unproven(now);
   if (newest && from == address_) {
-    candidate_.reset();  // the peer is where it was: it has come back, or never left
+    candidate_.reset();  // the peer is at its address: it has returned, or never left
   } else if (newest && !(candidate_ && candidate_->address == from)) {
     candidate_ = Candidate{.address = from, .token = {}, .next_try = now, .forgotten_at = now + rules_.forgotten_after};
     random_(candidate_->token);
@@ -19,7 +19,8 @@ void PathWatch::heard(const Endpoint& from, bool newest, std::size_t bytes, std:
 
 bool PathWatch::echoed(const Endpoint& from, const PathToken& token, std::chrono::nanoseconds now) {
   forget_unproven(now);
-  // A token that was not sent yet is known to nobody; asked all the same, as random bytes are a parameter.
+  // Nobody knows a token that was not sent yet. It is checked anyway, because the source of random bytes is a
+  // parameter.
   if (!candidate_ || candidate_->tries == 0 || candidate_->address != from || candidate_->token != token) return false;
   address_ = from;
   candidate_.reset();
@@ -30,7 +31,8 @@ bool PathWatch::echoed(const Endpoint& from, const PathToken& token, std::chrono
 std::optional<PathWatch::Challenge> PathWatch::challenge_due(std::size_t bytes, std::chrono::nanoseconds now) {
   forget_unproven(now);
   if (!candidate_ || candidate_->tries == rules_.tries || now < candidate_->next_try) return {};
-  if (candidate_->sent + bytes > rules_.most_sent * candidate_->received) return {};  // waits until more has come
+  // waits until more bytes have arrived
+  if (candidate_->sent + bytes > rules_.most_sent * candidate_->received) return {};
   candidate_->sent += bytes;
   ++candidate_->tries;
   candidate_->next_try = now + rules_.retry_after;

@@ -1,4 +1,4 @@
-// Where a peer is now: whose address it is believed, and how it proves another one.
+// Tracks the address of a peer, and how the peer proves a new address.
 #pragma once
 #include <array>
 #include <chrono>
@@ -16,34 +16,35 @@ using PathToken = std::array<std::uint8_t, 16>;
 struct PathRules {
   std::chrono::nanoseconds retry_after = std::chrono::milliseconds{200};
   int tries = 3;  // challenges to one address
-  // An address not proven by then is forgotten, and may begin anew. No round trip may be longer.
+  // An unproven address is forgotten after this time, and may start again. No round trip may be longer.
   std::chrono::nanoseconds forgotten_after = std::chrono::seconds{1};
-  std::size_t most_sent = 3;  // bytes to an address not yet proven, for each byte that came from it
+  std::size_t most_sent = 3;  // bytes sent to an unproven address, for each byte received from it
 };
 
-// A server's view of one session. Addresses are written by whoever sends, so a datagram from a new one moves nothing by
-// itself: it must be authentic and newer than all before, which no copy of an old one is; then a challenge goes to the
-// new address, and only its echo, authentic and from there, makes it the peer's. Until then all else goes where it
-// went. The first address of a session is proven in the same way. After RFC 9000, section 8.2 and 9.3. One thread.
+// A server's view of one session. The sender writes its own address, so a datagram from a new address changes nothing
+// by itself. It must be authentic and newer than all before; a copy of an old datagram is not newer. Then a challenge
+// goes to the new address. Only its echo, authentic and from that address, makes it the peer's address. Until then
+// everything else goes to the old address. The first address of a session is proven in the same way. Follows RFC 9000,
+// sections 8.2 and 9.3. One thread.
 class PathWatch {
  public:
   explicit PathWatch(FillRandom random, const PathRules& rules = {});
 
-  // An authentic datagram of `bytes` came from `from`; `newest`: its counter is above all before (Opened::newest).
+  // An authentic datagram of `bytes` came from `from`. `newest`: its counter is above all before (Opened::newest).
   // `now`: since any start, the same for all calls.
   void heard(const Endpoint& from, bool newest, std::size_t bytes, std::chrono::nanoseconds now);
-  // An authentic datagram from `from` brought this token. True when it moved the peer there.
+  // An authentic datagram from `from` contained this token. True if the peer's address changed to `from`.
   bool echoed(const Endpoint& from, const PathToken& token, std::chrono::nanoseconds now);
 
   struct Challenge {
     Endpoint to;
     PathToken token;
   };
-  // A challenge that is due, to be sent at once in a datagram of `bytes`, all counted; called at every turn of the
+  // A challenge that is due. Send it at once, in a datagram of `bytes` bytes in total. Call this in every turn of the
   // loop.
   [[nodiscard]] std::optional<Challenge> challenge_due(std::size_t bytes, std::chrono::nanoseconds now);
 
-  // Where everything but challenges goes; not set before the first address is proven.
+  // Destination of everything but challenges. Not set before the first address is proven.
   [[nodiscard]] const Endpoint& address() const { return address_; }
   [[nodiscard]] std::uint64_t moves() const { return moves_; }
 
@@ -61,7 +62,7 @@ class PathWatch {
   const PathRules rules_;
   Endpoint address_;
   std::optional<Candidate> candidate_;
-  std::uint64_t moves_ = 0;  // how often the address changed, the first one included
+  std::uint64_t moves_ = 0;  // changes of the address, including the first address
 };
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// Random bytes as a parameter: the system's for keys and challenges, seeded ones in simulations.
+// Source of random bytes as a parameter: the system's for keys and challenges, a seeded one in simulations.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -6,9 +6,9 @@
 
 namespace osteon {
 
-// Fills all of it.
+// Fills the whole span.
 using FillRandom = std::function<void(std::span<std::uint8_t>)>;
-// Fit for keys. Any thread.
+// Suitable for keys. Any thread.
 [[nodiscard]] FillRandom system_random();
 
 }  // namespace osteon

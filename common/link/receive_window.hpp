@@ -1,5 +1,5 @@
-// Puts numbered items that came in any order, some of them several times, back into their order: each comes out exactly
-// once, after all before it. Pure. One thread. The other end is SendWindow.
+// Restores the order of numbered items that arrive in any order and may be repeated. Each item comes out exactly once,
+// after all items before it. Pure. One thread. The other end is SendWindow.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -11,15 +11,16 @@ namespace osteon {
 
 struct ReceiveCounts {
   std::uint64_t taken = 0;
-  std::uint64_t repeated = 0;  // had come before
-  std::uint64_t beyond = 0;    // so far ahead of what is missing that they were dropped; they will come again
+  std::uint64_t repeated = 0;  // arrived before
+  std::uint64_t beyond = 0;    // dropped, because too far ahead of the missing item; they will be sent again
 };
 
-// `Item`: what a packet's bytes were decoded to.
+// `Item`: the decoded form of an item.
 template <class Item>
 class ReceiveWindow {
  public:
-  // `first`: number of the first item to come out. `most_ahead`: how far beyond it items are kept; bounds the memory.
+  // `first`: number of the first item to come out. `most_ahead`: how far beyond it items are stored; this bounds the
+  // memory.
   explicit ReceiveWindow(std::uint64_t first = 1, std::uint64_t most_ahead = 1024)
       : next_(first), most_ahead_(most_ahead) {}
 
@@ -38,7 +39,7 @@ class ReceiveWindow {
     return true;
   }
 
-  // The next item in order, once; none while it is missing.
+  // The next item in order, once. Nothing while it is missing.
   std::optional<Item> take() {
     const auto at = held_.find(next_);
     if (at == held_.end()) return {};
@@ -48,18 +49,18 @@ class ReceiveWindow {
     return item;
   }
 
-  // All up to this number have come some other way: none of them comes out any more.
+  // All items up to this number arrived in another way. None of them comes out any more.
   void skip(std::uint64_t upto) {
     if (upto < next_) return;
     held_.erase(held_.begin(), held_.upper_bound(upto));
     next_ = upto + 1;
   }
 
-  // Every item up to this number was taken, or skipped. To be acknowledged at once, or later where taking is not yet
-  // keeping: a cut when it is committed.
+  // Every item up to this number was taken or skipped. Acknowledge it at once, or later if taking an item does not make
+  // it durable: a cut is acknowledged when it is committed.
   [[nodiscard]] std::uint64_t acknowledged() const { return next_ - 1; }
-  // Of the 64 items from upto + 2 on those that have come, taken or not, the lowest bit for upto + 2: what need not be
-  // sent again. `upto`: what is acknowledged in the same packet.
+  // Bits for the 64 items from upto + 2 on, the lowest for upto + 2. A bit is set if its item has arrived, taken or
+  // not, and need not be sent again. `upto`: the number that the same packet acknowledges.
   [[nodiscard]] std::uint64_t beyond(std::uint64_t upto) const {
     const std::uint64_t last = held_.empty() ? next_ - 1 : held_.rbegin()->first;
     std::uint64_t bits = 0;
@@ -67,7 +68,7 @@ class ReceiveWindow {
       if (number < next_ || held_.contains(number)) bits |= bit;
     return bits;
   }
-  [[nodiscard]] std::size_t held() const { return held_.size(); }  // out of order, or not yet taken
+  [[nodiscard]] std::size_t held() const { return held_.size(); }  // out of order, or not taken yet
   [[nodiscard]] const ReceiveCounts& counts() const { return counts_; }
 
  private:

@@ -15,7 +15,7 @@ bool ReplayWindow::is_fresh(std::uint64_t counter) const noexcept {
 void ReplayWindow::mark(std::uint64_t counter) noexcept {
   OSTEON_CHECK(is_fresh(counter));
   if (is_newest(counter)) {
-    // Words that come into the window now still hold what left it a turn of the ring ago.
+    // Words that enter the window now still contain values from one turn of the ring ago.
     const std::uint64_t words = any_ ? std::min(counter / 64 - newest_ / 64, kWords) : 0;
     for (std::uint64_t i = 0; i < words; ++i) seen_[(counter / 64 - i) % kWords] = 0;
     newest_ = counter;

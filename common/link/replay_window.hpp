@@ -1,21 +1,21 @@
-// Which counters of a peer have been seen, so that a datagram that somebody sends again is known.
+// Tracks which counters of a peer were seen, to recognise replayed datagrams.
 #pragma once
 #include <array>
 #include <cstdint>
 
 namespace osteon {
 
-// The last kSpan counters up to the newest; what is older counts as seen. The ring of RFC 6479, section 2: one word
-// more than the window has, so that moving on clears whole words and shifts nothing.
+// Covers the last kSpan counters up to the newest. Older counters count as seen. Uses the ring of RFC 6479, section 2:
+// one word more than the window, so that an advance clears whole words and shifts nothing.
 class ReplayWindow {
  public:
   static constexpr std::uint64_t kSpan = 2048;
 
-  // Neither seen nor too old. Asked before a datagram is authenticated; nothing changes.
+  // Neither seen nor too old. Called before a datagram is authenticated; changes nothing.
   [[nodiscard]] bool is_fresh(std::uint64_t counter) const noexcept;
-  // After it was authenticated, and only of fresh ones.
+  // Called after authentication, only for fresh counters.
   void mark(std::uint64_t counter) noexcept;
-  // Above all that were marked.
+  // Above all marked counters.
   [[nodiscard]] bool is_newest(std::uint64_t counter) const noexcept { return !any_ || counter > newest_; }
 
  private:

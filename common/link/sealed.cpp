@@ -16,7 +16,7 @@ static_assert(kTagBytes == crypto_aead_chacha20poly1305_ietf_ABYTES);
 static_assert(sizeof(SealKey::bytes) == crypto_aead_chacha20poly1305_ietf_KEYBYTES);
 static_assert(sizeof(SealKey::bytes) == crypto_kdf_KEYBYTES);
 
-// Chooses the processor's fastest code; any thread, any number of times.
+// Chooses the fastest code for the processor. Any thread, any number of times.
 void ready_sodium() { OSTEON_CHECK(sodium_init() >= 0); }
 
 void put_little(std::uint64_t value, std::span<std::uint8_t> into) {
@@ -74,7 +74,8 @@ Sealer::Sealer(std::uint32_t session, const SealKey& key, const SealRules& rules
 std::span<const std::uint8_t> Sealer::seal(std::span<const std::uint8_t> plain, std::chrono::nanoseconds now,
                                            std::span<std::uint8_t> into) noexcept {
   OSTEON_CHECK(plain.size() <= kMostPlainBytes && into.size() >= plain.size() + kSealBytes);
-  OSTEON_CHECK(counter_ != std::numeric_limits<std::uint64_t>::max());  // the next one would be 0, used before
+  // otherwise the next counter would be 0, which was used before
+  OSTEON_CHECK(counter_ != std::numeric_limits<std::uint64_t>::max());
   if (under_key_ > 0 && (now - began_ >= rules_.rekey_after || under_key_ >= rules_.rekey_packets)) {
     key_ = next_key(key_);
     ++generation_;
@@ -110,7 +111,7 @@ std::optional<Opened> Opener::open(std::span<const std::uint8_t> datagram, std::
     ++counts_.malformed;
     return {};
   }
-  // How far the sender's key is ahead of ours; 255 is the one before ours.
+  // How far the sender's key is ahead of ours; 255 is the key before ours.
   const auto ahead = static_cast<std::uint8_t>(datagram[kGenerationAt] - static_cast<std::uint8_t>(generation_));
   const bool of_previous = ahead == 255 && previous_.has_value();
   if (!of_previous && ahead > kMostAhead) {
@@ -122,7 +123,7 @@ std::optional<Opened> Opener::open(std::span<const std::uint8_t> datagram, std::
     ++counts_.replayed;
     return {};
   }
-  // Walks to the sender's key on copies: only what is authentic moves ours.
+  // Advances copies to the sender's key, because only an authentic datagram may advance ours.
   SealKey key = of_previous ? *previous_ : key_, before = key;
   for (int step = 0; !of_previous && step < ahead; ++step) {
     before = key;

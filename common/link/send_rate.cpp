@@ -6,7 +6,7 @@ namespace osteon {
 namespace {
 
 constexpr double kSmoothing_packets = 64.0;
-// A loss is never taken for certain or impossible: the estimate rests on few packets.
+// Loss never counts as certain or impossible, because the estimate uses few packets.
 constexpr double kLeastLoss = 0.005, kMostLoss = 0.9;
 
 double seconds(std::chrono::nanoseconds t) { return std::chrono::duration<double>(t).count(); }
@@ -29,7 +29,7 @@ SendRate::Time SendRate::next(Time now, Time wanted, std::size_t needed_bytes, b
 
 std::size_t SendRate::budget(Time now, bool fresh) const {
   if (next(now, now, 0, fresh) > now) return 0;
-  // A byte that is there but for rounding is there.
+  // A byte that is missing only by rounding counts.
   return std::min(kMostDatagramBytes, static_cast<std::size_t>(tokens(now) + 1e-3) - params_.overhead_bytes);
 }
 
@@ -42,8 +42,8 @@ void SendRate::sent(Time now, std::size_t bytes) {
 void SendRate::heard(std::uint64_t newest_counter, std::uint64_t received) {
   if (newest_counter <= newest_ || received < received_) return;
   const auto passed = static_cast<double>(newest_counter - newest_);
-  // Packets that were overtaken are counted after the one that overtook them, so a single look may see too many lost or
-  // come; over some of them that evens out.
+  // Reordered packets are counted late, so a single report may show too many or too few losses. The average over
+  // several reports is correct.
   const double share = 1.0 - static_cast<double>(received - received_) / passed;
   loss_ += (1.0 - std::exp(-passed / kSmoothing_packets)) * (share - loss_);
   newest_ = newest_counter;

@@ -1,5 +1,5 @@
-// When the next packet goes, how large it may be, and in how many packets each item is repeated: the pace of one end of
-// a session. Pure: time is a parameter. One thread.
+// Controls the sending pace of one end of a session: when the next packet goes, how large it may be, and in how many
+// packets each item is repeated. Pure: time is a parameter. One thread.
 #pragma once
 #include <algorithm>
 #include <chrono>
@@ -11,18 +11,20 @@
 namespace osteon {
 
 struct SendRateParams {
-  std::chrono::nanoseconds interval = std::chrono::milliseconds(8);  // between packets while there is something to say
-  // The same where it is new, as long as the rate allows: a cut that is sooner on its way is sooner felt.
+  std::chrono::nanoseconds interval = std::chrono::milliseconds(8);  // between packets while there is something to send
+  // Between packets with new items, as long as the rate allows: a cut that is sent sooner is felt sooner.
   std::chrono::nanoseconds fresh_interval = std::chrono::milliseconds(4);
-  std::chrono::nanoseconds idle_interval = std::chrono::milliseconds(250);  // between packets that only keep alive
+  // between packets that only keep the session alive
+  std::chrono::nanoseconds idle_interval = std::chrono::milliseconds(250);
   double bytes_per_s = 300'000.0 / 8.0;
-  std::size_t burst_bytes = 2 * (kMostDatagramBytes + 28);  // that may go at once after a silence
-  std::size_t overhead_bytes = 28;                          // UDP and IPv4 headers, which count
-  // A packet waits until it may have so many bytes, headers included: where the rate is short, fewer packets that carry
-  // something are worth more than many whose fixed part eats it.
+  std::size_t burst_bytes = 2 * (kMostDatagramBytes + 28);  // that may go at once after a pause
+  std::size_t overhead_bytes = 28;                          // headers of UDP and IPv4, which count
+  // A packet waits until it may have at least this many bytes, headers included. At a low rate, few packets with
+  // content are better than many that consist mostly of headers.
   std::size_t least_bytes = 280;
   int fewest_repeats = 2, most_repeats = 12;
-  double late_share = 0.0002;  // of items that may come a round trip late for being in none of the packets that arrived
+  // share of items that may be a round trip late because none of the packets that arrived contained them
+  double late_share = 0.0002;
 };
 
 class SendRate {
@@ -31,30 +33,32 @@ class SendRate {
 
   explicit SendRate(SendRateParams params = {}) : params_(params), tokens_(static_cast<double>(params.burst_bytes)) {}
 
-  // When the next packet may go, at `now` or later. `wanted`: when there will be something to say, `now` or earlier for
-  // at once, Time::max() for nothing; then it is one that keeps the session alive. `needed_bytes`: the least budget()
-  // that it is worth going with, such as for one long item. `fresh`: it was never sent before.
+  // When the next packet may go, at `now` or later. `wanted`: when there will be something to send; `now` or earlier
+  // means at once. Time::max() means nothing; then the next packet only keeps the session alive. `needed_bytes`: the
+  // least budget() that makes a packet useful, for example for one long item. `fresh`: the content was never sent
+  // before.
   [[nodiscard]] Time next(Time now, Time wanted, std::size_t needed_bytes = 0, bool fresh = false) const;
-  // Largest whole datagram that may go now, at most kMostDatagramBytes; 0 where next() is later.
+  // Largest whole datagram that may go now, at most kMostDatagramBytes. 0 if next() is later.
   [[nodiscard]] std::size_t budget(Time now, bool fresh = false) const;
-  // A datagram of so many bytes went.
+  // A datagram of this many bytes was sent.
   void sent(Time now, std::size_t bytes);
 
-  // What the other end says of our packets in each of its own: the newest counter that it has seen and how many have
-  // come in all, repeats of the network not counted. Anything that does not move forward is ignored.
+  // What each packet of the other end reports about our packets: the newest counter that it has seen, and how many
+  // packets arrived, repeats of the network not counted. Values that do not advance are ignored.
   void heard(std::uint64_t newest_counter, std::uint64_t received);
   void set_round_trip(Time round_trip) { round_trip_ = round_trip; }
-  // Share of packets lost lately, 0 to 1; smoothed over about 64 packets, 0.1 before the first.
+  // Share of packets lost lately, 0 to 1, smoothed over about 64 packets. 0.1 before the first packet.
   [[nodiscard]] double loss() const { return std::clamp(loss_, 0.0, 1.0); }
-  // Packets that each item goes into: the fewest k with loss^k R/T <= late_share (send_window.hpp), within the bounds.
+  // How many packets contain each item: the fewest k with loss^k R/T <= late_share (send_window.hpp), within the
+  // bounds.
   [[nodiscard]] int repeats() const;
 
  private:
   [[nodiscard]] double tokens(Time now) const;
 
   SendRateParams params_;
-  Time last_ = Time::min();  // packet, min: none yet
-  Time filled_{};            // when tokens_ was counted
+  Time last_ = Time::min();  // when the last packet went; min: none yet
+  Time filled_{};            // when tokens_ was updated
   double tokens_;            // bytes that may go
   Time round_trip_ = std::chrono::milliseconds(200);
   double loss_ = 0.1;  // may leave 0 to 1 while late packets are counted

@@ -7,7 +7,7 @@
 namespace osteon {
 namespace {
 
-// Packets that an item which counts as lost goes into: once would leave many to be lost again.
+// Number of packets for an item that counts as lost. With one packet, many items would be lost again.
 constexpr int kResends = 3;
 
 }  // namespace
@@ -36,7 +36,7 @@ std::optional<std::uint64_t> SendWindow::push(SendItem item) {
 }
 
 bool SendWindow::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
-  // What was never sent cannot have arrived: an answer that says so is of another window, or wrong.
+  // An item that was never sent cannot have arrived. Such a report is wrong or belongs to another window.
   const std::uint64_t fresh = next() - unsent_;
   if (upto >= fresh) return false;
   bool news = upto >= oldest_;
@@ -67,7 +67,7 @@ void SendWindow::forget_oldest() {
 }
 
 SendWindow::Time SendWindow::retransmission_time() const {
-  // The acknowledgement waits for the other end's next packet, and that may be lost too.
+  // The acknowledgement waits for the other end's next packet, which may be lost too.
   return round_trip_ + round_trip_ / 8 + std::chrono::milliseconds(24);
 }
 
@@ -87,12 +87,12 @@ std::size_t SendWindow::least_room(Time now) const {
   return room;
 }
 
-// A packet on its way to being full.
+// A packet that is being filled.
 class SendWindow::Filling {
  public:
   Filling(SendWindow& window, std::size_t budget) : window_(window), budget_(budget), chosen_(window.waiting_.size()) {}
 
-  // False where the packet has no room for it.
+  // False if the packet has no room for the item.
   bool add(std::uint64_t number) {
     if (chosen(number)) return true;
     const Waiting& waiting = *window_.find(number);
@@ -139,21 +139,22 @@ class SendWindow::Filling {
 SendWindow::Picked SendWindow::pick(Time now, std::size_t budget_bytes, int repeats) {
   if (waiting_.empty()) return {};
   Filling packet(*this, budget_bytes);
-  // Of what is on its way the oldest has mostly arrived, and is no neighbour of the others: alone it would take a head
-  // of its own in every packet.
+  // Of the items in flight, the oldest has mostly arrived and is no neighbour of the others. Added alone, it would need
+  // a head of its own in every packet. So it goes only when it is overdue.
   if (oldest_overdue(now)) packet.add(oldest_);
   const std::uint64_t fresh = next() - unsent_;
   for (std::uint64_t number = fresh; number < next(); ++number)
     if (!packet.add(number)) return packet.take(now);
-  // What was in flight when many packets were lost in a row comes before others' repeats: all that follows waits for
-  // it.
+  // Items that were in flight during a burst of losses go before repeats of others, because all later items wait for
+  // them.
   for (std::uint64_t number = oldest_; number < fresh; ++number) {
     Waiting& waiting = *find(number);
     if (waiting.arrived) continue;
     if (waiting.last_sent + retransmission_time() <= now) waiting.resend = kResends;
     if (waiting.resend > 0 && !packet.add(number)) return packet.take(now);
   }
-  // Sent in order, so the least often sent are the last: a packet's items are then neighbours, which share one head.
+  // Items were sent in order, so the least often sent are the last. Starting there, the items of a packet are
+  // neighbours and share one head.
   for (std::uint64_t number = fresh; number-- > oldest_;)
     if (find(number)->sent < repeats && !find(number)->arrived && !packet.add(number)) break;
   return packet.take(now);

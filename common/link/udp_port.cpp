@@ -15,7 +15,7 @@ namespace {
 
 using asio::ip::udp;
 
-// Turns of receive() that bring nothing: a flood of what is dropped must not keep its caller from what is due.
+// Limits the attempts of receive() that return nothing, so that a flood of dropped datagrams does not block the caller.
 constexpr int kMostTurns = 64;
 
 Endpoint endpoint_of(const udp::endpoint& from) {
@@ -30,7 +30,7 @@ Endpoint endpoint_of(const udp::endpoint& from) {
   return endpoint;
 }
 
-// As a socket of the family takes it; nothing where a socket of IPv4 is to reach IPv6.
+// The address as a socket of this family accepts it. Nothing if an IPv4 socket would have to reach IPv6.
 std::optional<udp::endpoint> reached_by(bool is_v4, const Endpoint& to) {
   asio::ip::address_v6::bytes_type bytes;
   for (std::size_t i = 0; i < 8; ++i) {
@@ -55,7 +55,7 @@ struct UdpPort::Socket {
 };
 
 UdpPort::UdpPort(std::unique_ptr<Socket> socket) : socket_(std::move(socket)) {}
-UdpPort::~UdpPort() = default;  // closes the socket, and drops without a call what waits on it
+UdpPort::~UdpPort() = default;  // closes the socket, and drops its waiting handlers without calling them
 
 Result<std::unique_ptr<UdpPort>> UdpPort::open(const UdpPortOptions& options) {
   const std::string name = options.address + " port " + std::to_string(options.port);
@@ -75,7 +75,8 @@ Result<std::unique_ptr<UdpPort>> UdpPort::open(const UdpPortOptions& options) {
     return refused("opened");
   if (socket->datagrams.bind({address, options.port}, error)) return refused("bound");
   if (socket->datagrams.non_blocking(true, error)) return refused("opened");
-  socket->datagrams.set_option(asio::socket_base::receive_buffer_size(options.receive_buffer_bytes), error);  // a wish
+  // optional; an error does not matter
+  socket->datagrams.set_option(asio::socket_base::receive_buffer_size(options.receive_buffer_bytes), error);
   return std::unique_ptr<UdpPort>(new UdpPort(std::move(socket)));
 }
 
@@ -89,7 +90,7 @@ void UdpPort::send(const Endpoint& to, std::span<const std::uint8_t> bytes) {
 
 std::optional<Datagram> UdpPort::receive(std::span<std::uint8_t> into) {
   OSTEON_CHECK(into.size() >= kMostDatagramBytes);
-  // One byte more than is allowed, as the system cuts off silently what does not fit.
+  // One byte more than allowed, because the system silently truncates longer datagrams.
   std::array<std::uint8_t, 1> beyond{};
   const std::array<asio::mutable_buffer, 2> buffers{asio::buffer(into.data(), kMostDatagramBytes),
                                                     asio::buffer(beyond)};
@@ -99,7 +100,7 @@ std::optional<Datagram> UdpPort::receive(std::span<std::uint8_t> into) {
     const std::size_t size = socket_->datagrams.receive_from(buffers, from, 0, error);
     if (error == asio::error::would_block) return {};
     if (error) {
-      ++receive_failed_;  // such as connection_refused: what was sent before found no program there
+      ++receive_failed_;  // such as connection_refused: no program received what was sent before
     } else if (size > kMostDatagramBytes) {
       ++dropped_;
     } else {
@@ -122,7 +123,7 @@ bool UdpPort::wait(std::chrono::nanoseconds patience) {
     socket->datagrams.async_wait(udp::socket::wait_read,
                                  [socket](const asio::error_code&) { socket->watched = false; });
   }
-  // run_one_for() looks at nothing when its time is over at once.
+  // run_one_for() does nothing if its time is zero.
   return (patience.count() > 0 ? socket->context.run_one_for(patience) : socket->context.poll_one()) > 0;
 }
 

@@ -1,4 +1,4 @@
-// How the resistance of bone to being cut grows with its density, against cortical bone.
+// How the resistance of bone to cutting grows with its density, relative to cortical bone.
 #pragma once
 #include <cmath>
 
@@ -6,7 +6,7 @@ namespace osteon {
 
 inline constexpr double kCorticalDensity = 1.9;  // g/cm3
 
-// [haptic] As the thrust of drilling does, equation (7.3): (density / 1.9)^1.1841. [A] for every other way of cutting.
+// [haptic] Like the thrust of drilling, equation (7.3): (density / 1.9)^1.1841. [A] for every other way of cutting.
 [[nodiscard]] inline double relative_strength(double density_g_cm3) noexcept {
   return density_g_cm3 > 0.0 ? std::pow(density_g_cm3 / kCorticalDensity, 1.1841) : 0.0;
 }

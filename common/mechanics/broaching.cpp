@@ -12,7 +12,7 @@ Newtons broaching_resistance(const BroachingParams& params, double engaged_area_
 
 double blow_advance_mm(const BroachingParams& params, double engaged_area_mm2, GramsPerCm3 density) noexcept {
   const double resistance_n = broaching_resistance(params, engaged_area_mm2, density).value();
-  // N mm of the blow.
+  // Energy of the blow, N mm.
   const double energy = 1e3 * params.efficiency * params.impulse_n_s * params.impulse_n_s / (2.0 * params.mallet_kg);
   if (energy < params.seated_mm * resistance_n) return 0.0;
   return resistance_n > 0.0 ? std::min(energy / resistance_n, params.most_mm) : params.most_mm;

@@ -23,11 +23,11 @@ Newtons agus_friction(const AgusParams& params, Newtons normal, double axis_dist
   const double contact_mm = std::sqrt(agus_depth_mm(params, normal) * params.radius_mm);  // Hertz: a^2 = h R
   if (!(contact_mm > 0.0)) return Newtons{0.0};
   const double away = axis_distance_mm / contact_mm;
-  // The share of the pressure's friction that points along omega x r at the contact's middle. Far out 1 - <s^2>/(4 d^2)
-  // with Hertz's mean <s^2> = 2/5 a^2.
+  // The fraction of the pressure's friction that points along omega x r at the contact's middle. Far from the pole it
+  // is 1 - <s^2>/(4 d^2) with Hertz's mean <s^2> = 2/5 a^2.
   double share = 1.0 - 0.1 / (away * away);
   if (away < 4.0) {
-    // Over rings s of the disc, each weighted by its length and Hertz's pressure, sqrt(1 - (s/a)^2).
+    // Sum over rings s of the disc, each weighted by its length and Hertz's pressure, sqrt(1 - (s/a)^2).
     constexpr int kRings = 8, kPlaces = 24;
     double sum = 0.0, weights = 0.0;
     for (int i = 0; i < kRings; ++i) {

@@ -8,7 +8,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kMostLag_s = 1.0;     // nobody's line makes the others wait for longer
+constexpr double kMostLag_s = 1.0;     // a slower connection does not make the others wait longer
 constexpr double kLagSmoothing = 0.1;  // of one measurement
 
 Vec3 clamped(const Vec3& v, double most) {
@@ -16,13 +16,13 @@ Vec3 clamped(const Vec3& v, double most) {
   return size > most ? Vec3(v * (most / size)) : v;
 }
 
-// Way of a step with all after it, each shorter by `less`.
+// Distance of a step and all following ones, each shorter by `less`.
 double braking_way(double step, double less) {
   const double whole = std::floor(step / less);
   return (whole + 1.0) * (step - 0.5 * less * whole);
 }
 
-// The longest step of such a way: whole ones of `less`, and a part.
+// The longest first step for such a distance: whole multiples of `less`, and a fraction.
 double braking_step(double way, double less) {
   const double whole = std::floor(0.5 * (std::sqrt(1.0 + 8.0 * way / less) - 1.0));
   return less * whole + (way - 0.5 * less * whole * (whole + 1.0)) / (whole + 1.0);
@@ -32,12 +32,12 @@ double against(const Vec3& step, const Vec3& load) {
   return load.isZero() ? 0.0 : std::max(0.0, -step.dot(load) / load.norm());
 }
 
-// What the load is given by braking after a step.
+// The energy that braking after a step releases to the load.
 double braking_mj(const Vec3& last, const Vec3& load, double less) {
   return load.norm() * braking_way(std::max(0.0, against(last, load) - less), less);
 }
 
-// A step against the load only so long that funds pay for it and for braking after it.
+// Limits a step against the load, so that the funds cover it and the braking after it.
 Vec3 slowed(const Vec3& step, const Vec3& load, double less, double funds_mj) {
   const double size = load.norm(), wanted = against(step, load),
                most = wanted > 0.0 ? braking_step(funds_mj / size, less) : 0.0;
@@ -55,7 +55,7 @@ Vec3 rotation_vector(const Eigen::Quaterniond& q) {
   return q.vec() * ((q.w() < 0.0 ? -2.0 : 2.0) * std::atan2(sine, std::abs(q.w())) / sine);
 }
 
-// Of the mount itself behind a load that grows: damping over stiffness, the slower of both ways.
+// Lag of the mount itself behind a growing load: damping over stiffness, the larger of translation and rotation.
 double lag_of(const MountParams& m) {
   constexpr double kSI = 1e-3;
   const double place = m.mass_kg / m.stiffness_n_per_mm, turn = m.inertia_kg_mm2 / m.stiffness_nmm_per_rad;
@@ -74,14 +74,14 @@ bool MountServer::receive(std::uint64_t author, const MountLoad& push) noexcept 
   if (found == authors_.end() || !push.load.finite() || !std::isfinite(push.energy_mj)) return false;
   Author& a = found->second;
   if (push.push_seq <= a.push_seq) return false;
-  // The first total heard is where the count begins, whatever an earlier session came to.
+  // The first total is the start of the count, because an earlier session may have left any value.
   if (a.push_seq == 0) {
     a.told_mj = push.energy_mj;
     a.heard_s = now_s_;
   }
   const double gained_mj = push.energy_mj - a.told_mj;
   if (gained_mj > 0.0) {
-    // What nobody's arm can do was not put in.
+    // A gain that no person could have put in does not count.
     constexpr double kSpare_s = 0.5;
     share_out(author, std::min(gained_mj, params_.most_n * params_.most_mm_per_s * (now_s_ - a.heard_s + kSpare_s)));
     a.told_mj = push.energy_mj;
@@ -95,7 +95,7 @@ bool MountServer::receive(std::uint64_t author, const MountLoad& push) noexcept 
 }
 
 void MountServer::share_out(std::uint64_t from, double energy_mj) noexcept {
-  if (authors_.size() < 2) return;  // there is nobody to be pushed back by it
+  if (authors_.size() < 2) return;  // nobody else could be pushed back by it
   for (auto& [author, a] : authors_)
     if (author != from) a.granted_mj += energy_mj / static_cast<double>(authors_.size() - 1);
 }
@@ -144,7 +144,7 @@ void MountFollower::see(const MountPose& seen) noexcept {
     lag_s_ = smoothed_lag(lag_s_, now_s_ - timed_s_);
     timed_seq_ = 0;
   }
-  // As the server does: the first total is where the count begins.
+  // As on the server, the first total is the start of the count.
   if (total_mj_ < 0.0) total_mj_ = std::max(0.0, seen.energy_mj);
   const double gained_mj = seen.energy_mj - total_mj_;
   if (gained_mj <= 0.0) return;
@@ -158,7 +158,7 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   now_s_ += dt_s;
   since_seen_s_ += dt_s;
 
-  // Two passes, so that neither the pose nor its speed jumps at a pose told.
+  // Two passes, so that neither the pose nor its speed jumps when a pose arrives.
   low_pass_s_ =
       std::clamp(params_.per_lag * (std::max(lag_s_, slowest_s_) + mount_lag_s_), params_.least_s, params_.most_s);
   const double share = -std::expm1(-dt_s / low_pass_s_), share_again = -std::expm1(-dt_s / params_.least_s);
@@ -172,9 +172,10 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   Vec3 move_mm = clamped(share_again * (smooth_.mm - shown_.mm), params_.most_mm_per_s * dt_s);
   Vec3 turn_rad =
       clamped(share_again * rotation_vector(smooth_.turn * shown_.turn.conjugate()), params_.most_rad_per_s * dt_s);
-  // Slowed ahead of what funds compel, and setting out and stopping no faster than a bone does.
+  // Slowed before the funds run out, and accelerated and stopped no faster than a real bone.
   const double most_mm = params_.most_mm_per_s2 * dt_s * dt_s, most_rad = params_.most_rad_per_s2 * dt_s * dt_s;
-  // Move and turn each get what they need for braking, and a half of what is left of the funds where both ask for it.
+  // Translation and rotation each get what they need for braking. If both need more, each gets half of the remaining
+  // funds.
   double funds_move_mj = braking_mj(move_mm_, load_.force_n, most_mm);
   double funds_turn_mj = braking_mj(turn_rad_, load_.moment_nmm, most_rad);
   const double needed_mj = funds_move_mj + funds_turn_mj, left_mj = funds_mj() - needed_mj;
@@ -192,8 +193,8 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   move_mm = move_mm_ + clamped(paid_mm - move_mm_, most_mm);
   turn_rad = turn_rad_ + clamped(paid_rad - turn_rad_, most_rad);
 
-  // What the step takes from the hand, and what it gives: only along force and moment, and only as far as there are
-  // funds.
+  // The energy that the step takes from the user, and what it gives. It changes only along force and moment, and only
+  // as far as there are funds.
   double by_move_mj = load_.force_n.dot(move_mm), by_turn_mj = load_.moment_nmm.dot(turn_rad);
   const double taken_mj = std::max(0.0, by_move_mj) + std::max(0.0, by_turn_mj);
   const double wanted_mj = std::max(0.0, -by_move_mj) + std::max(0.0, -by_turn_mj);
@@ -211,7 +212,7 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   shown_.mm += move_mm;
   shown_.turn = (quaternion(turn_rad) * shown_.turn).normalized();
 
-  // One's own is spent first: what was granted is for what that does not pay.
+  // The user's own funds are spent first. Granted funds cover the rest.
   const double net_mj = by_move_mj + by_turn_mj;
   (net_mj > 0.0 ? put_in_mj_ : released_mj_) += std::abs(net_mj);
   own_mj_ += net_mj;
@@ -220,7 +221,7 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
     own_mj_ = 0.0;
   }
 
-  // What was granted is handed on while it is not wanted here: who is short of it gets it in the end.
+  // Granted funds are passed on while they are not needed here, so that a client without funds eventually gets them.
   const double spare_mj = std::max(0.0, own_mj_ - params_.kept_mj);
   const double handed_on_mj = held_back_ || net_mj < 0.0 ? 0.0 : std::min(1.0, dt_s / params_.hand_on_s) * others_mj_;
   own_mj_ -= spare_mj;

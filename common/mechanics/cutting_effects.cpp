@@ -59,12 +59,12 @@ void SawBinding::step(const BindingParams& params, double pressure_n) noexcept {
 
 double BroachDrive::step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2,
                          double density_g_cm3, double held_n, double gone_mm, double dt_s) noexcept {
-  // The way of a step is known in the next one, so a blow lasts one more.
+  // The motion of a step is known only in the next one, so a blow lasts one step longer.
   lasts_s_ -= dt_s;
   left_mm_ = lasts_s_ > -1.5 * dt_s ? std::max(0.0, left_mm_ - std::max(0.0, gone_mm)) : 0.0;
   const bool struck = blows_per_minute > 0.0 && held_n > 0.0;
   until_blow_s_ -= dt_s;
-  if (!struck || !striking_) until_blow_s_ = std::max(0.0, until_blow_s_);  // pauses are not made up for
+  if (!struck || !striking_) until_blow_s_ = std::max(0.0, until_blow_s_);  // missed blows are not made up for
   striking_ = struck;
   if (struck && until_blow_s_ <= 0.5 * dt_s) {
     until_blow_s_ += 60.0 / blows_per_minute;
@@ -106,7 +106,7 @@ FeedLaw CuttingEffects::felt(const FeedLaw& law) const noexcept {
     out.offset_n += binding_.drag_n(binding_params);
     if (binding_.jammed()) out.max_feed_mm_per_s = 0.0;
   }
-  // The blow does the work, not the hand.
+  // The blow does the work, not the user's hand.
   if (broaches_) out = {0.0, 0.0, 1.0, may_go_mm_per_s_, 0.0};
   return out;
 }
@@ -135,7 +135,7 @@ void CuttingEffects::step(const EffectMoment& moment, double dt_s) noexcept {
   if (drills_) grab_.step(grab_params, moment.engaged, moment.cutting, moment.cutting_n, back_mm > 0.0);
   if (saws_) binding_.step(binding_params, moment.kerf_pressure_n);
   if (broaches_) {
-    const double held_n = moment.engaged > 0.0 ? moment.push_n : 0.0;  // in the air nobody strikes
+    const double held_n = moment.engaged > 0.0 ? moment.push_n : 0.0;  // no blows in the air
     BlowParams blow = blow_params;
     blow.law.wear *= wear();
     const double may_go_mm = drive_.step(blow, moment.spindle_rpm, moment.engaged_area_mm2, moment.density_g_cm3,

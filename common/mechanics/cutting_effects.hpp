@@ -1,9 +1,9 @@
-// What a surgeon misses at once if it is not there: bluntness, clogged flutes, the grab at breakthrough, a saw that
-// binds, a broach that goes by blows. Small state machines, each stepped by what the tool did in a tick; their sums do
-// not depend on the tick's length. All [haptic]: no allocation, clock or random number in any of them.
+// Effects that a surgeon expects of real tools: bluntness, clogged flutes, the grab at breakthrough, a saw that binds,
+// a broach driven by blows. They are small state machines, stepped by what the tool did in a tick. Their sums do not
+// depend on the length of the tick. All [haptic]: no allocation, clock or random number.
 //
-// Those that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. The grab pulls by
-// itself: it belongs to the port of the motor's forces, which bounds it and shuts it with the pedal.
+// Effects that resist (bluntness, clogging, binding, blows) change the law that the proxy solves. The grab pulls
+// actively. It belongs to the port of the motor's forces, which bounds it and stops it with the pedal.
 #pragma once
 #include <cstdint>
 
@@ -14,9 +14,9 @@
 
 namespace osteon {
 
-// An edge loses its sharpness by the work of cutting: wear' = (blunt - wear) · power / work, so a blunt tool needs
-// `blunt` times the force and never more. A bicortical hole of 3.2 mm costs about 30 J, so a hundred of them make it a
-// quarter blunt [A].
+// An edge becomes blunt by the work of cutting: wear' = (blunt - wear) · power / work. So a blunt tool needs at most
+// `blunt` times the force. A bicortical hole of 3.2 mm costs about 30 J, so a hundred of them make it a quarter blunt
+// [A].
 struct BluntnessParams {
   double blunt = 2.0;
   double work_j = 10'000.0;
@@ -31,21 +31,21 @@ class Bluntness {
   double wear_;
 };
 
-// Flutes fill with chips by the bone drilled in one go, and empty as the drill is drawn back. From `onset` on, full
-// ones need more torque, and some more thrust [A]: nobody clears a drill for a bicortical hole, nor leaves it in for
-// ten diameters of cortical bone.
+// Flutes fill with chips by the bone drilled in one pass, and empty when the drill is drawn back. From `onset` on,
+// chips increase the torque, and the thrust to a smaller degree [A]. Nobody clears a drill for a bicortical hole, or
+// leaves it in for ten diameters of cortical bone.
 struct CloggingParams {
   double capacity_diameters =
-      10.0;                        // depth in cortical bone until they are full; of softer bone there is less to carry
-  double cleared_diameters = 1.5;  // way back until full ones are empty
-  double onset = 0.5;              // level up to which chips find their way out
-  double torque_gain = 5.0;        // torque of full flutes over that of empty ones, less one
+      10.0;                        // depth in cortical bone until they are full; softer bone gives fewer chips
+  double cleared_diameters = 1.5;  // distance of withdrawal until full flutes are empty
+  double onset = 0.5;              // level up to which chips leave freely
+  double torque_gain = 5.0;        // relative increase of torque with full flutes
   double thrust_gain = 0.5;
 };
 class FluteClogging {
  public:
-  // `cut_mm`: advance into bone; `back_mm`: withdrawal; both of this tick and not negative. `engaged`: share of the
-  // point that took bone of that density.
+  // `cut_mm`: advance into bone. `back_mm`: withdrawal. Both in this tick and not negative. `engaged`: fraction of the
+  // point that cut bone of that density.
   void step(const CloggingParams& params, double diameter_mm, double cut_mm, double engaged, double density_g_cm3,
             double back_mm) noexcept;
   [[nodiscard]] double level() const noexcept { return level_; }  // 0 empty, 1 full
@@ -60,12 +60,12 @@ class FluteClogging {
 };
 [[nodiscard]] bool has_flutes(ToolKind kind) noexcept;
 
-// When the point comes out on the far side, the lips catch the rim that is left and the flutes screw the drill forward:
-// a pull of ratio · (the last whole thrust) · 4 e (1 - e) with the engaged share e, and as much more torque. Only after
-// the whole point was in bone: going in, it does nothing.
+// When the point comes out on the far side, the lips catch the remaining rim and the flutes pull the drill forward. The
+// pull is ratio · (the last whole thrust) · 4 e (1 - e) with the engaged fraction e, and the torque rises accordingly.
+// It needs that the whole point was in bone before, so there is no pull on entry.
 struct GrabParams {
-  double whole = 0.9;        // share from which the point counts as whole
-  double gone = 0.02;        // and below which as out
+  double whole = 0.9;        // fraction from which the point counts as whole
+  double gone = 0.02;        // fraction below which it counts as out
   double ratio = 0.15;       // of the thrust [A]
   double torque_gain = 1.0;  // [A]
 };
@@ -83,9 +83,9 @@ class BreakthroughGrab {
   double engaged_ = 0, whole_n_ = 0;
 };
 
-// A blade that is pressed aside in its kerf presses on the wall: friction drags, and from jam_n on it stands until the
-// pressure is down to `release` of that. One that is turned beyond its play is no matter of this: the kerf's walls are
-// in its way. No kerf closes by itself here.
+// A blade that is pressed sideways in its kerf presses on the wall, and friction drags. From jam_n on it stops until
+// the pressure has fallen to `release` of that. A blade turned beyond its play is not treated here, because the walls
+// of the kerf stop it. Kerfs do not close by themselves here.
 struct BindingParams {
   double friction = 0.3;  // [A]
   double jam_n = 30.0;    // [A]
@@ -103,17 +103,17 @@ class SawBinding {
   bool jammed_ = false;
 };
 
-// Blows at the rate of the handpiece or mallet, the first at once; each drives the broach over `contact_s` as far as
-// broaching.hpp says. One that would drive it less than `seated_mm` leaves it where it is: it is seated.
+// Blows at the rate of the handpiece or mallet, the first at once. Each drives the broach over `contact_s` by the
+// advance of broaching.hpp. A blow that would drive it less than `seated_mm` does not move it: it is seated.
 struct BlowParams {
   BroachingParams law;
   double contact_s = 5e-3;  // [A]
 };
 class BroachDrive {
  public:
-  // `held_n`: push of the hand; a loosely held broach bounces and advances in proportion. `gone_mm`: its way since the
-  // last step; what the hand does not follow of a blow while it lasts is lost. Returns how far it may go until the next
-  // step, mm.
+  // `held_n`: push of the user's hand. A loosely held broach bounces and advances less, in proportion. `gone_mm`: its
+  // motion since the last step. If the hand does not follow a blow while it lasts, that part is lost. Returns the
+  // largest advance until the next step, mm.
   double step(const BlowParams& params, double blows_per_minute, double engaged_area_mm2, double density_g_cm3,
               double held_n, double gone_mm, double dt_s) noexcept;
   [[nodiscard]] bool seated() const noexcept { return seated_; }
@@ -125,8 +125,8 @@ class BroachDrive {
   bool seated_ = false, striking_ = false;
 };
 
-// The motor that drives a tool of this kind, by the power of such handpieces [A]: what drills, as the drill of 1000
-// rpm; burs, saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
+// The motor of a tool of this kind, by the power of such handpieces [A]. Drills have that of the drill of 1000 rpm;
+// burs, saws and reamers four times that. Constant power: torque and droop follow from the tool's speed.
 [[nodiscard]] SpindleParams motor_of(const Tool& tool) noexcept;
 
 // What the tool did in a tick.
@@ -139,24 +139,24 @@ struct EffectMoment {
   double cutting_n = 0;   // of the tool on the bone, along the feed
   double torque_nmm = 0;  // as felt, see CuttingEffects::torque_nmm()
   double advance_mm = 0;  // along the feed, negative when drawn back
-  double push_n = 0;      // of the hand along the feed
+  double push_n = 0;      // of the user's hand along the feed
   double kerf_pressure_n = 0;
 };
 
-// All of them for one tool. Order in a tick: felt() and torque_nmm() for the proxy, then step().
+// All effects for one tool. Order in a tick: felt() and torque_nmm() for the proxy, then step().
 class CuttingEffects {
  public:
   explicit CuttingEffects(const Tool& tool, double wear = 1.0) noexcept;
 
   // For LawInputs::wear.
   [[nodiscard]] double wear() const noexcept { return bluntness_.wear(); }
-  // The law as clogging, binding and blows change it.
+  // The law after clogging, binding and blows.
   [[nodiscard]] FeedLaw felt(const FeedLaw& law) const noexcept;
   [[nodiscard]] double torque_nmm(double law_torque_nmm) const noexcept;
   void step(const EffectMoment& moment, double dt_s) noexcept;
-  // On taking the tool up: clean and free; only its wear stays.
+  // Called when the tool is picked up: clean and free, only its wear stays.
   void take_up() noexcept;
-  // Of the grab at breakthrough, on the tool along the feed; not bounded by what the hand feels.
+  // The pull of the grab at breakthrough, on the tool along the feed. Not bounded by what the user feels.
   [[nodiscard]] double pull_n() const noexcept { return drills_ ? grab_.pull_n(grab_params) : 0.0; }
 
   [[nodiscard]] const FluteClogging& clogging() const noexcept { return clogging_; }
@@ -178,7 +178,7 @@ class CuttingEffects {
   BreakthroughGrab grab_;
   SawBinding binding_;
   BroachDrive drive_;
-  double may_go_mm_per_s_ = 0;  // broach: in the next tick
+  double may_go_mm_per_s_ = 0;  // broach: speed limit in the next tick
 };
 
 }  // namespace osteon

@@ -1,4 +1,4 @@
-// What the tool does to the bone, as felt by the haptic client: drives sound, gauges and the drawn tool.
+// What a tool does to the bone, as the haptic client computes it. It drives sound, gauges and the drawn tool.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -14,7 +14,7 @@ struct CuttingState {
   AuthorId author;
   std::uint64_t state_seq = 0;
   Pose pose_bone_tool;    // the proxy
-  Pose pose_bone_device;  // the hand
+  Pose pose_bone_device;  // the user's hand
   std::string tool_name;
   double spindle_rpm = 0;
   double feed_mm_per_s = 0;
@@ -25,7 +25,7 @@ struct CuttingState {
   double depth_mm = 0;  // of the tip from the entry of the step under way, along the axis of its site;
                         // negative before the bone, 0 before the first step
   CuttingPhase phase = CuttingPhase::idle;
-  bool on_metal = false;  // it turns, and metal is in its way: it cuts nothing
+  bool on_metal = false;  // the spindle turns, but metal is in the way: the tool cuts nothing
 };
 
 }  // namespace osteon

@@ -35,7 +35,8 @@ FeedSolution solve_feed(const FeedLaw& law, double stiffness_n_per_mm, double ex
   double low = 0.0, high = std::min(law.max_feed_mm_per_s, extension_mm / dt_s);
   if (surplus_n(high) >= 0.0) return {high, resistance_n(law, high), high == law.max_feed_mm_per_s, false};
 
-  // Bisection: 48 halvings are far below any force a hand feels, and the time is the same in every tick.
+  // Bisection. The error after 48 halvings is far below any force that a person feels, and the time is the same in
+  // every tick.
   for (int i = 0; i < 48; ++i) {
     const double middle = 0.5 * (low + high);
     (surplus_n(middle) >= 0.0 ? low : high) = middle;

@@ -1,5 +1,6 @@
-// Exponentially weighted moving average, equation (7.15): F_i = E_i (1 - alpha) + F_(i-1) alpha. For the cutting force
-// only: in the coupling that holds the hand a filter makes energy (5 ms of it some joules in 10 s of stroking).
+// Exponentially weighted moving average, equation (7.15): F_i = E_i (1 - alpha) + F_(i-1) alpha. Only for the cutting
+// force. In the coupling that holds the user's hand, a filter creates energy (5 ms of it creates some joules in 10 s of
+// stroking).
 #pragma once
 #include <cmath>
 
@@ -7,7 +8,7 @@ namespace osteon {
 
 inline constexpr double kCuttingFilter_s = 2e-3;  // tau
 
-// `T`: double, or a vector with + and *. The factor follows from the tick, alpha = exp(-dt/tau), so that what is felt
+// `T`: double, or a vector with + and *. The factor follows from the tick, alpha = exp(-dt/tau), so that the felt force
 // does not depend on the loop's rate.
 template <class T>
 class ForceFilter {
@@ -20,7 +21,7 @@ class ForceFilter {
     value_ = sample * (1.0 - alpha) + value_ * alpha;
     return value_;
   }
-  // [haptic] For a safety zero, or on taking up a tool.
+  // [haptic] For a safety zero, or when a tool is picked up.
   void reset(const T& value) noexcept { value_ = value; }
   [[nodiscard]] const T& value() const noexcept { return value_; }
 

@@ -41,7 +41,7 @@ DrillingParams drilling_of(const LawTool& tool, const LawInputs& in) noexcept {
           .wear = in.wear,
           .heel_mm_per_rev = tool.heel_mm_per_rev};
 }
-// The laws of which no torque is known: two lips whose cutting force makes the thrust, M = T D / (4 sin(beta/2)) [A].
+// For laws without a known torque: two lips whose cutting force makes the thrust, M = T D / (4 sin(beta/2)) [A].
 double lips_torque(const LawTool& tool, const LawInputs& in, double thrust_n) noexcept {
   return drilling_torque(drilling_of(tool, in), Newtons{thrust_n}).value();
 }
@@ -90,7 +90,7 @@ MillingParams milling_of(const LawTool& tool, const LawInputs& in) noexcept {
 }
 FeedLaw milling(const LawTool& tool, const LawInputs& in) noexcept {
   const MillingParams params = milling_of(tool, in);
-  // Without a sum over points: the whole engaged area at the mean distance.
+  // Without a sum over points: the whole engaged area at its mean distance.
   const double mean = milling_resistance(params, area_mm2(tool, in), arm_mm(tool, in), in.density_g_cm3);
   return milling_law(params, speed_of(in), in.milling_sum > 0.0 ? in.milling_sum : mean, edges_mm(tool, in),
                      density_of(in));
@@ -104,7 +104,7 @@ double milling_torque(const LawTool& tool, const LawInputs& in, double thrust_n)
   return thrust_n * arm_mm(tool, in);
 }
 
-// As strong as the share of the point that is in bone, and as the tool is wider than the drill of the fit [A].
+// Proportional to the fraction of the point in bone, and to the tool's diameter relative to the drill of the fit [A].
 FeedLaw spring_damper(const LawTool& tool, const LawInputs& in) noexcept {
   if (stands(in)) return {};
   const SpringDamperParams params{.wear = in.wear};
@@ -120,7 +120,7 @@ FeedLaw spring_damper(const LawTool& tool, const LawInputs& in) noexcept {
 
 FeedLaw multi_point(const LawTool& tool, const LawInputs& in) noexcept {
   if (stands(in)) return {};
-  // Without a sum over points: the point's cone, whose normals lean by half its angle.
+  // Without a sum over points: the cone of the point, whose normals lean by half its angle.
   const double directed = in.directed_density > 0.0
                               ? in.directed_density
                               : in.engaged * in.density_g_cm3 * std::sin(0.5 * tool.point_angle_rad);
@@ -167,7 +167,7 @@ double no_torque(const LawTool&, const LawInputs&, double) noexcept { return 0.0
 
 bool is_saw(ToolKind kind) noexcept { return kind == ToolKind::oscillating_saw || kind == ToolKind::reciprocating_saw; }
 bool is_broach(ToolKind kind) noexcept { return kind == ToolKind::broach; }
-// Those whose point goes ahead of their flutes. A screw is none: it cuts by its thread, at a tenth of such speeds.
+// Tools whose point goes ahead of their flutes. A screw is none: it cuts by its thread, at a tenth of such speeds.
 bool is_drill(ToolKind kind) noexcept {
   return kind == ToolKind::drill || kind == ToolKind::end_drill || kind == ToolKind::pin;
 }
@@ -382,7 +382,7 @@ const ForceLaw& default_law(const Tool& tool) {
       case ToolKind::broach:
         return "broach";
       default:
-        return "multi-point";  // screws and solids of any form; what does not cut asks for none
+        return "multi-point";  // screws and solids of any form; for tools that do not cut it is never used
     }
   }();
   return *find_force_law(name);

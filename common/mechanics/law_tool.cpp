@@ -8,14 +8,14 @@ namespace osteon {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Teeth of a reamer or burr stand out enough for some turns' usual feed [A].
+// The teeth of a reamer or burr stand out by the usual feed of some turns [A].
 constexpr double kUsualFeeds = 5.0;
 
 double disc_mm2(double diameter_mm) noexcept { return 0.25 * kPi * diameter_mm * diameter_mm; }
 
 void set_box(LawTool& law, double leading_area_mm2) {
   law.leading_area_mm2 = leading_area_mm2;
-  law.diameter_mm = 2.0 * std::sqrt(leading_area_mm2 / kPi);  // of the disc of that area
+  law.diameter_mm = 2.0 * std::sqrt(leading_area_mm2 / kPi);  // diameter of the disc with that area
   law.arm_mm = 0.25 * law.diameter_mm;
   law.heel_mm_per_rev = 0.33 * law.diameter_mm;
   law.edge_length_mm = law.diameter_mm;
@@ -37,11 +37,11 @@ LawTool law_tool(const Tool& tool) {
 
   switch (tool.kind) {
     case ToolKind::screw:
-      // Its thread lets it advance by its pitch in a turn, no less for its heel and no more.
+      // Its thread makes it advance by exactly its pitch per turn.
       law.heel_mm_per_rev = tool.thread_pitch_mm;
       break;
     case ToolKind::round_burr:
-      // Fed sideways: the mean of sqrt(R^2 - z^2) over the disc, and half of the meridians that are its edges.
+      // Fed sideways: the mean of sqrt(R^2 - z^2) over the disc, and half of the meridians, which are its edges.
       law.arm_mm = 8.0 / (3.0 * kPi) * radius_mm;
       law.edge_length_mm = 0.5 * law.teeth * kPi * radius_mm;
       law.heel_mm_per_rev = usual_heel_mm;

@@ -22,8 +22,8 @@ Oscillator of_turn(const MountParams& p) {
   return {mass, p.damping * 2.0 * std::sqrt(p.stiffness_nmm_per_rad * mass), p.stiffness_nmm_per_rad, p.most_rad};
 }
 
-// Spring and damper as they are at the end of the step. A stop takes the motion away, which can only lose energy: it
-// lies on the way that the load and the spring would go.
+// Uses the forces of spring and damper at the end of the step. A stop ends the motion, which can only lose energy,
+// because the stop is on the way in which load and spring push.
 void advance(const Oscillator& o, const Vec3& load, double dt, Vec3& at, Vec3& speed) {
   speed = (speed + dt / o.mass * (load - o.stiffness * at)) / (1.0 + dt / o.mass * (o.damping + dt * o.stiffness));
   const Vec3 next = at + dt * speed;

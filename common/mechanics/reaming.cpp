@@ -12,7 +12,7 @@ double edge_n(const ReamingParams& p, double edge_length_mm, GramsPerCm3 density
   return p.wear * p.edge_n_per_mm * edge_length_mm * relative_strength(density.value());
 }
 
-// N for 1 mm/s.
+// Force in N at 1 mm/s.
 double chip_n(const ReamingParams& p, double rpm, double edge_length_mm, GramsPerCm3 density) noexcept {
   return p.wear * p.radial_ratio * p.pressure_n_per_mm2 * relative_strength(density.value()) * edge_length_mm * 60.0 /
          (rpm * p.teeth);

@@ -17,7 +17,7 @@ HandParams novice_hand() {
 HandParams scaled(const HandParams& hand, double force, double length) {
   HandParams result = hand;
   result.push_n *= force;
-  // Forces for each millimetre of the handle's way, its speed or its acceleration.
+  // Forces per millimetre of the handle's position, speed or acceleration.
   result.mass_kg *= force * length;
   result.damping_n_s_per_mm *= force * length;
   result.stiffness_n_per_mm *= force * length;
@@ -34,7 +34,7 @@ void Hand::place(const Vec3& at_mm) noexcept {
 
 void Hand::step(const HandCommand& command, const Vec3& force_n, double dt_s) noexcept {
   if (command.mode != mode_) {
-    // The push starts from where the hand is, whatever tension the approach had left in the spring.
+    // The push starts from the position of the hand, so the spring has no tension left from the approach.
     if (command.mode == HandMode::push) rest_mm_ = position_mm_;
     mode_ = command.mode;
     in_mode_s_ = 0.0;
@@ -71,7 +71,7 @@ void Hand::step(const HandCommand& command, const Vec3& force_n, double dt_s) no
     const Vec3 lateral_force_n =
         params_.lateral_n_per_mm * (stretch - stretch.dot(axis) * axis) + force_n - force_n.dot(axis) * axis;
     const double axial_speed = velocity_mm_per_s_.dot(axis);
-    // Damping implicitly, so that a light hand of a scaled-down device stays stable.
+    // Damping is implicit, so that a light hand on a scaled-down device stays stable.
     const double axial = (axial_speed + dt * axial_force_n / mass) / (1.0 + dt * params_.damping_n_s_per_mm / mass);
     const Vec3 lateral =
         (velocity_mm_per_s_ - axial_speed * axis + dt / mass * lateral_force_n) / (1.0 + dt * lateral_damping / mass);

@@ -12,7 +12,7 @@ void Spindle::step(const SpindleParams& params, double command_rpm, double torqu
   double behind_rpm = std::max(0.0, before_rpm - rpm);
   const double load_nmm = std::max(0.0, torque_nmm);
   if (std::max(load_nmm, behind_rpm / params.droop_rpm_per_nmm) <= params.most_nmm) {
-    // Linear, and solved exactly for a load that stays, so that any dt is stable.
+    // Linear, and solved exactly for a constant load, so it is stable for any dt.
     behind_rpm += (params.droop_rpm_per_nmm * load_nmm - behind_rpm) * (1.0 - std::exp(-dt_s / params.response_s));
   } else {
     const double inertia = params.response_s / params.droop_rpm_per_nmm;  // N mm s per rpm

@@ -49,7 +49,7 @@ Result<void> check_writable(const std::filesystem::path& file, const std::string
   else if (std::filesystem::exists(file, ignored) || std::filesystem::is_symlink(file, ignored))
     reason = ::access(file.c_str(), W_OK) != 0 ? errno : 0;
   else if (const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600); made < 0)
-    reason = errno;  // also where a folder may be written, but no file be made in it, as in /proc
+    reason = errno;  // also if the folder is writable but no file can be made in it, as in /proc
   else if (::close(made); ::unlink(file.c_str()) != 0)
     reason = errno;
   if (reason == 0) return {};

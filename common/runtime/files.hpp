@@ -1,4 +1,4 @@
-// Small files written whole or not at all.
+// Reads and writes small files. A file is written completely or not at all.
 #pragma once
 #include <filesystem>
 #include <string>
@@ -12,8 +12,8 @@ namespace osteon {
 [[nodiscard]] Result<void> write_file(const std::filesystem::path& file, std::string_view content);
 // Error: not_found or internal, naming the path.
 [[nodiscard]] Result<std::string> read_file(const std::filesystem::path& file);
-// Whether a file could be written there; what it holds stays. No file is always well. `what` ("the recording") and
-// `option` ("--wav") are for the sentence. Error: internal.
+// Whether the file could be written. Its content is not changed. An empty path is always good. `what` ("the recording")
+// and `option` ("--wav") are for the message. Error: internal.
 [[nodiscard]] Result<void> check_writable(const std::filesystem::path& file, const std::string& what,
                                           const std::string& option);
 

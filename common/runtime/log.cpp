@@ -10,7 +10,7 @@
 namespace osteon::log {
 namespace {
 
-// Quoted where a space or a quote would make the line ambiguous to a parser.
+// Quoted if a space or a quote would make the line ambiguous for a parser.
 void append(std::string& line, const Field& field) {
   const std::string value = bounded_text(field.value);
   line += ' ';

@@ -1,5 +1,5 @@
-// Structured log lines on standard error: time, level, program, event, then key=value fields.
-// Not for real-time threads: they count and report through their statistics instead.
+// Structured log lines on standard error: time, level, program, event, then key=value fields. Not for real-time
+// threads, which count and report through their statistics instead.
 #pragma once
 #include <concepts>
 #include <cstdint>
@@ -28,8 +28,8 @@ void info(std::string_view event, std::initializer_list<Field> fields = {});
 void warn(std::string_view event, std::initializer_list<Field> fields = {});
 void error(std::string_view event, std::initializer_list<Field> fields = {});
 
-// Prints the one sentence "PROGRAM: message" to standard error and returns the exit code for main: 130 for a
-// cancelled run, 1 otherwise.
+// Prints the sentence "PROGRAM: message" to standard error. Returns the exit code for main: 130 for a cancelled run, 1
+// otherwise.
 [[nodiscard]] int exit_with(std::string_view program, const Error& error);
 
 }  // namespace osteon::log

@@ -9,8 +9,8 @@
 namespace osteon {
 
 MemoryReserve::MemoryReserve(std::size_t bytes) : bytes_(bytes) {
-  // Blocks of this size come from the heap, and the heap returns nothing: else refill() would fetch the same pages
-  // again.
+  // Blocks of this size must come from the heap, and the heap must keep freed memory. Otherwise refill() would fetch
+  // the same pages again.
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, INT_MAX);
   refill();

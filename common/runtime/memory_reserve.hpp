@@ -1,19 +1,19 @@
-// Memory that the system has given already, for a thread whose work must not wait for new pages.
+// Memory that the system has already provided, for a thread whose work must not wait for new pages.
 #pragma once
 #include <cstddef>
 
 namespace osteon {
 
-// For a thread that applies cuts: those of a tick or of a moment take less. One cut takes about 0.2 MB.
+// For a thread that applies cuts. The cuts of one tick take less. One cut takes about 0.2 MB.
 inline constexpr std::size_t kCutReserve = std::size_t{4} << 20;
 
-// Of the thread that makes and refills it: what a thread takes comes from its own part of the heap. Small blocks that
-// it takes later are then memory that it has held before. The first reserve tells the heap to keep what it was given.
+// Belongs to the thread that makes and refills it, because every thread allocates from its own part of the heap. Small
+// blocks that the thread allocates later reuse this memory. The first reserve tells the heap to keep freed memory.
 class MemoryReserve {
  public:
   explicit MemoryReserve(std::size_t bytes);
-  // Takes that much, touches every page and gives it back to the heap. In a pause of the work: pages that were used up
-  // since cost a microsecond or two each, the others nearly nothing.
+  // Allocates the memory, touches every page and frees it to the heap. Call it in a pause of the work. Pages that were
+  // used up since cost a microsecond or two each, other pages almost nothing.
   void refill() noexcept;
 
  private:

@@ -1,4 +1,4 @@
-// How far long work is: a bar on a terminal, a line every tenth elsewhere. Written to standard error.
+// Shows the progress of long work: a bar on a terminal, otherwise a line for every tenth. Written to standard error.
 #pragma once
 #include <string>
 
@@ -16,7 +16,7 @@ class Progress {
  private:
   std::string what_;
   bool terminal_;
-  int shown_ = -1;  // per cent on a terminal, tenths elsewhere
+  int shown_ = -1;  // percent on a terminal, otherwise tenths
 };
 
 }  // namespace osteon

@@ -22,7 +22,7 @@ namespace {
 constexpr std::size_t kStackBytes = 256 * 1024;
 constexpr unsigned long kExactSlack_ns = 1;
 
-// Every page of it written once, so that none is missing later.
+// Writes every page of the stack once, so that none is missing later.
 [[gnu::noinline]] void touch_stack() noexcept {
   volatile char stack[kStackBytes];
   for (std::size_t i = 0; i < kStackBytes; i += 1024) stack[i] = 0;
@@ -55,7 +55,7 @@ long limit(int resource, long unit) {
 
 std::string preemption() {
   if (first_line("/sys/kernel/realtime") == "1") return "rt";
-  // "none (voluntary) full": the one in brackets is at work; readable by root alone.
+  // "none (voluntary) full": the one in parentheses is active. Only root can read it.
   const std::string modes = first_line("/sys/kernel/debug/sched/preempt");
   const std::size_t open = modes.find('('), close = modes.find(')');
   if (open != std::string::npos && close != std::string::npos) return modes.substr(open + 1, close - open - 1);
@@ -92,13 +92,13 @@ MachineFacts look_at_machine(int priority) {
   }).join();
   facts.rtprio_limit = limit(RLIMIT_RTPRIO, 1);
   facts.memlock_limit_kib = limit(RLIMIT_MEMLOCK, 1024);
-  // A page is enough to see whether locking is allowed at all; how much is the limit's to say.
+  // One page shows whether locking is allowed at all. The limit says how much.
   void* const page = ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
   if (page != MAP_FAILED) {
     facts.lock_works = ::mlock(page, 4096) == 0;
     ::munmap(page, 4096);
   }
-  if (::geteuid() == 0) facts.memlock_limit_kib = LONG_MAX;  // the limit does not bind root
+  if (::geteuid() == 0) facts.memlock_limit_kib = LONG_MAX;  // the limit does not apply to root
   for (int core = 0; core < facts.cores; ++core) {
     const std::string governor =
         first_line("/sys/devices/system/cpu/cpu" + std::to_string(core) + "/cpufreq/scaling_governor");
@@ -177,15 +177,15 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
   else if (!facts.governors.empty())
     say(Finding::fine, "All cores run at full clock.");
   else
-    say(Finding::fine, "The clock of the cores is not governed from here.");
+    say(Finding::fine, "The clock of the cores is not controlled from here.");
 
   if (facts.preemption == "rt" || facts.preemption == "full")
     say(Finding::fine, facts.preemption == "rt" ? "The kernel is a real-time one." : "The kernel can be preempted.");
   else
     say(Finding::note,
         facts.preemption == "dynamic"
-            ? "The kernel's preemption was chosen at boot and is not told."
-            : "The kernel is preempted only where it offers to be (" + facts.preemption + ").",
+            ? "The kernel's preemption was chosen at boot and is unknown."
+            : "The kernel is preempted only at certain points (" + facts.preemption + ").",
         "boot with preempt=full, or install linux-image-rt-amd64");
 
   if (facts.clock_source != "tsc" && facts.clock_source != "kvm-clock" && facts.clock_source != "arch_sys_counter" &&

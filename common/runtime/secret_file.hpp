@@ -1,4 +1,4 @@
-// Files that one user alone should read.
+// Files that only one user should be able to read.
 #pragma once
 #include <filesystem>
 #include <optional>
@@ -6,9 +6,9 @@
 
 namespace osteon {
 
-// Who else may read or write a secret file, and what to do, as a sentence that names it. Nothing: its owner alone may,
-// or it is not there. A group counts only where this process could do without: the file's owner may let a server of
-// another user read it as one of its group.
+// Who else can read or write a secret file, and what to do, as a sentence that names the file. Nothing if only the
+// owner can, or if the file does not exist. Group access counts only if this process does not need it: the file's owner
+// may let a server that runs as another user read it through its group.
 [[nodiscard]] std::optional<std::string> who_else_reads(const std::filesystem::path& file);
 
 }  // namespace osteon

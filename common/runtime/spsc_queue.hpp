@@ -1,4 +1,4 @@
-// Events between two threads in order: a fixed ring, try-push and try-pop only. One producer, one consumer.
+// An ordered queue between two threads: a fixed ring with try-push and try-pop only. One producer, one consumer.
 #pragma once
 #include <array>
 #include <atomic>
@@ -11,7 +11,7 @@ class SpscQueue {
   static_assert((Capacity & (Capacity - 1)) == 0, "a power of two");
 
  public:
-  // [producer] False when full; the value is then not taken.
+  // [producer] False when full; the value is then not stored.
   bool try_push(const T& value) noexcept {
     const std::size_t head = head_.load(std::memory_order_relaxed);
     if (head - tail_.load(std::memory_order_acquire) == Capacity) return false;
@@ -27,7 +27,7 @@ class SpscQueue {
     tail_.store(tail + 1, std::memory_order_release);
     return true;
   }
-  // Any thread; a moment's figure.
+  // Any thread. A snapshot.
   [[nodiscard]] std::size_t size() const noexcept {
     return head_.load(std::memory_order_acquire) - tail_.load(std::memory_order_acquire);
   }

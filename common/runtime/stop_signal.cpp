@@ -13,7 +13,7 @@
 namespace osteon {
 namespace {
 
-// Signal handlers reach only static storage; StopSignal owns both for the time of its life.
+// Signal handlers can use only static storage. StopSignal owns both variables during its lifetime.
 std::atomic<int> stop_requests{0};
 std::atomic<int> wake_descriptor{-1};
 
@@ -27,7 +27,7 @@ void raise_flag() noexcept {
 
 void on_signal(int) { raise_flag(); }
 
-// Sleeps until that many requests have come, or the time is over. The descriptor becomes readable with each.
+// Waits until this many requests have arrived, or the time is over. The descriptor becomes readable with each request.
 bool wait_for_requests(int wanted, std::chrono::milliseconds time) {
   const auto end = std::chrono::steady_clock::now() + time;
   while (stop_requests.load(std::memory_order_acquire) < wanted) {
@@ -35,7 +35,7 @@ bool wait_for_requests(int wanted, std::chrono::milliseconds time) {
     if (left.count() <= 0) return false;
     pollfd wake{wake_descriptor.load(), POLLIN, 0};
     ::poll(&wake, 1, static_cast<int>(left.count()));
-    // An earlier request must not wake again.
+    // Reads the descriptor, so that an earlier request does not wake again.
     std::uint64_t seen = 0;
     [[maybe_unused]] const auto read = ::read(wake.fd, &seen, sizeof seen);
   }

@@ -1,11 +1,11 @@
-// SIGINT and SIGTERM as a flag that any thread may read and one may wait for.
+// SIGINT and SIGTERM as a flag. Any thread may read it, and one thread may wait for it.
 #pragma once
 #include <chrono>
 
 namespace osteon {
 
-// One per process, made in main before other threads start. A second signal ends nothing by itself: an impatient person
-// must not leave half-written files; it may shorten a wait. SIGQUIT still ends a process that hangs.
+// One per process, made in main before other threads start. A second signal does not end the process, because an
+// impatient person must not leave half-written files. It may shorten a wait. SIGQUIT still ends a process that hangs.
 class StopSignal {
  public:
   StopSignal();
@@ -14,10 +14,10 @@ class StopSignal {
   StopSignal& operator=(const StopSignal&) = delete;
 
   [[nodiscard]] bool requested() const noexcept;
-  void request() noexcept;  // as if a signal had come
-  // True when a stop was requested before the time was over.
+  void request() noexcept;  // as if a signal had arrived
+  // True if a stop was requested before the time was over.
   bool wait_for(std::chrono::milliseconds time) const;
-  // The same, of a second request.
+  // The same for a second request.
   bool wait_for_second(std::chrono::milliseconds time) const;
 };
 

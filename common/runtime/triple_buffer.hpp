@@ -1,5 +1,5 @@
-// State between two threads: the writer always stores the newest value, the reader always takes the newest complete
-// one, neither ever waits. One writer thread and one reader thread.
+// State between two threads. The writer always stores the newest value, and the reader always takes the newest complete
+// one. Neither ever waits. One writer thread and one reader thread.
 #pragma once
 #include <array>
 #include <atomic>
@@ -13,7 +13,7 @@ class TripleBuffer {
   TripleBuffer() = default;
   explicit TripleBuffer(const T& initial) { slots_.fill(initial); }
 
-  // [writer] The slot to fill, then publish(). The slot holds some older value.
+  // [writer] The slot to fill before publish(). It contains some older value.
   [[nodiscard]] T& writable() noexcept { return slots_[write_]; }
   // [writer]
   void publish() noexcept { write_ = shared_.exchange(write_ | kFresh, std::memory_order_acq_rel) & kIndex; }
@@ -22,13 +22,13 @@ class TripleBuffer {
     writable() = value;
     publish();
   }
-  // [reader] Takes the newest value if there is a new one; true then.
+  // [reader] Takes the newest value. True if there is a new one.
   bool refresh() noexcept {
     if (!(shared_.load(std::memory_order_relaxed) & kFresh)) return false;
     read_ = shared_.exchange(read_, std::memory_order_acq_rel) & kIndex;
     return true;
   }
-  // [reader] What the last refresh() took.
+  // [reader] The value that the last refresh() took.
   [[nodiscard]] T& value() noexcept { return slots_[read_]; }
 
  private:

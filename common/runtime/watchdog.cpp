@@ -41,21 +41,21 @@ void Watchdog::watch(int priority) {
     parameters.sched_priority = priority;
     ::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters);
   }
-  std::int64_t told = kResting;  // a stall goes by the beat before it
-  const auto tell = [&](std::int64_t since) {
-    if (since <= told) return;
-    told = since;
+  std::int64_t reported = kResting;  // the last beat before the stall that was reported last
+  const auto report = [&](std::int64_t since) {
+    if (since <= reported) return;
+    reported = since;
     stalls_.fetch_add(1, std::memory_order_relaxed);
     if (late_) late_();
   };
   while (!over_) {
     std::this_thread::sleep_for(patience_ / 4);
-    tell(stood_since_ns_.load(std::memory_order_relaxed));
+    report(stood_since_ns_.load(std::memory_order_relaxed));
     const std::int64_t last = beat_at_ns_.load(std::memory_order_relaxed);
     const std::int64_t silence = now_ns() - last;
     if (last == kResting || silence <= patience_.count()) continue;
     measure(silence);
-    tell(last);
+    report(last);
   }
 }
 

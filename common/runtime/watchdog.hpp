@@ -1,4 +1,4 @@
-// Looks after a loop from another thread: says when it has not run for a while, how often and how long that was.
+// Watches a loop from another thread. Reports stalls, and counts and measures them.
 #pragma once
 #include <atomic>
 #include <chrono>
@@ -10,17 +10,17 @@ namespace osteon {
 
 class Watchdog {
  public:
-  // `late` is called on the watchdog's own thread, once for each stall, as soon as no beat has come for `patience`, or
-  // after it, where the watchdog stood as well; the watch begins with the first beat. `priority`: of that thread, above
-  // the loop's; 0 or what the machine refuses: ordinary.
+  // `late` is called on the watchdog's own thread, once for each stall, as soon as no beat has come for `patience`. If
+  // the watchdog itself stalled too, `late` is called after that. Watching begins with the first beat. `priority`: of
+  // the watchdog's thread, above that of the loop. With 0, or if the machine refuses it, the priority is ordinary.
   Watchdog(std::chrono::nanoseconds patience, int priority, std::function<void()> late);
   ~Watchdog();
   Watchdog(const Watchdog&) = delete;
   Watchdog& operator=(const Watchdog&) = delete;
 
-  // [loop] The loop runs.
+  // [loop] The loop is running.
   void beat() noexcept;
-  // [loop] The loop means to stop: silence is no stall from here on, until it beats again.
+  // [loop] The loop is about to pause. Silence is not a stall until the next beat.
   void rest() noexcept { beat_at_ns_.store(kResting, std::memory_order_relaxed); }
   // Any thread.
   [[nodiscard]] std::uint64_t stalls() const noexcept { return stalls_.load(std::memory_order_relaxed); }
@@ -36,7 +36,7 @@ class Watchdog {
 
   const std::chrono::nanoseconds patience_;
   const std::function<void()> late_;
-  // When the last beat came; when the last one came before a stall that is over (on the steady clock).
+  // Time of the last beat, and of the last beat before a stall that has ended (on the steady clock).
   std::atomic<std::int64_t> beat_at_ns_{kResting}, stood_since_ns_{kResting};
   std::atomic<std::uint64_t> stalls_{0};
   std::atomic<std::int64_t> longest_ns_{0};

@@ -43,7 +43,7 @@ Spectrum power_spectrum(std::span<const float> samples, double rate_hz, int size
       result.power[k] += re * re + im * im;
     }
   }
-  // Parseval: the two-sided sum of |X|^2 is size * sum (w x)^2; inner bins stand for both signs of the frequency.
+  // Parseval: the two-sided sum of |X|^2 is size * sum (w x)^2. Inner bins represent both signs of the frequency.
   const double scale = 1.0 / (static_cast<double>(size) * window_power * frames);
   for (std::size_t k = 0; k <= n / 2; ++k) result.power[k] *= (k == 0 || k == n / 2) ? scale : 2.0 * scale;
   return result;
@@ -80,7 +80,7 @@ std::vector<Peak> strongest_peaks(const Spectrum& spectrum, int count, double ap
   std::vector<Peak> peaks;
   for (const std::size_t k : tops) {
     if (static_cast<int>(peaks.size()) == count) break;
-    // Parabola through the logarithms of the three highest bins.
+    // A parabola through the logarithms of the three highest bins.
     const double a = power_db(p[k - 1]), b = power_db(p[k]), c = power_db(p[k + 1]);
     const double bend = a - 2.0 * b + c;
     const double offset = bend < 0 ? 0.5 * (a - c) / bend : 0.0;

@@ -1,11 +1,11 @@
-// Average power spectrum of a signal (Welch: Hann windows, half overlapped) and what is read from it.
+// Average power spectrum of a signal (Welch: Hann windows, half overlapped), and measurements on it.
 #pragma once
 #include <span>
 #include <vector>
 
 namespace osteon::sound {
 
-// One-sided: power[k] belongs to k * bin_hz, and their sum is the mean square of the signal.
+// One-sided: power[k] belongs to k * bin_hz. The sum is the mean square of the signal.
 struct Spectrum {
   double bin_hz = 0;
   std::vector<double> power;
@@ -14,17 +14,17 @@ struct Spectrum {
 // `size`: samples in a window, a power of two. A signal shorter than one window is padded with silence.
 [[nodiscard]] Spectrum power_spectrum(std::span<const float> samples, double rate_hz, int size = 4096);
 
-// Level of everything in [from_hz, to_hz).
+// Level of all power in [from_hz, to_hz).
 [[nodiscard]] double band_db(const Spectrum& spectrum, double from_hz, double to_hz);
 
-// Power-weighted mean frequency, how bright it sounds; 0 for silence.
+// Power-weighted mean frequency, a measure of brightness. 0 for silence.
 [[nodiscard]] double centroid_hz(const Spectrum& spectrum, double from_hz, double to_hz);
 
 struct Peak {
   double hz = 0;
-  double level_db = 0;  // of the bins of the window's main lobe
+  double level_db = 0;  // of the bins in the window's main lobe
 };
-// The strongest local maxima, loudest first; at least `apart_hz` from any louder one.
+// The strongest local maxima, loudest first. Each is at least `apart_hz` from any louder one.
 [[nodiscard]] std::vector<Peak> strongest_peaks(const Spectrum& spectrum, int count, double apart_hz);
 
 }  // namespace osteon::sound

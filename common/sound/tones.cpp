@@ -9,8 +9,8 @@
 namespace osteon::sound {
 namespace {
 
-// Squared amplitude of a sine at `hz` under a Hann window. Rotating phasors instead of Goertzel's real recurrence:
-// the latter loses digits at low frequencies.
+// Squared amplitude of a sine at `hz` under a Hann window. It uses rotating phasors instead of Goertzel's real
+// recurrence, which loses digits at low frequencies.
 double squared_amplitude(std::span<const float> samples, double rate_hz, double hz) {
   const auto n = static_cast<double>(samples.size());
   const double turn = 2.0 * std::numbers::pi * hz / rate_hz;
@@ -41,7 +41,7 @@ double tone_db(std::span<const float> samples, double rate_hz, double hz) {
 
 Tone find_tone(std::span<const float> samples, double rate_hz, double low_hz, double high_hz) {
   OSTEON_CHECK(!samples.empty() && low_hz <= high_hz);
-  // The main lobe is 4 / duration wide: a quarter of that steps over no peak.
+  // The main lobe is 4 / duration wide, so steps of a quarter of that miss no peak.
   const double step = rate_hz / static_cast<double>(samples.size());
   double best_hz = low_hz, best = -1;
   for (int i = 0; low_hz + i * step <= high_hz; ++i) {
@@ -49,7 +49,7 @@ Tone find_tone(std::span<const float> samples, double rate_hz, double low_hz, do
     const double power = squared_amplitude(samples, rate_hz, hz);
     if (power > best) best = power, best_hz = hz;
   }
-  // Golden section inside the lobe, which has one maximum there.
+  // Golden-section search inside the lobe, which has one maximum.
   constexpr double kGolden = 0.6180339887498949;
   double a = best_hz - step, b = best_hz + step;
   double c = b - kGolden * (b - a), d = a + kGolden * (b - a);

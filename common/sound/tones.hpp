@@ -1,12 +1,12 @@
-// Single tones in a signal, measured to a small part of a hertz by a windowed Fourier sum at any frequency.
+// Measures single tones in a signal to a small fraction of a hertz, by a windowed Fourier sum at any frequency.
 #pragma once
 #include <span>
 #include <vector>
 
 namespace osteon::sound {
 
-// Amplitude of the tone at `hz` by a Hann-windowed Goertzel sum, in dB re amplitude 1. Tones closer than
-// 4 / duration are not told apart.
+// Amplitude of the tone at `hz` by a Hann-windowed Goertzel sum, in dB re amplitude 1. Tones closer than 4 / duration
+// cannot be separated.
 [[nodiscard]] double tone_db(std::span<const float> samples, double rate_hz, double hz);
 
 struct Tone {
@@ -17,7 +17,7 @@ struct Tone {
 [[nodiscard]] Tone find_tone(std::span<const float> samples, double rate_hz, double low_hz, double high_hz);
 
 struct TrackParams {
-  int window = 4096;        // samples looked at together
+  int window = 4096;        // samples analysed together
   int hop = 1024;           // samples from one point of the track to the next
   double reach = 0.03;      // largest relative change of frequency in one hop
   double quiet_db = -90.0;  // below this level the track keeps its last frequency

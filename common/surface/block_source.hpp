@@ -1,4 +1,5 @@
-// Copies what a block is made from out of a field: anything that can gather its solid distance and S as CutField does.
+// Copies the data for a block out of a field. The field may be anything that gathers its solid distance and S as
+// CutField does.
 #pragma once
 #include <vector>
 
@@ -6,7 +7,7 @@
 
 namespace osteon {
 
-// Levels coarser than the case's own take every 2nd or 4th sample of it, a plane at a time.
+// Levels coarser than the case's own use every 2nd or 4th sample of it, one plane at a time.
 template <class Gather>
 void gather_level(const Gather& gather, int level, const CoordBox& box, std::vector<float>& out) {
   const Coord n = box.dims();
@@ -27,7 +28,7 @@ void gather_level(const Gather& gather, int level, const CoordBox& box, std::vec
   }
 }
 
-// Fills `out`, using again what it has room for. kWhollyCovered where it sees that there is no surface.
+// Fills `out` and reuses its memory. Sets kWhollyCovered if there is no surface.
 template <class Field>
 void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKey& key, double pitch_mm,
                   BlockSamples& out) {
@@ -58,7 +59,7 @@ void gather_block(const Field& field, const SurfaceBlocks& blocks, const BlockKe
     gather_level(solid, key.level, box, out.solid_mm);
     gather_level(surface, key.level, box, out.surface_mm);
   }
-  // The samples of level 0 that samples of this level are nearest to.
+  // The samples of level 0 that are nearest to samples of this level.
   const int level = key.level;
   const Coord beyond{1, 1, 1};
   const CoordBox at_h = level >= 0 ? CoordBox{shift_down(box.min, level), shift_down(box.max, level) + beyond}

@@ -57,11 +57,11 @@ void Contour::build(const SolidRows& solid, CoveredGroups covered, const SeamRul
       edges_[2][x][y] = (row ^ row >> 1) & all_cells;
     }
   if (covered != 0) {
-    // Only edges of drawn cells. A crossed edge's cells are crossed, so crossed cells tell as well as drawn ones.
+    // Only edges of drawn cells. The cells of a crossed edge are crossed, so testing crossed cells is enough.
     const auto cells = [&](int x, int y) {
       return x >= 0 && y >= 0 && x < kBlockCells && y < kBlockCells ? cells_[x][y] : 0u;
     };
-    const auto both = [](std::uint32_t row) { return row | row << 1; };  // samples of a row's cells
+    const auto both = [](std::uint32_t row) { return row | row << 1; };  // samples of the cells in a row
     for (int x = 0; x < kN; ++x)
       for (int y = 0; y < kN; ++y) {
         edges_[0][x][y] &= both(cells(x, y) | cells(x, y - 1));
@@ -92,7 +92,7 @@ void Contour::collapse(const SeamRule& seams) {
     const int u = (axis + 1) % 3, v = (axis + 2) % 3;
     for (const int side : {0, kBlockCells})
       for (int i = 0; i < 4; ++i) {
-        // A quarter of the face; where the coarse cell is as large as the block, its first quarter stands for all.
+        // A quarter of the face. If the coarse cell is as large as the block, its first quarter represents all.
         std::array<int, 3> place{};
         place[static_cast<std::size_t>(axis)] = side / 4;
         place[static_cast<std::size_t>(u)] = 1 + 2 * (i / 2);
@@ -113,8 +113,8 @@ void Contour::collapse(const SeamRule& seams) {
   }
 }
 
-// Follows the contour through the fine faces of one coarse face from each of its ends, and moves the vertices between
-// to the nearer end.
+// Follows the contour through the fine faces of one coarse face from each of its ends. Moves the vertices in between to
+// the nearer end.
 void Contour::collapse_face(const std::array<int, 3>& origin, int axis, int cells) {
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   const int first = sample_number(origin[0], origin[1], origin[2]);
@@ -130,7 +130,7 @@ void Contour::collapse_face(const std::array<int, 3>& origin, int axis, int cell
     const int at = first + (i + (k == 1)) * du + (j + (k == 2)) * dv;
     return at + (k % 2 == 0 ? u : v) * kBlockSampleCount;
   };
-  std::array<std::uint16_t, 2 * kN * kN> path;  // more than a face has edges
+  std::array<std::uint16_t, 2 * kN * kN> path;  // more than the number of edges in a face
 
   const auto follow = [&](int i, int j, int k) {
     std::size_t length = 0;
@@ -138,7 +138,7 @@ void Contour::collapse_face(const std::array<int, 3>& origin, int axis, int cell
       path[length++] = static_cast<std::uint16_t>(number(i, j, k));
       int out = -1;
       if (crossed(i, j, 0) && crossed(i, j, 1) && crossed(i, j, 2) && crossed(i, j, 3))
-        out = corner(i, j, k) ? (k + 3) & 3 : (k + 1) & 3;  // the solid corner's other edge
+        out = corner(i, j, k) ? (k + 3) & 3 : (k + 1) & 3;  // the other edge of the solid corner
       else
         for (int other = 0; other < 4; ++other)
           if (other != k && crossed(i, j, other)) out = other;
@@ -146,7 +146,7 @@ void Contour::collapse_face(const std::array<int, 3>& origin, int axis, int cell
       j += (out == 2) - (out == 0);
       k = (out + 2) & 3;
       if (i < 0 || j < 0 || i >= cells || j >= cells) {
-        // The same edge, seen from the fine face that it was left by.
+        // The same edge, seen from the fine face on the other side.
         path[length++] = static_cast<std::uint16_t>(number(i, j, k));
         return length;
       }
@@ -155,7 +155,7 @@ void Contour::collapse_face(const std::array<int, 3>& origin, int axis, int cell
   const auto start = [&](int i, int j, int k) {
     if (!crossed(i, j, k)) return;
     const std::size_t length = follow(i, j, k);
-    if (path[0] > path[length - 1]) return;  // walked from its other end
+    if (path[0] > path[length - 1]) return;  // the path was already followed from its other end
     for (std::size_t p = 1; p + 1 < length; ++p) {
       const int edge = path[p], to = 2 * p < length ? path[0] : path[length - 1];
       if (!used(edge) || !used(to)) continue;

@@ -1,5 +1,5 @@
-// The combinatorial half of a block's mesh: from solid samples and seams to vertices and triangles, without places.
-// Both sides of the wire run it, so only what it cannot know is sent.
+// The combinatorial part of a block's mesh: from solid samples and seams to vertices and triangles, without positions.
+// Server and viewer both compute it, so only what is not in it is sent.
 #pragma once
 #include <array>
 #include <bit>
@@ -13,16 +13,16 @@ namespace osteon {
 
 using SolidRows = std::array<std::array<std::uint32_t, kBlockSamples>, kBlockSamples>;  // [x][y], bit z
 
-// Too large for a stack frame in a loop: keep one and use it again.
+// Too large for a stack frame in a loop. Keep one and reuse it.
 class Contour {
  public:
-  // In the order of samples, x slowest, and of axes within a row. Vertices inside a coarse face of a seam are not
-  // among them: they have moved to the nearer end of their piece of the contour.
+  // Vertices are in the order of samples, x slowest, and of axes within a row of samples. Vertices inside a coarse face
+  // of a seam are not included: they have moved to the nearer end of their part of the contour.
   void build(const SolidRows& solid, CoveredGroups covered, const SeamRule& seams);
 
   [[nodiscard]] std::span<const std::uint16_t> vertex_edges() const { return {edge_of_vertex_.data(), vertices_}; }
 
-  // visit(number, x, y, z, axis) for every vertex in that order: its edge goes from the sample along the axis.
+  // Calls visit(number, x, y, z, axis) for every vertex in that order. Its edge goes from the sample along the axis.
   template <class Visit>
   void for_vertices(Visit visit) const {
     std::size_t vertex = 0;
@@ -33,7 +33,7 @@ class Contour {
             visit(vertex++, x, y, static_cast<unsigned>(std::countr_zero(left)), axis);
   }
 
-  // visit(a, b, c) for every triangle that is not shrunk to a line.
+  // Calls visit(a, b, c) for every triangle that is not collapsed to a line.
   template <class Visit>
   void for_triangles(Visit visit) const {
     const auto& cases = case_triangles();
@@ -57,7 +57,7 @@ class Contour {
 
  private:
   using Rows = std::uint32_t[kBlockSamples][kBlockSamples];
-  // A case's triangles, their corners as steps in vertex_of_edge_ from the cell's first sample.
+  // The triangles of a case. Corners are given as offsets in vertex_of_edge_ from the cell's first sample.
   struct CaseTriangles {
     std::uint16_t corners = 0;
     std::array<std::int16_t, 3 * kCaseTriangles> offsets{};
@@ -68,7 +68,7 @@ class Contour {
   void collapse_face(const std::array<int, 3>& origin, int axis, int cells);
 
   Rows solid_;
-  Rows cells_;     // crossed and drawn
+  Rows cells_;     // crossed and drawn cells
   Rows edges_[3];  // crossed edges of drawn cells
   bool collapsed_ = false;
   struct Moved {
@@ -77,7 +77,7 @@ class Contour {
   std::array<Moved, 6 * 2 * kBlockSamples * kBlockSamples> moved_;  // at most every edge of the six faces
   std::size_t moved_count_ = 0;
   std::size_t vertices_ = 0;
-  std::array<std::uint16_t, 3 * kBlockSampleCount> vertex_of_edge_;  // where edges_ or moved_ name the edge
+  std::array<std::uint16_t, 3 * kBlockSampleCount> vertex_of_edge_;  // valid where edges_ or moved_ contain the edge
   std::array<std::uint16_t, 3 * kBlockSampleCount> edge_of_vertex_;
 };
 

@@ -20,8 +20,9 @@ int edge_between(const MarchingCubesTable& table, int a, int b) {
 // Corners of the six faces, counter-clockwise seen from outside the cell.
 constexpr int kFaces[6][4] = {{0, 1, 3, 2}, {4, 6, 7, 5}, {0, 4, 5, 1}, {2, 3, 7, 6}, {0, 2, 6, 4}, {1, 5, 7, 3}};
 
-// The surface cuts each face along segments. Around every run of solid corners one goes from the edge where the run
-// begins to the edge where it ends; each crossed edge ends a segment on one of its faces and begins one on the other.
+// The surface cuts each face along segments. One segment goes around every run of solid corners, from the edge where
+// the run begins to the edge where it ends. Each crossed edge ends a segment on one of its faces and begins one on the
+// other.
 std::array<int, kCellEdges> next_edges(const MarchingCubesTable& table, int solid) {
   std::array<int, kCellEdges> next;
   next.fill(-1);

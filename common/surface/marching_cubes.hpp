@@ -1,12 +1,12 @@
-// Marching cubes: which edges of a cell the surface crosses, and the triangles between them.
-// Lorensen 1987; the table is derived here, not tabulated by hand.
+// Marching cubes: which edges of a cell the surface crosses, and the triangles between them. Lorensen 1987. The table
+// is computed here, not written by hand.
 #pragma once
 #include <array>
 #include <cstdint>
 
 namespace osteon {
 
-// Corner i of a cell lies at (i >> 2 & 1, i >> 1 & 1, i & 1); a case has bit i set where corner i is solid.
+// Corner i of a cell lies at (i >> 2 & 1, i >> 1 & 1, i & 1). A case has bit i set if corner i is solid.
 struct CellEdge {
   std::uint8_t corner;  // the end with the smaller coordinates
   std::uint8_t axis;    // 0, 1, 2: towards +x, +y, +z
@@ -14,7 +14,7 @@ struct CellEdge {
 inline constexpr int kCellEdges = 12;
 inline constexpr int kCaseTriangles = 5;  // no case has more
 
-// Triangles of a case as edge numbers, three by three, counter-clockwise seen from outside the solid.
+// Triangles of a case as edge numbers, three for each triangle, counter-clockwise seen from outside the solid.
 struct CellCase {
   std::uint8_t corners = 0;  // three for each triangle
   std::array<std::uint8_t, 3 * kCaseTriangles> edges{};
@@ -22,8 +22,8 @@ struct CellCase {
 
 struct MarchingCubesTable {
   std::array<CellEdge, kCellEdges> edges;
-  // On a face with two solid corners across from each other the surface separates them; as the rule sees only the face,
-  // neighbours agree.
+  // On a face with two diagonally opposite solid corners, the surface separates them. The rule depends only on the
+  // face, so neighbours agree.
   std::array<CellCase, 256> cases;
 };
 

@@ -15,17 +15,18 @@
 namespace osteon {
 namespace {
 
-// Payload: flags; the covered groups and the seams where there are any; the solid bits as below; then for each vertex
-// in the order of the contour its place along the edge, its normal, one cut bit where vertices differ in it, and two
-// bits of tissue where any is metal or enamel.
+// Payload: flags; covered groups and seams if there are any; solid bits as described below. Then for each vertex in the
+// order of the contour: its position along the edge, its normal, one cut bit if vertices differ in it, and two bits of
+// tissue if any is metal or enamel.
 constexpr int kN = kBlockSamples;
 constexpr std::uint8_t kHasCovered = 1, kHasSeams = 2, kAllCut = 4, kSomeCut = 8, kHasTissue = 16, kFlags = 31;
-// Two bits of a vertex; what they say is in kTissues.
+// Two bits of a vertex are an index in kTissues.
 constexpr std::array kTissues{Tissue::none, Tissue::metal, Tissue::enamel};
 constexpr std::size_t kGathered = static_cast<std::size_t>(kBlockApron) * kBlockApron * kBlockApron;
 
-// Solid bits go row by row, x slowest, as the difference from what the three rows before suggest: a plane continues.
-// One byte is a run of rows without difference, or one run of differing bits by length and start; other rows take four.
+// Solid bits are coded row by row of samples, x slowest, as the difference from a prediction by the three previous
+// rows, which continues a plane. One byte is a run of rows without difference, or one run of differing bits by length
+// and start. Other rows take four bytes.
 constexpr unsigned kSameRows = 64, kDifferenceLengths = 11, kRawRow = 255;
 
 std::uint32_t expected_row(const SolidRows& rows, std::size_t x, std::size_t y) {
@@ -61,7 +62,7 @@ void write_rows(const SolidRows& rows, std::vector<std::uint8_t>& out) {
   flush();
 }
 
-// Takes bytes from the front; false where they are not what write_rows() writes.
+// Takes bytes from the front. False if write_rows() did not write them.
 bool read_rows(std::span<const std::uint8_t>& bytes, SolidRows& rows) {
   constexpr std::uint32_t kRow = (1u << kN) - 1;
   unsigned same = 0;
@@ -112,7 +113,7 @@ void write_seams(const Seams& seams, std::vector<std::uint8_t>& out) {
   }
 }
 
-// A coarse face as large as the block has one neighbour, or its quarters would not agree on it.
+// A coarse face as large as the block has one neighbour. Otherwise its quarters would not agree.
 bool whole_faces(const Seams& seams) {
   const SeamRule rule(seams);
   for (int axis = 0; axis < 3; ++axis)
@@ -151,7 +152,7 @@ bool read_seams(std::span<const std::uint8_t>& bytes, Seams& seams) {
   return whole_faces(seams);
 }
 
-// Unit vectors on the octahedron unfolded into a square (Meyer 2010).
+// Unit vectors on the octahedron unfolded to a square (Meyer 2010).
 std::array<std::uint8_t, 2> encode_normal(std::array<float, 3> n) {
   const float sum = std::abs(n[0]) + std::abs(n[1]) + std::abs(n[2]);
   if (!(sum > 0.0f)) return {128, 128};
@@ -177,7 +178,7 @@ std::array<float, 3> decode_normal(std::uint8_t a, std::uint8_t b) {
   return {u / length, v / length, w / length};
 }
 
-// Which of the 17 samples of a row are solid; reads nothing after them.
+// Which of the 17 samples of a row are solid. Reads nothing after them.
 std::uint32_t solid_bits(const float* row) {
   std::uint32_t bits = row[16] < 0.0f ? 1u << 16 : 0u;
 #if defined(__SSE2__)
@@ -204,7 +205,7 @@ std::array<float, 3> gradient_between(const float* a, const float* b, float t, s
 }
 
 struct Vertex {
-  int place = 0;  // along its edge, 252ths
+  int place = 0;  // position along its edge, 252ths
   std::array<float, 3> gradient{};
   bool cut = false;
   Tissue tissue = Tissue::none;
@@ -213,7 +214,7 @@ struct Vertex {
 // The field around one block, its contour, and the vertices on it.
 class Mesher {
  public:
-  // False where the block has no surface.
+  // False if the block has no surface.
   bool begin(const BlockSamples& samples) {
     const std::vector<float>& surface = samples.uncut ? samples.solid_mm : samples.surface_mm;
     return begin(samples, samples.solid_mm, surface, samples.covered, samples.seams);
@@ -250,10 +251,10 @@ class Mesher {
   [[nodiscard]] const SolidRows& rows() const { return rows_; }
   [[nodiscard]] const Contour& contour() const { return contour_; }
 
-  // visit(number, x, y, z, axis, vertex) for every vertex in order.
+  // Calls visit(number, x, y, z, axis, vertex) for every vertex in order.
   template <class Visit>
   void for_vertices(double level_pitch_mm, Visit visit) const {
-    // On the imported surface S is zero up to the rounding of the vertex's place.
+    // On the imported surface S is zero, up to the rounding of the vertex's position.
     const float below_surface = -static_cast<float>(level_pitch_mm) / 32.0f;
     const bool ruled = rule_.any();
     const float *const field = field_, *const raw = raw_, *const surface = surface_;
@@ -273,7 +274,7 @@ class Mesher {
   }
 
  private:
-  // The vertex that the ruling level has on the coarse edge that this edge is a piece of.
+  // The vertex of the determining level on the coarse edge that contains this edge.
   bool on_coarse_edge(const std::array<int, 3>& at, unsigned axis, float below_surface, Vertex& vertex) const {
     std::array<int, 3> place;
     for (unsigned k = 0; k < 3; ++k) place[k] = k == axis ? SeamRule::of_cell(at[k]) : SeamRule::of_sample(at[k]);
@@ -293,7 +294,7 @@ class Mesher {
     vertex.place = std::clamp(cells * edge_place(fa, fb) - kEdgePlaces * (at[axis] - from[axis]), 0, kEdgePlaces);
     vertex.cut = surface_[a] + t * (surface_[b] - surface_[a]) < static_cast<float>(cells) * below_surface;
     if (tissue_) vertex.tissue = tissue_[fa < 0.0f ? a : b];
-    // The coarse level's own gradient, as its block has it.
+    // The gradient of the coarse level, as its block computes it.
     const std::vector<float>& coarse = samples_->coarse_mm[static_cast<std::size_t>(steps - 1)];
     const auto side = static_cast<std::size_t>(kBlockCells / cells + 3);
     OSTEON_CHECK(coarse.size() == side * side * side);
@@ -308,14 +309,14 @@ class Mesher {
   const float* raw_ = nullptr;    // as gathered
   const float* field_ = nullptr;  // with the seams' contour
   const float* surface_ = nullptr;
-  const Tissue* tissue_ = nullptr;  // null: none at all
+  const Tissue* tissue_ = nullptr;  // null: no tissue
   SeamRule rule_{Seams{}};
   SolidRows rows_{};
   std::array<float, kGathered> ruled_;
   Contour contour_;
 };
 
-// One for each thread: making a block allocates nothing but its result.
+// One for each thread, so that making a block allocates only its result.
 Mesher& mesher() {
   static thread_local Mesher one;
   return one;
@@ -364,7 +365,7 @@ BlockPayload encode(Mesher& at, CoveredGroups covered, const Seams& seams, doubl
   return payload;
 }
 
-// Where a vertex lies, from global integers, so that blocks of all levels place one that they share on the same bits.
+// Positions of vertices, computed from global integers. So blocks of all levels give a shared vertex the same bits.
 class Places {
  public:
   Places(const BlockKey& key, double level_pitch_mm) : unit_mm_(level_pitch_mm / kEdgePlaces) {
@@ -433,7 +434,7 @@ void mesh_block(const BlockSamples& samples, Mesh& mesh) {
                     mesh.cut_face[v] = vertex.cut;
                     if (!mesh.tissue.empty()) mesh.tissue[v] = vertex.tissue;
                   });
-  // Roots and quotients several at a time.
+  // Roots and quotients, several at a time.
   static thread_local std::array<float, 3 * kBlockSampleCount> scales;
   for (std::size_t v = 0; v < count; ++v) {
     const auto& g = mesh.normals[v];
@@ -444,7 +445,7 @@ void mesh_block(const BlockSamples& samples, Mesh& mesh) {
     auto& n = mesh.normals[v];
     n = {n[0] * scales[v], n[1] * scales[v], scales[v] > 0.0f ? n[2] * scales[v] : 1.0f};
   }
-  // Into memory that is large enough for any block, then out at once.
+  // Written to memory that is large enough for any block, then copied at once.
   using Triangle = std::array<std::uint32_t, 3>;
   constexpr std::size_t kCells = static_cast<std::size_t>(kBlockCells) * kBlockCells * kBlockCells;
   static thread_local std::array<Triangle, kCaseTriangles * kCells> made;

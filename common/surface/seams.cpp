@@ -11,24 +11,25 @@ constexpr std::array<int, 3> kStride{kSlab, kRow, 1};
 
 int gathered(const std::array<int, 3>& at) { return (at[0] + 1) * kSlab + (at[1] + 1) * kRow + at[2] + 1; }
 
-// Half blocks on both sides of a place, as SeamRule names places: a plane between two has both, an inside one.
+// Half blocks on both sides of a position, numbered as in SeamRule. A plane between two half blocks has both, a
+// position inside has one.
 constexpr int first_half(int place) { return (place + 1) / 2; }
 constexpr int last_half(int place) { return place / 2 + 1; }
 
-// The value with the side that the ruling contour gives it.
+// The value with the sign that the determining contour gives it.
 float on_side(float value, bool solid) {
   if ((value < 0.0f) == solid) return value;
   return solid ? -1e-6f : 1e-6f;
 }
 
-// The samples of one class of places: first to last along an axis.
+// The samples of each kind of position: first to last along an axis.
 constexpr std::array<int, 5> kFirst{0, 1, 8, 9, 16}, kLast{0, 7, 8, 15, 16};
 
 class Ruling {
  public:
   Ruling(std::span<float> values, int cells) : f_(values), cells_(cells) {}
 
-  // Samples on coarse edges: linear, the side changing at the vertex.
+  // Samples on coarse edges are linear; the sign changes at the vertex.
   void edge(const std::array<int, 3>& at, int axis) {
     const auto k = static_cast<std::size_t>(axis);
     std::array<int, 3> from = at, to = at;
@@ -42,13 +43,13 @@ class Ruling {
     f_[static_cast<std::size_t>(gathered(at))] = on_side(value, solid);
   }
 
-  // All samples inside one coarse face, whose edges are done: u and v its axes.
+  // All samples inside one coarse face whose edges are done. u and v are its axes.
   void face(const std::array<int, 3>& origin, int u, int v) {
     const int first = gathered(origin), du = kStride[static_cast<std::size_t>(u)],
               dv = kStride[static_cast<std::size_t>(v)];
     const auto value = [&](int i, int j) -> float& { return f_[static_cast<std::size_t>(first + i * du + j * dv)]; };
     const int n = cells_;
-    // Where the contour enters and leaves, in half cells: midway between the fine samples on both sides of it.
+    // Where the contour enters and leaves, in half cells: midway between the fine samples on both sides.
     std::array<std::array<int, 2>, 4> ends;
     std::size_t count = 0;
     for (int i = 0; i < n; ++i) {
@@ -73,7 +74,7 @@ class Ruling {
           const int here = side(2 * i, 2 * j), corner = side(0, 0);
           solid = here == 0 || ((here > 0) == (corner > 0)) == solid00;
         } else if (count == 4) {
-          solid = false;  // two solid corners across from each other stay apart
+          solid = false;  // two diagonally opposite solid corners stay separate
         }
         const float s = static_cast<float>(i) / static_cast<float>(n),
                     t = static_cast<float>(j) / static_cast<float>(n);
@@ -127,7 +128,7 @@ void take_coarse_contour(const SeamRule& rule, std::span<float> values) {
                     }
                   if (!faces && off == 1) ruling.edge(at, axis);
                   if (!faces || off != 2) continue;
-                  // Once for each coarse face: at its first inner sample.
+                  // Once for each coarse face, at its first inner sample.
                   std::array<int, 3> origin = at;
                   std::array<int, 2> axes{};
                   std::size_t n = 0;

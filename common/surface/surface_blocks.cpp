@@ -21,7 +21,7 @@ void for_each(const CoordBox& box, Visit visit) {
       for (std::int32_t z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z});
 }
 
-// Blocks of a level that read samples of a box of that level: block b reads from 16 b − reach to 16 b + 16 + reach.
+// Blocks of a level that read samples of a box of that level. Block b reads from 16 b − reach to 16 b + 16 + reach.
 CoordBox readers(const CoordBox& samples, std::int32_t reach) {
   const Coord below{reach + 1, reach + 1, reach + 1}, above{reach, reach, reach};
   return {shift_down(samples.min - below, 4), shift_down(samples.max + above, 4)};
@@ -66,7 +66,7 @@ CoveredGroups SurfaceBlocks::covered(const BlockKey& key) const {
   if (key.level < 0) return groups;
   for (int finer = key.level + 1; finer < kLevels; ++finer) {
     if (fine_[static_cast<std::size_t>(finer - 1)].empty()) continue;
-    // A block one level finer covers 2³ groups of 4³ cells, one two levels finer a single one.
+    // A block one level finer covers 2³ groups of 4³ cells. A block two levels finer covers one group.
     const int shift = finer - key.level;
     const std::int32_t blocks = 1 << shift, wide = 4 / blocks;
     const Coord first = shift_up(key.index, shift);
@@ -83,7 +83,7 @@ Seams SurfaceBlocks::seams(const BlockKey& key) const {
   Seams seams;
   const bool no_coarse = std::ranges::all_of(coarse_, [](const Indices& drawn) { return drawn.empty(); });
   if (key.level == kCoarsestLevel || (key.level <= 0 && no_coarse)) return seams;
-  // At the finest level both halves of a neighbour are one block.
+  // At the finest level both halves of a neighbour are in one block.
   const int wide = key.level == kFinest ? 2 : 1;
   const auto around = [&](int i) { return wide == 2 ? (i == 0 ? -1 : i == 3 ? 1 : 0) : i - 1; };
   for (int x = 0; x < 4; ++x)
@@ -121,10 +121,10 @@ bool SurfaceBlocks::meets(const BlockKey& key, int steps) const {
 
 namespace {
 
-// The distinct blocks that read any of a cut's leaves. A cut's leaves lie together, so they are marked in a box.
+// The distinct blocks that read any of a cut's leaves. These leaves are close together, so they are marked in a box.
 class Readers {
  public:
-  // Blocks of level `to` that read, up to `reach` samples beyond their cells, samples of these leaves of level `from`.
+  // Blocks of level `to` that read samples of these leaves of level `from`, up to `reach` samples beyond their cells.
   void find(const std::vector<Coord>& leaves, int from, int to, std::int32_t reach, std::vector<Coord>& found) {
     found.clear();
     boxes_.clear();
@@ -177,11 +177,11 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
   }
 
   for (int l = any_coarse ? kCoarsestLevel : 0; l < kLevels; ++l) {
-    if (l > 0 && fine_[static_cast<std::size_t>(l - 1)].empty()) continue;  // nothing is drawn at it
+    if (l > 0 && fine_[static_cast<std::size_t>(l - 1)].empty()) continue;  // nothing is drawn at this level
     readers_of.find(changed_leaves, level, l, 1, near);
     for (const Coord index : near)
       if (const BlockKey key{body_, l, index}; drawn(key)) stale.push_back(key);
-    // The normals on a seam come from the coarser level's samples, which reach further: 2, 4, … samples.
+    // The normals on a seam use samples of the coarser level, which extend farther: 2, 4, … samples.
     const int most_steps = any_coarse ? l - kCoarsestLevel : l;
     for (int steps = 1; steps <= most_steps; ++steps) {
       readers_of.find(changed_leaves, level, l, 1 << steps, far);
@@ -192,7 +192,7 @@ std::vector<BlockKey> SurfaceBlocks::touch(int level, const std::vector<Coord>& 
     }
   }
 
-  // Where a block is drawn for the first time, the coarser ones give up their cells and the others change their seams.
+  // When a block is drawn for the first time, coarser blocks give up its cells, and other blocks change their seams.
   for (const Coord index : fresh) {
     for (int l = 0; l < level; ++l)
       if (const BlockKey key{body_, l, shift_down(index, level - l)}; drawn(key)) stale.push_back(key);
@@ -222,13 +222,13 @@ std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const
       return distance_mm(box, f.position_mm) <= f.*limit * (is_finer ? kFocusHysteresis : 1.0);
     });
   };
-  // Cells reach one sample beyond the block, so a surface may lie in the block below the first sample.
+  // Cells extend one sample beyond the block, so a surface may be in the block below the first sample.
   const auto blocks_of_bone = [&](int level) {
     return CoordBox{shift_down(bone_samples.min - Coord{1, 1, 1}, 4 - level), shift_down(bone_samples.max, 4 - level)};
   };
   Indices& halves = coarse_[0];
   Indices& quarters = coarse_[1];
-  // What was cut is drawn in full, and so is the block of level 0 next to it.
+  // Cut blocks are drawn in full, and so is the neighbouring block of level 0.
   Indices in_full;  // blocks of level -1
   for (int level = 1; level < kLevels; ++level)
     for (const Coord index : fine_[static_cast<std::size_t>(level - 1)]) {
@@ -241,11 +241,11 @@ std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const
     const bool was_full = !halves.contains(child) && !quarters.contains(shift_down(child, 1));
     if (near(-1, child, &Focus::full_mm, was_full)) in_full.insert(child);
   });
-  std::set<Coord> changed;  // blocks of level -1 whose level became another
+  std::set<Coord> changed;  // blocks of level -1 whose level changed
   for_each(roots, [&](Coord root) {
     const bool was_quarter = quarters.contains(root);
-    // Levels change by one step at a time: where a coarse contour and one four times finer meet, the surface could
-    // fold.
+    // Neighbouring levels differ by at most one step. Where a coarse contour met one four times finer, the surface
+    // could fold.
     bool quarter = !near(kCoarsestLevel, root, &Focus::half_mm, !was_quarter);
     for_each({2 * root - Coord{1, 1, 1}, 2 * root + Coord{2, 2, 2}},
              [&](Coord c) { quarter = quarter && !in_full.contains(c); });
@@ -265,7 +265,7 @@ std::vector<BlockKey> SurfaceBlocks::focus(std::span<const Focus> focuses, const
   });
   if (changed.empty()) return {};
 
-  // All blocks in what changed, and beside it those whose seams did.
+  // All blocks in the changed region, and those beside it whose seams changed.
   std::set<Coord> around;
   for (const Coord at : changed)
     for_each({at - Coord{1, 1, 1}, at + Coord{1, 1, 1}}, [&](Coord c) { around.insert(c); });

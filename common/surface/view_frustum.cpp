@@ -7,9 +7,9 @@ namespace osteon {
 namespace {
 
 constexpr double kToolFull_mm = 8.0, kToolHalf_mm = 16.0;
-// Beyond what is seen at the target's distance, so that a small turn of the camera shows nothing coarse.
+// Extends the visible part at the target's distance, so that a small turn of the camera shows nothing coarse.
 constexpr double kMargin = 1.25;
-// A place that moves by less than this share of its distance changes nothing that can be seen.
+// A position that moves by less than this fraction of its distance changes nothing visible.
 constexpr double kSmallStep = 1.0 / 16.0;
 
 }  // namespace
@@ -30,7 +30,7 @@ Focus focus_of_tool(const Vec3& tip_mm) { return {tip_mm, kToolFull_mm, kToolHal
 
 bool nearly_equal(const ViewFrustum& a, const ViewFrustum& b) {
   if (a.up.has_value() != b.up.has_value()) return false;
-  if (a.up && (*a.up - *b.up).norm() > kSmallStep) return false;  // radians, as long as it is little
+  if (a.up && (*a.up - *b.up).norm() > kSmallStep) return false;  // radians, while small
   const double small_mm = kSmallStep * (a.target_mm - a.eye_mm).norm();
   return (a.eye_mm - b.eye_mm).norm() <= small_mm && (a.target_mm - b.target_mm).norm() <= small_mm &&
          std::abs(a.pixel_rad - b.pixel_rad) <= kSmallStep * a.pixel_rad &&

@@ -1,4 +1,4 @@
-// One mesh from the blocks of a surface.
+// Joins the blocks of a surface to one mesh.
 #pragma once
 #include <span>
 
@@ -6,8 +6,8 @@
 
 namespace osteon {
 
-// Joins vertices whose positions have the same bits, as those on the faces between blocks have; the first one's normal
-// and cut face are kept. Triangles stay in the order of the blocks.
+// Joins vertices whose positions have the same bits, such as those on the faces between blocks. The normal and cut face
+// of the first one are kept. Triangles stay in the order of the blocks.
 [[nodiscard]] Mesh weld(std::span<const Mesh> blocks);
 
 }  // namespace osteon

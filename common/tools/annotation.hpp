@@ -1,4 +1,4 @@
-// What somebody draws on the bone for others to see. It takes no part in cutting.
+// What a person draws on the bone for others to see. It does not affect cutting.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,11 +10,11 @@
 
 namespace osteon {
 
-// Kept in journals and sent: numbers stay.
+// Stored in journals and sent, so the numbers never change.
 enum class AnnotationKind : std::uint8_t {
-  pointer = 1,  // an arrow to one point; an author has one
-  line = 2,     // through all points
-  label = 3,    // words at one point
+  pointer = 1,  // an arrow to one point; each author has at most one
+  line = 2,     // a line through all points
+  label = 3,    // text at one point
 };
 
 struct Annotation {
@@ -29,8 +29,8 @@ struct Annotation {
 
 inline constexpr std::size_t kMostAnnotations = 256, kMostAnnotationPoints = 1024, kMostAnnotationWords = 256;
 
-// Error invalid_input: points too few or too many for its kind, words too long or missing, a colour of more than 24
-// bits. Names the field.
+// Error invalid_input, naming the field: too few or too many points for the kind, text too long or missing, a colour of
+// more than 24 bits.
 [[nodiscard]] Result<void> check(const Annotation& drawn);
 
 }  // namespace osteon

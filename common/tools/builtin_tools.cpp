@@ -1,4 +1,4 @@
-// The tool box of Appendix B: the files of common/tools/box, which the build puts into the program.
+// The tool box of Appendix B: the files of common/tools/box, which the build embeds in the program.
 #include <utility>
 #include <vector>
 
@@ -7,7 +7,7 @@
 
 namespace osteon {
 
-// Name and text of each file, in the order in which tools are listed; written by the build from box/*.yaml.
+// Name and text of each file, in the order in which tools are listed. The build generates it from box/*.yaml.
 std::span<const std::pair<std::string_view, std::string_view>> box_files();
 
 std::span<const Tool> builtin_tools() {

@@ -10,11 +10,11 @@
 namespace osteon {
 namespace {
 
-// Pin holes lie in the two ends of a block, so that no slot crosses them: from its ends to their middles, and to the
-// ends of its slots, in diameters of a pin hole.
+// Pin holes are in the two ends of a block, so that no slot crosses them. Distances from the ends to the middles of the
+// holes, and to the ends of the slots, in diameters of a pin hole.
 constexpr double kPinFromEnd = 1.5, kSlotFromEnd = 3.0;
-// A 4-in-1 block's slots leave its bone side at these shares of half its thickness: the chamfers run outwards from
-// there and meet the anterior and posterior cuts.
+// The slots of a 4-in-1 block leave its bone side at these fractions of half its thickness. From there the chamfers run
+// outwards and meet the anterior and posterior cuts.
 constexpr double kStraightAt = 0.8, kChamferAt = 0.6;
 
 void add_pin_holes(const Tool& block, GuideShape& shape) {
@@ -24,23 +24,24 @@ void add_pin_holes(const Tool& block, GuideShape& shape) {
         {{side * x, 0, -block.cutting_length_mm}, Vec3::UnitZ(), block.diameter_mm, block.cutting_length_mm});
 }
 
-// The lead-in: a cone of 45 degrees before the mouth, as deep as half the opening is wide, in which the tip is led to
-// it.
+// The lead-in: a cone of 45 degrees before the mouth, half as deep as the opening is wide. It guides the tip to the
+// mouth.
 constexpr double kLeadIn = 0.5;
-// Slope of the tool against the opening, beyond which it is not going in.
+// Largest slope of the tool against the opening at which it still enters.
 constexpr double kMostSlope = 1.0;
-// How much a change of slope counts against one of place, in lengths of the opening: a hand that trembles is moved
-// rather than turned.
+// Weight of a change of slope against a change of position, in lengths of the opening. So a trembling tool is moved
+// rather than rotated.
 constexpr double kSlopeWeight = 4.0;
 
 using Vec2 = Eigen::Vector2d;
 
-// An opening's own frame: x and y across it (y along a slot's normal), z the way in, origin in the middle of its mouth.
+// An opening's own frame: x and y across it (y along a slot's normal), z the direction of insertion, origin in the
+// middle of its mouth.
 struct Opening {
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  // columns, guide frame
   Vec3 mouth_mm = Vec3::Zero();
   double length_mm = 0;
-  Vec2 play_mm = Vec2::Zero();  // across: bore: both the same; slot: along its flat, across it
+  Vec2 play_mm = Vec2::Zero();  // across; bore: both equal; slot: along its flat, across it
   double roll_arm_mm = 0;       // slot: half the blade's width
   double lead_in_mm = 0;
   bool slot = false;
@@ -52,7 +53,7 @@ bool turns(ToolKind kind) {
 }
 bool saws(ToolKind kind) { return kind == ToolKind::oscillating_saw || kind == ToolKind::reciprocating_saw; }
 
-// What a turning tool needs of a bore, what a blade needs of a slot along its flat.
+// The size of a turning tool that a bore must fit, and the width of a blade that a slot must fit along its flat.
 double tool_diameter_mm(const Tool& tool) { return std::max(tool.diameter_mm, tool.shank_diameter_mm); }
 double swept_width_mm(const Tool& tool) { return tool.width_mm + 2.0 * tool.pivot_mm * std::sin(0.5 * tool.swing_rad); }
 
@@ -76,7 +77,7 @@ Opening opening_for(const GuideShape& shape, std::size_t index, const Tool& tool
   opening.axes.col(2) = slot.direction;
   opening.mouth_mm = slot.entry_mm;
   opening.length_mm = slot.depth_mm;
-  // The plate is what the slot holds; the teeth only have to go through.
+  // The slot holds the plate. The teeth only need to pass through.
   opening.play_mm = {0.5 * (slot.width_mm - swept_width_mm(tool)), 0.5 * (slot.height_mm - tool.thickness_mm)};
   opening.roll_arm_mm = 0.5 * tool.width_mm;
   opening.lead_in_mm = kLeadIn * slot.height_mm + 1.0;
@@ -94,24 +95,25 @@ Vec2 at(const Line& line, double z_mm, double length_mm) {
   return line.middle_mm + (z_mm - 0.5 * length_mm) * line.slope;
 }
 
-// One condition on the line: at this depth it is no farther from the middle than this.
+// A condition on the line: at this depth its distance from the middle is limited.
 struct Hold {
   double z_mm = 0;
-  double widening_mm = 0;  // beyond the play: in the lead-in
+  double widening_mm = 0;  // allowed in addition to the play, in the lead-in
 };
 struct Holds {
   std::array<Hold, 2> hold;
   int count = 0;
 };
-// From the mouth to the tip or the end; before the mouth the tip alone, in the cone.
+// Conditions from the mouth to the tip or the end. Before the mouth, only the tip in the cone.
 Holds holds_of(double tip_mm, double length_mm) {
   if (tip_mm <= 0.0) return {{Hold{tip_mm, -tip_mm}, Hold{}}, 1};
   return {{Hold{0.0, 0.0}, Hold{std::min(tip_mm, length_mm), 0.0}}, 2};
 }
 
-// Least change of (middle, weight · slope) so that the line keeps within `radius` (plus widening) of zero at its holds.
-// With multipliers k and l of the two conditions, G the Gram matrix of their rows and u the line at the holds,
-// (I + G diag(k, l)) u = u_wanted. For a given k the l that keeps the second is a closed form; k is bracketed.
+// Smallest change of (middle, weight · slope) for which the line stays within `radius` (plus widening) of zero at its
+// holds. With multipliers k and l of the two conditions, G the Gram matrix of their rows and u the line at the holds,
+// (I + G diag(k, l)) u = u_wanted. For a given k, the l that fulfils the second condition has a closed form. k is
+// bracketed.
 template <class V>  // Vec2 in a bore, double in a slot
 void nearest(V& middle, V& slope, const Holds& holds, double length_mm, double radius_mm) {
   const auto size = [](const V& v) {
@@ -129,7 +131,7 @@ void nearest(V& middle, V& slope, const Holds& holds, double length_mm, double r
   const bool two = holds.count == 2;
   if (size(w0) <= r0 && (!two || size(w1) <= r1)) return;
 
-  // Nothing is at rest exactly on a limit of zero width.
+  // With a limit of zero width, nothing would rest exactly on it.
   constexpr double kNo_mm = 1e-12;
   V u0 = w0, u1 = w1;
   double k = 0.0, l = 0.0;
@@ -163,7 +165,7 @@ double change(double middle, double slope, const Line& wanted, double length_mm)
   return (middle - wanted.middle_mm.y()) * (middle - wanted.middle_mm.y()) + turn * turn;
 }
 
-// A blade that rolls takes up play at both its edges, so roll and play across share the room.
+// A blade that rolls uses up play at both its edges, so roll and play across share the room.
 void nearest_in_slot(Line& line, const Holds& holds, const Opening& opening) {
   nearest(line.middle_mm.x(), line.slope.x(), holds, opening.length_mm, opening.play_mm.x());
   const Line wanted = line;
@@ -176,7 +178,7 @@ void nearest_in_slot(Line& line, const Holds& holds, const Opening& opening) {
     const double turn = weight * (std::abs(wanted.roll) - lift / arm);
     return change(line.middle_mm.y(), line.slope.y(), wanted, opening.length_mm) + turn * turn;
   };
-  // Convex in the lift of the blade's edges, which is at most what was wanted.
+  // Convex in the lift of the blade's edges, which is at most the wanted lift.
   double low = 0.0, high = std::min(play + holds.hold[0].widening_mm, std::abs(wanted.roll) * arm);
   if (across(high) <= 0.0) return;
   constexpr double kGolden = 0.6180339887498949;
@@ -196,7 +198,7 @@ void nearest_in_slot(Line& line, const Holds& holds, const Opening& opening) {
   line.roll = std::copysign(lift / arm, wanted.roll);
 }
 
-// A tool in an opening's frame as a line; slopes beyond what goes in are cut off.
+// A tool in an opening's frame as a line. Larger slopes than can enter are limited.
 Line line_of(const Opening& opening, const Pose& tool) {
   Line line;
   const Vec3 axis = tool.direction(Vec3::UnitZ());
@@ -208,7 +210,7 @@ Line line_of(const Opening& opening, const Pose& tool) {
   line.tip_mm = tool.position_mm.z();
   line.middle_mm = tool.position_mm.head<2>() + (0.5 * opening.length_mm - line.tip_mm) * line.slope;
   if (opening.slot) {
-    // The blade's flat as y = roll · x + …: which of its sides looks up does not matter.
+    // The blade's flat as y = roll · x + …. It does not matter which side faces up.
     const Vec3 normal = tool.direction(Vec3::UnitY());
     const double up = std::abs(normal.y()), side = normal.y() < 0.0 ? normal.x() : -normal.x();
     line.roll = up * kMostSlope >= std::abs(side) && up > 0.0 ? side / up : std::copysign(kMostSlope, side);

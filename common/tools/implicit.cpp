@@ -14,7 +14,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kSameCorner_mm = 1e-6;
 
-// Distance to a flat convex polygon, from a point on the outer side of its plane.
+// Distance to a flat convex polygon from a point on the outer side of its plane.
 double polygon_distance(const std::vector<Vec3>& corners, const Vec3& normal, double height_mm, const Vec3& p) {
   bool above = true;
   double squared = kInfinity;
@@ -92,7 +92,7 @@ std::vector<std::vector<Vec3>> face_polygons(const std::vector<HalfSpace>& faces
       if ((corner - p).norm() < kSameCorner_mm) return;
     polygon.push_back(p);
   };
-  // Every three faces meet in a point; it is a corner of the solid when it lies behind all others.
+  // Every three faces meet in a point. It is a corner of the solid if it lies behind all other faces.
   for (std::size_t i = 0; i < faces.size(); ++i)
     for (std::size_t j = i + 1; j < faces.size(); ++j)
       for (std::size_t k = j + 1; k < faces.size(); ++k) {
@@ -136,7 +136,7 @@ Implicit convex(std::vector<HalfSpace> faces) {
             double inside = -kInfinity;
             for (const HalfSpace& face : faces) inside = std::max(inside, face.normal.dot(p) - face.offset_mm);
             if (inside <= 0.0) return inside;
-            // The nearest point lies on a face that is seen from here.
+            // The nearest point lies on a face that is visible from p.
             double nearest = kInfinity;
             for (std::size_t i = 0; i < faces.size(); ++i) {
               const double height = faces[i].normal.dot(p) - faces[i].offset_mm;

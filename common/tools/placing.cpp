@@ -10,7 +10,7 @@ template <class... F>
 struct Overloaded : F... {
   using F::operator()...;
 };
-// Deduced without it too, but not by clang before 17.
+// Clang before 17 does not deduce it otherwise.
 template <class... F>
 Overloaded(F...) -> Overloaded<F...>;
 

@@ -1,5 +1,5 @@
-// Ways for an item to come to stand that the bone decides: set down on its surface, turned along its thread, driven
-// home.
+// Ways to place an item for which the bone determines the pose: set down on the surface, turned along its thread, or
+// driven home.
 #pragma once
 #include <optional>
 #include <variant>
@@ -9,31 +9,31 @@
 
 namespace osteon {
 
-// By place_on_bone().
+// For place_on_bone().
 struct OntoBone {
   Vec3 near_mm;
   std::optional<Vec3> axis;
   Vec3 across = Vec3::UnitX();
 };
-// By turn_screw(): a screw that stands, in (positive) or out.
+// For turn_screw(): a standing screw, in (positive) or out.
 struct ByThread {
   double turns = 0;
 };
-// By drive_home(): a trial implant that stands.
+// For drive_home(): a standing trial implant.
 struct DriveHome {
   double most_mm = 0;
 };
-// Nothing: where the item itself says.
+// monostate: the pose of the item itself.
 using Placing = std::variant<std::monostate, OntoBone, ByThread, DriveHome>;
 
-// The farthest that one motion goes: it bounds how long the bone is asked.
+// Largest distance of one motion. It bounds the time spent on queries of the bone.
 inline constexpr double kFarthestMotion_mm = 100.0;
 
 struct Placed {
-  SceneItem item;               // yet to be judged by set_by_rules()
-  double contact_fraction = 0;  // driven home: share of the implant's surface that lies on bone
+  SceneItem item;               // set_by_rules() must still check it
+  double contact_fraction = 0;  // driven home: share of the implant's surface in contact with bone
 };
-// `before`: the item as it stands, or null; where it moves from there, `wanted` gives no more than its tool. Errors:
+// `before`: the item as it stands, or null. If the item moves from there, only the tool of `wanted` is used. Errors:
 // invalid_input, with the remedy.
 [[nodiscard]] Result<Placed> placed(const Placing& how, const Standing* before, const Standing& wanted,
                                     const BoneQuery& bone);

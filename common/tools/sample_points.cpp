@@ -18,7 +18,7 @@ constexpr double kPi = std::numbers::pi;
 void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing,
               bool active) {
   const int count = std::max(3, static_cast<int>(std::ceil(2.0 * kPi * r / spacing)));
-  // Successive rings are turned against each other, so that no straight seam is left unsampled.
+  // Successive rings are rotated against each other, so that no straight seam stays unsampled.
   const double turn = 0.5 * static_cast<double>(points.size());
   for (int i = 0; i < count; ++i) {
     const double angle = 2.0 * kPi * (i + turn) / count;
@@ -30,7 +30,7 @@ void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inwar
 void add_frustum(std::vector<SamplePoint>& points, Corner a, Corner b, double spacing, bool active) {
   const double er = b.r - a.r, ez = b.z - a.z, length = std::hypot(er, ez);
   const int rings = std::max(1, static_cast<int>(std::ceil(length / spacing)));
-  // Corners run from the tip backwards (z falls), so turning the direction by a right angle points to the axis.
+  // Corners run from the tip backwards (z falls), so the direction rotated by a right angle points to the axis.
   const Corner inward{ez / length, -er / length};
   for (int i = 0; i < rings; ++i) {
     const double t = (i + 0.5) / rings;
@@ -44,7 +44,7 @@ void add_sphere(std::vector<SamplePoint>& points, double radius, double shank_ra
   for (int i = 0; i < rings; ++i) {
     const double polar = kPi * (i + 0.5) / rings;  // from the tip
     const double r = radius * std::sin(polar), up = radius * std::cos(polar);
-    if (up < 0.0 && r < shank_radius) continue;  // where the shank leaves the sphere
+    if (up < 0.0 && r < shank_radius) continue;  // here the shank leaves the sphere
     const double area = 2.0 * kPi * radius * radius * (std::cos(kPi * i / rings) - std::cos(kPi * (i + 1) / rings));
     add_ring(points, r, up - radius, {-std::sin(polar), -std::cos(polar)}, area, spacing, true);
   }
@@ -53,7 +53,7 @@ void add_sphere(std::vector<SamplePoint>& points, double radius, double shank_ra
 std::vector<SamplePoint> points_with_spacing(const Tool& tool, double spacing) {
   std::vector<SamplePoint> points;
   const double shank_radius = 0.5 * tool.shank_diameter_mm;
-  // Walls only block, so they are sampled more thinly than the face that cuts.
+  // Walls only block, so they are sampled less densely than the cutting face.
   const double wall_spacing = std::max(2.0 * spacing, tool.shank_diameter_mm / 3.0);
   if (tool.kind == ToolKind::drill) {
     const double radius = 0.5 * tool.diameter_mm, height = point_height_mm(tool);
@@ -76,7 +76,7 @@ std::vector<SamplePoint> points_on_rings(const Tool& tool, int count) {
   }
 }
 
-// What is bored forwards cuts with its end only: its sides run in the hole that it has made.
+// Tools that bore forwards cut only with their end, because their sides run in the hole that the end has made.
 bool cuts_forwards_only(ToolKind kind) {
   return kind == ToolKind::end_drill || kind == ToolKind::pin || kind == ToolKind::screw;
 }
@@ -93,7 +93,7 @@ std::vector<SamplePoint> sample_points(const Tool& tool, int count) {
   const TriangleMesh surface = tool_surface(tool, coarse);
   const double back_mm = -tool.cutting_length_mm, point_mm = -point_height_mm(tool);
   const auto active = [&](const Vec3& p, const Vec3& outward) {
-    // Nothing cuts with the face at its back.
+    // The back face of a tool never cuts.
     constexpr double kNear_mm = 0.01;
     if (!tool.cuts() || part(p) > solid(p) + 1e-9 || p.z() < back_mm + kNear_mm) return false;
     return !cuts_forwards_only(tool.kind) || (outward.z() > 0.1 && p.z() > point_mm - kNear_mm);
@@ -109,7 +109,7 @@ std::vector<SamplePoint> sample_points(const Tool& tool, int count) {
     point.active = true;
     active_mm2 += point.area_mm2;
   }
-  // Walls only block, so they are sampled more thinly than the face that cuts.
+  // Walls only block, so they are sampled less densely than the cutting face.
   const double spacing = std::sqrt(active_mm2 / static_cast<double>(points.size()));
   const auto passive = [&](const Vec3& p, const Vec3& outward) { return !active(p, outward); };
   const auto walls =

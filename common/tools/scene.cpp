@@ -19,7 +19,7 @@ std::string shown(const Vec3& v) {
   return text.data();
 }
 
-// Directions spread evenly over a sphere, by the golden angle.
+// Evenly spread directions on a sphere, by the golden angle.
 Vec3 direction(int i, int count) {
   const double z = 1.0 - (2.0 * i + 1.0) / count, r = std::sqrt(1.0 - z * z), angle = kPi * (3.0 - std::sqrt(5.0)) * i;
   return {r * std::cos(angle), r * std::sin(angle), z};
@@ -34,7 +34,7 @@ Vec3 gradient(const BoneQuery& bone, const Vec3& p, double step_mm) {
   return result;
 }
 
-// The crossing between a point outside and one inside.
+// The surface crossing between a point outside and one inside.
 Vec3 crossing(const BoneQuery& bone, Vec3 outside, Vec3 inside) {
   for (int i = 0; i < 40; ++i) {
     const Vec3 middle = 0.5 * (outside + inside);
@@ -58,7 +58,7 @@ Motion motion(const Pose& from, const Pose& to) {
           std::atan2(x.y(), x.x())};
 }
 
-// The part of an implant's surface that faces the way in: its end and its outside, not what is hollow.
+// The part of an implant's surface that faces the direction of insertion: its end and outside, not its hollow.
 std::vector<SamplePoint> facing_points(const Tool& implant, int count) {
   std::vector<SamplePoint> points = sample_points(implant, count);
   std::erase_if(points, [](const SamplePoint& point) {
@@ -121,7 +121,7 @@ std::optional<SurfacePlace> nearest_surface(const BoneQuery& bone, const Vec3& n
   }
   if (!found) return std::nullopt;
 
-  // The foot of the perpendicular: along the normal to the surface, then a step of the rest along the surface.
+  // The foot of the perpendicular: first along the normal to the surface, then by the remaining step along the surface.
   Vec3 at = *found;
   Vec3 outward = Vec3::UnitZ();
   for (int i = 0; i < 20; ++i) {
@@ -160,7 +160,7 @@ int pins_in(const Tool& guide, const Pose& pose_bone_guide, std::span<const Stan
     const std::size_t opening = shape.bores.size() + i;
     count += std::ranges::any_of(scene, [&](const Standing& pin) {
       if (pin.tool.kind != ToolKind::pin) return false;
-      // By the part that goes through: a head holds the guide down from outside.
+      // Only the part that goes through counts, because a head holds the guide down from outside.
       Tool body = pin.tool;
       body.shank_diameter_mm = std::min(body.shank_diameter_mm, body.diameter_mm);
       if (!fits(shape, opening, body)) return false;
@@ -181,7 +181,7 @@ Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* 
     return failure(ErrorCode::invalid_input, "an item cannot become another tool; take it out and set " + name);
   if (tool.cuts() && tool.kind != ToolKind::pin && tool.kind != ToolKind::screw && tool.kind != ToolKind::mesh)
     return failure(ErrorCode::invalid_input,
-                   name + " is a tool for the hand; guides, pins, screws and implants are left on the bone");
+                   name + " is a hand-held tool; only guides, pins, screws and implants stand on the bone");
   const Motion moved = before ? motion(before->item.pose_bone_item, item.pose_bone_item) : Motion{};
   const bool moves =
       before && (std::abs(moved.along_mm) > kAcross_mm || moved.across_mm > kAcross_mm || moved.tilt_rad > kTilt_rad ||
@@ -214,7 +214,7 @@ Driven turn_screw(const Tool& screw, const Pose& pose_bone_screw, double turns, 
   const double pitch = screw.thread_pitch_mm;
   const auto at = [&](double t) { return advanced(pose_bone_screw, pitch * t, 2.0 * kPi * t); };
   if (turns <= 0.0) return {at(turns), turns, turns == 0.0 && head_meets_bone(screw, pose_bone_screw, bone)};
-  // Steps of a twentieth of a millimetre, so that no bone is jumped over; then the place where the head meets it.
+  // Steps of 0.05 mm, so that no bone is skipped. Then the exact position at which the head meets it.
   const double step = 0.05 / std::max(0.05, pitch);
   double free = 0.0;
   if (head_meets_bone(screw, pose_bone_screw, bone)) return {pose_bone_screw, 0.0, true};

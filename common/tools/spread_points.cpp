@@ -14,9 +14,9 @@ namespace {
 
 constexpr int kCandidatesPerPoint = 12;
 constexpr int kMostCandidates = 200'000;
-// So far from an edge that this much deeper is still well inside.
+// Distance from an edge: a point this much deeper must still be clearly inside.
 constexpr double kProbe_mm = 0.05;
-// Normals that differ by more than this lie on different sides of something thin.
+// Normals that differ by more than this are on different sides of something thin.
 constexpr double kOtherSide = -0.3;
 
 struct Candidate {
@@ -24,7 +24,7 @@ struct Candidate {
   bool on_edge;
 };
 
-// Moves a point of the mesh onto the solid; nothing where that does not settle, as beside a sharp inner corner.
+// Moves a point of the mesh onto the solid. Nothing if that does not converge, as beside a sharp inner corner.
 std::optional<Candidate> settled(const Implicit& solid, Vec3 p) {
   Vec3 outward = gradient(solid, p);
   double off = solid(p);
@@ -39,7 +39,7 @@ std::optional<Candidate> settled(const Implicit& solid, Vec3 p) {
   return Candidate{p, outward, on_edge};
 }
 
-// Kept points by cells as wide as the radius: what is near lies in the 27 around.
+// Kept points in cells as wide as the radius. Near points are in the 27 cells around.
 class Neighbours {
  public:
   Neighbours(const std::vector<Candidate>& all, double cell_mm) : all_(all), cell_(cell_mm) {}
@@ -86,7 +86,7 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
                                        const Spread& spread) {
   struct Piece {
     Vec3 a, ab, ac;
-    double until_mm2;  // area of this piece and all before it
+    double until_mm2;  // area of this triangle and all before it
   };
   std::vector<Piece> pieces;
   double area = 0.0;
@@ -100,7 +100,7 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
   }
   if (pieces.empty()) return {};
 
-  // Of equal circles in the densest packing, each owns sqrt(3)/2 of its spacing squared.
+  // In the densest packing of equal circles, each covers sqrt(3)/2 of its spacing squared.
   const double wanted = spread.count > 0
                             ? spread.count
                             : std::max(1.0, area / (0.5 * std::sqrt(3.0) * spread.spacing_mm * spread.spacing_mm));
@@ -122,7 +122,7 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
   }
   if (candidates.empty()) return {};
 
-  // In an order without rhyme over the surface, the same everywhere: a multiplicative generator's shuffle.
+  // A shuffled order over the surface, the same everywhere, by a multiplicative generator.
   std::vector<std::uint32_t> order(candidates.size());
   std::iota(order.begin(), order.end(), 0u);
   std::uint64_t state = 0x9e3779b97f4a7c15u;
@@ -137,7 +137,7 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
     radius *= 0.97;
     kept = kept_at(candidates, order, radius);
   }
-  if (kept.empty()) kept.push_back(order.front());  // all on edges: one is better than none
+  if (kept.empty()) kept.push_back(order.front());  // all are on edges, and one point is better than none
 
   std::vector<SamplePoint> points;
   for (const std::uint32_t index : kept)
@@ -147,7 +147,7 @@ std::vector<SamplePoint> spread_points(const Implicit& solid, const TriangleMesh
     double nearest = std::numeric_limits<double>::infinity();
     SamplePoint* owner = nullptr;
     for (SamplePoint& point : points) {
-      // A point on the other side does not stand for this one while there is another.
+      // A point on the other side does not represent this one while there is another.
       const bool other_side = -point.inward.dot(candidate.outward) <= kOtherSide;
       const double distance = (point.position_mm - candidate.point).squaredNorm() + (other_side ? 1e6 : 0.0);
       if (distance < nearest) {

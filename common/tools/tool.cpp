@@ -12,7 +12,7 @@ std::int32_t quanta(double mm) { return static_cast<std::int32_t>(std::lround(mm
 
 double tip_height_mm(const Tool& tool) { return 0.5 * tool.diameter_mm / std::tan(0.5 * tool.point_angle_rad); }
 
-// A solid of revolution's outline point: distance from the axis and place along it.
+// A point of a solid of revolution's outline: distance from the axis and position along it.
 struct Outline {
   double r, z;
 };
@@ -40,8 +40,8 @@ double cylinder_distance(double radius, double top, double bottom, Outline p) {
   return std::hypot(dr, dz);
 }
 
-// Rounds a unit normal, and the face so that it goes through the same middle: far from the tip the step of a normal is
-// more than one of an offset.
+// Rounds a unit normal, and moves the face so that it passes through the same middle. Far from the tip, one step of the
+// normal has more effect than one step of the offset.
 HullPlane rounded(const HalfSpace& face, const std::vector<Vec3>& polygon) {
   HullPlane plane;
   Vec3 normal;
@@ -60,14 +60,14 @@ void make_hull(CutBody& body, const std::vector<HalfSpace>& faces) {
   const auto polygons = face_polygons(faces);
   for (std::size_t i = 0; i < faces.size(); ++i)
     if (!polygons[i].empty()) body.planes.push_back(rounded(faces[i], polygons[i]));
-  // The box of what the rounded planes enclose.
+  // The box of the solid that the rounded planes enclose.
   std::vector<HalfSpace> planes;
   for (const HullPlane& plane : body.planes) {
     const Vec3 normal = Vec3(plane.normal[0], plane.normal[1], plane.normal[2]).normalized();
     planes.push_back({normal, plane.offset * kQuantum_mm});
   }
   const Box box = box_of(face_polygons(planes));
-  constexpr double kRounding = 1e-6;  // of the corners' own arithmetic
+  constexpr double kRounding = 1e-6;  // rounding of the corners' own arithmetic
   for (int k = 0; k < 3; ++k) {
     body.lowest[static_cast<std::size_t>(k)] =
         static_cast<std::int32_t>(std::floor(box.min_mm[k] / kQuantum_mm + kRounding));
@@ -145,7 +145,7 @@ Digest Tool::hash() const {
       hasher.integer(static_cast<std::uint32_t>(value));
     for (const std::int16_t value : mesh->values) hasher.integer(static_cast<std::uint16_t>(value));
   }
-  // Only where it is given: definitions from before there was a choice keep their hash, and so their rooms.
+  // Hashed only if given. So older definitions, without a law, keep their hash and their rooms stay valid.
   if (!law.empty()) hasher.text(law);
   return hasher.finish();
 }
@@ -162,7 +162,7 @@ Box world_bounds(const Tool& tool, const Pose& pose_bone_tool) {
 Vec3 normal(const Tool& tool, const Vec3& point_tool_mm) { return gradient(tool_solid(tool), point_tool_mm); }
 
 double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm) {
-  // The two that a hand holds most are asked often: without a solid made first.
+  // The two most used tools are evaluated often, so they need no solid.
   if (tool.kind != ToolKind::drill && tool.kind != ToolKind::round_burr) return tool_solid(tool)(point_tool_mm);
   const Outline p{std::hypot(point_tool_mm.x(), point_tool_mm.y()), point_tool_mm.z()};
   const double shank = cylinder_distance(0.5 * tool.shank_diameter_mm, shank_start_mm(tool), -tool.reach_mm(), p);

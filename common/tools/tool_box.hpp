@@ -1,4 +1,5 @@
-// The tools that a room knows, by the hash of their definition. It only grows, so what find() gave stays valid.
+// The tools that a room knows, by the hash of their definition. Tools are never removed, so results of find() stay
+// valid.
 #pragma once
 #include <map>
 #include <memory>
@@ -15,22 +16,22 @@ class ToolBox {
   struct Entry {
     Digest hash;
     Tool tool;
-    CutBody body;  // tool.cut_body(), made once
+    CutBody body;  // tool.cut_body(), computed once
   };
 
-  // The entry of this definition, new or already there.
+  // Returns the entry of this definition, new or existing.
   const Entry& add(const Tool& tool);
   [[nodiscard]] const Entry* find(const Digest& hash) const;  // null when unknown
-  // The tool of this name. Errors: not_found (names those that there are), invalid_input (two bear it).
+  // The tool with this name. Errors: not_found (lists the existing names), invalid_input (two tools have this name).
   [[nodiscard]] Result<Tool> find(std::string_view name) const;
-  [[nodiscard]] std::vector<const Entry*> entries() const;  // in the order of their hashes
+  [[nodiscard]] std::vector<const Entry*> entries() const;  // sorted by hash
 
  private:
   mutable std::mutex mutex_;
   std::map<Digest, std::unique_ptr<const Entry>> entries_;
 };
 
-// A box with all builtin tools. Owners: every holder of a bone, in one process the same box.
+// A box with all builtin tools. Owners: every holder of a bone; in one process they share the box.
 [[nodiscard]] std::shared_ptr<ToolBox> builtin_tool_box();
 
 }  // namespace osteon

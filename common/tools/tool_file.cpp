@@ -19,9 +19,9 @@ namespace osteon {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-constexpr std::uintmax_t kLargestFile = 512u << 20;  // bytes, a mesh's samples included
+constexpr std::uintmax_t kLargestFile = 512u << 20;  // bytes, including a mesh's samples
 
-// Thrown by the reading below, caught in parse_tool().
+// Thrown while reading, caught in parse_tool().
 struct Fault {
   std::string what;
 };
@@ -56,7 +56,8 @@ std::int64_t whole(const YAML::Node& node, const std::string& field, std::int64_
   return static_cast<std::int64_t>(value);
 }
 
-// An angle in degrees that reads back as exactly this one, or nothing: not every number of radians has one.
+// The angle in degrees that reads back as exactly this one. Nothing if there is none, because not every number of
+// radians has one.
 std::optional<double> exact_degrees(double rad) {
   const double about = rad / kDegree;
   std::array<char, 32> text{};
@@ -77,7 +78,7 @@ std::optional<double> exact_degrees(double rad) {
   return std::nullopt;
 }
 
-// "point_angle_rad" is "point_angle_deg" in a file.
+// A field "point_angle_rad" is "point_angle_deg" in a file.
 std::string in_degrees(std::string_view field) { return std::string(field.substr(0, field.size() - 3)) + "deg"; }
 
 std::shared_ptr<const SampledDistance> read_samples(const YAML::Node& node) {
@@ -272,7 +273,7 @@ Result<Tool> edited(const Tool& tool, std::string_view field, double value) {
                                                  (names.empty() ? "nothing of it can" : "choose one of " + names));
   }
   Tool changed = tool;
-  // Before it becomes a whole number of teeth, which not every value can.
+  // Checked before the conversion to a whole number of teeth, which not every value allows.
   if (const auto fault = value_fault(*rule, value)) return failure(ErrorCode::invalid_input, tool.name + ": " + *fault);
   set_field(changed, *rule, value);
   derive_fields(changed);

@@ -12,7 +12,7 @@ namespace osteon {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
-// Below this a wall or an end is not made, mm.
+// A wall or an end cannot be thinner than this, mm.
 constexpr double kThinnest_mm = 0.2;
 
 constexpr std::array<KindName, 19> kKinds{{
@@ -67,7 +67,7 @@ void add_drive(std::vector<FieldRule>& rules, double slowest, double fastest, in
 }
 
 std::string written(double value) {
-  // What is written in degrees must not show the rounding of radians.
+  // A value in degrees must not show the rounding of radians.
   std::array<char, 32> text{};
   const auto end = std::to_chars(text.data(), text.data() + text.size(), value, std::chars_format::general, 6).ptr;
   return {text.data(), end};
@@ -84,7 +84,7 @@ bool good_name(const std::string& name) {
              name, [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '-' || c == '.'; });
 }
 
-// UTF-8 without control characters: anything else could be neither written to a tool file nor sent.
+// UTF-8 without control characters. Other text can be neither written to a tool file nor sent.
 bool is_plain_text(std::string_view text) {
   while (!text.empty()) {
     const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
@@ -108,7 +108,7 @@ std::string at_most(const char* field, double value, const std::string& what, do
          " mm; make it narrower";
 }
 
-// How the fields fit together, each of them within its own limits.
+// Checks how the fields fit together. Each field is already within its own limits.
 std::optional<std::string> fit_fault(const Tool& t) {
   const double radius = 0.5 * t.diameter_mm, shank = 0.5 * t.shank_diameter_mm;
   switch (t.kind) {
@@ -193,7 +193,7 @@ std::optional<std::string> fit_fault(const Tool& t) {
       break;
     case ToolKind::distal_block:
     case ToolKind::four_in_one_block: {
-      // Pin holes lie in the ends; what is between them is for the slots.
+      // Pin holes are in the ends. The space between them is for the slots.
       if (t.width_mm < 8.0 * t.diameter_mm)
         return "\"diameter_mm\" is " + written(t.diameter_mm) +
                ", too wide for pin holes beside the slots; make it at most an eighth of width_mm";
@@ -351,7 +351,7 @@ double get_field(const Tool& tool, const FieldRule& rule) {
 }
 
 void set_field(Tool& tool, const FieldRule& rule, double value) {
-  // What does not fit into a count is found as a fault of its value: it becomes one below every limit.
+  // A value that does not fit into a count becomes -1, which is below every limit, so it is reported as a fault.
   if (rule.count != nullptr)
     tool.*rule.count = value == std::floor(value) && std::abs(value) < 1e6 ? static_cast<int>(value) : -1;
   else
@@ -363,7 +363,7 @@ void derive_fields(Tool& tool) {
   if (tool.kind == ToolKind::sphere_reamer || tool.kind == ToolKind::trial_cup)
     tool.cutting_length_mm = 0.5 * tool.diameter_mm;
   if (tool.kind == ToolKind::mesh && tool.mesh) {
-    // The lattice holds the solid: its size is a bound of the solid's.
+    // The lattice contains the solid, so its size is a bound of the solid's size.
     const CoordBox& box = tool.mesh->box;
     const double pitch_mm = tool.mesh->pitch * kQuantum_mm;
     tool.diameter_mm =

@@ -1,5 +1,5 @@
-// What the definition of each kind of tool may say: its fields, their limits, and how they must fit together. One table
-// for files, for edits and for what comes over the wire.
+// What the definition of each kind of tool may contain: its fields, their limits, and how they must fit together. One
+// table serves files, edits and messages from the network.
 #pragma once
 #include <optional>
 #include <span>
@@ -21,7 +21,7 @@ struct FieldRule {
   std::string_view name;  // of the member of Tool
   double Tool::*number = nullptr;
   int Tool::*count = nullptr;      // instead of `number`
-  double lowest = 0, highest = 0;  // both allowed
+  double lowest = 0, highest = 0;  // both inclusive
   bool required = true;
   bool editable = false;
   [[nodiscard]] bool whole() const { return count != nullptr; }
@@ -31,12 +31,12 @@ struct FieldRule {
 
 [[nodiscard]] double get_field(const Tool& tool, const FieldRule& rule);
 void set_field(Tool& tool, const FieldRule& rule, double value);
-// Sets the lengths that follow from others: a round bur's, a sphere reamer's, a trial cup's cutting length.
+// Sets the lengths that follow from others: the cutting length of a round bur, a sphere reamer or a trial cup.
 void derive_fields(Tool& tool);
 
-// "from 0.5 to 20"; angles in degrees.
+// "from 0.5 to 20". Angles in degrees.
 [[nodiscard]] std::string limits_sentence(const FieldRule& rule);
-// What is wrong, as a sentence with the field and the remedy; nothing for a good one.
+// The fault, as a sentence with the field and the remedy. Nothing if there is none.
 [[nodiscard]] std::optional<std::string> value_fault(const FieldRule& rule, double value);
 [[nodiscard]] std::optional<std::string> tool_fault(const Tool& tool);
 

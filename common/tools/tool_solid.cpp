@@ -12,10 +12,10 @@ namespace osteon {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-// Arcs become chords: with these numbers no builtin tool is more than 0.01 mm off its arc (0.02 mm for what is cut at
-// a case's own pitch), well below what its level can show.
+// Arcs become chords. With these numbers no builtin tool differs from its arc by more than 0.01 mm (0.02 mm for tools
+// that cut at the case's own pitch). This is well below the resolution of the tool's level.
 constexpr int kBarrelChords = 8, kEndChords = 7, kEdgeChords = 6, kTipChords = 15;
-// Openings are taken out this far beyond their ends, so that no skin is left there.
+// Openings are extended this far beyond their ends, so that no skin is left there.
 constexpr double kOver_mm = 1.0;
 
 double in_quanta(double mm) { return static_cast<double>(std::lround(mm / kQuantum_mm)) * kQuantum_mm; }
@@ -25,7 +25,7 @@ bool bores(const Tool& tool) {
          tool.kind == ToolKind::screw;
 }
 
-// What of a drill, pin or screw goes into bone: the thread of a screw runs round its core.
+// The radius of the part of a drill, pin or screw that goes into bone. A screw's thread runs around its core.
 double bore_radius_mm(const Tool& tool) {
   return 0.5 * (tool.kind == ToolKind::screw ? tool.core_diameter_mm : tool.diameter_mm);
 }
@@ -42,7 +42,7 @@ std::vector<Corner> barrel_outline(const Tool& tool) {
   std::vector<Corner> corners{{0, 0}, {0, -2.0 * half}};
   for (int i = 0; i <= kBarrelChords; ++i) {
     const double a = angle * (2.0 * i / kBarrelChords - 1.0);
-    // The ends exactly at the ends, whatever the rounding of sine and arc sine.
+    // The ends are exact, whatever the rounding of sine and arc sine.
     const double z = i == 0 ? -2.0 * half : i == kBarrelChords ? 0.0 : bulge * std::sin(a) - half;
     corners.push_back({radius - bulge * (1.0 - std::cos(a)), z});
   }
@@ -70,7 +70,7 @@ std::vector<Corner> canal_reamer_outline(const Tool& tool) {
   return corners;
 }
 
-// The toothed end of an oscillating blade at all angles up to half a `swing` to either side: its tooth line is an arc
+// The toothed end of an oscillating blade at all angles up to half a `swing` to either side. Its tooth line is an arc
 // about the pivot, and a side reaches farthest out at the end of the stroke.
 std::vector<HalfSpace> swung_blade(const Tool& tool, double swing_rad, double thickness_mm) {
   const double pivot = tool.pivot_mm, half_width = 0.5 * tool.width_mm, half_swing = 0.5 * swing_rad;
@@ -100,7 +100,7 @@ std::vector<HalfSpace> straight_blade(const Tool& tool, double stroke_mm, double
   return faces;
 }
 
-// Width and thickness are those of the upper end; the sides taper to the tip, their edges are bevelled.
+// Width and thickness are those of the upper end. The sides taper to the tip, and their edges are bevelled.
 std::vector<HalfSpace> tapered_stem(const Tool& tool) {
   const double slope = std::tan(tool.taper_rad), length = tool.cutting_length_mm;
   const double half_x = 0.5 * tool.width_mm - length * slope, half_y = 0.5 * tool.thickness_mm - length * slope;
@@ -121,8 +121,9 @@ std::vector<HalfSpace> tapered_stem(const Tool& tool) {
 
 double kerf_mm(const Tool& tool) { return tool.thickness_mm + tool.set_mm; }
 
-// A ridge of triangular section that winds round the core, from the tip to the head. Seen along a meridian it is a comb
-// of triangles; going round the axis shifts it by one pitch a turn, so its distance is divided by how much that adds.
+// A ridge of triangular section that winds around the core, from the tip to the head. In a meridian plane it is a comb
+// of triangles. Around the axis it shifts by one pitch per turn, so its distance is divided by the factor that this
+// adds.
 Implicit thread(const Tool& tool) {
   const double core = 0.5 * tool.core_diameter_mm, crest = 0.5 * tool.diameter_mm, pitch = tool.thread_pitch_mm;
   const double root = 0.9 * core, depth = crest - root, half_foot = 0.4 * pitch;
@@ -133,7 +134,7 @@ Implicit thread(const Tool& tool) {
     const double r = std::hypot(p.x(), p.y());
     const double turn = p.z() / pitch - std::atan2(p.y(), p.x()) / (2.0 * kPi);
     const double u = std::abs(turn - std::round(turn)) * pitch;
-    // Flank from the foot (half_foot, root) to the crest (0, crest); below the root there is only the core.
+    // The flank from the foot (half_foot, root) to the crest (0, crest). Below the root there is only the core.
     const double flank = (u * depth + (r - crest) * half_foot) / slant;
     return std::max({slower * flank, root - r, within(p)});
   };
@@ -153,7 +154,7 @@ Implicit without_openings(const Tool& guide, Implicit body) {
     Eigen::Matrix3d axes;
     axes << slot.normal.cross(slot.direction), slot.normal, slot.direction;
     const Vec3 half(0.5 * slot.width_mm, 0.5 * slot.height_mm, 0.0);
-    // A slanted slot goes on beyond both faces by as much as it is high, so that it opens whole.
+    // A slanted slot extends beyond both faces by its height, so that it opens completely.
     const double over = kOver_mm + 2.0 * slot.height_mm;
     Vec3 low = -half, high = half;
     low.z() = -over;
@@ -166,7 +167,7 @@ Implicit without_openings(const Tool& guide, Implicit body) {
 Implicit sampled_solid(std::shared_ptr<const SampledDistance> mesh) {
   const double pitch = mesh->pitch * kQuantum_mm;
   const Box box{position_mm(mesh->box.min, pitch), position_mm(mesh->box.max, pitch)};
-  // Inside the lattice trilinear; outside the distance to the lattice is added to the value at its edge.
+  // Trilinear inside the lattice. Outside, the distance to the lattice is added to the value at its edge.
   const auto distance = [mesh, pitch, box](const Vec3& p) {
     const Vec3 nearest = p.cwiseMax(box.min_mm).cwiseMin(box.max_mm);
     const Coord dims = mesh->box.dims();
@@ -232,7 +233,7 @@ CutOutline cut_outline(const Tool& tool) {
   CutOutline outline;
   outline.kind = CutKind::turned;
   if (bores(tool)) {
-    // Only the lips and a land of one radius behind them cut: the rest runs in the hole that these have made.
+    // Only the lips and a land of one radius behind them cut. The rest runs in the hole that these have made.
     const double radius = bore_radius_mm(tool), height = point_height_mm(tool);
     outline.profile = pointed(radius, height, std::min(tool.cutting_length_mm, in_quanta(height) + in_quanta(radius)));
     return outline;
@@ -326,12 +327,12 @@ Implicit tool_solid(const Tool& tool) {
   switch (tool.kind) {
     case ToolKind::oscillating_saw:
     case ToolKind::reciprocating_saw: {
-      // The plate behind the teeth, thinner by their set: it runs free in the kerf.
+      // The plate behind the teeth is thinner by their set, so it runs free in the kerf.
       const double x = 0.5 * tool.width_mm, y = 0.5 * tool.thickness_mm;
       return unite(std::move(part), cuboid({Vec3(-x, -y, -tool.reach_mm()), Vec3(x, y, -tool.cutting_length_mm)}));
     }
     case ToolKind::outside_reamer: {
-      // The cup that carries the ring is closed by a plate, and the shank stands on it.
+      // A plate closes the cup that carries the ring, and the shank stands on the plate.
       const double length = tool.cutting_length_mm;
       Implicit plate = cylinder(0.5 * tool.diameter_mm, -length - tool.thickness_mm, -length);
       return unite(unite(std::move(part), std::move(plate)), shank(tool));

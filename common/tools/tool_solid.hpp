@@ -1,19 +1,19 @@
-// Each tool's solid as implicit functions and their union, intersection and difference (Niu 2008, §6.1).
+// Each tool's solid as implicit functions, combined by union, intersection and difference (Niu 2008, §6.1).
 #pragma once
 #include "common/tools/implicit.hpp"
 #include "common/tools/tool.hpp"
 
 namespace osteon {
 
-// The cutting part at rest: bur, flutes, toothed end of a blade. The whole body of a tool that does not cut.
+// The cutting part at rest: bur, flutes, toothed end of a blade. For a tool that does not cut, the whole body.
 [[nodiscard]] Implicit cutting_part(const Tool& tool);
-// Cutting part and shank: what one can touch. The same as signed_distance_mm(), made once for many points.
+// Cutting part and shank: everything that can be touched. Equal to signed_distance_mm(), but made once for many points.
 [[nodiscard]] Implicit tool_solid(const Tool& tool);
-// What a cut takes away at one pose, and what Tool::cut_body() holds in whole numbers: a drill's lips with the land
-// behind them (deploy/decisions/0005), the envelope of a saw's stroke. Only of tools that cut.
+// What a cut removes at one pose, which Tool::cut_body() holds in whole numbers: a drill's lips with the land behind
+// them (deploy/decisions/0005), the envelope of a saw's stroke. Only for tools that cut.
 [[nodiscard]] Implicit cut_solid(const Tool& tool);
 
-// The same as outlines, mm; empty where the cutting body is of another kind.
+// The same as outlines, mm. Empty if the cutting body is of another kind.
 struct CutOutline {
   CutKind kind = CutKind::none;
   double radius_mm = 0;           // ball
@@ -23,13 +23,14 @@ struct CutOutline {
 };
 [[nodiscard]] CutOutline cut_outline(const Tool& tool);
 
-// Height of a conical point: of a drill, a pin, a screw's core.
+// Height of a conical point: of a drill, a pin or a screw's core.
 [[nodiscard]] double point_height_mm(const Tool& tool);
-// Where the shank begins: behind the cutting part, or inside a round bur's ball, where that is as thin as the shank.
+// Where the shank begins: behind the cutting part, or inside the ball of a round bur, where the ball is as thin as the
+// shank.
 [[nodiscard]] double shank_start_mm(const Tool& tool);
-// The radius that a contoured bur's end must have for its taper to end at its diameter and length.
+// The radius of a contoured bur's end for which its taper ends at its diameter and length.
 [[nodiscard]] double end_radius_mm(const Tool& contoured_burr);
-// How far the ends of an oscillating saw's tooth line lie behind its middle, at the ends of the stroke.
+// How far the ends of an oscillating saw's tooth line are behind its middle, at the ends of the stroke.
 [[nodiscard]] double tooth_line_drop_mm(const Tool& oscillating_saw);
 
 }  // namespace osteon

@@ -15,17 +15,17 @@
 namespace osteon {
 namespace {
 
-// Where parts touch face to face the distance is zero inside; so near it still counts as inside.
+// Where parts touch face to face, the distance is zero inside. Points this near still count as inside.
 constexpr double kInside_mm = 1e-7;
-// An edge or corner whose planes differ by less than this share is taken as smooth (relative eigenvalue).
+// An edge or corner whose planes differ by less than this fraction counts as smooth (relative eigenvalue).
 constexpr double kFlat = 0.02;
 
-// Corner values of the cells near the surface, found by halving a box: with a 1-Lipschitz distance whole boxes whose
-// middle is farther than half their diagonal are left out.
+// Corner values of the cells near the surface, found by bisecting a box. With a 1-Lipschitz distance, a box is skipped
+// if the distance at its middle exceeds half its diagonal.
 class Grid {
  public:
   Grid(const Implicit& solid, double cell_mm) : solid_(solid), cell_(cell_mm) {
-    // Off the origin by an irrational share: faces of a tool then do not lie in the grid's planes.
+    // Shifted from the origin by an irrational fraction, so that faces of a tool do not lie in the grid's planes.
     origin_ = solid.bounds.min_mm - Vec3(1.317, 1.271, 1.413) * cell_mm;
     const Vec3 size = solid.bounds.max_mm - origin_;
     int largest = 1;
@@ -47,12 +47,12 @@ class Grid {
   bool inside(Coord c) { return value(c) < 0.0; }
   [[nodiscard]] double cell_mm() const { return cell_; }
 
-  // Where the surface crosses the edge between two corners.
+  // The crossing of the surface with the edge between two corners.
   Vec3 crossing(Coord a, Coord b) {
     Vec3 pa = place(a), pb = place(b);
     double fa = value(a), fb = value(b);
     for (int i = 0; i < 40 && (pb - pa).norm() > 1e-7 * cell_; ++i) {
-      // Secant and bisection in turn: one is fast, the other sure.
+      // Secant and bisection alternate: one is fast, the other reliable.
       const double t = i % 2 == 0 ? std::clamp(fa / (fa - fb), 0.02, 0.98) : 0.5;
       const Vec3 p = pa + t * (pb - pa);
       const double f = solid_(p) - kInside_mm;
@@ -91,8 +91,8 @@ class Grid {
 
 constexpr std::array<Coord, 3> kSteps{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 
-// The point nearest to all planes through the crossings, from their middle on: along directions in which the planes
-// say nothing it stays there.
+// The point nearest to all planes through the crossings, starting from their middle. It does not move along directions
+// that the planes do not determine.
 Vec3 feature(const std::vector<Vec3>& points, const std::vector<Vec3>& normals) {
   Vec3 middle = Vec3::Zero();
   for (const Vec3& p : points) middle += p / static_cast<double>(points.size());
@@ -146,16 +146,16 @@ TriangleMesh surface_of(const Implicit& solid, double cell_mm) {
       }
     }
     if (points.empty()) continue;
-    // Out of its cell a vertex could fold the surface over.
+    // A vertex outside its cell could fold the surface over.
     const Vec3 low = grid.place(cell), high = grid.place(cell + Coord{1, 1, 1});
     Vec3 p = feature(points, normals).cwiseMax(low).cwiseMin(high);
-    // On a curved face the planes meet beside the surface: once more onto it.
+    // On a curved face the planes meet beside the surface, so the point is projected onto it again.
     if (const double off = solid(p); std::abs(off) > 1e-4 * cell_mm)
       p = (p - off * gradient(solid, p)).cwiseMax(low).cwiseMin(high);
     vertex_of.emplace(cell, static_cast<std::uint32_t>(mesh.positions_mm.size()));
     mesh.positions_mm.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
   }
-  // Each crossed edge joins the vertices of its four cells. In the order of the cells, so that files are equal.
+  // Each crossed edge joins the vertices of its four cells, in the order of the cells, so that files are reproducible.
   for (const Coord& cell : grid.cells())
     for (std::size_t k = 0; k < 3; ++k) {
       if (!crossings[k].contains(cell)) continue;

@@ -1,4 +1,4 @@
-// The surface of an implicit solid as triangles: to draw a tool, to write it as STL, to spread points on it.
+// The surface of an implicit solid as triangles: to draw a tool, to write it as STL, and to spread points on it.
 #pragma once
 #include "common/geometry/triangle_mesh.hpp"
 #include "common/tools/implicit.hpp"
@@ -6,14 +6,14 @@
 
 namespace osteon {
 
-// Dual contouring on cells of `cell_mm`: closed and turned outwards, one vertex in each cell that the surface crosses,
-// on its sharp edges and corners too. What is thinner than a cell may be lost.
+// Dual contouring on cells of `cell_mm`. The result is closed and oriented outwards. It has one vertex in each cell
+// that the surface crosses, also on sharp edges and corners. Parts thinner than a cell may be lost.
 // T. Ju, F. Losasso, S. Schaefer, J. Warren: Dual contouring of Hermite data. SIGGRAPH 2002.
 [[nodiscard]] TriangleMesh surface_of(const Implicit& solid, double cell_mm);
 
-// Of any tool, cutting part and shank; cells of `resolution_mm`, or smaller where the tool is thin.
+// The surface of any tool, cutting part and shank. Cells of `resolution_mm`, or smaller if the tool is thin.
 [[nodiscard]] TriangleMesh tool_surface(const Tool& tool, double resolution_mm);
-// The largest cell that loses nothing of this tool: half of its thinnest wall, plate or thread.
+// The largest cell that loses no part of this tool: half of its thinnest wall, plate or thread.
 [[nodiscard]] double thinnest_cell_mm(const Tool& tool);
 
 }  // namespace osteon

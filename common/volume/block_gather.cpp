@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kSide = kBlockSide;
 
-// Loops of constant length, so that a compiler makes a few vector instructions of each.
+// Loops of constant length, so that a compiler turns each into a few vector instructions.
 template <std::size_t kCount, class Each>
 inline void times(Each each) {
   for (std::size_t i = 0; i < kCount; ++i) each(i);
@@ -22,7 +22,8 @@ float cut(float s, float r, float uncut) {
   return s < other ? other : s;
 }
 
-// The same for several samples at once. Written out, as a compiler does not know that rows lie apart or are the same.
+// The same for several samples at once. Written out, because a compiler does not know that rows of samples are separate
+// or identical.
 using Four = float __attribute__((vector_size(16)));
 using Two = float __attribute__((vector_size(8)));
 template <class Lanes>
@@ -34,8 +35,8 @@ inline void cut_lanes(const float* from, const float* cuts, float uncut, float* 
   std::memcpy(to, &made, sizeof made);
 }
 
-// visit(first sample of the row, pointers to it in the four leaves along z) for each row. A leaf of one value is a row
-// of it that is read again and again.
+// Calls visit(first sample, pointers to it in the four leaves along z) for each row of samples. A leaf of one value is
+// a row of that value, read repeatedly.
 template <class Visit>
 void for_rows(std::span<const LeafView, kBlockLeaves> leaves, Visit visit) {
   std::array<std::array<float, kLeafSize>, kBlockLeaves> constants;
@@ -64,7 +65,7 @@ void interpolate(const float* coarse, float* out) {
   constexpr std::size_t kFine = std::size_t{1} << kShift, kMask = kFine - 1;
   constexpr auto kCoarse = static_cast<std::size_t>(coarse_side(kShift));
   constexpr float kStep = 1.0f / static_cast<float>(kFine);
-  // Rows along z are kept with the samples before the block's first that their first coarse cell has.
+  // Rows of samples along z include the samples before the block's first one that its first coarse cell has.
   constexpr std::size_t kWide = (kCoarse - 1) * kFine, kPlane = kSide * kWide;
   static_assert(kWide % 4 == 0 && kWide >= kSide + kMask);
   alignas(64) std::array<float, kCoarse * kCoarse * kWide> lines;

@@ -1,4 +1,4 @@
-// Gathering for one mesh block: 19³ samples out of the 4³ leaves that they meet, by loops of constant length.
+// Gathers the samples of one mesh block: 19³ samples from the 4³ leaves that they meet, by loops of constant length.
 #pragma once
 #include <cstddef>
 #include <span>
@@ -17,19 +17,19 @@ inline constexpr std::size_t kBlockLeaves = 4 * 4 * 4;
          (box.min.z & last) == last;
 }
 
-// A leaf as a reader sees it: its samples, or null and the value that all of them have.
+// A leaf for reading: its samples, or null and the value of all samples.
 struct LeafView {
   const float* samples;
   float constant;
 };
 
-// Out of the leaves that meet the block, x slowest.
+// Copies from the leaves that meet the block, x slowest.
 void copy_block(std::span<const LeafView, kBlockLeaves> leaves, std::span<float, kBlockVolume> out);
-// to = max(from, −R), but `from` where R is at its clip `uncut`. `to` may be `from`.
+// to = max(from, −R), but `from` where R is at its clip `uncut`. `to` may be the same as `from`.
 void cut_block(std::span<const LeafView, kBlockLeaves> leaves, float uncut, std::span<const float, kBlockVolume> from,
                std::span<float, kBlockVolume> to);
-// Trilinear from a lattice 2 or 4 times (shift 1, 2) as coarse, one axis after the other: z, y, x. `coarse` begins at
-// the sample at or before the block's first, and has coarse_side() samples along an axis.
+// Trilinear interpolation from a lattice 2 or 4 times (shift 1, 2) as coarse, one axis after the other: z, y, x.
+// `coarse` begins at the sample at or before the first of the block, and has coarse_side() samples along each axis.
 [[nodiscard]] constexpr std::int32_t coarse_side(int shift) {
   return ((kBlockSide - 1 + (1 << shift) - 1) >> shift) + 2;
 }

@@ -33,8 +33,8 @@ constexpr const char* kInfoFile = "case.json";
 constexpr const char* kVolumeFile = "bone.vdb";
 constexpr std::uintmax_t kMostInfoBytes = 1 << 20;
 const std::vector<std::string> kGridNames{"surface", "density", "clearance", "bone", "tissue"};
-// A case of a temporal bone at 0.1 mm takes 0.5 GiB, and five times its file. A file that declares more than all this
-// is damaged or hostile; a file of up to 64 MiB stays below 1 GiB.
+// A case of a temporal bone at 0.1 mm takes 0.5 GiB, five times the size of its file. A file that declares more than
+// all these limits is damaged or hostile. A file of up to 64 MiB stays below 1 GiB.
 constexpr std::uint64_t kCaseMemoryBytes = std::uint64_t{768} << 20, kMemoryToFile = 12, kMostCaseLeaves = 4'000'000;
 
 VdbLimits limits_for(const std::filesystem::path& file) {
@@ -45,14 +45,14 @@ VdbLimits limits_for(const std::filesystem::path& file) {
   return {.memory_bytes = memory, .leaves = kMostCaseLeaves, .grids = 16};
 }
 
-// Above it bone counts as cortical. [A] Apparent densities of cancellous bone end near here.
+// Bone above it counts as cortical. [A] Apparent densities of cancellous bone end near here.
 constexpr float kCorticalFrom_g_cm3 = 1.0f;
-// Clearance is kept this far from the bone, in leaves; farther points read this distance.
+// Clearance is stored up to this distance from the bone, in leaves. Farther points get this distance.
 constexpr int kClearanceLeaves = 12;
 
 float to_quantum(float mm) { return std::round(mm * 1024.0f) / 1024.0f + 0.0f; }
 
-// The leaf's samples out of a part, with `outside` where the part ends.
+// The samples of a leaf from a part, with `outside` beyond the part.
 template <class T>
 void read_leaf(const CoordBox& part, const std::vector<T>& from, Coord origin, T outside,
                std::array<T, kLeafVoxels>& out) {
@@ -70,7 +70,7 @@ void read_leaf(const CoordBox& part, const std::vector<T>& from, Coord origin, T
     }
 }
 
-// One number where the leaf is all one: a bone's inside is mostly that.
+// Stores one number if all values are equal, as in most of a bone's inside.
 void store_leaf(SparseVolume& volume, Coord origin, std::span<const float, kLeafVoxels> values) {
   if (std::ranges::all_of(values, [&](float v) { return v == values[0]; })) {
     if (values[0] != volume.background()) volume.set_constant(origin, values[0]);
@@ -79,7 +79,7 @@ void store_leaf(SparseVolume& volume, Coord origin, std::span<const float, kLeaf
   }
 }
 
-// One leaf of bone from the samples of a part. False: the density is not a number.
+// Adds one leaf of bone from the samples of a part. False: the density is not a number.
 bool add_leaf(Case::Grids& grids, const CoordBox& box, const PartSamples& part, Coord origin) {
   const float band = grids.surface.background();
   std::array<float, kLeafVoxels> s, rho, tissue, bone;
@@ -95,10 +95,10 @@ bool add_leaf(Case::Grids& grids, const CoordBox& box, const PartSamples& part, 
   if (std::ranges::all_of(s, [&](float v) { return v == band; })) return true;
   if (!part.bone.empty()) read_leaf(box, part.bone, origin, std::uint8_t{0}, number);
   if (!part.tissue.empty()) read_leaf(box, part.tissue, origin, Tissue::none, known);
-  // A sample inside the surface without a number lies between the voxels of the scan: it counts as bone 1.
+  // A sample inside the surface without a number lies between the voxels of the scan. It counts as bone 1.
   for (std::size_t i = 0; i < kLeafVoxels; ++i)
     bone[i] = s[i] < 0.0f ? std::max(1.0f, static_cast<float>(number[i])) : 0.0f;
-  // A leaf of the surface that is not all inside stays one, also if its samples are equal.
+  // Only a leaf that is wholly inside becomes a constant. A surface leaf stays a leaf even if its samples are equal.
   if (std::ranges::all_of(s, [&](float v) { return v == -band; })) {
     grids.surface.set_constant(origin, -band);
     store_leaf(grids.bone, origin, bone);
@@ -150,7 +150,7 @@ Digest content_hash(const Case::Grids& grids) {
   return hasher.finish();
 }
 
-// Box and volume of the bone, which follow from the surface.
+// Computes box and volume of the bone from the surface.
 void measure(Case::Grids& grids) {
   constexpr std::int32_t kFar = std::numeric_limits<std::int32_t>::max();
   grids.bounds = {{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
@@ -168,7 +168,7 @@ void measure(Case::Grids& grids) {
   for (const Coord origin : grids.surface.leaves()) {
     include(origin);
     const float* leaf = grids.surface.leaf(origin);
-    // A sample whose distance is within half a pitch of the surface is bone in part.
+    // A sample whose distance is within half a pitch of the surface is partly bone.
     for (int i = 0; i < kLeafVoxels; ++i) samples += std::clamp(0.5 - static_cast<double>(leaf[i]) / pitch, 0.0, 1.0);
   }
   grids.volume_mm3 = samples * pitch * pitch * pitch;
@@ -182,7 +182,7 @@ bool has_inside(const Case::Grids& grids) {
   return !grids.surface.constants().empty() || std::ranges::any_of(grids.surface.leaves(), inside);
 }
 
-// Where metal and enamel are, which follows from the tissue.
+// Finds the leaves with metal and enamel from the tissue.
 void find_hard_leaves(Case::Grids& grids) {
   constexpr auto kMetal = static_cast<float>(Tissue::metal), kEnamel = static_cast<float>(Tissue::enamel);
   const auto note = [&](Coord origin, std::span<const float> leaf) {
@@ -210,8 +210,8 @@ bool meets(const std::vector<Coord>& leaves, const CoordBox& box) {
   return false;
 }
 
-// Lower envelope of parabolas along one line of squared distances: exact Euclidean distance transform, one axis at a
-// time (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, 2012).
+// Lower envelope of parabolas along one line of squared distances: the exact Euclidean distance transform, one axis at
+// a time (Felzenszwalb and Huttenlocher, Distance transforms of sampled functions, 2012).
 void distance_along_line(std::vector<double>& line) {
   const int n = static_cast<int>(line.size());
   std::vector<int> parabola(line.size());
@@ -240,7 +240,7 @@ void distance_along_line(std::vector<double>& line) {
   line = std::move(result);
 }
 
-// Distance between leaves, less one leaf's diagonal on either side, bounds the distance to the bone from below.
+// The distance between leaves, minus one leaf diagonal on either side, is a lower bound of the distance to the bone.
 SparseVolume make_clearance(const SparseVolume& surface, double pitch) {
   std::vector<Coord> occupied = surface.leaves();
   const std::vector<Coord> inside = surface.constants();
@@ -300,7 +300,7 @@ json to_json(const Case::Grids& grids) {
           {"content_hash", to_hex(grids.hash)}};
 }
 
-// A box of samples out of a volume over more; empty out of an empty one.
+// A box of samples from a larger volume. Empty if the volume is empty.
 template <class T>
 void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>& out) {
   out.clear();
@@ -404,7 +404,7 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   Digest named;
   try {
     const json j = json::parse(in);
-    const json& version = j.at("schema_version");  // compared as it is: any number may stand there
+    const json& version = j.at("schema_version");  // compared as JSON, because any number may be there
     if (version != kCaseSchemaVersion)
       return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + version.dump().substr(0, 20) +
                                                  ", but this program reads version " +
@@ -536,7 +536,7 @@ void Case::gather_hard(int level, const CoordBox& box, std::span<Tissue> out) co
           out[i++] = shown(tissue(wide * at));
           continue;
         }
-        // Of the corners of the cell that the sample is in, the nearest first.
+        // The corners of the cell that contains the sample, the nearest first.
         const Coord low = shift_down(at, level), part = at - wide * low;
         const Coord near{part.x > half, part.y > half, part.z > half};
         Tissue found = Tissue::none;

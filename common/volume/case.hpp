@@ -1,4 +1,5 @@
-// A case: the imported bone, which never changes. A folder with case.json and bone.vdb, named by its content's hash.
+// A case: the imported bone, which never changes. It is a folder with case.json and bone.vdb, named by the hash of its
+// content.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -34,49 +35,49 @@ struct CaseInfo {
   friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
 };
 
-// What an importer knows about the samples beyond their distance and density. Each volume has the box of the distance,
-// or is empty.
+// What an importer knows about the samples beside distance and density. Each volume is empty or has the box of the
+// distance.
 struct SampleLabels {
-  DenseVolume<std::uint8_t> bone;  // number of the bone, from 1; read inside the surface. Empty: all are bone 1.
+  // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
+  DenseVolume<std::uint8_t> bone;
   DenseVolume<Tissue> tissue;      // metal, enamel, or none: the density decides. Empty: it decides everywhere.
 };
 
-// What a part of a bone holds, so that a builder need not look at every sample of what is all one.
+// What a part of a bone contains, so that a builder need not read every sample of a uniform part.
 enum class PartKind {
   samples,  // distance and density are filled
-  outside,  // no sample within the band of 4 voxels round the bone: nothing is read
-  inside,   // every sample is bone and deeper than the band: the distance is not read
+  outside,  // no sample within the band of 4 voxels around the bone: nothing is read
+  inside,   // every sample is bone, deeper than the band: the distance is not read
 };
 // Samples of a part, z fastest.
 struct PartSamples {
-  std::vector<float> surface_mm;  // signed distance; beyond the band only the sign matters
+  std::vector<float> surface_mm;  // signed distance; outside the band only the sign matters
   std::vector<float> density_g_cm3;
-  std::vector<std::uint8_t> bone;  // as SampleLabels; empty unless it is filled
+  std::vector<std::uint8_t> bone;  // as SampleLabels; empty unless filled
   std::vector<Tissue> tissue;      // the same
 };
-// Fills the samples of a box. Distance and density have its size, the labels are empty. Asked once for each part,
+// Fills the samples of a box. Distance and density have its size; the labels are empty. Called once for each part,
 // always in the same order, by one thread.
 using FillPart = std::function<PartKind(const CoordBox& box, PartSamples& samples)>;
 
 // Read-only after construction, so any thread may read it at any time.
 class Case {
  public:
-  // From the signed distance to the bone surface (mm, negative inside; only the band of 4 voxels matters, beyond it
-  // the sign) and the density (g/cm³), both over the same box.
+  // Builds from the signed distance to the bone surface (mm, negative inside) and the density (g/cm³), both over the
+  // same box. The distance matters only in the band of 4 voxels; outside it, only its sign.
   [[nodiscard]] static Result<Case> build(CaseInfo info, const DenseVolume<float>& surface_mm,
                                           const DenseVolume<float>& density_g_cm3, const SampleLabels& labels = {},
                                           const KeepGoing& keep_going = {});
-  // The same from parts of at most kPartSamples³, without ever holding the whole in memory: for large bones. Leaves of
-  // one density are kept as one number. `keep_going` is asked between parts, and with a false answer the error is
-  // cancelled.
+  // The same from parts of at most kPartSamples³, for large bones: the whole is never in memory. A leaf with one
+  // density is stored as one number. `keep_going` is called between parts. If it returns false, the error is cancelled.
   static constexpr std::int32_t kPartSamples = 64;
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
   // match its hash), unsupported (schema version), exhausted (more memory than a case of its size takes).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
-  // Writes beside `folder` and renames, so no half-written case is ever seen. `keep_going` is asked before the
-  // renaming, too. Errors: exists, internal (disk), cancelled.
+  // Writes beside `folder` and renames, so that a partly written case is never visible. `keep_going` is called before
+  // the renaming, too. Errors: exists, internal (disk), cancelled.
   [[nodiscard]] Result<void> save(const std::filesystem::path& folder, const KeepGoing& keep_going = {}) const;
 
   [[nodiscard]] const CaseInfo& info() const;
@@ -89,28 +90,28 @@ class Case {
 
   // Samples of level 0, z fastest. Signed distance S clipped to ±4 h, and density.
   void gather_surface(const CoordBox& box, std::span<float> out) const;
-  // The leaves of S that meet the box, x slowest; false where all samples of them are on one side, beyond the band.
+  // The leaves of S that meet the box, x slowest. False if all their samples are on one side, outside the band.
   bool view_surface(const CoordBox& box, std::span<LeafView> leaves) const;
   void gather_density(const CoordBox& box, std::span<float> out) const;
   // Trilinear, at any point of the bone frame.
   [[nodiscard]] double surface_mm(const Vec3& point_mm) const;
   [[nodiscard]] double density_g_cm3(const Vec3& point_mm) const;
-  // A lower bound of the distance to the bone, mm, zero in and near it.
+  // A lower bound of the distance to the bone, mm. Zero in the bone and near it.
   [[nodiscard]] double clearance_mm(const Vec3& point_mm) const;
   [[nodiscard]] Tissue tissue(Coord sample) const;
-  // Origins of the leaves that hold metal, and of those that hold metal or enamel; sorted, and empty for most cases.
+  // Origins of the leaves that contain metal, and of those that contain metal or enamel. Sorted, and empty for most
+  // cases.
   [[nodiscard]] const std::vector<Coord>& metal_leaves() const;
   [[nodiscard]] const std::vector<Coord>& hard_leaves() const;
-  // On the samples of a level: metal, enamel, or none for all else, of the nearest sample of level 0 that is bone; z
-  // fastest.
+  // On the samples of a level: metal, enamel or none, as the nearest sample of level 0 that is bone. z fastest.
   void gather_hard(int level, const CoordBox& box, std::span<Tissue> out) const;
   // Number of the bone that the sample belongs to, from 1; 0: no bone.
   [[nodiscard]] int bone_number(Coord sample) const;
-  // Whether any sample of level 0 in the box is within the band of the surface; if none is, all are on one side of it.
+  // Whether any sample of level 0 in the box is within the band of the surface. If none is, all are on one side of it.
   [[nodiscard]] bool has_surface(const CoordBox& box) const;
   // Whether any sample of level 0 in the box is bone or in the band around it.
   [[nodiscard]] bool has_bone(const CoordBox& box) const;
-  // Whether any leaf of level 0 that the box meets holds metal, or metal or enamel.
+  // Whether any leaf of level 0 that the box meets contains metal, or metal or enamel.
   [[nodiscard]] bool has_metal(const CoordBox& box) const;
   [[nodiscard]] bool has_hard(const CoordBox& box) const;
 

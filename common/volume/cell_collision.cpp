@@ -12,7 +12,7 @@ std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 std::size_t count(Coord dims) { return at(dims.x) * at(dims.y) * at(dims.z); }
 
-// Where a point lies in a lattice: its cell, counted from the first, and how far in it. False outside.
+// The position of a point in a lattice: its cell, counted from the first, and the position in it. False outside.
 struct Place {
   Coord cell;
   double x, y, z;
@@ -20,7 +20,7 @@ struct Place {
 bool locate(const Vec3& point_mm, double pitch_mm, const CoordBox& samples, Coord cells, Place& place) {
   const Vec3 p = point_mm / pitch_mm - Vec3{static_cast<double>(samples.min.x), static_cast<double>(samples.min.y),
                                             static_cast<double>(samples.min.z)};
-  // Also false for what is not a number.
+  // Also false for NaN.
   if (!(p.x() >= 0.0 && p.y() >= 0.0 && p.z() >= 0.0 && p.x() < cells.x && p.y() < cells.y && p.z() < cells.z))
     return false;
   place.cell = {static_cast<std::int32_t>(p.x()), static_cast<std::int32_t>(p.y()), static_cast<std::int32_t>(p.z())};
@@ -50,7 +50,7 @@ BoneCells::BoneCells(const CutField& field, int level, const CoordBox& samples)
 }
 
 void BoneCells::update(const CutField& field, const CoordBox& changed) {
-  // A sample is a corner of the cells before it too.
+  // A sample is also a corner of the cells before it.
   const CoordBox box{{std::max(samples_.min.x, changed.min.x - 1), std::max(samples_.min.y, changed.min.y - 1),
                       std::max(samples_.min.z, changed.min.z - 1)},
                      {std::min(samples_.max.x, changed.max.x + 1), std::min(samples_.max.y, changed.max.y + 1),

@@ -1,5 +1,5 @@
-// Collision of a tool's sample points with bone, in two ways: on segmentation cells (Niu 2008, §7.2), and by
-// the distance field. The first knows of a sample only whether it is bone (1) or not (0).
+// Collision of a tool's sample points with bone, in two ways: on segmentation cells (Niu 2008, §7.2), and by the
+// distance field. Segmentation cells only know whether a sample is bone (1) or not (0).
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -11,21 +11,21 @@
 
 namespace osteon {
 
-// What decides within a cell that has both.
+// How to decide in a cell with both kinds of samples.
 enum class MixedCell : std::uint8_t {
-  nearest,    // the sample nearest to the point: wrong by up to half a cell's diagonal
-  trilinear,  // the eight, weighted by their nearness, against one half
+  nearest,    // the sample nearest to the point: wrong by up to half a cell diagonal
+  trilinear,  // all eight samples, weighted by nearness, compared with one half
 };
 
-// The segmentation of a box of samples of one level, as codes of its cells: one bit for each corner, so that a cell
-// that is all bone or all empty is told by one byte.
+// The segmentation of a box of samples of one level, as codes of its cells. A code has one bit for each corner, so one
+// byte tells whether a cell is all bone or all empty.
 class BoneCells {
  public:
   BoneCells(const CutField& field, int level, const CoordBox& samples);
-  // After cuts: those of the box that lie in `changed` again.
+  // Called after cuts. Computes the cells of the box that lie in `changed` again.
   void update(const CutField& field, const CoordBox& changed);
 
-  // Whether the point is on or in the bone; never outside the box, where no cell is.
+  // Whether the point is on or in the bone. Always false outside the box, where there are no cells.
   [[nodiscard]] bool inside(const Vec3& point_mm, MixedCell rule) const;
   [[nodiscard]] std::size_t memory_bytes() const { return codes_.size(); }
 
@@ -37,12 +37,11 @@ class BoneCells {
   std::vector<std::uint8_t> codes_;  // bit 4x + 2y + z: the sample at that corner is bone
 };
 
-// The distance field of a box of samples, trilinear between them: the same question, asked of how far instead of
-// whether.
+// The distance field of a box of samples, trilinear between them. It answers the same question by distances.
 class BoneDistance {
  public:
   BoneDistance(const CutField& field, int level, const CoordBox& samples);
-  [[nodiscard]] double distance_mm(const Vec3& point_mm) const;  // far outside the box
+  [[nodiscard]] double distance_mm(const Vec3& point_mm) const;  // outside the box: a large distance
   [[nodiscard]] bool inside(const Vec3& point_mm) const { return distance_mm(point_mm) <= 0.0; }
   [[nodiscard]] std::size_t memory_bytes() const { return values_.size() * sizeof(float); }
 
@@ -53,7 +52,7 @@ class BoneDistance {
   std::vector<float> values_;
 };
 
-// The first of a tool's points that is on or in the bone, as in Niu 2008, §7.2; none when the tool is free.
+// The first of a tool's points that is on or in the bone, as in Niu 2008, §7.2. Nothing if the tool is free.
 [[nodiscard]] std::optional<std::size_t> first_contact(const BoneCells& bone, MixedCell rule,
                                                        std::span<const SamplePoint> points, const Pose& pose_bone_tool);
 [[nodiscard]] std::optional<std::size_t> first_contact(const BoneDistance& bone, std::span<const SamplePoint> points,

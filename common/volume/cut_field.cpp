@@ -24,7 +24,7 @@ struct CutField::Grids {
 
 namespace {
 
-// The library's own synchronisation is invisible to the thread sanitizer.
+// The thread sanitizer does not see the library's own synchronisation.
 #if defined(__SANITIZE_THREAD__)
 constexpr bool kMayUseThreads = false;
 #else
@@ -41,7 +41,7 @@ CoordBox coarse_box(const CoordBox& box, int level) {
   return {shift_down(box.min, level), shift_down(box.max, level) + Coord{1, 1, 1}};
 }
 
-// Linear interpolation from a coarser lattice, one axis after the other: `fine` samples per coarse one.
+// Linear interpolation from a coarser lattice, one axis after the other: `fine` samples per coarse sample.
 void interpolate(const CoordBox& coarse, std::span<const float> from, const CoordBox& box, int shift,
                  std::span<float> out, std::vector<float>& lines) {
   const std::int32_t fine = 1 << shift, mask = fine - 1;
@@ -49,7 +49,7 @@ void interpolate(const CoordBox& coarse, std::span<const float> from, const Coor
   const Coord cd = coarse.dims(), d = box.dims();
   const auto cy = static_cast<std::size_t>(cd.y), cz = static_cast<std::size_t>(cd.z);
   const auto ny = static_cast<std::size_t>(d.y), nz = static_cast<std::size_t>(d.z);
-  // Along z on every line of the coarse lattice, then along y on two planes of it at a time.
+  // Along z on every line of the coarse lattice, then along y on two of its planes at a time.
   const std::size_t coarse_lines = static_cast<std::size_t>(cd.x) * cy, plane = ny * nz;
   lines.resize(coarse_lines * nz + 2 * plane);
   for (std::size_t line = 0; line < coarse_lines; ++line) {
@@ -92,7 +92,7 @@ void interpolate(const CoordBox& coarse, std::span<const float> from, const Coor
   }
 }
 
-// R of one level on the samples of another: interpolated where the other is finer, every nth sample where coarser.
+// R of one level on the samples of another. Interpolated if the other is finer, every nth sample if it is coarser.
 void gather_at_level(const SparseVolume& cuts, int from_level, int level, const CoordBox& box, std::span<float> out,
                      GatherScratch& scratch) {
   if (from_level >= level) {
@@ -109,7 +109,7 @@ void gather_at_level(const SparseVolume& cuts, int from_level, int level, const 
   interpolate(coarse, scratch.coarse, box, shift, out, scratch.lines);
 }
 
-// R at its clip says only that no cut is near: there the depth is that of S.
+// R at its clip only says that no cut is near. There the depth is that of S.
 void take_cut(std::span<const float> cuts, float uncut, std::span<float> out) {
   const float* cut = cuts.data();
   float* solid = out.data();
@@ -122,15 +122,15 @@ void take_cut(std::span<const float> cuts, float uncut, std::span<float> out) {
 
 std::int16_t to_quanta(float mm) { return static_cast<std::int16_t>(std::lround(mm * 1024.0f)); }
 
-// A cut is applied to every body of a room, so the one that it names does not matter here.
+// A cut is applied to every body of a room, so the body that it names does not matter here.
 SweptTool sweep(const CutField::Grids& grids, const Cut& cut) {
   const ToolBox::Entry* tool = grids.tools->find(cut.tool);
   OSTEON_CHECK(tool != nullptr && tool->body.cuts());
   return SweptTool(cut, tool->body, grids.bone.pitch_mm());
 }
 
-// Whether a leaf is kept depends on the case and its place only, never on earlier cuts: it is when any leaf of level 0
-// that it touches has bone. Neighbours touch the same few, so the last answers are remembered.
+// Whether a leaf is stored depends only on the case and the leaf's position, never on earlier cuts: it is stored if any
+// leaf of level 0 that it touches has bone. Neighbours touch the same few leaves, so the last results are cached.
 class BoneNear {
  public:
   BoneNear(const Case& bone, int level) : bone_(bone), level_(level) {}
@@ -161,8 +161,8 @@ class BoneNear {
   std::array<Answer, 64> answers_{};
 };
 
-// From this many evaluations of a sweep in a leaf on (about a third of a microsecond each), several threads are worth
-// waking. The bytes do not depend on it: every leaf is cut by itself.
+// From this many evaluations of a sweep in a leaf on (about 1/3 microsecond each), several threads are worthwhile. The
+// bytes do not depend on it, because every leaf is cut separately.
 constexpr std::size_t kThreadedFrom = 192;
 constexpr std::size_t kLeavesAtOnce = 16;
 
@@ -180,7 +180,7 @@ CutReport cut_leaves(CutField::Grids& grids, const SweptTool& swept, int level, 
 
   struct Job {
     const CutPlan::Leaf* leaf;
-    float* samples;  // of the volume, null for a leaf that it has not
+    float* samples;  // of the volume; null for a missing leaf
     LeafChange change;
     SparseVolume::NewLeaf made;
   };
@@ -210,7 +210,7 @@ CutReport cut_leaves(CutField::Grids& grids, const SweptTool& swept, int level, 
     }
   };
   if (plan.near.size() >= kThreadedFrom && kMayUseThreads) {
-    // Isolated: a thread that waits here must not take up work of others, which may be long.
+    // Isolated, because a thread that waits here must not take other work, which may be long.
     tbb::this_task_arena::isolate([&] {
       tbb::parallel_for(tbb::blocked_range<std::size_t>(0, jobs.size(), kLeavesAtOnce),
                         [&](const tbb::blocked_range<std::size_t>& part) { work(part.begin(), part.end()); });
@@ -285,7 +285,7 @@ void CutField::restore(const FieldLeaf& leaf) {
   const auto mm = [](std::int16_t v) { return static_cast<float>(v) * static_cast<float>(kQuantum_mm); };
   if (leaf.is_constant()) {
     const float value = mm(leaf.values.front());
-    // Nothing but what is gone throughout, or was never cut, is kept without samples.
+    // A leaf of one value is stored without samples only if it is wholly cut away or was never cut.
     if (value == cuts.background())
       cuts.set_constant(leaf.origin, value);
     else
@@ -390,9 +390,9 @@ void CutField::gather_solid(int level, const CoordBox& box, std::span<float> out
 CutField::Gathered CutField::gather_block(int level, const CoordBox& box, std::span<float> solid,
                                           std::span<float> surface) const {
   OSTEON_CHECK(is_block(box) && solid.size() == kBlockVolume && surface.size() == kBlockVolume);
-  static thread_local GatherScratch scratch;  // blocks are made many at a time, on any thread
+  static thread_local GatherScratch scratch;  // many blocks are made at a time, on any thread
   using Out = std::span<float, kBlockVolume>;
-  std::array<LeafView, kBlockLeaves> leaves;  // of S at level 0, else of R of the block's own level
+  std::array<LeafView, kBlockLeaves> leaves;  // of S at level 0, otherwise of R of the block's own level
   const CoordBox coarse = coarse_box(box, level);
   const bool any_surface = level == 0 ? grids_->bone.view_surface(box, leaves) : grids_->bone.has_surface(coarse);
   std::array<bool, kLevels> any_cut{};
@@ -466,8 +466,8 @@ double CutField::solid_mm(const Vec3& point_mm) const {
 }
 
 double CutField::removed_mm3() const {
-  // Every cell of 8³ voxels of level 0 that any level cut into, at the finest level that did. A cell ends where the
-  // next one begins, at that one's first samples: so those before a cut leaf lose bone too.
+  // Every cell of 8³ voxels of level 0 that any level cut into, at the finest level that did. A cell ends at the first
+  // samples of the next cell. So cells before a cut leaf lose bone too.
   std::set<Coord> touched;
   for (int level = 0; level < kLevels; ++level)
     for (const auto& origins : {grids_->cuts[static_cast<std::size_t>(level)].leaves(),
@@ -495,8 +495,8 @@ double CutField::removed_mm3() const {
     gather_surface(level, box, before, scratch);
     gather_solid(level, box, after, scratch);
     const double pitch = level_pitch_mm(grids_->bone.pitch_mm(), level);
-    // A sample within half a pitch of a surface is bone in part. Those on both ends count half, so that cells of any
-    // levels fill space without overlap.
+    // A sample within half a pitch of a surface is partly bone. Samples at both ends have half weight, so that cells of
+    // different levels fill space without overlap.
     const auto bone_part = [&](float f) { return std::clamp(0.5 - static_cast<double>(f) / pitch, 0.0, 1.0); };
     const std::int32_t n = kLeafSize << level;
     const auto weight = [n](std::int32_t i) { return i == 0 || i == n ? 0.5 : 1.0; };

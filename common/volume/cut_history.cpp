@@ -20,20 +20,20 @@ auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin
 
 }  // namespace
 
-void CutHistory::add(RoomSeq place, const Cut& cut, const std::vector<Coord>& leaves) {
-  OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels && !contains(place));
-  own_.events.emplace(place, Event{cut, {}});
-  for (const Coord origin : leaves) own_.reach[at(cut.level)][origin].push_back(place);
+void CutHistory::add(RoomSeq seq, const Cut& cut, const std::vector<Coord>& leaves) {
+  OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels && !contains(seq));
+  own_.events.emplace(seq, Event{cut, {}});
+  for (const Coord origin : leaves) own_.reach[at(cut.level)][origin].push_back(seq);
 }
 
-void CutHistory::add_mask(RoomSeq place, Mask mask) {
-  OSTEON_CHECK(mask && !contains(place));
-  own_.events.emplace(place, Event{{}, std::move(mask)});
+void CutHistory::add_mask(RoomSeq seq, Mask mask) {
+  OSTEON_CHECK(mask && !contains(seq));
+  own_.events.emplace(seq, Event{{}, std::move(mask)});
 }
 
-void CutHistory::add_mask(RoomSeq place, std::vector<FieldLeaf> mask) {
+void CutHistory::add_mask(RoomSeq seq, std::vector<FieldLeaf> mask) {
   std::ranges::sort(mask, {}, place_of);
-  add_mask(place, std::make_shared<const std::vector<FieldLeaf>>(std::move(mask)));
+  add_mask(seq, std::make_shared<const std::vector<FieldLeaf>>(std::move(mask)));
 }
 
 CutHistory CutHistory::fork() {
@@ -41,20 +41,20 @@ CutHistory CutHistory::fork() {
   return *this;
 }
 
-const CutHistory::Part* CutHistory::part_of(RoomSeq place) const {
-  if (own_.events.contains(place)) return &own_;
+const CutHistory::Part* CutHistory::part_of(RoomSeq seq) const {
+  if (own_.events.contains(seq)) return &own_;
   for (const auto& part : shared_)
-    if (part->events.contains(place)) return part.get();
+    if (part->events.contains(seq)) return part.get();
   return nullptr;
 }
 
-bool CutHistory::contains(RoomSeq place) const { return part_of(place) != nullptr; }
-bool CutHistory::undone(RoomSeq place) const { return undone_.contains(place); }
+bool CutHistory::contains(RoomSeq seq) const { return part_of(seq) != nullptr; }
+bool CutHistory::undone(RoomSeq seq) const { return undone_.contains(seq); }
 
-const Cut* CutHistory::find_cut(RoomSeq place) const {
-  const Part* part = part_of(place);
+const Cut* CutHistory::find_cut(RoomSeq seq) const {
+  const Part* part = part_of(seq);
   if (part == nullptr) return nullptr;
-  const Cut& cut = part->events.at(place).cut;
+  const Cut& cut = part->events.at(seq).cut;
   return cut.path.empty() ? nullptr : &cut;
 }
 
@@ -64,27 +64,27 @@ std::size_t CutHistory::size() const {
   return events;
 }
 
-std::vector<LevelLeaves> CutHistory::undo(CutField& field, std::span<const RoomSeq> places) {
-  return rebuild(field, places, true);
+std::vector<LevelLeaves> CutHistory::undo(CutField& field, std::span<const RoomSeq> seqs) {
+  return rebuild(field, seqs, true);
 }
 
-std::vector<LevelLeaves> CutHistory::redo(CutField& field, std::span<const RoomSeq> places) {
-  return rebuild(field, places, false);
+std::vector<LevelLeaves> CutHistory::redo(CutField& field, std::span<const RoomSeq> seqs) {
+  return rebuild(field, seqs, false);
 }
 
-void CutHistory::note_undone(std::span<const RoomSeq> places, bool undone) {
-  for (const RoomSeq place : places) {
-    if (!contains(place)) continue;
+void CutHistory::note_undone(std::span<const RoomSeq> seqs, bool undone) {
+  for (const RoomSeq seq : seqs) {
+    if (!contains(seq)) continue;
     if (undone)
-      undone_.insert(place);
+      undone_.insert(seq);
     else
-      undone_.erase(place);
+      undone_.erase(seq);
   }
 }
 
-// The leaves of a cut are not kept beside it: a leaf lists its cuts already, and a cut's own follow from its path.
-CutHistory::Leaves CutHistory::reached(const CutField& field, const Part& part, RoomSeq place) {
-  const Event& event = part.events.at(place);
+// The leaves of a cut are not stored with it. A leaf lists its cuts already, and the cut's leaves follow from its path.
+CutHistory::Leaves CutHistory::reached(const CutField& field, const Part& part, RoomSeq seq) {
+  const Event& event = part.events.at(seq);
   Leaves leaves;
   if (event.cut.path.empty()) {
     for (const FieldLeaf& leaf : *event.mask) leaves[at(leaf.level)].push_back(leaf.origin);
@@ -93,23 +93,23 @@ CutHistory::Leaves CutHistory::reached(const CutField& field, const Part& part, 
   const auto& reach = part.reach[at(event.cut.level)];
   for (const Coord origin : field.reach(event.cut)) {
     const auto listed = reach.find(origin);
-    if (listed != reach.end() && std::ranges::find(listed->second, place) != listed->second.end())
+    if (listed != reach.end() && std::ranges::find(listed->second, seq) != listed->second.end())
       leaves[at(event.cut.level)].push_back(origin);
   }
   return leaves;
 }
 
-std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const RoomSeq> places, bool undone) {
+std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const RoomSeq> seqs, bool undone) {
   cost_ = {};
   Leaves touched;
-  for (const RoomSeq place : places) {
-    const Part* part = part_of(place);
-    if (!part || this->undone(place) == undone) continue;
+  for (const RoomSeq seq : seqs) {
+    const Part* part = part_of(seq);
+    if (!part || this->undone(seq) == undone) continue;
     if (undone)
-      undone_.insert(place);
+      undone_.insert(seq);
     else
-      undone_.erase(place);
-    const Leaves leaves = reached(field, *part, place);
+      undone_.erase(seq);
+    const Leaves leaves = reached(field, *part, seq);
     for (int level = 0; level < kLevels; ++level)
       touched[at(level)].insert(touched[at(level)].end(), leaves[at(level)].begin(), leaves[at(level)].end());
   }
@@ -140,7 +140,7 @@ std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const Ro
 }
 
 void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
-  // By event, so that each path is prepared once.
+  // Grouped by event, so that each path is prepared once.
   std::map<RoomSeq, std::pair<const Event*, Leaves>> work;
   std::vector<const Event*> masks;
   const auto add_part = [&](const Part& part) {
@@ -148,19 +148,19 @@ void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
       for (const Coord origin : leaves[at(level)]) {
         const auto listed = part.reach[at(level)].find(origin);
         if (listed == part.reach[at(level)].end()) continue;
-        for (const RoomSeq place : listed->second) {
-          if (undone(place)) continue;
-          auto& [event, of_event] = work[place];
-          event = &part.events.at(place);
+        for (const RoomSeq seq : listed->second) {
+          if (undone(seq)) continue;
+          auto& [event, of_event] = work[seq];
+          event = &part.events.at(seq);
           of_event[at(level)].push_back(origin);
         }
       }
-    for (const auto& [place, event] : part.events)
-      if (event.mask && !undone(place)) masks.push_back(&event);
+    for (const auto& [seq, event] : part.events)
+      if (event.mask && !undone(seq)) masks.push_back(&event);
   };
   for (const auto& part : shared_) add_part(*part);
   add_part(own_);
-  for (const auto& [place, one] : work) {
+  for (const auto& [seq, one] : work) {
     const std::vector<Coord>& part = one.second[at(one.first->cut.level)];
     field.apply_to(one.first->cut, part);
     ++cost_.cuts;
@@ -168,7 +168,7 @@ void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
   }
   for (const Event* event : masks)
     for (int level = 0; level < kLevels; ++level) {
-      // Both are sorted: one walk through the mask.
+      // Both are sorted, so one pass through the mask is enough.
       auto mask = event->mask->begin();
       for (const Coord origin : leaves[at(level)]) {
         mask = std::lower_bound(mask, event->mask->end(), std::tuple(level, origin),

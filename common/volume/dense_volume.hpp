@@ -1,4 +1,4 @@
-// A box of samples in memory: what importers fill and cases are built from.
+// A box of samples in memory. Importers fill it, and cases are built from it.
 #pragma once
 #include <cstddef>
 #include <vector>

@@ -29,10 +29,10 @@ using Grid = openvdb::FloatGrid;
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kFormatVersion = 1;
-// A body that is cut everywhere at 0.1 mm has about this many; a file that names more is broken or hostile.
+// A body that is cut everywhere at 0.1 mm has about this many leaves. A file with more is damaged or hostile.
 constexpr std::size_t kMostLeaves = 4'000'000;
 constexpr std::size_t kMostBodies = 4096;
-// Places are samples of a lattice in front of a surgeon: kilometres are an error.
+// Largest coordinate in samples. A larger one would be kilometres away from the bone.
 constexpr std::int32_t kFarthestSample = 1 << 22;
 
 constexpr VdbLimits kFieldLimits{
@@ -45,7 +45,7 @@ constexpr const char* kSeqKey = "osteon_room_seq";
 constexpr const char* kPitchKey = "osteon_pitch_mm";
 constexpr const char* kBodiesKey = "osteon_bodies";
 constexpr const char* kItemsKey = "osteon_items";
-constexpr const char* kToolsKey = "osteon_tools";  // how many; each under this and its number
+constexpr const char* kToolsKey = "osteon_tools";  // number of tools; each is stored under this key and its number
 constexpr std::size_t kMostItems = 4096, kMostTools = 1024;
 
 auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.body, leaf.level, leaf.origin); }
@@ -54,7 +54,7 @@ std::string grid_name(BodyId body, int level) {
   return "cuts.body" + std::to_string(body.value) + ".level" + std::to_string(level);
 }
 
-// The body and level that a name stands for, written in no other way.
+// The body and level of a grid's name. Only the exact form is accepted.
 std::optional<std::pair<BodyId, int>> parse_name(const std::string& name) {
   unsigned body = 0, level = 0;
   if (std::sscanf(name.c_str(), "cuts.body%9u.level%1u", &body, &level) != 2) return std::nullopt;
@@ -76,8 +76,8 @@ void put_leaf(Grid& grid, const FieldLeaf& leaf) {
                          [](std::int16_t v) { return static_cast<float>(v) * static_cast<float>(kQuantum_mm); });
 }
 
-// After the .vdb stand a word and the SHA-256 of all before it. OpenVDB finds its grids by their offsets and never
-// looks there. A damaged file must not reach OpenVDB's reader, which believes every length that it reads.
+// The .vdb data is followed by a word and the SHA-256 of everything before it. OpenVDB finds its grids by their offsets
+// and never reads there. A damaged file must not reach OpenVDB's reader, which trusts every length that it reads.
 constexpr std::string_view kSeal = "osteon-fields-1\n";
 constexpr std::size_t kSealBytes = kSeal.size() + sizeof(Digest::bytes);
 
@@ -124,7 +124,7 @@ Result<void> check_seal(const fs::path& file) {
   return {};
 }
 
-// The file's name must not come back after a power cut with less than was written.
+// After a power cut, the file's name must not appear with incomplete content.
 Result<void> sync(const fs::path& path) {
   const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   const bool synced = fd >= 0 && ::fsync(fd) == 0;
@@ -133,8 +133,8 @@ Result<void> sync(const fs::path& path) {
   return {};
 }
 
-// A line for each item: its number, body, tool, place, rotation (x y z w), turns, whether it is seated, when it was
-// set.
+// One line for each item: its number, body, tool, position, rotation (x y z w), turns, whether it is seated, and when
+// it was set.
 std::string text_of(const std::vector<SceneItem>& items) {
   std::string text;
   for (const SceneItem& item : items) {
@@ -178,7 +178,7 @@ std::optional<std::vector<SceneItem>> items_of(const std::string& text) {
   return items;
 }
 
-// Files of before the scene was saved have none.
+// Files from before the scene was saved have none.
 Result<void> read_scene(const fs::path& file, const openvdb::MetaMap& meta, SavedFields& fields) {
   if (const auto text = meta.getMetadata<openvdb::StringMetadata>(kItemsKey)) {
     auto items = items_of(text->value());
@@ -284,7 +284,7 @@ Result<SavedFields> read_head(const fs::path& file, const openvdb::MetaMap& meta
   return fields;
 }
 
-// Appends one grid's leaves; what is wrong, if anything.
+// Appends the leaves of one grid. Returns the fault, if any.
 std::optional<std::string> read_grid(const Grid& grid, BodyId body, int level, double pitch_mm,
                                      std::vector<FieldLeaf>& out) {
   const std::int32_t band = band_quanta(level_pitch_mm(pitch_mm, level));
@@ -309,14 +309,14 @@ std::optional<std::string> read_grid(const Grid& grid, BodyId body, int level, d
   };
   for (auto it = grid.tree().cbeginLeaf(); it; ++it)
     if (auto wrong = add(it->origin(), it->buffer().data(), false)) return wrong;
-  // Tiles, active or not: what differs from the background is there.
+  // Tiles, active or not: values that differ from the background count.
   auto tile = grid.tree().cbeginValueAll();
   tile.setMaxDepth(Grid::TreeType::ValueAllCIter::LEAF_DEPTH - 1);
   for (; tile; ++tile) {
     const float value = *tile;
     if (value == grid.background()) continue;
     const openvdb::CoordBBox box = tile.getBoundingBox();
-    // Cuts leave tiles of one leaf; a larger one is a merged neighbourhood, within reason.
+    // Cuts leave tiles of one leaf. A larger tile is several merged leaves, up to a limit.
     if (box.dim().x() > 128) return "it has a constant larger than any bone";
     for (auto x = box.min().x(); x <= box.max().x(); x += kLeafSize)
       for (auto y = box.min().y(); y <= box.max().y(); y += kLeafSize)

@@ -9,12 +9,12 @@
 #include "common/field/kernel.hpp"
 #include "common/volume/solid_labels.hpp"
 
-// The masks. Let M be −band on the piece's samples and +band on the rest's; on air beside the piece −band, beside the
-// rest +band, beside both 0. The parent takes R = min(R, M), the piece R = min(R, −M): trilinear M is negative round
-// the piece and positive round the rest, so the parent keeps the points where M > 0, the piece those where M < 0, and
-// no point is kept by both. M is written on one lattice wherever piece and rest are within a cell of each other: that
-// of the finest cut there. Farther off nothing of the other is near, and whole leaves of level 0 are constants, which
-// go on for one sample over the seam so that both lattices cover it.
+// The masks. Let M be −band on the piece's samples and +band on the samples of the rest. On air beside the piece it is
+// −band, beside the rest +band, beside both 0. The parent takes R = min(R, M), the piece R = min(R, −M). Trilinear M is
+// negative around the piece and positive around the rest. So the parent keeps the points with M > 0, the piece those
+// with M < 0, and no point is in both. Where piece and rest are within a cell of each other, M is written on one
+// lattice: that of the finest cut there. Farther away only one of them is near, and whole leaves of level 0 are
+// constants. The constants extend one sample over the seam, so that both lattices cover it.
 namespace osteon {
 namespace {
 
@@ -26,7 +26,7 @@ std::int16_t band_of(const Case& bone, int level) {
   return static_cast<std::int16_t>(band_quanta(level_pitch_mm(bone.pitch_mm(), level)));
 }
 
-// Samples of a cell at the level of the masks, n along an axis.
+// Samples of a cell at the level of the masks, n along each axis.
 struct Sides {
   std::int32_t n = 0;
   std::vector<std::uint8_t> side;
@@ -38,7 +38,7 @@ struct Sides {
 
 constexpr Coord kSix[6] = {{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
 
-// Solid samples of unknown side take the side of what they touch.
+// Solid samples of unknown side take the side of a sample that they touch.
 void flood(Sides& sides, std::vector<Coord> from) {
   while (!from.empty()) {
     const Coord c = from.back();
@@ -53,7 +53,7 @@ void flood(Sides& sides, std::vector<Coord> from) {
   }
 }
 
-// Labels of a cell at its own level, as the finder gave them.
+// Labels of a cell at its own level, as the finder assigned them.
 std::vector<std::uint16_t> own_labels(const CutField& field, const PieceCell& cell) {
   const std::int32_t n = kLeafSize << cell.level;
   std::vector<std::uint16_t> labels(at(n * n * n), 1);
@@ -65,8 +65,8 @@ std::vector<std::uint16_t> own_labels(const CutField& field, const PieceCell& ce
   return labels;
 }
 
-// The sides of a cell's samples at `level`, not below its own. A fine sample of a coarser cell has the side of the
-// coarse sample to which it is connected.
+// The sides of a cell's samples at `level`, which is not below its own. A fine sample of a coarser cell has the side of
+// the coarse sample to which it is connected.
 Sides sides_of(const CutField& field, const PieceCell& cell, int level) {
   OSTEON_CHECK(cell.level <= level);
   Sides sides{kLeafSize << level, {}};
@@ -100,7 +100,7 @@ Sides sides_of(const CutField& field, const PieceCell& cell, int level) {
 
 using SidesOf = std::unordered_map<Coord, Sides, CoordHash>;
 
-// What the cells could not tell by themselves, from their neighbours; at last it belongs to the rest, which stays.
+// Samples that a cell cannot decide by itself take the side of their neighbours. The remaining ones belong to the rest.
 void settle_unknown(SidesOf& all) {
   for (int round = 0; round < 2; ++round)
     for (auto& [origin, sides] : all) {
@@ -128,7 +128,7 @@ void settle_unknown(SidesOf& all) {
   for (auto& [origin, sides] : all) std::ranges::replace(sides.side, kUnknown, kRest);
 }
 
-// A cell's sides with one sample around it, from the neighbours that there are.
+// A cell's sides with a margin of one sample, from the neighbours that exist.
 Sides with_margin(const SidesOf& all, Coord origin) {
   const std::int32_t n = all.at(origin).n;
   Sides grown{n + 2, {}};
@@ -151,14 +151,14 @@ Sides with_margin(const SidesOf& all, Coord origin) {
   return grown;
 }
 
-// Each sample: what is in the 27 around it, one axis at a time.
+// For each sample: what the 27 samples around it contain, one axis at a time.
 std::vector<std::uint8_t> near_sides(const Sides& sides) {
   std::vector<std::uint8_t> now = sides.side, next(now.size());
   const std::size_t strides[3] = {at(sides.n * sides.n), at(sides.n), 1};
   for (const std::size_t stride : strides) {
     for (std::size_t i = 0; i < now.size(); ++i) {
       std::uint8_t seen = now[i];
-      // A neighbour across the border of the box wraps round; only the margin reads it.
+      // At the border of the box, neighbours wrap around. Only the margin reads these.
       if (i >= stride) seen |= now[i - stride];
       if (i + stride < now.size()) seen |= now[i + stride];
       next[i] = seen;
@@ -189,7 +189,7 @@ void add_leaves(BodyId body, int level, Coord cell, const std::vector<std::int16
       }
 }
 
-// M of one cell where piece and rest are near each other, into both masks.
+// Writes M of one cell where piece and rest are near each other into both masks.
 void add_interface(const CutField& field, const SidesOf& all, int level, Coord origin, Fragment& fragment) {
   const Sides grown = with_margin(all, origin);
   const std::vector<std::uint8_t> near = near_sides(grown);
@@ -204,15 +204,15 @@ void add_interface(const CutField& field, const SidesOf& all, int level, Coord o
         const std::uint8_t side = grown.side[g] ? grown.side[g] : near[g];
         if (side == (kPiece | kRest)) taken[i] = left[i] = 0;
         if (side == kPiece) taken[i] = none;
-        // Air beside neither: slivers thinner than the lattice may end there, and stay with the parent.
+        // Air beside neither side: slivers thinner than the lattice may end there. They stay with the parent.
         if (side == kRest || side == 0) left[i] = none;
       }
   add_leaves(field.body(), level, origin, taken, band, fragment.taken);
   add_leaves(field.body(), level, origin, left, band, fragment.left);
 }
 
-// Constants on whole cells of level 0 that have no other side near, and on the one layer of samples around them: at the
-// seam both lattices cover what is solid.
+// Constants on whole cells of level 0 without the other side nearby, and on the one layer of samples around them. At
+// the seam both lattices cover what is solid.
 void add_constants(const CutField& field, const CellMap& map, std::span<const PieceCell> cells,
                    std::span<const std::uint8_t> whole, std::vector<FieldLeaf>& out) {
   const std::int16_t band = band_of(field.bone(), 0), none = static_cast<std::int16_t>(-band);
@@ -242,7 +242,7 @@ void lower(FieldLeaf& leaf, const FieldLeaf& by) {
   leaf.compact();
 }
 
-// Where a constant's seam lies in a cell that has leaves of the same level, the two are one leaf.
+// If the seam of a constant lies in a cell that has leaves of the same level, the two become one leaf.
 void sort_and_unite(std::vector<FieldLeaf>& leaves) {
   std::ranges::sort(leaves, {}, [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); });
   std::size_t last = 0;
@@ -257,8 +257,8 @@ void sort_and_unite(std::vector<FieldLeaf>& leaves) {
 }
 
 // The volume of a piece, cell by cell. A cell's samples and those of the planes after it, each end with half its
-// weight, cover the cell exactly, so cells of different levels do not overlap. A sample within half a pitch of a
-// surface is bone in part; what is in air is shared by the solid samples beside it.
+// weight, cover the cell exactly. So cells of different levels do not overlap. A sample within half a pitch of a
+// surface is partly bone. The part in air is shared by the solid samples beside it.
 class Measure {
  public:
   Measure(const CutField& field, const CellMap& map, std::span<const PieceCell> cells)
@@ -320,7 +320,7 @@ class Measure {
   std::unordered_map<std::int32_t, std::vector<std::uint16_t>> labels_;
 };
 
-// Full, and so is all around it: nothing to look at.
+// The cell and all its neighbours are full, so no samples need to be read.
 bool is_deep(const CellMap& map, std::span<const PieceCell> cells, const PieceCell& cell) {
   if (!cell.full) return false;
   for (int around = 0; around < 27; ++around) {
@@ -334,7 +334,7 @@ bool is_deep(const CellMap& map, std::span<const PieceCell> cells, const PieceCe
 }  // namespace
 
 CellMap::CellMap(const CoordBox& bounds_samples, const std::vector<Coord>& origins) : count_(origins.size()) {
-  // One cell more all around, so that neighbours need no test.
+  // One extra cell on all sides, so that neighbours need no check.
   box_ = CoordBox{shift_down(bounds_samples.min, 3), shift_down(bounds_samples.max, 3)}.grown(1);
   const Coord d = box_.dims();
   cells_.assign(at(d.x) * at(d.y) * at(d.z), -1);
@@ -358,7 +358,7 @@ std::vector<std::uint8_t> CellMap::dilated(std::span<const std::uint8_t> marked)
   for (std::size_t i = 0; i < cells_.size(); ++i)
     if (cells_[i] >= 0) now[i] = marked[at(cells_[i])];
   const Coord d = box_.dims();
-  // The border is never marked, so what wraps round it is nothing.
+  // The border is never marked, so wrapping around it has no effect.
   for (const std::size_t stride : {at(d.y) * at(d.z), at(d.z), std::size_t{1}}) {
     for (std::size_t i = 0; i < now.size(); ++i)
       next[i] = static_cast<std::uint8_t>(now[i] | (i >= stride ? now[i - stride] : 0) |

@@ -19,16 +19,16 @@ constexpr int kFinest = kLevels - 1;
 
 std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
 
-// Components that face each other: of a cell, and of the next one along an axis.
+// Linked components: one of a cell, and one of the next cell along an axis.
 using Link = std::pair<std::uint16_t, std::uint16_t>;
 
 struct Cell {
   Coord origin;                                     // samples of level 0
-  int level = 0;                                    // at which it is labelled
-  bool full = false;                                // solid throughout
+  int level = 0;                                    // the level at which it is labelled
+  bool full = false;                                // completely solid
   std::vector<std::uint32_t> counts;                // samples of each component
-  std::vector<std::int32_t> parts;                  // of each component, where the cell has several
-  std::array<std::vector<std::uint16_t>, 6> faces;  // labels of the first and last layer along x, y, z; none when full
+  std::vector<std::int32_t> parts;                  // of each component, if the cell has several parts
+  std::array<std::vector<std::uint16_t>, 6> faces;  // labels of the first and last layer along x, y, z; none if full
   std::array<std::int32_t, 3> next{-1, -1, -1}, previous{-1, -1, -1};  // cells along x, y, z
   std::array<std::vector<Link>, 3> links;                              // to the next ones
   std::int32_t home = kNoPart;                                         // part of the case, or kSeveralParts
@@ -40,13 +40,13 @@ struct Cell {
   }
 };
 
-// Where two bones of the case come near each other: which sample belongs to which.
+// Where two bones of the case are close to each other: the bone of each sample.
 struct SharedHome {
   std::vector<std::uint16_t> labels;  // of the case's samples
   std::vector<std::int32_t> parts;    // of each label, from 1
 };
 
-// Which component each node, a cell's component, is part of.
+// The component that each node (a cell's component) belongs to.
 struct Walk {
   std::vector<std::uint32_t> first_node;  // of each cell, and one past the last
   std::vector<std::uint32_t> root;        // the first node of the same component
@@ -69,12 +69,12 @@ std::vector<std::uint16_t> face_labels(const std::vector<std::uint16_t>& labels,
 
 struct FragmentFinder::Parts {
   std::vector<Cell> cells;  // all leaves of the case with bone, sorted
-  CellMap map;              // their places
+  CellMap map;              // finds them by origin
   std::map<std::int32_t, SharedHome> shared;
   bool links_changed = true;
   bool outstanding = false;  // the last search found pieces
 
-  // Labels a cell's samples; at level 0 from the case alone if there is no field.
+  // Labels a cell's samples. Without a field: at level 0, from the case alone.
   void label(Cell& cell, const CutField* field, const Case& bone) const {
     cell.level = field ? cut_level(*field, cell.origin) : 0;
     const CoordBox box = cell_box(cell.origin, cell.level);
@@ -100,7 +100,7 @@ struct FragmentFinder::Parts {
     if (cell.home == kSeveralParts) vote(cell, labels);
   }
 
-  // Each component belongs to the part of the case that most of its samples lie in.
+  // Each component belongs to the part of the case that contains most of its samples.
   void vote(Cell& cell, const std::vector<std::uint16_t>& labels) const {
     const SharedHome& home = shared.at(map.find(cell.origin));
     const std::int32_t n = kLeafSize << cell.level;
@@ -121,7 +121,7 @@ struct FragmentFinder::Parts {
     }
   }
 
-  // Links of a cell to the next one along an axis, at the samples of the coarser of the two.
+  // Links of a cell to the next one along an axis, at the samples of the coarser one.
   [[nodiscard]] std::vector<Link> links_of(const Cell& cell, int axis) const {
     std::vector<Link> links;
     if (cell.next[at(axis)] < 0) return links;
@@ -165,7 +165,7 @@ struct FragmentFinder::Parts {
     return result;
   }
 
-  // The parts of the case, before any cut.
+  // Finds the parts of the case, before any cut.
   void find_home() {
     const Walk all = walk();
     for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -178,7 +178,7 @@ struct FragmentFinder::Parts {
     }
   }
 
-  // The roots of the pieces: of every part of the case all but the largest component. Equal ones: the first stays.
+  // The roots of the pieces: of every part of the case, all but the largest component. Of equal ones the first stays.
   [[nodiscard]] std::vector<std::uint32_t> pieces(const Walk& all) const {
     struct Component {
       std::uint64_t volume = 0;  // samples of the finest level
@@ -253,7 +253,7 @@ FragmentFinder::FragmentFinder(const CutField& field) : parts_(std::make_unique<
   link_all();
   parts_->find_home();
 
-  // Where two bones share a cell, which samples are whose.
+  // Where two bones share a cell: the bone of each sample.
   const Walk all = parts_->walk();
   for (std::size_t i = 0; i < parts_->cells.size(); ++i) {
     Cell& cell = parts_->cells[i];
@@ -269,7 +269,7 @@ FragmentFinder::FragmentFinder(const CutField& field) : parts_(std::make_unique<
     parts_->vote(cell, parts_->shared.at(static_cast<std::int32_t>(i)).labels);
   }
 
-  // What was cut already.
+  // Applies earlier cuts.
   for (Cell& cell : parts_->cells) {
     bool cut = false;
     for (int level = 0; level < kLevels && !cut; ++level)
@@ -287,7 +287,7 @@ TouchCost FragmentFinder::touch(const CutField& field, int level, const std::vec
   TouchCost cost;
   std::vector<std::int32_t> touched;
   for (const Coord origin : changed_leaves) {
-    // A sample of the level reaches the finer samples of the cell before it.
+    // A sample of the level affects the finer samples of the cell before it.
     const Coord own = floor_to(shift_down(origin, level), kLeafSize),
                 low = floor_to(shift_down(origin - Coord{1, 1, 1}, level), kLeafSize);
     for (std::int32_t x = low.x; x <= own.x; x += kLeafSize)

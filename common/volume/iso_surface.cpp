@@ -17,40 +17,39 @@
 #include "common/core/check.hpp"
 #include "common/geometry/triangle_distance.hpp"
 
-// The surface is meshed by dual contouring in its simplest form: every cell with a crossing has one point, the mean of
-// the crossings on its edges, and every crossed lattice edge has a quad between the points of the four cells around it
-// (Gibson 1998). Only samples of the narrow band get a distance. Those nearer than a
-// voxel look at every triangle beside them. The others get the nearest point of the surface from their neighbours,
-// layer by layer outwards, and then look at the triangles around it: of two sheets they may take the other where a
-// facet of the one is nearer than its corners (2 samples of 1000 of a skull are more than 0.01 voxel off by that).
-// OpenVDB's meshToVolume, tried first, was up to 0.6 voxel wrong at the end of the band and took longer. Every loop is
-// bounded.
+// The surface is meshed by dual contouring in its simplest form. Every cell with a crossing has one point, the mean of
+// the crossings on its edges. Every crossed lattice edge has a quad between the points of the four cells around it
+// (Gibson 1998). Only samples of the narrow band get a distance. Samples nearer than a voxel test every triangle beside
+// them. The others get the nearest surface point from their neighbours, layer by layer outwards, and then test the
+// triangles around it. Of two sheets they may choose the wrong one if a facet is nearer than its corners (2 samples of
+// 1000 of a skull are more than 0.01 voxel off by that). OpenVDB's meshToVolume was tried first; it was up to 0.6 voxel
+// wrong at the end of the band and slower. Every loop is bounded.
 namespace osteon {
 namespace {
 
 using Vec3f = Eigen::Vector3f;
 
-constexpr int kBand = 4;        // voxels to which the distance is clipped
-constexpr int kMargin = 6;      // voxels around a slab whose surface can be nearest to a sample of the slab
-constexpr int kSlab = 48;       // voxels along x that one thread works on
-constexpr int kMostSteps = 16;  // of a walk over the mesh, which takes one or two
-constexpr std::size_t kMostTriangles = 700'000'000;  // of a slab: three corners of each are counted in 32 bits
+constexpr int kBand = 4;        // voxels; the distance is clipped to this
+constexpr int kMargin = 6;      // voxels around a slab that can contain the surface nearest to a sample of the slab
+constexpr int kSlab = 48;       // voxels along x that one thread processes
+constexpr int kMostSteps = 16;  // of a walk over the mesh, which usually takes one or two
+constexpr std::size_t kMostTriangles = 700'000'000;  // of a slab, because three corners of each are counted in 32 bits
 constexpr std::int32_t kNone = -1;
 
-// iso − field, so negative inside; never zero, so that every sample has a side.
+// iso − field, so negative inside. Never zero, so that every sample has a side.
 float depth(float value, float iso) {
   const float d = iso - value;
   return d == 0.0f ? -1e-3f : d;
 }
 
-// One slab of samples with its margin, in voxel coordinates counted from the margin's corner.
+// One slab of samples with its margin, in voxel coordinates from the margin's corner.
 class Slab {
  public:
   Slab(const DenseVolume<float>& field, float iso, const std::atomic<bool>& stopped)
       : field_(field), iso_(iso), stopped_(stopped) {}
 
-  // Writes the magnitudes of the samples from `first_x` to `last_x`, the latter not included, counted from the box's
-  // corner; their signs are in `out` already. Memory of an earlier slab is used again.
+  // Writes the magnitudes of the samples from `first_x` up to but excluding `last_x`, counted from the box's corner.
+  // Their signs are already in `out`. The memory of an earlier slab is reused.
   void measure(int first_x, int last_x, double pitch_mm, DenseVolume<float>& out) {
     read(first_x, last_x);
     cell_points();
@@ -74,7 +73,7 @@ class Slab {
     OSTEON_CHECK(count < static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()));
     if (values_.size() < squared_.size()) values_.swap(squared_);
     values_.resize(count);
-    // Beyond its box the field goes on as at the box's edge.
+    // Beyond its box the field continues with its values at the box's edge.
     float* to = values_.data();
     for (int x = 0; x < nx_ && !stopped_; ++x)
       for (int y = 0; y < ny_; ++y, to += nz_) {
@@ -95,8 +94,7 @@ class Slab {
   }
   static std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
 
-  // A cell is named by its lowest corner. Cells in which the field crosses the value get a point, in the order of
-  // memory.
+  // A cell is named by its lowest corner. Cells in which the field crosses the value get a point, in memory order.
   void cell_points() {
     points_.clear();
     cells_.clear();
@@ -136,7 +134,7 @@ class Slab {
                       sum / static_cast<float>(crossings));
   }
 
-  // A crossed lattice edge starts at the lowest corner of a cell with a point, so only those are looked at.
+  // A crossed lattice edge starts at the lowest corner of a cell with a point, so only those cells are checked.
   void quads() {
     triangles_.clear();
     const std::array<int, 3> step{ny_ * nz_, nz_, 1};
@@ -145,7 +143,7 @@ class Slab {
       if (triangles_.size() > kMostTriangles)
         throw std::length_error("it has too many triangles; choose a larger --pitch");
       const int x = i / (ny_ * nz_), y = i / nz_ % ny_, z = i % nz_;
-      if (x == 0 || y == 0 || z == 0) continue;  // the cells around the edge lie beyond the margin
+      if (x == 0 || y == 0 || z == 0) continue;  // the cells around the edge are beyond the margin
       const bool inside = values_[at(i)] < 0;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         if ((values_[at(i + step[axis])] < 0) == inside) continue;
@@ -162,7 +160,7 @@ class Slab {
     return distance_to_triangle<float>(p, points_[at(t[0])], points_[at(t[1])], points_[at(t[2])]);
   }
 
-  // Offers a triangle to a sample, which keeps the nearest.
+  // Offers a triangle to a sample, which stores the nearest one.
   void offer(std::int32_t triangle, std::int32_t sample, const Vec3f& p) {
     const float squared = distance(triangle, p).squared;
     float& best = squared_[at(sample)];
@@ -172,10 +170,10 @@ class Slab {
     nearest = triangle;
   }
 
-  // Every triangle to the samples right around it: for those nearer than a voxel that is all.
+  // Offers every triangle to the samples directly around it. Samples nearer than a voxel need no more.
   void seed() {
     nearest_.assign(values_.size(), kNone);
-    squared_.swap(values_);  // which nobody reads any more
+    squared_.swap(values_);  // whose values are not read any more
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
       if ((t & 0xffff) == 0 && stopped_) return;
       const Vec3f &a = points_[at(triangles_[t][0])], &b = points_[at(triangles_[t][1])],
@@ -192,7 +190,7 @@ class Slab {
     }
   }
 
-  // Calls with each of the up to 26 neighbours of a sample.
+  // Calls `visit` for each of the up to 26 neighbours of a sample.
   template <class Visit>
   void each_neighbour(std::int32_t i, Visit visit) const {
     const int x = i / (ny_ * nz_), y = i / nz_ % ny_, z = i % nz_;
@@ -202,7 +200,7 @@ class Slab {
           if (const std::int32_t j = index(u, v, w); j != i) visit(j);
   }
 
-  // Offers a point of the surface to a sample, which keeps the nearest within the band.
+  // Offers a surface point to a sample, which stores the nearest one within the band.
   void offer_point(std::int32_t point, std::int32_t sample, const Vec3f& p) {
     const float squared = (points_[at(point)] - p).squaredNorm();
     std::int32_t& nearest = nearest_point_[at(sample)];
@@ -211,9 +209,9 @@ class Slab {
     if (squared < limit) nearest = point;
   }
 
-  // The nearest point of the surface for every sample of the band: first at the corners of the points' cells, then one
-  // layer of samples after the other, as many as the band is wide and one more. Each sample looks once at the points
-  // that its neighbours have.
+  // Finds the nearest surface point for every sample of the band. It starts at the corners of the points' cells. Then
+  // it adds one layer of samples after the other, one more than the band is wide. Each sample tests once the points of
+  // its neighbours.
   void spread() {
     nearest_point_.assign(nearest_.size(), kNone);
     waiting_.assign(nearest_.size(), 0);
@@ -249,7 +247,7 @@ class Slab {
     });
   }
 
-  // For each point the triangles that have it, one list after the other.
+  // For each point, the triangles that contain it, one list after the other.
   void triangles_around_points() {
     around_begin_.assign(points_.size() + 1, 0);
     for (const auto& t : triangles_)
@@ -261,14 +259,14 @@ class Slab {
       for (const std::int32_t p : triangles_[t]) around_[at(fill[at(p)]++)] = static_cast<std::int32_t>(t);
   }
 
-  // The triangles around a point of the surface to a sample.
+  // Offers the triangles around a surface point to a sample.
   void offer_around(std::int32_t point, std::int32_t sample, const Vec3f& p) {
     for (std::int32_t n = around_begin_[at(point)]; n < around_begin_[at(point) + 1]; ++n)
       offer(around_[at(n)], sample, p);
   }
 
-  // From the nearest point to the nearest triangle: those around the point, then over the mesh, around the corners of
-  // the part of the triangle that is nearest, while that leads to a nearer one.
+  // From the nearest point to the nearest triangle. It tests the triangles around the point. Then it walks over the
+  // mesh, around the corners of the nearest part of the triangle, while that finds a nearer one.
   void refine(std::int32_t sample) {
     const Vec3f p = position(sample);
     std::int32_t known = nearest_point_[at(sample)];
@@ -305,15 +303,15 @@ class Slab {
   const std::atomic<bool>& stopped_;
   int first_x_ = 0, nx_ = 0, ny_ = 0, nz_ = 0;
   std::vector<float> values_;
-  std::vector<std::int32_t> cells_;  // that have a point, in the order of the points
+  std::vector<std::int32_t> cells_;  // cells with a point, in the order of the points
   std::vector<Vec3f> points_;
   std::vector<std::array<std::int32_t, 3>> triangles_;
-  // Of each sample; before, while the surface is meshed, the point of each cell.
+  // The nearest point of each sample. Earlier, while the surface is meshed, the point of each cell.
   std::vector<std::int32_t> nearest_point_;
-  std::vector<std::int32_t> nearest_;  // triangle of each sample
-  std::vector<float> squared_;         // and the distance to it, voxels²; nothing where there is none
+  std::vector<std::int32_t> nearest_;  // nearest triangle of each sample
+  std::vector<float> squared_;         // the distance to it, voxels²; undefined without a triangle
   std::vector<std::int32_t> layer_, next_layer_;
-  std::vector<std::uint8_t> waiting_;  // 1: the sample was in a layer
+  std::vector<std::uint8_t> waiting_;  // 1: the sample was already in a layer
   std::vector<std::int32_t> around_begin_, around_;
 };
 
@@ -325,7 +323,7 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   const auto stopped_by_caller = [] {
     return failure(ErrorCode::cancelled, "stopped while measuring the bone surface");
   };
-  // Asked once before any work: the threads below may be done before they are first looked at.
+  // Called once before any work, because the threads below may finish before they are first checked.
   if (!keep_going(0.0)) return stopped_by_caller();
   DenseVolume<float> out;
   out.box = field.box;
@@ -334,13 +332,14 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   std::transform(field.values.begin(), field.values.end(), out.values.begin(),
                  [&](float v) { return std::copysign(band, depth(v, iso)); });
 
-  // Slabs are independent and each is worked on by one thread in a fixed order, so the result is one.
+  // Slabs are independent, and one thread processes each in a fixed order, so the result does not depend on the
+  // threads.
   const int width = field.box.dims().x;
   const int slabs = (width + kSlab - 1) / kSlab;
   std::atomic<int> next{0};
   std::atomic<int> finished{0};
   std::atomic<bool> stopped{false};
-  std::mutex mutex;  // of `failed`, and for whoever waits for `finished`
+  std::mutex mutex;  // guards `failed` and the wait for `finished`
   std::condition_variable progressed;
   std::string failed;
   const auto work = [&] {
@@ -363,7 +362,7 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   std::vector<std::thread> helpers;
   const int threads = std::min(slabs, static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
   for (int i = 0; i < threads; ++i) helpers.emplace_back(work);
-  // The caller's thread watches, so that keep_going is called from one thread only.
+  // The caller's thread waits, so that keep_going is called from one thread only.
   bool cancelled = false;
   while (finished < slabs && !stopped) {
     if (!keep_going(static_cast<double>(finished) / slabs)) cancelled = stopped = true;

@@ -19,7 +19,7 @@
 namespace osteon {
 namespace {
 
-constexpr float kFarthest_mm = 1e5f;  // from the origin: beyond it samples have no number
+constexpr float kFarthest_mm = 1e5f;  // from the origin; farther samples have no number
 
 Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_triangles, double largest_mm) {
   char text[200];
@@ -61,7 +61,7 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_t
   return {};
 }
 
-// Asked by all threads of OpenVDB; the question goes on from the caller's alone.
+// All threads of OpenVDB call it. It forwards the call only from the caller's thread.
 class Interrupter {
  public:
   explicit Interrupter(const KeepGoing& keep_going) : keep_going_(keep_going) {}
@@ -78,7 +78,8 @@ class Interrupter {
   std::atomic<bool> stopped_{false};
 };
 
-// Around the surface: distances, rough far from it, and the triangle they are to; beyond, the sign alone.
+// Around the surface: distances, which are inexact far from it, and the nearest triangle. Beyond the band only the
+// sign.
 struct Band {
   openvdb::FloatGrid::Ptr value;
   openvdb::Int32Grid nearest{static_cast<std::int32_t>(openvdb::util::INVALID_IDX)};
@@ -104,8 +105,8 @@ Band measure_band(const TriangleMesh& mesh, double pitch_mm, int width, const Ke
   return band;
 }
 
-// The band's distances are good next to the surface and up to half a voxel wrong at the end of it, but its nearest
-// triangles are right or beside the right one: each sample looks at those of its neighbours as well.
+// The band's distances are exact next to the surface and up to half a voxel wrong at its end. Its nearest triangles are
+// correct, or neighbours of the correct one. So each sample also tests the triangles of its neighbours.
 class BandDistance {
  public:
   BandDistance(const Band& band, const TriangleMesh& mesh, double pitch_mm)
@@ -115,7 +116,7 @@ class BandDistance {
         value_(band.value->getConstAccessor()),
         nearest_(band.nearest.getConstAccessor()) {}
 
-  // mm; outside of the band as wide as it is.
+  // Distance in mm. Outside the band, the width of the band.
   [[nodiscard]] double at(Coord sample) const {
     const openvdb::Coord here(sample.x, sample.y, sample.z);
     const auto rough = static_cast<double>(value_.getValue(here));
@@ -195,12 +196,13 @@ Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMe
 
 namespace {
 
-// What the band and the case made of it take, by their leaves: about so many bytes for each sample near the surface.
+// Memory of the band and of the resulting case, by their leaves: about this many bytes for each sample near the
+// surface.
 constexpr double kBytesPerSample = 24.0, kMostBytes = 12e9;
-constexpr double kMostLattice = 4e9;  // samples of the whole box, most of which are never looked at
-constexpr double kBandShare = 0.5;    // of the time
+constexpr double kMostLattice = 4e9;  // samples of the whole box, most of which are never read
+constexpr double kBandShare = 0.5;    // fraction of the time
 
-// The pieces of a surface that hang together, sorted into those that bound bone and those, turned the other way, that
+// The connected parts of a surface, in two groups: those that bound bone, and those with opposite orientation that
 // bound cavities within it.
 struct Shells {
   TriangleMesh bone, cavities;
@@ -271,7 +273,7 @@ Result<Case> build_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densi
     for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
       for (std::int32_t y = part.min.y; y <= part.max.y; ++y)
         for (std::int32_t z = part.min.z; z <= part.max.z; ++z) {
-          // One solid less another is the maximum of a distance and the other's, turned.
+          // The difference of two solids is the maximum of one distance and the other's negative.
           const double mm = bone.at({x, y, z});
           *out++ = static_cast<float>(cavities ? std::max(mm, -cavities->at({x, y, z})) : mm);
         }
@@ -297,7 +299,7 @@ Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densit
   }
   if (const auto good = check(mesh, pitch, kMostBoneTriangles, kLargestBone_mm); !good)
     return tl::unexpected(good.error());
-  // The band is ten samples deep, and its leaves reach some seven beyond it.
+  // The band is ten samples deep, and its leaves extend about seven samples beyond it.
   const double bytes = area_mm2(mesh) / (pitch * pitch) * 17.0 * kBytesPerSample;
   const Vec3 samples = bounds(mesh).size_mm() / pitch;
   if (bytes > kMostBytes || samples.prod() > kMostLattice) {
@@ -318,7 +320,7 @@ Result<Case> case_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densit
 
 MeshLoader stl_beside(const std::filesystem::path& folder) {
   return [folder](const std::string& name, double pitch_mm) -> Result<std::shared_ptr<const SampledDistance>> {
-    // A tool file may come from anyone; it names no files elsewhere.
+    // A tool file may come from an untrusted source, so it must not name files in other folders.
     if (name.empty() || name == "." || name == ".." || name.find_first_of("/\\") != std::string::npos)
       return failure(ErrorCode::invalid_input,
                      "\"" + name + "\" must be the plain name of an STL file beside the tool file");

@@ -9,7 +9,7 @@
 namespace osteon {
 namespace {
 
-// The leaves of metal that meet the box of a sweep.
+// The metal leaves that meet the box of a sweep.
 std::vector<Coord> leaves_in(const std::vector<Coord>& metal, const SweptTool& swept, double pitch_mm) {
   Box box;
   for (const ToolSweep& sweep : swept.sweeps()) {
@@ -24,7 +24,7 @@ std::vector<Coord> leaves_in(const std::vector<Coord>& metal, const SweptTool& s
   return found;
 }
 
-// Whether some metal is left at or beside one of these samples of a leaf.
+// Whether metal is left at or beside one of these samples of a leaf.
 bool is_left(Coord leaf, const std::vector<Coord>& samples, std::span<const CutField* const> fields) {
   const Case& bone = fields.front()->bone();
   const CoordBox around = CoordBox{leaf, leaf + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1}}.grown(1);

@@ -1,10 +1,11 @@
-// The start of the OpenVDB library.
+// Initialises the OpenVDB library.
 #pragma once
 
 namespace osteon {
 
-// Any thread, as often as you like: before OpenVDB reads or writes. OpenVDB then neither writes nor interprets its hint
-// for delayed loading. That hint may declare any number of leaves, and OpenVDB allocates for all of them.
+// Call it before OpenVDB reads or writes. Any thread, any number of times. Afterwards OpenVDB neither writes nor reads
+// its hint for delayed loading. That hint may declare any number of leaves, and OpenVDB allocates memory for all of
+// them.
 void start_openvdb();
 
 }  // namespace osteon

@@ -29,8 +29,8 @@ SubVolumeField::SubVolumeField(Case bone, int level, std::shared_ptr<const ToolB
 RefineReport SubVolumeField::apply(const Cut& cut) {
   OSTEON_CHECK(cut.level == level_);
   RefineReport report;
-  // The cut itself tells which leaves it reached, so its way through the bone is worked out once. Leaves that it has
-  // made are left alone by what is resampled after it.
+  // The cut reports which leaves it reached, so its path through the bone is computed once. The resampling afterwards
+  // does not change leaves that the cut has made.
   report.cut = field_.apply(cut);
   std::set<Coord> touched;
   for (const Coord leaf : report.cut.reached_leaves)
@@ -57,7 +57,7 @@ void SubVolumeField::resample(Coord origin) {
         leaf.origin = {x, y, z};
         const Coord last = leaf.origin + Coord{kLeafSize - 1, kLeafSize - 1, kLeafSize - 1};
         if (field_.has_cuts(level_, {leaf.origin, last})) continue;
-        // Leaves without bone are kept by neither method.
+        // Neither method stores leaves without bone.
         if (field_.bone().has_bone({shift_down(leaf.origin, level_), shift_down(last, level_) + Coord{1, 1, 1}}))
           field_.restore(leaf);
       }
@@ -66,7 +66,7 @@ void SubVolumeField::resample(Coord origin) {
 void SubVolumeField::gather_solid(const CoordBox& box, std::span<float> out) const {
   const Coord dims = box.dims();
   OSTEON_CHECK(out.size() == at(dims.x) * at(dims.y) * at(dims.z));
-  // Where all of the box was resampled, nothing is interpolated.
+  // If the whole box was resampled, nothing is interpolated.
   const Coord first = floor_to(shift_down(box.min, level_), kSubVolumeSamples), last = shift_down(box.max, level_);
   std::vector<float> cuts;
   for (std::int32_t sx = first.x; sx <= last.x; sx += kSubVolumeSamples)

@@ -32,7 +32,7 @@ int label_solid(Coord dims, std::span<const float> solid_mm, std::vector<std::ui
   const std::size_t nz = static_cast<std::size_t>(dims.z), nyz = static_cast<std::size_t>(dims.y) * nz;
   OSTEON_CHECK(solid_mm.size() == static_cast<std::size_t>(dims.x) * nyz);
   labels.assign(solid_mm.size(), 0);
-  // At most half of the samples have a label of their own before they are united.
+  // Before they are united, at most half of the samples have separate labels.
   OSTEON_CHECK(solid_mm.size() < 2u * 65535u);
   UnionFind sets;
   sets.add();

@@ -1,5 +1,5 @@
-// Connected components of the solid samples of one box: samples with f < 0 that share a face of their voxels (six
-// neighbours). Marching cubes with our table keeps solids apart that meet at an edge only, and so does this.
+// Connected components of the solid samples in one box: samples with f < 0 whose voxels share a face (six neighbours).
+// Solids that meet only at an edge are separate, as in marching cubes with our table.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -9,7 +9,7 @@
 
 namespace osteon {
 
-// labels: 0 for air, else 1, 2, … in the order of the first sample, z fastest. Returns how many.
+// labels: 0 for air, otherwise 1, 2, … in the order of the first sample, z fastest. Returns the number of components.
 int label_solid(Coord dims, std::span<const float> solid_mm, std::vector<std::uint16_t>& labels);
 
 // Sets of numbers that can be united.
@@ -18,7 +18,7 @@ class UnionFind {
   void reset(std::size_t count);
   std::uint32_t add();
   std::uint32_t find(std::uint32_t i);
-  void unite(std::uint32_t a, std::uint32_t b);  // the smaller name stays
+  void unite(std::uint32_t a, std::uint32_t b);  // the smaller number represents the union
 
  private:
   std::vector<std::uint32_t> parent_;

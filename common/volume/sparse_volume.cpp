@@ -64,7 +64,8 @@ void SparseVolume::gather(const CoordBox& box, std::span<float> out) const {
                              static_cast<std::size_t>(dims.z) +
                          (z0 - box.min.z);
             if (data) {
-              // A whole row of a leaf is two registers; the few samples at a box's ends are not worth a call.
+              // A whole row of samples of a leaf is two registers. A few samples at the end of a box are not worth a
+              // call.
               const float* from = data + (x - lx) * 64 + (y - ly) * 8 + (z0 - lz);
               if (z1 - z0 + 1 == kLeafSize)
                 std::memcpy(row, from, sizeof(float) * kLeafSize);
@@ -84,7 +85,7 @@ void SparseVolume::gather_every(std::int32_t stride, const CoordBox& box, std::s
   OSTEON_CHECK(out.size() ==
                static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y) * static_cast<std::size_t>(dims.z));
   const Grid::ConstUnsafeAccessor accessor = impl_->grid->getConstUnsafeAccessor();
-  const std::int32_t in_leaf = kLeafSize / stride;  // samples of ours along a leaf
+  const std::int32_t in_leaf = kLeafSize / stride;  // gathered samples along a leaf
   const Coord first = floor_to(box.min, in_leaf);
   for (std::int32_t lx = first.x; lx <= box.max.x; lx += in_leaf)
     for (std::int32_t ly = first.y; ly <= box.max.y; ly += in_leaf)
@@ -204,7 +205,7 @@ void SparseVolume::find(std::span<const Coord> origins, std::span<Place> places)
 void SparseVolume::LeafDeleter::operator()(void* leaf) const { delete static_cast<Leaf*>(leaf); }
 
 SparseVolume::NewLeaf SparseVolume::make_leaf(Coord origin, std::span<const float, kLeafVoxels> samples) {
-  // Made without samples, so that they are not filled twice.
+  // Made without samples, so that they are not written twice.
   NewLeaf made(new Leaf(openvdb::PartialCreate(), vdb(origin), 0.0f, true));
   auto* leaf = static_cast<Leaf*>(made.get());
   leaf->allocate();
@@ -222,7 +223,7 @@ Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
     start_openvdb();
     openvdb::GridPtrVec grids;
     for (const auto& [name, volume] : volumes) {
-      const Grid::Ptr grid = volume->impl_->grid->copy();  // shares the tree, has a name and transform of its own
+      const Grid::Ptr grid = volume->impl_->grid->copy();  // shares the tree; has its own name and transform
       grid->setName(name);
       grid->setTransform(openvdb::math::Transform::createLinearTransform(pitch_mm));
       grids.push_back(grid);
@@ -246,7 +247,7 @@ Result<std::vector<SparseVolume>> load_volumes(const std::filesystem::path& file
   try {
     start_openvdb();
     openvdb::io::File in(file.string());
-    in.open(false);  // no delayed loading: the file may be replaced while we run
+    in.open(false);  // no delayed loading, because the file may be replaced while the program runs
     std::vector<SparseVolume> volumes;
     for (const std::string& name : names) {
       if (!in.hasGrid(name))

@@ -17,11 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// The format as OpenVDB 10 writes it (openvdb/io/Archive.h, tree/InternalNode.h, io/Compression.h).
+// The format that OpenVDB 10 writes (openvdb/io/Archive.h, tree/InternalNode.h, io/Compression.h).
 constexpr std::int64_t kMagic = 0x56444220;
 constexpr std::uint32_t kFormat = 224;
 constexpr std::uint64_t kUuidBytes = 36;
-constexpr std::uint32_t kNoZip = 0b110;  // Blosc, active values alone
+constexpr std::uint32_t kNoZip = 0b110;  // Blosc, active values only
 constexpr std::uint32_t kBlosc = 0b100, kActiveAlone = 0b010;
 constexpr std::uint64_t kScaleMapBytes = 5 * 3 * sizeof(double);
 constexpr std::uint32_t kBloscHeaderBytes = 16;
@@ -32,14 +32,14 @@ constexpr std::int32_t kFarthest = 1 << 23;        // samples
 constexpr std::uint64_t kRootEntryBytes = 96;      // of a tile or child in the root's table
 constexpr std::uint64_t kLeafNodeBytes = kLeafVoxels * sizeof(float) + 128;
 
-// What is wrong with a file. Thrown through the walk and caught by measure_vdb().
+// A fault of a file. Thrown during the walk and caught by measure_vdb().
 struct Refusal {
   ErrorCode code;
   std::string what;
 };
 [[noreturn]] void damaged(std::string what) { throw Refusal{ErrorCode::invalid_input, std::move(what)}; }
 
-// A file's bytes in order. None beyond its end is read.
+// A file's bytes in order. Never reads beyond its end.
 class Bytes {
  public:
   explicit Bytes(const fs::path& file) : in_(file, std::ios::binary), end_(fs::file_size(file)), buffer_(kBuffer) {}
@@ -103,7 +103,7 @@ class Bytes {
   std::size_t at_ = 0, filled_ = 0;
 };
 
-// Entries of a kind have one size; OpenVDB reads that much, whatever size the file gives.
+// Entries of a kind have one size. OpenVDB reads this many bytes, whatever size the file gives.
 std::optional<std::uint32_t> size_of_kind(std::string_view kind) {
   if (kind == "bool") return 1;
   if (kind == "float" || kind == "int32") return 4;
@@ -120,22 +120,22 @@ void skip_metadata(Bytes& bytes) {
     (void)bytes.text();
     const std::string kind = bytes.text();
     const auto size = bytes.number<std::uint32_t>();
-    // A hint for readers that load a grid bit by bit. forget_delayed_loading() has OpenVDB keep it as plain bytes.
+    // A hint for readers that load a grid gradually. forget_delayed_loading() makes OpenVDB treat it as plain bytes.
     const bool plain = kind == "string" || kind == "__delayedload";
     if (!plain && size_of_kind(kind) != size) damaged("its metadata has an entry of an unknown kind or size");
     bytes.skip(size);
   }
 }
 
-// Nodes of the tree, from the root's children (2) to the leaves (0).
+// Positions in a node of the tree, from the root's children (2) to the leaves (0).
 constexpr std::uint32_t places_of(int level) { return level == 2 ? 1u << 15 : 1u << 12; }
 
-// One grid: topology first, then the values of all leaves in the same order.
+// One grid: the topology first, then the values of all leaves in the same order.
 class GridWalk {
  public:
   GridWalk(Bytes& bytes, const VdbLimits& limits, VdbSize& size) : bytes_(bytes), limits_(limits), size_(size) {}
 
-  // `values`: where the leaves' values begin, as the grid's head says.
+  // `values`: position where the leaves' values begin, from the grid's header.
   void run(std::uint64_t values) {
     compression_ = bytes_.number<std::uint32_t>();
     if ((compression_ & ~kNoZip) != 0) damaged("a grid is compressed in a way that Osteon does not use");
@@ -173,7 +173,7 @@ class GridWalk {
     }
   }
 
-  // The root's table is written in order. A place that comes twice would be read into memory twice.
+  // The root's table is written in order. A position that occurs twice would be loaded into memory twice.
   void next_place(std::optional<Place>& before) {
     const auto place = bytes_.number<Place>();
     for (const std::int32_t c : place)
@@ -212,7 +212,7 @@ class GridWalk {
     return static_cast<std::uint32_t>(active);
   }
 
-  // The values of a node: which of its inactive ones are which, and then its active ones.
+  // The values of a node: which inactive value each position has, followed by the active values.
   void skip_values(std::uint32_t places, std::uint32_t active) {
     constexpr std::uint8_t kOneInactive = 2, kMask = 3, kMaskAndOne = 4, kMaskAndTwo = 5, kAll = 6;
     const auto kind = bytes_.number<std::uint8_t>();
@@ -224,7 +224,7 @@ class GridWalk {
     skip_packed((some ? active : places) * sizeof(float));
   }
 
-  // `unpacked`: bytes that OpenVDB will read them into. It believes the length that the file gives.
+  // `unpacked`: number of bytes that OpenVDB will unpack them into. It trusts the length that the file gives.
   void skip_packed(std::uint64_t unpacked) {
     if ((compression_ & kBlosc) == 0) return bytes_.skip(unpacked);
     const auto length = bytes_.number<std::int64_t>();
@@ -259,7 +259,7 @@ class GridWalk {
   VdbSize& size_;
   std::uint32_t compression_ = 0;
   std::uint64_t counted_ = 0;
-  std::vector<std::uint16_t> leaves_;  // how many values of each are active
+  std::vector<std::uint16_t> leaves_;  // number of active values of each leaf
 };
 
 VdbSize walk(const fs::path& file, const VdbLimits& limits) {

@@ -1,5 +1,5 @@
-// How much a .vdb file would take once it is loaded, told from its bytes alone. OpenVDB allocates what a file declares
-// and does not notice that a file ends. So a file of strangers is walked through here before OpenVDB opens it.
+// Computes from the bytes of a .vdb file how much memory it would take. OpenVDB allocates what a file declares and does
+// not notice when a file ends early. So untrusted files are measured here before OpenVDB opens them.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -18,10 +18,10 @@ struct VdbSize {
   std::uint64_t leaves = 0;  // of the largest grid
 };
 
-// Any thread. Memory: 256 KiB, and two bytes a leaf of one grid. Reads the headers, the topology and the lengths of all
-// compressed parts; values stay compressed. Takes what save_volumes() and save_fields() write: grids of float one
-// behind the other, in format 224, compressed by Blosc or not at all. Whatever follows the last grid is not looked at.
-// Errors: not_found; invalid_input (no such file, or damaged); exhausted (beyond the limits). Each names the file.
+// Any thread. Memory: 256 KiB, and two bytes for each leaf of one grid. Reads the headers, the topology and the lengths
+// of all compressed parts. Values stay compressed. Accepts what save_volumes() and save_fields() write: consecutive
+// grids of float, in format 224, compressed by Blosc or not at all. Data after the last grid is ignored. Errors:
+// not_found; invalid_input (no such file, or damaged); exhausted (beyond the limits). Each names the file.
 [[nodiscard]] Result<VdbSize> measure_vdb(const std::filesystem::path& file, const VdbLimits& limits);
 
 }  // namespace osteon

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kPerNewton = 1e3, kPerNewtonMillimetre = 1e2, kPerMillijoule = 1e3;
 constexpr double kPerMillimetre = 65536.0, kPerRadian = 1048576.0;
-constexpr std::int64_t kMostEnergy = std::int64_t{1} << 53;  // steps that a double still counts one by one
+constexpr std::int64_t kMostEnergy = std::int64_t{1} << 53;  // largest number of steps that a double counts exactly
 constexpr std::uint32_t kMostLag_ms = 60'000;
 
 using Numbers = google::protobuf::RepeatedField<std::int32_t>;
@@ -28,7 +28,7 @@ std::int64_t energy_steps(double mj) {
   return static_cast<std::int64_t>(std::min(std::floor(mj * kPerMillijoule), static_cast<double>(kMostEnergy)));
 }
 
-// Reads on after a number that is wrong; the first such is the error.
+// Continues to read after a wrong number. The first fault is the error.
 class Reading {
  public:
   void expect(bool good, const char* field, const std::string& what) {

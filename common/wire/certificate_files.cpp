@@ -22,7 +22,7 @@ Result<std::string> read(const fs::path& folder, const char* name, const char* w
     return failure(ErrorCode::not_found, folder.string() +
                                              " is no folder; give with --certificates the one that holds " +
                                              "ca.pem, person.pem and person.key");
-  // The two mistakes that are made with what deploy/certs writes.
+  // The two common mistakes with the folders that deploy/certs writes.
   if (!fs::exists(file, unknown) && fs::exists(folder / "server.key", unknown))
     return failure(ErrorCode::not_found, folder.string() + " is the folder of a server; give that of a person with " +
                                              "--certificates, such as certs/people/anna");
@@ -39,7 +39,7 @@ Result<std::string> read(const fs::path& folder, const char* name, const char* w
                      (fs::exists(file, unknown) ? ", is empty or cannot be read" : ", is missing") + kAsk);
 }
 
-// Binary, as Windows exports certificates: one ASN.1 sequence that is as long as it says.
+// Binary, as Windows exports certificates: one ASN.1 sequence whose length matches.
 bool is_der(const std::string& text) {
   const auto byte = [&](std::size_t i) { return static_cast<std::size_t>(static_cast<unsigned char>(text[i])); };
   if (text.size() < 4 || byte(0) != 0x30) return false;

@@ -1,4 +1,4 @@
-// The files of a client's certificate, looked at before anything is sent to a server.
+// Reads and checks the files of a client's certificate before anything is sent to a server.
 #pragma once
 #include <filesystem>
 
@@ -7,9 +7,9 @@
 
 namespace osteon::wire {
 
-// `folder`: with ca.pem, person.pem and person.key. Errors: not_found (a file is missing or empty), invalid_input (it
-// is not what its name says, or the key is not that of the certificate). What depends on the time is left to the
-// server, whose clock counts.
+// `folder` contains ca.pem, person.pem and person.key. Errors: not_found (a file is missing or empty), invalid_input (a
+// file is not what its name says, or the key does not belong to the certificate). Validity times are left to the
+// server, because its clock counts.
 [[nodiscard]] Result<ProbeFiles> read_certificate_files(const std::filesystem::path& folder);
 
 }  // namespace osteon::wire

@@ -10,7 +10,7 @@ namespace {
 using namespace std::chrono_literals;
 using Time = LinkEndpoint::Time;
 
-// Packets that hold the answer to one challenge: at 30 % loss all are lost once in 15000 moves.
+// Number of packets with the answer to one challenge. At 30 % loss, all of them are lost once in 15000 address changes.
 constexpr int kEchoes = 8;
 constexpr Time kPartnerForgotten = 2s;
 
@@ -51,7 +51,7 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   DatagramBuffer plain;
   const auto opened = half_.open(datagram, now, plain);
   if (!opened) return;
-  // All of it is read before anything is believed.
+  // Everything is parsed before anything is used.
   v1::DownPacket packet;
   if (!packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size()))) return half_.malformed();
   const std::string& token = packet.path_challenge();
@@ -83,11 +83,11 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     std::ranges::copy(token, echo_.begin());
     echoes_left_ = kEchoes;
     half_.repeat_news(kEchoes);
-    return;  // a challenge goes where the server does not know yet whether its client is there, and holds nothing else
+    return;  // a packet with a challenge goes to an unproven address and contains nothing else
   }
   half_.is_alive(now);
   half_.heard(packet, *opened, now);
-  // A later time than now is no time of this client's.
+  // A later time than now was not sent by this client.
   if (packet.times().echo_sent_us() != 0 && packet.times().echo_sent_us() <= static_cast<std::uint64_t>(now / 1us))
     arrived_at_ = std::max(arrived_at_, Time(std::chrono::microseconds(packet.times().echo_sent_us())));
   if (opened->newest) {
@@ -124,7 +124,7 @@ std::optional<IndexedEntry> ClientLink::take_entry() {
   return IndexedEntry{entries_.acknowledged(), std::move(*entry)};
 }
 
-// When the state itself asks for a packet.
+// When the state itself needs a packet.
 Time ClientLink::state_due() const {
   if (moved_) return said_at_ + half_.options().state_interval;
   return state_ && at_the_bone(*state_) ? effort_at_ + half_.options().effort_interval : Time::max();
@@ -132,7 +132,7 @@ Time ClientLink::state_due() const {
 
 Time ClientLink::push_due() const { return push_ ? pushed_at_ + half_.options().bone_interval : Time::max(); }
 
-// A part of the packet that goes now, empty where there is nothing new to say.
+// The tool's state for the packet that goes now. Empty if there is nothing new.
 v1::UpPacket ClientLink::state_part(Time now) const {
   v1::UpPacket part;
   const Time interval = half_.options().effort_interval;
@@ -162,7 +162,7 @@ std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t>
   }
   const bool has_room = filler.add(head);
   OSTEON_CHECK(has_room);
-  // Push and state go before repeated cuts, but not before a cut that would never find room beside it.
+  // Load and state go before repeated cuts, but must leave room for the next cut, which otherwise might never be sent.
   v1::UpPacket push;
   if (push_due() <= now) *push.mutable_push() = to_wire(*push_);
   if (push.has_push() && push.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(push)) {

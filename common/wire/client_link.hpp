@@ -1,8 +1,8 @@
-// A haptic client's end of the fast path: its cuts and its tool's state go up in sealed datagrams, what the room
-// decided and what partners' tools do comes down. A state machine that is polled: no socket, no clock, no thread.
+// A haptic client's end of the fast path. It sends its cuts and its tool's state in sealed datagrams. It receives the
+// room's decisions and the states of partners' tools. A state machine that is polled: no socket, no clock, no thread.
 //
-// The stream is always there beside it. What cannot go in datagrams goes over the stream, and both ends put the two
-// together by number: which copy comes first does not matter.
+// The stream always runs beside it and carries what cannot go in datagrams. Both ends merge the two by number, so it
+// does not matter which copy arrives first.
 #pragma once
 #include <cstdint>
 #include <map>
@@ -19,62 +19,64 @@
 
 namespace osteon::wire {
 
-// One thread. `now`: since any start, not before it, the same for all calls.
+// One thread. `now`: since any start, never negative, the same for all calls.
 class ClientLink {
  public:
   using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
-  // The first cut to be pushed has `first_author_seq`, and the first entry to come `first_index`.
+  // `first_author_seq`: number of the first cut to be pushed. `first_index`: index of the first entry to arrive.
   ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq = 1, std::uint64_t first_index = 1,
              const LinkOptions& options = {});
 
-  // As the room has told them over the stream.
+  // As the room has sent them over the stream.
   [[nodiscard]] ToolNumbers& tools() { return tools_; }
 
-  // Every cut of this author, in order, but for those that are decided before it is their turn: an earlier session has
-  // brought them. False: it goes over the stream, since it is too long for a packet or too much is
-  // unacknowledged. While the link is not alive(), every cut above acknowledged() goes over the stream too.
+  // Takes every cut of this author, in order. Cuts decided before their turn may be missing, because an earlier session
+  // sent them. False: send it over the stream, since it is too long for a packet or too much is unacknowledged. While
+  // the link is not alive(), every cut above acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const Cut& cut);
-  // The stream's word: cuts up to here are decided and kept.
+  // The stream reports that cuts up to this one are decided and durable.
   void acknowledge(std::uint64_t author_seq) { half_.acknowledge(author_seq); }
-  // Newest state of the tool, to be called at every state, whose state_seq rises. It goes at once where the tool has
-  // moved by more than the deadband, some 30 times a second while it is at the bone, and now and then in any case.
+  // Newest state of the tool. Call it for every state; state_seq rises. A state is sent at once if the tool has moved
+  // by more than the deadband. It is sent some 30 times a second while the tool touches the bone, and now and then
+  // otherwise.
   void set_state(const CuttingState& state, std::uint32_t buttons);
-  // Newest push on a bone on its mount: it goes once, soon, where none newer comes before.
+  // Newest load on a bone on its mount. It is sent once, soon, unless a newer one replaces it.
   void set_push(const MountLoad& push) { push_ = push; }
 
-  // Anything may come.
+  // Accepts any bytes.
   void receive(std::span<const std::uint8_t> datagram, Time now);
-  // The stream's copy of an entry. False: it has come before, or is too far ahead of what was taken.
+  // The stream's copy of an entry. False: it arrived before, or is too far ahead of what was taken.
   bool offer(const IndexedEntry& entry) { return entries_.offer(entry.index, entry.entry); }
-  // The stream has brought this entry, and before it all that had not been taken here: none of them comes out any more.
+  // The stream has delivered this entry and all entries before it that were not taken here. None of them comes out any
+  // more.
   void heard(std::uint64_t index) { entries_.skip(index); }
-  // Rows in order of their index, each once. An entry of kind streamed comes only after its copy was offered.
+  // Entries in order of their index, each once. An entry of kind streamed comes out only after its copy was offered.
   [[nodiscard]] std::optional<IndexedEntry> take_entry();
 
-  // When send() has something, at `now` or later; to be asked anew after any other call.
+  // When send() has something to send, at `now` or later. Ask again after any other call.
   [[nodiscard]] Time next(Time now) const;
-  // The datagram that is due, to the server, within `into` (kMostDatagramBytes); empty: none.
+  // The datagram that is due to the server, within `into` (kMostDatagramBytes). Empty if there is none.
   [[nodiscard]] std::span<const std::uint8_t> send(Time now, std::span<std::uint8_t> into);
 
-  // Datagrams get through both ways: one has come lately that a server sends only where it knows the client to be, and
-  // it was said that one that went not long ago has arrived.
+  // Datagrams get through in both directions. The server recently sent one that it sends only to a proven address, and
+  // it reported that a recent one of ours arrived.
   [[nodiscard]] bool alive(Time now) const {
     return half_.alive(now) && now - arrived_at_ < 2 * half_.options().alive_for;
   }
-  // Cuts up to this one are decided and kept.
+  // Cuts up to this one are decided and durable.
   [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
-  // Rows up to this one have come, and were taken.
+  // Entries up to this one have arrived and were taken.
   [[nodiscard]] std::uint64_t entries_taken() const { return entries_.acknowledged(); }
-  // As of the newest packet; 0 before the first.
+  // As of the newest packet. 0 before the first.
   [[nodiscard]] std::uint64_t lease_epoch() const { return lease_epoch_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
-  // Tools that were heard of within the last two seconds.
+  // Tools whose state arrived within the last two seconds.
   [[nodiscard]] std::vector<KnownToolState> partners(Time now) const;
-  // The newest place of the bone on its mount, once; nothing where it stands on none.
+  // The newest pose of the bone on its mount, once. Nothing if it stands on none.
   [[nodiscard]] std::optional<MountPose> take_bone() { return std::exchange(bone_, std::nullopt); }
-  // The server's clock as seen from here, and the round trip.
+  // The estimate of the server's clock, and the round trip.
   [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
   [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way up
   [[nodiscard]] const LinkEndpoint& half() const { return half_; }
@@ -93,21 +95,21 @@ class ClientLink {
   LinkEndpoint half_;
   ToolNumbers tools_;
   std::optional<CutSender>
-      sender_;               // codes each cut against the one before it; a new one where that is not in the window
+      sender_;               // codes each cut against the one before it; a new one if that cut is not in the window
   std::uint64_t coded_ = 0;  // the last cut that it coded
   ReceiveWindow<SessionEntry> entries_;
   std::map<std::uint64_t, Partner> partners_;  // by author
   std::uint64_t lease_epoch_ = 0;
   bool frozen_ = false;
   Time arrived_at_ =
-      -std::chrono::hours(1);  // when the newest packet went of which the server says that it has arrived
+      -std::chrono::hours(1);  // when the newest packet was sent of which the server says that it arrived
 
   std::optional<KnownToolState> state_, said_;  // newest, and last sent
-  bool moved_ = false;                      // from the one to the other, by more than the deadband
+  bool moved_ = false;                      // whether they differ by more than the deadband
   Time said_at_ = -std::chrono::hours(1), effort_at_ = said_at_;
-  std::optional<MountLoad> push_;  // newest that has not gone
+  std::optional<MountLoad> push_;  // newest that was not sent yet
   Time pushed_at_ = -std::chrono::hours(1);
-  std::optional<MountPose> bone_;  // newest that was not taken
+  std::optional<MountPose> bone_;  // newest that was not taken yet
   std::uint64_t bone_seq_ = 0;
   PathToken echo_{};
   int echoes_left_ = 0;

@@ -23,7 +23,7 @@ ConnectionFault lasting(ErrorCode code, std::string sentence) { return {{code, s
 std::string now_text() { return text_of(std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now())); }
 std::string clock_text() { return "this machine's clock says " + now_text(); }
 
-// What an alert of TLS (RFC 8446, section 6.2) says of the certificate that was shown; X509_V_OK: nothing.
+// What a TLS alert (RFC 8446, section 6.2) says about the certificate that we showed. X509_V_OK: nothing.
 int fault_of_alert(int alert) {
   switch (alert) {
     case SSL_AD_CERTIFICATE_EXPIRED:
@@ -34,7 +34,7 @@ int fault_of_alert(int alert) {
       return X509_V_ERR_UNABLE_TO_GET_ISSUER_CERT;
     case SSL_AD_UNSUPPORTED_CERTIFICATE:
       return X509_V_ERR_INVALID_PURPOSE;
-    case SSL_AD_BAD_CERTIFICATE:  // which OpenSSL says also of one that does not hold yet
+    case SSL_AD_BAD_CERTIFICATE:  // OpenSSL sends this also for a certificate that is not valid yet
     case SSL_AD_CERTIFICATE_UNKNOWN:
     case SSL_AD_ACCESS_DENIED:
       return X509_V_ERR_APPLICATION_VERIFICATION;
@@ -43,7 +43,7 @@ int fault_of_alert(int alert) {
   }
 }
 
-// What is looked at of a connection that failed.
+// Finds out why a connection failed.
 class Diagnosis {
  public:
   Diagnosis(const std::string& address, const ClientCredentials& credentials)
@@ -92,22 +92,22 @@ class Diagnosis {
 
   [[nodiscard]] ConnectionFault no_tls() const {
     const std::string& first = probe_.first_bytes;
-    // The head of a SETTINGS frame, with which a server of HTTP/2 begins: three bytes of length, then its type.
+    // The start of a SETTINGS frame, which an HTTP/2 server sends first: three bytes of length, then the type.
     constexpr char kSettings = 4;
     if (first.size() > 3 && first[0] == 0 && first[3] == kSettings) {
       if (is_plain()) return slow();
       return lasting(ErrorCode::invalid_input,
-                     "the server at " + address_ + " speaks plain text, and you come with a " +
+                     "the server at " + address_ + " uses plain text, but you gave a " +
                          "certificate; give --plain in place of --certificates and --ticket, " +
                          "or start the server with --certificates");
     }
     if (!first.empty()) return not_osteon();
     if (probe_.is_closed)
       return for_now("what listens at " + address_ +
-                     " closes the connection without a word; it is no Osteon server, or " +
+                     " closes the connection without an answer; it is no Osteon server, or " +
                      "one that is full: see --most-connections of the server and the limits of a proxy");
     return for_now("what listens at " + address_ +
-                   " takes the connection and says nothing; it is no Osteon server, or " +
+                   " accepts the connection and sends nothing; it is no Osteon server, or " +
                    "one that hangs: look at its log, or start it anew");
   }
 
@@ -124,7 +124,7 @@ class Diagnosis {
 
   [[nodiscard]] ConnectionFault tls_for_plain() const {
     return lasting(ErrorCode::invalid_input, "the server at " + address_ +
-                                                 " asks for a certificate, and you come with " +
+                                                 " asks for a certificate, but you gave " +
                                                  "--plain; give --certificates DIR with --ticket FILE in its place");
   }
 
@@ -137,7 +137,7 @@ class Diagnosis {
     return probe_.is_closed ? own_fault() : slow();
   }
 
-  // Of the server's certificate.
+  // A fault of the server's certificate.
   [[nodiscard]] ConnectionFault server_fault() const {
     const std::string authority = (folder_ / "ca.pem").string();
     const Validity valid = probe_.shown ? validity_of(*probe_.shown) : Validity{};
@@ -171,8 +171,8 @@ class Diagnosis {
     }
   }
 
-  // Of our own certificate: by the alert of TLS that came, or by its own text where the server said nothing. This is
-  // how a server of ours ends a handshake that it refuses: the reason stands in its log alone.
+  // A fault of our own certificate: by the TLS alert that arrived, or by the certificate itself if the server sent
+  // none. Our server ends a refused handshake without an alert and writes the reason only to its log.
   [[nodiscard]] ConnectionFault own_fault() const {
     const std::vector<X509Ptr> chain = certificates_of(files_.certificate);
     int fault = fault_of_alert(probe_.alert);
@@ -183,7 +183,7 @@ class Diagnosis {
     const auto denied = [](std::string sentence) { return lasting(ErrorCode::denied, std::move(sentence)); };
     if (is_unknown_authority(fault))
       return denied("the server at " + address_ + " does not know the authority of " + own +
-                    "and takes no such certificate; ask whoever runs the server for one of its authority");
+                    "and accepts no such certificate; ask whoever runs the server for one of its authority");
     switch (fault) {
       case X509_V_ERR_CERT_HAS_EXPIRED:
         return denied(own + "has expired: it holds until " + text_of(valid.ends) +
@@ -196,7 +196,7 @@ class Diagnosis {
       case X509_V_ERR_INVALID_PURPOSE:
         return denied(own + "is not for a person; whoever runs the server makes one with deploy/certs person");
       default:
-        // Also for some seconds where too many calls came from there: a later try may find it otherwise.
+        // This happens also for some seconds after too many calls from one address. A later try may succeed.
         return for_now("the server at " + address_ + " refuses " + own +
                        "though it is in time and of the authority in ca.pem: most likely it was revoked; ask whoever " +
                        "runs the server, whose log says why");

@@ -1,4 +1,4 @@
-// Why a client got no connection to a server, found out by one more connection.
+// Finds out why a client could not connect to a server, by one more connection.
 #pragma once
 #include <chrono>
 #include <string>
@@ -10,9 +10,9 @@ namespace osteon::wire {
 
 struct ConnectionFault {
   Error error;         // one sentence: what is wrong, and the remedy
-  bool lasts = false;  // it does not go away by waiting
+  bool lasts = false;  // waiting does not help
 };
-// `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds; carries no
+// `address`: HOST:PORT, where a connection with `credentials` has just failed. Takes at most three seconds. Sends no
 // call and no ticket. deploy/docs/troubleshooting.md lists the sentences.
 [[nodiscard]] ConnectionFault connection_fault(const std::string& address, const ClientCredentials& credentials);
 

@@ -13,14 +13,14 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
 }
 
 constexpr double kMostOfATool =
-    1e6;  // of its force in N, its speed in 1/min and so on: beyond it the steps of packets end
+    1e6;  // limits a tool's force in N, its speed in 1/min and so on: the steps of packets end there
 bool all_of_a_tool(std::initializer_list<double> values) {
   return std::ranges::all_of(values,
-                             [](double v) { return std::abs(v) <= kMostOfATool; });  // also not where it is no number
+                             [](double v) { return std::abs(v) <= kMostOfATool; });  // also false for NaN
 }
 
-constexpr double kFurthest_mm = 1e5;  // no bone is there, and beyond it the steps of packets end
-// Of what is up in a picture: how far its length may be from 1, and the sine of the least angle to the line of sight.
+constexpr double kFurthest_mm = 1e5;  // no bone is farther away, and the steps of packets end there
+// For the up direction of a picture: tolerance of its length, and sine of the smallest angle to the line of sight.
 constexpr double kUnitWithin = 1e-3, kLeastAcross = 0.01;
 
 bool is_up(const Vec3& up, const Vec3& sight) {
@@ -105,7 +105,7 @@ v1::FieldLeaf to_wire(const FieldLeaf& leaf) {
   out.set_level(static_cast<std::uint32_t>(leaf.level));
   *out.mutable_origin() = to_wire(leaf.origin);
   std::string* bytes = out.mutable_values();
-  // Most leaves of a piece's field are gone throughout.
+  // Most leaves of a fragment's field are wholly cut away.
   const bool constant = std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == leaf.values.front(); });
   bytes->resize(2 * (constant ? 1 : leaf.values.size()));
   for (std::size_t i = 0; 2 * i < bytes->size(); ++i) {
@@ -174,15 +174,15 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   if (!tool) return failure(ErrorCode::invalid_input, "pose_bone_tool." + tool.error().message);
   const auto device = from_wire(state.pose_bone_device());
   if (!device) return failure(ErrorCode::invalid_input, "pose_bone_device." + device.error().message);
-  if (tool->position_mm.norm() > kFurthest_mm) return bad("pose_bone_tool", "is no place near the bone");
-  if (device->position_mm.norm() > kFurthest_mm) return bad("pose_bone_device", "is no place near the bone");
+  if (tool->position_mm.norm() > kFurthest_mm) return bad("pose_bone_tool", "is not near the bone");
+  if (device->position_mm.norm() > kFurthest_mm) return bad("pose_bone_device", "is not near the bone");
   out.pose_bone_tool = *tool;
   out.pose_bone_device = *device;
   out.tool_name = state.tool_name();
   out.force_physical_N = from_wire(state.force_physical_n());
   if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
                       state.torque_n_mm(), state.depth_mm(), out.force_physical_N.norm()}))
-    return bad("cutting state", "has a number that is not finite, or that no tool has");
+    return bad("cutting state", "has a number that is not finite or too large for a tool");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
   out.density_g_cm3 = state.density_g_cm3();
@@ -289,8 +289,8 @@ Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
 Result<ViewFrustum> from_wire(const v1::ViewFrustum& look) {
   ViewFrustum out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
   const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthest_mm; };
-  if (!placed(out.eye_mm)) return bad("look.eye_mm", "is no place near the bone");
-  if (!placed(out.target_mm)) return bad("look.target_mm", "is no place near the bone");
+  if (!placed(out.eye_mm)) return bad("look.eye_mm", "is not near the bone");
+  if (!placed(out.target_mm)) return bad("look.target_mm", "is not near the bone");
   if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad("look.pixel_rad", "must be between 0 and 1");
   if (!(out.view_rad > 0.0 && out.view_rad < 1.5)) return bad("look.view_rad", "must be between 0 and 1.5");
   if (!look.has_up()) return out;
@@ -336,7 +336,7 @@ Result<Restrictions> from_wire(const v1::Restrictions& supervision) {
   out.stopped = supervision.stopped();
   out.taken_by = {supervision.taken_by()};
   out.guide = {supervision.guide()};
-  // What is beyond 31 bits is beyond every limit, too.
+  // A value beyond 31 bits exceeds every limit, too.
   out.guide_share = static_cast<int>(std::min<std::uint32_t>(supervision.guide_share(), INT32_MAX));
   out.force_limit = static_cast<int>(std::min<std::uint32_t>(supervision.force_limit(), INT32_MAX));
   if (supervision.has_zone()) {

@@ -1,4 +1,5 @@
-// Between the generated protocol types and ours. The only place beside the programs' net/ that sees generated types.
+// Converts between the generated protocol types and ours. Beside the net/ folders of the programs, only this library
+// sees generated types.
 #pragma once
 #include <optional>
 
@@ -25,7 +26,7 @@ namespace osteon::wire {
 [[nodiscard]] Coord from_wire(const v1::Coord& c);
 [[nodiscard]] v1::Cut to_wire(const Cut& cut);
 [[nodiscard]] v1::CuttingState to_wire(const CuttingState& state);
-[[nodiscard]] v1::FieldLeaf to_wire(const FieldLeaf& leaf);  // one value when all are equal
+[[nodiscard]] v1::FieldLeaf to_wire(const FieldLeaf& leaf);  // one value if all are equal
 [[nodiscard]] v1::SceneItem to_wire(const SceneItem& item);
 [[nodiscard]] v1::ToolDefinition to_wire(const Tool& tool);
 [[nodiscard]] v1::ViewFrustum to_wire(const ViewFrustum& look);
@@ -33,19 +34,20 @@ namespace osteon::wire {
 [[nodiscard]] v1::Annotation to_wire(const Annotation& annotation);
 [[nodiscard]] std::string to_wire(const Digest& digest);
 
-// Error invalid_input, naming the field, for anything a correct peer never sends: wrong counts, numbers that are not
-// finite, quaternions far from unit, unknown enums, levels out of range.
+// Error invalid_input, naming the field, for anything that a correct peer never sends: wrong counts, numbers that are
+// not finite, quaternions far from unit length, unknown enums, levels out of range.
 [[nodiscard]] Result<Pose> from_wire(const v1::Pose& pose);
 [[nodiscard]] Result<Cut> from_wire(const v1::Cut& cut);
 [[nodiscard]] Result<CuttingState> from_wire(const v1::CuttingState& state);
 [[nodiscard]] Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf);
 [[nodiscard]] Result<SceneItem> from_wire(const v1::SceneItem& item);
 [[nodiscard]] Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request);
-[[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // by the rules of tool files
+[[nodiscard]] Result<Tool> from_wire(const v1::ToolDefinition& tool);  // checked by the rules of tool files
 [[nodiscard]] Result<BlockKey> key_from_wire(const v1::MeshBlock& block);
 [[nodiscard]] Result<ViewFrustum> from_wire(const v1::ViewFrustum& look);
-[[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);  // by check(); tools in any order
-[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);       // by check()
+// checked by check(); tools in any order
+[[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);
+[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);       // checked by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

@@ -17,7 +17,7 @@ constexpr const char* kWays =
     "--certificates DIR with --ticket FILE, as whoever runs the server gives them to you, or --plain for a server on "
     "this machine";
 
-// Without the line's end. Empty: there is nothing, or it cannot be read.
+// Without the end of line. Empty: there is nothing, or it cannot be read.
 std::string first_word(const std::filesystem::path& file) {
   std::error_code unknown;
   std::string text;
@@ -25,7 +25,7 @@ std::string first_word(const std::filesystem::path& file) {
   return text;
 }
 
-// gRPC ends the process of whoever sends other bytes in a header.
+// gRPC aborts the process if a header contains other bytes.
 bool is_ascii(const std::string& text) {
   return std::ranges::all_of(text, [](char c) { return c > ' ' && c <= '~'; });
 }
@@ -36,17 +36,17 @@ void add_credential_options(CLI::App& app, CredentialArguments& arguments) {
   app.add_option("--certificates", arguments.certificates,
                  "Folder with ca.pem, person.pem and person.key: who the server is, and who you are");
   app.add_option("--ticket", arguments.ticket,
-                 "File with the ticket that says which room you may come into, and in what role");
+                 "File with the ticket that says which room you may enter, and in which role");
   app.add_flag("--plain", arguments.plain,
-               "Plain text without a certificate, to a server on this machine that was started so");
+               "Plain text without a certificate, to a server on this machine that was started with --plain");
 }
 
 Result<ClientCredentials> client_credentials(const CredentialArguments& arguments) {
   if (arguments.plain && (!arguments.certificates.empty() || !arguments.ticket.empty()))
-    return failure(ErrorCode::invalid_input, "--plain goes without --certificates and --ticket; give one or the other");
+    return failure(ErrorCode::invalid_input, "--plain excludes --certificates and --ticket; give one or the other");
   if (arguments.plain) return ClientCredentials{};
   if (arguments.certificates.empty() || arguments.ticket.empty())
-    return failure(ErrorCode::invalid_input, std::string("say how to come to the server: ") + kWays);
+    return failure(ErrorCode::invalid_input, std::string("say how to connect to the server: ") + kWays);
   ClientCredentials credentials{.certificates = arguments.certificates, .ticket = arguments.ticket};
   const std::string ticket = first_word(credentials.ticket);
   if (ticket.empty())
@@ -66,7 +66,7 @@ Result<std::shared_ptr<grpc::ChannelCredentials>> channel_credentials(const Clie
                                                                       const std::string& address) {
   if (credentials.certificates.empty()) {
     if (is_loopback(address.substr(0, address.rfind(':')))) return grpc::InsecureChannelCredentials();
-    return failure(ErrorCode::invalid_input, "plain text goes to a server on this machine alone, and " + address +
+    return failure(ErrorCode::invalid_input, "plain text is only for a server on this machine, and " + address +
                                                  " is another; give --certificates DIR with --ticket FILE");
   }
   const Result<ProbeFiles> files = read_certificate_files(credentials.certificates);

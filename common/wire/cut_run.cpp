@@ -26,7 +26,7 @@ std::uint64_t zigzag(std::int64_t value) {
 }
 std::int64_t unzigzag(std::uint64_t value) { return static_cast<std::int64_t>(value >> 1 ^ (0 - (value & 1))); }
 
-// Reads what was put; after the first fault everything is 0 and `good` false.
+// Reads coded values. After the first fault every value is 0 and `good` is false.
 struct Reader {
   std::string_view rest;
   bool good = true;
@@ -50,8 +50,7 @@ struct Reader {
   }
 };
 
-// A pose as its seven numbers; those of the rotation count in 16 bits, and all wrap round, so that any pose can follow
-// any.
+// A pose as its seven numbers. Those of the rotation have 16 bits. All wrap around, so any pose can follow any other.
 using Numbers = std::array<std::uint32_t, 7>;
 constexpr std::size_t kPositions = 3;
 constexpr std::uint8_t kSecondOrder = 128;
@@ -70,7 +69,7 @@ QuantisedPose pose_of(const Numbers& numbers) {
   return out;
 }
 
-// The signed difference a - b, the short way round.
+// The signed difference a - b, with wrap-around.
 std::int64_t difference(const Numbers& a, const Numbers& b, std::size_t i) {
   return i < kPositions ? static_cast<std::int32_t>(a[i] - b[i]) : static_cast<std::int16_t>(a[i] - b[i]);
 }
@@ -98,7 +97,7 @@ std::string coded_knot(const Numbers& knot, const Numbers& expected, std::uint8_
   return out;
 }
 
-// `before`: whose time and speed this cut mostly has, or nearly.
+// `before`: the previous cut, which mostly has about the same time and speed.
 void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, const Cut& before) {
   const bool own_first = cut.path.empty() || cut.path.front() != from;
   const bool own_time = cut.path_us != before.path_us, own_speed = cut.spindle_rpm != before.spindle_rpm;
@@ -117,7 +116,8 @@ void put_cut(std::string& out, const Cut& cut, const QuantisedPose& from, const 
   }
 }
 
-// Appends to `cut`, whose other fields are there; `cut.path_us` and `cut.spindle_rpm` are those of the cut before.
+// Appends to the path of `cut`, whose other fields are set. `cut.path_us` and `cut.spindle_rpm` are those of the
+// previous cut.
 bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
   const std::uint64_t what = in.varint();
   const std::uint64_t knots = what >> 3;
@@ -127,14 +127,14 @@ bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
     cut.path_us = static_cast<std::uint32_t>(path_us);
   }
   if ((what & 4) != 0) {
-    // A sum beyond what a number holds wraps round, and is no speed either.
+    // An overflowing sum wraps around and gives no valid speed.
     const auto speed = static_cast<std::int64_t>(cut.spindle_rpm + static_cast<std::uint64_t>(unzigzag(in.varint())));
     if (speed < 0 || speed > std::numeric_limits<std::uint32_t>::max()) return false;
     cut.spindle_rpm = static_cast<std::uint32_t>(speed);
   }
   if ((what & 2) == 0) cut.path.push_back(from);
   Numbers last = numbers_of(from), by{};
-  for (std::uint64_t k = 0; k < knots; ++k) {  // each takes a byte at least, so the bytes bound them
+  for (std::uint64_t k = 0; k < knots; ++k) {  // each takes at least one byte, so the size of the input limits them
     const std::uint8_t flag = in.byte();
     Numbers knot = (flag & kSecondOrder) != 0 ? moved(last, by) : last;
     for (std::size_t i = 0; i < knot.size(); ++i) {
@@ -152,7 +152,7 @@ bool get_cut(Reader& in, Cut& cut, const QuantisedPose& from) {
   return in.good;
 }
 
-// Everything that the cuts of a run have in common.
+// Whether the cuts can be in one run: all fields that a run shares are equal.
 bool same_run(const Cut& a, const Cut& b) {
   return a.author == b.author && a.lease_epoch == b.lease_epoch && a.body == b.body && a.tool == b.tool &&
          a.level == b.level;
@@ -187,7 +187,7 @@ v1::CutRun head_of(const Cut& cut, const RunState& before, const ToolNumbers& to
   return head;
 }
 
-// The state before a run's first cut, its fields being those of that cut.
+// The state before a run's first cut. The fields of `last` are those of that cut.
 Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNumbers& tools) {
   RunState state;
   state.last.author = author;
@@ -218,7 +218,7 @@ Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNum
   return state;
 }
 
-// The item of an entry that is no cut is a piece of a packet by itself.
+// The item of an entry that is not a cut. It is a part of a packet by itself.
 SendItem piece_of(const SessionEntry& entry, std::uint64_t index) {
   v1::DownPacket packet;
   if (entry.kind == SessionEntryKind::rejected) {

@@ -11,13 +11,13 @@ namespace {
 using namespace std::chrono_literals;
 using Time = LinkEndpoint::Time;
 
-// What a packet holds beside items and states, at most: the seal, times, acknowledgement, a path token, epoch and
+// Largest size of a packet's content beside items and states: the seal, times, acknowledgement, a path token, epoch and
 // frozen.
 constexpr std::size_t kFixedBytes = kSealBytes + 57 + 22 + 18 + 14;
 
 std::uint64_t in_us(Time time) { return static_cast<std::uint64_t>(time / 1us); }
 
-// Nothing for what no clock shows.
+// Nothing for a time that no clock shows.
 std::optional<Time> from_us(std::uint64_t us) {
   constexpr std::uint64_t kMost_us = std::uint64_t{1} << 50;  // 36 years
   return us < kMost_us ? std::optional<Time>(std::chrono::microseconds(us)) : std::nullopt;
@@ -61,7 +61,7 @@ void LinkEndpoint::heard(const v1::PacketTimes& times, const Opened& opened, Tim
     peer_sent_us_ = times.sent_us();
     peer_came_ = now;
   }
-  // Nothing of ours had come yet, or it speaks of packets that never went.
+  // None of our packets had arrived yet, or the report names packets that were never sent.
   if (times.received_counter() == 0 || times.received_counter() >= sealer_.counter() ||
       times.received_packets() > counts_.packets_sent)
     return;
@@ -81,7 +81,7 @@ bool LinkEndpoint::acknowledge(std::uint64_t upto, std::uint64_t beyond) {
     window_.acknowledge(upto, beyond);
     return true;
   }
-  // It has come over the stream, before any packet held it. What is left was in no packet either.
+  // The item arrived over the stream before any packet contained it. The remaining items were in no packet either.
   sent_upto_ = std::min(upto, window_.next() - 1);
   const bool known = window_.restart(sent_upto_);
   OSTEON_CHECK(known);
@@ -92,7 +92,7 @@ bool LinkEndpoint::begin(std::uint64_t number) {
   OSTEON_CHECK(number > last_);
   last_ = number;
   if (window_.empty() && window_.next() != number) {
-    // All before went over the stream.
+    // All earlier items went over the stream.
     window_ = SendWindow(options_.window, number);
     if (const auto reading = peer_came_ ? clock_.at(*peer_came_) : std::nullopt)
       window_.set_round_trip(reading->round_trip);
@@ -104,9 +104,8 @@ bool LinkEndpoint::begin(std::uint64_t number) {
 }
 
 Time LinkEndpoint::keep_alive_interval() const {
-  // The other end gives this one up when all packets of `alive_for` were lost: k of them, with loss^k <= 10^-4. One
-  // more, as delays vary. Before anything is known of the path it is taken for a bad one, so that the first packet soon
-  // gets through.
+  // The other end gives up when all packets of `alive_for` are lost: k packets, with loss^k <= 10^-4. One more is added
+  // because delays vary. An unknown path counts as a bad one, so that the first packet gets through soon.
   const double loss = received_at_ ? std::clamp(rate_.loss(), 0.01, 0.5) : 0.5;
   const auto packets = static_cast<int>(std::ceil(std::log(1e-4) / std::log(loss))) + 1;
   return options_.alive_for / packets;
@@ -117,7 +116,7 @@ Time LinkEndpoint::next(Time now, Time wanted) const {
   if (answer_due_ || news_left_ > 0) wanted = now;
   if (const auto due = window_.next_due(now, rate_.repeats())) wanted = std::min(wanted, *due);
   const Time keep_alive = *sent_at_ + keep_alive_interval();
-  // Where nobody answers, packets only ask whether anybody is there again.
+  // If nobody answers, packets only test whether the other end is back.
   wanted = alive(now) ? std::min(wanted, keep_alive) : keep_alive;
   return rate_.next(now, wanted, kFixedBytes + window_.least_room(now), fresh(now));
 }
@@ -125,7 +124,7 @@ Time LinkEndpoint::next(Time now, Time wanted) const {
 bool LinkEndpoint::fresh(Time now) const { return alive(now) && window_.holds_fresh(); }
 
 std::size_t LinkEndpoint::room(Time now) const {
-  constexpr std::size_t kAsking = 280;  // where perhaps nobody hears it
+  constexpr std::size_t kAsking = 280;  // used while the other end may be unreachable
   const std::size_t budget = rate_.budget(now, fresh(now));
   return (alive(now) ? budget : std::min(budget, kAsking)) - kSealBytes;
 }

@@ -1,5 +1,5 @@
-// What the two ends of the fast path have in common: sealing, when a packet goes, which items it repeats, and what the
-// other end says of those that came. ClientLink and ServerLink add what is in the packets.
+// The common part of both ends of the fast path: sealing, when a packet goes, which items it repeats, and the other
+// end's reports about received packets. ClientLink and ServerLink add the contents of packets.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -20,74 +20,75 @@ struct LinkOptions {
   SendRateParams rate;
   SealRules seal;
   SendWindowLimits window{.bytes_per_head = kRunBytes};
-  std::uint64_t most_ahead = 1024;  // items that came and wait for one before them
-  // Nothing heard for so long: the link counts as dead, and what it carries goes over the stream as well.
+  std::uint64_t most_ahead = 1024;  // items that arrived and wait for an earlier one
+  // After this time without a packet the link counts as dead. Its content then goes over the stream as well.
   std::chrono::nanoseconds alive_for = std::chrono::milliseconds(500);
-  // At 30 % loss each way all challenges are lost in one move of 1000, and the others take less than a second.
+  // At 30 % loss each way all challenges are lost in one address change of 1000. The others take less than a second.
   PathRules path{.retry_after = std::chrono::milliseconds(100), .tries = 6};
   PoseDeadband deadband;
   std::chrono::nanoseconds effort_interval = std::chrono::milliseconds(33);  // between forces and the like of one tool
-  std::chrono::nanoseconds state_interval = std::chrono::milliseconds(16);   // between states of one tool that moves
+  std::chrono::nanoseconds state_interval = std::chrono::milliseconds(16);   // between states of one moving tool
   std::chrono::nanoseconds bone_interval =
-      std::chrono::milliseconds(8);  // between pushes, and between places of the bone
-  std::chrono::nanoseconds times_interval = std::chrono::milliseconds(30);  // between packets that hold times
+      std::chrono::milliseconds(8);  // between loads, and between poses of the bone
+  std::chrono::nanoseconds times_interval = std::chrono::milliseconds(30);  // between packets that contain times
 };
-// The way down has no limit as tight as the way up, and what a session is told waits for its next packet.
+// The rate limit down is not as tight as the one up, and what a session receives waits for its next packet.
 [[nodiscard]] LinkOptions server_link_options();
 
 struct LinkCounts {
   std::uint64_t packets_sent = 0, bytes_sent = 0;          // sealed, without headers of UDP and IP
-  std::uint64_t packets_received = 0, bytes_received = 0;  // authentic ones, each once
-  std::uint64_t malformed = 0;  // authentic, but not what a correct peer sends: nothing was taken from them
+  std::uint64_t packets_received = 0, bytes_received = 0;  // authentic packets, each counted once
+  std::uint64_t malformed = 0;  // authentic, but not what a correct peer sends; nothing was taken from them
   std::uint64_t left_out = 0;   // runs whose tool was not known yet
   std::uint64_t streamed = 0;   // items that could only go over the stream
 };
 
-// Items are numbered one by one. Those that cannot go in packets come to the other end over the stream, under their
-// number; to the window they are items without bytes, which are acknowledged as all others are. One thread; times since
-// any start, not before it.
+// Items are numbered one by one. Items that cannot go in packets reach the other end over the stream, under their
+// number. In the window they are items without bytes, which are acknowledged like all others. One thread. Times are
+// since any start, never negative.
 class LinkEndpoint {
  public:
   using Time = std::chrono::nanoseconds;
 
-  // `first`: number of the first item to go out.
+  // `first`: number of the first item to send.
   LinkEndpoint(std::uint32_t session, const SealKey& out, const SealKey& in, std::uint64_t first,
                const LinkOptions& options);
   LinkEndpoint(const LinkEndpoint&) = delete;
   LinkEndpoint& operator=(const LinkEndpoint&) = delete;
 
-  // --- what comes
-  // The plain bytes of an authentic datagram that was not here before, within `into` (kMostDatagramBytes).
+  // --- receiving
+  // The plain bytes of an authentic datagram that did not arrive before, within `into` (kMostDatagramBytes).
   [[nodiscard]] std::optional<Opened> open(std::span<const std::uint8_t> datagram, Time now,
                                            std::span<std::uint8_t> into);
   void malformed() { ++counts_.malformed; }
   void left_out(std::uint64_t runs) { counts_.left_out += runs; }
-  // What a packet says of ours. What no correct peer says is ignored.
+  // Processes what a packet reports about our packets. Reports that no correct peer makes are ignored.
   template <class Packet>
   void heard(const Packet& packet, const Opened& opened, Time now) {
     if (packet.has_times()) heard(packet.times(), opened, now);
     acknowledge(packet.acknowledged(), packet.acknowledged_beyond());
   }
-  // The other end is there, by a packet that shows that it can be reached.
+  // Marks the other end as alive, by a packet which shows that it can be reached.
   void is_alive(Time now) { received_at_ = now; }
-  // See SendWindow::acknowledge; `upto` may lie beyond what ever went in packets. False where no such item exists.
+  // See SendWindow::acknowledge. `upto` may lie beyond all items that were ever in packets. False if no such item
+  // exists.
   bool acknowledge(std::uint64_t upto, std::uint64_t beyond = 0);
 
-  // --- what goes
-  // The next item is this one, and the window is ready for it. False where it has to go over the stream. Every item is
-  // announced here, in order, but for those that the other end is known to have.
+  // --- sending
+  // Announces the next item and prepares the window for it. False if the item must go over the stream. Every item is
+  // announced here, in order, except those that the other end is known to have.
   [[nodiscard]] bool begin(std::uint64_t number);
   void goes_over_stream() { ++counts_.streamed; }
-  // An acknowledgement has something to say, and goes with the next packet.
+  // There is something to acknowledge. It goes with the next packet.
   void answer() { answer_due_ = true; }
-  // News that nobody acknowledges go at once, in so many packets, as some are lost.
+  // News that nobody acknowledges goes at once, in this many packets, because some are lost.
   void repeat_news(int packets) { news_left_ = std::max(news_left_, packets); }
 
-  // When a packet goes, where the end itself wants one at `wanted` (Time::max(): not at all).
+  // When a packet goes. `wanted`: when the caller wants one; Time::max(): not at all.
   [[nodiscard]] Time next(Time now, Time wanted) const;
-  // Plain bytes of the packet that goes now.
+  // Plain bytes that the next packet may have.
   [[nodiscard]] std::size_t room(Time now) const;
-  // Its beginning. `acknowledged`, `beyond`: of what came (ReceiveWindow).
+  // The first part of a packet. `acknowledged`, `beyond`: of received items (ReceiveWindow).
   template <class Packet>
   [[nodiscard]] Packet head(Time now, std::uint64_t acknowledged, std::uint64_t beyond) {
     Packet packet;
@@ -104,12 +105,12 @@ class LinkEndpoint {
     const SendWindow::Picked picked = filler.add_items(window_, now, rate_.repeats());
     if (!picked.numbers.empty()) sent_upto_ = std::max(sent_upto_, picked.numbers.back());
   }
-  // The datagram at the beginning of `into` (kMostDatagramBytes), counted as one that went now.
+  // Seals a datagram into the beginning of `into` (kMostDatagramBytes), and counts it as sent now.
   std::span<const std::uint8_t> seal(std::string_view plain, Time now, std::span<std::uint8_t> into);
-  // One that goes beside the pace.
+  // Seals a datagram that is outside the pace.
   std::span<const std::uint8_t> seal_beside(std::string_view plain, Time now, std::span<std::uint8_t> into);
 
-  // --- how it fares
+  // --- state
   [[nodiscard]] bool alive(Time now) const { return received_at_ && now - *received_at_ < options_.alive_for; }
   [[nodiscard]] std::uint64_t acknowledged() const { return acknowledged_; }
   [[nodiscard]] SendWindow& window() { return window_; }
@@ -133,11 +134,11 @@ class LinkEndpoint {
   SendRate rate_;
   ClockOffset clock_;
   LinkCounts counts_;
-  std::uint64_t last_;          // item that was announced
+  std::uint64_t last_;          // last item that was announced
   std::uint64_t acknowledged_;  // every item up to this one
-  std::uint64_t sent_upto_;     // every item up to this one was in a packet, or has arrived without
-  std::uint64_t newest_ = 0;    // counter that came
-  // Of the newest packet with times: as it says itself, and when it came.
+  std::uint64_t sent_upto_;     // every item up to this one was in a packet, or arrived without one
+  std::uint64_t newest_ = 0;    // newest counter received
+  // Of the newest packet with times: its own send time, and when it arrived.
   std::uint64_t peer_sent_us_ = 0;
   std::optional<Time> peer_came_;
   std::optional<Time> received_at_, sent_at_, timed_at_;

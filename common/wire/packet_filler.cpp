@@ -19,7 +19,7 @@ void put_field(std::string& out, int field, const std::string& bytes) {
   out += bytes;
 }
 
-// Where runs are in a packet, and the items in a run.
+// The fields of a packet that contain runs, and the field of a run that contains its items.
 template <class Packet>
 struct Fields;
 template <>
@@ -51,7 +51,7 @@ SendWindow::Picked PacketFiller<Packet>::add_items(SendWindow& window, SendWindo
   for (const std::uint64_t number : picked.numbers) {
     const SendItem& item = window.item(number);
     if (item.head.empty()) {
-      bytes_ += item.bytes;  // a piece of a packet by itself
+      bytes_ += item.bytes;  // a part of a packet by itself
       continue;
     }
     std::size_t run = runs.size();

@@ -9,25 +9,26 @@
 
 namespace osteon::wire {
 
-// What a packet takes for a run beside its head and its items: two tags and two lengths below 16 KiB. For
+// Bytes of a run beside its head and items: two tags and two lengths below 16 KiB. For
 // SendWindowLimits::bytes_per_head.
 inline constexpr std::size_t kRunBytes = 6;
 
-// Parts of a packet may be joined byte to byte, so each is added if it fits. `Packet`: v1::UpPacket or v1::DownPacket.
+// Parts of a packet may be concatenated byte by byte, so each part is added if it fits. `Packet`: v1::UpPacket or
+// v1::DownPacket.
 template <class Packet>
 class PacketFiller {
  public:
-  // `most_bytes`: of the plain packet, before sealing.
+  // `most_bytes`: largest plain packet, before sealing.
   explicit PacketFiller(std::size_t most_bytes) : most_bytes_(most_bytes) {}
 
-  // A packet with only some fields set. False, and nothing is added, where it does not fit. Messages within must not be
-  // in two parts, or they would be merged; repeated fields go on.
+  // Adds a packet with only some fields set. False, with nothing added, if it does not fit. A nested message must not
+  // be in two parts, because they would be merged. Repeated fields may be.
   bool add(const Packet& part);
-  // The items that the window picks for what room there is.
+  // Adds the items that the window picks for the room that is left.
   SendWindow::Picked add_items(SendWindow& window, SendWindow::Time now, int repeats);
 
   [[nodiscard]] std::size_t room() const { return most_bytes_ - bytes_.size(); }
-  [[nodiscard]] std::string take() { return std::move(bytes_); }  // once
+  [[nodiscard]] std::string take() { return std::move(bytes_); }  // call once
 
  private:
   std::size_t most_bytes_;

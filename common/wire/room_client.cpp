@@ -22,17 +22,17 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a piece of a case is 1 MiB, a mesh message about 256 kB
+constexpr int kMaxReceiveBytes = 4 * 1024 * 1024;  // a part of a case is 1 MiB, a mesh message about 256 kB
 constexpr auto kAnswerTime = 5s;                   // for one request to a server that was reached
-constexpr auto kAgainTime = 1s;                    // for one attempt to come back to a server that was lost
+constexpr auto kAgainTime = 1s;                    // for one attempt to reconnect to a lost server
 // For one attempt to connect: TCP, TLS and HTTP/2 take four round trips. gRPC calls this time a back-off.
 constexpr int kConnectMs = 3000;
-// A server that is silent so long is asked whether it lives, and gone if it has not answered for some time. The server
-// allows pings from kShortestPingMs on (server/net/room_server.cpp). A hand goes on feeling its own replica of the
-// bone: it waits longer than its ConfirmationMonitor does.
+// A server that is silent for kPingMs gets a ping, and counts as lost if it does not answer in time. The server allows
+// pings from kShortestPingMs on (server/net/room_server.cpp). A haptic client waits longer than its ConfirmationMonitor does,
+// because its user can still feel its own replica of the bone.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 
-// The room that a channel's calls are to: empty, the only one that is open.
+// The room that calls on a channel go to. Empty: the only open room.
 class RoomName {
  public:
   explicit RoomName(std::string name) : name_(std::move(name)) {}
@@ -50,7 +50,7 @@ class RoomName {
   std::string name_;
 };
 
-// Puts the room's name and the ticket on every call of a channel.
+// Adds the room's name and the ticket to every call of a channel.
 class RoomNamer final : public grpc::experimental::Interceptor {
  public:
   RoomNamer(std::string room, std::string ticket) : room_(std::move(room)), ticket_(std::move(ticket)) {}
@@ -63,7 +63,7 @@ class RoomNamer final : public grpc::experimental::Interceptor {
   }
 
  private:
-  const std::string room_, ticket_;  // which the call refers to until it is over
+  const std::string room_, ticket_;  // referenced by the call until it is over
 };
 
 class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInterface {
@@ -71,7 +71,7 @@ class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInte
   RoomNamers(std::shared_ptr<const RoomName> room, ClientCredentials credentials)
       : room_(std::move(room)), credentials_(std::move(credentials)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(grpc::experimental::ClientRpcInfo*) override {
-    return new RoomNamer(room_ ? room_->get() : std::string(), ticket_text(credentials_));  // which the call deletes
+    return new RoomNamer(room_ ? room_->get() : std::string(), ticket_text(credentials_));  // the call deletes it
   }
 
  private:
@@ -83,7 +83,7 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address,
                                             const std::shared_ptr<grpc::ChannelCredentials>& tls, ClientKind kind,
                                             const std::shared_ptr<const RoomName>& room,
                                             const ClientCredentials& credentials) {
-  // What fails is told in one sentence by the program, not in gRPC's own lines.
+  // The program reports failures in one sentence, so gRPC's own log lines are switched off.
   gpr_set_log_function([](gpr_log_func_args*) {});
   grpc::ChannelArguments arguments;
   arguments.SetInt(GRPC_ARG_ENABLE_HTTP_PROXY, 0);
@@ -105,7 +105,7 @@ bool can_be_reached(const std::string& address) {
   return at && at->port > 0 && address.find('/') == std::string::npos;
 }
 
-// gRPC's words for an answer in HTTP alone, of a proxy or of a server that knows no gRPC.
+// Translates gRPC's text for a plain HTTP answer, from a proxy or from a server without gRPC.
 std::optional<Error> error_of_http(const std::string& said, const std::string& server) {
   constexpr std::string_view kStatus = "http2 header with status: ";
   const std::size_t at = said.find(kStatus);
@@ -130,7 +130,7 @@ Error error_of(const grpc::Status& status, const std::string& server) {
       return {ErrorCode::not_found, status.error_message()};
     case grpc::StatusCode::UNAUTHENTICATED:
     case grpc::StatusCode::PERMISSION_DENIED:
-      return {ErrorCode::denied, "the server lets you in no further: " + status.error_message()};
+      return {ErrorCode::denied, "the server denies access: " + status.error_message()};
     case grpc::StatusCode::UNIMPLEMENTED:
       return {ErrorCode::unsupported, server + " is not an Osteon server of this version"};
     default:
@@ -148,7 +148,7 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
   const Result<std::shared_ptr<grpc::ChannelCredentials>> tls = channel_credentials(credentials, address);
   if (!tls) return tl::unexpected(tls.error());
   std::shared_ptr<grpc::Channel> channel = make_channel(address, *tls, kind, room, credentials);
-  // In short waits, so that a person who gives up is heard.
+  // Waits in short intervals, so that the caller can stop.
   const auto until = Clock::now() + patience;
   bool has_looked = false;
   while (!channel->WaitForConnected(std::chrono::system_clock::now() + 50ms)) {
@@ -156,7 +156,7 @@ Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const s
     const bool is_over = Clock::now() >= until;
     const bool has_failed = !has_looked && channel->GetState(false) == GRPC_CHANNEL_TRANSIENT_FAILURE;
     if (!is_over && !has_failed) continue;
-    // At the first failure and at the end: nobody waits for what does not get better by waiting.
+    // At the first failure and at the end, so that nobody waits if waiting does not help.
     has_looked = true;
     ConnectionFault fault = connection_fault(address, credentials);
     if (is_over || fault.lasts) return tl::unexpected(std::move(fault.error));
@@ -172,7 +172,7 @@ v1::JoinRequest request_of(ClientKind kind) {
   return request;
 }
 
-// Over `room`'s channel; `server` is for sentences.
+// Joins over `room`'s channel. `server` is for messages.
 Result<JoinedRoom> ask_to_join(JoinedRoom room, const v1::JoinRequest& request, const std::string& server,
                                grpc::ClientContext& context) {
   v1::JoinResponse response;
@@ -217,7 +217,7 @@ Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const 
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
   Result<JoinedRoom> joined = ask_to_join(std::move(room), request, "the program at " + address, context);
-  // Others may be opened from now on: this one is meant.
+  // More rooms may be opened later. Name this one in further calls.
   if (joined) calls_to->set(joined->name);
   return joined;
 }
@@ -231,7 +231,7 @@ Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std
     request.set_kept_chain(to_wire(kept->chain));
     request.set_kept_seal(to_wire(kept->seal));
   }
-  // As soon as the channel, which keeps trying, has a connection.
+  // Waits until the channel, which keeps trying, has a connection.
   grpc::ClientContext context;
   context.set_wait_for_ready(true);
   context.set_deadline(std::chrono::system_clock::now() + kAgainTime);

@@ -1,4 +1,4 @@
-// Reaching a server and joining its room: what every client does first.
+// Connects to a server and joins its room, as every client does first.
 #pragma once
 #include <chrono>
 #include <functional>
@@ -21,7 +21,7 @@ namespace osteon::wire {
 enum class ClientKind { haptic = 1, viewer = 2, audio = 3, console = 4 };
 
 struct JoinedRoom {
-  std::shared_ptr<grpc::Channel> channel;  // shared with every stub made from it; every call over it is to this room
+  std::shared_ptr<grpc::Channel> channel;  // shared with every stub made from it; every call over it goes to this room
   std::string name;
   AuthorId author;
   std::uint64_t server_epoch = 0;
@@ -31,27 +31,27 @@ struct JoinedRoom {
   double pitch_mm = 0;
   Box bounds;
   RoomSeq room_seq;
-  std::string secret;  // proves that a later connection is this one's
+  std::string secret;  // proves that a later connection belongs to this one
 };
 
-// A channel to the server, over which no room is named. Errors: invalid_input (`address` is not HOST:PORT), those of
-// connection_fault (no connection within `patience`, or one that waiting does not bring), cancelled (`stop` returned
-// true), and those of channel_credentials.
+// A channel to the server that names no room. Errors: invalid_input (`address` is not HOST:PORT), those of
+// connection_fault (no connection within `patience`, or waiting does not help), cancelled (`stop` returned true), and
+// those of channel_credentials.
 [[nodiscard]] Result<std::shared_ptr<grpc::Channel>> reach_server(const std::string& address, ClientKind kind,
                                                                   std::chrono::milliseconds patience,
                                                                   const std::function<bool()>& stop,
                                                                   const ClientCredentials& credentials = {});
 
-// `name`: the caller's, shown to others. `room`: which one; empty, the only one that is open. Errors: those of
-// reach_server, and unsupported (protocol or kernel version differ; the room is closed), not_found (there is no such
-// room), denied (who you are, your ticket or your role does not let you in).
+// `name`: the caller's, shown to others. `room`: the room to join; empty: the only open room. Errors: those of
+// reach_server, unsupported (protocol or kernel versions differ, or the room is closed), not_found (there is no such
+// room), denied (the person, ticket or role is not admitted).
 [[nodiscard]] Result<JoinedRoom> join_room(const std::string& address, ClientKind kind, const std::string& name,
                                            std::chrono::milliseconds patience, const std::function<bool()>& stop,
                                            const std::string& room = {}, const ClientCredentials& credentials = {});
 
-// The same author again over the same channel, after the stream or the server was lost. `kept`: the newest event that
-// the server said is kept, its chain and the server's seal. Errors: unavailable (try again), any other (the room knows
-// this client no more).
+// Joins again as the same author over the same channel, after the stream or the server was lost. `kept`: the newest
+// event that the server reported as durable, its chain and the server's seal. Errors: unavailable (try again), any
+// other (the room does not know this client any more).
 struct DurableSeq {
   RoomSeq room_seq;
   Digest chain, seal;

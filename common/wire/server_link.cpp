@@ -12,7 +12,7 @@ namespace {
 using namespace std::chrono_literals;
 using Time = LinkEndpoint::Time;
 
-constexpr Time kPartnerRefresh = 250ms;  // a state may be lost, and the tool rest
+constexpr Time kPartnerRefresh = 250ms;  // repeats a resting tool's state, which may have been lost
 
 }  // namespace
 
@@ -29,7 +29,7 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
   DatagramBuffer plain;
   const auto opened = half_.open(datagram, now, plain);
   if (!opened) return;
-  // All of it is read before anything is believed.
+  // Everything is parsed before anything is used.
   v1::UpPacket packet;
   if (!packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size()))) return half_.malformed();
   PathToken token{};
@@ -168,7 +168,7 @@ std::optional<ServerLink::Out> ServerLink::send(Time now, std::span<std::uint8_t
     bone_.reset();
     bone_at_ = now;
   }
-  // Tools may take half of the room before entries, which are repeated as far as it goes, and then what is left.
+  // Tools may take half of the room. Entries come next, repeated as far as they fit, and use the rest.
   add_partners(filler, now, std::max(filler.room() / 2, half_.window().least_room(now)));
   half_.add_items(filler, now);
   add_partners(filler, now, 0);

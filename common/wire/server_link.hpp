@@ -1,4 +1,4 @@
-// The room's end of the fast path of one session: the other end of ClientLink. A state machine that is polled: no
+// The room's end of the fast path of one session; ClientLink is the other end. A state machine that is polled: no
 // socket, no clock, no thread.
 #pragma once
 #include <cstdint>
@@ -16,49 +16,49 @@
 
 namespace osteon::wire {
 
-// One thread. `now`: since any start, not before it, the same for all calls.
+// One thread. `now`: since any start, never negative, the same for all calls.
 class ServerLink {
  public:
   using Time = LinkEndpoint::Time;
   static constexpr std::size_t kMostPartners = 16;
 
-  // The first cut to come has `first_author_seq`, and the first entry to be pushed `first_index`. `random`: for the
-  // tokens of challenges.
+  // `first_author_seq`: number of the first cut to arrive. `first_index`: index of the first entry to be pushed.
+  // `random`: for the tokens of challenges.
   ServerLink(const SessionKeys& keys, AuthorId author, FillRandom random, std::uint64_t first_author_seq = 1,
              std::uint64_t first_index = 1, const LinkOptions& options = server_link_options());
 
-  // As the session has been told, or will be, over the stream.
+  // As sent to the session over the stream, or about to be sent.
   [[nodiscard]] ToolNumbers& tools() { return tools_; }
 
-  // Anything may come from anywhere. What is not authentic changes nothing, and nobody hears of it.
+  // Accepts any bytes from any address. A datagram that is not authentic changes nothing and gets no answer.
   void receive(const Endpoint& from, std::span<const std::uint8_t> datagram, Time now);
-  // A cut that came over the stream. False: it has come before, or is too far ahead of what was taken.
+  // A cut that came over the stream. False: it arrived before, or is too far ahead of what was taken.
   bool offer(const Cut& cut) { return cuts_.offer(cut.author_seq, cut); }
   // Cuts in order of their author_seq, each once.
   [[nodiscard]] std::optional<Cut> take_cut() { return cuts_.take(); }
-  // Cuts up to here were decided, and what was decided is kept: they are acknowledged. Also cuts that came by an
-  // earlier session of this author, and are decided only now.
+  // Cuts up to this one were decided and the decisions are durable, so they are acknowledged. This includes cuts of an
+  // earlier session of this author that are decided only now.
   void decided(std::uint64_t author_seq);
   // Newest state of the tool, once.
   [[nodiscard]] std::optional<KnownToolState> take_state();
-  // Newest push on the bone, once.
+  // Newest load on the bone, once.
   [[nodiscard]] std::optional<MountLoad> take_push() { return std::exchange(push_, std::nullopt); }
 
-  // Every entry of the session, in order of its index. False: the client gets it over the stream only, since it is of
-  // kind streamed or too long for a packet, or since too much is unacknowledged. While the link is not alive(), every
+  // Takes every entry of the session, in order of its index. False: the client gets it over the stream only, because it
+  // is of kind streamed, too long for a packet, or too much is unacknowledged. While the link is not alive(), every
   // entry above acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const IndexedEntry& entry);
-  // An entry that the session's client is told of: an own cut in it is decided and kept, as is one that it rejects, which
-  // raises the lease too. It is pushed, unless `index` is 0: it has no number, having been among what the client was
-  // sent first.
+  // Sends an entry to the session's client. If it is the client's own cut, or rejects one, that cut is decided and
+  // durable. A rejection also raises the lease. The entry is pushed unless `index` is 0; then it has no number, because
+  // it was part of what the client received first.
   bool tell(std::uint64_t index, const SessionEntry& entry);
-  // The session's word over the stream: it has taken the entries up to here.
+  // The session reports over the stream that it has taken the entries up to this one.
   void acknowledge(std::uint64_t index) { half_.acknowledge(index); }
-  // The author has left: their cuts come no more.
+  // The author has left and sends no more cuts.
   void forget(AuthorId author) { sender_.forget(author); }
-  // Newest states of others' tools; at most kMostPartners count. Who is not among them is not spoken of any more.
+  // Newest states of others' tools; at most kMostPartners are used. A tool that is missing is not sent any more.
   void set_partners(std::span<const KnownToolState> partners);
-  // Newest place of the bone on its mount: it goes once, soon, where none newer comes before.
+  // Newest pose of the bone on its mount. It is sent once, soon, unless a newer one replaces it.
   void set_bone(const MountPose& bone) { bone_ = bone; }
   void set_lease_epoch(std::uint64_t epoch);
   void set_frozen(bool frozen);
@@ -67,19 +67,19 @@ class ServerLink {
     Endpoint to;
     std::span<const std::uint8_t> bytes;
   };
-  // When send() has something beside challenges, at `now` or later; Time::max() before the client's address is proven.
-  // Challenges are due after receive(), and then in turns: send() is called at every turn of the loop.
+  // When send() has something beside challenges, at `now` or later. Time::max() before the client's address is proven.
+  // Challenges are due after receive() and then in later turns, so call send() in every turn of the loop.
   [[nodiscard]] Time next(Time now) const;
-  // What is due, within `into` (kMostDatagramBytes); to be called until there is nothing.
+  // What is due, within `into` (kMostDatagramBytes). Call it until it returns nothing.
   [[nodiscard]] std::optional<Out> send(Time now, std::span<std::uint8_t> into);
 
-  // The client is known to be at address(), and was heard from there lately.
+  // The client is known to be at address(), and a packet came from there lately.
   [[nodiscard]] bool alive(Time now) const { return half_.alive(now); }
   [[nodiscard]] const Endpoint& address() const { return path_.address(); }
   [[nodiscard]] std::uint64_t moves() const { return path_.moves(); }
   // The session has taken the entries up to this one.
   [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
-  // The client's clock as seen from here, and the round trip.
+  // The estimate of the client's clock, and the round trip.
   [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
   [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way down
   [[nodiscard]] const LinkEndpoint& half() const { return half_; }
@@ -103,9 +103,9 @@ class ServerLink {
   std::uint64_t decided_;
   KnownToolState state_;
   bool state_is_new_ = false;
-  std::optional<MountLoad> push_;  // newest that was not taken
+  std::optional<MountLoad> push_;  // newest that was not taken yet
   std::uint64_t push_seq_ = 0;
-  std::optional<MountPose> bone_;  // newest that has not gone
+  std::optional<MountPose> bone_;  // newest that was not sent yet
   Time bone_at_ = -std::chrono::hours(1);
 
   EntrySender sender_;

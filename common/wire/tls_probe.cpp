@@ -34,7 +34,7 @@ struct Address {
 };
 struct Addresses {
   std::vector<Address> all;
-  std::string why;  // there is none
+  std::string why;  // why there is no address
 };
 
 Addresses look_up(const std::string& host, const std::string& port) {
@@ -53,7 +53,7 @@ Addresses look_up(const std::string& host, const std::string& port) {
   return addresses;
 }
 
-// The system's resolver knows no limit of time: beyond `until` its thread is left to end by itself.
+// The system's resolver has no timeout. After `until` its thread is left to end by itself.
 Addresses look_up_until(const std::string& host, const std::string& port, Clock::time_point until) {
   std::packaged_task<Addresses()> task([host, port] { return look_up(host, port); });
   std::future<Addresses> found = task.get_future();
@@ -74,7 +74,7 @@ class Socket {
   Socket(const Socket&) = delete;
   Socket& operator=(const Socket&) = delete;
 
-  // 0, or the system's number of why not.
+  // 0, or the system's error number.
   int connect(const Address& to, Clock::time_point until) {
     close();
     descriptor_ = ::socket(to.family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -86,7 +86,7 @@ class Socket {
     socklen_t size = sizeof error;
     return ::getsockopt(descriptor_, SOL_SOCKET, SO_ERROR, &error, &size) == 0 ? error : errno;
   }
-  // False: the other end has closed it, or takes nothing.
+  // False: the other end has closed it, or accepts nothing.
   bool send(std::string_view bytes, Clock::time_point until) {
     while (!bytes.empty()) {
       const ssize_t sent = ::send(descriptor_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
@@ -97,7 +97,7 @@ class Socket {
     }
     return true;
   }
-  // How many bytes came; 0: the other end has closed it; -1: nothing came in time.
+  // Number of bytes received. 0: the other end has closed it. -1: nothing arrived in time.
   int receive(char* into, std::size_t most, Clock::time_point until) {
     if (!ready(POLLIN, until)) return -1;
     return static_cast<int>(std::max<ssize_t>(0, ::recv(descriptor_, into, most, 0)));
@@ -115,10 +115,10 @@ class Socket {
   int descriptor_ = -1;
 };
 
-// The reason of the system for the address that came furthest: one that refuses tells more than one that is silent.
+// Reports the system's error for the address that got furthest. A refusal says more than silence.
 bool connect(Socket& socket, const std::vector<Address>& addresses, Clock::time_point until, Probe& probe) {
   for (std::size_t i = 0; i < addresses.size(); ++i) {
-    // Each of those left has the same share of the time.
+    // The remaining addresses share the remaining time equally.
     const auto share = (until - Clock::now()) / static_cast<int>(addresses.size() - i);
     const int error = socket.connect(addresses[i], Clock::now() + share);
     if (error == 0) return true;
@@ -130,7 +130,7 @@ bool connect(Socket& socket, const std::vector<Address>& addresses, Clock::time_
   return false;
 }
 
-// Keeps what is wrong with the server's certificate, and ends the handshake there: an impostor sees nothing of ours.
+// Stores what is wrong with the server's certificate and ends the handshake, so that an impostor sees nothing of ours.
 int judge_certificate(int holds, X509_STORE_CTX* context) {
   auto* ssl = static_cast<SSL*>(X509_STORE_CTX_get_ex_data(context, SSL_get_ex_data_X509_STORE_CTX_idx()));
   auto& probe = *static_cast<Probe*>(SSL_get_app_data(ssl));
@@ -142,7 +142,7 @@ int judge_certificate(int holds, X509_STORE_CTX* context) {
   return 0;
 }
 
-// TLS over memory, so that no write to a closed connection ends the process, and the first bytes are seen.
+// TLS over memory. So a write to a closed connection does not end the process, and the first bytes can be inspected.
 class Tls {
  public:
   Tls(Socket& socket, Clock::time_point until, Probe& probe) : socket_(socket), until_(until), probe_(probe) {}
@@ -167,7 +167,7 @@ class Tls {
     if (!ssl_) return false;
     in_ = BIO_new(BIO_s_mem());
     out_ = BIO_new(BIO_s_mem());
-    SSL_set_bio(ssl_.get(), in_, out_);  // which owns both
+    SSL_set_bio(ssl_.get(), in_, out_);  // takes ownership of both
     SSL_set_app_data(ssl_.get(), &probe_);
     X509_VERIFY_PARAM* rules = SSL_get0_param(ssl_.get());
     if (X509_VERIFY_PARAM_set1_ip_asc(rules, host.c_str()) == 1) return true;
@@ -184,8 +184,8 @@ class Tls {
     probe_.protocol.assign(reinterpret_cast<const char*>(agreed), size);
   }
 
-  // The beginning of HTTP/2 (RFC 9113, section 3.4), and what is said to that: in TLS 1.3 a client hears only then that
-  // its certificate is refused.
+  // Sends the beginning of HTTP/2 (RFC 9113, section 3.4) and reads the answer. In TLS 1.3 a client learns only then
+  // that its certificate is refused.
   void greet() {
     static constexpr std::string_view kPreface("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33);
     char some[64];
@@ -249,7 +249,7 @@ Probe probe_tls(const std::string& host, const std::string& port, const ProbeFil
   Tls tls(socket, until, probe);
   if (!tls.set_up(host, files)) return probe;
   tls.shake_hands();
-  constexpr char kHandshake = 22, kAlert = 21;  // record types of TLS, before the version 3.x (RFC 8446, section 5.1)
+  constexpr char kHandshake = 22, kAlert = 21;  // TLS record types, before the version 3.x (RFC 8446, section 5.1)
   const std::string& first = probe.first_bytes;
   if (first.size() > 1 && (first[0] == kHandshake || first[0] == kAlert) && first[1] == 3) {
     probe.reached = Probe::Reached::tls;

@@ -15,7 +15,7 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
   return failure(ErrorCode::invalid_input, field + " " + what);
 }
 
-// In whole steps, as far as the type goes; nothing for what is no number.
+// Whole steps, clamped to the type's range. 0 for NaN.
 template <class Integer>
 Integer steps(double value, double per_unit) {
   if (std::isnan(value)) return 0;

@@ -8,15 +8,15 @@
 
 namespace osteon::wire {
 
-// `with_effort`: also force, feed and the like, which are worth their bytes at the rate of gauges and sound only.
+// `with_effort`: also force, feed and the like. Gauges and sound need them only at their own, lower rate.
 [[nodiscard]] v1::ToolState to_tool_state(const CuttingState& state, std::uint32_t buttons, bool with_effort);
 
 struct KnownToolState {
   CuttingState state;
   std::uint32_t buttons = 0;
 };
-// Takes a newer state over into what is known of the tool; what is not sent stays as it was. False where it is no
-// newer. Error invalid_input, naming the field, for what a correct peer never sends; then nothing has changed.
+// Merges a newer state into the known state of the tool. What is not sent stays as it was. False if it is not newer.
+// Error invalid_input, naming the field, for what a correct peer never sends; then nothing has changed.
 [[nodiscard]] Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known);
 
 }  // namespace osteon::wire

@@ -5,13 +5,13 @@
 namespace osteon::wire {
 namespace {
 
-// The version that came with a kind of message; all before 4 know the first ten.
+// The version that introduced a kind of message. All before 4 know the first ten.
 std::uint32_t version_of(v1::SessionResponse::MessageCase kind) {
   return kind > v1::SessionResponse::kNoted ? 4 : kOldestProtocolVersion;
 }
 
-// Where an event has its place in the room's order; 0: it is none.
-std::uint64_t place_of(const v1::SessionResponse& row) {
+// The sequence number of an event in the room. 0: the message is no event.
+std::uint64_t room_seq_of(const v1::SessionResponse& row) {
   switch (row.message_case()) {
     case v1::SessionResponse::kSupervised:
       return row.supervised().room_seq();
@@ -37,10 +37,10 @@ Result<void> check_protocol_version(std::uint32_t clients) {
 
 std::optional<v1::SessionResponse> row_in(std::uint32_t version, const v1::SessionResponse& row) {
   if (version >= version_of(row.message_case())) return row;
-  const std::uint64_t place = place_of(row);
-  if (place == 0) return std::nullopt;
+  const std::uint64_t room_seq = room_seq_of(row);
+  if (room_seq == 0) return std::nullopt;
   v1::SessionResponse noted;
-  noted.mutable_noted()->set_room_seq(place);
+  noted.mutable_noted()->set_room_seq(room_seq);
   noted.set_index(row.index());
   return noted;
 }

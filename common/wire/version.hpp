@@ -1,4 +1,4 @@
-// Which versions of the protocol speak with each other: a server takes clients of its own and of the one before.
+// Which protocol versions are compatible: a server accepts clients of its own version and of the one before.
 #pragma once
 #include <cstdint>
 #include <optional>
@@ -8,16 +8,16 @@
 
 namespace osteon::wire {
 
-// Version of the protocol that this build speaks, and the oldest that its server takes from clients.
+// Version of the protocol of this build, and the oldest client version that its server accepts.
 inline constexpr std::uint32_t kProtocolVersion = 4;
 inline constexpr std::uint32_t kOldestProtocolVersion = kProtocolVersion - 1;
 
 // Error unsupported: a sentence with both versions and the remedy.
 [[nodiscard]] Result<void> check_protocol_version(std::uint32_t clients);
 
-// The row as a session of that version is sent it. Nothing: it is not sent at all. A version knows the kinds of
-// messages that it was made with and takes others for a fault; what has a place in the room's order is told to it as an
-// event that leaves all as it is.
+// The message as a session of that version receives it. Nothing: it is not sent at all. A version treats messages of
+// unknown kinds as a fault. So an event of an unknown kind, which has a sequence number, is sent as an event that
+// changes nothing.
 [[nodiscard]] std::optional<v1::SessionResponse> row_in(std::uint32_t version, const v1::SessionResponse& row);
 
 }  // namespace osteon::wire

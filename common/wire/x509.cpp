@@ -32,7 +32,7 @@ std::chrono::sys_seconds time_of(const ASN1_TIME* time) {
   return std::chrono::sys_seconds{std::chrono::seconds(timegm(&parts))};
 }
 
-// Empty: it is no name of a machine.
+// Empty: it does not name a machine.
 std::string machine_of(const GENERAL_NAME& name) {
   if (name.type != GEN_DNS && name.type != GEN_IPADD) return {};
   const ASN1_STRING* value = name.type == GEN_DNS ? name.d.dNSName : name.d.iPAddress;

@@ -1,4 +1,4 @@
-// Certificates as files hold them and as a server shows them.
+// Reads certificates from files and as a server shows them, and checks them.
 #pragma once
 #include <openssl/x509.h>
 
@@ -19,9 +19,9 @@ struct KeyFree {
 };
 using KeyPtr = std::unique_ptr<EVP_PKEY, KeyFree>;
 
-// Those in a PEM text, up to the first one that cannot be read.
+// The certificates in a PEM text, up to the first one that cannot be read.
 [[nodiscard]] std::vector<X509Ptr> certificates_of(std::string_view pem);
-// Null where it cannot be read. No pass phrase is asked for.
+// Null if it cannot be read. No pass phrase is asked for.
 [[nodiscard]] KeyPtr key_of(std::string_view pem);
 
 struct Validity {
@@ -29,12 +29,12 @@ struct Validity {
 };
 [[nodiscard]] Validity validity_of(const X509& certificate);
 inline constexpr std::string_view kNoMachine = "no machine";
-// The DNS names and IP addresses of a server's certificate: "a, b and c"; kNoMachine where there is none.
+// The DNS names and IP addresses of a server's certificate: "a, b and c". kNoMachine if there is none.
 [[nodiscard]] std::string machines_of(const X509& certificate);
-// X509_V_OK, or why an authority in `authorities` did not issue the first of `chain` for TLS clients, or it does not
-// hold now.
+// X509_V_OK if an authority in `authorities` issued the first of `chain` for TLS clients and it is valid now. Otherwise
+// the reason.
 [[nodiscard]] int verify_own(const std::vector<X509Ptr>& chain, const std::vector<X509Ptr>& authorities);
-// X509_V_ERR codes that say that no known authority issued a certificate.
+// X509_V_ERR codes which say that no known authority issued a certificate.
 [[nodiscard]] bool is_unknown_authority(int verify_error);
 
 // "2026-11-25 14:00:00 UTC"

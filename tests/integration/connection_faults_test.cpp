@@ -397,7 +397,7 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
       {"own of another authority", "does not know the authority of your certificate"},
       {"own revoked", "person.pem, was revoked"},
       {"own of a server", "is not for a person"},
-      {"plain text", "asks for a certificate, and you come with --plain"},
+      {"plain text", "asks for a certificate, but you gave --plain"},
       {"no server behind it", "is a proxy that reaches no Osteon server"},
       {"ticket expired", "the ticket expired at"}};
   const std::vector<Listed> page = listed();

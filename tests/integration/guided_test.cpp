@@ -234,7 +234,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   ASSERT_EQ(standing.size(), 3u);
   EXPECT_NEAR(standing.at(2).at("at_mm").at(2).get<double>(), -2.0, 0.01);
   refused("place guide-1 near 0 0 30", "20 mm");
-  refused("place drill-3.2 near 0 0 3", "for the hand");
+  refused("place drill-3.2 near 0 0 3", "hand-held");
 }
 
 // The shape of a tool of the box, written as triangles, comes back from a folder as a tool of its own.

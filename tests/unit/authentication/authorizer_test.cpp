@@ -143,7 +143,7 @@ TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
   authorizer_->set_most_ticket_life(24h);
   EXPECT_EQ(refused("anna", day, "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", more, "ward", kUndo, false),
-            "ticket: the ticket is good for 26 more hours, and this server takes none for more than 24; ask for a "
+            "ticket: the ticket is valid for 26 more hours, but this server accepts at most 24; ask for a "
             "shorter one");
   // A ticket does not say since when it is good: what is left counts.
   now_ += 2 * 3600;
