@@ -30,6 +30,8 @@ namespace fs = std::filesystem;
 constexpr const char* kExplicit = "1.2.840.10008.1.2.1";
 constexpr const char* kImplicit = "1.2.840.10008.1.2";
 constexpr int kRows = 4, kColumns = 5;
+// GDCM allocates and clears what a damaged length claims, and an assertion leaves it behind. No sound input needs this.
+constexpr std::size_t kMostBytesAtOnce = std::size_t{4} << 20;
 
 bool keep_going(double) { return true; }
 
@@ -191,6 +193,7 @@ Target dicom_target() {
   gdcm::Trace::ErrorOff();
   Target target{"dicom", read_dicom, {bytes_of_text(a_slice(kExplicit)), bytes_of_text(a_slice(kImplicit))}};
   target.mutations = 40;
+  target.most_bytes_at_once = kMostBytesAtOnce;
   return target;
 }
 
@@ -210,6 +213,7 @@ Target scan_archive_target() {
       {an_archive(files, {}), an_archive(files, {.zip_compression = "store"}), an_archive(files, {.format = "pax"}),
        an_archive(files, {.format = "pax", .gzip = true}), an_archive(files, {.format = "iso9660"})}};
   target.mutations = 50;
+  target.most_bytes_at_once = kMostBytesAtOnce;
   return target;
 }
 
