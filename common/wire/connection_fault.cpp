@@ -196,10 +196,9 @@ class Diagnosis {
       case X509_V_ERR_INVALID_PURPOSE:
         return denied(own + "is not for a person; whoever runs the server makes one with deploy/certs person");
       default:
-        // Also for some seconds where too many calls came from there: a later try may find it otherwise.
         return for_now("the server at " + address_ + " refuses " + own +
-                       "though it is in time and of the authority in ca.pem: most likely it was revoked; ask whoever " +
-                       "runs the server, whose log says why");
+                       "though it is in time and of the authority in ca.pem: it was revoked, or too many calls came " +
+                       "from you; wait a minute, and then ask whoever runs the server, whose log says why");
     }
   }
 

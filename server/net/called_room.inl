@@ -46,9 +46,10 @@ inline tl::expected<Caller, Refusal> judged(Gate& gate, const grpc::CallbackServ
 }
 
 // Authorizes a call at its beginning: certificate, ticket, role, headers and how often. Null: it may go on. The one
-// place where calls are counted as admitted or refused; every handler begins with it.
+// place where calls are counted as admitted or refused; every handler begins with it. `about`: the room that the message
+// names, for a ticket of every room.
 inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context,
-                                        std::string_view method) {
+                                        std::string_view method, std::string_view about = {}) {
   if (!rooms.gate) return {};
   const PeerClaims peer = peer_claims(context);
   const std::optional<std::string> room = metadata_of(context, "osteon-room-bin"),
@@ -56,7 +57,8 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
   const CallClaims call{.peer = peer,
                         .ticket = ticket ? std::string_view(*ticket) : std::string_view(),
                         .room = room ? std::string_view(*room) : std::string_view(),
-                        .method = method};
+                        .method = method,
+                        .about = about};
   // Tells programs the reason, and refused_call_notes() that it was noted.
   const auto tell = [&](std::string_view reason) {
     context.AddTrailingMetadata(kRefusalTrailer, std::string(reason));
@@ -144,7 +146,7 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
 
 // The log keeps the paths.
 inline Status status_of(const Error& error) {
-  if (without_paths(error.message) != error.message) log::warn("a call failed", {{"reason", error.message}});
+  if (without_paths(error.message) != error.message) log_failed_call(error.message);
   std::string said = short_words(error.message);
   switch (error.code) {
     case ErrorCode::invalid_input: return invalid(std::move(said));

@@ -48,7 +48,11 @@ bool Connections::add(int descriptor) {
   const std::string peer = inode ? peer_of(descriptor, *inode) : "";
   if (peer.empty()) return false;
   const std::lock_guard lock(mutex_);
-  open_[peer] = {descriptor, *inode, {.peer = peer, .user = {}, .serial = {}, .is_proxys = peer.starts_with(kUnix)}};
+  open_[peer] = {descriptor, *inode, {.peer = peer,
+                                   .user = {},
+                                   .serial = {},
+                                   .is_proxys = peer.starts_with(kUnix),
+                                   .accepted = std::chrono::steady_clock::now()}};
   return true;
 }
 

@@ -1,6 +1,7 @@
 // The open connections of a server: from where each comes, whose it is, and its descriptor, by which it can be
 // closed. gRPC owns the descriptors, and neither counts connections nor closes one on request.
 #pragma once
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -16,6 +17,7 @@ struct Connection {
   std::string user;        // of the certificate; empty until a call came over it
   std::string serial;      // likewise, hexadecimal
   bool is_proxys = false;  // over the Unix socket of a proxy: of many people, and never closed here
+  std::chrono::steady_clock::time_point accepted{};
 };
 
 // Any thread.

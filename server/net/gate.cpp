@@ -23,6 +23,10 @@ namespace {
 
 constexpr std::size_t kMostRemembered = 4096;  // certificates, and tickets
 constexpr unsigned kCertificatesEverySeconds = 1;
+constexpr std::chrono::seconds kFirstCall{2};  // after a revocation, for connections without a call
+constexpr std::string_view kPaused = "too many calls came from you; wait a minute";
+constexpr std::string_view kTooOften =
+    "that is called too often; wait a second between calls, since who goes on loses all connections for a minute";
 
 UnixTime system_now() { return std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()); }
 
@@ -176,7 +180,7 @@ std::optional<Refusal> Gate::judge_handshake(std::string_view chain_pem) {
     if (const auto why = revoked(certificate->serial, certificate->user, {}))
       refusal = Refusal{"revoked", false, *why};
     else if (is_paused(certificate->user))
-      refusal = Refusal{"flood", true, "too many calls came from you; wait a minute"};
+      refusal = Refusal{"flood", true, std::string(kPaused)};
   }
   if (!refusal) return {};
   // The name in a chain that does not hold is only what somebody says. A revoked one holds otherwise.
@@ -314,6 +318,7 @@ tl::expected<Caller, Refusal> Gate::judge(const CallClaims& call) {
                 .address = call.peer.address};
   // A role may hold in one room alone: that room has to be known here, however the call names it.
   std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
+  if (room == kAnyRoom && !call.about.empty()) room = call.about;
   if (room == kAnyRoom && only_room_) room = only_room_();
   if (std::optional<Refusal> refusal = judge_again(caller, room, call.method)) return tl::unexpected(std::move(*refusal));
   caller.room = std::move(room);
@@ -330,9 +335,10 @@ tl::expected<Caller, Refusal> Gate::admit(const CallClaims& call) {
       if (connections_ && !call.peer.by_proxy)
         connections_->identify(call.peer.peer, certificate->user, certificate->serial);
     }
-    if (caller &&
-        (is_paused(caller->user) || !rates_.take(caller->user, call.method, std::chrono::steady_clock::now())))
-      caller = tl::unexpected(Refusal{"rate", true, "that is called too often; wait a moment and try again", true});
+    if (caller && is_paused(caller->user))
+      caller = tl::unexpected(Refusal{"flood", true, std::string(kPaused), true});
+    else if (caller && !rates_.take(caller->user, call.method, std::chrono::steady_clock::now()))
+      caller = tl::unexpected(Refusal{"rate", true, std::string(kTooOften), true});
     ++(caller ? counts_.admitted : counts_.refused);
     if (caller) return caller;
   }
@@ -515,15 +521,21 @@ void Gate::refresh() {
   if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
   tell("ticket keys were not read, and those before count on", keys, keys_fault_);
   // A changed role alone closes no connection: those before a first call would be closed with it.
-  revoked_anew_ = is_revocation || (authorities && *authorities);
+  if (!is_revocation && !(authorities && *authorities)) return;
+  const std::lock_guard lock(mutex_);
+  revoked_at_ = std::chrono::steady_clock::now();
 }
 
 void Gate::close_revoked() {
-  if (!connections_) return;
   const std::lock_guard lock(mutex_);
-  // Whose connection has made no call may have come with a certificate that is revoked now. Who may come does so again.
-  const std::size_t closed = connections_->close_if(
-      [this](const Connection& one) { return one.serial.empty() || revoked(one.serial, one.user, {}); });
+  if (!connections_ || !revoked_at_) return;
+  // Whose connection has made no call may have come with a certificate that is revoked now. Who is just coming in has
+  // the time for a first call; who came later was judged by the new list.
+  const bool is_over = std::chrono::steady_clock::now() - *revoked_at_ >= kFirstCall;
+  const std::size_t closed = connections_->close_if([&](const Connection& one) {
+    return one.serial.empty() ? is_over && one.accepted <= *revoked_at_ : revoked(one.serial, one.user, {}).has_value();
+  });
+  if (is_over) revoked_at_.reset();
   if (closed > 0)
     log::info("connections closed", {{"of", "revoked certificates and before a first call"}, {"count", closed}});
 }
@@ -532,7 +544,7 @@ void Gate::look() {
   std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
   std::vector<std::shared_ptr<Watched>> held;  // let go of without the lock, which their end takes
   // One look later than their streams end: so the clients still hear why.
-  if (revoked_anew_.exchange(false)) close_revoked();
+  close_revoked();
   refresh();
   {
     const std::lock_guard lock(mutex_);

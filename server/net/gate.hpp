@@ -2,7 +2,6 @@
 // the beginning of every call, and at all of it again several times a second for as long as a stream is open. The one
 // place where a connection or a call is refused for who makes it.
 #pragma once
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -68,6 +67,7 @@ struct CallClaims {
   std::string_view ticket{};  // metadata osteon-ticket; empty: none came
   std::string_view room{};    // metadata osteon-room-bin; empty: none came
   std::string_view method{};  // full name; empty: whatever it is
+  std::string_view about{};   // room that the message names, where `room` and the ticket name none; empty: none
 };
 
 // A stream that is open. Its end is heard of, or it is told to end, whatever comes first.
@@ -159,7 +159,7 @@ class Gate {
   [[nodiscard]] Result<bool> read_authorities();
   // Reads tickets.pub. True: it has other keys now. Under reading_.
   [[nodiscard]] Result<bool> read_ticket_keys();
-  // Closes the connections whose certificate is revoked, and those of which nobody knows yet whose they are.
+  // Closes the connections whose certificate is revoked, and those of which nobody knows for a while whose they are.
   void close_revoked();
   [[nodiscard]] std::optional<std::string> revoked(const std::string& serial, const std::string& user,
                                                    const std::string& ticket_id) const;  // under mutex_
@@ -189,7 +189,6 @@ class Gate {
   std::mutex reading_;         // taken before mutex_, never within it
   AccessFile access_;          // under reading_, as the next
   std::string access_fault_, authorities_fault_, keys_fault_;  // that was logged last
-  std::atomic<bool> revoked_anew_ = false;  // at the last look
   mutable std::mutex mutex_;
   AccessList access_list_;
   std::vector<TicketCheckKey> ticket_keys_;
@@ -197,6 +196,8 @@ class Gate {
   std::set<std::string> listed_serials_;            // on the revocation lists
   std::set<std::string> checked_;  // certificates in PEM that a proxy showed and these authorities signed
   std::map<std::string, std::chrono::steady_clock::time_point> paused_;  // until when, by user
+  // When somebody was revoked, until all connections that were open then were looked at.
+  std::optional<std::chrono::steady_clock::time_point> revoked_at_;
   std::unordered_map<std::string, PersonCertificate> certificates_;  // by PEM, of those seen lately
   CallRates rates_;
   std::unordered_map<std::string, CheckedTicket> tickets_;     // by text, of those seen lately

@@ -23,8 +23,8 @@ class RefusalCounts {
     else
       ++counts_[counts_.size() < kMost ? std::string(reason) : "other"];
   }
-  // Counts it, and logs it: once for each `who`, a person or an address, `from` and reason, so that nobody fills the
-  // disk. `from`: the address of a person; empty: it is not known, or `who` is one.
+  // Counts it, and logs it: once for each `who`, a person or an address, `from` and reason, and by RefusalLog's limit,
+  // so that nobody fills the disk. `from`: the address of a person; empty: it is not known, or `who` is one.
   void note(std::string_view reason, std::string_view who, std::string_view said, std::string_view from = {});
   [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
     const std::lock_guard lock(mutex_);

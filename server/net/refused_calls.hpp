@@ -39,6 +39,9 @@ class HandshakeWatch {
 // The trailing header of a call that the gate refused: its reason in one word. The gate has noted the call.
 inline constexpr const char* kRefusalTrailer = "osteon-refusal";
 
+// Logs why a call failed, with the paths that its caller is not told: by RefusalLog's limit. Any thread.
+void log_failed_call(std::string_view why);
+
 // Notes every call that ends since its message was malformed or nonsense ("request"), asked for too much ("quota"), or
 // was not its caller's to make ("denied"), by the caller's address. Join and the gate note their own. `refusals` outlives the server.
 [[nodiscard]] std::vector<std::unique_ptr<grpc::experimental::ServerInterceptorFactoryInterface>> refused_call_notes(

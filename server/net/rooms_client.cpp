@@ -138,10 +138,8 @@ Result<std::vector<std::string>> RoomsClient::remove(const std::string& name, bo
   v1::DeleteRoomRequest request;
   request.set_name(name);
   request.set_with_branches(with_branches);
-  // By the ticket's own room first: who made a branch has a ticket for the room that it was made from.
-  auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request, "");
-  if (!response && response.error().code == ErrorCode::denied)
-    response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request);
+  // By the ticket's own room: who made a branch has a ticket for the room that it was made from.
+  const auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request, "");
   if (!response) return tl::unexpected(response.error());
   return std::vector<std::string>(response->deleted().begin(), response->deleted().end());
 }

@@ -478,6 +478,19 @@ TEST_F(Doors, DeleteNoBranchThatATicketIsNotFor) {
   EXPECT_EQ(any->remove("ward", true).value_or(std::vector<std::string>()).size(), 2u);
 }
 
+TEST_F(Doors, AreAskedOnceForADeletion) {
+  ASSERT_TRUE(server_->rooms().create("annex", nullptr));
+  people_.append_access("role bob operator annex");
+  server_->rooms().gate->look();
+  auto bob = RoomsClient::reach(address(), 5s, {}, people_.door("bob", Role::observer, "*"));
+  ASSERT_TRUE(bob.has_value()) << bob.error().message;
+  const GateCounts before = server_->door_health().gate;
+  EXPECT_EQ(bob->remove("ward", false).error().code, ErrorCode::denied);
+  EXPECT_EQ(server_->door_health().gate.refused, before.refused + 1);
+  EXPECT_TRUE(bob->remove("annex", false)) << "where the role is another";
+  EXPECT_EQ(server_->door_health().gate.refused, before.refused + 1);
+}
+
 TEST_F(Doors, ShowNothingOfARoomInWhichOneIsNoInstructor) {
   people_.append_access("role ina trainee theatre");
   server_->rooms().gate->look();

@@ -312,6 +312,14 @@ TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
   EXPECT_TRUE(test::wait_until([&] { return refused("anna", annas, "ward", kSay, true).empty(); }, 10s));
 }
 
+// As behind a proxy, where they come in over a connection that stays.
+TEST_F(GateTest, TellsWhoBeganTooManyCallsToWaitAMinute) {
+  gate_->note_flood(shown(certificate("anna")));
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kWatch, true),
+            "flood: too many calls came from you; wait a minute");
+  EXPECT_EQ(refused("ben", ticket("ben", "ward", Role::trainee), "ward", kWatch, true), "") << "another person";
+}
+
 // Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost unseen.
 TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
@@ -443,14 +451,30 @@ TEST(CallRates, AreThoseOfCallsThatThereAre) {
 
 TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {
   RefusalLog log;
-  EXPECT_TRUE(log.is_new("anna", "a"));
-  EXPECT_FALSE(log.is_new("anna", "a"));
-  EXPECT_TRUE(log.is_new("anna", "b"));
-  EXPECT_TRUE(log.is_new("ben", "a"));
-  for (std::size_t i = 0; i < 3 * RefusalLog::kMost; ++i) EXPECT_TRUE(log.is_new("eve", std::to_string(i)));
+  RefusalLog::Time now{};
+  const auto is_new = [&](std::string_view peer, std::string_view reason) {
+    return log.is_new(peer, reason, now += std::chrono::ceil<RefusalLog::Time::duration>(1.0s / RefusalLog::kLinesPerSecond));
+  };
+  EXPECT_TRUE(is_new("anna", "a"));
+  EXPECT_FALSE(is_new("anna", "a"));
+  EXPECT_TRUE(is_new("anna", "b"));
+  EXPECT_TRUE(is_new("ben", "a"));
+  for (std::size_t i = 0; i < 3 * RefusalLog::kMost; ++i) EXPECT_TRUE(is_new("eve", std::to_string(i)));
   EXPECT_EQ(log.size(), RefusalLog::kMost);
-  EXPECT_FALSE(log.is_new("eve", std::to_string(3 * RefusalLog::kMost - 1)));
-  EXPECT_TRUE(log.is_new("anna", "a"));
+  EXPECT_FALSE(is_new("eve", std::to_string(3 * RefusalLog::kMost - 1)));
+  EXPECT_TRUE(is_new("anna", "a"));
+}
+
+// As from ever new addresses of IPv6.
+TEST(RefusalLog, SaysNoMoreInATimeThanItsLimit) {
+  RefusalLog log;
+  const RefusalLog::Time now{};
+  std::size_t said = 0;
+  for (std::size_t i = 0; i < 1000; ++i) said += log.is_new("address " + std::to_string(i), "tls", now) ? 1 : 0;
+  EXPECT_EQ(said, RefusalLog::kLinesAtOnce);
+  EXPECT_TRUE(log.is_new("anna", "tls", now + 10s));
+  EXPECT_EQ(log.take_left_out(), 1000 - said);
+  EXPECT_EQ(log.take_left_out(), 0u);
 }
 
 }  // namespace

@@ -152,6 +152,19 @@ TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
   EXPECT_TRUE(test::wait_until([&] { return server_->door_health().connections.open == 1; }, kPatience));
 }
 
+// Whoever is just coming in has made no call yet, and loses nothing by the revocation of somebody else.
+TEST_F(Insiders, LoseNoConnectionThatIsNewWhenSomebodyElseIsRevoked) {
+  RawHttp2 mallorys(address(), people_.person("mallory"));
+  ASSERT_TRUE(mallorys.call(1, kSession));
+  ASSERT_TRUE(is_answered(mallorys));
+  RawHttp2 annas(address(), people_.person("anna"));
+  ASSERT_TRUE(annas.read(5s).has_value());
+  people_.certs({"revoke", "mallory"});
+  ASSERT_TRUE(mallorys.closed_within(kPatience));
+  ASSERT_TRUE(annas.call(1, kSession));
+  EXPECT_TRUE(is_answered(annas));
+}
+
 // Whoever is about to make a first call notices nothing of the role of somebody else.
 TEST_F(Insiders, LoseNoConnectionByAChangedRole) {
   RawHttp2 line(address(), people_.person("anna"));
