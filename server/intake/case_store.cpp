@@ -67,7 +67,8 @@ Result<std::unique_ptr<CaseStore>> CaseStore::open(fs::path folder, fs::path pro
   for (const auto& entry : fs::directory_iterator(folder, error))
     if (entry.path().filename().string().starts_with(kIncoming)) left.push_back(entry.path());
   for (const fs::path& one : left) fs::remove_all(one, error);
-  return std::unique_ptr<CaseStore>(new CaseStore(fs::absolute(folder), std::move(program), quota));
+  folder = fs::absolute(folder);
+  return std::unique_ptr<CaseStore>(new CaseStore(std::move(folder), std::move(program), quota));
 }
 
 std::uint64_t CaseStore::case_bytes() const {
