@@ -347,7 +347,7 @@ Result<void> Journal::append(std::span<const JournalRow> rows) {
   if (rows.empty()) return {};
   JournalHead head = state.head;
   // Into the transaction, which is in memory, and into the log, which makes them safe.
-  const Result<void> done = write([&] {
+  Result<void> done = write([&] {
     return state.file.add_rows(rows, head).and_then([&] {
       std::optional<Signature> signature;
       if (state.signed_since) {
@@ -448,7 +448,7 @@ Result<void> Journal::add_checkpoint(CheckpointFile file) {
   std::sort(all->begin(), all->end(), [](const Checkpoint& a, const Checkpoint& b) { return a.at.place > b.at.place; });
   const auto kept = static_cast<std::ptrdiff_t>(std::min(kCheckpointsKept, all->size()));
   const std::vector<Checkpoint> old(all->begin() + kept, all->end());
-  const Result<void> noted = write_through([&] {
+  Result<void> noted = write_through([&] {
     Result<void> done = state.file.add_checkpoint(file.about_);
     for (const Checkpoint& checkpoint : old)
       if (done)

@@ -681,11 +681,11 @@ Result<void> JournalFile::add_rows(std::span<const JournalRow> rows, JournalHead
   for (const JournalRow& row : rows) {
     OSTEON_CHECK(row.place.value == head.place.value + 1);
     head = next_in_chain(head, row);
-    const Result<void> put = insert_->integer(0, static_cast<std::int64_t>(row.place.value))
-                                 .integer(1, row.at_ns)
-                                 .blob(2, row.bytes)
-                                 .blob(3, as_text(head.chain))
-                                 .run();
+    Result<void> put = insert_->integer(0, static_cast<std::int64_t>(row.place.value))
+                           .integer(1, row.at_ns)
+                           .blob(2, row.bytes)
+                           .blob(3, as_text(head.chain))
+                           .run();
     if (!put) return put;
   }
   return {};

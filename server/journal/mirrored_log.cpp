@@ -368,8 +368,8 @@ Result<void> MirroredLog::append(std::span<const JournalRow> rows, const Journal
     OSTEON_CHECK(signature.has_value() == member->is_signed);
     const std::string entry = encode_entry(rows, head, signature, member->salt);
     if (Result<void> named = check_named(*member); !named) return named;
-    const Result<void> put = durable_ ? member->file->write_durably(member->end, entry)
-                                      : member->file->write_at(member->end, entry);
+    Result<void> put = durable_ ? member->file->write_durably(member->end, entry)
+                                : member->file->write_at(member->end, entry);
     if (!put) return put;
     member->end += entry.size();
     member->written = std::max(member->written, member->end);

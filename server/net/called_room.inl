@@ -63,10 +63,10 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
   const auto tell = [&](std::string_view reason) {
     context.AddTrailingMetadata(kRefusalTrailer, std::string(reason));
   };
-  const auto wrong = [&](std::string sentence) {
+  const auto wrong = [&](const std::string& sentence) {
     tell("request");
     rooms.gate->note_refused("request", sentence, call);
-    return Status(StatusCode::INVALID_ARGUMENT, short_words(std::move(sentence)));
+    return Status(StatusCode::INVALID_ARGUMENT, short_words(sentence));
   };
   for (const auto& [key, value] : context.client_metadata())
     if (!is_known_header({key.data(), key.size()}, peer.by_proxy))
@@ -147,16 +147,16 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
 // The log keeps the paths.
 inline Status status_of(const Error& error) {
   if (without_paths(error.message) != error.message) log_failed_call(error.message);
-  std::string said = short_words(error.message);
+  const std::string said = short_words(error.message);
   switch (error.code) {
-    case ErrorCode::invalid_input: return invalid(std::move(said));
-    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, std::move(said)};
-    case ErrorCode::denied: return {StatusCode::PERMISSION_DENIED, std::move(said)};
-    case ErrorCode::exhausted: return {StatusCode::RESOURCE_EXHAUSTED, std::move(said)};
-    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, std::move(said)};
+    case ErrorCode::invalid_input: return invalid(said);
+    case ErrorCode::not_found: return {StatusCode::NOT_FOUND, said};
+    case ErrorCode::denied: return {StatusCode::PERMISSION_DENIED, said};
+    case ErrorCode::exhausted: return {StatusCode::RESOURCE_EXHAUSTED, said};
+    case ErrorCode::exists: return {StatusCode::ALREADY_EXISTS, said};
     case ErrorCode::unavailable:
-    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, std::move(said)};
-    default: return {StatusCode::INTERNAL, std::move(said)};
+    case ErrorCode::unsupported: return {StatusCode::FAILED_PRECONDITION, said};
+    default: return {StatusCode::INTERNAL, said};
   }
 }
 
@@ -198,7 +198,7 @@ std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::Callbac
 // An event of the room; the call is answered when every session has been told, by what `fill` makes of it.
 template <class Fill>
 grpc::ServerUnaryReactor* change_room(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
-                                      std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+                                      std::function<Result<RoomEvent>(Room&)>&& event, Fill fill) {
   room.host().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
     if (decided) fill(*decided);
     reactor->Finish(decided ? Status::OK : status_of(decided.error()));

@@ -443,7 +443,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const D
 
 Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
-  if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
+  if (Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
     const RoomKeeper* keeper = (*already)->keeper();
     if (const Error* why = keeper ? keeper->closed_to_rows() : nullptr)
       return failure(ErrorCode::unavailable, "the room " + name + " is there and takes no more cuts: " + why->message);
