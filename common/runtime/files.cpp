@@ -48,10 +48,12 @@ Result<void> check_writable(const std::filesystem::path& file, const std::string
     reason = EISDIR;
   else if (std::filesystem::exists(file, ignored) || std::filesystem::is_symlink(file, ignored))
     reason = ::access(file.c_str(), W_OK) != 0 ? errno : 0;
-  else if (const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600); made < 0)
-    reason = errno;  // also if the folder is writable but no file can be made in it, as in /proc
-  else if (::close(made); ::unlink(file.c_str()) != 0)
-    reason = errno;
+  else {
+    // A folder may be writable and yet take no file, as in /proc.
+    const int made = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+    if (made >= 0) ::close(made);
+    if (made < 0 || ::unlink(file.c_str()) != 0) reason = errno;
+  }
   if (reason == 0) return {};
   return failure(ErrorCode::internal, "cannot write " + what + " " + file.string() + ": " +
                                           std::generic_category().message(reason) + "; give " + option +

@@ -123,8 +123,7 @@ class Diagnosis {
   }
 
   [[nodiscard]] ConnectionFault tls_for_plain() const {
-    return lasting(ErrorCode::invalid_input, "the server at " + address_ +
-                                                 " asks for a certificate, but you gave " +
+    return lasting(ErrorCode::invalid_input, "the server at " + address_ + " asks for a certificate, but you gave " +
                                                  "--plain; give --certificates DIR with --ticket FILE in its place");
   }
 
@@ -196,10 +195,9 @@ class Diagnosis {
       case X509_V_ERR_INVALID_PURPOSE:
         return denied(own + "is not for a person; whoever runs the server makes one with deploy/certs person");
       default:
-        // This happens also for some seconds after too many calls from one address. A later try may succeed.
         return for_now("the server at " + address_ + " refuses " + own +
-                       "though it is in time and of the authority in ca.pem: most likely it was revoked; ask whoever " +
-                       "runs the server, whose log says why");
+                       "though it is in time and of the authority in ca.pem: it was revoked, or too many calls came " +
+                       "from you; wait a minute, and then ask whoever runs the server, whose log says why");
     }
   }
 

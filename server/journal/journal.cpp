@@ -311,8 +311,9 @@ Result<void> Journal::write(const std::function<Result<void>()>& work) {
   Result<void> done = check_named();
   if (done) done = work();
   if (done) return done;
-  close_for_good({ErrorCode::unavailable, state.path.string() + " takes no more entries because a write to it failed: " +
-                                              done.error().message + "; salvage it into a new journal"});
+  close_for_good({ErrorCode::unavailable,
+                  state.path.string() + " takes no more entries because a write to it failed: " + done.error().message +
+                      "; salvage it into a new journal"});
   return tl::unexpected(*state.closed);
 }
 
@@ -351,7 +352,7 @@ Result<void> Journal::append(std::span<const JournalEntry> entries) {
   if (entries.empty()) return {};
   JournalHead head = state.head;
   // Adds them to the transaction, which is in memory, and to the log, which makes them durable.
-  const Result<void> done = write([&] {
+  Result<void> done = write([&] {
     return state.file.add_entries(entries, head).and_then([&] {
       std::optional<Signature> signature;
       if (state.signed_since) {
@@ -407,9 +408,10 @@ Result<void> Journal::check_witness(const JournalHead& witness) {
   State& state = *state_;
   const std::string place = std::to_string(witness.place.value), file = state.path.string();
   if (witness.place > state.head.place && state.recovered_to)
-    return failure(ErrorCode::unavailable,
-                   file + " was salvaged up to event " + std::to_string(state.recovered_to->value) +
-                       ", and a client knows event " + place + ": what it knows beyond that is lost; it has to join again");
+    return failure(ErrorCode::unavailable, file + " was salvaged up to event " +
+                                               std::to_string(state.recovered_to->value) +
+                                               ", and a client knows event " + place +
+                                               ": what it knows beyond that is lost; it has to join again");
   if (witness.place > state.head.place) {
     // The note also closes the journal for the next process, because the witness may never come back to report this.
     close_for_good({ErrorCode::unavailable,
@@ -455,7 +457,7 @@ Result<void> Journal::add_checkpoint(CheckpointFile file) {
   std::sort(all->begin(), all->end(), [](const Checkpoint& a, const Checkpoint& b) { return a.at.place > b.at.place; });
   const auto kept = static_cast<std::ptrdiff_t>(std::min(kCheckpointsKept, all->size()));
   const std::vector<Checkpoint> old(all->begin() + kept, all->end());
-  const Result<void> noted = write_through([&] {
+  Result<void> noted = write_through([&] {
     Result<void> done = state.file.add_checkpoint(file.about_);
     for (const Checkpoint& checkpoint : old)
       if (done)
@@ -577,7 +579,7 @@ Result<void> Journal::close() {
   state_.reset();
   if (vouched && done) {
     static_cast<void>(disk.remove(wal_of(path)));  // it is empty
-    static_cast<void>(remove_log(path, disk));  // no longer needed, as the footer says
+    static_cast<void>(remove_log(path, disk));     // no longer needed, as the footer says
   }
   return done;
 }

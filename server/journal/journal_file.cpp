@@ -608,7 +608,8 @@ void JournalFile::inspect_log(Inspection& found) {
   if (log_.witnessed > found.head.place) check_witness({log_.witnessed, {}}, "its log", found);
   found.witnessed = std::max(found.witnessed, log_.witnessed);
   for (const std::string& foreign : log_.foreign)
-    found.faults.push_back(foreign + "; put the files of the same moment together again, or salvage it into a new journal");
+    found.faults.push_back(foreign +
+                           "; put the files of the same moment together again, or salvage it into a new journal");
   if (!needs_log_) return;
   const std::string untold = "how many entries are missing after event " + std::to_string(found.head.place.value) +
                              " cannot be told" + std::string(kRemedy);
@@ -696,11 +697,11 @@ Result<void> JournalFile::add_entries(std::span<const JournalEntry> entries, Jou
   for (const JournalEntry& entry : entries) {
     OSTEON_CHECK(entry.place.value == head.place.value + 1);
     head = next_in_chain(head, entry);
-    const Result<void> put = insert_->integer(0, static_cast<std::int64_t>(entry.place.value))
-                                 .integer(1, entry.at_ns)
-                                 .blob(2, entry.bytes)
-                                 .blob(3, as_text(head.chain))
-                                 .run();
+    Result<void> put = insert_->integer(0, static_cast<std::int64_t>(entry.place.value))
+                           .integer(1, entry.at_ns)
+                           .blob(2, entry.bytes)
+                           .blob(3, as_text(head.chain))
+                           .run();
     if (!put) return put;
   }
   return {};

@@ -74,7 +74,7 @@ std::string encode_batch(std::span<const JournalEntry> entries, const JournalHea
 
 struct Batch {
   std::uint64_t first = 0;  // sequence number
-  JournalHead head;  // after the batch
+  JournalHead head;         // after the batch
   std::vector<JournalEntry> entries;
   std::optional<Signature> signature;
 };
@@ -97,7 +97,7 @@ std::optional<std::pair<Batch, std::size_t>> decode_batch(std::string_view bytes
     if (left.size() < 16 || integer_at(left, 8) > left.size() - 16) return std::nullopt;
     const std::uint64_t length = integer_at(left, 8);
     batch.entries.push_back({RoomSeq{batch.first + i}, static_cast<std::int64_t>(integer_at(left, 0)),
-                          std::string(left.substr(16, length))});
+                             std::string(left.substr(16, length))});
     left.remove_prefix(16 + length);
   }
   if (!left.empty()) return std::nullopt;
@@ -112,8 +112,8 @@ struct FoundFile {
   LogStart start;
   std::vector<Batch> batches;
   bool is_there = false;
-  bool damaged = false;  // something unreadable lies between batches
-  bool is_cut = false;  // shorter than it was made
+  bool damaged = false;       // something unreadable lies between batches
+  bool is_cut = false;        // shorter than it was made
   bool ends_in_part = false;  // with part of a batch
   [[nodiscard]] RoomSeq last() const { return batches.empty() ? start.base.place : batches.back().head.place; }
 };
@@ -369,7 +369,7 @@ Result<void> MirroredLog::append(std::span<const JournalEntry> entries, const Jo
     OSTEON_CHECK(signature.has_value() == member->is_signed);
     const std::string batch = encode_batch(entries, head, signature, member->salt);
     if (Result<void> named = check_named(*member); !named) return named;
-    const Result<void> put =
+    Result<void> put =
         durable_ ? member->file->write_durably(member->end, batch) : member->file->write_at(member->end, batch);
     if (!put) return put;
     member->end += batch.size();

@@ -283,7 +283,7 @@ Result<std::shared_ptr<const SigningKeys>> load_or_make_signing_keys(const fs::p
 }
 
 Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const fs::path& file) {
-  const auto before = load_signing_keys(file);
+  auto before = load_signing_keys(file);
   if (!before) return before;
   const SigningKey after = SigningKey::make();
   std::vector<Succession> successions = (*before)->successions();

@@ -23,6 +23,10 @@ namespace {
 
 constexpr std::size_t kMostRemembered = 4096;  // certificates, and tickets
 constexpr unsigned kCertificatesEverySeconds = 1;
+constexpr std::chrono::seconds kFirstCall{2};  // after a revocation, for connections without a call
+constexpr std::string_view kPaused = "too many calls came from you; wait a minute";
+constexpr std::string_view kTooOften =
+    "that is called too often; wait a second between calls, since who goes on loses all connections for a minute";
 
 UnixTime system_now() { return std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now()); }
 
@@ -186,7 +190,7 @@ std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
     if (const auto why = revoked(certificate->serial, certificate->user, {}))
       refusal = Refusal{"revoked", false, *why};
     else if (is_paused(certificate->user))
-      refusal = Refusal{"flood", true, "too many calls came from you; wait a minute"};
+      refusal = Refusal{"flood", true, std::string(kPaused)};
   }
   if (!refusal) return {};
   // The name in an invalid chain is only a claim. A revoked chain is valid otherwise.
@@ -329,6 +333,7 @@ tl::expected<Caller, Refusal> Authorizer::judge(const CallClaims& call) {
                 .address = call.peer.address};
   // A role may hold in one room only, so the room must be known here, however the call names it.
   std::string room(call.room.empty() ? std::string_view(ticket->room) : call.room);
+  if (room == kAnyRoom && !call.about.empty()) room = call.about;
   if (room == kAnyRoom && only_room_) room = only_room_();
   if (std::optional<Refusal> refusal = judge_again(caller, room, call.method))
     return tl::unexpected(std::move(*refusal));
@@ -346,9 +351,10 @@ tl::expected<Caller, Refusal> Authorizer::admit(const CallClaims& call) {
       if (connections_ && !call.peer.by_proxy)
         connections_->identify(call.peer.peer, certificate->user, certificate->serial);
     }
-    if (caller &&
-        (is_paused(caller->user) || !rates_.take(caller->user, call.method, std::chrono::steady_clock::now())))
-      caller = tl::unexpected(Refusal{"rate", true, "that is called too often; wait a moment and try again", true});
+    if (caller && is_paused(caller->user))
+      caller = tl::unexpected(Refusal{"flood", true, std::string(kPaused), true});
+    else if (caller && !rates_.take(caller->user, call.method, std::chrono::steady_clock::now()))
+      caller = tl::unexpected(Refusal{"rate", true, std::string(kTooOften), true});
     ++(caller ? counts_.admitted : counts_.refused);
     if (caller) return caller;
   }
@@ -540,15 +546,21 @@ void Authorizer::refresh() {
   if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
   tell("ticket keys were not read, and those before count on", keys, keys_fault_);
   // A changed role alone closes no connection, since this would also close connections before their first call.
-  revoked_anew_ = is_revocation || (authorities && *authorities);
+  if (!is_revocation && !(authorities && *authorities)) return;
+  const std::lock_guard lock(mutex_);
+  revoked_at_ = std::chrono::steady_clock::now();
 }
 
 void Authorizer::close_revoked() {
-  if (!connections_) return;
   const std::lock_guard lock(mutex_);
-  // A connection without a call may use a certificate that was revoked meanwhile. Clients that may connect do so again.
-  const std::size_t closed = connections_->close_if(
-      [this](const Connection& one) { return one.serial.empty() || revoked(one.serial, one.user, {}); });
+  if (!connections_ || !revoked_at_) return;
+  // A connection without a call may use a certificate that is revoked now. A new one gets time for its first call. One
+  // that came after the revocation was judged by the new list.
+  const bool is_over = std::chrono::steady_clock::now() - *revoked_at_ >= kFirstCall;
+  const std::size_t closed = connections_->close_if([&](const Connection& one) {
+    return one.serial.empty() ? is_over && one.accepted <= *revoked_at_ : revoked(one.serial, one.user, {}).has_value();
+  });
+  if (is_over) revoked_at_.reset();
   if (closed > 0)
     log::info("connections closed", {{"of", "revoked certificates and before a first call"}, {"count", closed}});
 }
@@ -557,7 +569,7 @@ void Authorizer::look() {
   std::vector<std::pair<std::shared_ptr<Watched>, Refusal>> ending;
   std::vector<std::shared_ptr<Watched>> held;  // destroyed without the lock, since their destructors take it
   // Closes connections one check after their streams end, so that the clients still receive the reason.
-  if (revoked_anew_.exchange(false)) close_revoked();
+  close_revoked();
   refresh();
   {
     const std::lock_guard lock(mutex_);

@@ -2,7 +2,6 @@
 // ticket and revocations at the beginning of every call. Repeats these checks several times a second for every open
 // stream. This is the only place where a connection or a call is refused because of who makes it.
 #pragma once
-#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -68,6 +67,7 @@ struct CallClaims {
   std::string_view ticket{};  // metadata osteon-ticket; empty: none was sent
   std::string_view room{};    // metadata osteon-room-bin; empty: none was sent
   std::string_view method{};  // full name; empty: any method
+  std::string_view about{};   // room that the message names if `room` and the ticket name none; empty: none
 };
 
 // An open stream. Destroying it says that the stream has ended; the authorizer may end it before that.
@@ -202,7 +202,6 @@ class Authorizer {
   std::mutex reading_;                                         // taken before mutex_, never within it
   AccessFile access_;                                          // under reading_, as are the next three
   std::string access_fault_, authorities_fault_, keys_fault_;  // the fault that was logged last
-  std::atomic<bool> revoked_anew_ = false;                     // true: the last refresh found new revocations
   mutable std::mutex mutex_;
   AccessList access_list_;
   std::vector<TicketCheckKey> ticket_keys_;
@@ -211,7 +210,9 @@ class Authorizer {
   // Certificates in PEM that a proxy sent and that these authorities signed.
   std::set<std::string> checked_;
   std::map<std::string, std::chrono::steady_clock::time_point> paused_;  // until when, by user
-  std::unordered_map<std::string, PersonCertificate> certificates_;      // recently seen, by PEM
+  // Time of the newest revocation, until all connections that were open then were checked.
+  std::optional<std::chrono::steady_clock::time_point> revoked_at_;
+  std::unordered_map<std::string, PersonCertificate> certificates_;  // recently seen, by PEM
   CallRates rates_;
   std::unordered_map<std::string, CheckedTicket> tickets_;  // recently seen, by text
   using Seat = std::tuple<std::string, std::string, int>;   // room, user, kind

@@ -46,9 +46,10 @@ inline tl::expected<Caller, Refusal> judged(Authorizer& authorizer, const grpc::
 }
 
 // Authorizes a call at its beginning: certificate, ticket, role, headers and rate. Null: the call is allowed. Every
-// handler begins with this. It is the only place where calls are counted as admitted or refused.
+// handler begins with this. It is the only place where calls are counted as admitted or refused. `about`: the room that
+// the message names, for a ticket of every room.
 inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context,
-                                        std::string_view method) {
+                                        std::string_view method, std::string_view about = {}) {
   if (!rooms.authorizer) return {};
   const PeerClaims peer = peer_claims(context);
   const std::optional<std::string> room = metadata_of(context, "osteon-room-bin"),
@@ -56,13 +57,14 @@ inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServer
   const CallClaims call{.peer = peer,
                         .ticket = ticket ? std::string_view(*ticket) : std::string_view(),
                         .room = room ? std::string_view(*room) : std::string_view(),
-                        .method = method};
+                        .method = method,
+                        .about = about};
   // Sends programs the reason, and lets refused_call_notes() know that the refusal was noted.
   const auto tell = [&](std::string_view reason) { context.AddTrailingMetadata(kRefusalTrailer, std::string(reason)); };
-  const auto wrong = [&](std::string sentence) {
+  const auto wrong = [&](const std::string& sentence) {
     tell("request");
     rooms.authorizer->note_refused("request", sentence, call);
-    return Status(StatusCode::INVALID_ARGUMENT, short_words(std::move(sentence)));
+    return Status(StatusCode::INVALID_ARGUMENT, short_words(sentence));
   };
   for (const auto& [key, value] : context.client_metadata())
     if (!is_known_header({key.data(), key.size()}, peer.by_proxy))
@@ -146,24 +148,24 @@ inline Result<std::shared_ptr<OpenRoom>> called_room(const Rooms& rooms, const g
 
 // The status has no paths; the log has them.
 inline Status status_of(const Error& error) {
-  if (without_paths(error.message) != error.message) log::warn("a call failed", {{"reason", error.message}});
-  std::string said = short_words(error.message);
+  if (without_paths(error.message) != error.message) log_failed_call(error.message);
+  const std::string said = short_words(error.message);
   switch (error.code) {
     case ErrorCode::invalid_input:
-      return invalid(std::move(said));
+      return invalid(said);
     case ErrorCode::not_found:
-      return {StatusCode::NOT_FOUND, std::move(said)};
+      return {StatusCode::NOT_FOUND, said};
     case ErrorCode::denied:
-      return {StatusCode::PERMISSION_DENIED, std::move(said)};
+      return {StatusCode::PERMISSION_DENIED, said};
     case ErrorCode::exhausted:
-      return {StatusCode::RESOURCE_EXHAUSTED, std::move(said)};
+      return {StatusCode::RESOURCE_EXHAUSTED, said};
     case ErrorCode::exists:
-      return {StatusCode::ALREADY_EXISTS, std::move(said)};
+      return {StatusCode::ALREADY_EXISTS, said};
     case ErrorCode::unavailable:
     case ErrorCode::unsupported:
-      return {StatusCode::FAILED_PRECONDITION, std::move(said)};
+      return {StatusCode::FAILED_PRECONDITION, said};
     default:
-      return {StatusCode::INTERNAL, std::move(said)};
+      return {StatusCode::INTERNAL, said};
   }
 }
 
@@ -205,7 +207,7 @@ std::shared_ptr<OpenRoom> room_of_member(const Rooms& rooms, const grpc::Callbac
 // Queues an event of the room. The call is answered when every session was sent the event; `fill` makes the answer.
 template <class Fill>
 grpc::ServerUnaryReactor* change_room(OpenRoom& room, grpc::ServerUnaryReactor* reactor,
-                                      std::function<Result<RoomEvent>(Room&)> event, Fill fill) {
+                                      std::function<Result<RoomEvent>(Room&)>&& event, Fill fill) {
   room.runtime().queue_event(std::move(event), [reactor, fill](const Result<RoomEvent>& decided) {
     if (decided) fill(*decided);
     reactor->Finish(decided ? Status::OK : status_of(decided.error()));

@@ -48,7 +48,13 @@ bool Connections::add(int descriptor) {
   const std::string peer = inode ? peer_of(descriptor, *inode) : "";
   if (peer.empty()) return false;
   const std::lock_guard lock(mutex_);
-  open_[peer] = {descriptor, *inode, {.peer = peer, .user = {}, .serial = {}, .is_proxys = peer.starts_with(kUnix)}};
+  open_[peer] = {descriptor,
+                 *inode,
+                 {.peer = peer,
+                  .user = {},
+                  .serial = {},
+                  .is_proxys = peer.starts_with(kUnix),
+                  .accepted = std::chrono::steady_clock::now()}};
   return true;
 }
 
@@ -101,7 +107,7 @@ std::size_t Connections::close_if(const std::function<bool(const Connection&)>& 
     // After shutdown(), the receive queue would still be read: thousands of calls (CVE-2023-44487). So the
     // socket is disconnected instead.
     const sockaddr nowhere{.sa_family = AF_UNSPEC, .sa_data = {}};
-    ::connect(entry.descriptor, &nowhere, sizeof nowhere);
+    (void)::connect(entry.descriptor, &nowhere, sizeof nowhere);  // fails where gRPC has just closed it
     entry.is_cut_off = true;
     ++closed;
   }

@@ -1,6 +1,7 @@
 // The open connections of a server: where each comes from, whose it is, and its descriptor, by which it can be closed.
 // gRPC owns the descriptors. It neither counts connections nor closes one on request.
 #pragma once
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -16,6 +17,7 @@ struct Connection {
   std::string user;        // from the certificate; empty until a call has come over the connection
   std::string serial;      // likewise, hexadecimal
   bool is_proxys = false;  // from the Unix socket of a proxy: carries calls of many people, and is never closed here
+  std::chrono::steady_clock::time_point accepted{};
 };
 
 // Any thread may call it.

@@ -46,7 +46,7 @@ std::optional<Message> parse(const ByteBuffer& bytes) {
 // clients.
 inline std::string short_words(std::string_view why) { return bounded_text(without_paths(why), 1000); }
 
-inline Status invalid(std::string why) { return {StatusCode::INVALID_ARGUMENT, short_words(std::move(why))}; }
+inline Status invalid(std::string_view why) { return {StatusCode::INVALID_ARGUMENT, short_words(why)}; }
 
 inline Status status_of(const Refusal& why) {
   if (why.is_for_now) return {StatusCode::RESOURCE_EXHAUSTED, why.sentence};
@@ -94,9 +94,9 @@ class OutStream : public Reactor {
     return entered.has_value();
   }
 
-  void close(Status status) {
+  void close(const Status& status) {
     const std::lock_guard lock(mutex_);
-    close_locked(std::move(status));
+    close_locked(status);
   }
 
   void OnWriteDone(bool ok) final {
@@ -131,7 +131,7 @@ class OutStream : public Reactor {
   virtual void drop_waiting() {}
 
   // Ends the stream after the message in flight. An OK end sends what waits first, unless an error comes before that.
-  void close_locked(Status status) {
+  void close_locked(const Status& status) {
     const bool cuts_off = !status.ok() && !finished_ && !failing();
     if (!closing_ || cuts_off) closing_ = Status(status.error_code(), short_words(status.error_message()));
     if (cuts_off) {
@@ -201,9 +201,9 @@ class RefusedStream final : public OutStream<Reactor> {
 };
 
 template <class Reactor = WriteReactor>
-Reactor* refused(Status status) {
+Reactor* refused(const Status& status) {
   auto* stream = RefusedStream<Reactor>::launch(std::make_shared<RefusedStream<Reactor>>());
-  stream->close(std::move(status));
+  stream->close(status);
   return stream;
 }
 

@@ -23,8 +23,9 @@ class RefusalCounts {
     else
       ++counts_[counts_.size() < kMost ? std::string(reason) : "other"];
   }
-  // Counts a refusal and logs it once for each `who`, `from` and reason, so that nobody can fill the disk. `who`: a
-  // person or an address. `from`: the address of a person; empty if it is unknown or `who` is an address.
+  // Counts a refusal and logs it once for each `who`, `from` and reason, within the limit of RefusalLog, so that nobody
+  // can fill the disk. `who`: a person or an address. `from`: the address of a person; empty if it is unknown or `who`
+  // is an address.
   void note(std::string_view reason, std::string_view who, std::string_view said, std::string_view from = {});
   [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
     const std::lock_guard lock(mutex_);

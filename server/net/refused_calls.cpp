@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/runtime/log.hpp"
 #include "server/audit/audit_trail.hpp"
 #include "server/net/connections.hpp"
 #include "server/net/peer_claims.hpp"
@@ -107,6 +108,16 @@ class CallNotesMaker final : public grpc::experimental::ServerInterceptorFactory
 };
 
 }  // namespace
+
+void log_failed_call(std::string_view why) {
+  static std::mutex mutex;
+  static RefusalLog log;
+  {
+    const std::lock_guard lock(mutex);
+    if (!log.is_new("", why)) return;
+  }
+  log::warn("a call failed", {{"reason", why}});
+}
 
 HandshakeWatch::HandshakeWatch(RefusalCounts& refusals, Connections& connections)
     : refusals_(refusals), connections_(connections) {

@@ -40,6 +40,9 @@ class HandshakeWatch {
 // The trailing header of a call that the authorizer refused: its reason in one word. The authorizer has noted the call.
 inline constexpr const char* kRefusalTrailer = "osteon-refusal";
 
+// Logs why a call failed, with the paths that its caller does not receive, within the limit of RefusalLog. Any thread.
+void log_failed_call(std::string_view why);
+
 // Notes every call that ends because of its message. The message was malformed or nonsense ("request"), asked for too
 // much ("quota"), or was not allowed for its caller ("denied"). The call is noted under the caller's address. Join and
 // the authorizer note their own refusals. `refusals` outlives the server.

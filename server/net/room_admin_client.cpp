@@ -150,10 +150,8 @@ Result<std::vector<std::string>> RoomAdminClient::remove(const std::string& name
   v1::DeleteRoomRequest request;
   request.set_name(name);
   request.set_with_branches(with_branches);
-  // First with the ticket's own room: who made a branch has a ticket for the room that it was made from.
-  auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request, "");
-  if (!response && response.error().code == ErrorCode::denied)
-    response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request);
+  // With the ticket's own room: who made a branch has a ticket for the room that it was made from.
+  const auto response = ask(channel_, &v1::RoomsService::Stub::DeleteRoom, request, "");
   if (!response) return tl::unexpected(response.error());
   return std::vector<std::string>(response->deleted().begin(), response->deleted().end());
 }

@@ -66,8 +66,7 @@ Error kept_elsewhere(const OpenRoom& room) {
               "journals, or start it with --rooms FOLDER"};
 }
 Error not_kept(const std::string& name) {
-  return {ErrorCode::unavailable,
-          "the room " + name + " has no journal; start osteon-server with --rooms FOLDER"};
+  return {ErrorCode::unavailable, "the room " + name + " has no journal; start osteon-server with --rooms FOLDER"};
 }
 
 std::uint64_t new_server_epoch() {
@@ -89,7 +88,8 @@ std::vector<std::string> lines_of(const std::string& text) {
 // Reads ahead in a room's journal. The room stays in memory while it is shown.
 class EntryReader {
  public:
-  EntryReader(std::shared_ptr<OpenRoom> room, RoomSeq from, RoomSeq to) : room_(std::move(room)), next_(from), to_(to) {}
+  EntryReader(std::shared_ptr<OpenRoom> room, RoomSeq from, RoomSeq to)
+      : room_(std::move(room)), next_(from), to_(to) {}
   std::optional<LogEntry> operator()() {
     if (ahead_.empty() && next_ <= to_) {
       const RoomSeq last{std::min(to_.value, next_.value + kEntriesAhead - 1)};
@@ -97,7 +97,8 @@ class EntryReader {
         ahead_.push_back(entry);
         return true;
       });
-      if (!read) log::error("a room's entries cannot be shown", {{"room", room_->name}, {"reason", read.error().message}});
+      if (!read)
+        log::error("a room's entries cannot be shown", {{"room", room_->name}, {"reason", read.error().message}});
       next_ = read ? RoomSeq{last.value + 1} : RoomSeq{to_.value + 1};
     }
     if (ahead_.empty()) return std::nullopt;
@@ -458,7 +459,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const D
 
 Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
   const std::lock_guard changing(changing_);
-  if (const Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
+  if (Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
     const RoomStore* store = (*already)->store();
     if (const Error* why = store ? store->closed_to_entries() : nullptr)
       return failure(ErrorCode::unavailable, "the room " + name + " is there and takes no more cuts: " + why->message);

@@ -79,10 +79,9 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   }
   Reactor* ResumeRoom(Context* context, const v1::ResumeRoomRequest* request,
                       v1::ResumeRoomResponse* response) override {
-    return slowly(context, "ResumeRoom", request->name(),
-                  [this, request, response] {
-                    return answer_with(rooms_.resume(request->name()), response->mutable_room());
-                  });
+    return slowly(context, "ResumeRoom", request->name(), [this, request, response] {
+      return answer_with(rooms_.resume(request->name()), response->mutable_room());
+    });
   }
   Reactor* BranchRoom(Context* context, const v1::BranchRoomRequest* request,
                       v1::BranchRoomResponse* response) override {
@@ -90,7 +89,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       const Result<Requester> by = requester(*context, "BranchRoom", request->name());
       if (!by) return status_of(by.error());
       return answer_with(rooms_.branch(request->name(), request->new_name(), RoomSeq{request->room_seq()}, *by),
-                  response->mutable_room());
+                         response->mutable_room());
     });
   }
   Reactor* DeleteRoom(Context* context, const v1::DeleteRoomRequest* request,
@@ -135,7 +134,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       if (!copied) return status_of(copied.error());
       response->set_room_seq(copied->place.value);
       response->set_chain(wire::to_wire(copied->chain));
-      response->set_file(file.string());
+      response->set_file(file.filename().string());
       return Status(Status::OK);
     });
   }
@@ -145,8 +144,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       const Result<Requester> by = requester(*context, "ReplayRoom", request->name());
       if (!by) return status_of(by.error());
       return answer_with(rooms_.replay(request->name(), request->new_name(), RoomSeq{request->from_room_seq()},
-                                RoomSeq{request->to_room_seq()}, request->speed(), *by),
-                  response->mutable_room());
+                                       RoomSeq{request->to_room_seq()}, request->speed(), *by),
+                         response->mutable_room());
     });
   }
 
@@ -179,7 +178,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work,
                   const std::function<Result<void>()>& may = {}) {
     Reactor* reactor = context->DefaultReactor();
-    if (std::optional<Status> why = refusal_of(rooms_, *context, method(name))) return refuse(reactor, std::move(*why));
+    if (std::optional<Status> why = refusal_of(rooms_, *context, method(name), room))
+      return refuse(reactor, std::move(*why));
     const auto refusal = [this, context, name, room, may]() -> std::optional<Status> {
       const auto in_room = [&] { return caller_in(rooms_, *context, room, method(name)).map([](const Caller&) {}); };
       const Result<void> allowed = may ? may() : in_room();

@@ -413,7 +413,7 @@ class RoomServiceImpl final : public RoomBase {
         return reactor->Finish(status_of(written.error()));
       response->set_room_seq(saved.room_seq.value);
       response->set_field_hash(wire::to_wire(field_hash(saved.leaves, room->runtime().bone().pitch_mm())));
-      response->set_file(file.string());
+      response->set_file(file.filename().string());
       reactor->Finish(Status::OK);
     });
     return reactor;

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr std::string_view kIncoming = "incoming-", kArchive = "upload.zip";
 constexpr std::uintmax_t kMostDescription = 1 << 20;  // bytes
-constexpr std::string_view kNote = "memory.json";  // in a case's folder: the memory that it takes when it is loaded
+constexpr std::string_view kNote = "memory.json";     // in a case's folder: the memory that it takes when it is loaded
 
 tl::unexpected<Error> disk(const fs::path& where, const std::string& why) {
   return failure(ErrorCode::internal, "cannot write " + where.string() + ": " + why);
@@ -69,7 +69,8 @@ Result<std::unique_ptr<CaseRepository>> CaseRepository::open(fs::path folder, fs
   for (const auto& entry : fs::directory_iterator(folder, error))
     if (entry.path().filename().string().starts_with(kIncoming)) left.push_back(entry.path());
   for (const fs::path& one : left) fs::remove_all(one, error);
-  return std::unique_ptr<CaseRepository>(new CaseRepository(fs::absolute(folder), std::move(program), quota));
+  folder = fs::absolute(folder);
+  return std::unique_ptr<CaseRepository>(new CaseRepository(std::move(folder), std::move(program), quota));
 }
 
 std::uint64_t CaseRepository::case_bytes() const {

@@ -1,10 +1,12 @@
 // osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]: one target under libFuzzer, which
 // looks for inputs that reach what no input has reached. --seeds writes the target's own seeds into that folder first.
 #include <algorithm>
+#include <atomic>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <new>
 #include <random>
 #include <string>
@@ -16,6 +18,8 @@ namespace osteon::fuzz {
 namespace {
 
 const Target* chosen = nullptr;
+constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
+std::atomic<std::size_t> most_bytes_at_once = kNoLimit;  // libFuzzer itself takes more between two inputs
 
 [[noreturn]] void usage(const std::vector<Target>& all) {
   std::fprintf(stderr, "osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]; targets:");
@@ -54,8 +58,8 @@ void choose(std::span<char*> arguments) {
 // GDCM and OpenVDB ask for what a damaged file claims. The child that the import reads it in has a limit of memory and
 // takes std::bad_alloc for a damaged file; under the address sanitizer the limit is here.
 void* operator new(std::size_t bytes) {
-  constexpr std::size_t kMost = std::size_t{256} << 20;
-  void* memory = bytes > kMost ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
+  const bool too_many = bytes > osteon::fuzz::most_bytes_at_once;
+  void* memory = too_many ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
   if (memory == nullptr) throw std::bad_alloc();
   return memory;
 }
@@ -79,14 +83,21 @@ int LLVMFuzzerInitialize(int* argc, char*** argv) {
   return 0;
 }
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  osteon::fuzz::chosen->run({data, size});
-  if (osteon::fuzz::chosen->settle) osteon::fuzz::chosen->settle();
+  const osteon::fuzz::Target& target = *osteon::fuzz::chosen;
+  osteon::fuzz::most_bytes_at_once = target.most_bytes_at_once;
+  target.run({data, size});
+  // Calls go on beside those of the next inputs: some are answered after seconds.
+  static int begun = 0;
+  constexpr int kSettleEvery = 4096;
+  if (target.settle && ++begun % kSettleEvery == 0) target.settle();
+  osteon::fuzz::most_bytes_at_once = osteon::fuzz::kNoLimit;
   return 0;
 }
 std::size_t LLVMFuzzerCustomMutator(std::uint8_t* data, std::size_t size, std::size_t most, unsigned seed) {
-  std::mt19937 random(seed);
   const osteon::fuzz::Target& target = *osteon::fuzz::chosen;
-  if (!target.change || random() % 2 == 0) return LLVMFuzzerMutate(data, size, most);
+  if (!target.change) return LLVMFuzzerMutate(data, size, most);
+  static std::mt19937 random(seed);  // seeding takes longer than some targets
+  if (random() % 2 == 0) return LLVMFuzzerMutate(data, size, most);
   osteon::fuzz::Bytes input(data, data + size);
   target.change(input, random);
   if (input.size() > most) return LLVMFuzzerMutate(data, size, most);

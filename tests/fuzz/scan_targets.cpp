@@ -29,7 +29,9 @@ namespace fs = std::filesystem;
 
 constexpr const char* kExplicit = "1.2.840.10008.1.2.1";
 constexpr const char* kImplicit = "1.2.840.10008.1.2";
-constexpr int kEntries = 4, kColumns = 5;
+constexpr int kRows = 4, kColumns = 5;
+// GDCM allocates and clears what a damaged length claims, and an assertion leaves it behind. No sound input needs this.
+constexpr std::size_t kMostBytesAtOnce = std::size_t{4} << 20;
 
 bool keep_going(double) { return true; }
 
@@ -71,11 +73,11 @@ std::string a_slice(const std::string& syntax) {
   data.add(8, 0x103e, "LO", "HEAD 1.0").add(0x18, 0x1210, "SH", "H60s");
   data.add(0x20, 0x0e, "UI", "1.2.3.4").add(0x20, 0x11, "IS", "1").add(0x20, 0x32, "DS", "-10\\-20\\30");
   data.add(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0").add_number(0x28, 2, 1).add(0x28, 4, "CS", "MONOCHROME2");
-  data.add_number(0x28, 0x10, kEntries).add_number(0x28, 0x11, kColumns).add(0x28, 0x30, "DS", "0.5\\0.75");
+  data.add_number(0x28, 0x10, kRows).add_number(0x28, 0x11, kColumns).add(0x28, 0x30, "DS", "0.5\\0.75");
   data.add_number(0x28, 0x100, 16).add_number(0x28, 0x101, 12).add_number(0x28, 0x102, 11).add_number(0x28, 0x103, 0);
   data.add(0x28, 0x1052, "DS", "-1024").add(0x28, 0x1053, "DS", "1");
   std::string pixels;
-  for (int i = 0; i < kEntries * kColumns; ++i) pixels += {static_cast<char>(i), static_cast<char>(i % 16)};
+  for (int i = 0; i < kRows * kColumns; ++i) pixels += {static_cast<char>(i), static_cast<char>(i % 16)};
   data.add(0x7fe0, 0x10, "OW", pixels);
   const auto length = static_cast<char>(meta.bytes().size());
   const std::string head = DataSet(true).add(2, 0, "UL", {length, 0, 0, 0}).bytes();
@@ -191,6 +193,7 @@ Target dicom_target() {
   gdcm::Trace::ErrorOff();
   Target target{"dicom", read_dicom, {bytes_of_text(a_slice(kExplicit)), bytes_of_text(a_slice(kImplicit))}};
   target.mutations = 40;
+  target.most_bytes_at_once = kMostBytesAtOnce;
   return target;
 }
 
@@ -210,6 +213,7 @@ Target scan_archive_target() {
       {an_archive(files, {}), an_archive(files, {.zip_compression = "store"}), an_archive(files, {.format = "pax"}),
        an_archive(files, {.format = "pax", .gzip = true}), an_archive(files, {.format = "iso9660"})}};
   target.mutations = 50;
+  target.most_bytes_at_once = kMostBytesAtOnce;
   return target;
 }
 

@@ -47,7 +47,8 @@ BlockPayload a_block() {
   return encode_block(sphere, sphere, 0, 0.5);
 }
 
-// Coarser surroundings on several sides and corners; rough, so that entries of solid bits are coded in each of their ways.
+// Coarser surroundings on several sides and corners; rough, so that entries of solid bits are coded in each of their
+// ways.
 BlockPayload a_seamed_block() {
   BlockSamples block;
   block.key = {{}, 2, {}};
@@ -105,8 +106,9 @@ struct PacketCounts {
 PacketCounts up_packets, down_packets;
 
 void as_up_packet(std::span<const std::uint8_t> plain) {
+  static const Cut first = a_cut();
   wire::ServerLink link = server_end();
-  Cut cut = a_cut();
+  Cut cut = first;
   for (; cut.author_seq <= 3; ++cut.author_seq)
     OSTEON_CHECK(link.push({cut.author_seq, {.room_seq = {9}, .kind = wire::SessionEntryKind::committed, .cut = cut}}));
   Sealer sealer(link_keys().session, link_keys().up);
@@ -124,8 +126,9 @@ void as_up_packet(std::span<const std::uint8_t> plain) {
 }
 
 void as_down_packet(std::span<const std::uint8_t> plain) {
+  static const Cut first = a_cut();
   wire::ClientLink link(link_keys());
-  OSTEON_CHECK(link.push(a_cut()));
+  OSTEON_CHECK(link.push(first));
   Sealer sealer(link_keys().session, link_keys().down);
   DatagramBuffer buffer;
   for (auto now = 1000ms; now < 1040ms; now += 10ms) {

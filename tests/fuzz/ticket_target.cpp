@@ -33,22 +33,28 @@ std::string base64(std::span<const std::uint8_t> bytes) {
 
 // A ticket that is let in is, to the letter, one that the key signs: nobody has another way to write it.
 void open_text(std::string_view text) {
-  const TicketKey key = fixed_key();
-  const Result<Ticket> ticket = open_ticket(text, check_key_of(key));
+  static const TicketCheckKey check_key = check_key_of(fixed_key());
+  const Result<Ticket> ticket = open_ticket(text, check_key);
   if (!ticket) {
     OSTEON_CHECK(!ticket.error().message.empty() && ticket.error().message.size() < 300);
     return;
   }
   OSTEON_CHECK(ticket->role != Role::none && is_user_name(ticket->user) && !ticket->room.empty());
-  OSTEON_CHECK(sign_ticket(*ticket, key) == text);
+  OSTEON_CHECK(sign_ticket(*ticket, fixed_key()) == text);
+}
+
+using SecretKey = std::array<std::uint8_t, crypto_sign_SECRETKEYBYTES>;
+
+SecretKey secret_key() {
+  std::array<std::uint8_t, crypto_sign_PUBLICKEYBYTES> open{};
+  SecretKey secret{};
+  crypto_sign_seed_keypair(open.data(), secret.data(), fixed_key().seed.data());
+  return secret;
 }
 
 void open_signed(std::span<const std::uint8_t> contents) {
   if (contents.size() > 700) return;
-  std::array<std::uint8_t, crypto_sign_PUBLICKEYBYTES> open{};
-  std::array<std::uint8_t, crypto_sign_SECRETKEYBYTES> secret{};
-  const TicketKey key = fixed_key();
-  crypto_sign_seed_keypair(open.data(), secret.data(), key.seed.data());
+  static const SecretKey secret = secret_key();
   Bytes all = bytes_of("osteon join ticket 1\n");
   all.insert(all.end(), contents.begin(), contents.end());
   std::array<std::uint8_t, crypto_sign_BYTES> signature{};

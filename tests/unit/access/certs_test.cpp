@@ -12,9 +12,11 @@
 #include <iterator>
 #include <map>
 #include <string>
+#include <vector>
 
 #include "common/access/access_list.hpp"
 #include "tests/support/authentication/people.hpp"
+#include "tests/support/process.hpp"
 
 namespace osteon {
 namespace {
@@ -109,13 +111,32 @@ TEST_F(Certs, WhomTheyRevokeTheServerReadsOf) {
 TEST_F(Certs, WhatTheyRenewStaysReadable) {
   std::map<std::string, Rights> before;
   for (const auto& file : fs::directory_iterator(people_.server())) before[file.path().filename()] = rights_of(file);
-  ASSERT_EQ(before.size(), 8u);
+  ASSERT_EQ(before.size(), 9u);
   const auto renewed = fs::last_write_time(people_.server() / "server.pem");
   people_.certs({"server", "127.0.0.1"});
   EXPECT_NE(fs::last_write_time(people_.server() / "server.pem"), renewed);
   for (const auto& [name, rights] : before) EXPECT_EQ(rights_of(people_.server() / name), rights) << name;
-  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 8)
+  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 9)
       << "nothing is left beside";
+}
+
+// For programs that ask such a list; those of Osteon do not.
+TEST(CertsMade, NameTheListThatIsPublished) {
+  test::People people;
+  const auto shown = [&](const std::string& what, const std::vector<std::string>& how) {
+    std::vector<std::string> arguments{what, "-in", people.server() / (what == "crl" ? "crl.der" : "server.pem"),
+                                       "-noout"};
+    arguments.insert(arguments.end(), how.begin(), how.end());
+    return test::run("openssl", arguments).out;
+  };
+  EXPECT_EQ(shown("x509", {"-ext", "crlDistributionPoints"}).find("URI:"), std::string::npos);
+  people.certs({"--crl-url", "http://ca.example.org/crl.der", "server", "127.0.0.1"});
+  EXPECT_NE(shown("x509", {"-ext", "crlDistributionPoints"}).find("URI:http://ca.example.org/crl.der\n"),
+            std::string::npos);
+  EXPECT_EQ(shown("crl", {"-inform", "DER", "-text"}).find("Serial Number:"), std::string::npos);
+  (void)people.person("ben");
+  people.certs({"revoke", "ben"});
+  EXPECT_NE(shown("crl", {"-inform", "DER", "-text"}).find("Serial Number:"), std::string::npos);
 }
 
 // Of its own accord it opens nothing to others.

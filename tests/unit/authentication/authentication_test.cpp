@@ -502,6 +502,19 @@ TEST_F(Authentication, DeleteNoBranchThatATicketIsNotFor) {
   EXPECT_EQ(any->remove("ward", true).value_or(std::vector<std::string>()).size(), 2u);
 }
 
+TEST_F(Authentication, AreAskedOnceForADeletion) {
+  ASSERT_TRUE(server_->rooms().create("annex", nullptr));
+  people_.append_access("role bob operator annex");
+  server_->rooms().authorizer->look();
+  auto bob = RoomAdminClient::reach(address(), 5s, {}, people_.credentials("bob", Role::observer, "*"));
+  ASSERT_TRUE(bob.has_value()) << bob.error().message;
+  const AuthorizerCounts before = server_->connection_health().authorizer;
+  EXPECT_EQ(bob->remove("ward", false).error().code, ErrorCode::denied);
+  EXPECT_EQ(server_->connection_health().authorizer.refused, before.refused + 1);
+  EXPECT_TRUE(bob->remove("annex", false)) << "where the role is another";
+  EXPECT_EQ(server_->connection_health().authorizer.refused, before.refused + 1);
+}
+
 TEST_F(Authentication, ShowNothingOfARoomInWhichOneIsNoInstructor) {
   people_.append_access("role ina trainee theatre");
   server_->rooms().authorizer->look();
@@ -662,7 +675,7 @@ TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
   const auto older = join(credentials);
   ASSERT_TRUE(older.has_value()) << older.error().message;
   std::promise<void> go_on, held;
-  (*server_->rooms().find("ward"))->host().run_slowly([&, wait = go_on.get_future().share()] {
+  (*server_->rooms().find("ward"))->runtime().run_slowly([&, wait = go_on.get_future().share()] {
     held.set_value();
     wait.wait();
   });

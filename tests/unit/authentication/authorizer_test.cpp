@@ -28,7 +28,7 @@ std::string content(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-class GateTest : public ::testing::Test {
+class AuthorizerTest : public ::testing::Test {
  protected:
   static void SetUpTestSuite() { people_ = new test::People; }
   static void TearDownTestSuite() { delete people_; }
@@ -77,9 +77,9 @@ class GateTest : public ::testing::Test {
       std::chrono::duration_cast<std::chrono::seconds>(std::chrono::system_clock::now().time_since_epoch()).count();
   std::unique_ptr<Authorizer> authorizer_;
 };
-test::People* GateTest::people_ = nullptr;
+test::People* AuthorizerTest::people_ = nullptr;
 
-TEST_F(GateTest, ReadsWhoACertificateIsOf) {
+TEST_F(AuthorizerTest, ReadsWhoACertificateIsOf) {
   const Result<PersonCertificate> anna = read_person_certificate(certificate("anna"));
   ASSERT_TRUE(anna.has_value()) << anna.error().message;
   EXPECT_EQ(anna->user, "anna");
@@ -94,14 +94,14 @@ TEST_F(GateTest, ReadsWhoACertificateIsOf) {
     EXPECT_FALSE(read_person_certificate(text));
 }
 
-TEST_F(GateTest, LetsInWhoHasBoth) {
+TEST_F(AuthorizerTest, LetsInWhoHasBoth) {
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", ticket("anna", "*", Role::collaborator), "other", kUndo, true), "");
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "", kUndo, true), "");
   EXPECT_EQ(authorizer_->counts().admitted, 3u);
 }
 
-TEST_F(GateTest, SaysWhyNot) {
+TEST_F(AuthorizerTest, SaysWhyNot) {
   EXPECT_THAT(refused("anna", "", "ward", kUndo, false), HasSubstr("ticket: no ticket"));
   EXPECT_THAT(refused("anna", "osteon1.x.y", "ward", kUndo, false), HasSubstr("malformed"));
   EXPECT_THAT(
@@ -127,7 +127,7 @@ TEST_F(GateTest, SaysWhyNot) {
   EXPECT_EQ(authorizer_->counts().refused, 10u);
 }
 
-TEST_F(GateTest, GoesByTheClock) {
+TEST_F(AuthorizerTest, GoesByTheClock) {
   const std::string good = ticket("anna", "ward", Role::trainee, 10s);
   EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "");
   now_ += 10;
@@ -137,7 +137,7 @@ TEST_F(GateTest, GoesByTheClock) {
               HasSubstr("certificate: the certificate has expired"));
 }
 
-TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
+TEST_F(AuthorizerTest, TakesNoTicketThatIsGoodForTooLong) {
   const std::string day = ticket("anna", "ward", Role::trainee, 24h), more = ticket("anna", "ward", Role::trainee, 26h);
   EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "") << "unless somebody says otherwise";
   authorizer_->set_most_ticket_life(24h);
@@ -154,7 +154,7 @@ TEST_F(GateTest, TakesNoTicketThatIsGoodForTooLong) {
               HasSubstr("25 more hours"));
 }
 
-TEST_F(GateTest, ReadsTheListWhileItRuns) {
+TEST_F(AuthorizerTest, ReadsTheListWhileItRuns) {
   const std::string good = ticket("anna", "ward", Role::trainee), instead = ticket("ben", "ward", Role::trainee);
   people_->append_access("role anna observer ward");
   authorizer_->look();
@@ -166,7 +166,7 @@ TEST_F(GateTest, ReadsTheListWhileItRuns) {
   EXPECT_EQ(refused("ben", instead, "ward", kUndo, true), "");
 }
 
-TEST_F(GateTest, ReadsTheKeysOfTicketsWhileItRuns) {
+TEST_F(AuthorizerTest, ReadsTheKeysOfTicketsWhileItRuns) {
   const std::string old = ticket("anna", "ward", Role::trainee);
   const Caller anna = let_in("anna", Role::trainee);
   std::optional<Refusal> ended;
@@ -190,7 +190,7 @@ TEST_F(GateTest, ReadsTheKeysOfTicketsWhileItRuns) {
   EXPECT_THROW(people_->certs({"rotate-tickets", "--finish"}), std::runtime_error) << "there is none to finish";
 }
 
-TEST_F(GateTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
+TEST_F(AuthorizerTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
   const std::filesystem::path file = people_->server() / "tickets.pub";
   const std::string good = ticket("anna", "ward", Role::trainee), keys = content(file);
   testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
@@ -211,12 +211,12 @@ TEST_F(GateTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
   EXPECT_EQ(refused("anna", good, "ward", kUndo, true), "");
 }
 
-TEST_F(GateTest, DoesNotOpenWithAWrongList) {
+TEST_F(AuthorizerTest, DoesNotOpenWithAWrongList) {
   people_->append_access("nonsense");
   EXPECT_THAT(Authorizer::open(people_->server(), refusals_).error().message, HasSubstr("access.txt:1"));
 }
 
-TEST_F(GateTest, NamesTheFileThatIsWrong) {
+TEST_F(AuthorizerTest, NamesTheFileThatIsWrong) {
   const test::TempDir dir;
   for (const char* lacking : {"ca.pem", "server.pem", "server.key", "tickets.pub"}) {
     std::filesystem::remove_all(dir / "d");
@@ -231,7 +231,7 @@ TEST_F(GateTest, NamesTheFileThatIsWrong) {
   EXPECT_THAT(Authorizer::open(dir / "d", refusals_).error().message, HasSubstr("not that of the certificate"));
 }
 
-TEST_F(GateTest, WarnsOfSecretKeysThatOthersMayRead) {
+TEST_F(AuthorizerTest, WarnsOfSecretKeysThatOthersMayRead) {
   namespace fs = std::filesystem;
   const fs::path key = people_->server() / "server.key", proxy = people_->server() / "proxy.pem";
   const auto said = [&](fs::perms of_key) {
@@ -252,7 +252,7 @@ TEST_F(GateTest, WarnsOfSecretKeysThatOthersMayRead) {
   fs::permissions(proxy, fs::perms(0600));
 }
 
-TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
+TEST_F(AuthorizerTest, KeepsAuthorsToTheirPeople) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
   (void)authorizer_->joined(anna, "ward", 2, AuthorId{2});
@@ -274,7 +274,7 @@ TEST_F(GateTest, KeepsAuthorsToTheirPeople) {
   EXPECT_TRUE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1}));
 }
 
-TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
+TEST_F(AuthorizerTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
   (void)authorizer_->joined(ben, "ward", 1, AuthorId{2});
@@ -297,7 +297,7 @@ TEST_F(GateTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   EXPECT_EQ(authorizer_->counts().displaced, 1u);
 }
 
-TEST_F(GateTest, WhoComesAgainTooLateTakesNoPlace) {
+TEST_F(AuthorizerTest, WhoComesAgainTooLateTakesNoPlace) {
   const Caller anna = let_in("anna", Role::trainee);
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}));
   EXPECT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}, Authorizer::Coming::again));
@@ -315,7 +315,7 @@ TEST_F(GateTest, WhoComesAgainTooLateTakesNoPlace) {
   EXPECT_FALSE(authorizer_->check_author(anna, "ward", AuthorId{1}));
 }
 
-TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
+TEST_F(AuthorizerTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
   constexpr const char* kSay = "/osteon.v1.PeopleService/Say";
   const std::string annas = ticket("anna", "ward", Role::trainee), bens = ticket("ben", "ward", Role::trainee);
   std::string said;
@@ -330,9 +330,17 @@ TEST_F(GateTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
   EXPECT_TRUE(test::wait_until([&] { return refused("anna", annas, "ward", kSay, true).empty(); }, 10s));
 }
 
+// As behind a proxy, where they come in over a connection that stays.
+TEST_F(AuthorizerTest, TellsWhoBeganTooManyCallsToWaitAMinute) {
+  authorizer_->note_flood(shown(certificate("anna")));
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kWatch, true),
+            "flood: too many calls came from you; wait a minute");
+  EXPECT_EQ(refused("ben", ticket("ben", "ward", Role::trainee), "ward", kWatch, true), "") << "another person";
+}
+
 // Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost
 // unseen.
-TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
+TEST_F(AuthorizerTest, LooksAgainWhoItIsWhenAStreamBegins) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}) && authorizer_->joined(ben, "ward", 1, AuthorId{2}));
   ASSERT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{1}));
@@ -357,7 +365,7 @@ TEST_F(GateTest, LooksAgainWhoItIsWhenAStreamBegins) {
   EXPECT_EQ(authorizer_->counts().streams, 0u);
 }
 
-TEST_F(GateTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
+TEST_F(AuthorizerTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
   // Deleted and made again behind the authorizer's back: its authors are counted anew.
@@ -371,7 +379,7 @@ TEST_F(GateTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
   EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{2}));
 }
 
-TEST_F(GateTest, KnowsWhichRoomIsMeantThatIsNotNamed) {
+TEST_F(AuthorizerTest, KnowsWhichRoomIsMeantThatIsNotNamed) {
   people_->append_access("role anna observer ward");
   authorizer_->look();
   const std::string everywhere = ticket("anna", "*", Role::instructor);
@@ -382,7 +390,7 @@ TEST_F(GateTest, KnowsWhichRoomIsMeantThatIsNotNamed) {
   EXPECT_EQ(refused("anna", everywhere, "", kUndo, true), "");
 }
 
-TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
+TEST_F(AuthorizerTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}) && authorizer_->joined(ben, "ward", 1, AuthorId{2}));
   std::optional<Refusal> ended[3];
@@ -408,7 +416,7 @@ TEST_F(GateTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   EXPECT_EQ(calls, 2) << "a stream ends once";
 }
 
-TEST_F(GateTest, KnowsAPersonWhoseRoleHasChangedOnlyAfterAnotherJoin) {
+TEST_F(AuthorizerTest, KnowsAPersonWhoseRoleHasChangedOnlyAfterAnotherJoin) {
   const Caller before = let_in("anna", Role::collaborator);
   (void)authorizer_->joined(before, "ward", 1, AuthorId{1});
   people_->append_access("role anna trainee");
@@ -466,14 +474,31 @@ TEST(CallRates, AreThoseOfCallsThatThereAre) {
 
 TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {
   RefusalLog log;
-  EXPECT_TRUE(log.is_new("anna", "a"));
-  EXPECT_FALSE(log.is_new("anna", "a"));
-  EXPECT_TRUE(log.is_new("anna", "b"));
-  EXPECT_TRUE(log.is_new("ben", "a"));
-  for (std::size_t i = 0; i < 3 * RefusalLog::kMost; ++i) EXPECT_TRUE(log.is_new("eve", std::to_string(i)));
+  RefusalLog::Time now{};
+  const auto is_new = [&](std::string_view peer, std::string_view reason) {
+    return log.is_new(peer, reason,
+                      now += std::chrono::ceil<RefusalLog::Time::duration>(1.0s / RefusalLog::kLinesPerSecond));
+  };
+  EXPECT_TRUE(is_new("anna", "a"));
+  EXPECT_FALSE(is_new("anna", "a"));
+  EXPECT_TRUE(is_new("anna", "b"));
+  EXPECT_TRUE(is_new("ben", "a"));
+  for (std::size_t i = 0; i < 3 * RefusalLog::kMost; ++i) EXPECT_TRUE(is_new("eve", std::to_string(i)));
   EXPECT_EQ(log.size(), RefusalLog::kMost);
-  EXPECT_FALSE(log.is_new("eve", std::to_string(3 * RefusalLog::kMost - 1)));
-  EXPECT_TRUE(log.is_new("anna", "a"));
+  EXPECT_FALSE(is_new("eve", std::to_string(3 * RefusalLog::kMost - 1)));
+  EXPECT_TRUE(is_new("anna", "a"));
+}
+
+// As from ever new addresses of IPv6.
+TEST(RefusalLog, SaysNoMoreInATimeThanItsLimit) {
+  RefusalLog log;
+  const RefusalLog::Time now{};
+  std::size_t said = 0;
+  for (std::size_t i = 0; i < 1000; ++i) said += log.is_new("address " + std::to_string(i), "tls", now) ? 1 : 0;
+  EXPECT_EQ(said, RefusalLog::kLinesAtOnce);
+  EXPECT_TRUE(log.is_new("anna", "tls", now + 10s));
+  EXPECT_EQ(log.take_left_out(), 1000 - said);
+  EXPECT_EQ(log.take_left_out(), 0u);
 }
 
 }  // namespace

@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
+#include <fstream>
+#include <sstream>
+
 #include "server/journal/journal_file.hpp"
 #include "server/journal/maintenance.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -58,6 +61,36 @@ TEST_F(ErasingTest, TheChainAndItsSignaturesHold) {
   EXPECT_EQ(again.closed_because(), nullptr);
   EXPECT_EQ(entries_of(again)[2].bytes, "-");
   EXPECT_EQ(entries_of(again)[3].bytes, entries_[3].bytes);
+}
+
+// Neither in pages that a row was on before, as what stands in its place is longer, nor in the log's files behind their
+// end.
+TEST_F(ErasingTest, NoByteOfWhatWasErasedIsLeft) {
+  const std::string word = "Wilhelmina";
+  std::vector<JournalEntry> rows = some_rows(2, 2000, 60);
+  for (JournalEntry& row : rows) row.bytes = (row.place.value % 3 == 0 ? word : "Other") + row.bytes;
+  auto journal = Journal::create(file_, "genesis", {.keys = keys_});
+  ASSERT_TRUE(journal) << journal.error().message;
+  for (std::size_t i = 0; i < rows.size(); i += 20) append(*journal, rows, i, i + 20);
+  const auto found = [&] {
+    std::size_t files = 0;
+    for (const auto& entry : fs::directory_iterator(temp_.path())) {
+      std::ostringstream all;
+      all << std::ifstream(entry.path(), std::ios::binary).rdbuf();
+      files += std::move(all).str().find(word) == std::string::npos ? 0 : 1;
+    }
+    return files;
+  };
+  EXPECT_GT(found(), 0u);
+  const auto longer = [](const JournalEntry& row) {
+    auto bytes = every_third(row);
+    if (bytes) bytes->assign(200, '-');
+    return bytes;
+  };
+  EXPECT_EQ(journal->erase_rows(longer).value(), 666u);
+  EXPECT_EQ(found(), 0u) << "while it is open";
+  ASSERT_TRUE(journal->close());
+  EXPECT_EQ(found(), 0u);
 }
 
 TEST_F(ErasingTest, WithoutTheKeyNothingIsErased) {

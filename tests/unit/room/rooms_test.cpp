@@ -358,7 +358,7 @@ TEST_F(RoomsTest, AJournalIsCheckedAndCopiedWhileItsRoomIsCut) {
   EXPECT_TRUE(checked->faults.empty()) << checked->faults.front();
   EXPECT_GE(checked->room_seq.value, 21u);
   ASSERT_TRUE(copied.has_value()) << copied.error().message;
-  const auto report = verify_journal(copied->file);
+  const auto report = verify_journal(dir_ / "rooms" / copied->file);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_TRUE(report->sound());
   EXPECT_EQ(report->head.place, copied->room_seq);

@@ -201,6 +201,7 @@ TEST_F(RoomRpc, SavesOnRequestAndAtTheEnd) {
   const grpc::Status status = call(&v1::RoomService::Stub::SaveFields, request, saved);
   ASSERT_TRUE(status.ok()) << status.error_message();
   EXPECT_EQ(saved.room_seq(), 10u) << "two who came and eight cuts";
+  EXPECT_EQ(saved.file(), "half.vdb") << "a path of the server";
   EXPECT_EQ(saved.field_hash(), wire::to_wire(hand->hash()));
   const auto fields = load_fields(dir_ / "half.vdb", test_block());
   ASSERT_TRUE(fields) << fields.error().message;
