@@ -220,7 +220,8 @@ int main(int argc, char** argv) {
   app.add_option("--output", options.output, "pulse: PulseAudio's default sink; none: at the same pace to nowhere")
       ->capture_default_str();
   app.add_option("--wav", options.wav_file, "Record the sound: 48 kHz, 16 bit, mono");
-  app.add_option("--state-log", options.state_log_file, "CSV: when each cutting state was received and when it was played");
+  app.add_option("--state-log", options.state_log_file,
+                 "CSV: when each cutting state was received and when it was played");
   app.add_option("--summary", options.summary_file, "JSON written at the end: frames, latencies, callback work, peak");
   app.add_option("--timeout", options.patience_s, "Seconds to wait for the server")
       ->check(CLI::Range(0.0, 3600.0))

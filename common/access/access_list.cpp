@@ -96,8 +96,7 @@ Result<bool> AccessFile::refresh() {
   if (!text_ && !std::filesystem::exists(file_, error) && !error) return false;
   const std::uintmax_t size = std::filesystem::file_size(file_, error);
   if (!error && size > kMostFileBytes)
-    return failure(ErrorCode::invalid_input,
-                   file_.string() + " is larger than 4 MiB; this is not an access list");
+    return failure(ErrorCode::invalid_input, file_.string() + " is larger than 4 MiB; this is not an access list");
   std::ifstream in(file_, std::ios::binary);
   std::string text{std::istreambuf_iterator<char>(in), {}};
   if (error || !in)

@@ -54,7 +54,7 @@ constexpr std::array kCalls{
 // In the order of the enumerations.
 constexpr std::array<RoleSet, kDatagrams> kCarried{kCutters, kCutters, kCutters, kCutters,
                                                    kCutters, kCutters, kCutters, kCutters};
-constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kCutters, kInRoom,
+constexpr std::array<RoleSet, kStreamContents> kContents{kInRoom, kInRoom,     kInRoom, kCutters,   kInRoom,
                                                          kInRoom, kInstructor, kInRoom, kInstructor};
 constexpr std::array<RoleSet, kRights> kGranted{kCutters, kCutters, kPartners, kInstructor};
 

@@ -25,8 +25,8 @@ Result<Digest> digest_from_hex(std::string_view hex) {
     return failure(ErrorCode::invalid_input,
                    "a hash needs 64 hexadecimal digits, this has " + std::to_string(hex.size()));
   // libsodium also takes capitals. One digest has one text.
-  const bool is_hex = sodium_hex2bin(digest.bytes.data(), digest.bytes.size(), hex.data(), hex.size(), nullptr, nullptr,
-                                     nullptr) == 0;
+  const bool is_hex =
+      sodium_hex2bin(digest.bytes.data(), digest.bytes.size(), hex.data(), hex.size(), nullptr, nullptr, nullptr) == 0;
   if (!is_hex || to_hex(digest) != hex)
     return failure(ErrorCode::invalid_input, "a hash has only the digits 0-9 and a-f");
   return digest;

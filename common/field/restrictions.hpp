@@ -24,11 +24,11 @@ struct ZoneLimit {
 };
 
 struct Restrictions {
-  bool stopped = false;  // may not cut
-  AuthorId taken_by{};   // who has taken over the person's tool; null: nobody
-  AuthorId guide{};      // author whose tool guides the person's tool; null: nobody
-  int guide_share = 0;   // strength of the guidance; 1000: the device's limit
-  int force_limit = 0;   // largest force that the person feels and cuts with, steps of 0.01 N; 0: no limit
+  bool stopped = false;             // may not cut
+  AuthorId taken_by{};              // who has taken over the person's tool; null: nobody
+  AuthorId guide{};                 // author whose tool guides the person's tool; null: nobody
+  int guide_share = 0;              // strength of the guidance; 1000: the device's limit
+  int force_limit = 0;              // largest force that the person feels and cuts with, steps of 0.01 N; 0: no limit
   std::optional<ZoneLimit> zone{};  // where the tip must be to cut; none: anywhere
   std::vector<Digest> tools{};      // tools that the person may cut with, sorted; none: all
   std::string words{};              // reason, shown to the trainee

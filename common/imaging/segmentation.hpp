@@ -25,8 +25,8 @@ struct SegmentationParams {
   double bridged_mm = 1.5;  // radius: narrower openings in dense bone, as for vessels, do not open a marrow space
   // radius of the largest sphere in a marrow space; a wider space contains the brain, not marrow
   double widest_mm = 35.0;
-  double air_hu = -400.0;   // an enclosed space with a lower average is air, as in a sinus
-  bool hollow = false;      // only voxels at or above the threshold are bone
+  double air_hu = -400.0;  // an enclosed space with a lower average is air, as in a sinus
+  bool hollow = false;     // only voxels at or above the threshold are bone
 };
 
 // At which sides of the volume the scan ends: columns, rows, slices; first and last. A marrow space cut by the end of

@@ -56,8 +56,8 @@ struct MountServerParams {
   MountParams mount;
   double most_n = 100.0, most_nmm = 20000.0;  // of one user's load; larger loads are limited to this
   double most_mm_per_s = 500.0;  // limits the energy that a client can have put in: most_n along this speed
-  double silent_s = 0.5;                      // a load that is not renewed for this time fades ...
-  double fade_s = 0.2;                        // ... with this time constant
+  double silent_s = 0.5;         // a load that is not renewed for this time fades ...
+  double fade_s = 0.2;           // ... with this time constant
 };
 
 // The server's end. [tick] all of it. Authors are those who may load the bone.

@@ -35,11 +35,10 @@ class Bluntness {
 // chips increase the torque, and the thrust to a smaller degree [A]. Nobody clears a drill for a bicortical hole, or
 // leaves it in for ten diameters of cortical bone.
 struct CloggingParams {
-  double capacity_diameters =
-      10.0;                        // depth in cortical bone until they are full; softer bone gives fewer chips
-  double cleared_diameters = 1.5;  // distance of withdrawal until full flutes are empty
-  double onset = 0.5;              // level up to which chips leave freely
-  double torque_gain = 5.0;        // relative increase of torque with full flutes
+  double capacity_diameters = 10.0;  // depth in cortical bone until they are full; softer bone gives fewer chips
+  double cleared_diameters = 1.5;    // distance of withdrawal until full flutes are empty
+  double onset = 0.5;                // level up to which chips leave freely
+  double torque_gain = 5.0;          // relative increase of torque with full flutes
   double thrust_gain = 0.5;
 };
 class FluteClogging {

@@ -24,9 +24,9 @@ struct LawInputs {
       0;  // sum over engaged points of share of the active area · density · max(0, -inward·feed), g/cm3
   // of the cutting edges in bone, all teeth, counted as LawTool does; 0: derived from `engaged`
   double edge_length_mm = 0;
-  double mean_arm_mm = 0;     // mean distance of the engaged area from the axis; 0: LawTool::arm_mm
-  double teeth_engaged = 0;   // of a saw; 0: derived from `engaged`
-  double wear = 1.0;          // 1 sharp; a blunt tool needs about twice the thrust
+  double mean_arm_mm = 0;    // mean distance of the engaged area from the axis; 0: LawTool::arm_mm
+  double teeth_engaged = 0;  // of a saw; 0: derived from `engaged`
+  double wear = 1.0;         // 1 sharp; a blunt tool needs about twice the thrust
 };
 
 // Properties of the tool that laws use.
@@ -36,11 +36,11 @@ struct LawTool {
   double teeth = 2;                          // flutes, teeth
   // feed per turn at which the back of the edge touches; of a screw, the pitch of its thread
   double heel_mm_per_rev = 1.056;
-  double arm_mm = 0.8;             // mean distance at which the cutting force acts
-  double edge_length_mm = 3.73;    // of all cutting edges that face the feed
-  double stroke_mm = 0;            // saw: distance of the teeth from end to end
-  double tooth_pitch_mm = 0;       // saw
-  double leading_area_mm2 = 0;     // projected on the usual feed direction
+  double arm_mm = 0.8;           // mean distance at which the cutting force acts
+  double edge_length_mm = 3.73;  // of all cutting edges that face the feed
+  double stroke_mm = 0;          // saw: distance of the teeth from end to end
+  double tooth_pitch_mm = 0;     // saw
+  double leading_area_mm2 = 0;   // projected on the usual feed direction
 };
 [[nodiscard]] LawTool law_tool(const Tool& tool);
 

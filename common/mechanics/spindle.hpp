@@ -10,7 +10,7 @@ struct SpindleParams {
   // Speed lost under torque [A]: 1.9 % of 1000 rpm under the 27 N mm of cortical bone. The motor's 5500 Hz fall to 5400
   // Hz in Niu 2008, §8.5.4: 1.8 %.
   double droop_rpm_per_nmm = 0.7;
-  double most_nmm = 400;     // largest torque of the motor; a larger load stops it [A]
+  double most_nmm = 400;  // largest torque of the motor; a larger load stops it [A]
   // time constant of the speed after a load change that the motor can carry: the rotor's inertia [A]
   double response_s = 0.02;
 };

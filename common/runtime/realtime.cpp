@@ -183,9 +183,8 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
     say(Finding::fine, facts.preemption == "rt" ? "The kernel is a real-time one." : "The kernel can be preempted.");
   else
     say(Finding::note,
-        facts.preemption == "dynamic"
-            ? "The kernel's preemption was chosen at boot and is unknown."
-            : "The kernel is preempted only at certain points (" + facts.preemption + ").",
+        facts.preemption == "dynamic" ? "The kernel's preemption was chosen at boot and is unknown."
+                                      : "The kernel is preempted only at certain points (" + facts.preemption + ").",
         "boot with preempt=full, or install linux-image-rt-amd64");
 
   if (facts.clock_source != "tsc" && facts.clock_source != "kvm-clock" && facts.clock_source != "arch_sys_counter" &&

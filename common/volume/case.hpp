@@ -40,7 +40,7 @@ struct CaseInfo {
 struct SampleLabels {
   // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
   DenseVolume<std::uint8_t> bone;
-  DenseVolume<Tissue> tissue;      // metal, enamel, or none: the density decides. Empty: it decides everywhere.
+  DenseVolume<Tissue> tissue;  // metal, enamel, or none: the density decides. Empty: it decides everywhere.
 };
 
 // What a part of a bone contains, so that a builder need not read every sample of a uniform part.

@@ -59,7 +59,7 @@ class CutField {
   // present values of one leaf: one value if it is wholly cut away. A leaf never moves in memory.
   [[nodiscard]] std::vector<FieldLeaf> leaf_places() const;
   void read(FieldLeaf& leaf) const;
-  [[nodiscard]] Digest hash() const;                                  // field_hash() of leaves()
+  [[nodiscard]] Digest hash() const;  // field_hash() of leaves()
   // whether any R in the box of that level is below the band
   [[nodiscard]] bool has_cuts(int level, const CoordBox& box) const;
 

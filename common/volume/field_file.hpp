@@ -13,9 +13,9 @@ struct SavedFields {
   Digest case_hash;
   std::uint32_t kernel_version = 0;
   RoomSeq room_seq;
-  double pitch_mm = 0;                // h of the case
+  double pitch_mm = 0;            // h of the case
   std::vector<FieldLeaf> leaves;  // of all bodies, sorted by (body, level, origin); no leaf is at full band everywhere
-  std::vector<BodyId> bodies;         // existing bodies, also those without leaves; sorted
+  std::vector<BodyId> bodies;     // existing bodies, also those without leaves; sorted
   std::vector<SceneItem> items = {};  // items on the bone
   std::vector<Tool> tools = {};       // tools that are not built in
 };

@@ -105,7 +105,7 @@ class ClientLink {
       -std::chrono::hours(1);  // when the newest packet was sent of which the server says that it arrived
 
   std::optional<KnownToolState> state_, said_;  // newest, and last sent
-  bool moved_ = false;                      // whether they differ by more than the deadband
+  bool moved_ = false;                          // whether they differ by more than the deadband
   Time said_at_ = -std::chrono::hours(1), effort_at_ = said_at_;
   std::optional<MountLoad> push_;  // newest that was not sent yet
   Time pushed_at_ = -std::chrono::hours(1);

@@ -15,8 +15,7 @@ tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
 constexpr double kMostOfATool =
     1e6;  // limits a tool's force in N, its speed in 1/min and so on: the steps of packets end there
 bool all_of_a_tool(std::initializer_list<double> values) {
-  return std::ranges::all_of(values,
-                             [](double v) { return std::abs(v) <= kMostOfATool; });  // also false for NaN
+  return std::ranges::all_of(values, [](double v) { return std::abs(v) <= kMostOfATool; });  // also false for NaN
 }
 
 constexpr double kFurthest_mm = 1e5;  // no bone is farther away, and the steps of packets end there

@@ -47,7 +47,7 @@ namespace osteon::wire {
 [[nodiscard]] Result<ViewFrustum> from_wire(const v1::ViewFrustum& look);
 // checked by check(); tools in any order
 [[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);
-[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);       // checked by check()
+[[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);  // checked by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
 
 }  // namespace osteon::wire

@@ -350,7 +350,8 @@ Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const T
   return cuts;
 }
 
-Result<std::vector<IndexedEntry>> entries_of(const v1::DownPacket& packet, const ToolNumbers& tools, std::size_t* left_out) {
+Result<std::vector<IndexedEntry>> entries_of(const v1::DownPacket& packet, const ToolNumbers& tools,
+                                             std::size_t* left_out) {
   std::vector<IndexedEntry> entries;
   for (const v1::EntryRun& run : packet.entries()) {
     const auto read = entries_of_run(run, tools, entries);
@@ -360,23 +361,24 @@ Result<std::vector<IndexedEntry>> entries_of(const v1::DownPacket& packet, const
   }
   for (const v1::RejectedEntry& entry : packet.rejected()) {
     entries.push_back({entry.index(),
-                    {.room_seq = {entry.room_seq()},
-                     .kind = SessionEntryKind::rejected,
-                     .author_seq = entry.author_seq(),
-                     .reason = entry.reason(),
-                     .lease_epoch = entry.lease_epoch()}});
+                       {.room_seq = {entry.room_seq()},
+                        .kind = SessionEntryKind::rejected,
+                        .author_seq = entry.author_seq(),
+                        .reason = entry.reason(),
+                        .lease_epoch = entry.lease_epoch()}});
   }
   for (const v1::SupervisedEntry& entry : packet.supervised()) {
     Result<Restrictions> supervision = from_wire(entry.supervision());
     if (!supervision) return tl::unexpected(supervision.error());
     entries.push_back({entry.index(),
-                    {.room_seq = {entry.room_seq()},
-                     .kind = SessionEntryKind::supervised,
-                     .lease_epoch = entry.lease_epoch(),
-                     .supervision = std::move(*supervision),
-                     .by = {AuthorId{entry.decided_by()}, entry.decided_by_name()}}});
+                       {.room_seq = {entry.room_seq()},
+                        .kind = SessionEntryKind::supervised,
+                        .lease_epoch = entry.lease_epoch(),
+                        .supervision = std::move(*supervision),
+                        .by = {AuthorId{entry.decided_by()}, entry.decided_by_name()}}});
   }
-  for (const v1::StreamedEntry& entry : packet.streamed()) entries.push_back({entry.index(), {.room_seq = {entry.room_seq()}}});
+  for (const v1::StreamedEntry& entry : packet.streamed())
+    entries.push_back({entry.index(), {.room_seq = {entry.room_seq()}}});
   std::ranges::sort(entries, {}, &IndexedEntry::index);
   return entries;
 }

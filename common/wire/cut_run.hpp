@@ -71,12 +71,12 @@ enum class SessionEntryKind : std::uint8_t { committed, rejected, streamed, supe
 struct SessionEntry {
   RoomSeq room_seq;
   SessionEntryKind kind = SessionEntryKind::streamed;  // streamed: the content comes over the stream
-  Cut cut{};                                       // committed
-  std::uint64_t author_seq = 0;                    // rejected: of the session's own cut
-  std::uint32_t reason = 0;                        // rejected: number in the room's list of reasons
-  std::uint64_t lease_epoch = 0;                   // rejected, supervised: of the session, from now on
-  Restrictions supervision{};                      // supervised: of the session's person, from now on
-  Decider by{};                                    // supervised: who decided
+  Cut cut{};                                           // committed
+  std::uint64_t author_seq = 0;                        // rejected: of the session's own cut
+  std::uint32_t reason = 0;                            // rejected: number in the room's list of reasons
+  std::uint64_t lease_epoch = 0;                       // rejected, supervised: of the session, from now on
+  Restrictions supervision{};                          // supervised: of the session's person, from now on
+  Decider by{};                                        // supervised: who decided
   friend bool operator==(const SessionEntry&, const SessionEntry&) = default;
 };
 
@@ -119,6 +119,6 @@ struct IndexedEntry {
 // All entries of a packet in order of their index. Runs whose tool is not known yet are left out; `left_out`, if given,
 // counts them. Error invalid_input as above; then ignore the whole packet.
 [[nodiscard]] Result<std::vector<IndexedEntry>> entries_of(const v1::DownPacket& packet, const ToolNumbers& tools,
-                                                      std::size_t* left_out = nullptr);
+                                                           std::size_t* left_out = nullptr);
 
 }  // namespace osteon::wire

@@ -62,7 +62,8 @@ int run_check(int argc, char** argv) {
   const std::uint64_t missed = seconds > 0.0 ? measure(seconds) : 0;
   if (lacking == 0 && missed > 0)
     std::printf(
-        "This machine is set up for the haptic loop, but an empty loop missed ticks: end other programs, or look for what "
+        "This machine is set up for the haptic loop, but an empty loop missed ticks: end other programs, or look for "
+        "what "
         "delays its cores (power saving, a virtual machine's host), and measure longer with --seconds.\n");
   else if (lacking == 0)
     std::printf("This machine lacks nothing for the haptic loop.\n");

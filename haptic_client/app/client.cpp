@@ -381,7 +381,8 @@ class Client {
     const auto now = Clock::now();
     if (stall_reported_at_ && now - *stall_reported_at_ < 5s) return;
     stall_reported_at_ = now;
-    log::warn("the haptic loop has stalled", {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
+    log::warn("the haptic loop has stalled",
+              {{"longer_than_ms", kStall.count()}, {"remedy", "see osteon-haptic check"}});
   }
 
   void replica_thread() {
@@ -446,7 +447,8 @@ class Client {
   void take(const Interrupted& interrupted) {
     // Contact continues with the present bone. The received leaves replace it all at once, so that no bone is missing
     // in between.
-    if (joined_ && !interrupted_) log::warn("the connection to the server is interrupted", {{"reason", interrupted.why}});
+    if (joined_ && !interrupted_)
+      log::warn("the connection to the server is interrupted", {{"reason", interrupted.why}});
     interrupted_ = joined_;
     renewed_.clear();
     // Before joining, the received bone may have been restored since: begin anew.
@@ -571,11 +573,11 @@ class Client {
     else
       log::warn("the spindle is held", {{"because", name(health)}, {"unconfirmed_cuts", replica_.unconfirmed()}});
     if (health == RoomHealth::lost && link_ok_)
-      give_up({ErrorCode::unavailable,
-               interrupted_
-                   ? "the connection to the server was not restored; see whether osteon-server still runs and can be reached"
-                   : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
-                         " cuts; see whether it runs and can be reached"});
+      give_up({ErrorCode::unavailable, interrupted_
+                                           ? "the connection to the server was not restored; see whether osteon-server "
+                                             "still runs and can be reached"
+                                           : "the server has not answered " + std::to_string(replica_.unconfirmed()) +
+                                                 " cuts; see whether it runs and can be reached"});
   }
 
   void build_patch() {
@@ -746,25 +748,25 @@ class Client {
   MetalWatch metal_;                     // reporter thread
   std::vector<std::string> tool_names_;  // never changes
 
-  TripleBuffer<Patch> patches_;                    // replica → haptic
-  TripleBuffer<ToolPlace> places_;                 // haptic → replica
-  TripleBuffer<std::vector<PlacedGuide>> guides_;  // all items of the room's scene, replica → haptic
+  TripleBuffer<Patch> patches_;                                   // replica → haptic
+  TripleBuffer<ToolPlace> places_;                                // haptic → replica
+  TripleBuffer<std::vector<PlacedGuide>> guides_;                 // all items of the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
   TripleBuffer<HapticRestrictions> oversights_;                   // an instructor's restrictions, session → haptic
-  TripleBuffer<MountUpdate> places_of_bone_;                        // session → haptic
+  TripleBuffer<MountUpdate> places_of_bone_;                      // session → haptic
   std::atomic<std::uint64_t> line_{1};                            // number of the present connection
   TripleBuffer<MountLoad> pushes_;                                // haptic → reporter
   std::atomic<std::uint64_t> stop_flag_{0};                       // the newest datagram's stop flag, likewise
   TripleBuffer<Partners> partners_;                               // others' tools, session → haptic
-  Partners received_partners_;                                       // written by the session's thread, like the next
+  Partners received_partners_;                                    // written by the session's thread, like the next
   std::set<std::string> named_tools_;
   TripleBuffer<PartnerSolids> partner_solids_;  // replica → haptic
   PartnerSolids known_solids_;                  // replica thread
   // Age of a partner's state on arrival; assumes that both connections have equal delay.
   std::atomic<double> line_lag_s_{0};
-  SpscQueue<TickRow, 2048> rows_;      // haptic → reporter
-  TripleBuffer<TickStats> live_;       // haptic → reporter, once a second
-  TickStats last_ticks_;                     // reporter: of the last line
+  SpscQueue<TickRow, 2048> rows_;                       // haptic → reporter
+  TripleBuffer<TickStats> live_;                        // haptic → reporter, once a second
+  TickStats last_ticks_;                                // reporter: of the last line
   std::optional<Clock::time_point> stall_reported_at_;  // watchdog
   std::array<std::atomic<std::int64_t>, kTickTimes> tick_times_;
 
@@ -794,7 +796,7 @@ class Client {
   std::vector<OversightNote> loop_notes_;
   // Replica thread.
   bool supervised_ = false;    // the hand is restricted
-  std::string guard_;       // by whom, as far as the room says it
+  std::string guard_;          // by whom, as far as the room says it
   std::uint64_t lease_epoch_;  // of the room, as far as received
   std::deque<Cut> unsent_;     // bounded like the unconfirmed cuts
   Pose built_at_;

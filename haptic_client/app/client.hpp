@@ -18,10 +18,10 @@ namespace osteon::haptic {
 
 struct ClientOptions {
   std::filesystem::path session_log;
-  std::filesystem::path record;            // HDF5
+  std::filesystem::path record;  // HDF5
   // The recording that moves the handle; the room's bone must be as it was when the recording began.
   const RecordedDevice* played = nullptr;
-  bool status = false;                     // a line each second on standard output
+  bool status = false;  // a line each second on standard output
 };
 
 // An instructor's decision about the hand, or what the haptic loop did because of it.
@@ -53,14 +53,14 @@ struct ClientOutcome {
   double removed_total_mm3 = 0;
   std::size_t unconfirmed = 0;  // own cuts that are not in it, because the room never confirmed them
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
-  std::uint64_t held_for_room_ticks = 0;  // ticks in which the spindle was held because the room was silent or behind
-  std::vector<OversightNote> restrictions;   // in the order received
+  std::uint64_t held_for_room_ticks = 0;    // ticks in which the spindle was held because the room was silent or behind
+  std::vector<OversightNote> restrictions;  // in the order received
   std::vector<WordsNote> words;
   std::int64_t began_ns = 0;          // the session's first time
   std::uint64_t forbidden_ticks = 0;  // ticks in which the tool was not permitted to cut
   // Rejected: while stopped; because somebody else held the tool; because of the position or the tool.
   std::uint64_t cuts_stopped = 0, cuts_taken = 0, cuts_elsewhere = 0;
-  double supervised_step_n = 0;  // largest growth of the shown force in a tick while the hand was restricted
+  double supervised_step_n = 0;            // largest growth of the shown force in a tick while the hand was restricted
   double guide_mm = 0, guide_most_mm = 0;  // distance from the guiding handle: the last one, and the largest
   struct MountReport {
     bool there = false;                // the room's bone stands on a mount, as far as the client knows

@@ -284,7 +284,8 @@ Result<void> run(Options& options, const StopSignal& stop) {
   const std::string field = outcome->field_hash ? to_hex(*outcome->field_hash).substr(0, 12) : "unknown";
   std::string unconfirmed;
   if (outcome->unconfirmed > 0)
-    unconfirmed = " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in the following figures)";
+    unconfirmed =
+        " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in the following figures)";
   std::printf(
       "%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
       "field %s at %llu; %llu of %llu ms missed\n",

@@ -71,8 +71,7 @@ Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInf
   if (file.empty()) return {};
   file_.open(file, std::ios::trunc);
   if (!file_)
-    return failure(ErrorCode::internal,
-                   "the session log " + file.string() + " cannot be written; choose another path");
+    return failure(ErrorCode::internal, "the session log " + file.string() + " cannot be written; choose another path");
   file_ << "time_s,mono_ns,state_seq,phase,tool,tip_x_mm,tip_y_mm,tip_z_mm,depth_mm,device_depth_mm,force_physical_n,"
            "force_rendered_n,feed_mm_per_s,density_g_cm3,engaged,rpm,torque_nmm,law_out_of_range\n";
   return {};

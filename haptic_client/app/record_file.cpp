@@ -22,7 +22,8 @@ static_assert(std::is_same_v<hid_t, std::int64_t>);
 
 constexpr const char* kReadme =
     "One row for each millisecond, under `data` and in the groups of poses and wrenches. data/time has as many rows as "
-    "are complete. Lengths are millimetres, forces newtons, torques newton-millimetres, times seconds since 1970 (UTC). "
+    "are complete. Lengths are millimetres, forces newtons, torques newton-millimetres, times seconds since 1970 "
+    "(UTC). "
     "Poses are [x, y, z, qx, qy, qz, qw] of the tool, its tip at the origin and +z along its axis out of the tip. "
     "Frame `bone` is the patient's (DICOM LPS: x to the left, y to the back, z to the head). Frame `device` has x to "
     "the right, y up, z to the user. drill_pose is the pose that the bone allows for the tool (the proxy), device_pose "
@@ -352,7 +353,8 @@ void RecordFile::Impl::make_columns() {
   add(column<float, R>("data/device_depth", "mm", "", "the same of the hand",
                        [](const R& r) { return r.device_depth_mm; }));
   add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));
-  add(column<float, R>("data/guide_play", "mm", "", "while in a guide: permitted distance of the tip from the opening's middle",
+  add(column<float, R>("data/guide_play", "mm", "",
+                       "while in a guide: permitted distance of the tip from the opening's middle",
                        [](const R& r) { return r.report.guide_play_mm; }));
   add(enumeration<R>("data/state", "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
@@ -365,10 +367,11 @@ void RecordFile::Impl::make_columns() {
   add(column<std::uint32_t, R>("data/step", "1", "", "of the plan, from 0", [](const R& r) { return r.step; }));
   add(column<std::uint8_t, R>("data/tool", "1", "", "tool in hand: its index in metadata/tools",
                               [](const R& r) { return r.report.tool; }));
-  add(column<std::uint8_t, R>("data/law", "1", "", "force law of the tool: its index in metadata/laws", [this](const R& r) {
-    const auto tool = static_cast<std::size_t>(r.report.tool);
-    return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
-  }));
+  add(column<std::uint8_t, R>("data/law", "1", "", "force law of the tool: its index in metadata/laws",
+                              [this](const R& r) {
+                                const auto tool = static_cast<std::size_t>(r.report.tool);
+                                return tool < law_of_tool.size() ? law_of_tool[tool] : std::uint8_t{0};
+                              }));
   add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
                               "bits: exceeded limits of the law, named in metadata/range_bits",
                               [](const R& r) { return r.report.out_of_range; }));

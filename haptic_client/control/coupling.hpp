@@ -31,8 +31,8 @@ struct CouplingMoment {
 };
 
 struct CouplingForce {
-  Vec3 spring_n = Vec3::Zero();          // of the bone on the tool, within the limit: the physical force
-  Vec3 damping_n = Vec3::Zero();         // k_c·T of the sampled spring, never more than the spring
+  Vec3 spring_n = Vec3::Zero();   // of the bone on the tool, within the limit: the physical force
+  Vec3 damping_n = Vec3::Zero();  // k_c·T of the sampled spring, never more than the spring
   // The part of the cutting force that smoothing holds back, of the bone on the tool.
   Vec3 cutting_lag_n = Vec3::Zero();
   Vec3 turn_spring_nmm = Vec3::Zero();   // of the bone on the tool about its tip, within the limit, physical

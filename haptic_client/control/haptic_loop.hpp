@@ -71,16 +71,16 @@ enum LoopEvent : std::uint32_t {
   kCutsWaiting = 8,  // too many cuts wait for the replica: the tool rubs until the replica has caught up
   kMissedTicks = 16,
   kHeelContact = 32,
-  kGuided = 64,           // a guide holds the tool
-  kStalled = 128,         // the spindle stands under its load
-  kBreakthrough = 256,    // the bone that was cut has ended: the coupling's extension was released
+  kGuided = 64,         // a guide holds the tool
+  kStalled = 128,       // the spindle stands under its load
+  kBreakthrough = 256,  // the bone that was cut has ended: the coupling's extension was released
   // Bone that came back, or the tool's own rotation, pushed the tool from the handle: this became offset.
   kPushedAway = 512,
-  kEnergyLimited = 1024,  // the passivity monitor cut the force
-  kRamping = 2048,        // after connecting, or because the room is over
-  kRoomHeld = 4096,       // the room takes no cuts: the spindle stands
-  kForbidden = 8192,      // an instructor does not permit this tool to cut here now: the spindle stands
-  kHandGuided = 16384,    // another's handle leads this one
+  kEnergyLimited = 1024,    // the passivity monitor cut the force
+  kRamping = 2048,          // after connecting, or because the room is over
+  kRoomHeld = 4096,         // the room takes no cuts: the spindle stands
+  kForbidden = 8192,        // an instructor does not permit this tool to cut here now: the spindle stands
+  kHandGuided = 16384,      // another's handle leads this one
   kPartnerTouched = 32768,  // another's tool pushes this one
   kOnMetal = 65536,         // metal is in the way of the turning tool: nothing is cut
 };
@@ -88,27 +88,27 @@ enum LoopEvent : std::uint32_t {
 inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kOnMetal});
 
 struct LoopReport {
-  Vec3 force_device_n = Vec3::Zero();    // to write to the device, device frame
-  Vec3 force_physical_n = Vec3::Zero();  // of the bone on the tool, bone frame; not scaled, within the device's limit
-  Vec3 cutting_force_n = Vec3::Zero();   // of the tool on the bone, the law's part, bone frame
-  double cutting_work_mj = 0;            // work of that force over the path cut in this tick, physical
-  double pushed_back_mj = 0;  // work of a cut's force that rotation undid in the same tick; not shown
-  Vec3 coupling_device_n = Vec3::Zero();    // the coupling's part of force_device_n: passive
-  Vec3 motor_device_n = Vec3::Zero();       // the motor's part: active, within s · mu · normal force
-  Vec3 guide_device_n = Vec3::Zero();       // the guidance spring's part: paid for by the guiding handle's motion
-  Vec3 partner_device_n = Vec3::Zero();     // the rest: others' tools that touch this one
+  Vec3 force_device_n = Vec3::Zero();     // to write to the device, device frame
+  Vec3 force_physical_n = Vec3::Zero();   // of the bone on the tool, bone frame; not scaled, within the device's limit
+  Vec3 cutting_force_n = Vec3::Zero();    // of the tool on the bone, the law's part, bone frame
+  double cutting_work_mj = 0;             // work of that force over the path cut in this tick, physical
+  double pushed_back_mj = 0;              // work of a cut's force that rotation undid in the same tick; not shown
+  Vec3 coupling_device_n = Vec3::Zero();  // the coupling's part of force_device_n: passive
+  Vec3 motor_device_n = Vec3::Zero();     // the motor's part: active, within s · mu · normal force
+  Vec3 guide_device_n = Vec3::Zero();     // the guidance spring's part: paid for by the guiding handle's motion
+  Vec3 partner_device_n = Vec3::Zero();   // the rest: others' tools that touch this one
   Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
   // To write to a device that shows torque, device frame: the sum of the two below.
   Vec3 torque_device_nmm = Vec3::Zero();
   Vec3 coupling_device_nmm = Vec3::Zero();  // of the rotation's spring: passive, in the ledger
   // Moment of the cut: active, within the coupling's force at the arm of a rotation.
   Vec3 motor_device_nmm = Vec3::Zero();
-  Vec3 moved_mm = Vec3::Zero();          // of the proxy in this tick
+  Vec3 moved_mm = Vec3::Zero();  // of the proxy in this tick
   Pose pose_bone_proxy, pose_bone_device;
   Pose pose_rest_bone;  // the bone on its mount, relative to its rest pose
   // Of the handle's position, bone frame: slack, and the extension that returned bone would have caused.
   Vec3 offset_mm = Vec3::Zero();
-  EnergyReport energy;  // of the coupling, at the handle
+  EnergyReport energy;           // of the coupling, at the handle
   double guide_distance_mm = 0;  // while led: from this handle's position to the guiding handle's, bone frame
   double guide_play_mm = 0;      // while in a guide: permitted distance of the tip from the opening's middle
   double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
@@ -223,7 +223,7 @@ class HapticLoop {
   bool device_was_ok_ = true;
   // In the last tick less than the coupling's spring was shown, and the slew limit was not the reason.
   bool fell_short_ = false;
-  double ramp_ = 0;          // 0 … 1
+  double ramp_ = 0;  // 0 … 1
 };
 
 }  // namespace osteon::haptic

@@ -787,8 +787,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
     skive_mm_.setZero();
     travel(tick, pose_bone_device, nullptr, true, report);
   }
-  if (tick.may_cut)
-    update_sweep(model);  // else it would creep on through bone by the points' inset, without turning
+  if (tick.may_cut) update_sweep(model);  // else it would creep on through bone by the points' inset, without turning
   cut_before_ = report.cutting && !report.breakthrough;
 
   note_pushed_back(report);

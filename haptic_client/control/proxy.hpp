@@ -32,19 +32,20 @@ struct ProxyStep {
   bool may_cut = false;    // it would cut if the force suffices: it turns, and nothing forbids it
   bool near_bone = false;  // the cutting part touches bone or may remove it
   bool heel_contact = false;
-  bool on_metal = false;     // it turns, and metal is in its way: it goes no further there, and nothing is cut
-  bool returned = false;     // bone came back where the tool is: it cuts nothing until it has left that bone
+  bool on_metal = false;  // it turns, and metal is in its way: it goes no further there, and nothing is cut
+  bool returned = false;  // bone came back where the tool is: it cuts nothing until it has left that bone
   // The returned bone is too deep to be felt: no force, the spindle must stand, until the tool is drawn out.
   bool locked = false;
-  double feed_mm_per_s = 0;  // into bone, along the direction of cutting
-  double density_g_cm3 = 0;  // engaged-area weighted
-  double engaged = 0;        // share of the leading projected area that is in bone
+  double feed_mm_per_s = 0;             // into bone, along the direction of cutting
+  double density_g_cm3 = 0;             // engaged-area weighted
+  double engaged = 0;                   // share of the leading projected area that is in bone
   double engaged_area_mm2 = 0;          // that area
   double torque_nmm = 0;                // of the bone on the spindle, about the tool's axis
   double across_n = 0;                  // of the bone on the tool across the feed, as ForceLaw::across_n says
   unsigned out_of_range = 0;            // bits: the limits of the law that were exceeded
   Vec3 cutting_force_n = Vec3::Zero();  // of the tool on the bone
-  double cutting_work_mj = 0;  // work of the law's force over the path cut in this tick, all parts added; never negative
+  double cutting_work_mj =
+      0;  // work of the law's force over the path cut in this tick, all parts added; never negative
   // Rotation cuts nothing. In some ticks rotation pushes the tool back by more than it then cut. The force of that cut
   // would have done this work on the tool. Such a tick counts as rubbing, without force, but its cut still took work,
   // torque and feed. Zero in every other tick.

@@ -52,9 +52,9 @@ struct ReadyStep {
   EntrySite site;
   int tool = 0;  // index in the loop's tools
   double spindle_rpm = 0;
-  double stand_off_mm = 0;                                       // where the tool is taken up, above the surface
-  int guide = -1;                                                // place: index of the plan's guide
-  Tool item;  // definition of the item that the step leaves on the bone
+  double stand_off_mm = 0;  // where the tool is taken up, above the surface
+  int guide = -1;           // place: index of the plan's guide
+  Tool item;                // definition of the item that the step leaves on the bone
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();  // of the tool, bone frame
   std::vector<Vec3> sweep_mm;                                    // positions of the tip, burr
   double sweep_length_mm = 0;                                    // from the first to the last of them

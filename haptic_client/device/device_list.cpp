@@ -129,9 +129,8 @@ Result<std::unique_ptr<CombinedDevice>> make_devices(std::string_view names, con
 
 std::vector<DeviceLine> look_for_devices(const DeviceOptions& options) {
   std::vector<DeviceLine> lines;
-  lines.push_back({"simulated",
-                   "a simulated hand, strong enough for the drilling of bone; needs a plan",
-                   {{"always there"}, ""}});
+  lines.push_back(
+      {"simulated", "a simulated hand, strong enough for the drilling of bone; needs a plan", {{"always there"}, ""}});
   lines.push_back({"simulated-3.3N", "the same at a desktop device's force", {{"always there"}, ""}});
   for (const Kind& kind : kKinds) lines.push_back({kind.name, kind.what, kind.look(options)});
   return lines;

@@ -107,7 +107,8 @@ class FootPedal final : public HapticDevice {
     if (armed_) return "";
     if (!elsewhere_) return "release the foot pedal once; until then the spindle does not turn";
     return std::string(
-               "the foot pedal was down at its first reading, so the spindle does not turn; if nobody pressed it, it rests "
+               "the foot pedal was down at its first reading, so the spindle does not turn; if nobody pressed it, it "
+               "rests "
                "at "
                "the other end of its axis: ") +
            (options_.axis.inverted ? "leave out \"inverted\"" : "name it pedal-axis:inverted") +

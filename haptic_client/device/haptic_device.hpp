@@ -78,7 +78,7 @@ struct DeviceOutput {
 struct DeviceInfo {
   std::string model, serial, driver;  // as the device and its library report them; empty: not reported
   bool places = true, turns = true;   // what it reads: position, rotation
-  bool pedals = false;  // it drives the spindle: another device's spindle button becomes a second clutch
+  bool pedals = false;                // it drives the spindle: another device's spindle button becomes a second clutch
   int force_axes = 3, torque_axes = 0;  // what it shows: 0 or 3 of each
 };
 

@@ -65,7 +65,7 @@ class FastPath {
   const FastPathEvents events_;
   mutable std::mutex mutex_;
   wire::ClientLink link_;
-  std::uint64_t pushed_;                        // newest cut that the link was given
+  std::uint64_t pushed_;  // newest cut that the link was given
   // state_seq of each partner's last state passed on; used by the thread only.
   std::map<AuthorId, std::uint64_t> partners_;
   bool end_ = false;

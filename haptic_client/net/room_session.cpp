@@ -35,7 +35,7 @@ constexpr auto kCloseTime = 1s;
 constexpr std::chrono::milliseconds kLongestRedial = 10s;  // of a waiting time that a server requests
 constexpr auto kPushesApart = 33ms;                        // over the stream
 constexpr auto kAcknowledgeEvery = 250ms;  // between two acknowledgements of what this client has received
-constexpr auto kCaseSilence = 60s;                         // a whole case takes no longer on one machine
+constexpr auto kCaseSilence = 60s;         // a whole case takes no longer on one machine
 
 Error cannot_cache(const fs::path& path, const std::string& why) {
   return {ErrorCode::internal,
@@ -263,7 +263,8 @@ void RoomSession::Impl::write(Line& open) {
     if (const auto now = std::chrono::steady_clock::now(); now >= acknowledge_at) {
       acknowledge_at = now + kAcknowledgeEvery;
       const bool leaves = received_leaves.exchange(false);
-      if (const std::uint64_t newest = passed_on; newest != acknowledged && (leaves || !(path && path->health().alive))) {
+      if (const std::uint64_t newest = passed_on;
+          newest != acknowledged && (leaves || !(path && path->health().alive))) {
         request.mutable_acknowledged()->set_room_seq(acknowledged = newest);
         if (written = open.stream->Write(request); !written) break;
       }
@@ -383,8 +384,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       return taken;
     }();
     if (!delivered) {
-      broken =
-          Error{delivered.error().code, "the server sent an invalid message: " + delivered.error().message};
+      broken = Error{delivered.error().code, "the server sent an invalid message: " + delivered.error().message};
       open.context.TryCancel();
     }
   }

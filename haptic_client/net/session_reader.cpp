@@ -99,7 +99,8 @@ Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
   else if (entry.kind == wire::SessionEntryKind::supervised)
     supervised({entry.room_seq, entry.supervision, entry.lease_epoch, entry.by});
   else
-    rejected(entry.room_seq, entry.author_seq, entry.lease_epoch, std::string(sentence(static_cast<Rejection>(entry.reason))));
+    rejected(entry.room_seq, entry.author_seq, entry.lease_epoch,
+             std::string(sentence(static_cast<Rejection>(entry.reason))));
   return {};
 }
 
@@ -114,7 +115,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kComplete: {
       const v1::FieldComplete& entry = response.complete();
       complete_(entry.decided_author_seq());
-      RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(), entry.decided_author_seq()};
+      RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(),
+                      entry.decided_author_seq()};
       for (const std::uint64_t seq : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{seq});
       if (events_.complete) events_.complete(room);
       place_ = std::max(place_, RoomSeq{entry.room_seq()});
@@ -195,7 +197,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kSaid: {
       const v1::Said& entry = response.said();
       place_ = std::max(place_, RoomSeq{entry.room_seq()});
-      if (events_.said) events_.said({RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()});
+      if (events_.said)
+        events_.said({RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()});
       return {};
     }
     case v1::SessionResponse::kPartner: {

@@ -157,8 +157,7 @@ Result<void> run_audited(const fs::path& file, const fs::path& signing_key, Audi
 
 void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
-  CLI::App* audit =
-      app.add_subcommand("audit", "Checks or shows who did what on a server, or erases who somebody was");
+  CLI::App* audit = app.add_subcommand("audit", "Checks or shows who did what on a server, or erases who somebody was");
   audit->require_subcommand(1);
   const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
     CLI::App* sub = audit->add_subcommand(name, what);

@@ -407,8 +407,7 @@ int main(int argc, char** argv) {
                  "Unix socket for calls from a proxy on this machine; deploy/docs/security.md");
   app.add_flag("--plain", options.plain,
                "Plain text, without certificates and tickets, for clients on this machine alone");
-  app.add_option("--most-connections", options.most_connections,
-                 "Of all clients together; more are closed at once")
+  app.add_option("--most-connections", options.most_connections, "Of all clients together; more are closed at once")
       ->check(CLI::Range(1, 65535))
       ->capture_default_str();
   app.add_option("--most-ticket-hours", options.most_ticket_hours,
@@ -485,9 +484,8 @@ int main(int argc, char** argv) {
   app.add_option("--summary", options.summary_file, "JSON written at the end: field hash, counts, ticks, latencies");
   app.add_option("--metrics", options.metrics,
                  "PORT or HOST:PORT of this machine at which Prometheus reads figures of every room");
-  app.add_option(
-         "--drain-seconds", options.drain_seconds,
-         "After SIGTERM or Ctrl-C, how long clients have to leave in good order; a second signal ends this")
+  app.add_option("--drain-seconds", options.drain_seconds,
+                 "After SIGTERM or Ctrl-C, how long clients have to leave in good order; a second signal ends this")
       ->check(CLI::Range(0, 600))
       ->capture_default_str();
   std::filesystem::path config_file;

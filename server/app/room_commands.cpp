@@ -54,9 +54,9 @@ Result<void> verify(RoomAdminClient& rooms, const Arguments& given) {
               to_hex(checked->field_hash).c_str(), checked->checkpoints);
   for (const std::string& fault : checked->faults) std::printf("fault:       %s\n", fault.c_str());
   if (!checked->faults.empty())
-    return failure(ErrorCode::invalid_input,
-                   "the stored room " + given.name +
-                       " is not sound; close the room and see osteon-server verify and salvage");
+    return failure(
+        ErrorCode::invalid_input,
+        "the stored room " + given.name + " is not sound; close the room and see osteon-server verify and salvage");
   std::printf("verdict:     sound\n");
   return {};
 }
@@ -80,8 +80,7 @@ Result<void> remove(RoomAdminClient& rooms, const Arguments& given) {
 void add_room_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
   CLI::App* rooms = app.add_subcommand(
-      "rooms",
-      "Makes, lists, closes, branches, replays, checks, copies and deletes the rooms of a server that runs");
+      "rooms", "Makes, lists, closes, branches, replays, checks, copies and deletes the rooms of a server that runs");
   rooms->require_subcommand(1);
   using Run = Result<void> (*)(RoomAdminClient&, const Arguments&);
   const auto command = [&](const char* name, const char* what, Run run) {

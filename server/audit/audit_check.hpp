@@ -14,9 +14,9 @@ namespace osteon {
 
 struct AuditReport {
   std::uint64_t records = 0, first = 0, last = 0;  // first, last: sequence numbers
-  Digest last_hash;  // of the last line
+  Digest last_hash;                                // of the last line
   std::optional<std::string> fault;  // names the first line that is not as it was written; nothing: there is none
-  std::vector<std::string> notes;  // findings that are no fault of the log, one sentence each
+  std::vector<std::string> notes;    // findings that are no fault of the log, one sentence each
   [[nodiscard]] bool sound() const { return !fault; }
 };
 
@@ -30,7 +30,7 @@ struct AuditReport {
 // A record in the form that people read.
 struct AuditEntry {
   AuditRecord record;
-  AuditIdentity who;  // as far as it is known
+  AuditIdentity who;       // as far as it is known
   bool is_erased = false;  // the person behind the pseudonym was erased
 };
 // Reads all records in order. Returns the number of lines that are not records; verify_audit() names the first. Errors

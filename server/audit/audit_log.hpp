@@ -60,11 +60,11 @@ class AuditLog {
   std::shared_ptr<const SigningKeys> keys_;  // shared with the journals
   Unfit unfit_;
   AuditPeople people_;
-  std::optional<FileIdentity> seen_;  // the file as this object left it, with the size of its complete lines
-  std::uint64_t sequence_ = 0;  // of the last record
-  Digest last_;  // hash of its line
-  std::optional<AuditEvent> aside_;  // to be recorded with the next events
-  std::uint64_t unsure_ = 0;  // bytes after seen_->size that a failed write may have left
+  std::optional<FileIdentity> seen_;     // the file as this object left it, with the size of its complete lines
+  std::uint64_t sequence_ = 0;           // of the last record
+  Digest last_;                          // hash of its line
+  std::optional<AuditEvent> aside_;      // to be recorded with the next events
+  std::uint64_t unsure_ = 0;             // bytes after seen_->size that a failed write may have left
   bool opened_ = false, named_ = false;  // named_: the folder was synced since this object made the file
 };
 
@@ -75,7 +75,7 @@ class AuditLog {
 // The content of a retention record. The functions convert it to the record's detail and back.
 struct AuditStart {
   std::uint64_t sequence = 0;  // of the first record that was kept
-  Digest previous;  // hash of the line before it
+  Digest previous;             // hash of the line before it
   friend bool operator==(const AuditStart&, const AuditStart&) = default;
 };
 [[nodiscard]] std::string detail_of(const AuditStart& start);

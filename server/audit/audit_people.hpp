@@ -17,7 +17,7 @@ namespace osteon {
 
 struct AuditPerson {
   std::string pseudonym;  // 32 hexadecimal digits
-  std::string salt;  // 32 hexadecimal digits, random
+  std::string salt;       // 32 hexadecimal digits, random
   AuditIdentity who;
   // Whether the pseudonym is that of this identity.
   [[nodiscard]] bool fits() const;
@@ -50,8 +50,8 @@ class AuditPeople {
   Disk* disk_;
   std::filesystem::path file_;
   std::optional<FileIdentity> seen_;  // the file as this object left it
-  std::string waiting_;  // lines that are not yet in it
-  bool failed_ = false;  // whether the last save() failed
+  std::string waiting_;               // lines that are not yet in it
+  bool failed_ = false;               // whether the last save() failed
   std::map<AuditIdentity, std::string> known_;
 };
 

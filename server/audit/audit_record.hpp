@@ -17,9 +17,9 @@ namespace osteon {
 
 // Who acted. Unknown fields are empty.
 struct AuditIdentity {
-  std::string person{};  // of the certificate; for a command, the system's user
+  std::string person{};       // of the certificate; for a command, the system's user
   std::string certificate{};  // serial number, hexadecimal
-  std::string ticket{};  // id, hexadecimal
+  std::string ticket{};       // id, hexadecimal
   std::string address{};      // "ipv4:10.0.0.7"
   friend auto operator<=>(const AuditIdentity&, const AuditIdentity&) = default;
 };
@@ -30,9 +30,9 @@ inline constexpr std::string_view kClaimed = "claimed:";
 // What happened. Only the identity may name a person, because only the identity can be erased.
 struct AuditEvent {
   AuditIdentity who{};
-  std::string action;  // one word: "Join", "DeleteRoom", "handshake"
+  std::string action;    // one word: "Join", "DeleteRoom", "handshake"
   std::string object{};  // a room, a case, a file
-  std::string result;  // kOk, kRefused, kFailed or kLost
+  std::string result;    // kOk, kRefused, kFailed or kLost
   std::string detail{};  // fixed words and numbers
   std::chrono::system_clock::time_point at = std::chrono::system_clock::now();
 };
@@ -43,10 +43,10 @@ inline constexpr const char* kRetention = "retention";
 struct AuditRecord {
   std::uint64_t sequence = 0;  // from 1, without gaps
   std::string time;            // RFC 3339, UTC, microseconds
-  std::string identity;  // pseudonym; empty: the server itself
+  std::string identity;        // pseudonym; empty: the server itself
   std::string action, object, result, detail;
   Digest previous;  // SHA-256 of the line before this one, without its line end; zeros in the first record
-  PublicKey key;  // the key that signed it
+  PublicKey key;    // the key that signed it
 };
 
 // The record as a line without its line end. Sets `record.key` to that of `key`. Replaces bytes that are not UTF-8.

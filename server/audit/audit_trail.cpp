@@ -163,7 +163,8 @@ void AuditTrail::tell(const std::vector<AuditLog::Written>& written) {
 
 void AuditTrail::maintain() {
   const auto now = Clock::now();
-  if (options_.retention_days == 0 || (maintained_at_ != Clock::time_point{} && now - maintained_at_ < kMaintainEvery)) return;
+  if (options_.retention_days == 0 || (maintained_at_ != Clock::time_point{} && now - maintained_at_ < kMaintainEvery))
+    return;
   maintained_at_ = now;
   const auto removed =
       log_.remove_before(std::chrono::system_clock::now() - std::chrono::days(options_.retention_days));

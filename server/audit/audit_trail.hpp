@@ -21,19 +21,19 @@
 namespace osteon {
 
 struct AuditOptions {
-  std::filesystem::path file{};  // "audit.log" in the folder of the journals
+  std::filesystem::path file{};               // "audit.log" in the folder of the journals
   std::shared_ptr<const SigningKeys> keys{};  // shared with the journals
-  std::filesystem::path syslog{};  // Unix datagram socket of the system's log; empty: nothing is sent
-  int retention_days = 0;  // after which records are removed; 0: never
-  std::size_t most_waiting = 4096;  // events; refusals take at most half of it
+  std::filesystem::path syslog{};             // Unix datagram socket of the system's log; empty: nothing is sent
+  int retention_days = 0;                     // after which records are removed; 0: never
+  std::size_t most_waiting = 4096;            // events; refusals take at most half of it
   std::chrono::milliseconds window = std::chrono::minutes(10);  // time in which equal refusals count as one
-  std::chrono::milliseconds retry{1000};  // after a disk error
+  std::chrono::milliseconds retry{1000};                        // after a disk error
 };
 
 struct AuditCounts {
   std::uint64_t written = 0;  // records
-  std::uint64_t lost = 0;  // events for which the queue had no space
-  bool failing = false;  // the disk did not accept the last records
+  std::uint64_t lost = 0;     // events for which the queue had no space
+  bool failing = false;       // the disk did not accept the last records
 };
 
 // Any thread.
@@ -73,7 +73,7 @@ class AuditTrail {
   void run();
   void write(std::unique_lock<std::mutex>& lock);  // writes what is waiting; releases the lock while it does so
   void tell(const std::vector<AuditLog::Written>& written);  // [writer] the batch is on the disk
-  void maintain();  // [writer] retention
+  void maintain();                                           // [writer] retention
 
   const AuditOptions options_;
   AuditLog log_;  // used by the writer only, like the next three

@@ -18,14 +18,14 @@ namespace osteon::import {
 struct StepReport {
   std::string tool;
   int level = 0;
-  int cuts = 0;  // cuts that were made
-  int metal_refused = 0;  // cuts that were refused because they would have removed metal
+  int cuts = 0;            // cuts that were made
+  int metal_refused = 0;   // cuts that were refused because they would have removed metal
   double removed_mm3 = 0;  // by cutting, from all bodies; separated pieces are not counted
   std::int64_t visited = 0, computed = 0, modified = 0;  // samples of all bodies together (Niu 2008, §5.4)
   double cut_ms_median = 0, cut_ms_p99 = 0, cut_ms_most = 0;
   double frame_ms_median = 0, frame_ms_most = 0;  // time to mesh body 0's blocks that kCutsPerFrame cuts changed
-  double fragment_ms = 0;  // time to maintain the components and to detect fragments
-  int pieces = 0;  // pieces that separated in this step, without debris
+  double fragment_ms = 0;                         // time to maintain the components and to detect fragments
+  int pieces = 0;                                 // pieces that separated in this step, without debris
   double pieces_mm3 = 0;
   int debris = 0;
   double field_mb = 0;  // samples of all bodies' cut fields
@@ -58,12 +58,12 @@ class Carving {
   [[nodiscard]] double field_mb() const;
 
   double cut_mm_;
-  std::shared_ptr<ToolBox> tools_;  // shared with the bodies' fields
-  std::vector<CutField> bodies_;  // 0: the bone; others: separated pieces
+  std::shared_ptr<ToolBox> tools_;       // shared with the bodies' fields
+  std::vector<CutField> bodies_;         // 0: the bone; others: separated pieces
   std::vector<FragmentFinder> finders_;  // one for each body; none after settle()
-  CutHistory history_;  // of body 0
-  std::uint64_t events_ = 0;  // in the history
-  std::vector<RoomSeq> taken_;  // events of the history: bone that separated as pieces and debris
+  CutHistory history_;                   // of body 0
+  std::uint64_t events_ = 0;             // in the history
+  std::vector<RoomSeq> taken_;           // events of the history: bone that separated as pieces and debris
   bool settled_ = true;
   SurfaceBlocks surface_;
   std::vector<BlockKey> stale_;

@@ -17,24 +17,24 @@ struct CtOptions {
   double threshold_hu = imaging::kBoneThreshold_hu;
   DensityCalibration calibration = imaging::kRho1995;
   std::string title = "CT";  // never taken from the scan, because its names may be a patient's
-  std::vector<int> keep;  // islands by number, from 1; empty: the largest
+  std::vector<int> keep;     // islands by number, from 1; empty: the largest
   bool keep_all = false;
-  bool merge = false;  // the kept islands count as one bone
-  bool hollow = false;  // cavities enclosed by bone are not bone
+  bool merge = false;      // the kept islands count as one bone
+  bool hollow = false;     // cavities enclosed by bone are not bone
   bool list_only = false;  // find the islands and make no case
 };
 
 // Result of the segmentation.
 struct CtSegmentation {
   std::vector<imaging::Island> islands;  // largest first; number N is islands[N - 1]
-  std::vector<int> kept;  // numbers; empty if the islands were only listed
-  bool merged = false;  // the kept islands are one bone
-  double left_out_cm3 = 0.0;  // of the islands that were not kept
-  double marrow_cm3 = 0.0;  // below the threshold, within the kept islands
+  std::vector<int> kept;                 // numbers; empty if the islands were only listed
+  bool merged = false;                   // the kept islands are one bone
+  double left_out_cm3 = 0.0;             // of the islands that were not kept
+  double marrow_cm3 = 0.0;               // below the threshold, within the kept islands
   std::vector<double> joined_cm3;  // large parts of dense and cancellous bone that only marrow connects, if several
-  double case_cm3 = 0.0;  // of the case's bone
+  double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
-  Box region;  // part of the scan around everything that reaches the threshold, LPS
+  Box region;                                // part of the scan around everything that reaches the threshold, LPS
 };
 
 struct CtImport {

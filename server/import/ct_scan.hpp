@@ -9,7 +9,7 @@ namespace osteon::import {
 
 struct CtScan {
   imaging::HuVolume volume;
-  std::string source;  // kind and geometry only: no name, date or number of a patient, nor the file's name
+  std::string source;   // kind and geometry only: no name, date or number of a patient, nor the file's name
   SeriesReport report;  // for the person who imports; a case stores nothing of it
 };
 

@@ -25,7 +25,7 @@ constexpr int kMostDeaths = 100;  // of processes that read headers
 // Fewer files, or a smaller archive, are searched in a moment. Then no progress appears before an error.
 constexpr std::size_t kManyFiles = 500;
 constexpr std::uint64_t kLargeArchive = std::uint64_t{64} << 20;  // bytes
-constexpr double kUnpackedEnd = 0.4;  // of the progress of an archive
+constexpr double kUnpackedEnd = 0.4;                              // of the progress of an archive
 constexpr double kHeadersEnd = 0.6;
 
 void silence_library() {

@@ -14,7 +14,7 @@ namespace {
 constexpr int kLargestAxis = 1 << 14;
 constexpr double kMostVoxels = 4e9;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;
-constexpr int kFewSlices = 8;  // fewer are not a volume to operate on
+constexpr int kFewSlices = 8;                // fewer are not a volume to operate on
 constexpr std::size_t kGroupsCompared = 64;  // of one UID; in hostile files every slice could differ
 
 using Slices = std::vector<DicomHeader>;
@@ -260,7 +260,8 @@ class Arranger {
     if (at == gaps.size()) return std::nullopt;
     series_.entry.slice_mm = usual_mm;
     char brief[64], text[96];
-    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one position" : "a gap of %.3g mm", gaps[at]);
+    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one position" : "a gap of %.3g mm",
+                  gaps[at]);
     if (usual_mm < 1e-3)
       std::snprintf(text, sizeof text, " lie at the same position, like most slices");
     else

@@ -21,7 +21,7 @@ struct FoundFiles {
   std::string input;  // as it was given
   bool archive = false;
   std::vector<FoundFile> files;  // sorted by name
-  SkippedFiles skipped;  // everything that is not a regular file
+  SkippedFiles skipped;          // everything that is not a regular file
 
   // "folder/inner/name", "archive.zip: inner/name"
   [[nodiscard]] std::string shown(std::size_t file) const;

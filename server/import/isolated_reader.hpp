@@ -25,14 +25,14 @@ class ChildChannel {
 };
 
 struct IsolatedWork {
-  std::function<Result<void>(ChildChannel&)> run;  // in the child
+  std::function<Result<void>(ChildChannel&)> run;            // in the child
   std::function<bool(std::string_view message)> on_message;  // in the parent; false: the message makes no sense
   std::size_t memory_bytes = std::size_t{1} << 30;  // memory that the child may take beyond what it begins with
 };
 
 struct IsolatedEnd {
   Result<void> result;
-  bool died = false;  // killed by a signal, out of memory, or ended after two minutes of silence
+  bool died = false;                // killed by a signal, out of memory, or ended after two minutes of silence
   std::optional<std::size_t> file;  // the last file that it opened
 };
 

@@ -22,7 +22,7 @@ constexpr int kBatch = 32;
 constexpr std::size_t kMostKinds = 250;
 constexpr double kLargestVolume = 1.0e9;  // voxels
 constexpr double kLargestSlice = 6.4e7;  // pixels: a small file can claim far more, and all of them are decoded at once
-constexpr double kDensest_g_cm3 = 3.0;  // enamel
+constexpr double kDensest_g_cm3 = 3.0;   // enamel
 
 struct Slice {
   std::int64_t number = 0;

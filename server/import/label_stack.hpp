@@ -35,7 +35,7 @@ struct ColourCount {
 };
 
 struct LabelStack {
-  imaging::LabelVolume volume;  // labels in the order of the legend, from 1
+  imaging::LabelVolume volume;       // labels in the order of the legend, from 1
   std::vector<ColourCount> colours;  // most frequent first
 };
 

@@ -8,7 +8,7 @@ namespace osteon::import {
 namespace {
 
 constexpr std::size_t kMostListed = 40;
-constexpr double kDifference = 0.05;  // between voxels and case; larger ones are reported
+constexpr double kDifference = 0.05;       // between voxels and case; larger ones are reported
 constexpr double kLeastListed_cm3 = 0.05;  // smaller islands are summed up
 
 template <class... Values>

@@ -8,11 +8,11 @@
 namespace osteon::import {
 
 struct SeriesEntry {
-  int number = 0;  // 1 .. n, the argument of --series
+  int number = 0;           // 1 .. n, the argument of --series
   std::string description;  // from the scanner's operator; shown, never stored
   int slices = 0, rows = 0, columns = 0;
   double row_mm = 0.0, column_mm = 0.0, slice_mm = 0.0;  // between neighbours; 0 if unknown
-  std::string plane;  // axial, coronal, sagittal, oblique
+  std::string plane;                                     // axial, coronal, sagittal, oblique
   std::string kernel;
   std::string problem;  // why it cannot be imported
 };

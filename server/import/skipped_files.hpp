@@ -29,9 +29,9 @@ enum class FileKind : std::uint8_t {
   unreadable,  // no permission, or the disk fails
   not_dicom,
   empty,
-  archive,  // within a folder or another archive
-  link,  // to a folder or to nothing; within an archive, any link
-  special,  // pipes, sockets, devices
+  archive,   // within a folder or another archive
+  link,      // to a folder or to nothing; within an archive, any link
+  special,   // pipes, sockets, devices
   too_deep,  // folders below the last level that is searched
 };
 

@@ -10,9 +10,9 @@
 namespace osteon {
 
 struct JournalEntry {
-  RoomSeq place;  // rises by exactly one; the first is 1
+  RoomSeq place;           // rises by exactly one; the first is 1
   std::int64_t at_ns = 0;  // when it was decided, since the room was made; for replay
-  std::string bytes;  // the room's own encoding
+  std::string bytes;       // the room's own encoding
 };
 
 // How far a journal goes, and what it says: equal heads mean equal histories. Whoever had an entry acknowledged stores

@@ -23,8 +23,8 @@ class Statement {
   Statement& integer(int at, std::int64_t value);
   Statement& text(int at, std::string_view value);  // must remain valid until the next step
   Statement& blob(int at, std::string_view value);  // likewise
-  [[nodiscard]] Result<bool> step();  // true: there is a result row
-  [[nodiscard]] Result<void> run();  // to its end; ready to run again
+  [[nodiscard]] Result<bool> step();                // true: there is a result row
+  [[nodiscard]] Result<void> run();                 // to its end; ready to run again
   void reset();
 
   [[nodiscard]] std::int64_t integer(int column) const;
@@ -59,7 +59,7 @@ class Database {
   Database& operator=(Database&&) noexcept = default;
 
   [[nodiscard]] Result<Statement> prepare(std::string_view sql);
-  [[nodiscard]] Result<void> run(const std::string& sql);  // statements whose result rows do not matter
+  [[nodiscard]] Result<void> run(const std::string& sql);            // statements whose result rows do not matter
   [[nodiscard]] Result<std::int64_t> integer(std::string_view sql);  // of the first result row; 0 if there is none
   [[nodiscard]] Result<std::string> text(std::string_view sql);
   // Changes between the two calls stay in memory until commit(). It returns when SQLite's log has them durably.

@@ -58,7 +58,8 @@ Result<void> JournalFile::erase(std::span<const JournalEntry> instead) {
     const auto chain = chain_at(entry.place);
     if (!chain) return tl::unexpected(chain.error());
     OSTEON_CHECK(chain->has_value());
-    if (Result<void> put = statement->blob(0, entry.bytes).integer(1, static_cast<std::int64_t>(entry.place.value)).run();
+    if (Result<void> put =
+            statement->blob(0, entry.bytes).integer(1, static_cast<std::int64_t>(entry.place.value)).run();
         !put)
       return put;
     erased_[entry.place.value] = {**chain, digest_of_entry(entry.bytes)};
@@ -66,7 +67,8 @@ Result<void> JournalFile::erase(std::span<const JournalEntry> instead) {
   return set_register(kErasedRegister, encode_erased(erased_));
 }
 
-Result<std::size_t> Journal::erase_entries(const std::function<std::optional<std::string>(const JournalEntry&)>& without) {
+Result<std::size_t> Journal::erase_entries(
+    const std::function<std::optional<std::string>(const JournalEntry&)>& without) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
   std::vector<JournalEntry> instead;

@@ -37,7 +37,7 @@ class CheckpointFile {
 // Consecutive log entries of a journal that is read in parts.
 struct JournalSlice {
   std::vector<JournalEntry> entries;
-  JournalHead head;  // of the last of them
+  JournalHead head;              // of the last of them
   std::optional<Error> stopped;  // why the entry after it does not fit
 };
 
@@ -133,7 +133,7 @@ class Journal {
   // Whether one of JournalOptions::keys signed a register that exists. Without keys: true for every register that
   // exists.
   [[nodiscard]] Result<bool> is_vouched_for(std::string_view name);
-  [[nodiscard]] bool is_signed() const;  // whether it signs what it writes from now on
+  [[nodiscard]] bool is_signed() const;                                   // whether it signs what it writes from now on
   [[nodiscard]] bool is_vouched_for(const Checkpoint& checkpoint) const;  // one of checkpoints()
   // Vouches for the head in a footer. Then the log is no longer needed and is removed. Does nothing to a journal that
   // accepts no entries. The journal must not be used afterwards.
@@ -156,7 +156,7 @@ class Journal {
   [[nodiscard]] Result<void> begin_signing();
   [[nodiscard]] Result<void> note_keys();
   [[nodiscard]] Result<void> keep_signature();  // of the newest entries, in the database
-  void close_for_good(Error reason);  // with a note beside the file for the next process
+  void close_for_good(Error reason);            // with a note beside the file for the next process
   [[nodiscard]] Result<std::size_t> keep_people(const std::function<bool(const Person&)>& kept);
   std::unique_ptr<State> state_;
 };

@@ -24,7 +24,7 @@
 namespace osteon {
 
 // Files beside the journal's own, besides log_of() and mirror_of().
-[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);  // SQLite's write-ahead log
+[[nodiscard]] std::filesystem::path wal_of(const std::filesystem::path& journal);         // SQLite's write-ahead log
 [[nodiscard]] std::filesystem::path owner_file_of(const std::filesystem::path& journal);  // names who made it
 // says why it accepts no more entries
 [[nodiscard]] std::filesystem::path failed_of(const std::filesystem::path& journal);
@@ -44,11 +44,11 @@ namespace osteon {
 
 // What was found in a journal's file.
 struct Inspection {
-  JournalHead head;  // of the last entry that the chain confirms
-  std::vector<std::string> faults;  // one sentence each; none: sound
+  JournalHead head;                  // of the last entry that the chain confirms
+  std::vector<std::string> faults;   // one sentence each; none: sound
   std::optional<RoomSeq> first_bad;  // sequence number of the entry
   bool closed_cleanly = false;
-  RoomSeq witnessed;  // the furthest entry that its log, a footer or a checkpoint vouches for
+  RoomSeq witnessed;               // the furthest entry that its log, a footer or a checkpoint vouches for
   std::vector<std::string> notes;  // of its log: what one file lacks and the other has, an incomplete write
 };
 
@@ -67,7 +67,7 @@ using ErasedEntries = std::map<std::uint64_t, ErasedEntry>;  // by sequence numb
 [[nodiscard]] std::optional<ErasedEntries> decode_erased(std::string_view bytes);
 
 struct Walk {
-  JournalHead head;  // of the last entry that fitted
+  JournalHead head;              // of the last entry that fitted
   std::optional<Error> stopped;  // why the next one does not
 };
 
@@ -110,7 +110,7 @@ class JournalFile {
   [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
                           const std::function<bool(const JournalEntry&, const JournalHead&)>& take);
   [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
-  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();  // newest first
+  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
   [[nodiscard]] Result<std::vector<Person>> people(std::vector<std::optional<PublicKey>>* signers = nullptr);
   [[nodiscard]] Result<std::vector<std::string>> registers();  // their names, without the journal's own
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);

@@ -14,9 +14,9 @@ namespace osteon {
 struct JournalOptions {
   Disk* disk = nullptr;  // null: the computer's; must outlive the journal
   std::size_t most_entry_bytes = std::size_t{64} << 20;
-  std::uint64_t log_bytes = std::uint64_t{1} << 20;  // of each log file; what exceeds it goes into the database
-  int page_bytes = 4096;  // of a new journal; not smaller than the disk's sectors
-  bool durable = true;  // false, for tests only: waits for no sync
+  std::uint64_t log_bytes = std::uint64_t{1} << 20;   // of each log file; what exceeds it goes into the database
+  int page_bytes = 4096;                              // of a new journal; not smaller than the disk's sectors
+  bool durable = true;                                // false, for tests only: waits for no sync
   std::shared_ptr<const SigningKeys> keys = nullptr;  // they sign what is written; null: nothing is signed
 };
 
@@ -25,7 +25,7 @@ struct Checkpoint {
   JournalHead at;
   std::string meta;  // a few words of the owner's
   std::uint64_t size = 0;
-  Digest digest;  // SHA-256 of the file's bytes
+  Digest digest;          // SHA-256 of the file's bytes
   std::string seal = {};  // of the four above; empty: made when the checkpoint is added
 };
 

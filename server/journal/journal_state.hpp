@@ -21,11 +21,11 @@ struct Journal::State {
   FileIdentity identity;  // of the file
   JournalHead head = {};
   std::optional<MirroredLog> log = {};  // nothing: it has accepted no entries since it was opened
-  std::uint64_t generation = 0;  // of the log
+  std::uint64_t generation = 0;         // of the log
   std::optional<RoomSeq> recovered_to = {};
   std::optional<Error> closed = {};
-  std::vector<std::string> notes = {};  // from when it was opened
-  std::optional<RoomSeq> signed_since = {};  // none: nothing is signed
+  std::vector<std::string> notes = {};               // from when it was opened
+  std::optional<RoomSeq> signed_since = {};          // none: nothing is signed
   std::optional<SignedEntries> last_signature = {};  // of the newest entries, until the database has it
   bool only_read = false;
 };

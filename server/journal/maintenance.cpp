@@ -144,14 +144,14 @@ struct JournalCopy::State {
   Disk* disk;
   JournalFile* source;
   std::string genesis;  // of the copy
-  JournalHead copied;  // as the source has it
-  JournalHead head;  // as the copy has it
+  JournalHead copied;   // as the source has it
+  JournalHead head;     // as the copy has it
   RoomSeq last;
   std::optional<std::vector<std::string>> only = {};  // a branch: these registers, and no people
-  bool damaged = false;  // what cannot be read is left out
-  std::optional<std::uint64_t> epochs = {};  // salvaged: more openings than the lost part can have counted
-  std::shared_ptr<const SigningKeys> keys = {};  // they sign what is not copied as it is
-  bool signs_entries = false;  // those of a branch, which has another chain
+  bool damaged = false;                               // what cannot be read is left out
+  std::optional<std::uint64_t> epochs = {};           // salvaged: more openings than the lost part can have counted
+  std::shared_ptr<const SigningKeys> keys = {};       // they sign what is not copied as it is
+  bool signs_entries = false;                         // those of a branch, which has another chain
   std::optional<Journal> target = {};
   // Taken from the source and not yet put into the target.
   std::vector<JournalEntry> entries = {};
@@ -206,11 +206,12 @@ struct JournalCopying {
 
   static Result<void> take_entries(JournalCopy::State& state, std::size_t most_entries) {
     std::size_t bytes = 0;
-    const Walk walked = state.source->walk(state.copied, state.last, [&](const JournalEntry& entry, const JournalHead&) {
-      state.entries.push_back(entry);
-      bytes += entry.bytes.size();
-      return state.entries.size() < most_entries && bytes < kSliceBytes;
-    });
+    const Walk walked =
+        state.source->walk(state.copied, state.last, [&](const JournalEntry& entry, const JournalHead&) {
+          state.entries.push_back(entry);
+          bytes += entry.bytes.size();
+          return state.entries.size() < most_entries && bytes < kSliceBytes;
+        });
     if (walked.stopped && !state.damaged) return tl::unexpected(*walked.stopped);
     if (walked.stopped) state.last = walked.head.place;
     state.copied = walked.head;

@@ -20,12 +20,12 @@ struct SignedRange {
 
 struct VerifyReport {
   int version = 0;
-  JournalHead head;  // of the last entry that the chain confirms
+  JournalHead head;                  // of the last entry that the chain confirms
   std::optional<RoomSeq> first_bad;  // sequence number of the entry
-  RoomSeq witnessed;  // the furthest entry that a footer or checkpoint vouches for
+  RoomSeq witnessed;                 // the furthest entry that a footer or checkpoint vouches for
   bool closed_cleanly = false;
-  std::vector<std::string> faults;  // one sentence each
-  std::vector<std::string> notes;  // of its log: what one file lacks and the other has, an incomplete write
+  std::vector<std::string> faults;             // one sentence each
+  std::vector<std::string> notes;              // of its log: what one file lacks and the other has, an incomplete write
   std::vector<SignedRange> signed_range = {};  // in order of their ends; they may overlap
   // Checkpoints, registers, people and the footer of a closed journal, and who signed each of them. What the journal
   // records for itself is not listed.
@@ -36,11 +36,11 @@ struct VerifyReport {
 
 // What a server vouches for in a sound report: with one key, and with the keys before and after it.
 struct Vouched {
-  std::vector<SignedRange> ranges;  // one after the other
-  std::vector<SignedRange> by_others;  // entries that another key signed and no key of this server
+  std::vector<SignedRange> ranges;                     // one after the other
+  std::vector<SignedRange> by_others;                  // entries that another key signed and no key of this server
   std::vector<std::pair<RoomSeq, RoomSeq>> by_nobody;  // both ends included
-  std::size_t seals = 0;  // of VerifyReport::seals, signed by this server
-  std::vector<std::string> other_seals;  // not signed by this server
+  std::size_t seals = 0;                               // of VerifyReport::seals, signed by this server
+  std::vector<std::string> other_seals;                // not signed by this server
   [[nodiscard]] bool all() const {
     return (!ranges.empty() || seals > 0) && by_others.empty() && by_nobody.empty() && other_seals.empty();
   }
@@ -77,7 +77,7 @@ class JournalCopy {
   // The two halves of a step: only take() uses the source, and only put() waits for the copy to be written.
   [[nodiscard]] Result<void> take(std::size_t most_entries);
   [[nodiscard]] Result<bool> put();
-  [[nodiscard]] double fraction() const;  // of the entries
+  [[nodiscard]] double fraction() const;          // of the entries
   [[nodiscard]] const JournalHead& head() const;  // of the copy so far
 
  private:
@@ -109,8 +109,8 @@ class JournalCopy {
 [[nodiscard]] Result<void> delete_journals(const std::vector<std::filesystem::path>& files, Disk* disk = nullptr);
 
 struct RecoverReport {
-  JournalHead head;  // of the new journal
-  RoomSeq witnessed;  // what was vouched for; entries beyond head are lost
+  JournalHead head;                 // of the new journal
+  RoomSeq witnessed;                // what was vouched for; entries beyond head are lost
   std::vector<std::string> faults;  // of the old one
   [[nodiscard]] std::uint64_t lost() const { return witnessed > head.place ? witnessed.value - head.place.value : 0; }
 };

@@ -22,9 +22,9 @@ namespace osteon {
 
 // The state from which the entries of a log continue.
 struct LogStart {
-  Digest journal;  // the journal it belongs to: the chain of its genesis
+  Digest journal;                // the journal it belongs to: the chain of its genesis
   std::uint64_t generation = 0;  // rises by one whenever the log begins anew
-  JournalHead base;  // the last entry that the database had then
+  JournalHead base;              // the last entry that the database had then
   // Who signs each batch, and from which entry on. None: nobody does.
   struct Signer {
     PublicKey key;
@@ -35,16 +35,16 @@ struct LogStart {
 
 // What both files together contain.
 struct LogContents {
-  std::uint64_t generation = 0;  // the newest generation in either file; 0: neither can be read
-  std::vector<JournalEntry> entries;  // those after the head that was asked for
-  JournalHead head;  // of the last of them
+  std::uint64_t generation = 0;            // the newest generation in either file; 0: neither can be read
+  std::vector<JournalEntry> entries;       // those after the head that was asked for
+  JournalHead head;                        // of the last of them
   std::optional<SignedEntries> signature;  // of the batch that leads to head; not checked, may be anything
   std::vector<std::pair<std::filesystem::path, JournalHead>> bases;  // where each file starts
-  RoomSeq witnessed;  // the furthest entry that either file knows
+  RoomSeq witnessed;                                                 // the furthest entry that either file knows
   // What one file lacks and the other has, or an incomplete write; one sentence each.
   std::vector<std::string> notes;
   std::vector<std::string> foreign;  // files of another journal; one sentence each
-  std::vector<std::string> faults;  // why neither can be read; one sentence each
+  std::vector<std::string> faults;   // why neither can be read; one sentence each
   // A write was cut short in one file. It may have spoiled the batch before it, and the other file does not have that
   // batch.
   bool doubtful = false;
@@ -90,7 +90,7 @@ class MirroredLog {
     FileIdentity identity;
     std::string salt;
     bool is_signed = false;
-    std::uint64_t end = 0;  // end of the entries, bytes
+    std::uint64_t end = 0;      // end of the entries, bytes
     std::uint64_t written = 0;  // the furthest byte that was ever written
   };
   MirroredLog(std::uint64_t capacity, Disk& disk, bool durable)

@@ -241,7 +241,8 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
   bool too_many = false;
   const auto take = [&](const LogEntry& entry) {
     if (const auto* cut = std::get_if<CutEntry>(&entry.what)) {
-      if (entry.place >= what.from && (!what.of || cut->cut.author == what.of)) cuts[entry.place] = {cut->cut, entry.at};
+      if (entry.place >= what.from && (!what.of || cut->cut.author == what.of))
+        cuts[entry.place] = {cut->cut, entry.at};
     } else if (const auto* undo = std::get_if<UndoEntry>(&entry.what)) {
       undone.insert(undo->places.begin(), undo->places.end());
     } else if (const auto* redo = std::get_if<RedoEntry>(&entry.what)) {

@@ -37,8 +37,8 @@ class WordEraser {
 };
 
 struct Forgotten {
-  std::size_t people = 0;  // people whose names are erased
-  std::size_t entries = 0;    // entries whose words are erased
+  std::size_t people = 0;   // people whose names are erased
+  std::size_t entries = 0;  // entries whose words are erased
   std::vector<std::string> names = {};
 };
 // Erases words and names of the people that `whom` selects and of the person with that number (0: nobody). Words are

@@ -142,7 +142,7 @@ Result<What> read(const v1::JournalJoin& entry) {
   if (!secret) return bad("join.secret: " + secret.error().message);
   if (entry.role() >= static_cast<std::uint32_t>(kRoles)) return bad("join.role is not known");
   return JoinEntry{AuthorId{entry.author()}, static_cast<MemberKind>(entry.kind()), entry.person(), *secret,
-                 static_cast<Role>(entry.role())};
+                   static_cast<Role>(entry.role())};
 }
 
 Result<What> read(const v1::Cut& entry) {
@@ -358,7 +358,9 @@ Result<std::optional<std::string>> PersonExport::of(const JournalEntry& entry) {
                          : rejection != nullptr ? rejection->author
                                                 : read->author;
   if (!authors_.contains(whose)) return std::nullopt;
-  return entry_as_json(entry.place, at, entry.bytes).map([](std::string line) { return std::optional(std::move(line)); });
+  return entry_as_json(entry.place, at, entry.bytes).map([](std::string line) {
+    return std::optional(std::move(line));
+  });
 }
 
 tl::unexpected<Error> PersonExport::nobody() const {

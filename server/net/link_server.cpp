@@ -117,7 +117,8 @@ LinkServer::~LinkServer() {
   thread_.join();
 }
 
-std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t first_author_seq, SessionLink::Receiver& subscriber) {
+std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t first_author_seq,
+                                             SessionLink::Receiver& subscriber) {
   std::shared_ptr<SessionLink> link;
   {
     const std::lock_guard lock(mutex_);

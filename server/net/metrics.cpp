@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "common/field/rejection.hpp"
+#include "common/wire/host_port.hpp"
 #include "server/journal/journal_file.hpp"
 #include "server/net/certificate.hpp"
-#include "common/wire/host_port.hpp"
 #include "server/net/room_server.hpp"
 
 namespace osteon {
@@ -113,7 +113,8 @@ void add_room(Page& page, OpenRoom& room, bool draining) {
     page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
 
   const char* queue =
-      "What waits: cuts for a tick, entries for the disk, blocks for the surface, the slowest reader's entries or blocks.";
+      "What waits: cuts for a tick, entries for the disk, blocks for the surface, the slowest reader's entries or "
+      "blocks.";
   page.gauge("osteon_queue_length", queue, with("queue", "cuts"), static_cast<double>(health.queued_cuts));
   page.gauge("osteon_queue_length", queue, with("queue", "entries"), static_cast<double>(health.waiting_entries));
   page.gauge("osteon_queue_length", queue, with("queue", "blocks"), static_cast<double>(health.stale_blocks));
@@ -144,8 +145,8 @@ std::vector<MetricFamily> metrics_of(RoomServer& server, const fs::path& certifi
   auto refusals = server.rooms().refusals.counts();
   for (const char* known : {"version", "request", "room", "draining", "tls"}) refusals.try_emplace(known, 0u);
   for (const auto& [reason, count] : refusals)
-    page.counter("osteon_refusals_total", "Connections and calls that were refused.",
-                 {{"reason", reason}}, static_cast<double>(count));
+    page.counter("osteon_refusals_total", "Connections and calls that were refused.", {{"reason", reason}},
+                 static_cast<double>(count));
   if (!certificate.empty())
     if (const Result<double> days = certificate_days_left(certificate))
       page.gauge("osteon_certificate_days_left", "Days until the server's certificate ends.", {}, *days);

@@ -17,7 +17,7 @@ namespace osteon {
 // Entries of another room that are repeated in this one, which decides nothing itself.
 struct Playback {
   std::function<std::optional<LogEntry>()> next;  // [tick] nothing: there are no more entries
-  double speed = 1.0;                            // times the original speed; 0: nothing happens
+  double speed = 1.0;                             // times the original speed; 0: nothing happens
 };
 
 // One thread: the tick thread, or that of a demonstration. `now`: time since any start; never decreases.

@@ -15,7 +15,8 @@ constexpr std::size_t kSliceEntries = 256;  // read and hashed in a millisecond 
 
 }  // namespace
 
-Result<void> RoomStore::each_entry(JournalHead& at, RoomSeq last, const std::function<bool(const JournalEntry&)>& take) {
+Result<void> RoomStore::each_entry(JournalHead& at, RoomSeq last,
+                                   const std::function<bool(const JournalEntry&)>& take) {
   while (at.place < last) {
     Result<JournalSlice> slice = with_journal(
         [&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceEntries); });
@@ -127,7 +128,8 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   if (room && outcome && room->room_seq() == live->place) {
     report.replayed = {live->place, room->field_hash()};
     if (report.replayed.field_hash != live->field_hash)
-      report.faults.push_back("the entries of the room " + genesis_.room + " up to " + std::to_string(live->place.value) +
+      report.faults.push_back("the entries of the room " + genesis_.room + " up to " +
+                              std::to_string(live->place.value) +
                               " make another bone than the one that is being cut; close the room and open it again");
   }
 

@@ -50,7 +50,8 @@ void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
   if (!mount->step(now)) return;
   // A tick does not wait for clients that join, leave or are sent entries: the next pose will do as well.
   const std::unique_lock lock(sessions_mutex, std::try_to_lock);
-  if (lock) sessions.each([this](SessionSubscriber& subscriber) { subscriber.show_bone(mount->seen(subscriber.author())); });
+  if (lock)
+    sessions.each([this](SessionSubscriber& subscriber) { subscriber.show_bone(mount->seen(subscriber.author())); });
 }
 
 // Returns true if anything happened.
@@ -211,7 +212,8 @@ void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut c
   {
     const std::lock_guard lock(impl_->queue_mutex);
     if (!impl_->queue_closed) {
-      impl_->queue.emplace_back(std::in_place_type<QueuedCut>, QueuedCut{std::move(subscriber), std::move(cut), arrived});
+      impl_->queue.emplace_back(std::in_place_type<QueuedCut>,
+                                QueuedCut{std::move(subscriber), std::move(cut), arrived});
       return;
     }
   }

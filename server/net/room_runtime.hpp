@@ -52,7 +52,7 @@ class SessionSubscriber : public Subscriber {
   // tool.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
   virtual void answer(const Bytes& entry) = 0;  // likewise, outside the room's order
-  virtual void refuse(const Error& why) = 0;  // a violation of the protocol: the stream ends
+  virtual void refuse(const Error& why) = 0;    // a violation of the protocol: the stream ends
   // Another stream of its author was opened. That stream may have been abandoned and arrived late, so the author may
   // come again.
   virtual void replaced(const std::string& why) { end(why); }
@@ -83,7 +83,7 @@ struct RuntimeHealth {
   bool serving = false;          // takes cuts
   std::size_t sessions = 0, mesh_streams = 0, cutting_streams = 0;
   std::size_t queued_cuts = 0, stale_blocks = 0;
-  std::size_t waiting_entries = 0;     // decided and not yet durable
+  std::size_t waiting_entries = 0;  // decided and not yet durable
   DurationHistogram commit;         // of the journal's transactions
   std::size_t furthest_behind = 0;  // entries or blocks that wait for the slowest reader
   std::size_t blocks = 0;
@@ -157,7 +157,8 @@ class RoomRuntime {
   [[nodiscard]] SavedFields saved_fields();  // of all bodies, at its room_seq
   // The subscriber gets every entry after those in its leaves. With the digest of the author's secret, it replaces an
   // earlier session of that author. Error: invalid_input (the author may not cut, or has an open session).
-  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& subscriber, const Digest& secret = {});
+  [[nodiscard]] Result<void> open_session(const std::shared_ptr<SessionSubscriber>& subscriber,
+                                          const Digest& secret = {});
   // `look`: the author's first view. Without one, the subscriber is sent the whole bone in full.
   void watch_mesh(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look = std::nullopt);
   // The newest view of each viewer counts until its last mesh stream ends. Ignored for a viewer without a mesh stream.

@@ -168,7 +168,7 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
   const auto take = [&](const JournalEntry& one) {
     Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
     replayed = entry ? room->replay(*entry, one.place <= fields.place ? Room::Fields::leave : Room::Fields::evaluate)
-                   : Result<void>(tl::unexpected(entry.error()));
+                     : Result<void>(tl::unexpected(entry.error()));
     if (replayed && one.place == fields.place) replayed = room->set_fields(fields.leaves);
     if (replayed && one.place > fields.place && changes_bone(*entry)) changes_.push_back(one.place);
     if (progress && one.place.value % 64 == 0)
@@ -285,9 +285,8 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
     if (recovered && *recovered < witness.head.place) return after_recovery(checked.error().code);
     if (without_seal) return checked;
     if (!sealed) return begins_anew();
-    return failure(checked.error().code,
-                   room + " has lost some of the " + events + ": an older copy of its journal has gone on" +
-                       kJoinAsItIs);
+    return failure(checked.error().code, room + " has lost some of the " + events +
+                                             ": an older copy of its journal has gone on" + kJoinAsItIs);
   });
 }
 

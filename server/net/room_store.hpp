@@ -192,7 +192,7 @@ class RoomStore {
   // Entries after `at` up to `last`; `at` moves on with them. Error invalid_input: the entry after `at` does not fit
   // the chain.
   [[nodiscard]] Result<void> each_entry(JournalHead& at, RoomSeq last,
-                                      const std::function<bool(const JournalEntry&)>& take);
+                                        const std::function<bool(const JournalEntry&)>& take);
   [[nodiscard]] Result<void> run(JournalCopy& copy, const MaintenanceCalls& calls);
   // Checks a checkpoint's bytes. Finds nothing wrong if a newer checkpoint has replaced it in the meantime.
   [[nodiscard]] Result<void> check_bytes(const Checkpoint& one, RoomReport& report);
@@ -200,8 +200,8 @@ class RoomStore {
   std::mutex checkpointing_;  // held while a checkpoint is written; taken before turn_
   std::atomic<bool> closing_ = false;
   mutable InTurn turn_;
-  std::optional<Journal> journal_;           // nothing: closed
-  JournalHead last_;                         // the head at closing
+  std::optional<Journal> journal_;              // nothing: closed
+  JournalHead last_;                            // the head at closing
   std::optional<Error> why_closed_to_entries_;  // set once, before the pointer below to it
   std::atomic<const Error*> closed_to_entries_ = nullptr;
   const std::filesystem::path file_;

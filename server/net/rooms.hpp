@@ -182,14 +182,14 @@ class Rooms {
   // again.
   void begin_drain(std::chrono::milliseconds again, const std::string& why);
   [[nodiscard]] std::optional<std::string> draining() const;  // why nobody is admitted
-  void begin_end();  // stops long work and does no maintenance any more
+  void begin_end();                                           // stops long work and does no maintenance any more
   [[nodiscard]] bool ending() const { return ending_; }
   // Rooms that are open stay in the folder's list of open rooms.
   [[nodiscard]] std::map<std::string, RoomSummary> close_all();
 
   // Threads for slow calls, one for each kind, so that a slow call delays only calls of its own kind. Calls that
   // concern one room alone run on that room's thread for slow requests.
-  JobThread jobs;   // everything that changes the rooms: one at a time; opening one may take minutes
+  JobThread jobs;  // everything that changes the rooms: one at a time; opening one may take minutes
   // What every client asks for: the lists of rooms and of cases, and a case's files in parts.
   JobThread files;
   // Reads journals for demonstrations. Reading that of a closed room waits while any room is being changed.

@@ -18,9 +18,9 @@
 #include "server/net/job_thread.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/presence.hpp"
-#include "server/net/session_messages.hpp"
 #include "server/net/room_runtime.hpp"
 #include "server/net/runtime_parts.hpp"
+#include "server/net/session_messages.hpp"
 #include "server/net/state_publisher.hpp"
 
 namespace osteon {
@@ -69,7 +69,7 @@ struct RoomRuntime::Impl {
   // What some sessions get in place of the entry that the others get.
   struct Personal {
     AuthorId to;  // null: all
-    Bytes entry;    // null: there is none
+    Bytes entry;  // null: there is none
     wire::SessionEntry fast;
     [[nodiscard]] bool is_for(AuthorId author) const { return entry && (!to || to == author); }
   };
@@ -163,7 +163,7 @@ struct RoomRuntime::Impl {
   bool closing_told = false;
   // Of the tick thread: when sessions are next informed how much is durable.
   std::chrono::nanoseconds next_kept{};
-  Committer committer;                   // the last member with a thread, since it calls the others
+  Committer committer;  // the last member with a thread, since it calls the others
 
   std::thread tick_thread, piece_thread;
 };

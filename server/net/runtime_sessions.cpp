@@ -38,7 +38,8 @@ std::map<std::uint32_t, std::string> RoomRuntime::Impl::names_of(RoomStore* stor
 }
 
 void RoomRuntime::Impl::decide(QueuedCut& queued) {
-  if (closed() || player) return later([subscriber = queued.subscriber](const Result<void>&) { subscriber->decided(); });
+  if (closed() || player)
+    return later([subscriber = queued.subscriber](const Result<void>&) { subscriber->decided(); });
   const Clock::time_point taken = Clock::now();
   Result<Outcome> outcome = [&] {
     const std::unique_lock lock(room_mutex);
@@ -58,8 +59,8 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
   if (newly) figures.committed(queued.arrived, taken, done);
   if (!outcome->committed() && !outcome->repeated) figures.rejected(outcome->rejection);
   const Bytes entry = outcome->committed() ? cut_message(outcome->room_seq, queued.cut)
-                                         : rejection_message(outcome->room_seq, queued.cut.author_seq, outcome->lease_epoch,
-                                                         outcome->rejection);
+                                           : rejection_message(outcome->room_seq, queued.cut.author_seq,
+                                                               outcome->lease_epoch, outcome->rejection);
   tell_kept(room.time());
   wire::SessionEntry fast{.room_seq = outcome->room_seq, .kind = wire::SessionEntryKind::committed};
   if (outcome->committed()) {
@@ -70,8 +71,8 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
     fast.reason = static_cast<std::uint32_t>(outcome->rejection);
     fast.lease_epoch = outcome->lease_epoch;
   }
-  later([this, subscriber = queued.subscriber, entry, fast = std::move(fast), place = outcome->room_seq, repeated = outcome->repeated,
-         to_all = outcome->committed(), newly, done](const Result<void>& durable) {
+  later([this, subscriber = queued.subscriber, entry, fast = std::move(fast), place = outcome->room_seq,
+         repeated = outcome->repeated, to_all = outcome->committed(), newly, done](const Result<void>& durable) {
     const Clock::time_point kept = Clock::now();
     if (durable) {
       const std::lock_guard lock(sessions_mutex);
@@ -296,10 +297,10 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     for (const ToolBox::Entry* entry : tools) subscriber->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.place)
       subscriber->hold({.room_seq = {},
-                  .kind = wire::SessionEntryKind::supervised,
-                  .lease_epoch = lease_epoch,
-                  .supervision = held.supervision,
-                  .by = by});
+                        .kind = wire::SessionEntryKind::supervised,
+                        .lease_epoch = lease_epoch,
+                        .supervision = held.supervision,
+                        .by = by});
     if (impl_->redial) subscriber->answer(impl_->redial);
     if (impl_->ended) impl_->may_return ? subscriber->replaced(*impl_->ended) : subscriber->end(*impl_->ended);
   }

@@ -19,7 +19,8 @@ namespace osteon {
 
 // Whole SessionResponses.
 [[nodiscard]] Bytes cut_message(RoomSeq place, const Cut& cut);
-[[nodiscard]] Bytes rejection_message(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason);
+[[nodiscard]] Bytes rejection_message(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch,
+                                      Rejection reason);
 [[nodiscard]] Bytes link_message(const SessionKeys& keys, std::uint16_t udp_port);
 [[nodiscard]] Bytes kept_message(const Witness& witness);
 [[nodiscard]] Bytes redial_message(std::chrono::milliseconds after, const std::string& why);
@@ -27,7 +28,7 @@ namespace osteon {
 [[nodiscard]] Bytes scene_message(RoomSeq place, const std::vector<SceneItem>& items);
 // What an instructor has decided. `place` null: what was valid before. `by`: who decided it, as far as known.
 [[nodiscard]] Bytes supervised_message(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch,
-                                   const Decider& by);
+                                       const Decider& by);
 [[nodiscard]] Bytes said_message(RoomSeq place, AuthorId from, const WordsEntry& words);
 [[nodiscard]] Bytes partner_entry(const CuttingState& state);
 [[nodiscard]] Bytes bone_entry(const MountPose& seen);

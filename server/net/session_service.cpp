@@ -16,8 +16,8 @@
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "server/net/called_room.inl"
 #include "server/net/link_server.hpp"
-#include "server/net/session_messages.hpp"
 #include "server/net/services.hpp"
+#include "server/net/session_messages.hpp"
 
 namespace osteon {
 namespace {

@@ -27,8 +27,8 @@ struct JoinEntry {
   AuthorId author;  // assigned here, never again
   MemberKind kind = MemberKind::watcher;
   std::uint32_t person = 0;  // pseudonym; the person's name is stored elsewhere and can be erased; 0: unnamed
-  Digest secret{};  // SHA-256 of the secret by which a later connection proves that it is the same author's
-  Role role = Role::none;  // none: the room is older than roles, or the server itself joined
+  Digest secret{};           // SHA-256 of the secret by which a later connection proves that it is the same author's
+  Role role = Role::none;    // none: the room is older than roles, or the server itself joined
 };
 struct CutEntry {
   Cut cut;
@@ -42,9 +42,9 @@ struct RejectionEntry {
 };
 // One piece of a split, or debris.
 struct SplitPiece {
-  BodyId body;  // null for debris
+  BodyId body;     // null for debris
   CoordBox reach;  // samples of level 0 that contain its bone
-  Mask left;  // min(R, left) leaves only this piece of its parent
+  Mask left;       // min(R, left) leaves only this piece of its parent
 };
 struct SplitEntry {
   BodyId parent;
@@ -56,7 +56,7 @@ struct UndoEntry {
   std::vector<RoomSeq> places;
 };
 struct RedoEntry {
-  std::vector<RoomSeq> undos;  // undo events that are undone themselves, newest first
+  std::vector<RoomSeq> undos;   // undo events that are undone themselves, newest first
   std::vector<RoomSeq> places;  // events that take effect again, oldest first
 };
 struct RemoveBodyEntry {
@@ -93,9 +93,9 @@ struct WordsEntry {
 struct LogEntry {
   RoomSeq place;
   std::chrono::nanoseconds at{};  // time since the room was made, by the clock of the server that decided
-  AuthorId author;  // who asked for it; null: the room itself
-  std::variant<JoinEntry, CutEntry, RejectionEntry, SplitEntry, UndoEntry, RedoEntry, RemoveBodyEntry, ItemEntry, ToolEntry, MarkEntry,
-               SuperviseEntry, AnnotationEntry, WordsEntry>
+  AuthorId author;                // who asked for it; null: the room itself
+  std::variant<JoinEntry, CutEntry, RejectionEntry, SplitEntry, UndoEntry, RedoEntry, RemoveBodyEntry, ItemEntry,
+               ToolEntry, MarkEntry, SuperviseEntry, AnnotationEntry, WordsEntry>
       what;
 };
 

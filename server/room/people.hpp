@@ -22,7 +22,7 @@ class People {
   struct Supervised {
     Restrictions supervision;
     RoomSeq place;  // sequence number of the entry that set it
-    AuthorId by;  // the author who did
+    AuthorId by;    // the author who did
   };
 
   void join(AuthorId author, Role role, std::uint32_t person, bool hand) { members_[author] = {role, person, hand}; }

@@ -25,9 +25,9 @@
 #include "common/volume/fragments.hpp"
 #include "server/room/block_store.hpp"
 #include "server/room/cut_energy.hpp"
+#include "server/room/log_entry.hpp"
 #include "server/room/people.hpp"
 #include "server/room/room_event.hpp"
-#include "server/room/log_entry.hpp"
 #include "server/room/separation.hpp"
 
 namespace osteon {
@@ -36,12 +36,12 @@ namespace osteon {
 struct CutLimits {
   int path_knots = 64;
   double beyond_bone_mm = 60.0;  // largest distance of a tool's tip from the bone's box
-  double swept_mm = 25.0;  // largest path of the cutting part in one cut, its rotation included
+  double swept_mm = 25.0;        // largest path of the cutting part in one cut, its rotation included
   std::uint32_t spindle_rpm = 120000;
   // Limits over time, for one author; zero: no limit. set_time() gives the time.
   std::chrono::nanoseconds time_slack{};  // tool time that may be claimed beyond the time since the author joined
-  double swept_voxels_per_s = 0;  // of the cut's level: samples that the kernel has to visit
-  double power_w = 0;  // power of a motor; with blow_j it limits the energy of a cut
+  double swept_voxels_per_s = 0;          // of the cut's level: samples that the kernel has to visit
+  double power_w = 0;                     // power of a motor; with blow_j it limits the energy of a cut
   double blow_j = 20.0;
 };
 
@@ -112,7 +112,7 @@ class Room {
   // done to its piece as such is undone. Later cuts stay in the bone.
   Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
-  Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);  // all events after it
+  Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);         // all events after it
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still hold
   // Takes back everything since then, by the room's time. Takes back everything if nothing is older.
   Result<RoomEvent> undo_since(AuthorId by, std::chrono::nanoseconds since);
@@ -129,7 +129,7 @@ class Room {
   // What people decide about each other, draw and say: room_people.cpp. A trainee can take back and redo only their own
   // events. Errors as above, and denied: the author's role or restrictions do not allow it.
   Result<RoomEvent> supervise(AuthorId by, AuthorId subject, Restrictions supervision);
-  Result<RoomEvent> annotate(AuthorId by, Annotation drawn);  // id 0: a new one; an author has one pointer
+  Result<RoomEvent> annotate(AuthorId by, Annotation drawn);          // id 0: a new one; an author has one pointer
   Result<RoomEvent> wipe_off(AuthorId by, std::uint32_t annotation);  // an own one; an instructor may erase anyone's
   Result<RoomEvent> say(AuthorId by, AuthorId to, std::string words);
   [[nodiscard]] const People& people() const { return people_; }
@@ -157,12 +157,12 @@ class Room {
   // It never changes, so any thread may call this while another changes the room.
   [[nodiscard]] const Case& bone() const { return bone_; }
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const { return tools_; }
-  [[nodiscard]] std::vector<BodyId> bodies() const;  // those that exist, in order
-  [[nodiscard]] const CutField* find_field(BodyId body) const;  // null: no such body
-  [[nodiscard]] std::vector<BodyId> all_bodies() const;  // removed ones included
-  [[nodiscard]] const CutField* any_field(BodyId body) const;  // of one of all_bodies()
+  [[nodiscard]] std::vector<BodyId> bodies() const;                                    // those that exist, in order
+  [[nodiscard]] const CutField* find_field(BodyId body) const;                         // null: no such body
+  [[nodiscard]] std::vector<BodyId> all_bodies() const;                                // removed ones included
+  [[nodiscard]] const CutField* any_field(BodyId body) const;                          // of one of all_bodies()
   [[nodiscard]] const CutField& field() const { return bodies_.at(BodyId{0}).field; }  // of the case's bone
-  [[nodiscard]] Digest field_hash() const;  // of all bodies
+  [[nodiscard]] Digest field_hash() const;                                             // of all bodies
   [[nodiscard]] std::vector<SceneItem> items() const;
   // Number of events that changed the bone in another way than by cutting.
   [[nodiscard]] std::uint64_t bone_changes() const { return bone_changes_; }
@@ -187,9 +187,9 @@ class Room {
     Rejection rejection = Rejection::none;
   };
   struct Surgeon {
-    std::uint64_t epoch = 1;  // of the lease
+    std::uint64_t epoch = 1;                        // of the lease
     std::chrono::nanoseconds granted{}, claimed{};  // when it was granted, and tool time of the cuts since
-    double swept_voxels = 0;  // used of the limit, at time `spent`
+    double swept_voxels = 0;                        // used of the limit, at time `spent`
     std::chrono::nanoseconds spent{};
     std::vector<Decided> decided;  // entry author_seq − 1
   };
@@ -197,21 +197,21 @@ class Room {
     CutField field;
     CutHistory history;
     SurfaceBlocks surface;
-    CoordBox reach;  // samples of level 0 that contained its bone when the body was made
+    CoordBox reach;       // samples of level 0 that contained its bone when the body was made
     bool present = true;  // false: removed
   };
   struct Event {
     EventKind kind = EventKind::cut;
     AuthorId author{};
     bool undone = false;
-    BodyId body{};  // split: its parent; remove_body
+    BodyId body{};    // split: its parent; remove_body
     Mask taken = {};  // split
     std::vector<SplitPiece> pieces = {};
-    std::uint32_t item = 0;  // scene
+    std::uint32_t item = 0;                  // scene
     std::vector<RoomSeq> places = {};        // undo
     std::shared_ptr<const Cut> missed = {};  // cut: set if it is in no body's history; never changes
-    bool all_of_others = false;  // undo: it took back everything that people other than its author had done
-    std::string label = {};  // mark
+    bool all_of_others = false;              // undo: it took back everything that people other than its author had done
+    std::string label = {};                  // mark
     std::chrono::nanoseconds at{};
   };
   // State that an item was set to; nothing: removed.
@@ -285,7 +285,7 @@ class Room {
   std::map<BodyId, Body> bodies_;
   std::uint32_t last_body_ = 0, last_item_ = 0;
   std::map<std::uint32_t, std::vector<ItemState>> items_;  // states in order
-  std::map<RoomSeq, Event> events_;  // committed events, tombstones included
+  std::map<RoomSeq, Event> events_;                        // committed events, tombstones included
   std::vector<Focus> focuses_;
   std::set<BlockKey> stale_;
   std::vector<BodyLeaves> changes_;

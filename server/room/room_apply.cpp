@@ -71,7 +71,8 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
   };
   if (entry.place.value != room_seq_.value + 1)
     return impossible(entry, "entry " + std::to_string(room_seq_.value + 1) + " comes next");
-  if (entry.at < now_ || entry.at > kLongest) return impossible(entry, "its time does not follow that of the entry before it");
+  if (entry.at < now_ || entry.at > kLongest)
+    return impossible(entry, "its time does not follow that of the entry before it");
   struct Judge {
     const Room& room;
     const LogEntry& entry;

@@ -19,9 +19,9 @@ namespace osteon {
 struct Outcome {
   RoomSeq room_seq;
   Rejection rejection = Rejection::none;
-  bool repeated = false;  // decided before; this is the first outcome
+  bool repeated = false;          // decided before; this is the first outcome
   std::uint64_t lease_epoch = 0;  // of its author, from now on
-  CutReport report;  // of an applied cut, over all bodies
+  CutReport report;               // of an applied cut, over all bodies
   [[nodiscard]] bool committed() const { return rejection == Rejection::none; }
 };
 
@@ -44,19 +44,19 @@ enum class EventKind : std::uint8_t {
 struct RoomEvent {
   RoomSeq room_seq;
   EventKind kind = EventKind::cut;
-  AuthorId author;  // null: the room itself
+  AuthorId author;                // null: the room itself
   bool bone = false;              // bodies or leaves changed
   bool scene = false;             // items changed
-  std::vector<BodyId> bodies;  // those that exist from now on
+  std::vector<BodyId> bodies;     // those that exist from now on
   std::vector<FieldLeaf> leaves;  // changed leaves in their new state, and all leaves of a new body
   // Epoch, from now on, of every lease that was granted before; 0: unchanged. supervise: epoch of the subject's lease.
   std::uint64_t lease_epoch = 0;
   const ToolBox::Entry* tool = nullptr;  // the tool that was added
-  std::uint32_t item = 0;  // the item that was set or removed
-  std::optional<Placed> set;  // its new state, if it was set
+  std::uint32_t item = 0;                // the item that was set or removed
+  std::optional<Placed> set;             // its new state, if it was set
   std::vector<RoomSeq> places;  // undo, redo: sequence numbers of the events taken back or done again, oldest first
-  CutReport cut;  // over all bodies
-  std::string mark;  // its label
+  CutReport cut;                // over all bodies
+  std::string mark;             // its label
   std::variant<std::monostate, SuperviseEntry, AnnotationEntry, WordsEntry> people;  // what was decided, drawn or said
   std::vector<RoomEvent> further;  // follow-ups decided with it, each with a sequence number of its own after it
 };

@@ -141,8 +141,8 @@ Digest Room::field_hash() const {
 std::vector<SceneItem> Room::items() const {
   std::vector<SceneItem> standing;
   for (const auto& [id, entries] : items_) {
-    const auto newest =
-        std::find_if(entries.rbegin(), entries.rend(), [&](const ItemState& entry) { return !events_.at(entry.place).undone; });
+    const auto newest = std::find_if(entries.rbegin(), entries.rend(),
+                                     [&](const ItemState& entry) { return !events_.at(entry.place).undone; });
     if (newest != entries.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
   // The pins in the scene decide whether a guide is fixed.
@@ -257,7 +257,8 @@ Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
   std::set<RoomSeq> places;
   for (auto event = events_.rbegin(); event != events_.rend() && places.size() < count; ++event) {
     const Event& entry = event->second;
-    if (entry.undone || (of ? entry.author != of : people_.only_own(by) && !people_.same_person(by, entry.author))) continue;
+    if (entry.undone || (of ? entry.author != of : people_.only_own(by) && !people_.same_person(by, entry.author)))
+      continue;
     if (can_be_undone(event->first) && entry.kind != EventKind::split) places.insert(event->first);
   }
   if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");

@@ -85,9 +85,8 @@ Result<void> Room::may_change(AuthorId by) const {
   if (Result<void> member = check_member(by); !member) return member;
   for (const Restrictions* held : people_.binding(by))
     if (!held->may_cut())
-      return deny(
-          std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
-          "; you cannot undo, redo, place or remove anything until an instructor lets you go on");
+      return deny(std::string(held->stopped ? "your hand is stopped" : "your tool is taken") +
+                  "; you cannot undo, redo, place or remove anything until an instructor lets you go on");
   return {};
 }
 

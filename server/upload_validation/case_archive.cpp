@@ -81,7 +81,8 @@ class Unpacker {
     if (archive_entry_is_encrypted(entry) != 0) return refuse("is encrypted; pack the case without a password");
     if (archive_entry_symlink(entry) != nullptr || archive_entry_hardlink(entry) != nullptr)
       return refuse("is a link; pack the files themselves");
-    if (archive_entry_filetype(entry) != AE_IFREG) return refuse("is not a plain file; pack only the files of the case");
+    if (archive_entry_filetype(entry) != AE_IFREG)
+      return refuse("is not a plain file; pack only the files of the case");
     const std::size_t slash = path.find('/');
     const std::string folder = slash == std::string::npos ? "" : path.substr(0, slash);
     const std::string file = slash == std::string::npos ? path : path.substr(slash + 1);
@@ -140,8 +141,8 @@ Result<std::map<std::string, std::uint64_t>> unpack_case(const fs::path& file, c
   if (error) return failure(ErrorCode::not_found, file.string() + " cannot be read: " + error.message());
   const std::string name = file.filename().string();
   if (bytes > quota.archive_bytes)
-    return failure(ErrorCode::exhausted,
-                   name + " is larger than the " + std::to_string(quota.archive_bytes) + " bytes that this server accepts");
+    return failure(ErrorCode::exhausted, name + " is larger than the " + std::to_string(quota.archive_bytes) +
+                                             " bytes that this server accepts");
   const Reader a = zip_reader();
   if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK)
     return failure(ErrorCode::invalid_input,

@@ -191,7 +191,8 @@ class Files {
 
  private:
   static Result<void> no_space(std::string_view file) {
-    return failure(ErrorCode::internal, "the server cannot unpack " + std::string(file) + ": its disk accepts no more data");
+    return failure(ErrorCode::internal,
+                   "the server cannot unpack " + std::string(file) + ": its disk accepts no more data");
   }
   const fs::path folder_;
   std::string name_;
@@ -243,8 +244,7 @@ Result<CheckedCase> check_case(const fs::path& program, const fs::path& archive,
   const std::optional<std::string> said = listen(in.number(), Clock::now() + quota.time, stop);
   if (!said) {
     (void)child.end();
-    if (stop && stop())
-      return failure(ErrorCode::cancelled, "the check of the case was cancelled");
+    if (stop && stop()) return failure(ErrorCode::cancelled, "the check of the case was cancelled");
     return failure(ErrorCode::exhausted,
                    "reading the case takes longer than the allowed " + std::to_string(quota.time.count()) + " s");
   }

@@ -19,8 +19,8 @@ struct StoredCase {
   Digest hash;
   std::string title;
   std::filesystem::path folder;
-  std::uint64_t bytes = 0;  // on the disk
-  bool known = false;  // it was there before
+  std::uint64_t bytes = 0;         // on the disk
+  bool known = false;              // it was there before
   std::uint64_t memory_bytes = 0;  // memory that it takes when it is loaded; 0: unknown
 };
 

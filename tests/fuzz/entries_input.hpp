@@ -12,8 +12,8 @@
 
 namespace osteon::fuzz {
 
-// One entry: how far its place is from the one that comes next, how long after the one before it was decided, its bytes.
-// A time of either end of the range stands for the earliest and the latest that there are.
+// One entry: how far its place is from the one that comes next, how long after the one before it was decided, its
+// bytes. A time of either end of the range stands for the earliest and the latest that there are.
 struct Record {
   std::int8_t off = 0, later = 1;
   std::string bytes;

@@ -4,8 +4,8 @@
 
 namespace osteon::fuzz {
 
-// Any bytes as a sequence of entries, each with its place and time: what is refused changes nothing, what is taken makes
-// the same room again. Without the bone's fields, ten times as fast as with them.
+// Any bytes as a sequence of entries, each with its place and time: what is refused changes nothing, what is taken
+// makes the same room again. Without the bone's fields, ten times as fast as with them.
 [[nodiscard]] Target entries_target();
 // The same with them: from a checkpoint too, and gone on with.
 [[nodiscard]] Target evaluated_entries_target();

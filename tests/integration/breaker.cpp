@@ -64,7 +64,8 @@ struct Breaker::Parts {
     std::vector<std::string> names;
     for (const auto& [file, bytes] : image) {
       names.push_back(file);
-      if (file.ends_with("-log") || file.ends_with("-mirror")) names.insert(names.end(), 2, file);  // the newest entries
+      if (file.ends_with("-log") || file.ends_with("-mirror"))
+        names.insert(names.end(), 2, file);  // the newest entries
     }
     const std::string name = names[random.index(names.size())];
     const std::string kind = name.ends_with(".checkpoint") ? ".checkpoint" : name.substr(room.size());

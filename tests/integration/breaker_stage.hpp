@@ -36,9 +36,9 @@ struct Life {
   Image image;
   std::vector<Image> earlier;  // of moments before
   Oracle oracle;
-  wire::JoinedRoom member;  // of a client that may come back
-  std::uint64_t entries = 0;   // that the journal has, as the killed server left it
-  std::string fault;        // in what needed no damage
+  wire::JoinedRoom member;    // of a client that may come back
+  std::uint64_t entries = 0;  // that the journal has, as the killed server left it
+  std::string fault;          // in what needed no damage
 };
 
 // What `verify` says.

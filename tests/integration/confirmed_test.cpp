@@ -65,7 +65,8 @@ class Confirmed : public ::testing::Test {
     for (std::string line; std::getline(in, line);) {
       const json entry = json::parse(line);
       if (entry.at("event").contains("cut"))
-        places[std::stoull(entry["event"]["cut"]["author_seq"].get<std::string>())] = entry["place"].get<std::uint64_t>();
+        places[std::stoull(entry["event"]["cut"]["author_seq"].get<std::string>())] =
+            entry["place"].get<std::uint64_t>();
     }
     return places;
   }

@@ -403,9 +403,10 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
   const std::vector<Listed> page = listed();
   for (const auto& [what, part] : expected) {
     EXPECT_THAT(said.at(what), testing::HasSubstr(part)) << what;
-    EXPECT_EQ(std::ranges::count_if(
-                  page, [&](const Listed& entry) { return std::regex_match(said.at(what), pattern_of(entry.sentence)); }),
-              1)
+    EXPECT_EQ(
+        std::ranges::count_if(
+            page, [&](const Listed& entry) { return std::regex_match(said.at(what), pattern_of(entry.sentence)); }),
+        1)
         << what << ": " << said.at(what);
   }
   // The proxy's log says from where, and which fault by openssl verify's number.

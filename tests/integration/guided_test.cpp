@@ -256,14 +256,15 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
     for (int i = 0; i < kAround; ++i) ball.positions_mm.push_back(corner(entry, i));
   ball.positions_mm.push_back(corner(kEntries, 0));
   const auto index = [&](int entry, int i) {
-    return static_cast<std::uint32_t>(entry == 0       ? 0
+    return static_cast<std::uint32_t>(entry == 0          ? 0
                                       : entry == kEntries ? 1 + (kEntries - 1) * kAround
-                                                     : 1 + (entry - 1) * kAround + i % kAround);
+                                                          : 1 + (entry - 1) * kAround + i % kAround);
   };
   for (int entry = 0; entry < kEntries; ++entry)
     for (int i = 0; i < kAround; ++i) {
       if (entry > 0) ball.triangles.push_back({index(entry, i), index(entry + 1, i), index(entry, i + 1)});
-      if (entry < kEntries - 1) ball.triangles.push_back({index(entry, i + 1), index(entry + 1, i), index(entry + 1, i + 1)});
+      if (entry < kEntries - 1)
+        ball.triangles.push_back({index(entry, i + 1), index(entry + 1, i), index(entry + 1, i + 1)});
     }
   ASSERT_TRUE(write_stl(ball, tools / "ball.stl"));
   std::ofstream(tools / "ball.yaml")

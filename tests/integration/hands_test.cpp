@@ -34,25 +34,25 @@ struct Moment {
   bool touched, led;
 };
 std::vector<Moment> recorded(const std::filesystem::path& file) {
-  const RunResult answer =
-      run(OSTEON_PYTHON,
-          {"-c",
-           "import sys, json, h5py, numpy as np\n"
-           "f = h5py.File(sys.argv[1], 'r')\n"
-           "n = len(f['data/time'])\n"
-           "bits = [b.decode() if isinstance(b, bytes) else b for b in f['metadata/event_bits'][:]]\n"
-           "events = f['data/events'][:n]\n"
-           "bit = lambda name: (events >> bits.index(name)) & 1\n"
-           "x, y, z, w = f['burr_change/view'][-1]\n"
-           "turn = np.array([[1-2*(y*y+z*z), 2*(x*y-w*z), 2*(x*z+w*y)], [2*(x*y+w*z), 1-2*(x*x+z*z), 2*(y*z-w*x)],"
-           " [2*(x*z-w*y), 2*(y*z+w*x), 1-2*(x*x+y*y)]])\n"
-           "force = (f['drill_force_feedback/wrench'][:n, :3] - f['drill_force_feedback/motor_force'][:n]) @ turn.T\n"
-           "entries = np.column_stack([f['data/mono_ns'][:n] / 1e6, f['high_frequency_poses/device_pose/pose'][:n, :3], "
-           "force[:, :2],"
-           " bit('partner touched'), bit('hand guided')])\n"
-           "print(json.dumps(entries[::10].tolist()))\n",
-           file},
-          60s);
+  const RunResult answer = run(
+      OSTEON_PYTHON,
+      {"-c",
+       "import sys, json, h5py, numpy as np\n"
+       "f = h5py.File(sys.argv[1], 'r')\n"
+       "n = len(f['data/time'])\n"
+       "bits = [b.decode() if isinstance(b, bytes) else b for b in f['metadata/event_bits'][:]]\n"
+       "events = f['data/events'][:n]\n"
+       "bit = lambda name: (events >> bits.index(name)) & 1\n"
+       "x, y, z, w = f['burr_change/view'][-1]\n"
+       "turn = np.array([[1-2*(y*y+z*z), 2*(x*y-w*z), 2*(x*z+w*y)], [2*(x*y+w*z), 1-2*(x*x+z*z), 2*(y*z-w*x)],"
+       " [2*(x*z-w*y), 2*(y*z+w*x), 1-2*(x*x+y*y)]])\n"
+       "force = (f['drill_force_feedback/wrench'][:n, :3] - f['drill_force_feedback/motor_force'][:n]) @ turn.T\n"
+       "entries = np.column_stack([f['data/mono_ns'][:n] / 1e6, f['high_frequency_poses/device_pose/pose'][:n, :3], "
+       "force[:, :2],"
+       " bit('partner touched'), bit('hand guided')])\n"
+       "print(json.dumps(entries[::10].tolist()))\n",
+       file},
+      60s);
   EXPECT_EQ(answer.exit_code, 0) << answer.err;
   std::vector<Moment> moments;
   for (const json& entry : json::parse(answer.out, nullptr, false))

@@ -69,8 +69,9 @@ int main(int argc, char** argv) {
     return waits_us[static_cast<std::size_t>(share * static_cast<double>(waits_us.size() - 1))];
   };
   const auto written = static_cast<double>(waits_us.size() * per_commit);
-  std::printf("{\"commits\": %zu, \"p50_us\": %.1f, \"p99_us\": %.1f, \"bytes_per_entry\": %.1f, \"with_close\": %.1f}\n",
-              waits_us.size(), percentile(0.5), percentile(0.99), static_cast<double>(log) / written,
-              static_cast<double>(all) / written);
+  std::printf(
+      "{\"commits\": %zu, \"p50_us\": %.1f, \"p99_us\": %.1f, \"bytes_per_entry\": %.1f, \"with_close\": %.1f}\n",
+      waits_us.size(), percentile(0.5), percentile(0.99), static_cast<double>(log) / written,
+      static_cast<double>(all) / written);
   return 0;
 }

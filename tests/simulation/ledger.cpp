@@ -152,7 +152,8 @@ void Ledger::check_author(const LogEntry& entry, AuthorId author, std::uint64_t 
 
 void Ledger::check_held(const LogEntry& entry, const Hands& hands) {
   const bool changes = std::holds_alternative<UndoEntry>(entry.what) || std::holds_alternative<RedoEntry>(entry.what) ||
-                       std::holds_alternative<ItemEntry>(entry.what) || std::holds_alternative<RemoveBodyEntry>(entry.what);
+                       std::holds_alternative<ItemEntry>(entry.what) ||
+                       std::holds_alternative<RemoveBodyEntry>(entry.what);
   const Restrictions now = hands.of(entry.author);
   check(!changes || (!now.stopped && now.taken_by == AuthorId{}), Invariant::supervised,
         "entry " + number(entry.place) + " is what author " + std::to_string(entry.author.value) + " did while held");
@@ -167,7 +168,7 @@ void Ledger::check_cut(const LogEntry& entry, const Hands& hands, AuthorId by, c
   const Restrictions now = hands.of(by);
   const auto forbidden = [&](const std::string& why) {
     fault(Invariant::supervised, "entry " + number(entry.place) + " has " + whose(cut.author, cut.author_seq) +
-                                   ", and author " + std::to_string(by.value) + " " + why);
+                                     ", and author " + std::to_string(by.value) + " " + why);
   };
   if (now.stopped) forbidden("was stopped");
   if (now.taken_by != AuthorId{}) forbidden("had no tool");
@@ -197,7 +198,7 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
     fault(Invariant::acknowledged, "the room was said to stand at " + number(furthest_) + ", and " +
                                        std::to_string(entries.size()) + " entries are kept");
   std::map<AuthorId, std::uint64_t> newest, lease;  // of the leases that are not 1
-  std::map<RoomSeq, bool> of_bone;  // events that can be undone: whether bone comes back with them
+  std::map<RoomSeq, bool> of_bone;                  // events that can be undone: whether bone comes back with them
   Hands hands;
   const auto lease_of = [&](AuthorId author) {
     const auto found = lease.find(author);

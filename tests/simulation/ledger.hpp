@@ -28,7 +28,7 @@ enum class Invariant {
   decided,       // every cut of a present client is decided
   served,        // no client is refused, and what must work works
   datagrams,     // a receiver accepts only what a peer has sealed, once, and it agrees with the stream
-  supervised,      // nothing that an instructor forbids is committed, and after quiet each hand knows its restrictions
+  supervised,    // nothing that an instructor forbids is committed, and after quiet each hand knows its restrictions
   settled,       // after quiet all is decided and sent within two seconds
 };
 [[nodiscard]] std::string_view name(Invariant invariant);

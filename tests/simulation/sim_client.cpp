@@ -302,15 +302,17 @@ void SimClient::compare(const v1::SessionResponse& response) {
   const bool same = [&] {
     if (response.has_committed()) {
       const Result<Cut> cut = wire::from_wire(response.committed().cut());
-      return entry.kind == wire::SessionEntryKind::committed && entry.room_seq.value == response.committed().room_seq() &&
-             cut && *cut == entry.cut;
+      return entry.kind == wire::SessionEntryKind::committed &&
+             entry.room_seq.value == response.committed().room_seq() && cut && *cut == entry.cut;
     }
     if (response.has_rejected())
       return entry.kind == wire::SessionEntryKind::rejected && entry.room_seq.value == response.rejected().room_seq() &&
-             entry.author_seq == response.rejected().author_seq() && entry.lease_epoch == response.rejected().lease_epoch();
+             entry.author_seq == response.rejected().author_seq() &&
+             entry.lease_epoch == response.rejected().lease_epoch();
     if (response.has_supervised()) {
       const Result<Restrictions> decided = wire::from_wire(response.supervised().supervision());
-      return entry.kind == wire::SessionEntryKind::supervised && entry.room_seq.value == response.supervised().room_seq() &&
+      return entry.kind == wire::SessionEntryKind::supervised &&
+             entry.room_seq.value == response.supervised().room_seq() &&
              entry.lease_epoch == response.supervised().lease_epoch() && decided && *decided == entry.supervision &&
              entry.by == Decider{AuthorId{response.supervised().decided_by()}, response.supervised().decided_by_name()};
     }

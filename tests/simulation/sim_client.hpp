@@ -168,7 +168,7 @@ class SimClient {
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools_;
   std::unique_ptr<SimFastPath> fast_;
   std::map<std::uint64_t, wire::SessionEntry> said_;  // by datagrams: entries of the present stream by index
-  bool by_datagram_ = false;                        // how the present entry arrived
+  bool by_datagram_ = false;                          // how the present entry arrived
   std::uint64_t state_seq_ = 0;
   Time requests_there_{}, held_back_until_{};
   std::optional<Backoff> backoff_;

@@ -38,7 +38,7 @@ class Alarm {
 struct DatagramCounts {
   std::uint64_t sent = 0, opened = 0, forged = 0;
   std::uint64_t entries = 0, cuts = 0;  // delivered by datagrams
-  std::uint64_t moves = 0;           // addresses that were verified
+  std::uint64_t moves = 0;              // addresses that were verified
 };
 
 // All datagrams of a simulation. Whatever an end accepts as authentic must be something that the other end has sealed,

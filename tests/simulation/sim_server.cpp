@@ -6,8 +6,8 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "server/journal/maintenance.hpp"
-#include "server/net/session_messages.hpp"
 #include "server/net/services.hpp"
+#include "server/net/session_messages.hpp"
 
 namespace osteon::test {
 namespace {

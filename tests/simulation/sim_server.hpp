@@ -87,8 +87,8 @@ class SimServer {
   // For checks.
   [[nodiscard]] RoomRuntime& runtime() { return *runtime_; }
   [[nodiscard]] std::vector<LogEntry> entries();  // as they are on the disk
-  [[nodiscard]] Digest replayed();            // room_hash of a new room with these entries
-  [[nodiscard]] Digest live();                // room_hash; runs a tick
+  [[nodiscard]] Digest replayed();                // room_hash of a new room with these entries
+  [[nodiscard]] Digest live();                    // room_hash; runs a tick
   // Closes the room and opens it again: with a checkpoint of its end or without.
   [[nodiscard]] Digest reopened(bool with_checkpoint);
   [[nodiscard]] std::uint64_t crashes() const { return crashes_; }

@@ -293,7 +293,8 @@ class Simulation {
     }
     const Digest live = server_.live();
     entries_ = server_.entries();
-    ledger_.check(entries_.size() == status.room_seq.value, Invariant::replay, "the journal ends elsewhere than the room");
+    ledger_.check(entries_.size() == status.room_seq.value, Invariant::replay,
+                  "the journal ends elsewhere than the room");
     ledger_.check(server_.replayed() == live, Invariant::replay, "the journal's entries make another room");
     const std::map<AuthorId, Restrictions> held = Ledger::held(entries_);
     for (const auto& client : clients_) {

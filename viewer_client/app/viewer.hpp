@@ -29,12 +29,12 @@ struct ViewerOptions {
   bool answers = false;                           // print ok or error on standard output after each command
   bool stop_at_error = false;                     // a failed command ends the run
   std::function<void(const CameraView&)> looked;  // called after every turn with the window's view
-  std::function<SpaceMouseState()> cap;  // moves the camera; first button: overview, second button: tool
+  std::function<SpaceMouseState()> cap;           // moves the camera; first button: overview, second button: tool
   // Sends a request to the room and waits for its answer.
   std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
   // of the room; must outlive the viewer. Null: people are neither shown nor drawn for.
   SupervisionClient* people = nullptr;
-  std::string hand;                     // the tool operator at this window, a name or #NUMBER; empty: nobody
+  std::string hand;  // the tool operator at this window, a name or #NUMBER; empty: nobody
 };
 
 // [render]

@@ -127,14 +127,15 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
   if (!(closed && foreign) && (entries.size() > known.size() || !same_entries(entries, known, entries.size())))
     return {Verdict::Kind::named, "entries are there that nobody wrote"};
   if (!closed) {
-    if (!read || entries.size() < life.acknowledged.size()) return {Verdict::Kind::whole, "entries are missing in silence"};
+    if (!read || entries.size() < life.acknowledged.size())
+      return {Verdict::Kind::whole, "entries are missing in silence"};
     // A checkpoint may be lost: the earlier one, or the entries, then replace it.
     const bool doubted = !report || !std::ranges::all_of(report->faults, [](const std::string& fault) {
       return fault.find(".checkpoint") != fault.npos;
     });
     if (doubted)
-      return {Verdict::Kind::whole,
-              "verify finds damage, and it takes entries: " + (report ? report->faults.front() : report.error().message)};
+      return {Verdict::Kind::whole, "verify finds damage, and it takes entries: " +
+                                        (report ? report->faults.front() : report.error().message)};
     const JournalEntry next{RoomSeq{entries.size() + 1}, 0, "next"};
     return {Verdict::Kind::whole, opened->append({&next, 1}) ? "" : "it is whole and takes no entries"};
   }

@@ -14,13 +14,13 @@ enum class DamagedFiles {
 
 struct DamageTally {
   std::uint64_t trials = 0;
-  std::uint64_t acknowledged = 0;    // entries, in all trials
-  std::uint64_t whole = 0;           // all acknowledged entries are there, and the journal continues
+  std::uint64_t acknowledged = 0;  // entries, in all trials
+  std::uint64_t whole = 0;         // all acknowledged entries are there, and the journal continues
   // opened for reading, with the right number of missing entries, or "cannot be told"
   std::uint64_t named = 0;
-  std::uint64_t refused = 0;         // not opened, with a sentence
-  std::uint64_t silent = 0;          // entries are missing or differ, without any report
-  std::uint64_t called_damaged = 0;  // although nothing was damaged
+  std::uint64_t refused = 0;                  // not opened, with a sentence
+  std::uint64_t silent = 0;                   // entries are missing or differ, without any report
+  std::uint64_t called_damaged = 0;           // although nothing was damaged
   std::map<std::string, std::uint64_t> done;  // number of trials by kind of damage
   std::vector<std::string> faults;            // the first ones, with their seeds
 };

@@ -47,9 +47,9 @@ JournalHead plain_head(const std::string& genesis, const std::vector<JournalEntr
   const std::string name = "osteon journal";
   JournalHead head{RoomSeq{0}, sha256(little_endian(name.size()) + name + little_endian(genesis.size()) + genesis)};
   for (const JournalEntry& entry : entries)
-    head = {entry.place,
-            sha256(raw(head.chain) + little_endian(entry.place.value) +
-                   little_endian(static_cast<std::uint64_t>(entry.at_ns)) + little_endian(entry.bytes.size()) + entry.bytes)};
+    head = {entry.place, sha256(raw(head.chain) + little_endian(entry.place.value) +
+                                little_endian(static_cast<std::uint64_t>(entry.at_ns)) +
+                                little_endian(entry.bytes.size()) + entry.bytes)};
   return head;
 }
 

@@ -20,7 +20,7 @@ struct PathQuality {
   std::chrono::nanoseconds jitter{};  // delay is between delay - jitter and delay + jitter; keeps the order
   std::chrono::nanoseconds reorder_by = std::chrono::milliseconds(30);  // longest time that one is held back
   double bytes_per_s = 0;                                               // 0: no limit
-  std::size_t queue_bytes = 64 * 1024;  // waiting at the limit; more than that is lost
+  std::size_t queue_bytes = 64 * 1024;                                  // waiting at the limit; more than that is lost
 };
 
 struct ImpairmentCounts {

@@ -65,7 +65,8 @@ TEST(RoleTable, HasARowForEveryCallOfTheProtocolAndNoOther) {
     EXPECT_TRUE(entries.insert(std::string(entry.method)).second) << entry.method << " has two entries";
   for (const std::string& call : compiled)
     EXPECT_TRUE(entries.contains(call)) << call << " has no entry in common/access/role_table.cpp";
-  for (const std::string& entry : entries) EXPECT_TRUE(compiled.contains(entry)) << entry << " is no call of the protocol";
+  for (const std::string& entry : entries)
+    EXPECT_TRUE(compiled.contains(entry)) << entry << " is no call of the protocol";
 }
 
 TEST(RoleTable, LetsEveryRoleCallWhatItIsFor) {

@@ -238,7 +238,8 @@ TEST(AuditedCalls, AreAllThatOnlyInstructorsOrOperatorsMayMake) {
   const std::set<std::string_view> without{"Annotate", "ListRooms", "ListCases"};
   for (const CallRow& entry : call_rows()) {
     const bool is_everybodys = entry.roles.has(Role::trainee);
-    if (!is_everybodys && !without.contains(call_name(entry.method))) EXPECT_TRUE(is_audited(entry.method)) << entry.method;
+    if (!is_everybodys && !without.contains(call_name(entry.method)))
+      EXPECT_TRUE(is_audited(entry.method)) << entry.method;
   }
 }
 

@@ -225,7 +225,8 @@ class Line {
     v1::DownPacket packet;
     ASSERT_TRUE(packet.ParseFromArray(plain.data(), static_cast<int>(plain.size())));
     if (packet.acknowledged() > 0) seen.insert("acknowledgements");
-    for (const v1::EntryRun& entries : packet.entries()) seen.insert(entries.author() == me ? "own entry" : "committed_cuts");
+    for (const v1::EntryRun& entries : packet.entries())
+      seen.insert(entries.author() == me ? "own entry" : "committed_cuts");
     if (packet.partners_size() > 0) seen.insert("partners");
     if (packet.supervised_size() > 0) seen.insert("supervision");
     if (packet.has_bone()) seen.insert("bone_seen");

@@ -256,8 +256,7 @@ TEST(DeviceList, NamesArePutTogetherOrRefusedWithTheRemedy) {
   EXPECT_NE(message("fantom").find("choose among"), std::string::npos);
   EXPECT_NE(message("").find("choose among"), std::string::npos);
   EXPECT_NE(message("phantom+").find("--device phantom+: a name is missing"), std::string::npos);
-  EXPECT_NE(message("phantom+simulated").find("simulated has a simulated hand; name it alone"),
-            std::string::npos);
+  EXPECT_NE(message("phantom+simulated").find("simulated has a simulated hand; name it alone"), std::string::npos);
   EXPECT_NE(message("spacemouse+spacemouse").find("spacemouse is named twice"), std::string::npos);
   EXPECT_NE(message("falcon+spacemouse+spacemouse").find("two devices for the rotation"), std::string::npos);
   for (const char* nothing : {"recorded", "recorded:"})

@@ -28,7 +28,8 @@ struct Outcomes {
 
 class DamageTest : public ::testing::TestWithParam<bool> {
  protected:
-  // Small pages keep it small. `closed`: with a footer and without a log; else all but the first entries are in the log.
+  // Small pages keep it small. `closed`: with a footer and without a log; else all but the first entries are in the
+  // log.
   void SetUp() override {
     Journal journal =
         std::move(Journal::create(kFile, "bone", {.disk = &disk_, .log_bytes = kLogBytes, .page_bytes = 512}).value());

@@ -94,7 +94,8 @@ TEST_F(JournalTest, TakesNoRowAboveTheLimitAndGoesOn) {
   JournalOptions small = options();
   small.most_entry_bytes = 100;
   Journal journal = std::move(Journal::create(kFile, "bone", small).value());
-  const std::vector<JournalEntry> entries{{RoomSeq{1}, 0, std::string(100, 'a')}, {RoomSeq{2}, 0, std::string(101, 'b')}};
+  const std::vector<JournalEntry> entries{{RoomSeq{1}, 0, std::string(100, 'a')},
+                                          {RoomSeq{2}, 0, std::string(101, 'b')}};
   const Result<void> refused = journal.append(entries);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
@@ -380,7 +381,8 @@ TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
   });
 }
 
-// Where the tree of a large table moves entries from page to page it leaves copies behind, a few in thousands of entries.
+// Where the tree of a large table moves entries from page to page it leaves copies behind, a few in thousands of
+// entries.
 TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     std::mt19937_64 random(seed);

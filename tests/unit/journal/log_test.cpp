@@ -9,8 +9,8 @@
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/journal/old_journals.hpp"
 #include "tests/unit/journal/entries.hpp"
+#include "tests/unit/journal/old_journals.hpp"
 
 namespace osteon {
 namespace {
@@ -57,7 +57,8 @@ class LogTest : public ::testing::Test {
     EXPECT_NE(journal.closed_because(), nullptr) << "it takes entries";
     if (journal.closed_because() == nullptr) return {};
     EXPECT_FALSE(journal.next_server_epoch()) << "an epoch could come twice";
-    EXPECT_TRUE(equal(entries_of(journal), {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(entries)}));
+    EXPECT_TRUE(
+        equal(entries_of(journal), {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(entries)}));
     return journal.closed_because()->message;
   }
   void flip(const char* file, std::size_t entry) {
@@ -113,7 +114,8 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
 TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
   make_killed();
   for (const char* file : {kLog, kMirror}) flip(file, 50);
-  EXPECT_THAT(expect_closed(50), HasSubstr("goes to event 50, but its log vouches for event 60: 10 entries are missing"));
+  EXPECT_THAT(expect_closed(50),
+              HasSubstr("goes to event 50, but its log vouches for event 60: 10 entries are missing"));
   const auto recovered = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->head.place, RoomSeq{50});
@@ -136,7 +138,9 @@ TEST_F(LogTest, ItsLossIsNamed) {
   for (const std::size_t entry : {40, 50}) {
     disk_.load(killed);
     for (const char* file : {kLog, kMirror})
-      disk_.cut(file, entry == 40 ? 4096 : killed.at(file).find(entries_[entry - 1].bytes) + entries_[entry - 1].bytes.size() + 16);
+      disk_.cut(file, entry == 40
+                          ? 4096
+                          : killed.at(file).find(entries_[entry - 1].bytes) + entries_[entry - 1].bytes.size() + 16);
     EXPECT_THAT(expect_closed(entry), HasSubstr("was cut"));
     EXPECT_THAT(verify_journal(kFile, &disk_)->faults,
                 Contains(HasSubstr("after event " + std::to_string(entry) + " cannot be told")));
@@ -181,7 +185,8 @@ TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
     append(journal, entries_, 40, 60);
   }
   disk_.put(kFile, earlier.at(kFile));
-  EXPECT_THAT(expect_closed(20), HasSubstr("goes to event 20, but its log vouches for event 60: 40 entries are missing"));
+  EXPECT_THAT(expect_closed(20),
+              HasSubstr("goes to event 20, but its log vouches for event 60: 40 entries are missing"));
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
   EXPECT_EQ(Journal::open(kFile, options())->head().place, RoomSeq{20})
       << "an older copy of all files: only witnesses know more";
@@ -316,7 +321,8 @@ TEST_P(EarlierVersion, OpensAsItIs) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";
   const std::vector<JournalEntry> entries = some_entries(12, 31);
-  ASSERT_NO_FATAL_FAILURE(make_old_journal(file, GetParam(), {entries.begin(), entries.begin() + 30}, RowsIn::sqlites_log));
+  ASSERT_NO_FATAL_FAILURE(
+      make_old_journal(file, GetParam(), {entries.begin(), entries.begin() + 30}, RowsIn::sqlites_log));
   const auto before = contents_of(folder.path());
   const auto verified = verify_journal(file);
   ASSERT_TRUE(verified) << verified.error().message;

@@ -7,8 +7,8 @@
 #include "tests/support/disk/journal_trials.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/journal/old_journals.hpp"
 #include "tests/unit/journal/entries.hpp"
+#include "tests/unit/journal/old_journals.hpp"
 
 namespace osteon {
 namespace {
@@ -32,7 +32,8 @@ class UpkeepTest : public ::testing::Test {
     ASSERT_TRUE(journal.set_register("retention_days", "30"));
     ASSERT_TRUE(journal.next_server_epoch());
     for (const std::size_t place : {10, 25}) {
-      const JournalHead at = plain_head("bone", {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(place)});
+      const JournalHead at =
+          plain_head("bone", {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(place)});
       auto file = journal.begin_checkpoint(at, "meta");
       ASSERT_TRUE(file && file->write("room at " + std::to_string(place)) && file->finish());
       ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));

@@ -12,8 +12,8 @@
 #include "server/journal/journal_file.hpp"
 #include "server/journal/maintenance.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/journal/old_journals.hpp"
 #include "tests/unit/journal/entries.hpp"
+#include "tests/unit/journal/old_journals.hpp"
 
 namespace osteon {
 namespace {

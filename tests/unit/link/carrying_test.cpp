@@ -19,8 +19,9 @@ using namespace std::chrono_literals;
 using Time = VirtualTime::Time;
 
 struct Outcome {
-  bool each_once_in_order = true;  // the server has each author's cuts 1, 2, 3, ... and every author the server's entries
-  bool complete = false;           // and all of them, within the quiet time
+  bool each_once_in_order =
+      true;               // the server has each author's cuts 1, 2, 3, ... and every author the server's entries
+  bool complete = false;  // and all of them, within the quiet time
   std::size_t cuts = 0, refused = 0;
   Time quiet_until_complete{};
   std::vector<double> felt_ms;  // from a cut until the other author has it
@@ -43,11 +44,11 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
     int author;
     std::uint64_t number;
   };
-  std::vector<Row> entries;                    // the server's order
+  std::vector<Row> entries;                   // the server's order
   std::array<std::uint64_t, 2> last_entry{};  // in both down windows, of each author
-  std::array<std::vector<Time>, 2> made;    // by number - 1
-  std::array<std::uint64_t, 2> taken{};     // cuts that the server has of each
-  std::array<std::size_t, 2> known{};       // entries that each author has
+  std::array<std::vector<Time>, 2> made;      // by number - 1
+  std::array<std::uint64_t, 2> taken{};       // cuts that the server has of each
+  std::array<std::size_t, 2> known{};         // entries that each author has
   std::array<bool, 2> pausing{};
 
   const std::array<std::unique_ptr<SimPort>, 2> server_ports{network.open(node(1, 1)), network.open(node(1, 2))};
@@ -64,8 +65,8 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
           std::string text = std::to_string(a) + " " + std::to_string(number);
           text.resize(12, ' ');
           for (const auto& server : servers) {
-            // An entry is joined to the author's last one where that is the entry before; a real packet joins it over others
-            // too.
+            // An entry is joined to the author's last one where that is the entry before; a real packet joins it over
+            // others too.
             const bool follows = last_entry[a] != 0 && last_entry[a] + 1 == entries.size();
             if (!server->say(text, std::string(40, 'h'), follows)) outcome.each_once_in_order = false;
           }

@@ -1,5 +1,5 @@
-// What a room decides as entries: replayed, through their bytes, they make the same room again, from the beginning or from
-// any place on.
+// What a room decides as entries: replayed, through their bytes, they make the same room again, from the beginning or
+// from any place on.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -280,7 +280,7 @@ TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
   const RoomSeq first{2}, second{3}, undo{4}, next_undo{5};
   const Digest before = room.room_hash();
   for (const RedoEntry& redo : {RedoEntry{{undo, undo}, {second}}, RedoEntry{{undo, next_undo}, {first, second}},
-                              RedoEntry{{undo}, {second, second}}, RedoEntry{{next_undo, undo}, {second, first}}}) {
+                                RedoEntry{{undo}, {second, second}}, RedoEntry{{next_undo, undo}, {second, first}}}) {
     EXPECT_FALSE(room.replay({RoomSeq{6}, 1s, hand, redo}));
     EXPECT_EQ(room.room_hash(), before);
   }

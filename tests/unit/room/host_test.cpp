@@ -1,4 +1,5 @@
-// The runtime's threads with subscribers in place of streams: free of gRPC, so that the thread sanitizer can look at them.
+// The runtime's threads with subscribers in place of streams: free of gRPC, so that the thread sanitizer can look at
+// them.
 #include "server/net/room_runtime.hpp"
 
 #include <gtest/gtest.h>

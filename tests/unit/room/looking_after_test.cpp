@@ -11,9 +11,9 @@
 #include <map>
 #include <optional>
 
+#include "common/wire/host_port.hpp"
 #include "server/net/certificate.hpp"
 #include "server/net/health_watch.hpp"
-#include "common/wire/host_port.hpp"
 #include "server/net/metrics.hpp"
 #include "server/net/refusals.hpp"
 #include "tests/support/disk/memory_disk.hpp"

@@ -52,7 +52,8 @@ TEST(RoomMetal, ReplaysFromItsRows) {
   Room again(plate_block());
   int metal = 0;
   for (const LogEntry& entry : all.room.take_entries()) {
-    if (const auto* rejection = std::get_if<RejectionEntry>(&entry.what)) metal += rejection->reason == Rejection::metal;
+    if (const auto* rejection = std::get_if<RejectionEntry>(&entry.what))
+      metal += rejection->reason == Rejection::metal;
     ASSERT_TRUE(again.replay(entry));
   }
   EXPECT_EQ(metal, 1);

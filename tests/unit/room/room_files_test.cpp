@@ -343,7 +343,8 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   const auto all = branch_journal(kFile, "/rooms/b", {}, "b", {}, &disk_);
   ASSERT_FALSE(all);
   EXPECT_EQ(all.error().code, ErrorCode::unavailable);
-  EXPECT_THAT(all.error().message, AllOf(HasSubstr("entry 30 does not fit the chain"), HasSubstr("--at 29 takes these")));
+  EXPECT_THAT(all.error().message,
+              AllOf(HasSubstr("entry 30 does not fit the chain"), HasSubstr("--at 29 takes these")));
   EXPECT_EQ(branch_journal(kFile, "/rooms/b", last, "b", {}, &disk_).error().code, ErrorCode::invalid_input);
   EXPECT_FALSE(disk_.size("/rooms/b").value());
   const auto confirmed = branch_journal(kFile, "/rooms/b", RoomSeq{29}, "b", {}, &disk_);

@@ -17,11 +17,11 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
+using test::entries_of;
 using test::KeptCuts;
 using test::MemoryDisk;
 using test::plain_entries;
 using test::replay_of;
-using test::entries_of;
 using test::test_block;
 using ::testing::AllOf;
 using ::testing::HasSubstr;

@@ -44,7 +44,7 @@ TEST(Room, LeavesTheSameBoneForEveryInterleaving) {
   const auto hash_of = [](const std::vector<int>& turns) {
     Room room(test_block());
     std::vector<std::vector<Cut>> entries{strokes(room.join(MemberKind::surgeon), 4, 3),
-                                       strokes(room.join(MemberKind::surgeon), 4, 4)};
+                                          strokes(room.join(MemberKind::surgeon), 4, 4)};
     std::size_t next[2] = {0, 0};
     for (const int who : turns) commit(room, entries[static_cast<std::size_t>(who)][next[who]++]);
     return room.field_hash();

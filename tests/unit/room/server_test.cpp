@@ -49,7 +49,8 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
 // Nobody who has come back stays pending until the next event.
 TEST_F(RoomServerTest, AHandSaysThatTheLeavesHaveCome) {
   const auto hand = surgeon();
-  EXPECT_TRUE(wait_until([&] { return runtime().people().acknowledged_by(AuthorId{1}) == runtime().room_seq(); }, kPatience));
+  EXPECT_TRUE(
+      wait_until([&] { return runtime().people().acknowledged_by(AuthorId{1}) == runtime().room_seq(); }, kPatience));
 }
 
 // As one would that was told of more, by a server whose journal has lost its end.

@@ -122,16 +122,26 @@ TEST_F(ConsoleTest, WordsInQuotesAreOne) {
 TEST_F(ConsoleTest, SaysWhatIsKnownWhereItKnowsNothing) {
   EXPECT_EQ(say("halt Ben").find("error there is no command \"halt\"; known are people, freeze, free, take"), 0u);
   EXPECT_EQ(say("freeze"), "error the form is: freeze NAME|all [WORDS]");
-  for (const char* line : {"people now",     "free",
-                           "take all",       "guide Ben to Ada",
-                           "limit Ben",      "limit heat Ben 3",
-                           "undo",           "undo 0",
-                           "undo 2 of",      "redo 0",
-                           "mark",           "draw 1 2 3",
-                           "label 1 2 3",    "wipe",
-                           "wipe 0",         "say",
-                           "view",           "wait Ben",
-                           "wait acknowledged",     "quit now",
+  for (const char* line : {"people now",
+                           "free",
+                           "take all",
+                           "guide Ben to Ada",
+                           "limit Ben",
+                           "limit heat Ben 3",
+                           "undo",
+                           "undo 0",
+                           "undo 2 of",
+                           "redo 0",
+                           "mark",
+                           "draw 1 2 3",
+                           "label 1 2 3",
+                           "wipe",
+                           "wipe 0",
+                           "say",
+                           "view",
+                           "wait Ben",
+                           "wait acknowledged",
+                           "quit now",
                            "demonstrate a b"})
     EXPECT_EQ(say(line).find("error the form is: "), 0u) << line << ": " << say(line);
   EXPECT_TRUE(desk.asked_.empty());

@@ -363,13 +363,13 @@ TEST(EntryRun, TheLongestSupervisionFitsAPacket) {
       .room_seq = {~std::uint64_t{0}}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = ~std::uint64_t{0}};
   constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min();
   entry.supervision = {.stopped = true,
-                     .taken_by = {~std::uint64_t{0}},
-                     .guide = {~std::uint64_t{0}},
-                     .guide_share = kWholeShare,
-                     .force_limit = kMostForceLimit,
-                     .zone = ZoneLimit{{kLow, kLow, kLow}, 1 << 30},
-                     .tools = {},
-                     .words = std::string(kMostSupervisionWords, 'w')};
+                       .taken_by = {~std::uint64_t{0}},
+                       .guide = {~std::uint64_t{0}},
+                       .guide_share = kWholeShare,
+                       .force_limit = kMostForceLimit,
+                       .zone = ZoneLimit{{kLow, kLow, kLow}, 1 << 30},
+                       .tools = {},
+                       .words = std::string(kMostSupervisionWords, 'w')};
   for (std::size_t n = 0; n < wire::kMostToolsInPacket; ++n)
     entry.supervision.tools.push_back(digest(static_cast<std::uint8_t>(n)));
   entry.by = {AuthorId{~std::uint64_t{0}}, std::string(wire::kMostNameInPacket, 'n')};
@@ -461,7 +461,8 @@ TEST(EntryRun, AnyRowsComeBackInTheSessionsOrder) {
       while (auto entry = in.take()) back.push_back(std::move(*entry));
       window.acknowledge(in.acknowledged(), in.beyond(in.acknowledged()));
     }
-    for (std::size_t i = 0; i < entries.size(); ++i) ASSERT_EQ(back[i], entries[i]) << "seed " << seed << " entry " << i;
+    for (std::size_t i = 0; i < entries.size(); ++i)
+      ASSERT_EQ(back[i], entries[i]) << "seed " << seed << " entry " << i;
     entries_seen += entries.size();
   }
   std::printf("%zu entries in %zu packets, %zu runs left out for their tools\n", entries_seen, packets, left_out);

@@ -497,10 +497,10 @@ TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   Pair pair;
   pair.run(300ms);
   wire::SessionEntry word{.room_seq = {5},
-                        .kind = wire::SessionEntryKind::supervised,
-                        .lease_epoch = 6,
-                        .supervision = {.taken_by = {3}},
-                        .by = {AuthorId{3}, "Dr. Weber"}};
+                          .kind = wire::SessionEntryKind::supervised,
+                          .lease_epoch = 6,
+                          .supervision = {.taken_by = {3}},
+                          .by = {AuthorId{3}, "Dr. Weber"}};
   EXPECT_TRUE(pair.server.tell(1, word));
   pair.run(100ms);
   EXPECT_TRUE(pair.client.frozen());
@@ -573,7 +573,8 @@ TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
   };
   for (std::uint64_t n = 1; n <= 20; ++n) {
     ASSERT_TRUE(pair.client.push(pair.cut(n)));
-    ASSERT_TRUE(pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}}));
+    ASSERT_TRUE(
+        pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}}));
     pair.run(8ms);
   }
   pair.run(200ms);
@@ -640,7 +641,8 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   pair.run(300ms);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     ASSERT_TRUE(pair.client.push(pair.cut(n)));
-    ASSERT_TRUE(pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}}));
+    ASSERT_TRUE(
+        pair.server.push({n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}}));
   }
   v1::UpPacket up;
   up.set_acknowledged(4);

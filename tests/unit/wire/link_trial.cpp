@@ -130,7 +130,8 @@ void Trial::turn(std::size_t c) {
   DatagramBuffer buffer;
   while (const auto got = client.port->receive(buffer)) client.link.receive(got->bytes, now);
   while (auto entry = client.link.take_entry()) {
-    const bool of_other = entry->entry.kind == wire::SessionEntryKind::committed && entry->entry.cut.author != client.author;
+    const bool of_other =
+        entry->entry.kind == wire::SessionEntryKind::committed && entry->entry.cut.author != client.author;
     if (of_other) {
       const Client& other = *clients[entry->entry.cut.author.value - 10];
       const Time since = other.made_at.at(entry->entry.cut.author_seq - 1);
@@ -209,8 +210,8 @@ void Trial::tick() {
       sessions[1 - c]->link.set_partners(partners);
     }
     if (!session.link.alive(time.now())) {
-      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_entries) + 1; i <= session.entries.size();
-           ++i)
+      for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_entries) + 1;
+           i <= session.entries.size(); ++i)
         stream_entry(c, session.streamed_entries = i);
       if (session.said_kept != session.kept) {
         session.said_kept = session.kept;

@@ -51,11 +51,11 @@ class Trial {
     std::unique_ptr<SimPort> port;
     std::vector<Cut> cuts;  // all that were made, by author_seq - 1
     std::vector<Time> made_at;
-    std::uint64_t streamed_cuts = 0;     // up to here they went over the stream
+    std::uint64_t streamed_cuts = 0;          // up to here they went over the stream
     std::vector<wire::IndexedEntry> entries;  // all that were taken
-    std::vector<double> felt_ms;         // from a partner's cut until its entry was here
-    std::uint64_t said_entries = 0;         // over the stream
-    std::uint64_t uplink_bytes = 0;      // with 28 of headers each
+    std::vector<double> felt_ms;              // from a partner's cut until its entry was here
+    std::uint64_t said_entries = 0;           // over the stream
+    std::uint64_t uplink_bytes = 0;           // with 28 of headers each
     std::uint64_t entries_by_stream = 0, refused = 0;
     std::size_t most_waiting = 0;  // bytes unacknowledged
     std::optional<Time> wakes_at;
@@ -66,9 +66,9 @@ class Trial {
     Session(std::size_t which, const SessionKeys& keys, const TrialOptions& options)
         : link(keys, {10 + which}, seeded(options.seed * 7 + which), 1, 1, options.down) {}
     wire::ServerLink link;
-    std::vector<Cut> cuts;               // as they came
+    std::vector<Cut> cuts;                    // as they came
     std::vector<wire::IndexedEntry> entries;  // as they were told
-    std::uint64_t streamed_entries = 0;     // up to here they went over the stream
+    std::uint64_t streamed_entries = 0;       // up to here they went over the stream
     std::uint64_t kept = 0, said_kept = 0;
     std::uint64_t downlink_bytes = 0;
     std::optional<Time> wakes_at;
