@@ -2,7 +2,8 @@
 
 # The commands and options that a help text lists.
 _osteon_commands() {
-  sed -n -e '/^Subcommands:/,$ s/^  \([a-z][a-z-]*\) .*/\1/p' -e 's/,//g; s/.*Other commands: \([a-z ]*\) (.*/\1/p' <<<"$1"
+  sed -n -e '/^Subcommands:/,$ s/^  \([a-z][a-z-]*\) .*/\1/p' \
+    -e 's/,//g; s/.*Other commands: \([a-z ]*\) (.*/\1/p' <<<"$1"
 }
 _osteon_options() { grep -oE -- '(^|[ ,])--[a-z][a-z-]+' <<<"$1" | tr -d ' ,'; }
 

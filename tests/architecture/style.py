@@ -1,4 +1,4 @@
-"""Rules of style that a program can judge: widths, retired names, CMake lists, lengths of functions, commit subjects."""
+"""Rules of style that a program can judge: widths, replaced names, CMake lists, lengths, subjects of commits."""
 import re
 import subprocess
 from pathlib import Path
@@ -17,7 +17,8 @@ SOURCE_FILE = re.compile(r"[\w./${}-]+\.(?:cpp|hpp|inl)\b")
 
 
 def tracked_files(root: Path):
-    listed = subprocess.run(["git", "-C", str(root), "ls-files", "-z"], capture_output=True, text=True, check=True).stdout
+    listed = subprocess.run(["git", "-C", str(root), "ls-files", "-z"], capture_output=True, text=True,
+                            check=True).stdout
     return [root / name for name in listed.split("\0") if name and Path(name).suffix not in NO_TEXT]
 
 

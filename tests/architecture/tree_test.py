@@ -165,7 +165,8 @@ class TheRules(unittest.TestCase):
         self.assertFalse(style.cmake_faults("x/CMakeLists.txt", "  SOURCES a.cpp"))
         self.assertTrue(style.name_faults("a.cpp", "OldName old;", ["OldName"]))
         self.assertFalse(style.name_faults("a.cpp", "OldNames old;", ["OldName"]))
-        self.assertEqual(style.retired_names("## Replaced names\n| `OldName`, `Older` | `New` |\n"), ["OldName", "Older"])
+        table = "## Replaced names\n| `OldName`, `Older` | `New` |\n"
+        self.assertEqual(style.retired_names(table), ["OldName", "Older"])
 
     def test_long_functions(self):
         body = "  f();\n" * 71

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import jsonschema
 
-SCHEMA = json.loads((Path(os.environ["OSTEON_SOURCE_DIR"]) / "deploy/docs/plan.schema.json").read_text(encoding="utf-8"))
+SOURCE = Path(os.environ["OSTEON_SOURCE_DIR"])
+SCHEMA = json.loads((SOURCE / "deploy/docs/plan.schema.json").read_text(encoding="utf-8"))
 HAPTIC = os.environ["OSTEON_HAPTIC"]
 PLANS = 400
 POINT = {"point_mm": [1.0, 2.0, 3.0], "axis": [0.0, 0.0, -1.0]}

@@ -339,7 +339,8 @@ assert bits == ["speed", "feed", "density", "diameter", "depth of cut", "speed o
 assert f["burr_change/row"][:].tolist() == [0, 700] and f["burr_change/scale"][0] == 1.5
 assert f["metadata/voxel_volume"][()] == 0.125 and f["metadata"].attrs["force_scale"] == 0.0466
 assert b"bone" in f["metadata/README"][()]
-assert f["metadata/field_hash"][()].decode() == 64 * "f" and f["metadata/room_seq"][()] == 321 and f["metadata/finished"][()] == 1
+assert f["metadata/field_hash"][()].decode() == 64 * "f"
+assert f["metadata/room_seq"][()] == 321 and f["metadata/finished"][()] == 1
 assert f["drill_force_physical/wrench"][5, 3:].tolist() == [6, 2, 3]
 i = 1234
 print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i, 0], f["data/pose_drill"][i, 6],
