@@ -46,8 +46,8 @@ inline tl::expected<Caller, Refusal> judged(Gate& gate, const grpc::CallbackServ
 }
 
 // Authorizes a call at its beginning: certificate, ticket, role, headers and how often. Null: it may go on. The one
-// place where calls are counted as admitted or refused; every handler begins with it. `about`: the room that the message
-// names, for a ticket of every room.
+// place where calls are counted as admitted or refused; every handler begins with it. `about`: the room that the
+// message names, for a ticket of every room.
 inline std::optional<Status> refusal_of(const Rooms& rooms, grpc::CallbackServerContext& context,
                                         std::string_view method, std::string_view about = {}) {
   if (!rooms.gate) return {};

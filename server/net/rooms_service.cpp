@@ -168,7 +168,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
   Reactor* slowly(Context* context, const char* name, const std::string& room, std::function<Status()> work,
                   const std::function<Result<void>()>& may = {}) {
     Reactor* reactor = context->DefaultReactor();
-    if (std::optional<Status> why = refusal_of(rooms_, *context, method(name), room)) return refuse(reactor, std::move(*why));
+    if (std::optional<Status> why = refusal_of(rooms_, *context, method(name), room))
+      return refuse(reactor, std::move(*why));
     const auto refusal = [this, context, name, room, may]() -> std::optional<Status> {
       const auto in_room = [&] { return caller_in(rooms_, *context, room, method(name)).map([](const Caller&) {}); };
       const Result<void> allowed = may ? may() : in_room();

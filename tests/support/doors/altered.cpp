@@ -1,3 +1,4 @@
+#include "tests/support/content.hpp"
 #include "tests/support/doors/altered.hpp"
 
 #include <openssl/pem.h>
@@ -5,7 +6,6 @@
 
 #include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -14,11 +14,6 @@
 
 namespace osteon::test {
 namespace {
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 }  // namespace
 

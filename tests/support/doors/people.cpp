@@ -1,18 +1,13 @@
+#include "tests/support/content.hpp"
 #include "tests/support/doors/people.hpp"
 
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include "tests/support/process.hpp"
 
 namespace osteon::test {
 namespace {
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 }  // namespace
 

@@ -111,20 +111,23 @@ TEST_F(Certs, WhatTheyRenewStaysReadable) {
   people_.certs({"server", "127.0.0.1"});
   EXPECT_NE(fs::last_write_time(people_.server() / "server.pem"), renewed);
   for (const auto& [name, rights] : before) EXPECT_EQ(rights_of(people_.server() / name), rights) << name;
-  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 9) << "nothing is left beside";
+  EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 9)
+      << "nothing is left beside";
 }
 
 // For programs that ask such a list; those of Osteon do not.
 TEST(CertsMade, NameTheListThatIsPublished) {
   test::People people;
   const auto shown = [&](const std::string& what, const std::vector<std::string>& how) {
-    std::vector<std::string> arguments{what, "-in", people.server() / (what == "crl" ? "crl.der" : "server.pem"), "-noout"};
+    const fs::path file = people.server() / (what == "crl" ? "crl.der" : "server.pem");
+    std::vector<std::string> arguments{what, "-in", file, "-noout"};
     arguments.insert(arguments.end(), how.begin(), how.end());
     return test::run("openssl", arguments).out;
   };
   EXPECT_EQ(shown("x509", {"-ext", "crlDistributionPoints"}).find("URI:"), std::string::npos);
   people.certs({"--crl-url", "http://ca.example.org/crl.der", "server", "127.0.0.1"});
-  EXPECT_NE(shown("x509", {"-ext", "crlDistributionPoints"}).find("URI:http://ca.example.org/crl.der\n"), std::string::npos);
+  EXPECT_NE(shown("x509", {"-ext", "crlDistributionPoints"}).find("URI:http://ca.example.org/crl.der\n"),
+            std::string::npos);
   EXPECT_EQ(shown("crl", {"-inform", "DER", "-text"}).find("Serial Number:"), std::string::npos);
   (void)people.person("ben");
   people.certs({"revoke", "ben"});

@@ -15,6 +15,7 @@
 
 #include "common/wire/room_client.hpp"
 #include "server/net/room_server.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/doors/people.hpp"
 #include "tests/support/doors/proxy.hpp"
 #include "tests/support/doors/raw_http2.hpp"
@@ -30,6 +31,7 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
+using test::content;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
@@ -37,11 +39,6 @@ using testing::HasSubstr;
 constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
 constexpr const char* kWatch = "/osteon.v1.WatchService/WatchCutting";
 constexpr std::uint8_t kDataFrame = 0, kHeadersFrame = 1;
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 enum class Way { direct, proxy };
 

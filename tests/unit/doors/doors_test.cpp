@@ -12,7 +12,6 @@
 #include <fstream>
 #include <functional>
 #include <future>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -30,6 +29,7 @@
 #include "server/net/room_server.hpp"
 #include "server/net/rooms_client.hpp"
 #include "tests/architecture/proto_rules.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/doors/people.hpp"
 #include "tests/support/doors/proxy.hpp"
 #include "tests/support/doors/raw_http2.hpp"
@@ -43,12 +43,8 @@ namespace {
 using namespace std::chrono_literals;
 using grpc::ByteBuffer;
 using grpc::StatusCode;
+using test::content;
 using testing::HasSubstr;
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class Doors : public ::testing::Test {
  protected:

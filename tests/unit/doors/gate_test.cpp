@@ -5,12 +5,12 @@
 
 #include <atomic>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "server/net/person_certificate.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/doors/people.hpp"
 #include "tests/support/wait.hpp"
 
@@ -18,15 +18,11 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
+using test::content;
 using testing::HasSubstr;
 
 constexpr const char* kUndo = "/osteon.v1.RoomService/Undo";
 constexpr const char* kWatch = "/osteon.v1.WatchService/WatchMesh";
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class GateTest : public ::testing::Test {
  protected:
@@ -453,7 +449,8 @@ TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {
   RefusalLog log;
   RefusalLog::Time now{};
   const auto is_new = [&](std::string_view peer, std::string_view reason) {
-    return log.is_new(peer, reason, now += std::chrono::ceil<RefusalLog::Time::duration>(1.0s / RefusalLog::kLinesPerSecond));
+    now += std::chrono::ceil<RefusalLog::Time::duration>(1.0s / RefusalLog::kLinesPerSecond);
+    return log.is_new(peer, reason, now);
   };
   EXPECT_TRUE(is_new("anna", "a"));
   EXPECT_FALSE(is_new("anna", "a"));
