@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "server/net/connections.hpp"
 #include "server/net/person_certificate.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/doors/people.hpp"
@@ -314,6 +315,16 @@ TEST_F(GateTest, TellsWhoBeganTooManyCallsToWaitAMinute) {
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kWatch, true),
             "flood: too many calls came from you; wait a minute");
   EXPECT_EQ(refused("ben", ticket("ben", "ward", Role::trainee), "ward", kWatch, true), "") << "another person";
+}
+
+// A client may begin thousands of calls and close the connection before the first of them is looked at.
+TEST_F(GateTest, NotesTheFloodOfAConnectionThatIsGoneOnce) {
+  static Connections none;  // outlives the gate, whose thread looks at it
+  gate_->set_connections(none);
+  for (int call = 0; call < 1000; ++call) gate_->note_flood(shown(certificate("anna")));
+  EXPECT_EQ(refusals_.counts().at("flood"), 1u);
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kWatch, true),
+            "flood: too many calls came from you; wait a minute");
 }
 
 // Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost unseen.
