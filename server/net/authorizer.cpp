@@ -373,8 +373,7 @@ void Authorizer::note_refused(std::string_view reason, std::string_view sentence
 }
 
 void Authorizer::note_flood(const PeerClaims& peer) {
-  // gRPC had read these calls before the connection was closed.
-  if (connections_ && connections_->is_cut_off(peer.peer)) return;
+  const bool is_open = !connections_ || peer.by_proxy || connections_->is_open(peer.peer);
   std::string who = "a stranger";
   {
     const std::lock_guard lock(mutex_);
@@ -382,6 +381,8 @@ void Authorizer::note_flood(const PeerClaims& peer) {
       who = certificate->user;
       const auto now = std::chrono::steady_clock::now();
       std::erase_if(paused_, [now](const auto& entry) { return entry.second < now; });
+      // gRPC had read this call before the connection was closed, and its flood is noted already.
+      if (!is_open && paused_.contains(who)) return;
       paused_[who] = now + kPause;
     }
   }

@@ -18,9 +18,8 @@ class FloodWatch final : public grpc::experimental::Interceptor {
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(InterceptionHookPoints::POST_RECV_INITIAL_METADATA)) {
       const PeerClaims peer = peer_claims(*call_.server_context());
-      if (!flood_.take(peer.certificate_pem.empty() ? peer.peer : peer.certificate_pem,
-                       std::chrono::steady_clock::now()))
-        flooded_(peer);
+      const std::string& whose = peer.certificate_pem.empty() ? peer.peer : peer.certificate_pem;
+      if (!flood_.take(whose, std::chrono::steady_clock::now())) flooded_(peer);
     }
     methods->Proceed();
   }

@@ -114,10 +114,10 @@ std::size_t Connections::close_if(const std::function<bool(const Connection&)>& 
   return closed;
 }
 
-bool Connections::is_cut_off(const std::string& peer) {
+bool Connections::is_open(const std::string& peer) {
   const std::lock_guard lock(mutex_);
   const auto known = open_.find(peer);
-  return known != open_.end() && known->second.is_cut_off;
+  return known != open_.end() && !known->second.is_cut_off;
 }
 
 std::string some_addresses(Connections& connections) {

@@ -36,7 +36,7 @@ class Connections {
   // Cuts off each connection for which `which` returns true, and discards data that arrived unread. gRPC then sees the
   // end of the connection and drops it with all its calls. Returns how many were cut off.
   std::size_t close_if(const std::function<bool(const Connection&)>& which);
-  [[nodiscard]] bool is_cut_off(const std::string& peer);  // by close_if()
+  [[nodiscard]] bool is_open(const std::string& peer);  // false also once close_if() has cut it off
 
  private:
   struct Entry {

@@ -11,7 +11,6 @@
 #include <atomic>
 #include <fstream>
 #include <future>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <regex>
@@ -26,6 +25,7 @@
 #include "tests/support/authentication/altered.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/authentication/proxy.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon::test {
@@ -36,11 +36,6 @@ namespace fs = std::filesystem;
 
 constexpr auto kDay = 24h;
 constexpr auto kPatience = 10s;
-
-std::string content(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 // A text in which what is in capitals stands for anything.
 std::regex pattern_of(const std::string& text) {

@@ -1,11 +1,11 @@
 #include "tests/support/authentication/altered.hpp"
+#include "tests/support/content.hpp"
 
 #include <openssl/pem.h>
 #include <openssl/x509.h>
 
 #include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -13,15 +13,6 @@
 #include "common/wire/x509.hpp"
 
 namespace osteon::test {
-namespace {
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-}  // namespace
-
 void resign(const std::filesystem::path& certificate, const std::filesystem::path& authority,
             std::chrono::seconds begins, std::chrono::seconds ends) {
   const auto all = wire::certificates_of(content(certificate));

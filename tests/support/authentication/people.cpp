@@ -1,21 +1,12 @@
 #include "tests/support/authentication/people.hpp"
+#include "tests/support/content.hpp"
 
 #include <fstream>
-#include <iterator>
 #include <stdexcept>
 
 #include "tests/support/process.hpp"
 
 namespace osteon::test {
-namespace {
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
-}  // namespace
-
 People::People() {
   certs({"authority"});
   certs({"server", "127.0.0.1", "localhost"});

@@ -124,8 +124,8 @@ TEST_F(Certs, WhatTheyRenewStaysReadable) {
 TEST(CertsMade, NameTheListThatIsPublished) {
   test::People people;
   const auto shown = [&](const std::string& what, const std::vector<std::string>& how) {
-    std::vector<std::string> arguments{what, "-in", people.server() / (what == "crl" ? "crl.der" : "server.pem"),
-                                       "-noout"};
+    const fs::path file = people.server() / (what == "crl" ? "crl.der" : "server.pem");
+    std::vector<std::string> arguments{what, "-in", file, "-noout"};
     arguments.insert(arguments.end(), how.begin(), how.end());
     return test::run("openssl", arguments).out;
   };

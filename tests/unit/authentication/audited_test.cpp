@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -18,6 +17,7 @@
 #include "server/net/person_certificate.hpp"
 #include "server/net/room_admin_client.hpp"
 #include "tests/support/authentication/people.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -27,17 +27,13 @@ namespace {
 
 using namespace std::chrono_literals;
 using nlohmann::json;
+using test::content;
 using test::program;
 using test::run;
 using testing::HasSubstr;
 using testing::Not;
 
 constexpr std::chrono::milliseconds kLong = 60s;
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class Audited : public ::testing::Test {
  protected:

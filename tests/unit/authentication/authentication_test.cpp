@@ -12,7 +12,6 @@
 #include <fstream>
 #include <functional>
 #include <future>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -33,6 +32,7 @@
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/authentication/proxy.hpp"
 #include "tests/support/authentication/raw_http2.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -43,12 +43,8 @@ namespace {
 using namespace std::chrono_literals;
 using grpc::ByteBuffer;
 using grpc::StatusCode;
+using test::content;
 using testing::HasSubstr;
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class Authentication : public ::testing::Test {
  protected:

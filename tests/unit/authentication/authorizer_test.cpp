@@ -5,28 +5,25 @@
 
 #include <atomic>
 #include <fstream>
-#include <iterator>
 #include <optional>
 #include <stdexcept>
 #include <string>
 
+#include "server/net/connections.hpp"
 #include "server/net/person_certificate.hpp"
 #include "tests/support/authentication/people.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
+using test::content;
 using testing::HasSubstr;
 
 constexpr const char* kUndo = "/osteon.v1.RoomService/Undo";
 constexpr const char* kWatch = "/osteon.v1.WatchService/WatchMesh";
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class AuthorizerTest : public ::testing::Test {
  protected:
@@ -338,6 +335,16 @@ TEST_F(AuthorizerTest, TellsWhoBeganTooManyCallsToWaitAMinute) {
   EXPECT_EQ(refused("ben", ticket("ben", "ward", Role::trainee), "ward", kWatch, true), "") << "another person";
 }
 
+// A client may begin thousands of calls and close the connection before the first of them is looked at.
+TEST_F(AuthorizerTest, NotesTheFloodOfAConnectionThatIsGoneOnce) {
+  static Connections none;  // outlives the authorizer, whose thread looks at it
+  authorizer_->set_connections(none);
+  for (int call = 0; call < 1000; ++call) authorizer_->note_flood(shown(certificate("anna")));
+  EXPECT_EQ(refusals_.counts().at("flood"), 1u);
+  EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kWatch, true),
+            "flood: too many calls came from you; wait a minute");
+}
+
 // Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost
 // unseen.
 TEST_F(AuthorizerTest, LooksAgainWhoItIsWhenAStreamBegins) {
@@ -476,8 +483,8 @@ TEST(RefusalLog, SaysEachOnceAndRemembersNoMoreThanItsLimit) {
   RefusalLog log;
   RefusalLog::Time now{};
   const auto is_new = [&](std::string_view peer, std::string_view reason) {
-    return log.is_new(peer, reason,
-                      now += std::chrono::ceil<RefusalLog::Time::duration>(1.0s / RefusalLog::kLinesPerSecond));
+    now += std::chrono::ceil<RefusalLog::Time::duration>(1.0s / RefusalLog::kLinesPerSecond);
+    return log.is_new(peer, reason, now);
   };
   EXPECT_TRUE(is_new("anna", "a"));
   EXPECT_FALSE(is_new("anna", "a"));

@@ -19,6 +19,7 @@
 #include "tests/support/authentication/proxy.hpp"
 #include "tests/support/authentication/raw_http2.hpp"
 #include "tests/support/authentication/wrong_certificates.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/relay/impair_process.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -30,6 +31,7 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
+using test::content;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
@@ -37,11 +39,6 @@ using testing::HasSubstr;
 constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
 constexpr const char* kWatch = "/osteon.v1.WatchService/WatchCutting";
 constexpr std::uint8_t kDataFrame = 0, kHeadersFrame = 1;
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 enum class Way { direct, proxy };
 

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <fstream>
-#include <iterator>
 #include <memory>
 #include <string>
 #include <thread>
@@ -15,6 +14,7 @@
 #include "osteon/v1/people.grpc.pb.h"
 #include "server/net/room_server.hpp"
 #include "tests/support/authentication/people.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -24,13 +24,9 @@ namespace {
 
 using namespace std::chrono_literals;
 using grpc::StatusCode;
+using test::content;
 using testing::HasSubstr;
 namespace fs = std::filesystem;
-
-std::string content(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class GoingOn : public ::testing::Test {
  protected:

@@ -204,7 +204,8 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
   const std::uint64_t begun =
       server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused;
   EXPECT_LT(begun, 2'000u);
-  EXPECT_LT(counted("flood"), begun / 2) << "once for a connection, and not for each call";
+  // Once for the connection, and for calls that other threads begin at that moment.
+  EXPECT_LE(counted("flood"), 16u) << "of " << begun;
   // They do not come again at once, whatever connection they take.
   EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value());
   EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());

@@ -21,6 +21,7 @@
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/authentication/proxy.hpp"
 #include "tests/support/authentication/raw_http2.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
@@ -30,16 +31,12 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
+using test::content;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
 
 constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 // TCP connections over which nothing is said.
 class Connected {
@@ -173,8 +170,9 @@ TEST(ShippedLimits, AreThoseOfThePage) {
                     page = content(OSTEON_DEPLOY "/front-proxy.md");
   for (const char* line :
        {"| connections | 500; 20 for each address; 40 new ones of an address in 10 s.",
-        "| calls of one certificate | 300 in 1 s, 1500 in 10 s, begun or reset; 128 at a time; 16 at a time over one "
-        "connection. Who goes beyond the first two gets no new connection for a minute |",
+        "| calls of one certificate | 300 in 1 s, 1500 in 10 s, begun or reset; 128 at a time |",
+        "| calls over one connection | 16 at a time |",
+        "A certificate that goes beyond its calls in 1 s or 10 s gets no new connection for a minute.",
         "| time for a handshake | 25 s: ", "| from the handshake to a first request | 5 s |",
         "| a connection without a stream | closed after 1 s; one without a first call after 5 s |"})
     EXPECT_THAT(page, HasSubstr(line));

@@ -11,7 +11,6 @@
 #include <fstream>
 #include <functional>
 #include <future>
-#include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
@@ -24,6 +23,7 @@
 #include "server/net/refused_calls.hpp"
 #include "server/net/room_server.hpp"
 #include "tests/support/authentication/people.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/wait.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/members.hpp"
@@ -33,15 +33,11 @@ namespace {
 
 using namespace std::chrono_literals;
 using grpc::StatusCode;
+using test::content;
 using testing::HasSubstr;
 
 constexpr int kTimes = 3;  // that each is tried
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
-std::string content(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 int count_of(const std::string& text, const std::string& what) {
   int count = 0;
