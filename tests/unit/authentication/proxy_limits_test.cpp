@@ -167,14 +167,13 @@ TEST_F(ProxyLimits, LetHeadersAloneThroughThatCallsNeed) {
 // A promise of the page that the configuration does not keep is found here.
 TEST(ShippedLimits, AreThoseOfThePage) {
   const std::string configuration = content(OSTEON_DEPLOY "/haproxy.cfg"),
-                    page = content(OSTEON_DEPLOY "/front-proxy.md");
-  for (const char* line :
-       {"| connections | 500; 20 for each address; 40 new ones of an address in 10 s.",
-        "| calls of one certificate | 300 in 1 s, 1500 in 10 s, begun or reset; 128 at a time |",
-        "| calls over one connection | 16 at a time |",
-        "A certificate that goes beyond its calls in 1 s or 10 s gets no new connection for a minute.",
-        "| time for a handshake | 25 s: ", "| from the handshake to a first request | 5 s |",
-        "| a connection without a stream | closed after 1 s; one without a first call after 5 s |"})
+                    page = content(OSTEON_DEPLOY "/docs/security.md");
+  for (const char* line : {"| connections | 500; of one address 20, and 40 new ones in 10 s |",
+                           "| calls of one certificate | 300 in 1 s, 1500 in 10 s, begun or reset; 128 at a time |",
+                           "| calls over one connection | 16 at a time |",
+                           "A certificate that exceeds its calls gets no new\nconnection for a minute.",
+                           "| handshake | 25 s: ", "| from the handshake to the first request | 5 s |",
+                           "| a connection without a stream | 1 s; without a first call, 5 s |"})
     EXPECT_THAT(page, HasSubstr(line));
   for (const char* line :
        {"  maxconn 500", "  tcp-request connection reject if { sc0_conn_cur gt 20 }",
