@@ -21,6 +21,7 @@
 #include "common/runtime/spsc_queue.hpp"
 #include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/watchdog.hpp"
+#include "haptic_client/app/client_messages.hpp"
 #include "haptic_client/app/cut_log.hpp"
 #include "haptic_client/control/confirmation_monitor.hpp"
 #include "haptic_client/control/felt_mount.hpp"
@@ -48,78 +49,6 @@ constexpr std::size_t kTickTimes = 8192;     // ticks whose wake-up time is stor
 std::int64_t ns(Clock::time_point t) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(t.time_since_epoch()).count();
 }
-
-// Messages of the room on their way to the replica's thread.
-struct Committed {
-  RoomSeq room_seq;
-  Cut cut;
-};
-struct Rejected {
-  RoomSeq room_seq;
-  std::uint64_t author_seq;
-  std::uint64_t lease_epoch;
-  std::string reason;
-};
-struct Noted {
-  RoomSeq room_seq;  // of an event that does not change the bone
-};
-struct SceneSet {
-  RoomSeq room_seq;
-  std::vector<SceneItem> items;
-};
-struct ToolNamed {
-  std::string name;  // held by another person
-};
-struct Interrupted {
-  std::string why;  // the connection to the room is down and is being made again
-};
-using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid,
-                              ToolNamed, Noted, Interrupted>;
-
-// Others' tools, as last received.
-struct Partners {
-  static constexpr std::size_t kMost = 16;
-  struct Partner {
-    AuthorId author;  // null: none
-    std::uint64_t state_seq = 0;
-    Pose pose_bone_tool, pose_bone_device;
-    std::int64_t received_ns = 0;
-    std::size_t tool = 0;  // hash of its name
-  };
-  std::array<Partner, kMost> of;
-};
-
-// The solids of tools that others hold, by their names' hashes. They live as long as the client.
-struct PartnerSolids {
-  static constexpr std::size_t kMost = 32;
-  std::array<std::pair<std::size_t, const SolidLattice*>, kMost> of{};
-  std::size_t count = 0;
-  [[nodiscard]] const SolidLattice* find(std::size_t tool) const noexcept {
-    for (std::size_t i = 0; i < count; ++i)
-      if (of[i].first == tool) return of[i].second;
-    return nullptr;
-  }
-};
-
-GuideSeen guide_among(const Partners& partners, AuthorId guide) {
-  for (const Partners::Partner& partner : partners.of)
-    if (guide && partner.author == guide) return {true, partner.state_seq, partner.pose_bone_device.position_mm};
-  return {};
-}
-
-// Pose of the bone on its mount. Connections to the room are counted from 1.
-struct MountUpdate {
-  std::uint64_t line = 0;
-  MountPose seen;
-};
-
-// Pose of the tool, for the replica's thread.
-struct ToolPlace {
-  Pose pose_bone_tool;
-  int tool = 0;
-  std::uint32_t step = 0;
-  bool taken_up = false;
-};
 
 class Client {
  public:

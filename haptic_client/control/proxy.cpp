@@ -21,15 +21,13 @@ constexpr double kNothing_mm = 1e-6;
 constexpr double kSkin_mm = 1e-4;
 constexpr double kNoise_mm = 1e-5;  // of distances in floats
 constexpr double kFlatField = 0.3;  // a shorter gradient means nothing: samples are clipped there
-// On a slope, a drill's point holds up to this much sideways force for each newton along its axis [A]: 17 degrees.
-// Beyond that it skates, until most of its point is in bone.
+// Sideways force that a drill's point holds on a slope, per newton along its axis [A]: 17 degrees. Beyond it skates.
 constexpr double kBite = 0.3, kSteepest = 3.0, kWholePoint = 0.9;
 constexpr double kSkiveSpeed_mm_per_s = 30.0;
 constexpr double kMostSkive_mm = 3.0;
 // Stiffness with which a hand, and the other beside it, hold the point against that. [A]
 constexpr double kHand_n_per_mm = 20.0;
-// Play of a tool in its own hole, in insets. Points that stand some millimetres apart around it permit a little more
-// between them.
+// Play of a tool in its own hole, in insets: points that stand apart around it permit a little more.
 constexpr double kPlay = 1.5;
 constexpr std::int32_t kNoSweep = -1;
 constexpr double kDrawnOut_mm = 1.0;  // in a tick, of a tool that is locked in bone

@@ -10,6 +10,7 @@
 
 #include "tests/scenario/recording.hpp"
 #include "tests/support/shared_data.hpp"
+#include "tests/unit/wire/link_pair.hpp"
 #include "tests/unit/wire/link_trial.hpp"
 
 namespace osteon {
@@ -17,6 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::hostile;
+using test::LinkPair;
 using test::node;
 using test::PathQuality;
 using test::Random;
@@ -300,74 +302,9 @@ TEST(LinkEnds, BackAndForthBetweenDatagramsAndStream) {
   }
 }
 
-// Both ends in one place, without a network: what each says can be read, changed or lost.
-struct Pair {
-  explicit Pair(const wire::LinkOptions& up = {}, const wire::LinkOptions& down = wire::server_link_options())
-      : client(keys, 1, 1, up),
-        server(keys, {7}, test::seeded(2), 1, 1, down),
-        reads_up(3, keys.up),
-        reads_down(3, keys.down) {}
-
-  // For so long, what is sent arriving at once, where `lost` lets it.
-  void run(Time span) {
-    DatagramBuffer buffer, plain;
-    for (const Time until = now + span; now < until; now += 1ms) {
-      for (auto bytes = client.send(now, buffer); !bytes.empty(); bytes = client.send(now, buffer)) {
-        const auto opened = reads_up.open(bytes, now, plain);
-        ASSERT_TRUE(opened);
-        v1::UpPacket packet;
-        ASSERT_TRUE(packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size())));
-        ups.push_back(packet);
-        if (!lost || !lost(packet)) server.receive(node(2), bytes, now);
-      }
-      while (const auto out = server.send(now, buffer)) {
-        const auto opened = reads_down.open(out->bytes, now, plain);
-        ASSERT_TRUE(opened);
-        v1::DownPacket packet;
-        ASSERT_TRUE(packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size())));
-        downs.push_back(packet);
-        if (!lost_down || !lost_down(packet)) client.receive(out->bytes, now);
-      }
-    }
-  }
-  Cut cut(std::uint64_t number, std::size_t knots = 1) const {
-    Cut cut;
-    cut.author = {7};
-    cut.author_seq = number;
-    cut.path.resize(1 + knots);
-    for (std::size_t k = 0; k < cut.path.size(); ++k)
-      cut.path[k].position[0] = static_cast<std::int32_t>(10 * (number + k));
-    return cut;
-  }
-  // A packet of the client's that its program would never make.
-  void say(const v1::UpPacket& packet) {
-    DatagramBuffer buffer;
-    const std::string plain = packet.SerializeAsString();
-    server.receive(node(2),
-                   liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer), now);
-  }
-  void say(const v1::DownPacket& packet) {
-    DatagramBuffer buffer;
-    const std::string plain = packet.SerializeAsString();
-    client.receive(liar_down.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer),
-                   now);
-  }
-
-  SessionKeys keys = make_session_keys(3, test::seeded(1));
-  wire::ClientLink client;
-  wire::ServerLink server;
-  Opener reads_up, reads_down;
-  Sealer liar_up{3, keys.up, {.first_counter = 100'000}}, liar_down{3, keys.down, {.first_counter = 100'000}};
-  Time now = 1s;
-  std::vector<v1::UpPacket> ups;
-  std::vector<v1::DownPacket> downs;
-  std::function<bool(const v1::UpPacket&)> lost;
-  std::function<bool(const v1::DownPacket&)> lost_down;
-};
-
 // A challenge is answered from where it was sent to, or not at all.
 TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   ASSERT_EQ(pair.server.address(), node(2));
   const auto sealed = [&](const v1::UpPacket& packet) {
@@ -404,7 +341,7 @@ TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
 
 TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
   // A challenge shows the client that the server hears it, not that the server knows where it is.
-  Pair challenged;
+  LinkPair challenged;
   challenged.lost = [](const v1::UpPacket& packet) { return !packet.path_echo().empty(); };
   challenged.run(300ms);
   ASSERT_FALSE(challenged.downs.empty());
@@ -414,7 +351,7 @@ TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
   EXPECT_TRUE(challenged.client.alive(challenged.now) && challenged.server.alive(challenged.now));
 
   // The server is heard no more, then nobody is; and who speaks from elsewhere is not yet reached there.
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   pair.lost_down = [](const v1::DownPacket&) { return true; };
   pair.run(700ms);
@@ -430,7 +367,7 @@ TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
 
 // A client that hears its server, and is not heard, would put its cuts into datagrams for ever.
 TEST(LinkEnds, WhoIsNotHeardIsNotAliveThoughHeHears) {
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   ASSERT_TRUE(pair.client.alive(pair.now));
   pair.lost = [](const v1::UpPacket&) { return true; };
@@ -445,7 +382,7 @@ TEST(LinkEnds, WhoIsNotHeardIsNotAliveThoughHeHears) {
 
 // Both ends meet cuts that an earlier session of the author has brought, and that are decided only now.
 TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   pair.server.decided(2);
   pair.server.decided(1);
@@ -464,7 +401,7 @@ TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
 
 // What a session's client is told says of itself what it decides.
 TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   for (std::uint64_t n = 1; n <= 3; ++n) ASSERT_TRUE(pair.client.push(pair.cut(n)));
   pair.run(100ms);
@@ -494,7 +431,7 @@ TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
 
 // Whoever is stopped knows it by the packet itself, before the entry has its turn.
 TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   wire::SessionEntry word{.room_seq = {5},
                           .kind = wire::SessionEntryKind::supervised,
@@ -526,7 +463,7 @@ TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
 // After a long stop the stream brings thousands of entries in a moment.
 TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
   constexpr std::uint64_t kEntries = 5000;
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   const auto entry = [&](std::uint64_t n) {
     return wire::IndexedEntry{n, {.room_seq = {n}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(n)}};
@@ -550,7 +487,7 @@ TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
 TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
   wire::LinkOptions up, down = wire::server_link_options();
   up.rate.fewest_repeats = up.rate.most_repeats = down.rate.fewest_repeats = down.rate.most_repeats = 1;
-  Pair pair(up, down);
+  LinkPair pair(up, down);
   pair.run(300ms);
   ASSERT_TRUE(pair.client.alive(pair.now) && pair.server.alive(pair.now));
   std::array<int, 21> cuts{}, entries{};
@@ -600,7 +537,7 @@ TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
 }
 
 TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
-  Pair pair;
+  LinkPair pair;
   std::uint64_t number = 0;
   while (pair.client.push(pair.cut(number + 1, 20))) ++number;
   EXPECT_GT(pair.client.half().window().bytes_unacknowledged(), 15u * 1024);
@@ -637,7 +574,7 @@ TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
 }
 
 TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
-  Pair pair;
+  LinkPair pair;
   pair.run(300ms);
   for (std::uint64_t n = 1; n <= 3; ++n) {
     ASSERT_TRUE(pair.client.push(pair.cut(n)));
@@ -736,7 +673,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
 // A hand that trembles by less than the deadband costs what a resting one does; one that moves is followed.
 TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
   const auto packets_in_4s = [](double tremor_mm, double speed_mm_per_s) {
-    Pair pair;
+    LinkPair pair;
     pair.run(1s);
     Random random(3);
     CuttingState state;

@@ -1,0 +1,88 @@
+// What the threads of the haptic client hand to each other: messages of the room, others' tools, and the mount's pose.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "haptic_client/control/guiding.hpp"
+#include "haptic_client/control/replica.hpp"
+
+namespace osteon::haptic {
+
+// Messages of the room on their way to the replica's thread.
+struct Committed {
+  RoomSeq room_seq;
+  Cut cut;
+};
+struct Rejected {
+  RoomSeq room_seq;
+  std::uint64_t author_seq;
+  std::uint64_t lease_epoch;
+  std::string reason;
+};
+struct Noted {
+  RoomSeq room_seq;  // of an event that does not change the bone
+};
+struct SceneSet {
+  RoomSeq room_seq;
+  std::vector<SceneItem> items;
+};
+struct ToolNamed {
+  std::string name;  // held by another person
+};
+struct Interrupted {
+  std::string why;  // the connection to the room is down and is being made again
+};
+using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid,
+                              ToolNamed, Noted, Interrupted>;
+
+// Others' tools, as last received.
+struct Partners {
+  static constexpr std::size_t kMost = 16;
+  struct Partner {
+    AuthorId author;  // null: none
+    std::uint64_t state_seq = 0;
+    Pose pose_bone_tool, pose_bone_device;
+    std::int64_t received_ns = 0;
+    std::size_t tool = 0;  // hash of its name
+  };
+  std::array<Partner, kMost> of;
+};
+
+// The solids of tools that others hold, by their names' hashes. They live as long as the client.
+struct PartnerSolids {
+  static constexpr std::size_t kMost = 32;
+  std::array<std::pair<std::size_t, const SolidLattice*>, kMost> of{};
+  std::size_t count = 0;
+  [[nodiscard]] const SolidLattice* find(std::size_t tool) const noexcept {
+    for (std::size_t i = 0; i < count; ++i)
+      if (of[i].first == tool) return of[i].second;
+    return nullptr;
+  }
+};
+
+inline GuideSeen guide_among(const Partners& partners, AuthorId guide) {
+  for (const Partners::Partner& partner : partners.of)
+    if (guide && partner.author == guide) return {true, partner.state_seq, partner.pose_bone_device.position_mm};
+  return {};
+}
+
+// Pose of the bone on its mount. Connections to the room are counted from 1.
+struct MountUpdate {
+  std::uint64_t line = 0;
+  MountPose seen;
+};
+
+// Pose of the tool, for the replica's thread.
+struct ToolPlace {
+  Pose pose_bone_tool;
+  int tool = 0;
+  std::uint32_t step = 0;
+  bool taken_up = false;
+};
+
+}  // namespace osteon::haptic
