@@ -6,7 +6,7 @@ namespace osteon {
 
 PathWatch::PathWatch(FillRandom random, const PathRules& rules) : random_(std::move(random)), rules_(rules) {}
 
-void PathWatch::heard(const Endpoint& from, bool newest, std::size_t bytes, std::chrono::nanoseconds now) {
+void PathWatch::received(const Endpoint& from, bool newest, std::size_t bytes, std::chrono::nanoseconds now) {
   forget_unproven(now);
   if (newest && from == address_) {
     candidate_.reset();  // the peer is at its address: it has returned, or never left

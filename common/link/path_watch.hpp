@@ -32,7 +32,7 @@ class PathWatch {
 
   // An authentic datagram of `bytes` came from `from`. `newest`: its counter is above all before (Opened::newest).
   // `now`: since any start, the same for all calls.
-  void heard(const Endpoint& from, bool newest, std::size_t bytes, std::chrono::nanoseconds now);
+  void received(const Endpoint& from, bool newest, std::size_t bytes, std::chrono::nanoseconds now);
   // An authentic datagram from `from` contained this token. True if the peer's address changed to `from`.
   bool echoed(const Endpoint& from, const PathToken& token, std::chrono::nanoseconds now);
 

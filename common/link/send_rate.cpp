@@ -39,7 +39,7 @@ void SendRate::sent(Time now, std::size_t bytes) {
   last_ = now;
 }
 
-void SendRate::heard(std::uint64_t newest_counter, std::uint64_t received) {
+void SendRate::acknowledge(std::uint64_t newest_counter, std::uint64_t received) {
   if (newest_counter <= newest_ || received < received_) return;
   const auto passed = static_cast<double>(newest_counter - newest_);
   // Reordered packets are counted late, so a single report may show too many or too few losses. The average over

@@ -45,7 +45,7 @@ class SendRate {
 
   // What each packet of the other end reports about our packets: the newest counter that it has seen, and how many
   // packets arrived, repeats of the network not counted. Values that do not advance are ignored.
-  void heard(std::uint64_t newest_counter, std::uint64_t received);
+  void acknowledge(std::uint64_t newest_counter, std::uint64_t received);
   void set_round_trip(Time round_trip) { round_trip_ = round_trip; }
   // Share of packets lost lately, 0 to 1, smoothed over about 64 packets. 0.1 before the first packet.
   [[nodiscard]] double loss() const { return std::clamp(loss_, 0.0, 1.0); }

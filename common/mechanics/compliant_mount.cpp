@@ -76,18 +76,18 @@ bool MountServer::receive(std::uint64_t author, const MountLoad& push) noexcept 
   if (push.push_seq <= a.push_seq) return false;
   // The first total is the start of the count, because an earlier session may have left any value.
   if (a.push_seq == 0) {
-    a.told_mj = push.energy_mj;
-    a.heard_s = now_s_;
+    a.reported_mj = push.energy_mj;
+    a.received_s = now_s_;
   }
-  const double gained_mj = push.energy_mj - a.told_mj;
+  const double gained_mj = push.energy_mj - a.reported_mj;
   if (gained_mj > 0.0) {
     // A gain that no person could have put in does not count.
     constexpr double kSpare_s = 0.5;
-    share_out(author, std::min(gained_mj, params_.most_n * params_.most_mm_per_s * (now_s_ - a.heard_s + kSpare_s)));
-    a.told_mj = push.energy_mj;
+    share_out(author, std::min(gained_mj, params_.most_n * params_.most_mm_per_s * (now_s_ - a.received_s + kSpare_s)));
+    a.reported_mj = push.energy_mj;
   }
   a.push_seq = push.push_seq;
-  a.heard_s = now_s_;
+  a.received_s = now_s_;
   a.load = {clamped(push.load.force_n, params_.most_n), clamped(push.load.moment_nmm, params_.most_nmm)};
   if (push.seen_seq > 0 && push.seen_seq <= a.seen_seq && a.seen_seq - push.seen_seq < kTimesKept)
     a.lag_s = smoothed_lag(a.lag_s, now_s_ - a.sent_s[push.seen_seq % kTimesKept]);
@@ -104,7 +104,7 @@ void MountServer::step(double dt_s) noexcept {
   now_s_ += dt_s;
   Load all;
   for (auto& [author, a] : authors_) {
-    if (now_s_ - a.heard_s > params_.silent_s) a.load = std::exp(-dt_s / params_.fade_s) * a.load;
+    if (now_s_ - a.received_s > params_.silent_s) a.load = std::exp(-dt_s / params_.fade_s) * a.load;
     all = all + a.load;
   }
   mount_.step(all, dt_s);
@@ -128,7 +128,7 @@ MountFollower::MountFollower(const MountFollowerParams& params)
     : params_(params), own_mj_(params.allowance_mj), mount_lag_s_(lag_of(params.mount)), low_pass_s_(params.least_s) {
   OSTEON_CHECK(params.mount.good() && params.least_s > 0.0 && params.most_s >= params.least_s && params.per_lag >= 0.0);
   OSTEON_CHECK(params.most_mm_per_s2 > 0.0 && params.most_rad_per_s2 > 0.0);
-  OSTEON_CHECK(params.allowance_mj >= 0.0 && params.kept_mj >= 0.0 && params.granted_most_mj >= 0.0);
+  OSTEON_CHECK(params.allowance_mj >= 0.0 && params.reserve_mj >= 0.0 && params.granted_most_mj >= 0.0);
 }
 
 void MountFollower::see(const MountPose& seen) noexcept {
@@ -137,8 +137,8 @@ void MountFollower::see(const MountPose& seen) noexcept {
     return;
   seen_seq_ = seen.seen_seq;
   since_seen_s_ = 0.0;
-  told_ = {clamped(seen.shift.place_mm, params_.mount.most_mm),
-           quaternion(clamped(seen.shift.turn_rad, params_.mount.most_rad))};
+  received_ = {clamped(seen.shift.place_mm, params_.mount.most_mm),
+               quaternion(clamped(seen.shift.turn_rad, params_.mount.most_rad))};
   slowest_s_ = std::clamp(seen.lag_s, 0.0, kMostLag_s);
   if (timed_seq_ > 0 && seen.push_seq >= timed_seq_) {
     lag_s_ = smoothed_lag(lag_s_, now_s_ - timed_s_);
@@ -163,9 +163,9 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
       std::clamp(params_.per_lag * (std::max(lag_s_, slowest_s_) + mount_lag_s_), params_.least_s, params_.most_s);
   const double share = -std::expm1(-dt_s / low_pass_s_), share_again = -std::expm1(-dt_s / params_.least_s);
   if (since_seen_s_ <= params_.silent_s) {
-    smooth_.mm += share * (told_.mm - smooth_.mm);
+    smooth_.mm += share * (received_.mm - smooth_.mm);
     smooth_.turn =
-        (quaternion(share * rotation_vector(told_.turn * smooth_.turn.conjugate())) * smooth_.turn).normalized();
+        (quaternion(share * rotation_vector(received_.turn * smooth_.turn.conjugate())) * smooth_.turn).normalized();
   } else {
     smooth_ = shown_;
   }
@@ -222,7 +222,7 @@ void MountFollower::step(const Load& load, double dt_s) noexcept {
   }
 
   // Granted funds are passed on while they are not needed here, so that a client without funds eventually gets them.
-  const double spare_mj = std::max(0.0, own_mj_ - params_.kept_mj);
+  const double spare_mj = std::max(0.0, own_mj_ - params_.reserve_mj);
   const double handed_on_mj = held_back_ || net_mj < 0.0 ? 0.0 : std::min(1.0, dt_s / params_.hand_on_s) * others_mj_;
   own_mj_ -= spare_mj;
   others_mj_ -= handed_on_mj;

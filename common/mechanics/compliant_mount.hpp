@@ -81,8 +81,8 @@ class MountServer {
   struct Author {
     std::uint64_t push_seq = 0, seen_seq = 0;
     Load load;
-    double told_mj = 0, granted_mj = 0;
-    double heard_s = 0, lag_s = 0;
+    double reported_mj = 0, granted_mj = 0;
+    double received_s = 0, lag_s = 0;
     std::array<double, kTimesKept> sent_s{};  // send times of the last poses, by number
   };
   void share_out(std::uint64_t from, double energy_mj) noexcept;
@@ -100,7 +100,7 @@ struct MountFollowerParams {
   double most_mm_per_s = 60.0, most_rad_per_s = 1.0;
   double most_mm_per_s2 = 5000.0, most_rad_per_s2 = 50.0;  // except for a stop that the funds require [A]
   double allowance_mj = 2.0;                               // that may be released without being put in, in total
-  double kept_mj = 2.0;                                    // of what this user put in; the rest is given away at once
+  double reserve_mj = 2.0;                                 // of what this user put in; the rest is given away at once
   double granted_most_mj = 50.0;                           // largest unused part of what others gave
   double hand_on_s = 0.5;  // time constant with which the unused part is given away again
   double silent_s = 0.5;   // without a received pose for this time the bone stops
@@ -139,7 +139,7 @@ class MountFollower {
   };
 
   MountFollowerParams params_;
-  Place told_, smooth_, shown_;                            // the newest pose, after one pass, after both
+  Place received_, smooth_, shown_;                        // the newest pose, after one pass, after both
   Vec3 move_mm_ = Vec3::Zero(), turn_rad_ = Vec3::Zero();  // of the last step
   Load load_;
   double own_mj_, others_mj_ = 0;  // funds: of what this user put in, and of what was granted

@@ -107,7 +107,7 @@ MachineFacts look_at_machine(int priority) {
   facts.preemption = preemption();
   if (const std::string runtime = first_line("/proc/sys/kernel/sched_rt_runtime_us"); !runtime.empty()) {
     facts.rt_runtime_us = std::atol(runtime.c_str());
-    facts.rt_runtime_told = true;
+    facts.rt_runtime_known = true;
   }
   timespec resolution{};
   if (::clock_getres(CLOCK_MONOTONIC, &resolution) == 0)
@@ -162,7 +162,7 @@ std::vector<MachineFinding> judge(const MachineFacts& facts, int priority, long 
   else
     say(Finding::fine, "There are " + std::to_string(facts.cores) + " cores.");
 
-  if (facts.rt_runtime_told && facts.rt_runtime_us >= 0 && facts.rt_runtime_us < 500'000)
+  if (facts.rt_runtime_known && facts.rt_runtime_us >= 0 && facts.rt_runtime_us < 500'000)
     say(Finding::lacking,
         "Real-time threads are stopped after " + std::to_string(facts.rt_runtime_us / 1000) + " ms of every second.",
         "sudo sysctl kernel.sched_rt_runtime_us=950000");

@@ -27,7 +27,7 @@ struct MachineFacts {
   std::vector<std::string> governors;                                // one for each core that has one
   std::string preemption;   // "rt", "full", "voluntary", "none", "dynamic" (chosen at boot, value unknown)
   long rt_runtime_us = -1;  // of every second that real-time threads may use; -1 reported by the machine: all
-  bool rt_runtime_told = false;
+  bool rt_runtime_known = false;
   long timer_resolution_ns = -1;
   std::string clock_source;  // "tsc", "kvm-clock", …
   bool virtual_machine = false;

@@ -28,65 +28,67 @@ bool has_news(const KnownToolState& said, const KnownToolState& now, const PoseD
 
 ClientLink::ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq, std::uint64_t first_index,
                        const LinkOptions& options)
-    : half_(keys.session, keys.up, keys.down, first_author_seq, options), entries_(first_index, options.most_ahead) {}
+    : endpoint_(keys.session, keys.up, keys.down, first_author_seq, options),
+      entries_(first_index, options.most_ahead) {}
 
 bool ClientLink::push(const Cut& cut) {
-  if (half_.begin(cut.author_seq) && fits_a_packet(cut)) {
-    if (!sender_ || cut.author_seq != coded_ + 1) sender_.emplace(half_.window(), tools_);
+  if (endpoint_.begin(cut.author_seq) && fits_a_packet(cut)) {
+    if (!sender_ || cut.author_seq != coded_ + 1) sender_.emplace(endpoint_.window(), tools_);
     if (sender_->push(cut)) {
       coded_ = cut.author_seq;
       return true;
     }
   }
-  half_.goes_over_stream();
+  endpoint_.goes_over_stream();
   return false;
 }
 
 void ClientLink::set_state(const CuttingState& state, std::uint32_t buttons) {
   state_ = {state, buttons};
-  moved_ = !said_ || has_news(*said_, *state_, half_.options().deadband);
+  moved_ = !said_ || has_news(*said_, *state_, endpoint_.options().deadband);
 }
 
 void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   DatagramBuffer plain;
-  const auto opened = half_.open(datagram, now, plain);
+  const auto opened = endpoint_.open(datagram, now, plain);
   if (!opened) return;
   // Everything is parsed before anything is used.
   v1::DownPacket packet;
-  if (!packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size()))) return half_.malformed();
+  if (!packet.ParseFromArray(opened->plain.data(), static_cast<int>(opened->plain.size())))
+    return endpoint_.malformed();
   const std::string& token = packet.path_challenge();
-  if (!token.empty() && token.size() != echo_.size()) return half_.malformed();
+  if (!token.empty() && token.size() != echo_.size()) return endpoint_.malformed();
   std::size_t left_out = 0;
   const auto entries = entries_of(packet, tools_, &left_out);
-  if (!entries) return half_.malformed();
+  if (!entries) return endpoint_.malformed();
   if (std::ranges::any_of(*entries, [](const IndexedEntry& one) {
         return one.entry.kind != SessionEntryKind::streamed && !fits_a_packet(one.entry);
       }))
-    return half_.malformed();
+    return endpoint_.malformed();
   std::vector<KnownToolState> states;
   for (const v1::ToolState& sent : packet.partners()) {
     const auto known = partners_.find(sent.author());
     KnownToolState state = known == partners_.end() ? KnownToolState{} : known->second.state;
     const auto newer = take_over(sent, state);
-    if (!newer) return half_.malformed();
+    if (!newer) return endpoint_.malformed();
     if (*newer) states.push_back(std::move(state));
   }
   std::optional<MountPose> bone;
   if (packet.has_bone()) {
     const auto seen = from_wire(packet.bone());
-    if (!seen) return half_.malformed();
+    if (!seen) return endpoint_.malformed();
     bone = *seen;
   }
 
-  half_.left_out(left_out);
+  endpoint_.left_out(left_out);
   if (!token.empty()) {
     std::ranges::copy(token, echo_.begin());
     echoes_left_ = kEchoes;
-    half_.repeat_news(kEchoes);
+    endpoint_.repeat_news(kEchoes);
     return;  // a packet with a challenge goes to an unproven address and contains nothing else
   }
-  half_.is_alive(now);
-  half_.heard(packet, *opened, now);
+  endpoint_.is_alive(now);
+  endpoint_.read_times(packet, *opened, now);
   // A later time than now was not sent by this client.
   if (packet.times().echo_sent_us() != 0 && packet.times().echo_sent_us() <= static_cast<std::uint64_t>(now / 1us))
     arrived_at_ = std::max(arrived_at_, Time(std::chrono::microseconds(packet.times().echo_sent_us())));
@@ -96,7 +98,7 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
   }
   for (const IndexedEntry& entry : *entries)
     if (entry.entry.kind != SessionEntryKind::streamed) entries_.offer(entry.index, entry.entry);
-  if (!entries->empty() || left_out > 0) half_.answer();
+  if (!entries->empty() || left_out > 0) endpoint_.answer();
   for (KnownToolState& state : states) keep_partner(std::move(state), now);
   if (bone && bone->seen_seq > bone_seq_) {
     bone_ = bone;
@@ -107,15 +109,16 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
 void ClientLink::keep_partner(KnownToolState state, Time now) {
   const std::uint64_t author = state.state.author.value;
   if (partners_.size() == kMostPartners && !partners_.contains(author))
-    partners_.erase(std::ranges::min_element(partners_, {}, [](const auto& entry) { return entry.second.heard_at; }));
+    partners_.erase(
+        std::ranges::min_element(partners_, {}, [](const auto& entry) { return entry.second.received_at; }));
   partners_[author] = {std::move(state), now};
 }
 
 std::vector<KnownToolState> ClientLink::partners(Time now) const {
-  std::vector<KnownToolState> heard;
+  std::vector<KnownToolState> states;
   for (const auto& [author, partner] : partners_)
-    if (now - partner.heard_at < kPartnerForgotten) heard.push_back(partner.state);
-  return heard;
+    if (now - partner.received_at < kPartnerForgotten) states.push_back(partner.state);
+  return states;
 }
 
 std::optional<IndexedEntry> ClientLink::take_entry() {
@@ -126,16 +129,16 @@ std::optional<IndexedEntry> ClientLink::take_entry() {
 
 // When the state itself needs a packet.
 Time ClientLink::state_due() const {
-  if (moved_) return said_at_ + half_.options().state_interval;
-  return state_ && at_the_bone(*state_) ? effort_at_ + half_.options().effort_interval : Time::max();
+  if (moved_) return said_at_ + endpoint_.options().state_interval;
+  return state_ && at_the_bone(*state_) ? effort_at_ + endpoint_.options().effort_interval : Time::max();
 }
 
-Time ClientLink::push_due() const { return push_ ? pushed_at_ + half_.options().bone_interval : Time::max(); }
+Time ClientLink::push_due() const { return push_ ? pushed_at_ + endpoint_.options().bone_interval : Time::max(); }
 
 // The tool's state for the packet that goes now. Empty if there is nothing new.
 v1::UpPacket ClientLink::state_part(Time now) const {
   v1::UpPacket part;
-  const Time interval = half_.options().effort_interval;
+  const Time interval = endpoint_.options().effort_interval;
   if (state_ && (state_due() <= now || now - said_at_ >= interval))
     *part.mutable_state() = to_tool_state(state_->state, state_->buttons, now - effort_at_ >= interval);
   return part;
@@ -149,13 +152,13 @@ void ClientLink::said_state(const v1::UpPacket& part, Time now) {
   moved_ = false;
 }
 
-Time ClientLink::next(Time now) const { return half_.next(now, std::min(state_due(), push_due())); }
+Time ClientLink::next(Time now) const { return endpoint_.next(now, std::min(state_due(), push_due())); }
 
 std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t> into) {
   if (next(now) > now) return {};
-  PacketFiller<v1::UpPacket> filler(half_.room(now));
+  PacketFiller<v1::UpPacket> filler(endpoint_.room(now));
   const std::uint64_t taken = entries_.acknowledged();
-  auto head = half_.head<v1::UpPacket>(now, taken, entries_.beyond(taken));
+  auto head = endpoint_.head<v1::UpPacket>(now, taken, entries_.beyond(taken));
   if (echoes_left_ > 0) {
     --echoes_left_;
     head.set_path_echo(echo_.data(), echo_.size());
@@ -165,15 +168,16 @@ std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t>
   // Load and state go before repeated cuts, but must leave room for the next cut, which otherwise might never be sent.
   v1::UpPacket push;
   if (push_due() <= now) *push.mutable_push() = to_wire(*push_);
-  if (push.has_push() && push.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(push)) {
+  if (push.has_push() && push.ByteSizeLong() + endpoint_.window().least_room(now) <= filler.room() &&
+      filler.add(push)) {
     push_.reset();
     pushed_at_ = now;
   }
   const v1::UpPacket state = state_part(now);
-  if (state.ByteSizeLong() + half_.window().least_room(now) <= filler.room() && filler.add(state))
+  if (state.ByteSizeLong() + endpoint_.window().least_room(now) <= filler.room() && filler.add(state))
     said_state(state, now);
-  half_.add_items(filler, now);
-  return half_.seal(filler.take(), now, into);
+  endpoint_.add_items(filler, now);
+  return endpoint_.seal(filler.take(), now, into);
 }
 
 }  // namespace osteon::wire

@@ -37,7 +37,7 @@ class ClientLink {
   // the link is not alive(), every cut above acknowledged() goes over the stream too.
   [[nodiscard]] bool push(const Cut& cut);
   // The stream reports that cuts up to this one are decided and durable.
-  void acknowledge(std::uint64_t author_seq) { half_.acknowledge(author_seq); }
+  void acknowledge(std::uint64_t author_seq) { endpoint_.acknowledge(author_seq); }
   // Newest state of the tool. Call it for every state; state_seq rises. A state is sent at once if the tool has moved
   // by more than the deadband. It is sent some 30 times a second while the tool touches the bone, and now and then
   // otherwise.
@@ -51,7 +51,7 @@ class ClientLink {
   bool offer(const IndexedEntry& entry) { return entries_.offer(entry.index, entry.entry); }
   // The stream has delivered this entry and all entries before it that were not taken here. None of them comes out any
   // more.
-  void heard(std::uint64_t index) { entries_.skip(index); }
+  void received(std::uint64_t index) { entries_.skip(index); }
   // Entries in order of their index, each once. An entry of kind streamed comes out only after its copy was offered.
   [[nodiscard]] std::optional<IndexedEntry> take_entry();
 
@@ -63,10 +63,10 @@ class ClientLink {
   // Datagrams get through in both directions. The server recently sent one that it sends only to a proven address, and
   // it reported that a recent one of ours arrived.
   [[nodiscard]] bool alive(Time now) const {
-    return half_.alive(now) && now - arrived_at_ < 2 * half_.options().alive_for;
+    return endpoint_.alive(now) && now - arrived_at_ < 2 * endpoint_.options().alive_for;
   }
   // Cuts up to this one are decided and durable.
-  [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
+  [[nodiscard]] std::uint64_t acknowledged() const { return endpoint_.acknowledged(); }
   // Entries up to this one have arrived and were taken.
   [[nodiscard]] std::uint64_t entries_taken() const { return entries_.acknowledged(); }
   // As of the newest packet. 0 before the first.
@@ -77,14 +77,14 @@ class ClientLink {
   // The newest pose of the bone on its mount, once. Nothing if it stands on none.
   [[nodiscard]] std::optional<MountPose> take_bone() { return std::exchange(bone_, std::nullopt); }
   // The estimate of the server's clock, and the round trip.
-  [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
-  [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way up
-  [[nodiscard]] const LinkEndpoint& half() const { return half_; }
+  [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return endpoint_.clock(now); }
+  [[nodiscard]] double loss() const { return endpoint_.rate().loss(); }  // on the way up
+  [[nodiscard]] const LinkEndpoint& half() const { return endpoint_; }
 
  private:
   struct Partner {
     KnownToolState state;
-    Time heard_at{};
+    Time received_at{};
   };
   void keep_partner(KnownToolState state, Time now);
   [[nodiscard]] Time state_due() const;
@@ -92,7 +92,7 @@ class ClientLink {
   [[nodiscard]] v1::UpPacket state_part(Time now) const;
   void said_state(const v1::UpPacket& part, Time now);
 
-  LinkEndpoint half_;
+  LinkEndpoint endpoint_;
   ToolNumbers tools_;
   std::optional<CutSender>
       sender_;               // codes each cut against the one before it; a new one if that cut is not in the window

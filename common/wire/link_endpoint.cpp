@@ -56,7 +56,7 @@ std::optional<Opened> LinkEndpoint::open(std::span<const std::uint8_t> datagram,
   return opened;
 }
 
-void LinkEndpoint::heard(const v1::PacketTimes& times, const Opened& opened, Time now) {
+void LinkEndpoint::read_times(const v1::PacketTimes& times, const Opened& opened, Time now) {
   if (opened.newest) {
     peer_sent_us_ = times.sent_us();
     peer_came_ = now;
@@ -65,7 +65,7 @@ void LinkEndpoint::heard(const v1::PacketTimes& times, const Opened& opened, Tim
   if (times.received_counter() == 0 || times.received_counter() >= sealer_.counter() ||
       times.received_packets() > counts_.packets_sent)
     return;
-  rate_.heard(times.received_counter(), times.received_packets());
+  rate_.acknowledge(times.received_counter(), times.received_packets());
   const auto sent = from_us(times.echo_sent_us()), peer_received = from_us(times.echo_received_us()),
              peer_sent = from_us(times.sent_us());
   if (!sent || !peer_received || !peer_sent || !clock_.add({*sent, *peer_received, *peer_sent, now})) return;

@@ -64,8 +64,8 @@ class LinkEndpoint {
   void left_out(std::uint64_t runs) { counts_.left_out += runs; }
   // Processes what a packet reports about our packets. Reports that no correct peer makes are ignored.
   template <class Packet>
-  void heard(const Packet& packet, const Opened& opened, Time now) {
-    if (packet.has_times()) heard(packet.times(), opened, now);
+  void read_times(const Packet& packet, const Opened& opened, Time now) {
+    if (packet.has_times()) read_times(packet.times(), opened, now);
     acknowledge(packet.acknowledged(), packet.acknowledged_beyond());
   }
   // Marks the other end as alive, by a packet which shows that it can be reached.
@@ -122,7 +122,7 @@ class LinkEndpoint {
   [[nodiscard]] const LinkOptions& options() const { return options_; }
 
  private:
-  void heard(const v1::PacketTimes& times, const Opened& opened, Time now);
+  void read_times(const v1::PacketTimes& times, const Opened& opened, Time now);
   void put_times(v1::PacketTimes& times, Time now) const;
   [[nodiscard]] Time keep_alive_interval() const;
   [[nodiscard]] bool fresh(Time now) const;  // something waits that was never sent, and may go sooner than repeats

@@ -227,9 +227,9 @@ Result<JoinedRoom> join_again(const JoinedRoom& room, ClientKind kind, const std
   request.set_resume_author(room.author.value);
   request.set_secret(room.secret);
   if (kept) {
-    request.set_kept_room_seq(kept->room_seq.value);
-    request.set_kept_chain(to_wire(kept->chain));
-    request.set_kept_seal(to_wire(kept->seal));
+    request.set_durable_room_seq(kept->room_seq.value);
+    request.set_durable_chain(to_wire(kept->chain));
+    request.set_durable_seal(to_wire(kept->seal));
   }
   // Waits until the channel, which keeps trying, has a connection.
   grpc::ClientContext context;

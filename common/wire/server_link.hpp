@@ -53,7 +53,7 @@ class ServerLink {
   // it was part of what the client received first.
   bool tell(std::uint64_t index, const SessionEntry& entry);
   // The session reports over the stream that it has taken the entries up to this one.
-  void acknowledge(std::uint64_t index) { half_.acknowledge(index); }
+  void acknowledge(std::uint64_t index) { endpoint_.acknowledge(index); }
   // The author has left and sends no more cuts.
   void forget(AuthorId author) { sender_.forget(author); }
   // Newest states of others' tools; at most kMostPartners are used. A tool that is missing is not sent any more.
@@ -74,15 +74,15 @@ class ServerLink {
   [[nodiscard]] std::optional<Out> send(Time now, std::span<std::uint8_t> into);
 
   // The client is known to be at address(), and a packet came from there lately.
-  [[nodiscard]] bool alive(Time now) const { return half_.alive(now); }
+  [[nodiscard]] bool alive(Time now) const { return endpoint_.alive(now); }
   [[nodiscard]] const Endpoint& address() const { return path_.address(); }
   [[nodiscard]] std::uint64_t moves() const { return path_.moves(); }
   // The session has taken the entries up to this one.
-  [[nodiscard]] std::uint64_t acknowledged() const { return half_.acknowledged(); }
+  [[nodiscard]] std::uint64_t acknowledged() const { return endpoint_.acknowledged(); }
   // The estimate of the client's clock, and the round trip.
-  [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return half_.clock(now); }
-  [[nodiscard]] double loss() const { return half_.rate().loss(); }  // on the way down
-  [[nodiscard]] const LinkEndpoint& half() const { return half_; }
+  [[nodiscard]] std::optional<ClockReading> clock(Time now) const { return endpoint_.clock(now); }
+  [[nodiscard]] double loss() const { return endpoint_.rate().loss(); }  // on the way down
+  [[nodiscard]] const LinkEndpoint& half() const { return endpoint_; }
 
  private:
   struct Partner {
@@ -95,7 +95,7 @@ class ServerLink {
   [[nodiscard]] std::optional<Out> challenge(Time now, std::span<std::uint8_t> into);
   void add_partners(PacketFiller<v1::DownPacket>& filler, Time now, std::size_t keep_free);
 
-  LinkEndpoint half_;
+  LinkEndpoint endpoint_;
   ToolNumbers tools_;
   const AuthorId author_;
   PathWatch path_;

@@ -35,7 +35,7 @@ Result<void> check_protocol_version(std::uint32_t clients) {
                                  : "; install a newer Osteon where the server runs, before the clients"));
 }
 
-std::optional<v1::SessionResponse> row_in(std::uint32_t version, const v1::SessionResponse& row) {
+std::optional<v1::SessionResponse> entry_for_version(std::uint32_t version, const v1::SessionResponse& row) {
   if (version >= version_of(row.message_case())) return row;
   const std::uint64_t room_seq = room_seq_of(row);
   if (room_seq == 0) return std::nullopt;

@@ -18,6 +18,7 @@ inline constexpr std::uint32_t kOldestProtocolVersion = kProtocolVersion - 1;
 // The message as a session of that version receives it. Nothing: it is not sent at all. A version treats messages of
 // unknown kinds as a fault. So an event of an unknown kind, which has a sequence number, is sent as an event that
 // changes nothing.
-[[nodiscard]] std::optional<v1::SessionResponse> row_in(std::uint32_t version, const v1::SessionResponse& row);
+[[nodiscard]] std::optional<v1::SessionResponse> entry_for_version(std::uint32_t version,
+                                                                   const v1::SessionResponse& row);
 
 }  // namespace osteon::wire

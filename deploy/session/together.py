@@ -304,7 +304,7 @@ def described(entries, names):
             to = who.get(int(event["words"].get("to", 0)), "all") if int(event["words"].get("to", 0)) else "all"
             events.append((at, who.get(author, "?"), f"to {to}: “{event['words']['words']}”"))
         elif "undo" in event:
-            events.append((at, who.get(author, "?"), f"takes back {len(event['undo'].get('places', []))} events"))
+            events.append((at, who.get(author, "?"), f"takes back {len(event['undo'].get('room_seqs', []))} events"))
         elif "mark" in event:
             events.append((at, who.get(author, "?"), f"marks “{event['mark']['label']}”"))
     return {"events": events, "cuts": {who.get(author, f"#{author}"): count for author, count in cuts.items()}}

@@ -163,7 +163,7 @@ class Client {
     events.supervised = [this, pass](const HandSupervised& decided) {
       // Passed to the loop at once: it must not wait for earlier work of the replica.
       oversights_.store(
-          haptic_restrictions(decided.supervision, decided.place, decided.lease_epoch, session_.plan().tools));
+          haptic_restrictions(decided.supervision, decided.seq, decided.lease_epoch, session_.plan().tools));
       pass(decided);
     };
     events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) {
@@ -408,7 +408,7 @@ class Client {
     joined_ = true;
   }
   void take(const BonePart& part) {
-    replica_.change(part.place, part.bodies, part.leaves);
+    replica_.change(part.seq, part.bodies, part.leaves);
     changing_ = !part.last;
     follow_lease(part.lease_epoch);
   }
@@ -419,7 +419,7 @@ class Client {
     replica_.lease(epoch);
   }
   void take(const HandSupervised& decided) {
-    replica_.note(decided.place);
+    replica_.note(decided.seq);
     follow_lease(decided.lease_epoch);
     const std::string words = in_words(decided.supervision);
     // At the beginning of a connection without restrictions nothing is reported.
@@ -427,16 +427,16 @@ class Client {
     supervised_ = !words.empty();
     const std::string what = words.empty() ? "free" : words, by = called(decided.by);
     log::info("an instructor changed the restrictions",
-              {{"room_seq", decided.place.value}, {"what", what}, {"by", by}, {"words", decided.supervision.words}});
-    outcome_.restrictions.push_back({ns(Clock::now()), decided.place.value, what, by});
+              {{"room_seq", decided.seq.value}, {"what", what}, {"by", by}, {"words", decided.supervision.words}});
+    outcome_.restrictions.push_back({ns(Clock::now()), decided.seq.value, what, by});
     guard_ = words.empty() ? "" : by;
     if (!decided.supervision.words.empty())
-      outcome_.words.push_back({ns(Clock::now()), decided.place.value, 0, decided.supervision.words});
+      outcome_.words.push_back({ns(Clock::now()), decided.seq.value, 0, decided.supervision.words});
   }
   void take(const WordsSaid& said) {
-    replica_.note(said.place);
-    log::info("words", {{"room_seq", said.place.value}, {"from", said.from.value}, {"words", said.words}});
-    outcome_.words.push_back({ns(Clock::now()), said.place.value, said.from.value, said.words});
+    replica_.note(said.seq);
+    log::info("words", {{"room_seq", said.seq.value}, {"from", said.from.value}, {"words", said.words}});
+    outcome_.words.push_back({ns(Clock::now()), said.seq.value, said.from.value, said.words});
   }
   // Others' tools are felt as solids, if the room's tools contain them.
   void take(const ToolNamed& named) {

@@ -85,9 +85,9 @@ bool FastPath::send(const MountLoad& push) {
   return goes;
 }
 
-void FastPath::heard(std::uint64_t index) {
+void FastPath::received(std::uint64_t index) {
   const std::lock_guard lock(mutex_);
-  link_.heard(index);
+  link_.received(index);
 }
 
 void FastPath::decided(std::uint64_t author_seq) {
@@ -117,11 +117,11 @@ FastPathHealth FastPath::health() const {
 }
 
 void FastPath::take_partners(Time now, std::vector<CuttingState>& newer) {
-  for (const wire::KnownToolState& heard : link_.partners(now)) {
-    std::uint64_t& told = partners_[heard.state.author];
-    if (heard.state.state_seq <= told) continue;
-    told = heard.state.state_seq;
-    newer.push_back(heard.state);
+  for (const wire::KnownToolState& known : link_.partners(now)) {
+    std::uint64_t& newest_seq = partners_[known.state.author];
+    if (known.state.state_seq <= newest_seq) continue;
+    newest_seq = known.state.state_seq;
+    newer.push_back(known.state);
   }
 }
 

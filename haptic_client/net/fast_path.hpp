@@ -48,7 +48,7 @@ class FastPath {
   [[nodiscard]] bool send(const CuttingState& state);
   [[nodiscard]] bool send(const MountLoad& push);
   // What was received over the stream: a log entry, and the newest own cut that is decided.
-  void heard(std::uint64_t index);
+  void received(std::uint64_t index);
   void decided(std::uint64_t author_seq);
   void know_tool(std::uint32_t number, const Digest& tool);
   [[nodiscard]] FastPathHealth health() const;

@@ -25,18 +25,18 @@ struct RoomAtJoin {
   // The caller's cuts up to this one were decided: they are in the leaves or rejected.
   std::uint64_t decided_author_seq = 0;
   // Sequence numbers of the newest of these cuts; the last is that of decided_author_seq. Null: rejected.
-  std::vector<RoomSeq> decided_places{};
+  std::vector<RoomSeq> decided_seqs{};
   // Sequence number of one of these cuts; nothing: the room does not say it.
-  [[nodiscard]] std::optional<RoomSeq> place_of(std::uint64_t author_seq) const {
+  [[nodiscard]] std::optional<RoomSeq> seq_of(std::uint64_t author_seq) const {
     const std::uint64_t after = decided_author_seq - author_seq;
-    if (author_seq == 0 || author_seq > decided_author_seq || after >= decided_places.size()) return std::nullopt;
-    return decided_places[decided_places.size() - 1 - after];
+    if (author_seq == 0 || author_seq > decided_author_seq || after >= decided_seqs.size()) return std::nullopt;
+    return decided_seqs[decided_seqs.size() - 1 - after];
   }
 };
 
 // A part of an event that changed the bone in another way than by a cut: leaves to set, and bodies to keep.
 struct BonePart {
-  RoomSeq place;
+  RoomSeq seq;
   std::vector<BodyId> bodies;     // every other body is gone
   std::uint64_t lease_epoch = 0;  // cuts of an earlier one will be rejected
   std::vector<FieldLeaf> leaves;
@@ -45,7 +45,7 @@ struct BonePart {
 
 // An instructor has restricted the caller's hand: everything that is in force from now on.
 struct HandSupervised {
-  RoomSeq place;  // 0: it was in force when the stream began
+  RoomSeq seq;  // 0: it was in force when the stream began
   Restrictions supervision;
   std::uint64_t lease_epoch = 0;  // of the caller's lease from now on; cuts of an earlier one will be rejected
   Decider by{};                   // as far as the room says it
@@ -53,7 +53,7 @@ struct HandSupervised {
 
 // A message from a person in the room.
 struct WordsSaid {
-  RoomSeq place;
+  RoomSeq seq;
   AuthorId from, to;  // to: null for all
   std::string words;
 };

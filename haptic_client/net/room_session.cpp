@@ -296,7 +296,7 @@ void RoomSession::Impl::follow(const v1::SessionResponse& response) {
     }
   if (response.has_complete()) open_fast_path(response.complete().decided_author_seq());
   const std::shared_ptr<FastPath> path = fast_path();
-  if (path && response.index() != 0) path->heard(response.index());
+  if (path && response.index() != 0) path->received(response.index());
 }
 
 // Where there is no fast path, the stream carries everything.
@@ -316,7 +316,7 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                           [this](wire::IndexedEntry entry) {
                             const std::lock_guard lock(read_mutex);
                             (void)reader->take(std::move(entry));
-                            passed_on = reader->place().value;
+                            passed_on = reader->seq().value;
                           },
                       .dead =
                           [this] {
@@ -379,7 +379,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       follow(response);
       const bool complete = response.has_complete();
       Result<void> taken = reader->take(std::move(response));
-      passed_on = reader->place().value;
+      passed_on = reader->seq().value;
       if (complete) received_leaves = true;
       return taken;
     }();

@@ -29,7 +29,7 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomC
 
 void SessionReader::begin() {
   entries_ = ReceiveWindow<Entry>();
-  place_ = {};
+  seq_ = {};
   supervised_ = false;
   partners_.clear();
 }
@@ -75,20 +75,20 @@ void SessionReader::take(const CuttingState& partner) {
 }
 
 void SessionReader::supervised(const HandSupervised& decided) {
-  place_ = std::max(place_, decided.place);
+  seq_ = std::max(seq_, decided.seq);
   supervised_ = true;
   if (events_.supervised) events_.supervised(decided);
 }
 
 void SessionReader::committed(RoomSeq seq, const Cut& cut) {
-  place_ = std::max(place_, seq);
+  seq_ = std::max(seq_, seq);
   if (cut.author == own_) decided_(cut.author_seq);
   if (events_.committed) events_.committed(seq, cut);
 }
 
 void SessionReader::rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch,
                              const std::string& reason) {
-  place_ = std::max(place_, seq);
+  seq_ = std::max(seq_, seq);
   decided_(author_seq);
   if (events_.rejected) events_.rejected(seq, author_seq, lease_epoch, reason);
 }
@@ -117,9 +117,9 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       complete_(entry.decided_author_seq());
       RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(),
                       entry.decided_author_seq()};
-      for (const std::uint64_t seq : entry.decided_room_seqs()) room.decided_places.push_back(RoomSeq{seq});
+      for (const std::uint64_t seq : entry.decided_room_seqs()) room.decided_seqs.push_back(RoomSeq{seq});
       if (events_.complete) events_.complete(room);
-      place_ = std::max(place_, RoomSeq{entry.room_seq()});
+      seq_ = std::max(seq_, RoomSeq{entry.room_seq()});
       // Nothing was sent about this hand: the restrictions of an earlier stream are over.
       if (!supervised_) supervised({RoomSeq{}, {}, entry.lease_epoch(), {}});
       return {};
@@ -128,7 +128,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       const Result<Tool> tool = wire::from_wire(response.tool().tool());
       if (!tool) return tl::unexpected(tool.error());
       tools_->add(*tool);
-      place_ = std::max(place_, RoomSeq{response.tool().room_seq()});
+      seq_ = std::max(seq_, RoomSeq{response.tool().room_seq()});
       if (events_.noted && response.tool().room_seq() != 0) events_.noted(RoomSeq{response.tool().room_seq()});
       return {};
     }
@@ -142,7 +142,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
           return failure(ErrorCode::invalid_input, "change.leaves has one of a body that is gone");
         part.leaves.push_back(std::move(*leaf));
       }
-      place_ = std::max(place_, part.place);
+      seq_ = std::max(seq_, part.seq);
       if (events_.change) events_.change(std::move(part));
       return {};
     }
@@ -156,7 +156,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
         items.push_back(*item);
       }
       // Without an index it precedes the leaves, which have not arrived.
-      if (response.index() != 0) place_ = std::max(place_, RoomSeq{response.scene().room_seq()});
+      if (response.index() != 0) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
       if (events_.scene) events_.scene(RoomSeq{response.scene().room_seq()}, items);
       return {};
     }
@@ -172,16 +172,16 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       rejected(RoomSeq{entry.room_seq()}, entry.author_seq(), entry.lease_epoch(), entry.reason());
       return {};
     }
-    case v1::SessionResponse::kKept: {
-      const Result<Digest> chain = wire::digest_from_wire(response.kept().chain());
+    case v1::SessionResponse::kDurable: {
+      const Result<Digest> chain = wire::digest_from_wire(response.durable().chain());
       if (!chain) return tl::unexpected(chain.error());
       // An older server sends no seal.
-      const Result<Digest> seal = wire::digest_from_wire(response.kept().seal());
-      kept_ = {RoomSeq{response.kept().room_seq()}, *chain, seal ? *seal : Digest{}};
+      const Result<Digest> seal = wire::digest_from_wire(response.durable().seal());
+      kept_ = {RoomSeq{response.durable().room_seq()}, *chain, seal ? *seal : Digest{}};
       return {};
     }
     case v1::SessionResponse::kNoted:
-      place_ = std::max(place_, RoomSeq{response.noted().room_seq()});
+      seq_ = std::max(seq_, RoomSeq{response.noted().room_seq()});
       if (events_.noted) events_.noted(RoomSeq{response.noted().room_seq()});
       return {};
     case v1::SessionResponse::kSupervised: {
@@ -196,7 +196,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     }
     case v1::SessionResponse::kSaid: {
       const v1::Said& entry = response.said();
-      place_ = std::max(place_, RoomSeq{entry.room_seq()});
+      seq_ = std::max(seq_, RoomSeq{entry.room_seq()});
       if (events_.said)
         events_.said({RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()});
       return {};

@@ -38,7 +38,7 @@ class SessionReader {
   void take(const CuttingState& partner);
   // Sequence number of the newest event of the present stream that was passed on. Once all leaves have arrived, the
   // newest that they contain.
-  [[nodiscard]] RoomSeq place() const { return place_; }
+  [[nodiscard]] RoomSeq seq() const { return seq_; }
   // The newest event that the room has acknowledged as durable.
   [[nodiscard]] const std::optional<wire::DurableSeq>& kept() const { return kept_; }
 
@@ -58,7 +58,7 @@ class SessionReader {
   const std::function<void(std::uint64_t)> decided_, complete_;
   ReceiveWindow<Entry> entries_;
   std::optional<wire::DurableSeq> kept_;
-  RoomSeq place_;
+  RoomSeq seq_;
   bool supervised_ = false;  // restrictions of the present stream were passed on, before its leaves are complete
   std::map<AuthorId, std::uint64_t> partners_;  // newest state_seq of each partner
 };

@@ -52,7 +52,7 @@ void say(const std::string& what, const std::string& value) {
 void say_unsigned() { say("note", "not signed: there is no signing.key beside the journal; give --signing-key FILE"); }
 
 std::string text_of(const JournalHead& head) {
-  return std::to_string(head.place.value) + ", chain " + to_hex(head.chain).substr(0, 16);
+  return std::to_string(head.seq.value) + ", chain " + to_hex(head.chain).substr(0, 16);
 }
 
 // Reads a journal and writes nothing, neither to it nor beside it.
@@ -86,7 +86,7 @@ auto change_journal(const Arguments& given, const Do& what) -> decltype(what(std
 
 // The last event that is meant: that of --to, or the journal's last one if the journal confirms all of its own.
 Result<RoomSeq> last_of(const Journal& journal, const Arguments& given) {
-  const RoomSeq head = journal.head().place;
+  const RoomSeq head = journal.head().seq;
   if (given.at == 0) return check_whole(journal, "--to").map([&] { return head; });
   const Error* closed = journal.closed_because();
   if (given.at > head.value)
@@ -184,10 +184,10 @@ Result<Room> replayed(const Arguments& given) {
     Progress progress("replay");
     Result<void> outcome;
     const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& one) {
-      if (one.place > *last) return false;
-      const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+      if (one.seq > *last) return false;
+      const Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
       outcome = entry ? room->replay(*entry) : Result<void>(tl::unexpected(entry.error()));
-      progress.update(static_cast<double>(one.place.value) / static_cast<double>(last->value));
+      progress.update(static_cast<double>(one.seq.value) / static_cast<double>(last->value));
       return outcome.has_value();
     });
     if (!outcome) return failure(outcome.error().code, given.file.string() + ": " + outcome.error().message);
@@ -288,7 +288,7 @@ Result<void> replay(const Arguments& given) {
   if (!room) return tl::unexpected(room.error());
   say("events", std::to_string(room->room_seq().value));
   say("time", std::to_string(std::chrono::duration_cast<std::chrono::seconds>(room->time()).count()) + " s");
-  for (const auto& [place, label] : room->marks()) say("mark", std::to_string(place.value) + " " + label);
+  for (const auto& [seq, label] : room->marks()) say("mark", std::to_string(seq.value) + " " + label);
   say("field hash", to_hex(room->field_hash()));
   say("room hash", to_hex(room->room_hash()));
   if (given.fields.empty()) return {};
@@ -313,7 +313,7 @@ Result<void> branch(const Arguments& given) {
   const Result<JournalHead> made = branch_journal(given.file, given.to, RoomSeq{given.at}, given.to.stem().string(),
                                                   {[&](double fraction) { progress.update(fraction); }, {}});
   if (!made) return tl::unexpected(made.error());
-  say("branch", given.to.string() + " of " + given.file.string() + " at " + std::to_string(made->place.value));
+  say("branch", given.to.string() + " of " + given.file.string() + " at " + std::to_string(made->seq.value));
   return {};
 }
 
@@ -356,7 +356,7 @@ Result<void> write_out(const Arguments& given) {
       if (!out->write(line)) outcome = tl::unexpected(out->failed());
     };
     const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& entry) {
-      if (entry.place > *last) return false;
+      if (entry.seq > *last) return false;
       if (of_person) {
         const Result<std::optional<std::string>> line = of_person->of(entry);
         if (!line)
@@ -364,7 +364,7 @@ Result<void> write_out(const Arguments& given) {
         else if (*line)
           put(**line);
       } else {
-        const Result<std::string> line = entry_as_json(entry.place, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
+        const Result<std::string> line = entry_as_json(entry.seq, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
         if (!line)
           outcome = tl::unexpected(line.error());
         else

@@ -12,10 +12,10 @@ JournalHead first_head(std::string_view genesis) {
 JournalHead next_head(const JournalHead& before, const JournalEntry& entry) {
   Hasher hasher;
   hasher.bytes(std::as_bytes(std::span(before.chain.bytes)));
-  hasher.integer(entry.place.value);
+  hasher.integer(entry.seq.value);
   hasher.integer(static_cast<std::uint64_t>(entry.at_ns));
   hasher.text(entry.bytes);
-  return {entry.place, hasher.finish()};
+  return {entry.seq, hasher.finish()};
 }
 
 }  // namespace osteon

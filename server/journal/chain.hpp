@@ -10,7 +10,7 @@
 namespace osteon {
 
 struct JournalEntry {
-  RoomSeq place;           // rises by exactly one; the first is 1
+  RoomSeq seq;             // rises by exactly one; the first is 1
   std::int64_t at_ns = 0;  // when it was decided, since the room was made; for replay
   std::string bytes;       // the room's own encoding
 };
@@ -18,7 +18,7 @@ struct JournalEntry {
 // How far a journal goes, and what it says: equal heads mean equal histories. Whoever had an entry acknowledged stores
 // the head as a witness.
 struct JournalHead {
-  RoomSeq place;
+  RoomSeq seq;
   Digest chain;
   friend bool operator==(const JournalHead&, const JournalHead&) = default;
 };

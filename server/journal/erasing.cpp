@@ -21,8 +21,8 @@ Digest digest_of_entry(std::string_view bytes) {
 
 std::string encode_erased(const ErasedEntries& entries) {
   std::string bytes;
-  for (const auto& [place, entry] : entries)
-    bytes += encode_number(place) + std::string(as_text(entry.chain)) + std::string(as_text(entry.bytes));
+  for (const auto& [seq, entry] : entries)
+    bytes += encode_number(seq) + std::string(as_text(entry.chain)) + std::string(as_text(entry.bytes));
   return bytes;
 }
 
@@ -45,9 +45,9 @@ Result<void> JournalFile::read_erased() {
 }
 
 JournalHead JournalFile::next_in_chain(const JournalHead& before, const JournalEntry& entry) const {
-  const auto erased = erased_.find(entry.place.value);
+  const auto erased = erased_.find(entry.seq.value);
   if (erased != erased_.end() && erased->second.bytes == digest_of_entry(entry.bytes))
-    return {entry.place, erased->second.chain};
+    return {entry.seq, erased->second.chain};
   return next_head(before, entry);
 }
 
@@ -55,14 +55,13 @@ Result<void> JournalFile::erase(std::span<const JournalEntry> instead) {
   auto statement = database_.prepare("UPDATE rows SET bytes = ? WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
   for (const JournalEntry& entry : instead) {
-    const auto chain = chain_at(entry.place);
+    const auto chain = chain_at(entry.seq);
     if (!chain) return tl::unexpected(chain.error());
     OSTEON_CHECK(chain->has_value());
-    if (Result<void> put =
-            statement->blob(0, entry.bytes).integer(1, static_cast<std::int64_t>(entry.place.value)).run();
+    if (Result<void> put = statement->blob(0, entry.bytes).integer(1, static_cast<std::int64_t>(entry.seq.value)).run();
         !put)
       return put;
-    erased_[entry.place.value] = {**chain, digest_of_entry(entry.bytes)};
+    erased_[entry.seq.value] = {**chain, digest_of_entry(entry.bytes)};
   }
   return set_register(kErasedRegister, encode_erased(erased_));
 }
@@ -73,7 +72,7 @@ Result<std::size_t> Journal::erase_entries(
   if (state.closed) return tl::unexpected(*state.closed);
   std::vector<JournalEntry> instead;
   const Result<void> read_all = read(RoomSeq{1}, [&](const JournalEntry& entry) {
-    if (auto bytes = without(entry)) instead.push_back({entry.place, entry.at_ns, std::move(*bytes)});
+    if (auto bytes = without(entry)) instead.push_back({entry.seq, entry.at_ns, std::move(*bytes)});
     return true;
   });
   if (!read_all) return tl::unexpected(read_all.error());

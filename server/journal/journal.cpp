@@ -214,7 +214,7 @@ Result<void> Journal::begin_signing() {
   if (!all) return tl::unexpected(all.error());
   const auto last =
       std::find_if(all->rbegin(), all->rend(), [&](const SignedEntries& one) { return keys->trusts(one.key); });
-  const RoomSeq head = state.head.place;
+  const RoomSeq head = state.head.seq;
   const bool any = last != all->rend();
   const Result<bool> erased = is_vouched_for(kErasedRegister);
   if (!erased) return tl::unexpected(erased.error());
@@ -222,13 +222,13 @@ Result<void> Journal::begin_signing() {
     return failure(
         ErrorCode::unavailable,
         state.path.string() + ": somebody without this server's key has replaced entries of it; go on from a backup");
-  if (any && last->head.place == head) {
+  if (any && last->head.seq == head) {
     state.signed_since = last->since;
     return {};
   }
   state.signed_since = RoomSeq{head.value + 1};
   if (head.value == 0) return {};
-  const RoomSeq signed_to = any ? last->head.place : RoomSeq{};
+  const RoomSeq signed_to = any ? last->head.seq : RoomSeq{};
   const std::string entries = "entries " + std::to_string(signed_to.value + 1) + " to " + std::to_string(head.value);
   // A person who had the key salvaged the journal and thereby accepted these entries.
   const Result<bool> accepted = is_vouched_for(kRecoveredRegister);
@@ -346,7 +346,7 @@ Result<void> Journal::append(std::span<const JournalEntry> entries) {
   for (const JournalEntry& entry : entries)
     if (entry.bytes.size() > state.options.most_entry_bytes)
       return failure(ErrorCode::invalid_input,
-                     state.path.string() + ": entry " + std::to_string(entry.place.value) + " has " +
+                     state.path.string() + ": entry " + std::to_string(entry.seq.value) + " has " +
                          std::to_string(entry.bytes.size()) + " bytes, more than the " +
                          std::to_string(state.options.most_entry_bytes) + " that an entry may have");
   if (entries.empty()) return {};
@@ -372,29 +372,29 @@ Result<void> Journal::append(std::span<const JournalEntry> entries) {
 Result<void> Journal::read(RoomSeq from, const std::function<bool(const JournalEntry&)>& take) {
   State& state = *state_;
   OSTEON_CHECK(from.value >= 1);
-  if (from > state.head.place) return {};
+  if (from > state.head.seq) return {};
   const RoomSeq before{from.value - 1};
   const auto chain = state.file.chain_at(before);
   if (!chain) return tl::unexpected(chain.error());
-  const Walk walked = state.file.walk({before, chain->value_or(Digest{})}, state.head.place,
+  const Walk walked = state.file.walk({before, chain->value_or(Digest{})}, state.head.seq,
                                       [&](const JournalEntry& entry, const JournalHead&) { return take(entry); });
   if (walked.stopped) return tl::unexpected(*walked.stopped);
   return {};
 }
 
-Result<JournalHead> Journal::head_at(RoomSeq place) {
-  const auto chain = state_->file.chain_at(place);
+Result<JournalHead> Journal::head_at(RoomSeq seq) {
+  const auto chain = state_->file.chain_at(seq);
   if (!chain) return tl::unexpected(chain.error());
-  if (*chain) return JournalHead{place, **chain};
-  return failure(ErrorCode::invalid_input, state_->path.string() + " has no entry " + std::to_string(place.value) +
-                                               ", its last is " + std::to_string(state_->head.place.value));
+  if (*chain) return JournalHead{seq, **chain};
+  return failure(ErrorCode::invalid_input, state_->path.string() + " has no entry " + std::to_string(seq.value) +
+                                               ", its last is " + std::to_string(state_->head.seq.value));
 }
 
 JournalSlice Journal::read_slice(const JournalHead& after, RoomSeq last, std::size_t most_entries) {
   JournalSlice slice;
   std::size_t bytes = 0;
   Walk walked =
-      state_->file.walk(after, std::min(last, state_->head.place), [&](const JournalEntry& entry, const JournalHead&) {
+      state_->file.walk(after, std::min(last, state_->head.seq), [&](const JournalEntry& entry, const JournalHead&) {
         slice.entries.push_back(entry);
         bytes += entry.bytes.size();
         return slice.entries.size() < most_entries && bytes < kSliceBytes;
@@ -406,43 +406,43 @@ JournalSlice Journal::read_slice(const JournalHead& after, RoomSeq last, std::si
 
 Result<void> Journal::check_witness(const JournalHead& witness) {
   State& state = *state_;
-  const std::string place = std::to_string(witness.place.value), file = state.path.string();
-  if (witness.place > state.head.place && state.recovered_to)
+  const std::string seq = std::to_string(witness.seq.value), file = state.path.string();
+  if (witness.seq > state.head.seq && state.recovered_to)
     return failure(ErrorCode::unavailable, file + " was salvaged up to event " +
                                                std::to_string(state.recovered_to->value) +
-                                               ", and a client knows event " + place +
+                                               ", and a client knows event " + seq +
                                                ": what it knows beyond that is lost; it has to join again");
-  if (witness.place > state.head.place) {
+  if (witness.seq > state.head.seq) {
     // The note also closes the journal for the next process, because the witness may never come back to report this.
     close_for_good({ErrorCode::unavailable,
-                    file + " goes to event " + std::to_string(state.head.place.value) +
-                        ", but a client was told that event " + place +
+                    file + " goes to event " + std::to_string(state.head.seq.value) +
+                        ", but a client was told that event " + seq +
                         " is durable: entries were lost; salvage it into a new journal, or go on from a backup"});
     return tl::unexpected(*state.closed);
   }
-  const auto chain = state.file.chain_at(witness.place);
+  const auto chain = state.file.chain_at(witness.seq);
   if (chain && *chain == witness.chain) return {};
   // After a failed write, what the system shows of the file says nothing about the client.
   if (state.closed) return tl::unexpected(*state.closed);
   if (!chain) return tl::unexpected(chain.error());
   return failure(ErrorCode::invalid_input,
-                 file + " and a client know different histories up to event " + place + "; it has to join again");
+                 file + " and a client know different histories up to event " + seq + "; it has to join again");
 }
 
 Result<CheckpointFile> Journal::begin_checkpoint(const JournalHead& at, std::string_view meta, std::string_view seal) {
   State& state = *state_;
   if (state.closed) return tl::unexpected(*state.closed);
-  const auto chain = state.file.chain_at(at.place);
+  const auto chain = state.file.chain_at(at.seq);
   if (!chain) return tl::unexpected(chain.error());
-  if (at.place > state.head.place || *chain != at.chain)
+  if (at.seq > state.head.seq || *chain != at.chain)
     return failure(ErrorCode::invalid_input, state.path.string() + ": a checkpoint at event " +
-                                                 std::to_string(at.place.value) +
+                                                 std::to_string(at.seq.value) +
                                                  " is of another history than the journal's");
   const auto all = checkpoints();
   if (!all) return tl::unexpected(all.error());
   if (std::any_of(all->begin(), all->end(), [&](const Checkpoint& c) { return c.at == at; }))
     return failure(ErrorCode::exists,
-                   state.path.string() + " has a checkpoint at event " + std::to_string(at.place.value));
+                   state.path.string() + " has a checkpoint at event " + std::to_string(at.seq.value));
   auto file = DurableFile::begin(*state.disk, checkpoint_file(state.path, at));
   if (!file) return tl::unexpected(file.error());
   return CheckpointFile({at, std::string(meta), 0, {}, std::string(seal)}, std::move(*file));
@@ -454,7 +454,7 @@ Result<void> Journal::add_checkpoint(CheckpointFile file) {
   auto all = checkpoints();
   if (!all) return tl::unexpected(all.error());
   all->push_back(file.about_);
-  std::sort(all->begin(), all->end(), [](const Checkpoint& a, const Checkpoint& b) { return a.at.place > b.at.place; });
+  std::sort(all->begin(), all->end(), [](const Checkpoint& a, const Checkpoint& b) { return a.at.seq > b.at.seq; });
   const auto kept = static_cast<std::ptrdiff_t>(std::min(kCheckpointsKept, all->size()));
   const std::vector<Checkpoint> old(all->begin() + kept, all->end());
   Result<void> noted = write_through([&] {
@@ -462,7 +462,7 @@ Result<void> Journal::add_checkpoint(CheckpointFile file) {
     for (const Checkpoint& checkpoint : old)
       if (done)
         done = state.file.database().run("DELETE FROM checkpoints WHERE place = " +
-                                         std::to_string(checkpoint.at.place.value));
+                                         std::to_string(checkpoint.at.seq.value));
     return done;
   });
   if (!noted) return noted;

@@ -78,7 +78,7 @@ class Journal {
   [[nodiscard]] Result<void> read(RoomSeq from, const std::function<bool(const JournalEntry&)>& take);
 
   // The stored head at a sequence number, not beyond head(). Error invalid_input: the entry is missing.
-  [[nodiscard]] Result<JournalHead> head_at(RoomSeq place);
+  [[nodiscard]] Result<JournalHead> head_at(RoomSeq seq);
   // The next entries after `after` up to `last`, each checked against the chain. It returns at most `most_entries` of
   // them, and little more than 1 MiB.
   [[nodiscard]] JournalSlice read_slice(const JournalHead& after, RoomSeq last, std::size_t most_entries);

@@ -76,7 +76,7 @@ Result<void> copy_file(Disk& disk, const fs::path& from, const fs::path& to) {
 Digest seal_of(const Checkpoint& checkpoint) {
   Hasher hasher;
   hasher.text("checkpoint");
-  hasher.integer(checkpoint.at.place.value);
+  hasher.integer(checkpoint.at.seq.value);
   hasher.text(as_text(checkpoint.at.chain));
   hasher.text(checkpoint.meta);
   hasher.integer(checkpoint.size);
@@ -108,7 +108,7 @@ fs::path owner_file_of(const fs::path& journal) { return journal.string() + "-ow
 fs::path failed_of(const fs::path& journal) { return journal.string() + ".failed"; }
 
 fs::path checkpoint_file(const fs::path& journal, const JournalHead& at) {
-  return journal.string() + "-" + std::to_string(at.place.value) + "-" + to_hex(at.chain) + ".checkpoint";
+  return journal.string() + "-" + std::to_string(at.seq.value) + "-" + to_hex(at.chain) + ".checkpoint";
 }
 
 std::optional<JournalHead> parse_checkpoint_file(const fs::path& journal, std::string_view name) {
@@ -117,7 +117,7 @@ std::optional<JournalHead> parse_checkpoint_file(const fs::path& journal, std::s
   if (!name.starts_with(before) || !name.ends_with(kAfter)) return std::nullopt;
   name = name.substr(before.size(), name.size() - before.size() - kAfter.size());
   JournalHead head;
-  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), head.place.value);
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), head.seq.value);
   if (error != std::errc{} || end == name.data() + name.size() || *end != '-') return std::nullopt;
   const auto chain = digest_from_hex(name.substr(static_cast<std::size_t>(end - name.data()) + 1));
   if (!chain) return std::nullopt;
@@ -181,8 +181,7 @@ std::optional<std::uint64_t> decode_number(std::string_view bytes) {
 }
 
 std::string encode_footer(const Footer& footer) {
-  return encode_number(footer.head.place.value) + std::string(as_text(footer.head.chain)) +
-         (footer.clean ? '\1' : '\0');
+  return encode_number(footer.head.seq.value) + std::string(as_text(footer.head.chain)) + (footer.clean ? '\1' : '\0');
 }
 
 std::optional<Footer> decode_footer(std::string_view bytes) {
@@ -307,8 +306,8 @@ Result<void> JournalFile::take_log() {
   if (!read) return tl::unexpected(read.error());
   log_ = std::move(*read);
   for (const auto& [path, base] : log_.bases) {
-    if (base.place > stored->place) continue;  // inspect() counts what is missing between
-    const auto chain = chain_at(base.place);
+    if (base.seq > stored->seq) continue;  // inspect() counts what is missing between
+    const auto chain = chain_at(base.seq);
     if (chain && *chain == base.chain) continue;
     log_.faults.push_back(path.string() + " continues another history than " + file_.string() + " has");
     needs_log_ = true;
@@ -383,24 +382,23 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
     walked.stopped = statement.error();
     return walked;
   }
-  statement->integer(0, static_cast<std::int64_t>(before.place.value))
-      .integer(1, static_cast<std::int64_t>(last.value));
+  statement->integer(0, static_cast<std::int64_t>(before.seq.value)).integer(1, static_cast<std::int64_t>(last.value));
   JournalEntry entry;
-  while (walked.head.place < last) {
+  while (walked.head.seq < last) {
     const Result<bool> more = statement->step();
     if (!more) {
       walked.stopped = more.error();
-      walked.stopped->message = "after entry " + std::to_string(walked.head.place.value) + ": " + more.error().message;
+      walked.stopped->message = "after entry " + std::to_string(walked.head.seq.value) + ": " + more.error().message;
       return walked;
     }
     if (!*more) return walked;
-    entry.place.value = static_cast<std::uint64_t>(statement->integer(0));
+    entry.seq.value = static_cast<std::uint64_t>(statement->integer(0));
     entry.at_ns = statement->integer(1);
     entry.bytes = statement->bytes(2);
     const JournalHead next = next_in_chain(walked.head, entry);
-    if (entry.place.value != walked.head.place.value + 1 || statement->bytes(3) != as_text(next.chain)) {
+    if (entry.seq.value != walked.head.seq.value + 1 || statement->bytes(3) != as_text(next.chain)) {
       walked.stopped =
-          Error{ErrorCode::invalid_input, file_.string() + ": entry " + std::to_string(walked.head.place.value + 1) +
+          Error{ErrorCode::invalid_input, file_.string() + ": entry " + std::to_string(walked.head.seq.value + 1) +
                                               " does not fit the chain of hashes" + std::string(kRemedy)};
       return walked;
     }
@@ -410,11 +408,11 @@ Walk JournalFile::walk(const JournalHead& before, RoomSeq last,
   return walked;
 }
 
-Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq place) {
-  if (place.value == 0) return first_head(genesis_).chain;
+Result<std::optional<Digest>> JournalFile::chain_at(RoomSeq seq) {
+  if (seq.value == 0) return first_head(genesis_).chain;
   auto statement = database_.prepare("SELECT chain FROM rows WHERE place = ?");
   if (!statement) return tl::unexpected(statement.error());
-  const Result<bool> entry = statement->integer(0, static_cast<std::int64_t>(place.value)).step();
+  const Result<bool> entry = statement->integer(0, static_cast<std::int64_t>(seq.value)).step();
   if (!entry) return tl::unexpected(entry.error());
   if (!*entry) return std::nullopt;
   return digest_of(statement->bytes(0));
@@ -430,7 +428,7 @@ Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
     if (!more) return tl::unexpected(more.error());
     if (!*more) return all;
     Checkpoint checkpoint;
-    checkpoint.at.place.value = static_cast<std::uint64_t>(statement->integer(0));
+    checkpoint.at.seq.value = static_cast<std::uint64_t>(statement->integer(0));
     const auto chain = digest_of(statement->bytes(1)), digest = digest_of(statement->bytes(4));
     checkpoint.at.chain = chain.value_or(Digest{});
     checkpoint.meta = statement->bytes(2);
@@ -438,7 +436,7 @@ Result<std::vector<Checkpoint>> JournalFile::checkpoints() {
     checkpoint.digest = digest.value_or(Digest{});
     checkpoint.seal = statement->bytes(5);
     if (!chain || !digest || !check_seal(checkpoint.seal, seal_of(checkpoint), first_head(genesis_).chain))
-      return damaged("the record of the checkpoint at event " + std::to_string(checkpoint.at.place.value));
+      return damaged("the record of the checkpoint at event " + std::to_string(checkpoint.at.seq.value));
     all.push_back(std::move(checkpoint));
   }
 }
@@ -512,12 +510,12 @@ Result<std::vector<SignedEntries>> JournalFile::signed_entries() {
       if (!more) return tl::unexpected(more.error());
       if (!*more) break;
       SignedEntries& one = all.emplace_back();
-      one.head.place.value = static_cast<std::uint64_t>(statement->integer(0));
+      one.head.seq.value = static_cast<std::uint64_t>(statement->integer(0));
       one.since.value = static_cast<std::uint64_t>(statement->integer(1));
       const auto chain = digest_of(statement->bytes(2));
       const std::string_view key = statement->bytes(3), signature = statement->bytes(4);
       if (!chain || key.size() != one.key.bytes.size() || signature.size() != one.signature.bytes.size())
-        return damaged("the signature at event " + std::to_string(one.head.place.value));
+        return damaged("the signature at event " + std::to_string(one.head.seq.value));
       one.head.chain = *chain;
       std::ranges::copy(key, one.key.bytes.begin());
       std::ranges::copy(signature, one.signature.bytes.begin());
@@ -534,7 +532,7 @@ Result<void> JournalFile::add_signed_entries(const SignedEntries& entries) {
   const auto text_of = [](const auto& bytes) {
     return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   };
-  return statement->integer(0, static_cast<std::int64_t>(entries.head.place.value))
+  return statement->integer(0, static_cast<std::int64_t>(entries.head.seq.value))
       .integer(1, static_cast<std::int64_t>(entries.since.value))
       .blob(2, as_text(entries.head.chain))
       .blob(3, text_of(entries.key.bytes))
@@ -550,7 +548,7 @@ void JournalFile::inspect_signatures(Inspection& found) {
     return;
   }
   for (const SignedEntries& one : *all) {
-    const std::string what = "the signature at event " + std::to_string(one.head.place.value);
+    const std::string what = "the signature at event " + std::to_string(one.head.seq.value);
     if (!fits(one))
       found.faults.push_back(damaged(what).value().message);
     else
@@ -559,21 +557,20 @@ void JournalFile::inspect_signatures(Inspection& found) {
 }
 
 void JournalFile::check_witness(const JournalHead& witness, const std::string& what, Inspection& found) {
-  found.witnessed = std::max(found.witnessed, witness.place);
-  if (witness.place > found.head.place) {
-    const std::uint64_t missing = witness.place.value - found.head.place.value;
-    found.faults.push_back(file_.string() + " goes to event " + std::to_string(found.head.place.value) + ", but " +
-                           what + " vouches for event " + std::to_string(witness.place.value) + ": " +
-                           std::to_string(missing) + (missing == 1 ? " entry is missing" : " entries are missing") +
-                           std::string(kRemedy));
+  found.witnessed = std::max(found.witnessed, witness.seq);
+  if (witness.seq > found.head.seq) {
+    const std::uint64_t missing = witness.seq.value - found.head.seq.value;
+    found.faults.push_back(file_.string() + " goes to event " + std::to_string(found.head.seq.value) + ", but " + what +
+                           " vouches for event " + std::to_string(witness.seq.value) + ": " + std::to_string(missing) +
+                           (missing == 1 ? " entry is missing" : " entries are missing") + std::string(kRemedy));
     return;
   }
-  const auto chain = chain_at(witness.place);
+  const auto chain = chain_at(witness.seq);
   if (!chain) {
     found.faults.push_back(chain.error().message);
   } else if (*chain != witness.chain) {
     found.faults.push_back(file_.string() + ": " + what + " vouches for another history up to event " +
-                           std::to_string(witness.place.value) + std::string(kRemedy));
+                           std::to_string(witness.seq.value) + std::string(kRemedy));
   }
 }
 
@@ -592,11 +589,11 @@ Inspection JournalFile::inspect(bool files) {
       walk(first_head(genesis_), RoomSeq{INT64_MAX}, [](const JournalEntry&, const JournalHead&) { return true; });
   found.head = walked.head;
   if (walked.stopped) {
-    found.first_bad = RoomSeq{walked.head.place.value + 1};
+    found.first_bad = RoomSeq{walked.head.seq.value + 1};
     note(*walked.stopped);
   } else if (const Result<std::int64_t> entries = database_.integer("SELECT count(*) FROM rows"); !entries) {
     note(entries.error());
-  } else if (static_cast<std::uint64_t>(*entries) != found.head.place.value) {  // some have sequence numbers below 1
+  } else if (static_cast<std::uint64_t>(*entries) != found.head.seq.value) {  // some have sequence numbers below 1
     found.faults.push_back(file_.string() + " has entries with sequence numbers below 1" + std::string(kRemedy));
   }
   inspect_beside(files, found);
@@ -605,22 +602,22 @@ Inspection JournalFile::inspect(bool files) {
 
 void JournalFile::inspect_log(Inspection& found) {
   found.notes = log_.notes;
-  if (log_.witnessed > found.head.place) check_witness({log_.witnessed, {}}, "its log", found);
+  if (log_.witnessed > found.head.seq) check_witness({log_.witnessed, {}}, "its log", found);
   found.witnessed = std::max(found.witnessed, log_.witnessed);
   for (const std::string& foreign : log_.foreign)
     found.faults.push_back(foreign +
                            "; put the files of the same moment together again, or salvage it into a new journal");
   if (!needs_log_) return;
-  const std::string untold = "how many entries are missing after event " + std::to_string(found.head.place.value) +
-                             " cannot be told" + std::string(kRemedy);
+  const std::string unknown_count = "how many entries are missing after event " + std::to_string(found.head.seq.value) +
+                                    " cannot be told" + std::string(kRemedy);
   for (const std::string& fault : log_.faults) found.faults.push_back(fault + std::string(kRemedy));
-  if (!log_.faults.empty()) found.faults.push_back(file_.string() + ": " + untold);
+  if (!log_.faults.empty()) found.faults.push_back(file_.string() + ": " + unknown_count);
   if (log_.doubtful)
-    found.faults.push_back(file_.string() +
-                           ": a write to one file of its log was cut short, and the other is damaged: " + untold);
+    found.faults.push_back(
+        file_.string() + ": a write to one file of its log was cut short, and the other is damaged: " + unknown_count);
   if (log_.generation < generation_ && log_.faults.empty())
     found.faults.push_back(file_.string() + " was not closed, and its log " +
-                           (log_.generation == 0 ? "is missing" : "is an older copy") + ": " + untold);
+                           (log_.generation == 0 ? "is missing" : "is an older copy") + ": " + unknown_count);
 }
 
 void JournalFile::inspect_beside(bool files, Inspection& found) {
@@ -639,7 +636,7 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
     } else {
       found.closed_cleanly = footer->clean;
       check_witness(footer->head, "its footer", found);
-      if (footer->clean && footer->head.place < found.head.place)
+      if (footer->clean && footer->head.seq < found.head.seq)
         found.faults.push_back(file_.string() + " continues after its footer" + std::string(kRemedy));
     }
   }
@@ -649,7 +646,7 @@ void JournalFile::inspect_beside(bool files, Inspection& found) {
   } else {
     for (const Checkpoint& checkpoint : *all) {
       const fs::path file = checkpoint_file(file_, checkpoint.at);
-      check_witness(checkpoint.at, "the checkpoint at event " + std::to_string(checkpoint.at.place.value), found);
+      check_witness(checkpoint.at, "the checkpoint at event " + std::to_string(checkpoint.at.seq.value), found);
       if (!files) continue;
       const auto read = read_in_pieces(*disk_, file, [](std::string_view) { return Result<void>{}; });
       if (!read)
@@ -695,9 +692,9 @@ Result<void> JournalFile::add_entries(std::span<const JournalEntry> entries, Jou
     insert_ = std::move(*prepared);
   }
   for (const JournalEntry& entry : entries) {
-    OSTEON_CHECK(entry.place.value == head.place.value + 1);
+    OSTEON_CHECK(entry.seq.value == head.seq.value + 1);
     head = next_in_chain(head, entry);
-    Result<void> put = insert_->integer(0, static_cast<std::int64_t>(entry.place.value))
+    Result<void> put = insert_->integer(0, static_cast<std::int64_t>(entry.seq.value))
                            .integer(1, entry.at_ns)
                            .blob(2, entry.bytes)
                            .blob(3, as_text(head.chain))
@@ -760,7 +757,7 @@ Result<void> JournalFile::add_checkpoint(const Checkpoint& checkpoint) {
   if (!statement) return tl::unexpected(statement.error());
   const std::string seal =
       checkpoint.seal.empty() ? make_seal(seal_of(checkpoint), first_head(genesis_).chain, key_) : checkpoint.seal;
-  return statement->integer(0, static_cast<std::int64_t>(checkpoint.at.place.value))
+  return statement->integer(0, static_cast<std::int64_t>(checkpoint.at.seq.value))
       .blob(1, as_text(checkpoint.at.chain))
       .blob(2, checkpoint.meta)
       .integer(3, static_cast<std::int64_t>(checkpoint.size))

@@ -109,8 +109,8 @@ class JournalFile {
   // Walks over the entries after `before` up to `last`, each checked against the chain, while `take` returns true.
   [[nodiscard]] Walk walk(const JournalHead& before, RoomSeq last,
                           const std::function<bool(const JournalEntry&, const JournalHead&)>& take);
-  [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq place);  // as stored
-  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();          // newest first
+  [[nodiscard]] Result<std::optional<Digest>> chain_at(RoomSeq seq);  // as stored
+  [[nodiscard]] Result<std::vector<Checkpoint>> checkpoints();        // newest first
   [[nodiscard]] Result<std::vector<Person>> people(std::vector<std::optional<PublicKey>>* signers = nullptr);
   [[nodiscard]] Result<std::vector<std::string>> registers();  // their names, without the journal's own
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);

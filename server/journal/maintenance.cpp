@@ -56,11 +56,11 @@ VerifyReport report_of(JournalFile& file) {
   const auto checkpoints = file.checkpoints();
   const auto keys = file.find_register(kKeysRegister);
   if (entries)
-    for (const SignedEntries& one : *entries) report.signed_range.push_back({one.since, one.head.place, one.key});
+    for (const SignedEntries& one : *entries) report.signed_range.push_back({one.since, one.head.seq, one.key});
   if (keys && *keys) report.successions = decode_successions(**keys).value_or(std::vector<Succession>{});
   if (checkpoints)
     for (const Checkpoint& one : *checkpoints)
-      report.seals.emplace_back("the checkpoint at event " + std::to_string(one.at.place.value), file.signer_of(one));
+      report.seals.emplace_back("the checkpoint at event " + std::to_string(one.at.seq.value), file.signer_of(one));
   if (const auto names = file.registers())
     for (const std::string& name : *names) {
       if (name == kGenerationRegister || name == kIdRegister || name == kKeysRegister) continue;
@@ -88,12 +88,12 @@ Vouched vouched_by(const PublicKey& key, const VerifyReport& report) {
   const std::set<PublicKey> own = keys_of_line(key, report.successions);
   Vouched vouched;
   // All entries between two of these sequence numbers are signed by the same keys.
-  std::set<std::uint64_t> ends{report.head.place.value};
+  std::set<std::uint64_t> ends{report.head.seq.value};
   for (const SignedRange& range : report.signed_range) ends.insert({range.from.value - 1, range.to.value});
   RoomSeq from{1};
   for (const std::uint64_t end : ends) {
     const RoomSeq to{end};
-    if (to < from || to > report.head.place) continue;
+    if (to < from || to > report.head.seq) continue;
     const SignedRange* by = nullptr;
     for (const SignedRange& range : report.signed_range)
       if (range.from <= from && to <= range.to && (by == nullptr || own.contains(range.key))) by = &range;
@@ -213,7 +213,7 @@ struct JournalCopying {
           return state.entries.size() < most_entries && bytes < kSliceBytes;
         });
     if (walked.stopped && !state.damaged) return tl::unexpected(*walked.stopped);
-    if (walked.stopped) state.last = walked.head.place;
+    if (walked.stopped) state.last = walked.head.seq;
     state.copied = walked.head;
     return {};
   }
@@ -237,8 +237,8 @@ struct JournalCopying {
         if (Result<void> on = left_out(state, signatures.error()); !on) return on;
       } else {
         for (const SignedEntries& one : *signatures)
-          if (const auto chain = state.source->chain_at(one.head.place);
-              one.head.place <= state.copied.place && fits(one) && chain && *chain == one.head.chain)
+          if (const auto chain = state.source->chain_at(one.head.seq);
+              one.head.seq <= state.copied.seq && fits(one) && chain && *chain == one.head.chain)
             state.signatures.push_back(one);
       }
       auto people = state.source->people();
@@ -249,7 +249,7 @@ struct JournalCopying {
     }
     auto checkpoints = state.source->checkpoints();
     if (!checkpoints) return left_out(state, checkpoints.error());
-    std::erase_if(*checkpoints, [&](const Checkpoint& one) { return one.at.place > state.copied.place; });
+    std::erase_if(*checkpoints, [&](const Checkpoint& one) { return one.at.seq > state.copied.seq; });
     state.checkpoints = {checkpoints->rbegin(), checkpoints->rend()};
     return {};
   }
@@ -269,7 +269,7 @@ struct JournalCopying {
     if (state.no_checkpoint) return pass_over(state);
     if (state.all_taken) return {};
     if (Result<void> taken = take_entries(state, most_entries); !taken) return taken;
-    if (state.copied.place < state.last) return {};
+    if (state.copied.seq < state.last) return {};
     state.all_taken = true;
     return take_beside(state);
   }
@@ -305,7 +305,7 @@ struct JournalCopying {
       for (const Person& person : state.people)
         if (done) done = file.add_person(person);
       if (done && state.epochs)
-        done = file.set_register(kRecoveredRegister, encode_number(state.copied.place.value)).and_then([&] {
+        done = file.set_register(kRecoveredRegister, encode_number(state.copied.seq.value)).and_then([&] {
           return file.set_register(kEpochRegister, encode_number(*state.epochs));
         });
       return done;
@@ -316,7 +316,7 @@ struct JournalCopying {
     // A branch has the same entries under a chain of its own.
     JournalHead at = checkpoint.at;
     if (state.only) {
-      const auto head = state.target->head_at(at.place);
+      const auto head = state.target->head_at(at.seq);
       if (!head) return tl::unexpected(head.error());
       at = *head;
     }
@@ -360,7 +360,7 @@ Result<JournalCopy> JournalCopy::begin(Journal& source, const fs::path& to) {
   // Stores the signature of the newest entries where the copy reads it. If that fails, the copy gets an earlier
   // signature.
   if (state.signed_since) static_cast<void>(JournalInside::carry(source));
-  auto copy = JournalCopying::begin(state.path, state.file, state.head.place, to, *state.disk);
+  auto copy = JournalCopying::begin(state.path, state.file, state.head.seq, to, *state.disk);
   if (copy) copy->state_->keys = state.options.keys;
   return copy;
 }
@@ -368,7 +368,7 @@ Result<JournalCopy> JournalCopy::begin(Journal& source, const fs::path& to) {
 Result<JournalCopy> JournalCopy::begin_branch(Journal& source, const fs::path& to, RoomSeq last, std::string genesis,
                                               std::vector<std::string> registers) {
   auto& state = JournalInside::of(source);
-  OSTEON_CHECK(last <= state.head.place);
+  OSTEON_CHECK(last <= state.head.seq);
   auto copy = JournalCopying::begin(state.path, state.file, last, to, *state.disk);
   if (!copy) return copy;
   copy->state_->genesis = std::move(genesis);
@@ -389,7 +389,7 @@ const JournalHead& JournalCopy::head() const { return state_->head; }
 
 double JournalCopy::fraction() const {
   const auto last = static_cast<double>(state_->last.value);
-  return last > 0 ? static_cast<double>(state_->copied.place.value) / last : 1.0;
+  return last > 0 ? static_cast<double>(state_->copied.seq.value) / last : 1.0;
 }
 
 namespace {
@@ -405,7 +405,7 @@ Result<void> copy_sound(const fs::path& file, JournalFile& source, const fs::pat
                         std::shared_ptr<const SigningKeys> keys) {
   const Inspection found = source.inspect(true);
   if (!found.faults.empty()) return failure(ErrorCode::invalid_input, found.faults.front());
-  auto copy = JournalCopying::begin(file, source, found.head.place, to, disk);
+  auto copy = JournalCopying::begin(file, source, found.head.seq, to, disk);
   if (!copy) return tl::unexpected(copy.error());
   JournalCopying::state(*copy).keys = std::move(keys);
   return copy_all(*copy);
@@ -432,18 +432,18 @@ Result<void> migrate_journal(const fs::path& file, const fs::path& to, Disk* dis
 
 Result<bool> has_head(const fs::path& file, const JournalHead& head, Disk* disk) {
   auto source = Source::open(file, or_system(disk));
-  if (source) return (*source)->chain_at(head.place).map([&](const auto& chain) { return chain == head.chain; });
+  if (source) return (*source)->chain_at(head.seq).map([&](const auto& chain) { return chain == head.chain; });
   if (source.error().code != ErrorCode::exists) return tl::unexpected(source.error());
   // What is read during a write may be incomplete. Only an entry that fits the one before it counts.
   auto peeked = JournalFile::peek(file, or_system(disk));
   if (!peeked) return tl::unexpected(source.error());
-  if (!head.place) return first_head(peeked->genesis()) == head;
-  const RoomSeq before{head.place.value - 1};
+  if (!head.seq) return first_head(peeked->genesis()) == head;
+  const RoomSeq before{head.seq.value - 1};
   const auto chain = peeked->chain_at(before);
   if (!chain || !*chain) return tl::unexpected(source.error());
   const Walk walked =
-      peeked->walk({before, **chain}, head.place, [](const JournalEntry&, const JournalHead&) { return true; });
-  if (walked.stopped || walked.head.place != head.place) return tl::unexpected(source.error());
+      peeked->walk({before, **chain}, head.seq, [](const JournalEntry&, const JournalHead&) { return true; });
+  if (walked.stopped || walked.head.seq != head.seq) return tl::unexpected(source.error());
   return walked.head == head;
 }
 
@@ -493,9 +493,9 @@ Result<RecoverReport> salvage_journal(const fs::path& file, const fs::path& to, 
   if (!source) return tl::unexpected(source.error());
   Inspection found = (*source)->inspect(true);
   RecoverReport report{found.head, found.witnessed, std::move(found.faults)};
-  for (const JournalHead& head : known) report.witnessed = std::max(report.witnessed, head.place);
+  for (const JournalHead& head : known) report.witnessed = std::max(report.witnessed, head.seq);
 
-  const RoomSeq end = last ? std::min(last, found.head.place) : found.head.place;
+  const RoomSeq end = last ? std::min(last, found.head.seq) : found.head.seq;
   auto copy = JournalCopying::begin(file, **source, end, to, or_system(disk));
   if (!copy) return tl::unexpected(copy.error());
   auto& state = JournalCopying::state(*copy);

@@ -112,7 +112,7 @@ struct RecoverReport {
   JournalHead head;                 // of the new journal
   RoomSeq witnessed;                // what was vouched for; entries beyond head are lost
   std::vector<std::string> faults;  // of the old one
-  [[nodiscard]] std::uint64_t lost() const { return witnessed > head.place ? witnessed.value - head.place.value : 0; }
+  [[nodiscard]] std::uint64_t lost() const { return witnessed > head.seq ? witnessed.value - head.seq.value : 0; }
 };
 // Copies every entry up to the last that the chain confirms into a new journal that accepts entries. `known`: the heads
 // that clients had acknowledged, as further witnesses. `last`: no entry after it; null: all. `keys` sign that the

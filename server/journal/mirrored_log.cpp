@@ -44,7 +44,7 @@ std::string encode_start(const LogStart& start, std::string_view salt, std::uint
   std::string bytes(kMagic);
   bytes += as_text(start.journal);
   put_integer(bytes, start.generation);
-  put_integer(bytes, start.base.place.value);
+  put_integer(bytes, start.base.seq.value);
   bytes += as_text(start.base.chain);
   bytes += salt;
   put_integer(bytes, length);
@@ -65,7 +65,7 @@ std::string encode_batch(std::span<const JournalEntry> entries, const JournalHea
   std::string bytes(salt);
   put_integer(bytes, body.size());
   put_integer(bytes, entries.size());
-  put_integer(bytes, entries.front().place.value);
+  put_integer(bytes, entries.front().seq.value);
   bytes += as_text(head.chain);
   bytes += body;
   if (signature) bytes += text_of(signature->bytes);
@@ -115,7 +115,7 @@ struct FoundFile {
   bool damaged = false;       // something unreadable lies between batches
   bool is_cut = false;        // shorter than it was made
   bool ends_in_part = false;  // with part of a batch
-  [[nodiscard]] RoomSeq last() const { return batches.empty() ? start.base.place : batches.back().head.place; }
+  [[nodiscard]] RoomSeq last() const { return batches.empty() ? start.base.seq : batches.back().head.seq; }
 };
 
 void read_batches(std::string_view bytes, std::string_view salt, FoundFile& file) {
@@ -167,7 +167,7 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
   file.start.journal = *digest_of(first.substr(at, kChainBytes));
   at += kChainBytes;
   file.start.generation = integer_at(first, at);
-  file.start.base.place.value = integer_at(first, at + 8);
+  file.start.base.seq.value = integer_at(first, at + 8);
   file.start.base.chain = *digest_of(first.substr(at + 16, kChainBytes));
   if (file.start.journal != journal) {
     file.unreadable = kForeign;
@@ -188,7 +188,7 @@ Result<FoundFile> read_member(const fs::path& path, const Digest& journal, Disk&
 std::optional<std::vector<JournalEntry>> entries_after(const Batch& batch, JournalHead head) {
   std::vector<JournalEntry> entries;
   for (const JournalEntry& entry : batch.entries) {
-    if (entry.place <= head.place) continue;
+    if (entry.seq <= head.seq) continue;
     head = next_head(head, entry);
     entries.push_back(entry);
   }
@@ -198,9 +198,8 @@ std::optional<std::vector<JournalEntry>> entries_after(const Batch& batch, Journ
 
 // The batch of a file that continues from `head`, or null.
 const Batch* find_next(const FoundFile& file, const JournalHead& head) {
-  const auto found = std::ranges::find_if(file.batches, [&](const Batch& batch) {
-    return batch.first <= head.place.value + 1 && batch.head.place > head.place;
-  });
+  const auto found = std::ranges::find_if(
+      file.batches, [&](const Batch& batch) { return batch.first <= head.seq.value + 1 && batch.head.seq > head.seq; });
   return found == file.batches.end() ? nullptr : &*found;
 }
 
@@ -220,7 +219,7 @@ void note_differences(const FoundFile& log, const FoundFile& mirror, LogContents
   };
   const auto lacks_batches = [&](const FoundFile& one, const FoundFile& other) {
     return std::ranges::any_of(other.batches, [&](const Batch& batch) {
-      return batch.head.place <= one.last() && batch.first > one.start.base.place.value &&
+      return batch.head.seq <= one.last() && batch.first > one.start.base.seq.value &&
              std::ranges::none_of(one.batches, [&](const Batch& own) { return own.head == batch.head; });
     });
   };
@@ -259,7 +258,7 @@ Result<LogContents> read_log(const fs::path& journal, const Digest& identity, co
       found.foreign.push_back(file.path.string() + " belongs to another journal than " + journal.string());
     if (!file.unreadable.empty()) continue;
     found.generation = std::max(found.generation, file.start.generation);
-    found.witnessed = std::max({found.witnessed, file.start.base.place, file.last()});
+    found.witnessed = std::max({found.witnessed, file.start.base.seq, file.last()});
     found.bases.emplace_back(file.path, file.start.base);
   }
   for (bool more = true; more;) {

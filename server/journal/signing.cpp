@@ -58,7 +58,7 @@ Digest message_of(RoomSeq since, const JournalHead& head) {
   Hasher hasher;
   hasher.text("osteon journal rows");
   hasher.integer(since.value);
-  hasher.integer(head.place.value);
+  hasher.integer(head.seq.value);
   hasher.text(as_text(head.chain));
   return hasher.finish();
 }
@@ -301,7 +301,7 @@ SignedEntries sign_entries(const SigningKey& key, RoomSeq since, const JournalHe
 }
 
 bool fits(const SignedEntries& entries) {
-  return entries.since && entries.since <= entries.head.place &&
+  return entries.since && entries.since <= entries.head.seq &&
          verifies(entries.key, message_of(entries.since, entries.head), entries.signature);
 }
 

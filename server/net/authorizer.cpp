@@ -526,10 +526,10 @@ Result<bool> Authorizer::read_ticket_keys() {
 // A slow disk delays no call: files are read first, and only the result is stored under the lock that calls take.
 void Authorizer::refresh() {
   const std::lock_guard reading(reading_);
-  const auto tell = [](std::string_view what, const Result<bool>& read, std::string& told) {
+  const auto tell = [](std::string_view what, const Result<bool>& read, std::string& logged) {
     const std::string fault = read ? std::string() : read.error().message;
-    if (!fault.empty() && fault != told) log::error(what, {{"fault", fault}});
-    told = fault;
+    if (!fault.empty() && fault != logged) log::error(what, {{"fault", fault}});
+    logged = fault;
   };
   const Result<bool> list = access_.refresh();
   bool is_revocation = false;

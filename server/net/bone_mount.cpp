@@ -7,7 +7,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kTellAtRest = 50ms;
+constexpr auto kSendAtRest = 50ms;
 constexpr auto kLongestStep = 100ms;  // longest step after the machine stood still: the bone loses that time too
 constexpr double kRest_mj = 1e-6;     // less than a thousandth of a millimetre
 
@@ -33,8 +33,8 @@ bool BoneMount::step(std::chrono::nanoseconds now) {
   const auto since = stepped_.count() < 0 ? 0ns : std::min<std::chrono::nanoseconds>(now - stepped_, kLongestStep);
   stepped_ = now;
   bone_.step(1e-9 * static_cast<double>(since.count()));
-  if (bone_.mount().stored_mj() < kRest_mj && now - told_ < kTellAtRest) return false;
-  told_ = now;
+  if (bone_.mount().stored_mj() < kRest_mj && now - sent_ < kSendAtRest) return false;
+  sent_ = now;
   return true;
 }
 

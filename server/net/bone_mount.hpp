@@ -29,7 +29,7 @@ class BoneMount {
  private:
   std::mutex mutex_;  // never held with another mutex that is taken within
   MountServer bone_;
-  std::chrono::nanoseconds stepped_{-1}, told_{};
+  std::chrono::nanoseconds stepped_{-1}, sent_{};
 };
 
 }  // namespace osteon

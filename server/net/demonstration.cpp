@@ -241,12 +241,11 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
   bool too_many = false;
   const auto take = [&](const LogEntry& entry) {
     if (const auto* cut = std::get_if<CutEntry>(&entry.what)) {
-      if (entry.place >= what.from && (!what.of || cut->cut.author == what.of))
-        cuts[entry.place] = {cut->cut, entry.at};
+      if (entry.seq >= what.from && (!what.of || cut->cut.author == what.of)) cuts[entry.seq] = {cut->cut, entry.at};
     } else if (const auto* undo = std::get_if<UndoEntry>(&entry.what)) {
-      undone.insert(undo->places.begin(), undo->places.end());
+      undone.insert(undo->seqs.begin(), undo->seqs.end());
     } else if (const auto* redo = std::get_if<RedoEntry>(&entry.what)) {
-      for (const RoomSeq place : redo->places) undone.erase(place);
+      for (const RoomSeq seq : redo->seqs) undone.erase(seq);
     } else if (const auto* added = std::get_if<ToolEntry>(&entry.what)) {
       tools.emplace(added->tool.hash(), added->tool);
     }
@@ -265,8 +264,8 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
 
   Recording out;
   std::set<Digest> used;
-  for (auto& [place, recorded] : cuts) {
-    if (undone.contains(place)) continue;
+  for (auto& [seq, recorded] : cuts) {
+    if (undone.contains(seq)) continue;
     used.insert(recorded.cut.tool);
     out.cuts.push_back(std::move(recorded));
   }

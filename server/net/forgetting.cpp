@@ -55,7 +55,7 @@ bool WordEraser::names_one(std::string_view words) const {
 }
 
 std::optional<std::string> WordEraser::operator()(const JournalEntry& entry) {
-  Result<LogEntry> read = entry_from_bytes(entry.place, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
+  Result<LogEntry> read = entry_from_bytes(entry.seq, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
   if (!read) return std::nullopt;
   if (const auto* join = std::get_if<JoinEntry>(&read->what); join != nullptr && people_.contains(join->person))
     authors_.insert(join->author);

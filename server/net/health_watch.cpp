@@ -40,15 +40,15 @@ void HealthWatch::look() {
   const bool open = !rooms_.draining();
   std::map<std::string, bool> now;
   // A removed name is reported as not serving. The service does not know names that never existed.
-  for (const auto& [name, serving] : told_) now[name] = false;
+  for (const auto& [name, serving] : published_) now[name] = false;
   now[""] = open;
   if (of_ == Of::server_and_rooms)
     for (const std::shared_ptr<OpenRoom>& room : rooms_.open_rooms())
       now[room->name] = open && !room->runtime().stopped();
   for (const auto& [name, serving] : now)
-    if (const auto before = told_.find(name); before == told_.end() || before->second != serving)
+    if (const auto before = published_.find(name); before == published_.end() || before->second != serving)
       service_.SetServingStatus(name, serving);
-  told_ = std::move(now);
+  published_ = std::move(now);
 }
 
 }  // namespace osteon

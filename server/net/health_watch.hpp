@@ -36,7 +36,7 @@ class HealthWatch {
   const Of of_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::map<std::string, bool> told_;  // whether serving, by name
+  std::map<std::string, bool> published_;  // whether serving, by name
   bool end_ = false;
   std::thread thread_;
 };

@@ -19,14 +19,14 @@ constexpr std::uint32_t kGenesisVersion = 1;
 tl::unexpected<Error> bad(std::string what) { return failure(ErrorCode::invalid_input, std::move(what)); }
 
 template <class List>
-void put(const std::vector<RoomSeq>& places, List& out) {
-  for (const RoomSeq place : places) out.Add(place.value);
+void put(const std::vector<RoomSeq>& seqs, List& out) {
+  for (const RoomSeq seq : seqs) out.Add(seq.value);
 }
 template <class List>
-std::vector<RoomSeq> places_of(const List& list) {
-  std::vector<RoomSeq> places;
-  for (const std::uint64_t place : list) places.push_back(RoomSeq{place});
-  return places;
+std::vector<RoomSeq> seqs_of(const List& list) {
+  std::vector<RoomSeq> seqs;
+  for (const std::uint64_t seq : list) seqs.push_back(RoomSeq{seq});
+  return seqs;
 }
 
 template <class List>
@@ -104,10 +104,10 @@ struct Writer {
       put(piece.left, *one.mutable_left());
     }
   }
-  void operator()(const UndoEntry& undo) const { put(undo.places, *out.mutable_undo()->mutable_places()); }
+  void operator()(const UndoEntry& undo) const { put(undo.seqs, *out.mutable_undo()->mutable_room_seqs()); }
   void operator()(const RedoEntry& redo) const {
     put(redo.undos, *out.mutable_redo()->mutable_undos());
-    put(redo.places, *out.mutable_redo()->mutable_places());
+    put(redo.seqs, *out.mutable_redo()->mutable_room_seqs());
   }
   void operator()(const RemoveBodyEntry& removal) const { out.mutable_removal()->set_body(removal.body.value); }
   void operator()(const ItemEntry& item) const {
@@ -215,9 +215,9 @@ Result<What> read(const v1::JournalEntry& entry) {
     case v1::JournalEntry::kSplit:
       return read(entry.split());
     case v1::JournalEntry::kUndo:
-      return UndoEntry{places_of(entry.undo().places())};
+      return UndoEntry{seqs_of(entry.undo().room_seqs())};
     case v1::JournalEntry::kRedo:
-      return RedoEntry{places_of(entry.redo().undos()), places_of(entry.redo().places())};
+      return RedoEntry{seqs_of(entry.redo().undos()), seqs_of(entry.redo().room_seqs())};
     case v1::JournalEntry::kRemoval:
       return RemoveBodyEntry{BodyId{entry.removal().body()}};
     case v1::JournalEntry::kItem:
@@ -313,27 +313,27 @@ std::string to_bytes(const LogEntry& entry) {
   return out.SerializeAsString();
 }
 
-Result<LogEntry> entry_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
+Result<LogEntry> entry_from_bytes(RoomSeq seq, std::chrono::nanoseconds at, std::string_view bytes) {
   const auto in_entry = [&](const Error& error) {
-    return failure(error.code, "entry " + std::to_string(place.value) + ": " + error.message);
+    return failure(error.code, "entry " + std::to_string(seq.value) + ": " + error.message);
   };
   v1::JournalEntry in;
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
     return in_entry({ErrorCode::invalid_input, "it is no entry of a room"});
   Result<What> what = read(in);
   if (!what) return in_entry(what.error());
-  return LogEntry{place, at, AuthorId{in.author()}, std::move(*what)};
+  return LogEntry{seq, at, AuthorId{in.author()}, std::move(*what)};
 }
 
-Result<std::string> entry_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes) {
+Result<std::string> entry_as_json(RoomSeq seq, std::chrono::nanoseconds at, std::string_view bytes) {
   v1::JournalEntry in;
   std::string event;
   google::protobuf::util::JsonPrintOptions names;
   names.preserve_proto_field_names = true;
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
       !google::protobuf::util::MessageToJsonString(in, &event, names).ok())
-    return bad("entry " + std::to_string(place.value) + ": it is no entry of a room");
-  return "{\"place\":" + std::to_string(place.value) +
+    return bad("entry " + std::to_string(seq.value) + ": it is no entry of a room");
+  return "{\"room_seq\":" + std::to_string(seq.value) +
          ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) + ",\"event\":" + event + "}";
 }
 
@@ -347,7 +347,7 @@ PersonExport::PersonExport(std::uint32_t person, const std::vector<Person>& peop
 
 Result<std::optional<std::string>> PersonExport::of(const JournalEntry& entry) {
   const std::chrono::nanoseconds at(entry.at_ns);
-  const Result<LogEntry> read = entry_from_bytes(entry.place, at, entry.bytes);
+  const Result<LogEntry> read = entry_from_bytes(entry.seq, at, entry.bytes);
   if (!read) return tl::unexpected(read.error());
   const auto* join = std::get_if<JoinEntry>(&read->what);
   if (join != nullptr && join->person == person_) authors_.insert(join->author);
@@ -358,9 +358,7 @@ Result<std::optional<std::string>> PersonExport::of(const JournalEntry& entry) {
                          : rejection != nullptr ? rejection->author
                                                 : read->author;
   if (!authors_.contains(whose)) return std::nullopt;
-  return entry_as_json(entry.place, at, entry.bytes).map([](std::string line) {
-    return std::optional(std::move(line));
-  });
+  return entry_as_json(entry.seq, at, entry.bytes).map([](std::string line) { return std::optional(std::move(line)); });
 }
 
 tl::unexpected<Error> PersonExport::nobody() const {

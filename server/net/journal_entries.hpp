@@ -43,10 +43,10 @@ struct RoomGenesis {
 // Without sequence number and time, which a journal stores beside these bytes.
 [[nodiscard]] std::string to_bytes(const LogEntry& entry);
 // Error invalid_input, naming the entry and the field.
-[[nodiscard]] Result<LogEntry> entry_from_bytes(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+[[nodiscard]] Result<LogEntry> entry_from_bytes(RoomSeq seq, std::chrono::nanoseconds at, std::string_view bytes);
 
-// {"place": 12, "at_s": 3.25, "event": {...}}, on one line.
-[[nodiscard]] Result<std::string> entry_as_json(RoomSeq place, std::chrono::nanoseconds at, std::string_view bytes);
+// {"room_seq": 12, "at_s": 3.25, "event": {...}}, on one line.
+[[nodiscard]] Result<std::string> entry_as_json(RoomSeq seq, std::chrono::nanoseconds at, std::string_view bytes);
 
 // Exports everything that a journal has of one person, as lines of JSON.
 class PersonExport {

@@ -46,7 +46,7 @@ void SessionLink::say(News news) {
 }
 
 void SessionLink::offer(const Cut& cut) {
-  const std::lock_guard told(told_mutex_);
+  const std::lock_guard delivery(delivery_mutex_);
   News next;
   {
     const std::lock_guard lock(mutex_);
@@ -75,9 +75,9 @@ bool SessionLink::set_partners(std::span<const CuttingState> partners) {
   {
     const std::lock_guard lock(mutex_);
     if (!link_.alive(now_of_links())) return false;
-    std::vector<wire::KnownToolState> heard;
-    for (const CuttingState& state : partners) heard.push_back({state, 0});
-    link_.set_partners(heard);
+    std::vector<wire::KnownToolState> states;
+    for (const CuttingState& state : partners) states.push_back({state, 0});
+    link_.set_partners(states);
   }
   if (server_) server_->wake();
   return true;
@@ -94,7 +94,7 @@ bool SessionLink::set_bone(const MountPose& seen) {
 }
 
 void SessionLink::close() {
-  const std::lock_guard told(told_mutex_);
+  const std::lock_guard delivery(delivery_mutex_);
   subscriber_ = nullptr;
 }
 
@@ -181,7 +181,7 @@ void LinkServer::receive_some(Time now) {
         link = found->second;
     }
     if (!link) continue;
-    const std::lock_guard told(link->told_mutex_);
+    const std::lock_guard delivery(link->delivery_mutex_);
     SessionLink::News news;
     {
       const std::lock_guard lock(link->mutex_);

@@ -65,7 +65,7 @@ class SessionLink {
   const SessionKeys keys_;
   const AuthorId author_;
   // Order: told_mutex_, then mutex_.
-  std::mutex told_mutex_;  // held while the subscriber is called, so that its calls keep their order
+  std::mutex delivery_mutex_;  // held while the subscriber is called, so that its calls keep their order
   Receiver* subscriber_;
   std::mutex mutex_;
   wire::ServerLink link_;

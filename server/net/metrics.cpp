@@ -103,14 +103,14 @@ void add_room(Page& page, OpenRoom& room, bool draining) {
   page.histogram("osteon_cut_stage_seconds", stage, with("stage", "wait"), health.stages.wait);
   page.histogram("osteon_cut_stage_seconds", stage, with("stage", "decide"), health.stages.decide);
   page.histogram("osteon_cut_stage_seconds", stage, with("stage", "commit"), health.stages.commit);
-  page.histogram("osteon_cut_stage_seconds", stage, with("stage", "tell"), health.stages.tell);
+  page.histogram("osteon_cut_stage_seconds", stage, with("stage", "publish"), health.stages.publish);
   page.histogram("osteon_tick_late_seconds", "How late ticks began.", with(), health.tick.lateness);
   page.histogram("osteon_tick_work_seconds", "How long ticks took.", with(), health.tick.work);
   page.counter("osteon_ticks_missed_total", "Periods that no tick ran in.", with(),
                static_cast<double>(health.tick.missed));
   page.histogram("osteon_journal_commit_seconds", "Transactions of the journal.", with(), health.commit);
   if (room.store())
-    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.keeper_file()));
+    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.store_file()));
 
   const char* queue =
       "What waits: cuts for a tick, entries for the disk, blocks for the surface, the slowest reader's entries or "

@@ -104,7 +104,7 @@ class PeopleServiceImpl final : public PeopleBase {
     struct Answer {
       std::mutex mutex;
       std::size_t left = 0;
-      RoomSeq place;  // of the newest event that makes it valid, also of earlier ones
+      RoomSeq seq;  // of the newest event that makes it valid, also of earlier ones
       std::optional<Error> failed;
     };
     const auto answer = std::make_shared<Answer>();  // shared by the queued events
@@ -117,18 +117,18 @@ class PeopleServiceImpl final : public PeopleBase {
             const bool holds = all && now.supervision == word && r.people().supervises(by);
             if (!holds) return r.supervise(by, subject, word);
             const std::lock_guard lock(answer->mutex);
-            answer->place = std::max(answer->place, now.place);
+            answer->seq = std::max(answer->seq, now.seq);
             return RoomEvent{};
           },
           [answer, room, reactor, response](const Result<RoomEvent>& decided) {
             std::unique_lock lock(answer->mutex);
             if (decided)
-              answer->place = std::max(answer->place, decided->room_seq);
+              answer->seq = std::max(answer->seq, decided->room_seq);
             else if (!answer->failed)
               answer->failed = decided.error();
             if (--answer->left > 0) return;
             // For people about whom nothing was ever decided, it holds from the beginning.
-            response->set_room_seq(answer->place ? answer->place.value : room->runtime().room_seq().value);
+            response->set_room_seq(answer->seq ? answer->seq.value : room->runtime().room_seq().value);
             lock.unlock();
             reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
           });

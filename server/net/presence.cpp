@@ -20,7 +20,7 @@ Presence::Presence(const Room& room, const std::map<std::uint32_t, std::string>&
     entry.role = room.people().role(id);
     entry.hand = room.may_cut(id);
     entry.supervision = room.people().supervised(id).supervision;
-    entry.decided = room.people().supervised(id).place;
+    entry.decided = room.people().supervised(id).seq;
     entry.decided_by = room.people().supervised(id).by;
     entry.last_here = author;
   }
@@ -82,10 +82,10 @@ void Presence::took_cut(AuthorId author) {
   if (Entry* entry = change(author)) ++entry->cuts;
 }
 
-void Presence::heard(AuthorId author, RoomSeq place) {
+void Presence::acknowledged(AuthorId author, RoomSeq seq) {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
-  if (found != people_.end() && place > found->second.heard) change(author)->heard = place;
+  if (found != people_.end() && seq > found->second.acknowledged) change(author)->acknowledged = seq;
 }
 
 void Presence::looked(AuthorId author, const ViewFrustum& from) {
@@ -104,7 +104,7 @@ std::vector<AuthorId> Presence::supervised_hands() const {
 RoomSeq Presence::acknowledged_by(AuthorId author) const {
   const std::lock_guard lock(mutex_);
   const auto found = people_.find(author);
-  return found == people_.end() ? RoomSeq{} : found->second.heard;
+  return found == people_.end() ? RoomSeq{} : found->second.acknowledged;
 }
 
 std::string Presence::name_of(AuthorId author) const {
@@ -141,7 +141,7 @@ void Presence::publish(RoomSeq room_seq, Clock::time_point now) {
   {
     const std::lock_guard lock(mutex_);
     room_seq_ = room_seq;
-    if (std::exchange(told_, revision_) == revision_) return;
+    if (std::exchange(published_, revision_) == revision_) return;
   }
   next_ = now + kApart;
   const std::lock_guard lock(streams_mutex_);
@@ -184,7 +184,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
     if (entry.decided) *person.mutable_supervision() = wire::to_wire(entry.supervision);
     person.set_decided_room_seq(entry.decided.value);
     person.set_decided_by(entry.decided_by.value);
-    person.set_acknowledged_room_seq(entry.heard.value);
+    person.set_acknowledged_room_seq(entry.acknowledged.value);
   }
   std::set<std::uint32_t> drawn;
   for (const auto& [id, one] : annotations_) {
@@ -197,7 +197,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
     const bool own = !said.to || is_readers(said.to) || is_readers(said.from);
     if (said.number <= cursor.words || !(own ? rights.own_words : rights.others_words)) continue;
     v1::Words& words = *out.add_words();
-    words.set_room_seq(said.place.value);
+    words.set_room_seq(said.seq.value);
     words.set_from(said.from.value);
     words.set_to(said.to.value);
     words.set_words(said.words);

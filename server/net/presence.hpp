@@ -55,7 +55,7 @@ class Presence {
   void went(AuthorId author);
   void take(const RoomEvent& event);  // supervise, annotation, words; other kinds are ignored
   void took_cut(AuthorId author);
-  void heard(AuthorId author, RoomSeq place);
+  void acknowledged(AuthorId author, RoomSeq seq);
   void looked(AuthorId author, const ViewFrustum& from);
 
   // People with a tool, present or not, who may be supervised together. Instructors are not among them.
@@ -83,7 +83,7 @@ class Presence {
     bool hand = false;
     int streams = 0;
     Restrictions supervision;
-    RoomSeq decided, heard;
+    RoomSeq decided, acknowledged;
     AuthorId decided_by;
     std::optional<ViewFrustum> look;
     std::uint32_t cuts = 0;
@@ -95,7 +95,7 @@ class Presence {
   };
   struct Said {
     std::uint64_t number = 0;
-    RoomSeq place;
+    RoomSeq seq;
     AuthorId from, to;
     std::string words;
   };
@@ -107,7 +107,7 @@ class Presence {
   Clock::time_point next_{};  // used by the tick thread
 
   mutable std::mutex mutex_;
-  std::uint64_t revision_ = 1, told_ = 0;
+  std::uint64_t revision_ = 1, published_ = 0;
   std::map<AuthorId, Entry> people_;
   std::map<std::uint32_t, Drawn> annotations_;
   std::deque<Said> words_;

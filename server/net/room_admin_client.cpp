@@ -61,7 +61,7 @@ Result<Response> ask(const std::shared_ptr<grpc::Channel>& channel,
 RoomLine line_of(const v1::RoomInfo& info) {
   return {.name = info.name(),
           .open = info.open(),
-          .kept = info.kept(),
+          .kept = info.persisted(),
           .replay = info.replay(),
           .case_title = info.case_title(),
           .room_seq = RoomSeq{info.room_seq()},

@@ -74,35 +74,35 @@ Result<void> check_room_name(Journal& journal, const fs::path& file, const std::
 Result<void> check_whole(const Journal& journal, const std::string& option) {
   const Error* closed = journal.closed_because();
   if (closed == nullptr) return {};
-  const std::string last = std::to_string(journal.head().place.value);
+  const std::string last = std::to_string(journal.head().seq.value);
   return failure(closed->code, closed->message + " (its events are confirmed up to " + last +
-                                   (journal.head().place ? ", and " + option + " " + last + " takes these)" : ")"));
+                                   (journal.head().seq ? ", and " + option + " " + last + " takes these)" : ")"));
 }
 
-Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq place, const std::string& name) {
+Result<JournalCopy> begin_branch(Journal& from, const fs::path& to, RoomSeq seq, const std::string& name) {
   Result<RoomGenesis> genesis = genesis_from_bytes(from.genesis());
   if (!genesis) return tl::unexpected(genesis.error());
   const JournalHead& head = from.head();
-  if (!place)
+  if (!seq)
     if (const Result<void> whole = check_whole(from, "--at"); !whole) return tl::unexpected(whole.error());
-  if (place > head.place)
-    return failure(ErrorCode::invalid_input, "a branch at event " + std::to_string(place.value) +
+  if (seq > head.seq)
+    return failure(ErrorCode::invalid_input, "a branch at event " + std::to_string(seq.value) +
                                                  " lies beyond the last one of the room " + genesis->room + ", " +
-                                                 std::to_string(head.place.value));
-  const Result<JournalHead> at = place ? from.head_at(place) : head;
+                                                 std::to_string(head.seq.value));
+  const Result<JournalHead> at = seq ? from.head_at(seq) : head;
   if (!at) return tl::unexpected(at.error());
   genesis->parent = std::exchange(genesis->room, name);
-  genesis->parent_room_seq = at->place;
+  genesis->parent_room_seq = at->seq;
   genesis->parent_chain = at->chain;
   // Of its people, only the last number given, so that no number is given twice.
-  return JournalCopy::begin_branch(from, to, at->place, to_bytes(*genesis), {kPeopleRegister});
+  return JournalCopy::begin_branch(from, to, at->seq, to_bytes(*genesis), {kPeopleRegister});
 }
 
-Result<JournalHead> branch_journal(const fs::path& from, const fs::path& to, RoomSeq place, const std::string& name,
+Result<JournalHead> branch_journal(const fs::path& from, const fs::path& to, RoomSeq seq, const std::string& name,
                                    const MaintenanceCalls& calls, Disk* disk) {
   Result<Journal> journal = Journal::open_to_read(from, disk);
   if (!journal) return tl::unexpected(journal.error());
-  Result<JournalCopy> copy = begin_branch(*journal, to, place, name);
+  Result<JournalCopy> copy = begin_branch(*journal, to, seq, name);
   if (!copy) return tl::unexpected(copy.error());
   for (Result<bool> done = false; !*done;) {
     if (calls.stop && calls.stop()) return given_up("the branch " + to.string());

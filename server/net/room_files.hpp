@@ -36,7 +36,7 @@ struct MaintenanceCalls {
 // (no such sequence number, or damaged); unavailable (all of it was asked for, and the journal is closed to entries);
 // cancelled.
 [[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
-                                                 RoomSeq place, const std::string& name,
+                                                 RoomSeq seq, const std::string& name,
                                                  const MaintenanceCalls& calls = {}, Disk* disk = nullptr);
 
 // Whether this head is in the history of a journal.
@@ -71,7 +71,7 @@ struct RoomFile {
 [[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);
 
 // As branch_journal(), step by step, of a journal that is in use.
-[[nodiscard]] Result<JournalCopy> begin_branch(Journal& from, const std::filesystem::path& to, RoomSeq place,
+[[nodiscard]] Result<JournalCopy> begin_branch(Journal& from, const std::filesystem::path& to, RoomSeq seq,
                                                const std::string& name);
 // The error of work that was stopped.
 [[nodiscard]] tl::unexpected<Error> given_up(const std::string& what);

@@ -17,7 +17,7 @@ constexpr std::size_t kSliceEntries = 256;  // read and hashed in a millisecond 
 
 Result<void> RoomStore::each_entry(JournalHead& at, RoomSeq last,
                                    const std::function<bool(const JournalEntry&)>& take) {
-  while (at.place < last) {
+  while (at.seq < last) {
     Result<JournalSlice> slice = with_journal(
         [&](Journal& journal) -> Result<JournalSlice> { return journal.read_slice(at, last, kSliceEntries); });
     if (!slice) return tl::unexpected(slice.error());
@@ -26,21 +26,21 @@ Result<void> RoomStore::each_entry(JournalHead& at, RoomSeq last,
       if (!take(entry)) return {};
     if (slice->stopped) return tl::unexpected(*slice->stopped);
     if (slice->entries.empty())
-      return failure(ErrorCode::invalid_input, file_.string() + " has no entry " + std::to_string(at.place.value + 1));
+      return failure(ErrorCode::invalid_input, file_.string() + " has no entry " + std::to_string(at.seq.value + 1));
   }
   return {};
 }
 
 Result<void> RoomStore::read(RoomSeq from, RoomSeq to, const std::function<bool(const LogEntry&)>& take) {
   Result<JournalHead> at = with_journal([&](Journal& journal) -> Result<JournalHead> {
-    to = std::min(to, journal.head().place);
+    to = std::min(to, journal.head().seq);
     if (from > to) return JournalHead{to, {}};
     return journal.head_at(RoomSeq{from ? from.value - 1 : 0});
   });
   if (!at) return tl::unexpected(at.error());
   Result<void> outcome;
   const Result<void> read = each_entry(*at, to, [&](const JournalEntry& one) {
-    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    const Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
     if (!entry) outcome = tl::unexpected(entry.error());
     return entry && take(*entry);
   });
@@ -67,9 +67,9 @@ Result<JournalHead> RoomStore::backup(const std::filesystem::path& to, const Mai
   return copy->head();
 }
 
-Result<JournalHead> RoomStore::branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
+Result<JournalHead> RoomStore::branch(const std::filesystem::path& to, RoomSeq seq, const std::string& name,
                                       const MaintenanceCalls& calls) {
-  Result<JournalCopy> copy = with_journal([&](Journal& journal) { return begin_branch(journal, to, place, name); });
+  Result<JournalCopy> copy = with_journal([&](Journal& journal) { return begin_branch(journal, to, seq, name); });
   if (!copy) return tl::unexpected(copy.error());
   if (const Result<void> done = run(*copy, calls); !done) return tl::unexpected(done.error());
   return copy->head();
@@ -86,14 +86,14 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   RoomReport report;
   RoomSeq last;
   const auto checkpoints = with_journal([&](Journal& journal) -> Result<std::vector<Checkpoint>> {
-    last = journal.head().place;
+    last = journal.head().seq;
     report.head = first_head(journal.genesis());
     report.faults = verify_beside(journal);
     // If the list of checkpoints cannot be read, the journal has just said so.
     return journal.checkpoints().value_or(std::vector<Checkpoint>{});
   });
   if (!checkpoints) return tl::unexpected(checkpoints.error());
-  const RoomSeq replayed_to = live ? live->place : RoomSeq{};
+  const RoomSeq replayed_to = live ? live->seq : RoomSeq{};
   if (replayed_to > last)
     return failure(ErrorCode::unavailable, "event " + std::to_string(replayed_to.value) + " of the room " +
                                                genesis_.room + " is not durable yet; try again");
@@ -104,32 +104,31 @@ Result<RoomReport> RoomStore::verify(const Case& bone, const std::optional<BoneA
   const Result<void> read = each_entry(report.head, last, [&](const JournalEntry& one) {
     stopped = calls.stop && calls.stop();
     if (stopped) return false;
-    if (calls.progress && one.place.value % 64 == 0)
-      calls.progress(static_cast<double>(one.place.value) / static_cast<double>(last.value));
+    if (calls.progress && one.seq.value % 64 == 0)
+      calls.progress(static_cast<double>(one.seq.value) / static_cast<double>(last.value));
     if (!outcome) return true;  // the following entries are still checked against the chain
-    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    const Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
     if (!entry) outcome = tl::unexpected(entry.error());
-    if (!entry || !room || one.place > replayed_to) return true;
+    if (!entry || !room || one.seq > replayed_to) return true;
     outcome = room->replay(*entry);
     (void)room->take_changes();
     for (const Checkpoint& point : *checkpoints)
-      if (point.at.place == one.place && to_hex(field_hash(room->all_leaves(), pitch_mm_)) != point.meta)
-        report.faults.push_back("the checkpoint at event " + std::to_string(one.place.value) + " of " + file_.string() +
+      if (point.at.seq == one.seq && to_hex(field_hash(room->all_leaves(), pitch_mm_)) != point.meta)
+        report.faults.push_back("the checkpoint at event " + std::to_string(one.seq.value) + " of " + file_.string() +
                                 " is not what its entries make; remove it");
     return true;
   });
   if (stopped) return given_up("the check of the room " + genesis_.room);
   if (!read && read.error().code == ErrorCode::unavailable) return tl::unexpected(read.error());
   if (!read) {
-    report.first_bad = RoomSeq{report.head.place.value + 1};
+    report.first_bad = RoomSeq{report.head.seq.value + 1};
     report.faults.push_back(read.error().message);
   }
   if (!outcome) report.faults.push_back(file_.string() + ": " + outcome.error().message);
-  if (room && outcome && room->room_seq() == live->place) {
-    report.replayed = {live->place, room->field_hash()};
+  if (room && outcome && room->room_seq() == live->seq) {
+    report.replayed = {live->seq, room->field_hash()};
     if (report.replayed.field_hash != live->field_hash)
-      report.faults.push_back("the entries of the room " + genesis_.room + " up to " +
-                              std::to_string(live->place.value) +
+      report.faults.push_back("the entries of the room " + genesis_.room + " up to " + std::to_string(live->seq.value) +
                               " make another bone than the one that is being cut; close the room and open it again");
   }
 
@@ -197,7 +196,7 @@ Result<void> RoomStore::export_person(std::uint32_t person, const std::function<
   RoomSeq last;
   JournalHead at;
   const auto people = with_journal([&](Journal& journal) {
-    last = journal.head().place;
+    last = journal.head().seq;
     at = first_head(journal.genesis());
     return journal.people();
   });
@@ -219,7 +218,7 @@ Result<void> RoomStore::export_person(std::uint32_t person, const std::function<
 
 Result<void> RoomStore::tidy_if_idle() {
   return with_journal([&](Journal& journal) -> Result<void> {
-    const RoomSeq now = journal.head().place;
+    const RoomSeq now = journal.head().seq;
     const bool idle = idle_at_ == now;
     idle_at_ = now;
     if (!idle || journal.closed_because() != nullptr) return {};
@@ -229,8 +228,8 @@ Result<void> RoomStore::tidy_if_idle() {
 
 Result<bool> RoomStore::has_head(const JournalHead& head) {
   return with_journal([&](Journal& journal) -> Result<bool> {
-    if (head.place > journal.head().place) return false;
-    return journal.head_at(head.place).map([&](const JournalHead& here) { return here == head; });
+    if (head.seq > journal.head().seq) return false;
+    return journal.head_at(head.seq).map([&](const JournalHead& here) { return here == head; });
   });
 }
 

@@ -34,8 +34,8 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
   batch.clear();
   // A failed commit reports itself. A journal can also be closed by damage found at opening, by a witness, or by a name
   // or a checkpoint that could not be written.
-  if (store && store->closed_to_entries() && !closing_told) {
-    closing_told = true;
+  if (store && store->closed_to_entries() && !closing_reported) {
+    closing_reported = true;
     later([this](const Result<void>&) {
       if (!committer.failure()) close_room(*store->closed_to_entries());
     });
@@ -64,12 +64,12 @@ bool RoomRuntime::Impl::play(std::chrono::nanoseconds now) {
     {
       const std::unique_lock lock(room_mutex);
       if (const Result<void> happened = room.replay(*entry); !happened) {
-        log::error("playback ended", {{"place", entry->place.value}, {"reason", happened.error().message}});
+        log::error("playback ended", {{"room_seq", entry->seq.value}, {"reason", happened.error().message}});
         player->stop();
         break;
       }
       room_seq = room.room_seq().value;
-      if (meanwhile && cut) meanwhile->push_back(cut->cut);
+      if (cuts_during_copy && cut) cuts_during_copy->push_back(cut->cut);
     }
     if (!cut)
       show_scene();
@@ -98,8 +98,8 @@ void RoomRuntime::Impl::run_ticks() {
     }
     if (decided) reserve.refill();
     timer.done(own);
-    figures.publish(last);
-    // Others read a copy, so that a tick never waits for a reader of its figures. Only the last tick waits, to be sure.
+    metrics.publish(last);
+    // Others read a copy, so that a tick never waits for a reader of its metrics. Only the last tick waits, to be sure.
     std::unique_lock lock(stats_mutex, std::try_to_lock);
     if (!lock && last) lock.lock();
     if (!lock) continue;
@@ -188,8 +188,8 @@ RuntimeHealth RoomRuntime::health() const {
     const std::lock_guard lock(impl_->queue_mutex);
     health.queued_cuts = impl_->queue.size();
   }
-  health.stages = impl_->figures.stages();
-  health.rejections = impl_->figures.rejections();
+  health.stages = impl_->metrics.stages();
+  health.rejections = impl_->metrics.rejections();
   health.serving = !stopped();
   const std::lock_guard lock(impl_->stats_mutex);
   health.tick = impl_->stats;

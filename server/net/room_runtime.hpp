@@ -14,7 +14,7 @@
 #include "common/surface/view_frustum.hpp"
 #include "common/wire/cut_run.hpp"
 #include "server/net/committer.hpp"
-#include "server/net/cut_figures.hpp"
+#include "server/net/cut_metrics.hpp"
 #include "server/net/mesh_publisher.hpp"
 #include "server/net/playback.hpp"
 #include "server/net/presence.hpp"
@@ -35,9 +35,9 @@ class SessionSubscriber : public Subscriber {
   // Called once, after begin() and perhaps after entries. Entries apply to these leaves; applying one again that a leaf
   // already contains changes nothing.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
-  virtual void offer(RoomSeq place, const Bytes& entry) = 0;  // a whole SessionResponse
+  virtual void offer(RoomSeq seq, const Bytes& entry) = 0;  // a whole SessionResponse
   // The same. `fast`: the entry's short form for the fast path.
-  virtual void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& /*fast*/) { offer(place, entry); }
+  virtual void offer(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& /*fast*/) { offer(seq, entry); }
   // [thread of the tools' states] The newest states of all tools. Returns true if some are still to be sent and it
   // wants to be called again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
@@ -139,7 +139,7 @@ class RoomRuntime {
   // Checks the witness that a returning client was sent. It counts whoever sends it: after a loss, the author number
   // may belong to another person or to nobody. Errors: those of RoomStore::check_witness; unavailable (the room has no
   // store).
-  [[nodiscard]] Result<void> check_kept(const Witness& kept);
+  [[nodiscard]] Result<void> check_witness(const Witness& kept);
   // Checks whether an earlier connection may go on. `kept`: the witness that the client was sent, if any. Errors: first
   // those of check_kept; invalid_input (the secret does not match the author's digest); denied (`role` is given, and
   // the author joined with another).
@@ -148,7 +148,7 @@ class RoomRuntime {
   [[nodiscard]] BoneStatus bone_status();
   // [thread for slow requests] The leaves of all bodies at one sequence number, also of bodies that were taken away.
   struct Leaves {
-    RoomSeq place;
+    RoomSeq seq;
     std::vector<FieldLeaf> leaves;
   };
   [[nodiscard]] Leaves leaves_now();

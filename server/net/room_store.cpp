@@ -134,7 +134,7 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
   const Fields fields = store->newest_fields();
   Result<Room> room = store->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
-  store->evaluated_ = store->journal_->head().place.value - fields.place.value;
+  store->evaluated_ = store->journal_->head().seq.value - fields.seq.value;
   store->note_closing();
   return PersistedRoom{std::move(*room), std::move(store), made};
 }
@@ -143,11 +143,11 @@ RoomStore::Fields RoomStore::newest_fields() {
   const Result<std::vector<Checkpoint>> checkpoints = journal_->checkpoints();
   if (!checkpoints) return {};
   for (const Checkpoint& one : *checkpoints) {
-    if (one.at.place > journal_->head().place || !journal_->is_vouched_for(one)) continue;
+    if (one.at.seq > journal_->head().seq || !journal_->is_vouched_for(one)) continue;
     const Result<std::string> bytes = journal_->read_checkpoint(one);
     if (!bytes) continue;
-    if (Result<std::vector<FieldLeaf>> leaves = fields_of(one, *bytes)) return {one.at.place, std::move(*leaves)};
-    log::warn("a checkpoint is passed over", {{"place", one.at.place.value}});
+    if (Result<std::vector<FieldLeaf>> leaves = fields_of(one, *bytes)) return {one.at.seq, std::move(*leaves)};
+    log::warn("a checkpoint is passed over", {{"room_seq", one.at.seq.value}});
   }
   return {};
 }
@@ -163,16 +163,16 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
                                const std::function<void(double)>& progress) {
   Result<Room> room = begin_room(bone, genesis_, limits);
   if (!room) return room;
-  const std::uint64_t entries = journal_->head().place.value;
+  const std::uint64_t entries = journal_->head().seq.value;
   Result<void> replayed;
   const auto take = [&](const JournalEntry& one) {
-    Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
-    replayed = entry ? room->replay(*entry, one.place <= fields.place ? Room::Fields::leave : Room::Fields::evaluate)
+    Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    replayed = entry ? room->replay(*entry, one.seq <= fields.seq ? Room::Fields::leave : Room::Fields::evaluate)
                      : Result<void>(tl::unexpected(entry.error()));
-    if (replayed && one.place == fields.place) replayed = room->set_fields(fields.leaves);
-    if (replayed && one.place > fields.place && changes_bone(*entry)) changes_.push_back(one.place);
-    if (progress && one.place.value % 64 == 0)
-      progress(static_cast<double>(one.place.value) / static_cast<double>(entries));
+    if (replayed && one.seq == fields.seq) replayed = room->set_fields(fields.leaves);
+    if (replayed && one.seq > fields.seq && changes_bone(*entry)) changes_.push_back(one.seq);
+    if (progress && one.seq.value % 64 == 0)
+      progress(static_cast<double>(one.seq.value) / static_cast<double>(entries));
     return replayed.has_value();
   };
   if (Result<void> read = journal_->read(RoomSeq{1}, take); !read) return tl::unexpected(read.error());
@@ -185,11 +185,11 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
 Result<void> RoomStore::write(std::span<const LogEntry> entries) {
   std::vector<JournalEntry> out;
   out.reserve(entries.size());
-  for (const LogEntry& entry : entries) out.push_back({entry.place, entry.at.count(), to_bytes(entry)});
+  for (const LogEntry& entry : entries) out.push_back({entry.seq, entry.at.count(), to_bytes(entry)});
   return with_journal([&](Journal& journal) {
     const Result<void> kept = journal.append(out);
     for (const LogEntry& entry : entries)
-      if (kept && changes_bone(entry)) changes_.push_back(entry.place);
+      if (kept && changes_bone(entry)) changes_.push_back(entry.seq);
     return kept;
   });
 }
@@ -235,7 +235,7 @@ Digest RoomStore::seal_of(const JournalHead& head) const {
   Hasher hasher;
   hasher.text("osteon witness");
   hasher.text(witness_key_);
-  hasher.integer(head.place.value);
+  hasher.integer(head.seq.value);
   hasher.bytes(std::as_bytes(std::span(head.chain.bytes)));
   return hasher.finish();
 }
@@ -247,10 +247,10 @@ Witness RoomStore::witness() const {
 
 Result<void> RoomStore::check_witness(const Witness& witness) {
   const std::string room = "the room " + genesis_.room;
-  const std::string events = std::to_string(witness.head.place.value) + kAcknowledgedEvents;
+  const std::string events = std::to_string(witness.head.seq.value) + kAcknowledgedEvents;
   const bool sealed = witness.seal == seal_of(witness.head), without_seal = witness.seal == Digest{};
-  const auto lost_after = [&](RoomSeq place) {
-    return room + " has lost " + std::to_string(witness.head.place.value - place.value) + " of the " + events;
+  const auto lost_after = [&](RoomSeq seq) {
+    return room + " has lost " + std::to_string(witness.head.seq.value - seq.value) + " of the " + events;
   };
   // Another journal has another key.
   const auto begins_anew = [&] {
@@ -258,19 +258,19 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
                                                  kJoinAsItIs + ", or have the lost journal put back first");
   };
   return with_journal([&](Journal& journal) -> Result<void> {
-    const RoomSeq head = journal.head().place;
+    const RoomSeq head = journal.head().seq;
     const std::optional<RoomSeq> recovered = journal.recovered_to();
     const auto after_recovery = [&](ErrorCode code) {
       return failure(code, lost_after(*recovered) + ": its journal was salvaged up to event " +
                                std::to_string(recovered->value) + kJoinAsItIs);
     };
-    const bool beyond = witness.head.place > head;
+    const bool beyond = witness.head.seq > head;
     // The key may be among what was lost.
     if (beyond && !sealed && recovered) return after_recovery(ErrorCode::invalid_input);
     if (beyond && without_seal)
       return failure(ErrorCode::invalid_input,
                      room + " has " + std::to_string(head.value) + " events, and you name event " +
-                         std::to_string(witness.head.place.value) + " without the room's seal" + kJoinAsItIs);
+                         std::to_string(witness.head.seq.value) + " without the room's seal" + kJoinAsItIs);
     if (beyond && !sealed) return begins_anew();
     Result<void> checked = journal.check_witness(witness.head);
     if (checked) return checked;
@@ -279,10 +279,10 @@ Result<void> RoomStore::check_witness(const Witness& witness) {
       return failure(checked.error().code,
                      lost_after(head) + ", and takes no more cuts: salvage its journal, then start again");
     // If a journal is closed to entries, it is unknown whether its file is as it was written.
-    const Result<JournalHead> here = journal.head_at(witness.head.place);
+    const Result<JournalHead> here = journal.head_at(witness.head.seq);
     const bool another_history = here && here->chain != witness.head.chain && journal.closed_because() == nullptr;
     if (!another_history) return checked;
-    if (recovered && *recovered < witness.head.place) return after_recovery(checked.error().code);
+    if (recovered && *recovered < witness.head.seq) return after_recovery(checked.error().code);
     if (without_seal) return checked;
     if (!sealed) return begins_anew();
     return failure(checked.error().code, room + " has lost some of the " + events +
@@ -294,13 +294,13 @@ std::chrono::nanoseconds reopened_time(const Room& room) {
   return room.room_seq() ? room.time() + kTimeAway : room.time();
 }
 
-Result<void> RoomStore::checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves, const MaintenanceCalls& calls) {
+Result<void> RoomStore::checkpoint(RoomSeq seq, std::span<const FieldLeaf> leaves, const MaintenanceCalls& calls) {
   const std::lock_guard one_at_a_time(checkpointing_);
   const auto needed = with_journal([&](Journal& journal) -> Result<std::optional<JournalHead>> {
-    if (!place || place > journal.head().place) return std::nullopt;
+    if (!seq || seq > journal.head().seq) return std::nullopt;
     const auto known = journal.checkpoints();
-    if (known && !known->empty() && known->front().at.place >= place) return std::nullopt;
-    return journal.head_at(place);
+    if (known && !known->empty() && known->front().at.seq >= seq) return std::nullopt;
+    return journal.head_at(seq);
   });
   if (!needed) return tl::unexpected(needed.error());
   if (!*needed) return {};
@@ -310,7 +310,7 @@ Result<void> RoomStore::checkpoint(RoomSeq place, std::span<const FieldLeaf> lea
   if (!file) return tl::unexpected(file.error());
   for (std::size_t next = 0, unsynced = 0; next < leaves.size();) {
     if (closing_ || (calls.stop && calls.stop()))
-      return given_up("the checkpoint at event " + std::to_string(place.value));
+      return given_up("the checkpoint at event " + std::to_string(seq.value));
     v1::JournalFields fields;
     for (std::size_t size = 0; next < leaves.size() && size < kPieceBytes; ++next) {
       *fields.add_leaves() = wire::to_wire(leaves[next]);
@@ -328,7 +328,7 @@ Result<void> RoomStore::checkpoint(RoomSeq place, std::span<const FieldLeaf> lea
   if (Result<void> finished = file->finish(); !finished) return finished;
   return with_journal([&](Journal& journal) {
     const Result<void> added = journal.add_checkpoint(std::move(*file));
-    if (added) std::erase_if(changes_, [&](RoomSeq change) { return change <= place; });
+    if (added) std::erase_if(changes_, [&](RoomSeq change) { return change <= seq; });
     return added;
   });
 }

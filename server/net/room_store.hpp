@@ -43,7 +43,7 @@ class InTurn {
 
 // The bone after this many entries were applied to it: Room::room_seq() and Room::field_hash().
 struct BoneAt {
-  RoomSeq place;
+  RoomSeq seq;
   Digest field_hash{};
 };
 
@@ -144,7 +144,7 @@ class RoomStore {
   // its head. Errors: exists (something is in `to`), invalid_input (damaged: nothing is copied), cancelled.
   [[nodiscard]] Result<JournalHead> backup(const std::filesystem::path& to, const MaintenanceCalls& calls = {});
   // As branch_journal().
-  [[nodiscard]] Result<JournalHead> branch(const std::filesystem::path& to, RoomSeq place, const std::string& name,
+  [[nodiscard]] Result<JournalHead> branch(const std::filesystem::path& to, RoomSeq seq, const std::string& name,
                                            const MaintenanceCalls& calls = {});
 
   // Whether this head is in the journal's history. For branches_of().
@@ -154,7 +154,7 @@ class RoomStore {
   // Entries may have come since. The leaves are written and synced in parts, and noted in their own transaction. Does
   // nothing if the entries up to there are not durable yet, or if a checkpoint already reaches that far. Error
   // cancelled.
-  [[nodiscard]] Result<void> checkpoint(RoomSeq place, std::span<const FieldLeaf> leaves,
+  [[nodiscard]] Result<void> checkpoint(RoomSeq seq, std::span<const FieldLeaf> leaves,
                                         const MaintenanceCalls& calls = {});
   // Entries since the newest checkpoint that the next opening would evaluate. For CheckpointPolicy.
   [[nodiscard]] std::uint64_t changes_since_checkpoint() const;
@@ -167,7 +167,7 @@ class RoomStore {
   RoomStore(std::filesystem::path file, Journal journal, RoomGenesis genesis, double pitch_mm, Disk& disk);
   // Fields of the newest readable checkpoint; empty if there is none.
   struct Fields {
-    RoomSeq place;
+    RoomSeq seq;
     std::vector<FieldLeaf> leaves;
   };
   // Reads leaves and their hash from a checkpoint's bytes. Error invalid_input.

@@ -59,13 +59,13 @@ Error no_such_room(const std::string& name) {
 Error not_open(const std::string& name) {
   return {ErrorCode::unavailable, "the room " + name + " is closed; osteon-server rooms resume " + name + " opens it"};
 }
-Error kept_elsewhere(const OpenRoom& room) {
+Error stored_elsewhere(const OpenRoom& room) {
   return {ErrorCode::unavailable,
-          "the room " + room.name + " has its journal in " + room.keeper_file().string() +
+          "the room " + room.name + " has its journal in " + room.store_file().string() +
               ", not in a folder of rooms; stop the server and see osteon-server --help for the commands for "
               "journals, or start it with --rooms FOLDER"};
 }
-Error not_kept(const std::string& name) {
+Error not_persisted(const std::string& name) {
   return {ErrorCode::unavailable, "the room " + name + " has no journal; start osteon-server with --rooms FOLDER"};
 }
 
@@ -190,7 +190,7 @@ void OpenRoom::maintain(const std::function<bool()>& stop) {
   std::promise<RoomRuntime::Leaves> copied;
   runtime_->run_slowly([&] { copied.set_value(runtime_->leaves_now()); });
   const RoomRuntime::Leaves now = copied.get_future().get();
-  if (const Result<void> kept = store_->checkpoint(now.place, now.leaves, {.progress = {}, .stop = stop}); !kept)
+  if (const Result<void> kept = store_->checkpoint(now.seq, now.leaves, {.progress = {}, .stop = stop}); !kept)
     log::warn("no checkpoint", {{"room", name}, {"reason", kept.error().message}});
 }
 
@@ -198,7 +198,7 @@ Rooms::Rooms(RoomsOptions options) : options_(std::move(options)), cases_(option
   OSTEON_CHECK(!options_.cases.empty());
   for (const ServedCase& served : options_.cases) cases_.keep(served);
   for (JobThread* calls : {&jobs, &files, &recordings, &checks}) calls->start();
-  upkeep_ = std::thread([this] { run_upkeep(); });
+  maintenance_ = std::thread([this] { run_maintenance(); });
 }
 
 Rooms::~Rooms() {
@@ -211,7 +211,7 @@ void Rooms::end_calls() {
   for (JobThread* calls : {&jobs, &files, &recordings, &checks}) calls->stop();
 }
 
-void Rooms::run_upkeep() {
+void Rooms::run_maintenance() {
   using Clock = std::chrono::steady_clock;
   Clock::time_point forget_at = Clock::now();
   const auto maintain = [&] {
@@ -227,7 +227,7 @@ void Rooms::run_upkeep() {
     lock.unlock();
     maintain();
     lock.lock();
-  } while (!upkeep_wake_.wait_for(lock, kMaintainEvery, [&] { return ending_.load(); }));
+  } while (!maintenance_wake_.wait_for(lock, kMaintainEvery, [&] { return ending_.load(); }));
 }
 
 MaintenanceCalls Rooms::until_the_end() const {
@@ -254,15 +254,15 @@ void Rooms::begin_end() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
-    upkeep_wake_.notify_all();
+    maintenance_wake_.notify_all();
   }
-  if (upkeep_.joinable()) upkeep_.join();
+  if (maintenance_.joinable()) maintenance_.join();
 }
 
 Result<std::shared_ptr<OpenRoom>> Rooms::find(const std::string& name) const {
   const std::lock_guard lock(mutex_);
   if (const auto found = open_.find(name); found != open_.end()) return found->second;
-  if (!name.empty()) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
+  if (!name.empty()) return stored_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
   if (open_.size() == 1) return open_.begin()->second;
   if (open_.empty())
     return failure(ErrorCode::unavailable, "no room is open here; osteon-server rooms create NAME makes one");
@@ -280,7 +280,7 @@ std::vector<std::shared_ptr<OpenRoom>> Rooms::open_rooms() const {
 
 fs::path Rooms::journal_of(const std::string& name) const { return options_.folder / (name + kEnding); }
 
-Result<fs::path> Rooms::kept_file(const std::string& name) const {
+Result<fs::path> Rooms::stored_file(const std::string& name) const {
   std::error_code ignored;
   if (is_name(name) && !options_.folder.empty() && fs::exists(journal_of(name), ignored)) return journal_of(name);
   return tl::unexpected(no_such_room(name));
@@ -372,7 +372,7 @@ Result<void> Rooms::check_new(const std::string& name, const Requester& by) cons
 
 Result<void> Rooms::check_free(const std::string& name) const {
   const std::lock_guard lock(mutex_);
-  if (open_.contains(name) || kept_file(name))
+  if (open_.contains(name) || stored_file(name))
     return failure(ErrorCode::exists, "there is a room " + name + "; choose another name");
   return {};
 }
@@ -386,7 +386,7 @@ std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
   note_open();
   log::info("room open", {{"room", room->name},
                           {"room_seq", room->runtime().room_seq().value},
-                          {"kept", room->store() != nullptr},
+                          {"persisted", room->store() != nullptr},
                           {"serving", !room->runtime().stopped()}});
   return room;
 }
@@ -465,7 +465,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
       return failure(ErrorCode::unavailable, "the room " + name + " is there and takes no more cuts: " + why->message);
     return already;
   }
-  const Result<fs::path> file = kept_file(name);
+  const Result<fs::path> file = stored_file(name);
   if (!file) return tl::unexpected(file.error());
   const Result<RoomGenesis> genesis = peek_genesis(*file);
   if (!genesis) return tl::unexpected(genesis.error());
@@ -499,10 +499,10 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Loa
 
 Result<RoomSummary> Rooms::close(const std::string& name) {
   const std::lock_guard changing(changing_);
-  if (const auto kept = find(name); kept && (*kept)->store() && !kept_file((*kept)->name))
-    return tl::unexpected(kept_elsewhere(**kept));
+  if (const auto kept = find(name); kept && (*kept)->store() && !stored_file((*kept)->name))
+    return tl::unexpected(stored_elsewhere(**kept));
   const std::shared_ptr<OpenRoom> room = take_out(name);
-  if (!room) return kept_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
+  if (!room) return stored_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
   room->end_streams("the room " + name + " was closed");
   RoomSummary summary = room->close();
   note_open();
@@ -518,9 +518,9 @@ Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const s
     const std::lock_guard changing(changing_);
     if (Result<void> may = check_new(new_name, by); !may) return tl::unexpected(may.error());
     const Result<std::shared_ptr<OpenRoom>> from = find(name);
-    if (from && !(*from)->store()) return tl::unexpected(not_kept(name));
-    if (from && options_.folder.empty()) return tl::unexpected(kept_elsewhere(**from));
-    const Result<fs::path> file = from ? Result<fs::path>(fs::path{}) : kept_file(name);
+    if (from && !(*from)->store()) return tl::unexpected(not_persisted(name));
+    if (from && options_.folder.empty()) return tl::unexpected(stored_elsewhere(**from));
+    const Result<fs::path> file = from ? Result<fs::path>(fs::path{}) : stored_file(name);
     if (!file) return tl::unexpected(file.error());
     const fs::path journal = journal_of(new_name);
     const Result<JournalHead> made = make_owned(journal, by.user, [&] {
@@ -540,8 +540,8 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
   const Result<std::shared_ptr<OpenRoom>> source = find(name);
   if (!source) return tl::unexpected(source.error());
   RoomStore* store = (*source)->store();
-  if (!store) return tl::unexpected(not_kept(name));
-  const RoomSeq head = store->head().place;
+  if (!store) return tl::unexpected(not_persisted(name));
+  const RoomSeq head = store->head().seq;
   const RoomSeq last = to ? to : head;
   if (last > head || from > last)
     return failure(ErrorCode::invalid_input, "events " + std::to_string(from.value) + " to " +
@@ -569,23 +569,23 @@ Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const s
 Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::function<bool(const LogEntry&)>& take) {
   if (const Result<std::shared_ptr<OpenRoom>> room = find(name)) {
     RoomStore* store = (*room)->store();
-    if (!store) return tl::unexpected(not_kept(name));
-    const RoomSeq head = store->head().place;
+    if (!store) return tl::unexpected(not_persisted(name));
+    const RoomSeq head = store->head().seq;
     if (const Result<void> read = store->read(RoomSeq{1}, to ? std::min(to, head) : head, take); !read)
       return tl::unexpected(read.error());
     return store->genesis();
   }
   // Nobody can open it meanwhile.
   const std::lock_guard changing(changing_);
-  const Result<fs::path> file = kept_file(name);
+  const Result<fs::path> file = stored_file(name);
   if (!file) return tl::unexpected(file.error());
   Result<Journal> journal = Journal::open_to_read(*file);
   if (!journal) return tl::unexpected(journal.error());
   Result<RoomGenesis> genesis = genesis_from_bytes(journal->genesis());
   Result<void> sound;
   const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalEntry& entry) {
-    if (to && entry.place > to) return false;
-    const Result<LogEntry> one = entry_from_bytes(entry.place, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
+    if (to && entry.seq > to) return false;
+    const Result<LogEntry> one = entry_from_bytes(entry.seq, std::chrono::nanoseconds(entry.at_ns), entry.bytes);
     if (!one) sound = tl::unexpected(one.error());
     return one && take(*one);
   });
@@ -598,7 +598,7 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
                                                const std::function<Result<void>(const std::string& room)>& may) {
   if (is_backup_name(name)) return remove_backup(name, may);
   std::vector<std::string> names{name};
-  if (const Result<fs::path> file = kept_file(name)) {
+  if (const Result<fs::path> file = stored_file(name)) {
     // Only a room's own store can read a journal that is in use.
     const auto has = [this](const fs::path& of, const JournalHead& head) {
       const Result<std::shared_ptr<OpenRoom>> in_use = find(of.stem().string());
@@ -618,7 +618,7 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   } else if (const Result<std::shared_ptr<OpenRoom>> room = find(name); !room || name.empty()) {
     return tl::unexpected(file.error());
   } else if ((*room)->store()) {
-    return tl::unexpected(kept_elsewhere(**room));
+    return tl::unexpected(stored_elsewhere(**room));
   }
   for (const std::string& one : names)
     if (const Result<void> allowed = may ? may(one) : Result<void>{}; !allowed) return tl::unexpected(allowed.error());
@@ -628,7 +628,7 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
     if (find(*one))
       if (const Result<RoomSummary> closed = close(*one); !closed) return tl::unexpected(closed.error());
     const std::lock_guard changing(changing_);
-    if (const Result<fs::path> file = kept_file(*one))
+    if (const Result<fs::path> file = stored_file(*one))
       if (const auto gone = delete_room(*file, false); !gone) return tl::unexpected(gone.error());
     deleted.push_back(*one);
     log::info("room deleted", {{"room", *one}});
@@ -651,14 +651,14 @@ Result<std::vector<std::string>> Rooms::remove_backup(const std::string& name,
 Result<RoomReport> Rooms::verify(const std::string& name) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
-  if (!(*room)->store()) return tl::unexpected(not_kept(name));
+  if (!(*room)->store()) return tl::unexpected(not_persisted(name));
   std::promise<BoneStatus> bone;
   (*room)->runtime().run_slowly([&] { bone.set_value((*room)->runtime().bone_status()); });
   const BoneStatus status = bone.get_future().get();
   // What is decided is durable a moment later.
-  while ((*room)->store()->head().place < status.room_seq && !(*room)->runtime().stopped() && !ending_)
+  while ((*room)->store()->head().seq < status.room_seq && !(*room)->runtime().stopped() && !ending_)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  if ((*room)->store()->head().place < status.room_seq)
+  if ((*room)->store()->head().seq < status.room_seq)
     return failure(
         ErrorCode::unavailable,
         "the room " + name + " has stopped; check its journal with osteon-server verify once the server has ended");
@@ -670,8 +670,8 @@ Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& f
                                    const Requester& by) {
   const Result<std::shared_ptr<OpenRoom>> room = find(name);
   if (!room) return tl::unexpected(room.error());
-  if (!(*room)->store()) return tl::unexpected(not_kept(name));
-  if (options_.folder.empty()) return tl::unexpected(kept_elsewhere(**room));
+  if (!(*room)->store()) return tl::unexpected(not_persisted(name));
+  if (options_.folder.empty()) return tl::unexpected(stored_elsewhere(**room));
   // A client may not name a folder, as it could then write anywhere on the server's disk.
   if (!is_backup_name(file_name))
     return failure(ErrorCode::invalid_input, "\"" + file_name + "\" is not a plain name that ends in .backup");

@@ -88,7 +88,7 @@ class OpenRoom {
 
   [[nodiscard]] RoomRuntime& runtime() { return *runtime_; }
   [[nodiscard]] RoomStore* store() { return store_.get(); }  // null: the room is lost when it is closed
-  [[nodiscard]] std::filesystem::path keeper_file() const { return store_ ? store_->file() : std::filesystem::path{}; }
+  [[nodiscard]] std::filesystem::path store_file() const { return store_ ? store_->file() : std::filesystem::path{}; }
   // The protocol version of an author's newest join. For an author who never joined, this server's own version.
   void note_version(AuthorId author, std::uint32_t version);
   [[nodiscard]] std::uint32_t version_of(AuthorId author) const;
@@ -206,7 +206,7 @@ class Rooms {
   [[nodiscard]] Result<void> check_share(const Requester& by) const;
   [[nodiscard]] Result<void> check_free(const std::string& name) const;
   [[nodiscard]] std::size_t count() const;  // of open and persisted rooms
-  [[nodiscard]] Result<std::filesystem::path> kept_file(const std::string& name) const;
+  [[nodiscard]] Result<std::filesystem::path> stored_file(const std::string& name) const;
   Result<std::vector<std::string>> remove_backup(const std::string& name,
                                                  const std::function<Result<void>(const std::string&)>& may);
   Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const LoadedCase& of, bool is_new,
@@ -214,7 +214,7 @@ class Rooms {
   std::shared_ptr<OpenRoom> take_in(std::shared_ptr<OpenRoom> room);
   [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name);
   void note_open() const;  // writes the list of open rooms
-  void run_upkeep();
+  void run_maintenance();
   [[nodiscard]] MaintenanceCalls until_the_end() const;
 
   const RoomsOptions options_;
@@ -224,9 +224,9 @@ class Rooms {
   std::map<std::string, std::shared_ptr<OpenRoom>> open_;
   std::optional<std::string> draining_;  // under mutex_
   std::set<std::string> to_open_;        // open when the folder was last left, and not yet open again
-  std::condition_variable upkeep_wake_;
+  std::condition_variable maintenance_wake_;
   std::atomic<bool> ending_{false};
-  std::thread upkeep_;
+  std::thread maintenance_;
 };
 
 }  // namespace osteon

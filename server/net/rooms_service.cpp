@@ -25,7 +25,7 @@ v1::RoomInfo to_wire(const RoomListing& listing) {
   info.set_watchers(static_cast<std::uint32_t>(listing.watchers));
   info.set_parent(listing.parent);
   info.set_parent_room_seq(listing.parent_room_seq.value);
-  info.set_kept(listing.kept);
+  info.set_persisted(listing.kept);
   info.set_replay(listing.replay);
   return info;
 }
@@ -113,7 +113,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
     return slowly(context, "VerifyRoom", request->name(), [this, request, response] {
       const auto report = rooms_.verify(request->name());
       if (!report) return status_of(report.error());
-      response->set_room_seq(report->head.place.value);
+      response->set_room_seq(report->head.seq.value);
       response->set_chain(wire::to_wire(report->head.chain));
       response->set_field_hash(wire::to_wire(report->replayed.field_hash));
       response->set_checkpoints(static_cast<std::uint32_t>(report->checkpoints));
@@ -132,7 +132,7 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
       std::filesystem::path file;
       const Result<JournalHead> copied = rooms_.back_up(request->name(), request->file_name(), file, *by);
       if (!copied) return status_of(copied.error());
-      response->set_room_seq(copied->place.value);
+      response->set_room_seq(copied->seq.value);
       response->set_chain(wire::to_wire(copied->chain));
       response->set_file(file.filename().string());
       return Status(Status::OK);

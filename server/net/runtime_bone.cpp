@@ -31,7 +31,7 @@ void RoomRuntime::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
 
 RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
   const auto bodies = [&] { return which == Bodies::all ? room.all_bodies() : room.bodies(); };
-  const auto places = [&] {
+  const auto origins = [&] {
     std::vector<FieldLeaf> leaves;
     for (const BodyId body : bodies())
       std::ranges::move(room.any_field(body)->leaf_places(), std::back_inserter(leaves));
@@ -46,8 +46,8 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
       // Only this thread uses `meanwhile`, and the tick thread, which holds the lock exclusively.
       const std::shared_lock lock(room_mutex);
       changes = room.bone_changes();
-      leaves = places();
-      meanwhile.emplace();
+      leaves = origins();
+      cuts_during_copy.emplace();
     }
     read_leaves(leaves);
     {
@@ -55,13 +55,13 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
       copy.room_seq = room.room_seq();
       copy.counts = room.counts();
       copy.items = room.items();
-      cuts = std::move(*meanwhile);
-      meanwhile.reset();
+      cuts = std::move(*cuts_during_copy);
+      cuts_during_copy.reset();
       // Bone came back or fell apart meanwhile, so the copy is of another bone. If this happens again and again, the
       // room is locked for the whole copy.
       if (changes != room.bone_changes()) {
         if (attempt < 3) continue;
-        leaves = places();
+        leaves = origins();
         for (FieldLeaf& leaf : leaves) room.any_field(leaf.body)->read(leaf);
         cuts.clear();
       }

@@ -80,14 +80,14 @@ struct RoomRuntime::Impl {
   }
   // What sessions are sent for one event.
   struct Said {
-    RoomSeq place;
+    RoomSeq seq;
     MessageParts entries;
     Personal personal;
   };
   // Returns true if any session still lacks some of the states.
   bool tell_hands(const std::vector<CuttingState>& states);
   [[nodiscard]] std::uint32_t number_of(const Digest& tool);
-  void tell_kept(std::chrono::nanoseconds now);
+  void publish_durable(std::chrono::nanoseconds now);
   void move_bone(std::chrono::nanoseconds now);  // [tick] on its mount
   void note_changed(Clock::time_point arrived) {
     if (!driven()) mesh.changed(arrived);
@@ -114,7 +114,7 @@ struct RoomRuntime::Impl {
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
   Room room;
   std::shared_mutex room_mutex;
-  std::optional<std::vector<Cut>> meanwhile;  // under room_mutex: cuts applied since copy_bone() began to copy
+  std::optional<std::vector<Cut>> cuts_during_copy;  // under room_mutex: cuts applied since copy_bone() began
   const RuntimeRates rates_;
   const Clock::time_point room_began;  // time 0 of the room, as if it had hardly been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
@@ -149,7 +149,7 @@ struct RoomRuntime::Impl {
   mutable std::mutex stats_mutex;
   TickStats stats;
   RoomCounts counts;
-  CutFigures figures;
+  CutMetrics metrics;
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   bool may_return = false;                // under sessions_mutex: they may come again
@@ -160,9 +160,9 @@ struct RoomRuntime::Impl {
   std::vector<Queued> batch;                     // of the tick thread
   std::vector<Committer::Tell> tells;            // of the tick thread
   // Of the tick thread: sessions were informed that the journal is closed to entries.
-  bool closing_told = false;
+  bool closing_reported = false;
   // Of the tick thread: when sessions are next informed how much is durable.
-  std::chrono::nanoseconds next_kept{};
+  std::chrono::nanoseconds next_durable{};
   Committer committer;  // the last member with a thread, since it calls the others
 
   std::thread tick_thread, piece_thread;

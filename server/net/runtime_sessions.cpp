@@ -45,7 +45,8 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
     const std::unique_lock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
     room_seq = room.room_seq().value;
-    if (meanwhile && decision && decision->committed() && !decision->repeated) meanwhile->push_back(queued.cut);
+    if (cuts_during_copy && decision && decision->committed() && !decision->repeated)
+      cuts_during_copy->push_back(queued.cut);
     return decision;
   }();
   if (!outcome)
@@ -56,12 +57,12 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
   if (!outcome->report.changed_leaves.empty()) note_changed(queued.arrived);
   const Clock::time_point done = Clock::now();
   const bool newly = outcome->committed() && !outcome->repeated;
-  if (newly) figures.committed(queued.arrived, taken, done);
-  if (!outcome->committed() && !outcome->repeated) figures.rejected(outcome->rejection);
+  if (newly) metrics.committed(queued.arrived, taken, done);
+  if (!outcome->committed() && !outcome->repeated) metrics.rejected(outcome->rejection);
   const Bytes entry = outcome->committed() ? cut_message(outcome->room_seq, queued.cut)
                                            : rejection_message(outcome->room_seq, queued.cut.author_seq,
                                                                outcome->lease_epoch, outcome->rejection);
-  tell_kept(room.time());
+  publish_durable(room.time());
   wire::SessionEntry fast{.room_seq = outcome->room_seq, .kind = wire::SessionEntryKind::committed};
   if (outcome->committed()) {
     fast.cut = queued.cut;
@@ -71,7 +72,7 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
     fast.reason = static_cast<std::uint32_t>(outcome->rejection);
     fast.lease_epoch = outcome->lease_epoch;
   }
-  later([this, subscriber = queued.subscriber, entry, fast = std::move(fast), place = outcome->room_seq,
+  later([this, subscriber = queued.subscriber, entry, fast = std::move(fast), seq = outcome->room_seq,
          repeated = outcome->repeated, to_all = outcome->committed(), newly, done](const Result<void>& durable) {
     const Clock::time_point kept = Clock::now();
     if (durable) {
@@ -79,11 +80,11 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(subscriber->author());
       if (!repeated && to_all)
-        sessions.each([&](SessionSubscriber& one) { one.offer(place, entry, fast); });
+        sessions.each([&](SessionSubscriber& one) { one.offer(seq, entry, fast); });
       else if (author != open_authors.end())
-        repeated ? author->second->answer(entry) : author->second->offer(place, entry, fast);
+        repeated ? author->second->answer(entry) : author->second->offer(seq, entry, fast);
     }
-    if (durable && newly) figures.told(done, kept, Clock::now());
+    if (durable && newly) metrics.acknowledged(done, kept, Clock::now());
     if (durable && newly) people.took_cut(subscriber->author());
     subscriber->decided();
   });
@@ -123,9 +124,9 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
         for (const Bytes& entry : one.entries)
           sessions.each([&](SessionSubscriber& subscriber) {
             if (one.personal.is_for(subscriber.author()))
-              subscriber.offer(one.place, one.personal.entry, one.personal.fast);
+              subscriber.offer(one.seq, one.personal.entry, one.personal.fast);
             else
-              subscriber.offer(one.place, entry, {.room_seq = one.place, .kind = wire::SessionEntryKind::streamed});
+              subscriber.offer(one.seq, entry, {.room_seq = one.seq, .kind = wire::SessionEntryKind::streamed});
           });
     }
     answer(event);
@@ -133,12 +134,12 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
 }
 
 // [tick] Every second: the witness, up to which clients can rely on the room.
-void RoomRuntime::Impl::tell_kept(std::chrono::nanoseconds now) {
-  if (!store || now < next_kept) return;
-  next_kept = now + std::chrono::seconds(1);
+void RoomRuntime::Impl::publish_durable(std::chrono::nanoseconds now) {
+  if (!store || now < next_durable) return;
+  next_durable = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
     if (!durable) return;
-    const Bytes entry = kept_message(store->witness());
+    const Bytes entry = durable_message(store->witness());
     const std::lock_guard lock(sessions_mutex);
     sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(entry); });
   });
@@ -192,11 +193,11 @@ void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
   sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
 }
 
-Result<void> RoomRuntime::check_kept(const Witness& kept) {
+Result<void> RoomRuntime::check_witness(const Witness& kept) {
   if (impl_->player) return {};
   if (impl_->store) return impl_->store->check_witness(kept);
   return failure(ErrorCode::unavailable,
-                 "the room begins anew: it has no journal, and none of the " + std::to_string(kept.head.place.value) +
+                 "the room begins anew: it has no journal, and none of the " + std::to_string(kept.head.seq.value) +
                      " events that were acknowledged to you; start again to join it as it is now");
 }
 
@@ -204,7 +205,7 @@ Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const st
                                  std::optional<Role> role) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   if (kept)
-    if (Result<void> has = check_kept(*kept); !has) return has;
+    if (Result<void> has = check_witness(*kept); !has) return has;
   const std::shared_lock lock(impl_->room_mutex);
   if (!impl_->room.proves(author, secret))
     return failure(ErrorCode::invalid_input, "the room does not know author " + std::to_string(author.value) +
@@ -271,13 +272,13 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     const People::Supervised& held = impl_->room.people().supervised(subscriber->author());
     const std::uint64_t lease_epoch = impl_->room.lease_epoch(subscriber->author());
     const Decider by{held.by, impl_->people.name_of(held.by)};
-    if (held.place) before.push_back(supervised_message(RoomSeq{}, held.supervision, lease_epoch, by));
+    if (held.seq) before.push_back(supervised_message(RoomSeq{}, held.supervision, lease_epoch, by));
     v1::SessionResponse complete;
     complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
     complete.mutable_complete()->set_lease_epoch(lease_epoch);
     complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(subscriber->author()));
-    for (const RoomSeq place : impl_->room.decided_places(subscriber->author(), kMostRepeatedResults))
-      complete.mutable_complete()->add_decided_room_seqs(place.value);
+    for (const RoomSeq seq : impl_->room.decided_seqs(subscriber->author(), kMostRepeatedResults))
+      complete.mutable_complete()->add_decided_room_seqs(seq.value);
     for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
     const std::lock_guard lock(impl_->sessions_mutex);
     SessionSubscriber*& open = impl_->open_authors[subscriber->author()];
@@ -295,7 +296,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     if (impl_->mount && subscriber->feels_bone()) impl_->mount->join(subscriber->author());
     subscriber->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
     for (const ToolBox::Entry* entry : tools) subscriber->know_tool(impl_->number_of(entry->hash), entry->hash);
-    if (held.place)
+    if (held.seq)
       subscriber->hold({.room_seq = {},
                         .kind = wire::SessionEntryKind::supervised,
                         .lease_epoch = lease_epoch,

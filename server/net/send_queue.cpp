@@ -71,12 +71,12 @@ void SessionSendQueue::set_leaves(std::vector<FieldLeaf> leaves) {
   leaves_known_ = true;
 }
 
-bool SessionSendQueue::add(RoomSeq place, Bytes entry) {
-  if (!takes(place)) return true;
+bool SessionSendQueue::add(RoomSeq seq, Bytes entry) {
+  if (!takes(seq)) return true;
   if (entries_.size() >= kMaxEntries) return false;
   entries_.push_back({++index_, std::move(entry)});
-  places_.emplace_back(index_, place);
-  if (places_.size() > kMaxEntries) places_.pop_front();
+  seqs_.emplace_back(index_, seq);
+  if (seqs_.size() > kMaxEntries) seqs_.pop_front();
   return true;
 }
 
@@ -89,7 +89,7 @@ bool SessionSendQueue::add_answer(Bytes entry) {
 RoomSeq SessionSendQueue::arrived(std::uint64_t index) {
   std::erase_if(entries_, [&](const Entry& entry) { return entry.index != 0 && entry.index <= index; });
   RoomSeq newest;
-  for (; !places_.empty() && places_.front().first <= index; places_.pop_front()) newest = places_.front().second;
+  for (; !seqs_.empty() && seqs_.front().first <= index; seqs_.pop_front()) newest = seqs_.front().second;
   return newest;
 }
 

@@ -75,8 +75,8 @@ class SessionSendQueue {
   void set_leaves(std::vector<FieldLeaf> leaves);
   // Adds an entry of the room. Skips an entry up to `contained`. Returns false, and does not add the entry, if
   // kMaxEntries wait already. Added entries are counted from 1 on and carry this index.
-  [[nodiscard]] bool add(RoomSeq place, Bytes entry);
-  [[nodiscard]] bool takes(RoomSeq place) const { return place > contained_; }
+  [[nodiscard]] bool add(RoomSeq seq, Bytes entry);
+  [[nodiscard]] bool takes(RoomSeq seq) const { return seq > contained_; }
   // Index of the newest entry that was added.
   [[nodiscard]] std::uint64_t index() const { return index_; }
   // The reader has received entries up to this index by another way, so those that still wait are not sent. Returns the
@@ -101,7 +101,7 @@ class SessionSendQueue {
     Bytes bytes;
   };
   std::deque<Entry> entries_;
-  std::deque<std::pair<std::uint64_t, RoomSeq>> places_;  // of entries that the reader is not known to have
+  std::deque<std::pair<std::uint64_t, RoomSeq>> seqs_;  // of entries that the reader is not known to have
   std::uint64_t index_ = 0;
 };
 

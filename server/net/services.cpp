@@ -146,7 +146,7 @@ class RoomServiceImpl final : public RoomBase {
       const Authorizer::Coming coming = again ? Authorizer::Coming::again : Authorizer::Coming::anew;
       // First checks what was acknowledged to the caller: after a loss, the caller's number may belong to another
       // person.
-      if (const Result<void> kept = again ? check_kept(runtime, *request) : Result<void>(); !kept) {
+      if (const Result<void> kept = again ? check_witness(runtime, *request) : Result<void>(); !kept) {
         rooms_.refusals.note("loss", address_of(context->peer()), kept.error().message);
         return reactor->Finish(status_of(kept.error()));
       }
@@ -206,9 +206,9 @@ class RoomServiceImpl final : public RoomBase {
       response->set_subscribers(static_cast<std::uint32_t>(health.mesh_streams + health.cutting_streams));
       for (const BodyId body : status.bodies) response->add_bodies(body.value);
       for (const SceneItem& item : room->runtime().items()) *response->add_items() = wire::to_wire(item);
-      for (const auto& [place, label] : room->runtime().marks()) {
+      for (const auto& [seq, label] : room->runtime().marks()) {
         v1::RoomMark& mark = *response->add_marks();
-        mark.set_room_seq(place.value);
+        mark.set_room_seq(seq.value);
         mark.set_label(label);
       }
       v1::TickHealth& tick = *response->mutable_tick();
@@ -300,28 +300,28 @@ class RoomServiceImpl final : public RoomBase {
                                  v1::UndoResponse* response) override {
     grpc::ServerUnaryReactor* reactor = context->DefaultReactor();
     if (!admitted<v1::UndoRequest>(rooms_, *context, reactor)) return reactor;
-    std::vector<RoomSeq> places;
-    for (const std::uint64_t place : request->room_seqs()) places.push_back(RoomSeq{place});
+    std::vector<RoomSeq> seqs;
+    for (const std::uint64_t seq : request->room_seqs()) seqs.push_back(RoomSeq{seq});
     const bool by_count = request->count() != 0 || request->of_author() != 0;
     const std::chrono::milliseconds newest(std::min<std::uint64_t>(request->newest_ms(), kLongestUndoMs));
-    if (int{by_count} + int{!places.empty()} + int{request->to_mark() != 0} + int{newest.count() > 0} +
+    if (int{by_count} + int{!seqs.empty()} + int{request->to_mark() != 0} + int{newest.count() > 0} +
             int{request->all()} >
         1)
       return refuse(reactor, invalid("an UndoRequest has one of count, room_seqs, to_mark, newest_ms and all"));
     return change(
         *context, reactor, request->author(),
-        [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), places,
+        [by = AuthorId{request->author()}, of = AuthorId{request->of_author()}, count = request->count(), seqs,
          mark = RoomSeq{request->to_mark()}, newest, all = request->all()](Room& room) -> Result<RoomEvent> {
           if (all && !room.people().supervises(by))
             return failure(ErrorCode::denied, "only an instructor takes everything back, to the imported bone");
           if (all) return room.undo_to(by, RoomSeq{});
           if (newest.count() > 0) return room.undo_since(by, room.time() - newest);
           if (mark) return room.undo_to(by, mark);
-          return places.empty() ? room.undo_last(by, count, of) : room.undo(by, places);
+          return seqs.empty() ? room.undo_last(by, count, of) : room.undo(by, seqs);
         },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
-          for (const RoomSeq place : event.places) response->add_undone(place.value);
+          for (const RoomSeq seq : event.seqs) response->add_undone(seq.value);
         });
   }
 
@@ -334,7 +334,7 @@ class RoomServiceImpl final : public RoomBase {
         [by = AuthorId{request->author()}, count = request->count()](Room& room) { return room.redo_last(by, count); },
         [response](const RoomEvent& event) {
           response->set_room_seq(event.room_seq.value);
-          for (const RoomSeq place : event.places) response->add_redone(place.value);
+          for (const RoomSeq seq : event.seqs) response->add_redone(seq.value);
         });
   }
 
@@ -431,15 +431,15 @@ class RoomServiceImpl final : public RoomBase {
     return runtime.join(kind, caller.user.empty() ? request.name() : caller.user, digest_of_secret(response.secret()),
                         caller.role);
   }
-  static Result<void> check_kept(RoomRuntime& runtime, const v1::JoinRequest& request) {
-    if (request.kept_room_seq() == 0) return {};
-    const Result<Digest> chain = wire::digest_from_wire(request.kept_chain());
+  static Result<void> check_witness(RoomRuntime& runtime, const v1::JoinRequest& request) {
+    if (request.durable_room_seq() == 0) return {};
+    const Result<Digest> chain = wire::digest_from_wire(request.durable_chain());
     if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
     // Programs from before there were seals send none.
-    const Result<Digest> seal = wire::digest_from_wire(request.kept_seal());
-    return runtime.check_kept({{RoomSeq{request.kept_room_seq()}, *chain}, seal ? *seal : Digest{}});
+    const Result<Digest> seal = wire::digest_from_wire(request.durable_seal());
+    return runtime.check_witness({{RoomSeq{request.durable_room_seq()}, *chain}, seal ? *seal : Digest{}});
   }
-  // Called after check_kept(). `role`: the caller's role now; nothing: not checked.
+  // Called after check_witness(). `role`: the caller's role now; nothing: not checked.
   static Result<AuthorId> come_back(RoomRuntime& runtime, const v1::JoinRequest& request, std::optional<Role> role) {
     const AuthorId author{request.resume_author()};
     const Result<void> may = runtime.resume(author, digest_of_secret(request.secret()), {}, role);

@@ -39,17 +39,17 @@ Bytes block_message(const BlockKey& key, const StoredBlock& block) {
   return serialised(response);
 }
 
-Bytes cut_message(RoomSeq place, const Cut& cut) {
+Bytes cut_message(RoomSeq seq, const Cut& cut) {
   v1::SessionResponse response;
-  response.mutable_committed()->set_room_seq(place.value);
+  response.mutable_committed()->set_room_seq(seq.value);
   *response.mutable_committed()->mutable_cut() = wire::to_wire(cut);
   return serialised(response);
 }
 
-Bytes rejection_message(RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
+Bytes rejection_message(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
   v1::SessionResponse response;
   v1::RejectedCut& entry = *response.mutable_rejected();
-  entry.set_room_seq(place.value);
+  entry.set_room_seq(seq.value);
   entry.set_author_seq(author_seq);
   entry.set_lease_epoch(lease_epoch);
   entry.set_reason(std::string(sentence(reason)));
@@ -66,11 +66,11 @@ Bytes link_message(const SessionKeys& keys, std::uint16_t udp_port) {
   return serialised(response);
 }
 
-Bytes kept_message(const Witness& witness) {
+Bytes durable_message(const Witness& witness) {
   v1::SessionResponse response;
-  response.mutable_kept()->set_room_seq(witness.head.place.value);
-  response.mutable_kept()->set_chain(wire::to_wire(witness.head.chain));
-  response.mutable_kept()->set_seal(wire::to_wire(witness.seal));
+  response.mutable_durable()->set_room_seq(witness.head.seq.value);
+  response.mutable_durable()->set_chain(wire::to_wire(witness.head.chain));
+  response.mutable_durable()->set_seal(wire::to_wire(witness.seal));
   return serialised(response);
 }
 
@@ -81,24 +81,24 @@ Bytes redial_message(std::chrono::milliseconds after, const std::string& why) {
   return serialised(response);
 }
 
-Bytes tool_message(RoomSeq place, const Tool& tool, std::uint32_t number) {
+Bytes tool_message(RoomSeq seq, const Tool& tool, std::uint32_t number) {
   v1::SessionResponse response;
-  response.mutable_tool()->set_room_seq(place.value);
+  response.mutable_tool()->set_room_seq(seq.value);
   *response.mutable_tool()->mutable_tool() = wire::to_wire(tool);
   response.mutable_tool()->set_tool_number(number);
   return serialised(response);
 }
 
-Bytes scene_message(RoomSeq place, const std::vector<SceneItem>& items) {
+Bytes scene_message(RoomSeq seq, const std::vector<SceneItem>& items) {
   v1::SessionResponse response;
-  response.mutable_scene()->set_room_seq(place.value);
+  response.mutable_scene()->set_room_seq(seq.value);
   for (const SceneItem& item : items) *response.mutable_scene()->add_items() = wire::to_wire(item);
   return serialised(response);
 }
 
-Bytes supervised_message(RoomSeq place, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by) {
+Bytes supervised_message(RoomSeq seq, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by) {
   v1::SessionResponse response;
-  response.mutable_supervised()->set_room_seq(place.value);
+  response.mutable_supervised()->set_room_seq(seq.value);
   *response.mutable_supervised()->mutable_supervision() = wire::to_wire(supervision);
   response.mutable_supervised()->set_lease_epoch(lease_epoch);
   response.mutable_supervised()->set_decided_by(by.author.value);
@@ -106,9 +106,9 @@ Bytes supervised_message(RoomSeq place, const Restrictions& supervision, std::ui
   return serialised(response);
 }
 
-Bytes said_message(RoomSeq place, AuthorId from, const WordsEntry& words) {
+Bytes said_message(RoomSeq seq, AuthorId from, const WordsEntry& words) {
   v1::SessionResponse response;
-  response.mutable_said()->set_room_seq(place.value);
+  response.mutable_said()->set_room_seq(seq.value);
   response.mutable_said()->set_from(from.value);
   response.mutable_said()->set_to(words.to.value);
   response.mutable_said()->set_words(words.words);
@@ -127,9 +127,9 @@ Bytes bone_entry(const MountPose& seen) {
   return serialised(entry);
 }
 
-Bytes noted_entry(RoomSeq place, const std::string& mark) {
+Bytes noted_entry(RoomSeq seq, const std::string& mark) {
   v1::SessionResponse response;
-  response.mutable_noted()->set_room_seq(place.value);
+  response.mutable_noted()->set_room_seq(seq.value);
   response.mutable_noted()->set_mark(mark);
   return serialised(response);
 }

@@ -67,27 +67,27 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq place, const Bytes& any) override {
-    const Bytes entry = in_its_version(entry_for_role(place, any));
+  void offer(RoomSeq seq, const Bytes& any) override {
+    const Bytes entry = in_its_version(entry_for_role(seq, any));
     const std::lock_guard lock(mutex_);
-    if (entry && !closing()) send_or_give_up(send_queue_.add(place, entry));
+    if (entry && !closing()) send_or_give_up(send_queue_.add(seq, entry));
   }
   // [committing thread]
-  void offer(RoomSeq place, const Bytes& any, const wire::SessionEntry& fast) override {
-    const Bytes entry = in_its_version(entry_for_role(place, any));
+  void offer(RoomSeq seq, const Bytes& any, const wire::SessionEntry& fast) override {
+    const Bytes entry = in_its_version(entry_for_role(seq, any));
     if (!entry) return;
     std::uint64_t index = 0;
     {
       const std::lock_guard lock(mutex_);
       if (closing()) return;
       const std::uint64_t before = send_queue_.index();
-      send_or_give_up(send_queue_.add(place, entry));
+      send_or_give_up(send_queue_.add(seq, entry));
       if (send_queue_.index() > before) index = send_queue_.index();
     }
     // Beside the stream, which carries everything.
     const bool goes = entry == any && may_carry(content_of(fast));
     if (link_)
-      link_->tell(index, goes ? fast : wire::SessionEntry{.room_seq = place, .kind = wire::SessionEntryKind::streamed});
+      link_->tell(index, goes ? fast : wire::SessionEntry{.room_seq = seq, .kind = wire::SessionEntryKind::streamed});
   }
   void hold(const wire::SessionEntry& supervised) override {
     if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
@@ -232,13 +232,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       const std::lock_guard lock(mutex_);
       return send_queue_.arrived(index);
     }();
-    if (newest) runtime_.people().heard(author_, newest);
+    if (newest) runtime_.people().acknowledged(author_, newest);
   }
   // A client may have received more events than there are, from a server whose journal has lost its end. It then counts
   // as having received everything that is left. Such a loss is found by the client's witness at its next join, and is
   // no reason to refuse it here.
   void hear(RoomSeq newest) {
-    runtime_.people().heard(author_, std::min(newest, runtime_.room_seq()));
+    runtime_.people().acknowledged(author_, std::min(newest, runtime_.room_seq()));
     read_on();
   }
 
@@ -284,7 +284,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     }
   }
   // An entry as the reader's role may receive it. Without the forbidden content it says only that there was an event.
-  [[nodiscard]] Bytes entry_for_role(RoomSeq place, const Bytes& entry) const {
+  [[nodiscard]] Bytes entry_for_role(RoomSeq seq, const Bytes& entry) const {
     constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision,
                               StreamContent::own_words};
     if (std::ranges::all_of(kAll, [&](StreamContent content) { return may_receive(content); })) return entry;
@@ -292,7 +292,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     (void)said.ParseFromString(*entry);
     const std::optional<StreamContent> content = content_of(said);
     if (!content || may_receive(*content)) return entry;
-    return place ? noted_entry(place, {}) : nullptr;
+    return seq ? noted_entry(seq, {}) : nullptr;
   }
   // The same in this client's version of the protocol; null if that version has no such message.
   [[nodiscard]] Bytes in_its_version(const Bytes& entry) const {

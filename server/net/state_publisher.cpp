@@ -126,7 +126,7 @@ void StatePublisher::tell(Clock::time_point now) {
   states_lock.unlock();
   bool owed = false;
   for (Stream& stream : streams_) {
-    if (stream.told == number) continue;
+    if (stream.offered == number) continue;
     if (stream.pace.due(now))
       offer(stream, number, shown, now);
     else
@@ -137,7 +137,7 @@ void StatePublisher::tell(Clock::time_point now) {
 }
 
 void StatePublisher::offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
-  stream.told = number;
+  stream.offered = number;
   stream.pace.done(now);
   stream.subscriber->offer(shown);
 }

@@ -74,7 +74,7 @@ class StatePublisher {
   struct Stream {
     StateSubscriber* subscriber;
     Pace pace;
-    std::uint64_t told = 0;  // the newest message that it was offered
+    std::uint64_t offered = 0;  // the newest message that it was offered
   };
   void run();
   void tell(Clock::time_point now);

@@ -53,11 +53,11 @@ struct SplitEntry {
 };
 struct UndoEntry {
   // tombstones from now on, oldest first: the events that were asked for and those that depend on them
-  std::vector<RoomSeq> places;
+  std::vector<RoomSeq> seqs;
 };
 struct RedoEntry {
-  std::vector<RoomSeq> undos;   // undo events that are undone themselves, newest first
-  std::vector<RoomSeq> places;  // events that take effect again, oldest first
+  std::vector<RoomSeq> undos;  // undo events that are undone themselves, newest first
+  std::vector<RoomSeq> seqs;   // events that take effect again, oldest first
 };
 struct RemoveBodyEntry {
   BodyId body;
@@ -91,7 +91,7 @@ struct WordsEntry {
 };
 
 struct LogEntry {
-  RoomSeq place;
+  RoomSeq seq;
   std::chrono::nanoseconds at{};  // time since the room was made, by the clock of the server that decided
   AuthorId author;                // who asked for it; null: the room itself
   std::variant<JoinEntry, CutEntry, RejectionEntry, SplitEntry, UndoEntry, RedoEntry, RemoveBodyEntry, ItemEntry,

@@ -73,7 +73,7 @@ void People::add_to(Hasher& hasher) const {
     const Restrictions& one = supervised.supervision;
     hasher.text("supervision");
     hasher.integer(author.value);
-    hasher.integer(supervised.place.value);
+    hasher.integer(supervised.seq.value);
     hasher.integer(one.stopped ? 1 : 0);
     hasher.integer(one.taken_by.value);
     hasher.integer(one.guide.value);

@@ -21,13 +21,13 @@ class People {
  public:
   struct Supervised {
     Restrictions supervision;
-    RoomSeq place;  // sequence number of the entry that set it
-    AuthorId by;    // the author who did
+    RoomSeq seq;  // sequence number of the entry that set it
+    AuthorId by;  // the author who did
   };
 
   void join(AuthorId author, Role role, std::uint32_t person, bool hand) { members_[author] = {role, person, hand}; }
-  void supervise(RoomSeq place, AuthorId by, const SuperviseEntry& entry) {
-    supervised_[entry.subject] = {entry.supervision, place, by};
+  void supervise(RoomSeq seq, AuthorId by, const SuperviseEntry& entry) {
+    supervised_[entry.subject] = {entry.supervision, seq, by};
   }
   void draw(const AnnotationEntry& entry);
 

@@ -109,14 +109,14 @@ std::uint64_t Room::decided(AuthorId author) const {
   return surgeon == surgeons_.end() ? 0 : surgeon->second.decided.size();
 }
 
-std::vector<RoomSeq> Room::decided_places(AuthorId author, std::size_t most) const {
-  std::vector<RoomSeq> places;
+std::vector<RoomSeq> Room::decided_seqs(AuthorId author, std::size_t most) const {
+  std::vector<RoomSeq> seqs;
   const auto surgeon = surgeons_.find(author);
-  if (surgeon == surgeons_.end()) return places;
+  if (surgeon == surgeons_.end()) return seqs;
   const std::vector<Decided>& all = surgeon->second.decided;
   for (std::size_t i = all.size() - std::min(all.size(), most); i < all.size(); ++i)
-    places.push_back(all[i].rejection == Rejection::none ? all[i].room_seq : RoomSeq{});
-  return places;
+    seqs.push_back(all[i].rejection == Rejection::none ? all[i].room_seq : RoomSeq{});
+  return seqs;
 }
 
 Result<Outcome> Room::submit(const Cut& cut) {
@@ -149,8 +149,8 @@ Result<Outcome> Room::submit(const Cut& cut) {
   return Outcome{event.room_seq, rejection, false, surgeon->second.epoch, std::move(event.cut)};
 }
 
-void Room::note_decided(AuthorId author, const Digest& bytes, RoomSeq place, Rejection rejection) {
-  surgeons_.at(author).decided.push_back({bytes, place, rejection});
+void Room::note_decided(AuthorId author, const Digest& bytes, RoomSeq seq, Rejection rejection) {
+  surgeons_.at(author).decided.push_back({bytes, seq, rejection});
 }
 
 Rejection Room::judge(const Cut& cut) {

@@ -84,7 +84,7 @@ class Room {
   [[nodiscard]] std::uint64_t decided(AuthorId author) const;
   // Sequence numbers of the author's newest decided cuts, at most `most`; the last is that of decided(). Null:
   // rejected.
-  [[nodiscard]] std::vector<RoomSeq> decided_places(AuthorId author, std::size_t most) const;
+  [[nodiscard]] std::vector<RoomSeq> decided_seqs(AuthorId author, std::size_t most) const;
   // Rises with every undo and redo that changes the bone. What was computed from the bone before then is out of date.
   [[nodiscard]] std::uint64_t bone_epoch() const { return bone_epoch_; }
 
@@ -98,7 +98,7 @@ class Room {
   // Takes back these events, or the newest `count` events of one author or (null) of all; a trainee only takes back
   // their own. With a cut, every later split of a body that the cut had reached is undone too. With a split, what was
   // done to its piece as such is undone. Later cuts stay in the bone.
-  Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> places);
+  Result<RoomEvent> undo(AuthorId by, std::span<const RoomSeq> seqs);
   Result<RoomEvent> undo_last(AuthorId by, std::size_t count, AuthorId of);
   Result<RoomEvent> undo_to(AuthorId by, RoomSeq mark);         // all events after it
   Result<RoomEvent> redo_last(AuthorId by, std::size_t count);  // the newest undo events that still hold
@@ -196,7 +196,7 @@ class Room {
     Mask taken = {};  // split
     std::vector<SplitPiece> pieces = {};
     std::uint32_t item = 0;                  // scene
-    std::vector<RoomSeq> places = {};        // undo
+    std::vector<RoomSeq> seqs = {};          // undo
     std::shared_ptr<const Cut> missed = {};  // cut: set if it is in no body's history; never changes
     bool all_of_others = false;              // undo: it took back everything that people other than its author had done
     std::string label = {};                  // mark
@@ -204,7 +204,7 @@ class Room {
   };
   // State that an item was set to; nothing: removed.
   struct ItemState {
-    RoomSeq place;
+    RoomSeq seq;
     std::optional<SceneItem> item;
   };
 
@@ -217,7 +217,7 @@ class Room {
   [[nodiscard]] Result<void> check_member(AuthorId by) const;
   [[nodiscard]] bool exists(BodyId body) const;
   [[nodiscard]] std::vector<Standing> with_tools(const std::vector<SceneItem>& items) const;
-  [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> places) const;
+  [[nodiscard]] std::set<RoomSeq> with_what_falls_too(std::set<RoomSeq> seqs) const;
   // Deciding makes a log entry with the next sequence number. Applying it is the same for a new entry and one of a
   // journal.
   LogEntry next_entry(AuthorId by, decltype(LogEntry::what) what);
@@ -242,30 +242,30 @@ class Room {
   [[nodiscard]] Result<void> may_change(AuthorId by) const;
   // Whether `by` may make these redone cuts now. Their authors must be allowed to make them too, unless `by` supervises
   // them.
-  [[nodiscard]] Result<void> may_cut_again(AuthorId by, const std::set<RoomSeq>& places) const;
+  [[nodiscard]] Result<void> may_cut_again(AuthorId by, const std::set<RoomSeq>& seqs) const;
   // Depends on the author's role, not on the way in which the events were named.
-  [[nodiscard]] Result<void> may_take_back(AuthorId by, const std::set<RoomSeq>& places) const;
+  [[nodiscard]] Result<void> may_take_back(AuthorId by, const std::set<RoomSeq>& seqs) const;
   // Whether some of them are other people's, and nothing that others did remains without them. Splits belong to nobody.
-  [[nodiscard]] bool takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) const;
-  [[nodiscard]] Result<void> are_own(AuthorId by, const std::set<RoomSeq>& places) const;
+  [[nodiscard]] bool takes_all_of_others(AuthorId by, const std::set<RoomSeq>& seqs) const;
+  [[nodiscard]] Result<void> are_own(AuthorId by, const std::set<RoomSeq>& seqs) const;
   // `undos`: undo events.
   [[nodiscard]] Result<void> may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const;
   void bone_came_back(RoomEvent& event);
   void grant(Surgeon& surgeon);
   Event& add_event(const LogEntry& entry, EventKind kind);
   void finish_event(RoomEvent& event) const;  // adds what exists after it
-  void note_decided(AuthorId author, const Digest& bytes, RoomSeq place, Rejection rejection);
+  void note_decided(AuthorId author, const Digest& bytes, RoomSeq seq, Rejection rejection);
   void note_changed(BodyId body, const std::vector<LevelLeaves>& changed, RoomEvent* event);
   void add_body(BodyId id, CutField field, CutHistory history, const CoordBox& reach);
   void show_whole(BodyId body, RoomEvent& event);
   [[nodiscard]] std::set<BlockKey> focused(Body& body) const;  // what its focus makes stale
   [[nodiscard]] CutField made_piece(const Body& parent, const SplitPiece& piece) const;
   void catch_up(const Body& parent, CutField& field) const;
-  void cut_apart(RoomSeq place, Event& entry, RoomEvent& event);
+  void cut_apart(RoomSeq seq, Event& entry, RoomEvent& event);
   void list_blocks(BodyId id, const Body& body, std::vector<BlockKey>& keys) const;
   [[nodiscard]] Result<void> know(const Tool& tool) const;
-  [[nodiscard]] bool can_be_undone(RoomSeq place) const;
-  RoomEvent take_back(AuthorId by, std::set<RoomSeq> places);
+  [[nodiscard]] bool can_be_undone(RoomSeq seq) const;
+  RoomEvent take_back(AuthorId by, std::set<RoomSeq> seqs);
 
   Case bone_;
   CutLimits limits_;

@@ -19,7 +19,7 @@ constexpr std::uint64_t kLeftOfSplit = std::uint64_t{1} << 63;
 constexpr std::chrono::nanoseconds kLongest = std::chrono::hours(24 * 365 * 100);
 
 tl::unexpected<Error> impossible(const LogEntry& entry, const std::string& why) {
-  return failure(ErrorCode::invalid_input, "entry " + std::to_string(entry.place.value) + " cannot follow: " + why);
+  return failure(ErrorCode::invalid_input, "entry " + std::to_string(entry.seq.value) + " cannot follow: " + why);
 }
 
 CoordBox level_0_box(int level, Coord origin) {
@@ -37,7 +37,7 @@ CoordBox about(const Case& bone) { return bone.bounds_samples().grown(2 * kLeafS
 // Whether a split may have this mask: sorted leaves of the lattice, near the bone, that hold values.
 bool is_mask(const Mask& mask, const CoordBox& about) {
   if (!mask) return false;
-  const auto place_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
+  const auto seq_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
   for (std::size_t i = 0; i < mask->size(); ++i) {
     const FieldLeaf& leaf = (*mask)[i];
     const auto off_lattice = [](std::int32_t at) { return at % kLeafSize != 0; };
@@ -45,7 +45,7 @@ bool is_mask(const Mask& mask, const CoordBox& about) {
         off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z) ||
         !about.contains(shift_down(leaf.origin, leaf.level)))
       return false;
-    if (i > 0 && !(place_of((*mask)[i - 1]) < place_of(leaf))) return false;
+    if (i > 0 && !(seq_of((*mask)[i - 1]) < seq_of(leaf))) return false;
   }
   return true;
 }
@@ -69,7 +69,7 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
   const auto possible = [&](bool holds, const char* why) -> Result<void> {
     return holds ? Result<void>{} : Result<void>(impossible(entry, why));
   };
-  if (entry.place.value != room_seq_.value + 1)
+  if (entry.seq.value != room_seq_.value + 1)
     return impossible(entry, "entry " + std::to_string(room_seq_.value + 1) + " comes next");
   if (entry.at < now_ || entry.at > kLongest)
     return impossible(entry, "its time does not follow that of the entry before it");
@@ -97,29 +97,29 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
       return require(one.reason > Rejection::none && static_cast<int>(one.reason) < kRejections, "its reason is none");
     }
     Result<void> operator()(const SplitEntry& split) const {
-      const CoordBox place = about(room.bone());
-      bool whole = room.exists(split.parent) && is_mask(split.taken, place);
+      const CoordBox box = about(room.bone());
+      bool whole = room.exists(split.parent) && is_mask(split.taken, box);
       std::uint32_t next = room.last_body_;
       for (const SplitPiece& piece : split.pieces)
-        whole = whole && piece.body.value == ++next && is_mask(piece.left, place) && place.contains(piece.reach.min) &&
-                place.contains(piece.reach.max);
+        whole = whole && piece.body.value == ++next && is_mask(piece.left, box) && box.contains(piece.reach.min) &&
+                box.contains(piece.reach.max);
       return require(whole && room.bodies().size() + split.pieces.size() <= kMostBodies, "the split is incomplete");
     }
     Result<void> operator()(const UndoEntry& undo) const {
-      bool all = !undo.places.empty() && std::ranges::is_sorted(undo.places, std::less_equal{});
-      for (const RoomSeq place : undo.places) all = all && room.can_be_undone(place) && !room.events_.at(place).undone;
+      bool all = !undo.seqs.empty() && std::ranges::is_sorted(undo.seqs, std::less_equal{});
+      for (const RoomSeq seq : undo.seqs) all = all && room.can_be_undone(seq) && !room.events_.at(seq).undone;
       return require(all, "it takes back what does not stand");
     }
     Result<void> operator()(const RedoEntry& redo) const {
-      const auto stands = [&](RoomSeq place) {
-        const auto found = room.events_.find(place);
+      const auto stands = [&](RoomSeq seq) {
+        const auto found = room.events_.find(seq);
         return found != room.events_.end() && found->second.kind == EventKind::undo && !found->second.undone;
       };
       // Newest undo first, oldest event first, no duplicates.
       bool all = !redo.undos.empty() && std::ranges::all_of(redo.undos, stands) &&
                  std::ranges::is_sorted(redo.undos, std::greater_equal{}) &&
-                 std::ranges::is_sorted(redo.places, std::less_equal{});
-      for (const RoomSeq place : redo.places) all = all && room.can_be_undone(place) && room.events_.at(place).undone;
+                 std::ranges::is_sorted(redo.seqs, std::less_equal{});
+      for (const RoomSeq seq : redo.seqs) all = all && room.can_be_undone(seq) && room.events_.at(seq).undone;
       return require(all, "it does again what was not undone");
     }
     Result<void> operator()(const RemoveBodyEntry& removal) const {
@@ -129,7 +129,7 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
       const bool known = room.items_.contains(item.item);
       if (!item.set) return require(known, "there is no such item");
       const bool room_for_it = known || (item.item == room.last_item_ + 1 && room.items_.size() < kMostItems);
-      return require(room_for_it && item.set->id == item.item && item.set->set_at == entry.place.value &&
+      return require(room_for_it && item.set->id == item.item && item.set->set_at == entry.seq.value &&
                          room.exists(item.set->body) && room.tools_->find(item.set->tool),
                      "the item cannot stand there");
     }
@@ -168,9 +168,9 @@ Result<void> Room::can_follow(const LogEntry& entry) const {
 }
 
 RoomEvent Room::apply(const LogEntry& entry) {
-  room_seq_ = entry.place;
+  room_seq_ = entry.seq;
   RoomEvent event;
-  event.room_seq = entry.place;
+  event.room_seq = entry.seq;
   event.author = entry.author;
   std::visit([&](const auto& what) { apply(entry, what, event); }, entry.what);
   finish_event(event);
@@ -180,7 +180,7 @@ RoomEvent Room::apply(const LogEntry& entry) {
 void Room::finish_event(RoomEvent& event) const { event.bodies = bodies(); }
 
 Room::Event& Room::add_event(const LogEntry& entry, EventKind kind) {
-  Event& event = events_[entry.place];
+  Event& event = events_[entry.seq];
   event.kind = kind;
   event.author = entry.author;
   event.at = entry.at;
@@ -201,7 +201,7 @@ void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) 
   event.kind = EventKind::cut;
   add_event(entry, EventKind::cut);
   ++counts_.committed;
-  note_decided(cut.author, cut_digest(cut), entry.place, Rejection::none);
+  note_decided(cut.author, cut_digest(cut), entry.seq, Rejection::none);
   Surgeon& surgeon = surgeons_.at(cut.author);
   surgeon.claimed += std::chrono::microseconds(cut.path_us);
   surgeon.swept_voxels = voxels_spent(surgeon) + swept_voxels(cut);
@@ -211,11 +211,11 @@ void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) 
   for (auto& [id, body] : bodies_) {
     if (fields_ == Fields::leave) {
       if (const std::vector<Coord> reach = body.field.reach(cut); !reach.empty())
-        body.history.add(entry.place, cut, reach);
+        body.history.add(entry.seq, cut, reach);
       continue;
     }
     CutReport part = body.field.apply(cut);
-    if (!part.reached_leaves.empty()) body.history.add(entry.place, cut, part.reached_leaves);
+    if (!part.reached_leaves.empty()) body.history.add(entry.seq, cut, part.reached_leaves);
     if (!body.present) continue;  // nobody sees it, but it may come back
     event.cut.visited += part.visited;
     event.cut.computed += part.computed;
@@ -224,8 +224,8 @@ void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) 
                                     part.changed_leaves.end());
     if (!part.changed_leaves.empty()) note_changed(id, {{cut.level, std::move(part.changed_leaves)}}, nullptr);
   }
-  if (std::ranges::none_of(bodies_, [&](const auto& body) { return body.second.history.contains(entry.place); }))
-    events_.at(entry.place).missed = std::make_shared<const Cut>(cut);
+  if (std::ranges::none_of(bodies_, [&](const auto& body) { return body.second.history.contains(entry.seq); }))
+    events_.at(entry.seq).missed = std::make_shared<const Cut>(cut);
 }
 
 // A rejected cut also voids what its author has predicted on top of it. But a stale cut shows that the author does not
@@ -233,7 +233,7 @@ void Room::apply(const LogEntry& entry, const CutEntry& what, RoomEvent& event) 
 void Room::apply(const LogEntry& entry, const RejectionEntry& rejection, RoomEvent& event) {
   event.kind = EventKind::cut;
   ++counts_.rejected;
-  note_decided(rejection.author, rejection.bytes, entry.place, rejection.reason);
+  note_decided(rejection.author, rejection.bytes, entry.seq, rejection.reason);
   if (rejection.reason == Rejection::lease) return;
   grant(surgeons_.at(rejection.author));
 }
@@ -254,14 +254,14 @@ void Room::bone_came_back(RoomEvent& event) {
 
 void Room::apply(const LogEntry& entry, const UndoEntry& undo, RoomEvent& event) {
   event.kind = EventKind::undo;
-  const bool all_of_others = takes_all_of_others(entry.author, {undo.places.begin(), undo.places.end()});
+  const bool all_of_others = takes_all_of_others(entry.author, {undo.seqs.begin(), undo.seqs.end()});
   Event& added = add_event(entry, EventKind::undo);
-  added.places = undo.places;
+  added.seqs = undo.seqs;
   added.all_of_others = all_of_others;
-  event.places = undo.places;
+  event.seqs = undo.seqs;
   std::set<BodyId> back;
-  for (auto place = undo.places.rbegin(); place != undo.places.rend(); ++place) {
-    Event& fallen = events_.at(*place);
+  for (auto seq = undo.seqs.rbegin(); seq != undo.seqs.rend(); ++seq) {
+    Event& fallen = events_.at(*seq);
     fallen.undone = true;
     event.scene |=
         fallen.kind == EventKind::scene || fallen.kind == EventKind::split || fallen.kind == EventKind::remove_body;
@@ -278,10 +278,10 @@ void Room::apply(const LogEntry& entry, const UndoEntry& undo, RoomEvent& event)
   }
   for (auto& [id, body] : bodies_) {
     if (fields_ == Fields::leave) {
-      body.history.note_undone(undo.places, true);
+      body.history.note_undone(undo.seqs, true);
       continue;
     }
-    const auto changed = body.history.undo(body.field, undo.places);
+    const auto changed = body.history.undo(body.field, undo.seqs);
     if (body.present && !back.contains(id)) note_changed(id, changed, &event);
   }
   for (const BodyId id : back) show_whole(id, event);
@@ -294,8 +294,8 @@ void Room::apply(const LogEntry& entry, const RedoEntry& redo, RoomEvent& event)
   for (const RoomSeq undo : redo.undos) events_.at(undo).undone = true;
   // Cuts first: a piece is made from its parent with all of them applied.
   std::vector<RoomSeq> cuts;
-  for (const RoomSeq place : redo.places)
-    if (events_.at(place).kind == EventKind::cut) cuts.push_back(place);
+  for (const RoomSeq seq : redo.seqs)
+    if (events_.at(seq).kind == EventKind::cut) cuts.push_back(seq);
   for (auto& [id, body] : bodies_) {
     if (fields_ == Fields::leave) {
       body.history.note_undone(cuts, false);
@@ -304,15 +304,15 @@ void Room::apply(const LogEntry& entry, const RedoEntry& redo, RoomEvent& event)
     const auto changed = body.history.redo(body.field, cuts);
     if (body.present) note_changed(id, changed, &event);
   }
-  for (const RoomSeq place : redo.places) {
-    Event& again = events_.at(place);
+  for (const RoomSeq seq : redo.seqs) {
+    Event& again = events_.at(seq);
     if ((again.kind == EventKind::split || again.kind == EventKind::remove_body) && !exists(again.body)) continue;
     again.undone = false;
-    event.places.push_back(place);
+    event.seqs.push_back(seq);
     event.scene |=
         again.kind == EventKind::scene || again.kind == EventKind::split || again.kind == EventKind::remove_body;
     event.bone |= again.kind != EventKind::scene;
-    if (again.kind == EventKind::split) cut_apart(place, again, event);
+    if (again.kind == EventKind::split) cut_apart(seq, again, event);
     if (again.kind == EventKind::remove_body) bodies_.at(again.body).present = false;
   }
   if (event.bone) bone_came_back(event);
@@ -336,7 +336,7 @@ void Room::apply(const LogEntry& entry, const SplitEntry& split, RoomEvent& even
   one.pieces = split.pieces;
   if (!split.pieces.empty()) last_body_ = split.pieces.back().body.value;
   for (const SplitPiece& piece : split.pieces) last_body_ = std::max(last_body_, piece.body.value);
-  cut_apart(entry.place, one, event);
+  cut_apart(entry.seq, one, event);
   event.scene = true;
   ++bone_changes_;
 }
@@ -344,7 +344,7 @@ void Room::apply(const LogEntry& entry, const SplitEntry& split, RoomEvent& even
 void Room::apply(const LogEntry& entry, const ItemEntry& item, RoomEvent& event) {
   event.kind = EventKind::scene;
   add_event(entry, EventKind::scene).item = item.item;
-  items_[item.item].push_back({entry.place, item.set});
+  items_[item.item].push_back({entry.seq, item.set});
   last_item_ = std::max(last_item_, item.item);
   event.item = item.item;
   event.scene = true;
@@ -423,9 +423,9 @@ void Room::catch_up(const Body& parent, CutField& field) const {
 }
 
 // The pieces are copies of the parent, each with everything else removed. Then the parent loses them.
-void Room::cut_apart(RoomSeq place, Event& entry, RoomEvent& event) {
+void Room::cut_apart(RoomSeq seq, Event& entry, RoomEvent& event) {
   Body& parent = bodies_.at(entry.body);
-  const RoomSeq left_key{kLeftOfSplit | place.value};
+  const RoomSeq left_key{kLeftOfSplit | seq.value};
   const bool evaluated = fields_ == Fields::evaluate, ready = ready_.size() == entry.pieces.size();
   for (std::size_t i = 0; i < entry.pieces.size(); ++i) {
     const SplitPiece& piece = entry.pieces[i];
@@ -439,9 +439,9 @@ void Room::cut_apart(RoomSeq place, Event& entry, RoomEvent& event) {
     add_body(piece.body, std::move(field), std::move(history), piece.reach);
   }
   std::vector<LevelLeaves> changed;
-  const RoomSeq again[] = {place};
-  if (!parent.history.contains(place)) {
-    parent.history.add_mask(place, entry.taken);
+  const RoomSeq again[] = {seq};
+  if (!parent.history.contains(seq)) {
+    parent.history.add_mask(seq, entry.taken);
     std::map<int, std::vector<Coord>> origins;
     if (evaluated)
       for (const FieldLeaf& leaf : *entry.taken)
@@ -495,7 +495,7 @@ Digest Room::room_hash() const {
   for (const auto& [id, states] : items_)
     for (const ItemState& state : states) {
       hasher.integer(id);
-      hasher.integer(state.place.value);
+      hasher.integer(state.seq.value);
       hasher.integer(state.item ? 1 : 0);
       if (!state.item) continue;
       hasher.integer(state.item->body.value);
@@ -506,8 +506,8 @@ Digest Room::room_hash() const {
         hasher.number(part);
       hasher.integer(state.item->seated ? 1 : 0);
     }
-  for (const auto& [place, event] : events_) {
-    if (event.undone) hasher.integer(place.value);  // tombstones
+  for (const auto& [seq, event] : events_) {
+    if (event.undone) hasher.integer(seq.value);  // tombstones
     if (event.kind == EventKind::mark) hasher.text(event.label);
   }
   hasher.integer(authors_);

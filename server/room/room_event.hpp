@@ -54,9 +54,9 @@ struct RoomEvent {
   const ToolBox::Entry* tool = nullptr;  // the tool that was added
   std::uint32_t item = 0;                // the item that was set or removed
   std::optional<Placed> set;             // its new state, if it was set
-  std::vector<RoomSeq> places;  // undo, redo: sequence numbers of the events taken back or done again, oldest first
-  CutReport cut;                // over all bodies
-  std::string mark;             // its label
+  std::vector<RoomSeq> seqs;  // undo, redo: sequence numbers of the events taken back or done again, oldest first
+  CutReport cut;              // over all bodies
+  std::string mark;           // its label
   std::variant<std::monostate, SuperviseEntry, AnnotationEntry, WordsEntry> people;  // what was decided, drawn or said
   std::vector<RoomEvent> further;  // follow-ups decided with it, each with a sequence number of its own after it
 };

@@ -17,12 +17,12 @@ constexpr std::uint64_t kLoaded = std::uint64_t{1} << 62;
 
 tl::unexpected<Error> refuse(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
 
-auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
+auto seq_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
 
 // Unites the masks of several fragments. A leaf that several masks contain is kept once, with the smallest values.
 std::vector<FieldLeaf> united(std::vector<FieldLeaf> masks) {
-  if (std::ranges::is_sorted(masks, std::less_equal{}, place_of)) return masks;
-  std::ranges::stable_sort(masks, {}, place_of);
+  if (std::ranges::is_sorted(masks, std::less_equal{}, seq_of)) return masks;
+  std::ranges::stable_sort(masks, {}, seq_of);
   std::vector<FieldLeaf> out;
   for (FieldLeaf& leaf : masks) {
     if (out.empty() || out.back().level != leaf.level || out.back().origin != leaf.origin) {
@@ -142,7 +142,7 @@ std::vector<SceneItem> Room::items() const {
   std::vector<SceneItem> standing;
   for (const auto& [id, entries] : items_) {
     const auto newest = std::find_if(entries.rbegin(), entries.rend(),
-                                     [&](const ItemState& entry) { return !events_.at(entry.place).undone; });
+                                     [&](const ItemState& entry) { return !events_.at(entry.seq).undone; });
     if (newest != entries.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
   // The pins in the scene decide whether a guide is fixed.
@@ -196,57 +196,57 @@ Result<void> Room::know(const Tool& tool) const {
 // - With a cut: every later split of a body that the cut had reached, because the bone that comes back may hold the
 //   piece.
 // - With an earlier split: every later split of the same body, because the bone would come back in the later piece too.
-std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> places) const {
+std::set<RoomSeq> Room::with_what_falls_too(std::set<RoomSeq> seqs) const {
   std::set<BodyId> pieces_gone;
   bool more = true;
   while (more) {
     more = false;
-    for (const auto& [place, event] : events_) {
-      if (event.undone || places.contains(place)) continue;
+    for (const auto& [seq, event] : events_) {
+      if (event.undone || seqs.contains(seq)) continue;
       bool falls = false;
       if (event.kind == EventKind::split) {
         falls = pieces_gone.contains(event.body);
         const auto parent = bodies_.find(event.body);
-        for (const RoomSeq fallen : places)
-          falls |= fallen < place && parent != bodies_.end() && parent->second.history.contains(fallen);
+        for (const RoomSeq fallen : seqs)
+          falls |= fallen < seq && parent != bodies_.end() && parent->second.history.contains(fallen);
       } else if (event.kind == EventKind::remove_body) {
         falls = pieces_gone.contains(event.body);
         // Somebody removed the rest because the piece was still there. Without the piece, the room would have no bone
         // at all.
-        for (const RoomSeq fallen : places) {
+        for (const RoomSeq fallen : seqs) {
           const Event& split = events_.at(fallen);
-          falls |= fallen < place && split.kind == EventKind::split && split.body == event.body;
+          falls |= fallen < seq && split.kind == EventKind::split && split.body == event.body;
         }
       }
-      if (falls) more = places.insert(place).second;
+      if (falls) more = seqs.insert(seq).second;
     }
-    for (const RoomSeq place : places)
-      for (const SplitPiece& piece : events_.at(place).pieces) more |= pieces_gone.insert(piece.body).second;
+    for (const RoomSeq seq : seqs)
+      for (const SplitPiece& piece : events_.at(seq).pieces) more |= pieces_gone.insert(piece.body).second;
   }
-  return places;
+  return seqs;
 }
 
-bool Room::can_be_undone(RoomSeq place) const {
-  const auto found = events_.find(place);
+bool Room::can_be_undone(RoomSeq seq) const {
+  const auto found = events_.find(seq);
   if (found == events_.end()) return false;
   const EventKind kind = found->second.kind;
   return kind == EventKind::cut || kind == EventKind::split || kind == EventKind::remove_body ||
          kind == EventKind::scene;
 }
 
-RoomEvent Room::take_back(AuthorId by, std::set<RoomSeq> places) {
-  const std::set<RoomSeq> falls = with_what_falls_too(std::move(places));
+RoomEvent Room::take_back(AuthorId by, std::set<RoomSeq> seqs) {
+  const std::set<RoomSeq> falls = with_what_falls_too(std::move(seqs));
   return decide(by, UndoEntry{{falls.begin(), falls.end()}});
 }
 
-Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
+Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> seqs) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (places.empty()) return refuse("undo names no event");
-  for (const RoomSeq place : places) {
-    if (!can_be_undone(place)) return refuse("event " + std::to_string(place.value) + " cannot be undone");
-    if (events_.at(place).undone) return refuse("event " + std::to_string(place.value) + " is undone already");
+  if (seqs.empty()) return refuse("undo names no event");
+  for (const RoomSeq seq : seqs) {
+    if (!can_be_undone(seq)) return refuse("event " + std::to_string(seq.value) + " cannot be undone");
+    if (events_.at(seq).undone) return refuse("event " + std::to_string(seq.value) + " is undone already");
   }
-  const std::set<RoomSeq> named(places.begin(), places.end());
+  const std::set<RoomSeq> named(seqs.begin(), seqs.end());
   if (Result<void> may = may_take_back(by, named); !may) return tl::unexpected(may.error());
   return take_back(by, named);
 }
@@ -254,16 +254,16 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> places) {
 Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (count == 0) return refuse("undo needs a count of at least 1");
-  std::set<RoomSeq> places;
-  for (auto event = events_.rbegin(); event != events_.rend() && places.size() < count; ++event) {
+  std::set<RoomSeq> seqs;
+  for (auto event = events_.rbegin(); event != events_.rend() && seqs.size() < count; ++event) {
     const Event& entry = event->second;
     if (entry.undone || (of ? entry.author != of : people_.only_own(by) && !people_.same_person(by, entry.author)))
       continue;
-    if (can_be_undone(event->first) && entry.kind != EventKind::split) places.insert(event->first);
+    if (can_be_undone(event->first) && entry.kind != EventKind::split) seqs.insert(event->first);
   }
-  if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
-  if (Result<void> may = may_take_back(by, places); !may) return tl::unexpected(may.error());
-  return take_back(by, std::move(places));
+  if (seqs.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
+  if (Result<void> may = may_take_back(by, seqs); !may) return tl::unexpected(may.error());
+  return take_back(by, std::move(seqs));
 }
 
 Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) {
@@ -275,15 +275,14 @@ Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) 
 Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   if (mark > room_seq_) return refuse("event " + std::to_string(mark.value) + " lies beyond the newest event");
-  std::set<RoomSeq> places;
+  std::set<RoomSeq> seqs;
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
-    if (can_be_undone(event->first) && !event->second.undone) places.insert(event->first);
+    if (can_be_undone(event->first) && !event->second.undone) seqs.insert(event->first);
   // A split belongs to nobody: it is undone with the cut that separated the piece.
-  if (people_.only_own(by))
-    std::erase_if(places, [&](RoomSeq place) { return events_.at(place).kind == EventKind::split; });
-  if (places.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
-  if (Result<void> may = may_take_back(by, places); !may) return tl::unexpected(may.error());
-  return take_back(by, std::move(places));
+  if (people_.only_own(by)) std::erase_if(seqs, [&](RoomSeq seq) { return events_.at(seq).kind == EventKind::split; });
+  if (seqs.empty()) return failure(ErrorCode::unavailable, "there is nothing to undo");
+  if (Result<void> may = may_take_back(by, seqs); !may) return tl::unexpected(may.error());
+  return take_back(by, std::move(seqs));
 }
 
 Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
@@ -304,11 +303,11 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
         return later.second.kind == EventKind::split && !later.second.undone && later.second.body == parent;
       });
     };
-    for (const RoomSeq place : events_.at(undo).places)
-      if (events_.at(place).kind != EventKind::split || !split_since(events_.at(place).body)) again.insert(place);
+    for (const RoomSeq seq : events_.at(undo).seqs)
+      if (events_.at(seq).kind != EventKind::split || !split_since(events_.at(seq).body)) again.insert(seq);
   }
   if (Result<void> may = may_cut_again(by, again); !may) return tl::unexpected(may.error());
-  entry.places.assign(again.begin(), again.end());
+  entry.seqs.assign(again.begin(), again.end());
   return decide(by, std::move(entry));
 }
 
@@ -323,8 +322,8 @@ Result<RoomEvent> Room::mark(AuthorId by, std::string label) {
 
 std::vector<std::pair<RoomSeq, std::string>> Room::marks() const {
   std::vector<std::pair<RoomSeq, std::string>> marks;
-  for (const auto& [place, event] : events_)
-    if (event.kind == EventKind::mark) marks.emplace_back(place, event.label);
+  for (const auto& [seq, event] : events_)
+    if (event.kind == EventKind::mark) marks.emplace_back(seq, event.label);
   return marks;
 }
 

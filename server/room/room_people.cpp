@@ -90,18 +90,18 @@ Result<void> Room::may_change(AuthorId by) const {
   return {};
 }
 
-Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& places) const {
-  for (const RoomSeq place : places) {
-    const Event& event = events_.at(place);
+Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& seqs) const {
+  for (const RoomSeq seq : seqs) {
+    const Event& event = events_.at(seq);
     if (event.kind != EventKind::cut) continue;
     const Cut* cut = event.missed.get();
     for (auto body = bodies_.begin(); body != bodies_.end() && cut == nullptr; ++body)
-      cut = body->second.history.find_cut(place);
+      cut = body->second.history.find_cut(seq);
     if (cut == nullptr) continue;
     const auto forbidden = [&](AuthorId whose) -> Result<void> {
       for (const Restrictions* held : people_.binding(whose))
         if (const Rejection why = breach(*held, *cut); why != Rejection::none)
-          return deny("event " + std::to_string(place.value) + " is a cut that " + author_name(whose) +
+          return deny("event " + std::to_string(seq.value) + " is a cut that " + author_name(whose) +
                       " may not make now: " + std::string(sentence(why)));
       return {};
     };
@@ -112,10 +112,10 @@ Result<void> Room::may_cut_again(AuthorId by, const std::set<RoomSeq>& places) c
   return {};
 }
 
-Result<void> Room::may_take_back(AuthorId by, const std::set<RoomSeq>& places) const {
+Result<void> Room::may_take_back(AuthorId by, const std::set<RoomSeq>& seqs) const {
   if (people_.may_undo_all(by)) return {};
-  if (people_.only_own(by)) return are_own(by, places);
-  if (!takes_all_of_others(by, places)) return {};
+  if (people_.only_own(by)) return are_own(by, seqs);
+  if (!takes_all_of_others(by, seqs)) return {};
   return deny(
       "this takes back all that others have done here, and only an instructor may do that; take back less, or only "
       "your own");
@@ -124,29 +124,28 @@ Result<void> Room::may_take_back(AuthorId by, const std::set<RoomSeq>& places) c
 Result<void> Room::may_do_again(AuthorId by, const std::set<RoomSeq>& undos) const {
   if (people_.may_undo_all(by)) return {};
   if (people_.only_own(by)) return are_own(by, undos);
-  for (const RoomSeq place : undos)
-    if (const Event& undo = events_.at(place); undo.all_of_others && !people_.same_person(by, undo.author))
-      return deny("event " + std::to_string(place.value) +
+  for (const RoomSeq seq : undos)
+    if (const Event& undo = events_.at(seq); undo.all_of_others && !people_.same_person(by, undo.author))
+      return deny("event " + std::to_string(seq.value) +
                   " took back all that others had done; only an instructor may redo it");
   return {};
 }
 
-Result<void> Room::are_own(AuthorId by, const std::set<RoomSeq>& places) const {
-  for (const RoomSeq place : places)
-    if (!people_.same_person(by, events_.at(place).author))
-      return deny("event " + std::to_string(place.value) + " is not " + author_name(by) +
+Result<void> Room::are_own(AuthorId by, const std::set<RoomSeq>& seqs) const {
+  for (const RoomSeq seq : seqs)
+    if (!people_.same_person(by, events_.at(seq).author))
+      return deny("event " + std::to_string(seq.value) + " is not " + author_name(by) +
                   "'s own, and a trainee may only take back their own");
   return {};
 }
 
-bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& places) const {
+bool Room::takes_all_of_others(AuthorId by, const std::set<RoomSeq>& seqs) const {
   const auto is_others = [&](const Event& event) {
     return event.kind != EventKind::split && !people_.same_person(by, event.author);
   };
-  if (std::ranges::none_of(places, [&](RoomSeq place) { return is_others(events_.at(place)); })) return false;
+  if (std::ranges::none_of(seqs, [&](RoomSeq seq) { return is_others(events_.at(seq)); })) return false;
   const auto stays = [&](const auto& event) {
-    return can_be_undone(event.first) && !event.second.undone && is_others(event.second) &&
-           !places.contains(event.first);
+    return can_be_undone(event.first) && !event.second.undone && is_others(event.second) && !seqs.contains(event.first);
   };
   return std::ranges::none_of(events_, stays);
 }
@@ -159,7 +158,7 @@ void Room::apply(const LogEntry& entry, const SuperviseEntry& supervise, RoomEve
   const Restrictions& before = people_.supervised(supervise.subject).supervision;
   if (before.stopped != supervise.supervision.stopped || before.taken_by != supervise.supervision.taken_by)
     grant(surgeon);
-  people_.supervise(entry.place, entry.author, supervise);
+  people_.supervise(entry.seq, entry.author, supervise);
   event.lease_epoch = surgeon.epoch;
 }
 

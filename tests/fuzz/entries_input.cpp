@@ -59,7 +59,7 @@ class Changes {
   }
 
   void change(Coord& at) { number(below(3) == 0 ? at.x : below(2) ? at.y : at.z); }
-  void change(RoomSeq& place) { number(place.value); }
+  void change(RoomSeq& seq) { number(seq.value); }
   void change(Digest& digest) { number(digest.bytes[below(digest.bytes.size())]); }
   void change(QuantisedPose& knot) {
     if (below(3) == 0)
@@ -161,8 +161,8 @@ class Changes {
     for (SplitPiece& piece : entry.pieces)
       if (!piece.left) piece.left = std::make_shared<const std::vector<FieldLeaf>>();
   }
-  void change(UndoEntry& entry) { one_of(entry.places); }
-  void change(RedoEntry& entry) { one_of(below(2) ? entry.undos : entry.places); }
+  void change(UndoEntry& entry) { one_of(entry.seqs); }
+  void change(RedoEntry& entry) { one_of(below(2) ? entry.undos : entry.seqs); }
   void change(RemoveBodyEntry& entry) { number(entry.body.value); }
   void change(ItemEntry& entry) {
     if (!entry.set || below(4) == 0) return number(entry.item);
@@ -328,32 +328,32 @@ void change_entries(Bytes& data, std::mt19937& random) {
   std::vector<Record>& records = input.records;
   if (records.empty()) return;
   Changes changes(random);
-  const auto place = [&](std::size_t extra = 0) {
+  const auto seq = [&](std::size_t extra = 0) {
     return records.begin() + static_cast<std::ptrdiff_t>(changes.below(records.size() + extra));
   };
   switch (changes.below(12)) {
     case 0:
-      records.erase(place());
+      records.erase(seq());
       break;
     case 1: {
-      Record again = *place();
-      records.insert(place(1), std::move(again));
+      Record again = *seq();
+      records.insert(seq(1), std::move(again));
       break;
     }
     case 2:
-      std::iter_swap(place(), place());
+      std::iter_swap(seq(), seq());
       break;
     case 3:
-      changes.number(place()->off);
+      changes.number(seq()->off);
       break;
     case 4:
-      changes.number(place()->later);
+      changes.number(seq()->later);
       break;
     case 5:
       changes.number(changes.below(2) ? input.how : input.checkpoint);
       break;
     default:
-      change_field(place()->bytes, changes);
+      change_field(seq()->bytes, changes);
   }
   data = to_bytes(input);
 }

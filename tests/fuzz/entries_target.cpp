@@ -90,22 +90,22 @@ void replay_any_entries(std::span<const std::uint8_t> data, bool evaluate) {
   const auto reach_checkpoint = [&] { OSTEON_CHECK(other.set_fields(room.all_leaves()).has_value()); };
   std::chrono::nanoseconds at{};
   for (const Record& record : input.records) {
-    const RoomSeq place{room.room_seq().value + 1 + static_cast<std::uint64_t>(record.off)};
+    const RoomSeq seq{room.room_seq().value + 1 + static_cast<std::uint64_t>(record.off)};
     const std::chrono::nanoseconds when = time_of(record, at);
-    const Result<LogEntry> entry = entry_from_bytes(place, when, record.bytes);
+    const Result<LogEntry> entry = entry_from_bytes(seq, when, record.bytes);
     if (how & kAsText) {
-      const Result<std::string> line = entry_as_json(place, when, record.bytes);
+      const Result<std::string> line = entry_as_json(seq, when, record.bytes);
       OSTEON_CHECK(line ? line->find('\n') == std::string::npos : !entry);
     }
     if (!entry) continue;
     const std::string written = to_bytes(*entry);
-    const Result<LogEntry> read = entry_from_bytes(place, when, written);
+    const Result<LogEntry> read = entry_from_bytes(seq, when, written);
     OSTEON_CHECK(read && to_bytes(*read) == written);
     if (!room.replay(*entry, evaluate ? Room::Fields::evaluate : Room::Fields::leave)) continue;
     at = room.time();
-    const bool evaluate_here = evaluate && place > checkpoint;
+    const bool evaluate_here = evaluate && seq > checkpoint;
     OSTEON_CHECK(other.replay(*read, evaluate_here ? Room::Fields::evaluate : Room::Fields::leave).has_value());
-    if (evaluate && place == checkpoint) reach_checkpoint();
+    if (evaluate && seq == checkpoint) reach_checkpoint();
   }
   if (evaluate && room.room_seq() < checkpoint) reach_checkpoint();
   OSTEON_CHECK(room.take_entries().empty() && room.time() == other.time());

@@ -91,10 +91,10 @@ void expect_prefix(Journal& journal) {
   const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& entry) {
     OSTEON_CHECK(entries < kEntries);
     const JournalEntry& written = all_entries()[entries++];
-    OSTEON_CHECK(entry.place == written.place && entry.at_ns == written.at_ns && entry.bytes == written.bytes);
+    OSTEON_CHECK(entry.seq == written.seq && entry.at_ns == written.at_ns && entry.bytes == written.bytes);
     return true;
   });
-  OSTEON_CHECK(!read || entries == journal.head().place.value);
+  OSTEON_CHECK(!read || entries == journal.head().seq.value);
 }
 
 void open_any_journal(std::span<const std::uint8_t> data) {
@@ -112,7 +112,7 @@ void open_any_journal(std::span<const std::uint8_t> data) {
   OSTEON_CHECK(disk.image() == image);
   const Result<RecoverReport> recovered = salvage_journal(kFile, kRecovered, &disk);
   if (recovered) {
-    OSTEON_CHECK(recovered->head.place.value <= kEntries && (!is_sound || recovered->lost() == 0));
+    OSTEON_CHECK(recovered->head.seq.value <= kEntries && (!is_sound || recovered->lost() == 0));
     const Result<VerifyReport> now = verify_journal(kRecovered, &disk);
     OSTEON_CHECK(now && now->sound());
     Result<Journal> journal = Journal::open(kRecovered, {.disk = &disk, .log_bytes = 2000});

@@ -56,19 +56,19 @@ class Confirmed : public ::testing::Test {
   }
   void start_again() { stage_.start_server({"--journal", journal(), "--listen", stage_.address()}); }
   // Places of the hands' cuts by their numbers. One hand has cut.
-  std::map<std::uint64_t, std::uint64_t> places() {
+  std::map<std::uint64_t, std::uint64_t> seqs() {
     const fs::path lines = stage_ / "events.jsonl";
     const RunResult written = run(program("osteon-server"), {"export", journal(), lines}, 30s);
     EXPECT_EQ(written.exit_code, 0) << written.err;
-    std::map<std::uint64_t, std::uint64_t> places;
+    std::map<std::uint64_t, std::uint64_t> seqs;
     std::ifstream in(lines);
     for (std::string line; std::getline(in, line);) {
       const json entry = json::parse(line);
       if (entry.at("event").contains("cut"))
-        places[std::stoull(entry["event"]["cut"]["author_seq"].get<std::string>())] =
-            entry["place"].get<std::uint64_t>();
+        seqs[std::stoull(entry["event"]["cut"]["author_seq"].get<std::string>())] =
+            entry["room_seq"].get<std::uint64_t>();
     }
-    return places;
+    return seqs;
   }
   // One sentence ends the program.
   static std::string last_sentence(const Process& process, const std::string& name) {
@@ -98,15 +98,15 @@ TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
   const json summary = read_json(stage_ / "hand.json");
   EXPECT_GE(summary.at("interruptions"), 2);
   ASSERT_EQ(stage_.server().terminate(), 0);
-  const auto kept = places();
+  const auto kept = seqs();
   const Table cuts = read_table(stage_ / "hand-cuts.csv");
   ASSERT_GT(cuts.entries(), 150u);
   int elsewhere = 0, confirmed = 0;
   for (std::size_t i = 0; i < cuts.entries(); ++i) {
     if (cuts["confirmed_mono_ns"][i] == 0) continue;
     ++confirmed;
-    const auto place = kept.find(static_cast<std::uint64_t>(cuts["author_seq"][i]));
-    elsewhere += cuts["room_seq"][i] != (place == kept.end() ? 0.0 : static_cast<double>(place->second));
+    const auto seq = kept.find(static_cast<std::uint64_t>(cuts["author_seq"][i]));
+    elsewhere += cuts["room_seq"][i] != (seq == kept.end() ? 0.0 : static_cast<double>(seq->second));
   }
   EXPECT_GT(confirmed, 150);
   EXPECT_EQ(elsewhere, 0) << "cuts that the log has at another place than the journal";

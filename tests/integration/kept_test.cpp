@@ -284,13 +284,13 @@ TEST(Kept, InventedEventsAreSignedByNobody) {
   std::uint64_t last = 0;
   {
     Journal journal = std::move(Journal::open(file).value());
-    last = journal.head().place.value;
+    last = journal.head().seq.value;
     std::vector<JournalEntry> entries;
     ASSERT_TRUE(journal.read(RoomSeq{last}, [&](const JournalEntry& entry) {
       entries.assign(100'000, entry);
       return true;
     }));
-    for (std::size_t i = 0; i < entries.size(); ++i) entries[i].place.value = last + i + 1;
+    for (std::size_t i = 0; i < entries.size(); ++i) entries[i].seq.value = last + i + 1;
     ASSERT_TRUE(journal.append(entries) && journal.close());
   }
   verified = server({"verify", file.string(), "--key", key});

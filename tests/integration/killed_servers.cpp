@@ -18,24 +18,24 @@ using namespace std::chrono_literals;
 constexpr double kWidth_mm = 12.0;
 
 // What the journal has of each author: the places of his cuts, by their numbers.
-std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_places(const std::filesystem::path& file,
-                                                                 KilledServers& report) {
-  std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> places;
+std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_seqs(const std::filesystem::path& file,
+                                                               KilledServers& report) {
+  std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> seqs;
   Result<Journal> journal = Journal::open(file);
   if (!journal) {
     report.fault = journal.error().message;
-    return places;
+    return seqs;
   }
   const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalEntry& one) {
-    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    const Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
     if (!entry) report.fault = entry.error().message;
     if (!entry) return false;
     const auto* cut = std::get_if<CutEntry>(&entry->what);
-    if (cut && !places[cut->cut.author].emplace(cut->cut.author_seq, one.place).second) ++report.twice;
+    if (cut && !seqs[cut->cut.author].emplace(cut->cut.author_seq, one.seq).second) ++report.twice;
     return true;
   });
   if (!read) report.fault = read.error().message;
-  return places;
+  return seqs;
 }
 
 }  // namespace
@@ -86,18 +86,18 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
   for (const auto& hand : hands) report.hashes_that_differ += wire::to_wire(hand->surgeon().hash()) != hash;
   (void)stage.server().terminate();
 
-  const auto places = read_places(file, report);
+  const auto seqs = read_seqs(file, report);
   for (const auto& hand : hands) {
     report.sent += hand->sent();
-    const auto found = places.find(hand->surgeon().author());
+    const auto found = seqs.find(hand->surgeon().author());
     const std::map<std::uint64_t, RoomSeq> kept =
-        found == places.end() ? std::map<std::uint64_t, RoomSeq>{} : found->second;
+        found == seqs.end() ? std::map<std::uint64_t, RoomSeq>{} : found->second;
     report.kept += kept.size();
     if (!kept.empty()) report.missing += kept.rbegin()->first - kept.size();
-    for (const auto& [author_seq, place] : hand->surgeon().acknowledged()) {
+    for (const auto& [author_seq, seq] : hand->surgeon().acknowledged()) {
       ++report.acknowledged;
       const auto entry = kept.find(author_seq);
-      report.lost += entry == kept.end() || entry->second != place;
+      report.lost += entry == kept.end() || entry->second != seq;
     }
   }
   return report;

@@ -303,20 +303,20 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
 
 // The places of one author's cuts, as a journal has them.
 std::map<std::uint64_t, RoomSeq> kept_cuts(const std::filesystem::path& file, AuthorId author) {
-  std::map<std::uint64_t, RoomSeq> places;
+  std::map<std::uint64_t, RoomSeq> seqs;
   Result<Journal> journal = Journal::open(file);
   EXPECT_TRUE(journal.has_value()) << journal.error().message;
-  if (!journal) return places;
+  if (!journal) return seqs;
   const Result<void> read = journal->read(RoomSeq{1}, [&](const JournalEntry& one) {
-    const Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    const Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
     EXPECT_TRUE(entry.has_value());
     const CutEntry* cut = entry ? std::get_if<CutEntry>(&entry->what) : nullptr;
     const bool is_own = cut && cut->cut.author == author;
-    EXPECT_TRUE(!is_own || places.emplace(cut->cut.author_seq, one.place).second) << "twice";
+    EXPECT_TRUE(!is_own || seqs.emplace(cut->cut.author_seq, one.seq).second) << "twice";
     return entry.has_value();
   });
   EXPECT_TRUE(read.has_value());
-  return places;
+  return seqs;
 }
 
 TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
@@ -336,10 +336,10 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   const auto acknowledged = surgeon.acknowledged();
   const auto kept = kept_cuts(file, surgeon.author());
   EXPECT_GE(acknowledged.size(), 30u);
-  for (const auto& [number, place] : acknowledged) {
+  for (const auto& [number, seq] : acknowledged) {
     const auto entry = kept.find(number);
     ASSERT_NE(entry, kept.end()) << "cut " << number << " was acknowledged and is not kept";
-    EXPECT_EQ(entry->second, place);
+    EXPECT_EQ(entry->second, seq);
   }
 
   stage.start_server({"--journal", file, "--listen", stage.address()});

@@ -86,7 +86,7 @@ std::string Oracle::lacks(std::string_view lines, std::uint64_t up_to) const {
     constexpr std::string_view kEvent = ",\"event\":";
     const std::size_t event = line.find(kEvent);
     v1::JournalEntry entry;
-    if (!line.starts_with("{\"place\":" + std::to_string(place) + ",") || event == line.npos ||
+    if (!line.starts_with("{\"room_seq\":" + std::to_string(place) + ",") || event == line.npos ||
         !google::protobuf::util::JsonStringToMessage(
              std::string(line.substr(event + kEvent.size(), line.size() - event - kEvent.size() - 1)), &entry)
              .ok())
@@ -208,10 +208,10 @@ void LightHand::read() {
       case v1::SessionResponse::kNoted:
         oracle_->heard(RoomSeq{message.noted().room_seq()});
         break;
-      case v1::SessionResponse::kKept: {
-        const auto chain = wire::digest_from_wire(message.kept().chain()),
-                   seal = wire::digest_from_wire(message.kept().seal());
-        if (chain && seal) oracle_->heard_kept({RoomSeq{message.kept().room_seq()}, *chain, *seal});
+      case v1::SessionResponse::kDurable: {
+        const auto chain = wire::digest_from_wire(message.durable().chain()),
+                   seal = wire::digest_from_wire(message.durable().seal());
+        if (chain && seal) oracle_->heard_kept({RoomSeq{message.durable().room_seq()}, *chain, *seal});
         break;
       }
       default:

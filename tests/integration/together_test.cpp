@@ -254,7 +254,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   std::size_t others = 0, decisions = 0;
   for (std::string line; std::getline(in, line);) {
     const json entry = json::parse(line);
-    const auto place = entry.at("place").get<std::uint64_t>();
+    const auto place = entry.at("room_seq").get<std::uint64_t>();
     decisions += entry.at("event").contains("supervision");
     const bool forbidden = (place > frozen_at && place < free_at) || (place > taken_at && place < back_at);
     if (!forbidden || !entry.at("event").contains("cut")) continue;

@@ -116,7 +116,7 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   void offer(RoomSeq, const Bytes&, const wire::SessionEntry& fast) override {
     const bool committed = fast.kind == wire::SessionEntryKind::committed;
     if (committed && fast.cut.author == author_) times.note(told, fast.cut.author_seq);
-    if (!link_->tell(++index_, fast)) path_->heard(index_);  // the stream's copy
+    if (!link_->tell(++index_, fast)) path_->received(index_);  // the stream's copy
   }
   void answer(const Bytes&) override {}
   void refuse(const Error&) override { ++refused; }

@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
     print("stiff", line, run, false);
     // The same without the controller: an account that is always full.
     run.ticks = std::min(run.ticks, 200'000L);
-    run.client.allowance_mj = run.client.kept_mj = 1e9;
+    run.client.allowance_mj = run.client.reserve_mj = 1e9;
     print("uncontrolled", line, run, false);
   }
   std::printf("]}\n");

@@ -9,7 +9,7 @@
 namespace osteon::test {
 namespace {
 
-std::string number(RoomSeq place) { return std::to_string(place.value); }
+std::string number(RoomSeq seq) { return std::to_string(seq.value); }
 
 std::string whose(AuthorId author, std::uint64_t author_seq) {
   return "cut " + std::to_string(author_seq) + " of author " + std::to_string(author.value);
@@ -102,36 +102,36 @@ std::optional<std::chrono::nanoseconds> Ledger::age(const Cut& cut, std::chrono:
   return now - made->second[cut.author_seq - 1];
 }
 
-void Ledger::told(RoomSeq place, const Told& what) {
-  told_up_to(place);
-  const auto [at, first] = told_.emplace(place, what);
+void Ledger::told(RoomSeq seq, const Told& what) {
+  told_up_to(seq);
+  const auto [at, first] = told_.emplace(seq, what);
   check(first || at->second == what, Invariant::acknowledged,
-        "sequence number " + number(place) + " was sent twice, as different events");
+        "sequence number " + number(seq) + " was sent twice, as different events");
 }
 
-void Ledger::told_committed(RoomSeq place, const Cut& cut) {
-  told(place, {EventKind::cut, false, cut.author, cut.author_seq, cut_digest(cut)});
+void Ledger::told_committed(RoomSeq seq, const Cut& cut) {
+  told(seq, {EventKind::cut, false, cut.author, cut.author_seq, cut_digest(cut)});
 }
-void Ledger::told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq) {
-  told(place, {EventKind::cut, true, author, author_seq, {}});
+void Ledger::told_rejected(RoomSeq seq, AuthorId author, std::uint64_t author_seq) {
+  told(seq, {EventKind::cut, true, author, author_seq, {}});
 }
-void Ledger::told_event(RoomSeq place, EventKind kind) { told(place, {kind, false, {}, 0, {}}); }
-void Ledger::told_up_to(RoomSeq place) {
-  check(place <= kept_, Invariant::acknowledged,
-        "sequence number " + number(place) + " was sent while the entries were durable up to " + number(kept_));
-  furthest_ = std::max(furthest_, place);
+void Ledger::told_event(RoomSeq seq, EventKind kind) { told(seq, {kind, false, {}, 0, {}}); }
+void Ledger::told_up_to(RoomSeq seq) {
+  check(seq <= kept_, Invariant::acknowledged,
+        "sequence number " + number(seq) + " was sent while the entries were durable up to " + number(kept_));
+  furthest_ = std::max(furthest_, seq);
 }
 void Ledger::told_decided(AuthorId author, std::uint64_t author_seq) {
   std::uint64_t& newest = decided_[author];
   newest = std::max(newest, author_seq);
 }
 
-void Ledger::told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq) {
+void Ledger::acknowledged_seq(RoomSeq seq, AuthorId author, std::uint64_t author_seq) {
   const std::vector<Cut>& own = made_[author];
   if (author_seq == 0 || author_seq > own.size())
     return fault(Invariant::acknowledged, whose(author, author_seq) + " has a sequence number, and was never made");
-  if (place)
-    told_committed(place, own[author_seq - 1]);
+  if (seq)
+    told_committed(seq, own[author_seq - 1]);
   else
     rejected_.emplace(author, author_seq);
 }
@@ -140,14 +140,14 @@ void Ledger::check_author(const LogEntry& entry, AuthorId author, std::uint64_t 
                           std::map<AuthorId, std::uint64_t>& newest) {
   const std::uint64_t next = ++newest[author];
   check(author_seq == next, Invariant::author_order,
-        "entry " + number(entry.place) + " is " + whose(author, author_seq) + ", where " + std::to_string(next) +
+        "entry " + number(entry.seq) + " is " + whose(author, author_seq) + ", where " + std::to_string(next) +
             " comes next");
   const std::vector<Cut>& own = made_[author];
   if (author_seq == 0 || author_seq > own.size())
     return fault(Invariant::author_order,
-                 "entry " + number(entry.place) + " is " + whose(author, author_seq) + ", who never made it");
+                 "entry " + number(entry.seq) + " is " + whose(author, author_seq) + ", who never made it");
   check(cut_digest(own[author_seq - 1]) == bytes, Invariant::author_order,
-        "entry " + number(entry.place) + " is " + whose(author, author_seq) + ", with other bytes than were made");
+        "entry " + number(entry.seq) + " is " + whose(author, author_seq) + ", with other bytes than were made");
 }
 
 void Ledger::check_held(const LogEntry& entry, const Hands& hands) {
@@ -156,18 +156,18 @@ void Ledger::check_held(const LogEntry& entry, const Hands& hands) {
                        std::holds_alternative<RemoveBodyEntry>(entry.what);
   const Restrictions now = hands.of(entry.author);
   check(!changes || (!now.stopped && now.taken_by == AuthorId{}), Invariant::supervised,
-        "entry " + number(entry.place) + " is what author " + std::to_string(entry.author.value) + " did while held");
+        "entry " + number(entry.seq) + " is what author " + std::to_string(entry.author.value) + " did while held");
   const auto* redo = std::get_if<RedoEntry>(&entry.what);
   if (redo == nullptr) return;
-  for (const RoomSeq place : redo->places)
-    if (const auto cut = hands.cuts.find(place); cut != hands.cuts.end())
+  for (const RoomSeq seq : redo->seqs)
+    if (const auto cut = hands.cuts.find(seq); cut != hands.cuts.end())
       check_cut(entry, hands, entry.author, *cut->second);
 }
 
 void Ledger::check_cut(const LogEntry& entry, const Hands& hands, AuthorId by, const Cut& cut) {
   const Restrictions now = hands.of(by);
   const auto forbidden = [&](const std::string& why) {
-    fault(Invariant::supervised, "entry " + number(entry.place) + " has " + whose(cut.author, cut.author_seq) +
+    fault(Invariant::supervised, "entry " + number(entry.seq) + " has " + whose(cut.author, cut.author_seq) +
                                      ", and author " + std::to_string(by.value) + " " + why);
   };
   if (now.stopped) forbidden("was stopped");
@@ -189,7 +189,7 @@ void Ledger::check_carried(std::span<const LogEntry> entries, std::size_t join, 
   if (before == Restrictions{}) return;
   const auto* next = join + 1 < entries.size() ? std::get_if<SuperviseEntry>(&entries[join + 1].what) : nullptr;
   check(next != nullptr && next->subject == joined.author && next->supervision == before, Invariant::supervised,
-        "entry " + number(entries[join].place) + " lets a person's new hand go, author " +
+        "entry " + number(entries[join].seq) + " lets a person's new hand go, author " +
             std::to_string(joined.author.value));
 }
 
@@ -206,8 +206,8 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
   };
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const LogEntry& entry = entries[i];
-    check(entry.place.value == i + 1, Invariant::replay,
-          "entry " + std::to_string(i + 1) + " has the sequence number " + number(entry.place));
+    check(entry.seq.value == i + 1, Invariant::replay,
+          "entry " + std::to_string(i + 1) + " has the sequence number " + number(entry.seq));
     Told kept{*kind_of(entry), false, {}, 0, {}};
     bool bone_back = false;
     check_held(entry, hands);
@@ -216,18 +216,18 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
       kept = {EventKind::cut, false, cut->cut.author, cut->cut.author_seq, bytes};
       check_author(entry, cut->cut.author, cut->cut.author_seq, bytes, newest);
       check(!rejected_.contains({cut->cut.author, cut->cut.author_seq}), Invariant::acknowledged,
-            "entry " + number(entry.place) + " is a cut that was said to be rejected");
+            "entry " + number(entry.seq) + " is a cut that was said to be rejected");
       check(cut->cut.lease_epoch == lease_of(cut->cut.author), Invariant::lease,
-            "entry " + number(entry.place) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
+            "entry " + number(entry.seq) + ", " + whose(cut->cut.author, cut->cut.author_seq) + ", is of lease " +
                 std::to_string(cut->cut.lease_epoch) + " where " + std::to_string(lease_of(cut->cut.author)) +
                 " holds");
-      of_bone[entry.place] = true;
-      hands.cuts[entry.place] = &cut->cut;
+      of_bone[entry.seq] = true;
+      hands.cuts[entry.seq] = &cut->cut;
       check_cut(entry, hands, cut->cut.author, cut->cut);
     } else if (const auto* rejection = std::get_if<RejectionEntry>(&entry.what)) {
       // All these hands are honest.
       check(rejection->reason != Rejection::time, Invariant::served,
-            "entry " + number(entry.place) + " says that " + whose(rejection->author, rejection->author_seq) +
+            "entry " + number(entry.seq) + " says that " + whose(rejection->author, rejection->author_seq) +
                 " took longer than time has passed");
       kept = {EventKind::cut, true, rejection->author, rejection->author_seq, {}};
       check_author(entry, rejection->author, rejection->author_seq, rejection->bytes, newest);
@@ -235,9 +235,9 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
         const std::vector<Cut>& own = made_[rejection->author];
         check(rejection->author_seq <= own.size() &&
                   own[rejection->author_seq - 1].lease_epoch != lease_of(rejection->author),
-              Invariant::lease, "entry " + number(entry.place) + " rejects a cut of the lease that holds");
+              Invariant::lease, "entry " + number(entry.seq) + " rejects a cut of the lease that holds");
       } else {
-        lease[rejection->author] = entry.place.value + 1;
+        lease[rejection->author] = entry.seq.value + 1;
       }
     } else if (const auto* join = std::get_if<JoinEntry>(&entry.what)) {
       lease[join->author] = 1;
@@ -246,20 +246,20 @@ void Ledger::check_entries(std::span<const LogEntry> entries) {
       Restrictions& before = hands.held[decided->subject];
       const Restrictions& now = decided->supervision;
       if (before.stopped != now.stopped || before.taken_by != now.taken_by)
-        lease[decided->subject] = entry.place.value + 1;
+        lease[decided->subject] = entry.seq.value + 1;
       before = now;
     } else if (const auto* undo = std::get_if<UndoEntry>(&entry.what)) {
-      bone_back = std::ranges::any_of(undo->places, [&](RoomSeq place) { return of_bone[place]; });
+      bone_back = std::ranges::any_of(undo->seqs, [&](RoomSeq seq) { return of_bone[seq]; });
     } else if (const auto* redo = std::get_if<RedoEntry>(&entry.what)) {
-      bone_back = std::ranges::any_of(redo->places, [&](RoomSeq place) { return of_bone[place]; });
+      bone_back = std::ranges::any_of(redo->seqs, [&](RoomSeq seq) { return of_bone[seq]; });
     } else if (std::holds_alternative<SplitEntry>(entry.what) || std::holds_alternative<RemoveBodyEntry>(entry.what)) {
-      of_bone[entry.place] = true;
+      of_bone[entry.seq] = true;
     }
     if (bone_back)
-      for (auto& [author, epoch] : lease) epoch = entry.place.value + 1;
-    const auto told = told_.find(entry.place);
+      for (auto& [author, epoch] : lease) epoch = entry.seq.value + 1;
+    const auto told = told_.find(entry.seq);
     check(told == told_.end() || told->second == kept, Invariant::acknowledged,
-          "entry " + number(entry.place) + " is another event than was sent");
+          "entry " + number(entry.seq) + " is another event than was sent");
   }
   for (const auto& [author, author_seq] : decided_)
     check(newest[author] >= author_seq, Invariant::acknowledged,
@@ -278,14 +278,14 @@ std::optional<std::vector<Cut>> Ledger::standing(std::span<const LogEntry> entri
   std::set<RoomSeq> fallen;
   for (const LogEntry& entry : entries) {
     if (std::holds_alternative<SplitEntry>(entry.what)) return std::nullopt;
-    if (const auto* cut = std::get_if<CutEntry>(&entry.what)) cuts[entry.place] = &cut->cut;
-    if (const auto* undo = std::get_if<UndoEntry>(&entry.what)) fallen.insert(undo->places.begin(), undo->places.end());
+    if (const auto* cut = std::get_if<CutEntry>(&entry.what)) cuts[entry.seq] = &cut->cut;
+    if (const auto* undo = std::get_if<UndoEntry>(&entry.what)) fallen.insert(undo->seqs.begin(), undo->seqs.end());
     if (const auto* redo = std::get_if<RedoEntry>(&entry.what))
-      for (const RoomSeq place : redo->places) fallen.erase(place);
+      for (const RoomSeq seq : redo->seqs) fallen.erase(seq);
   }
   std::vector<Cut> all;
-  for (const auto& [place, cut] : cuts)
-    if (!fallen.contains(place)) all.push_back(*cut);
+  for (const auto& [seq, cut] : cuts)
+    if (!fallen.contains(seq)) all.push_back(*cut);
   return all;
 }
 

@@ -49,16 +49,16 @@ class Ledger {
   void made(const Cut& cut, std::chrono::nanoseconds now);
   // The age of a cut. None if there is no such cut.
   [[nodiscard]] std::optional<std::chrono::nanoseconds> age(const Cut& cut, std::chrono::nanoseconds now) const;
-  void kept_up_to(RoomSeq place) { kept_ = std::max(kept_, place); }  // entries that are durable and may be sent
+  void kept_up_to(RoomSeq seq) { kept_ = std::max(kept_, seq); }  // entries that are durable and may be sent
   // What a client received, in a stream or as an answer.
-  void told_committed(RoomSeq place, const Cut& cut);
-  void told_rejected(RoomSeq place, AuthorId author, std::uint64_t author_seq);
-  void told_event(RoomSeq place, EventKind kind);
-  void told_up_to(RoomSeq place);                                // newest sequence number that the room reported
+  void told_committed(RoomSeq seq, const Cut& cut);
+  void told_rejected(RoomSeq seq, AuthorId author, std::uint64_t author_seq);
+  void told_event(RoomSeq seq, EventKind kind);
+  void told_up_to(RoomSeq seq);                                  // newest sequence number that the room reported
   void told_decided(AuthorId author, std::uint64_t author_seq);  // up to this one
   // The room's decision about an author's cut, as sent to a returning client: its sequence number. Null: it rejected
   // the cut.
-  void told_place(RoomSeq place, AuthorId author, std::uint64_t author_seq);
+  void acknowledged_seq(RoomSeq seq, AuthorId author, std::uint64_t author_seq);
 
   // Checks everything that the entries of a journal must satisfy.
   void check_entries(std::span<const LogEntry> entries);
@@ -79,7 +79,7 @@ class Ledger {
     Digest bytes;  // of a committed cut
     friend bool operator==(const Told&, const Told&) = default;
   };
-  void told(RoomSeq place, const Told& what);
+  void told(RoomSeq seq, const Told& what);
   // What an instructor forbids, implemented here independently of the room: of a cut, made or redone by `by`, and of
   // all else that changes bone or scene.
   struct Hands;

@@ -259,7 +259,7 @@ void SimClient::follow(const v1::SessionResponse& response) {
       if (fast_) fast_->know_tool(response.tool().tool_number(), *tool);
     }
   if (response.has_complete()) open_fast_path(response.complete().decided_author_seq());
-  if (fast_ && response.index() != 0) fast_->heard(response.index());
+  if (fast_ && response.index() != 0) fast_->received(response.index());
 }
 
 void SimClient::open_fast_path(std::uint64_t decided) {
@@ -336,40 +336,40 @@ RoomEvents SimClient::events() {
   events.leaf = [this](const FieldLeaf& leaf) { pass(leaf); };
   events.complete = [this](const RoomAtJoin& room) {
     ledger_.told_up_to(room.contained);
-    const std::size_t places = room.decided_places.size();
-    ledger_.check(places == std::min<std::size_t>(room.decided_author_seq, kMostUnderway), Invariant::served,
-                  "a session begins with the sequence numbers of " + std::to_string(places) + " cuts");
-    for (std::uint64_t seq = 1; seq <= room.decided_author_seq; ++seq)
-      if (const std::optional<RoomSeq> place = room.place_of(seq)) ledger_.told_place(*place, room_->author, seq);
+    const std::size_t seqs = room.decided_seqs.size();
+    ledger_.check(seqs == std::min<std::size_t>(room.decided_author_seq, kMostUnderway), Invariant::served,
+                  "a session begins with the sequence numbers of " + std::to_string(seqs) + " cuts");
+    for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own)
+      if (const std::optional<RoomSeq> seq = room.seq_of(own)) ledger_.acknowledged_seq(*seq, room_->author, own);
     pass(room);
   };
-  events.committed = [this](RoomSeq place, const Cut& cut) {
-    ledger_.told_committed(place, cut);
-    pass(Committed{place, cut, by_datagram_});
+  events.committed = [this](RoomSeq seq, const Cut& cut) {
+    ledger_.told_committed(seq, cut);
+    pass(Committed{seq, cut, by_datagram_});
   };
-  events.rejected = [this](RoomSeq place, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string&) {
-    ledger_.told_rejected(place, room_->author, author_seq);
-    pass(Rejected{place, author_seq, lease_epoch});
+  events.rejected = [this](RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string&) {
+    ledger_.told_rejected(seq, room_->author, author_seq);
+    pass(Rejected{seq, author_seq, lease_epoch});
   };
   events.change = [this](BonePart&& part) {
-    ledger_.told_up_to(part.place);
+    ledger_.told_up_to(part.seq);
     pass(std::move(part));
   };
-  events.scene = [this](RoomSeq place, const std::vector<SceneItem>&) {
-    ledger_.told_up_to(place);
-    pass(Noted{place});
+  events.scene = [this](RoomSeq seq, const std::vector<SceneItem>&) {
+    ledger_.told_up_to(seq);
+    pass(Noted{seq});
   };
   events.supervised = [this](const HandSupervised& decided) {
-    if (decided.place) ledger_.told_event(decided.place, EventKind::supervise);
+    if (decided.seq) ledger_.told_event(decided.seq, EventKind::supervise);
     pass(decided);
   };
   events.said = [this](const WordsSaid& said) {
-    ledger_.told_event(said.place, EventKind::words);
-    pass(Noted{said.place});
+    ledger_.told_event(said.seq, EventKind::words);
+    pass(Noted{said.seq});
   };
-  events.noted = [this](RoomSeq place) {
-    ledger_.told_up_to(place);
-    pass(Noted{place});
+  events.noted = [this](RoomSeq seq) {
+    ledger_.told_up_to(seq);
+    pass(Noted{seq});
   };
   return events;
 }
@@ -427,7 +427,7 @@ void SimClient::take(const RoomAtJoin& room) {
 
 void SimClient::take(const Committed& committed) {
   if (committed.cut.author == room_->author) felt_.erase(committed.cut.author_seq);
-  replica_->commit(committed.place, committed.cut, committed.cut.author == room_->author);
+  replica_->commit(committed.seq, committed.cut, committed.cut.author == room_->author);
   const std::optional<Time> age = ledger_.age(committed.cut, time_.now());
   if (age && committed.cut.author != room_->author)
     (committed.by_datagram ? felt_by_datagram_ms_ : felt_by_stream_ms_)
@@ -436,20 +436,20 @@ void SimClient::take(const Committed& committed) {
 
 void SimClient::take(const Rejected& rejected) {
   felt_.erase(rejected.author_seq);
-  replica_->reject(rejected.place, rejected.author_seq);
+  replica_->reject(rejected.seq, rejected.author_seq);
   follow_lease(rejected.lease_epoch);
 }
 
 void SimClient::take(const BonePart& part) {
-  replica_->change(part.place, part.bodies, part.leaves);
+  replica_->change(part.seq, part.bodies, part.leaves);
   follow_lease(part.lease_epoch);
 }
 
 // If restrictions arrive before the leaves, their lease comes with the leaves.
 void SimClient::take(const HandSupervised& decided) {
   held_ = decided.supervision;
-  if (!decided.place) return;
-  replica_->note(decided.place);
+  if (!decided.seq) return;
+  replica_->note(decided.seq);
   follow_lease(decided.lease_epoch);
 }
 

@@ -84,16 +84,16 @@ class SimClient {
 
  private:
   struct Committed {
-    RoomSeq place;
+    RoomSeq seq;
     Cut cut;
     bool by_datagram;
   };
   struct Rejected {
-    RoomSeq place;
+    RoomSeq seq;
     std::uint64_t author_seq, lease_epoch;
   };
   struct Noted {
-    RoomSeq place;
+    RoomSeq seq;
   };
   struct Interrupted {};
   using FromRoom =
@@ -128,7 +128,7 @@ class SimClient {
   void take(const Rejected& rejected);
   void take(const BonePart& part);
   void take(const HandSupervised& decided);
-  void take(const Noted& noted) { replica_->note(noted.place); }
+  void take(const Noted& noted) { replica_->note(noted.seq); }
   void take(const Interrupted&);
   void follow_lease(std::uint64_t epoch);
   void watch();

@@ -232,7 +232,7 @@ bool SimFastPath::send(const Cut& cut) {
 
 void SimFastPath::send(const CuttingState& state) { link_.set_state(state, 0); }
 
-void SimFastPath::heard(std::uint64_t index) { link_.heard(index); }
+void SimFastPath::received(std::uint64_t index) { link_.received(index); }
 
 void SimFastPath::turn() {
   DatagramBuffer buffer;

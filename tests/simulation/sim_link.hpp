@@ -135,7 +135,7 @@ class SimFastPath {
               std::uint64_t first_author_seq, const wire::LinkOptions& options, Time ahead, Hears hears);
   [[nodiscard]] bool send(const Cut& cut);
   void send(const CuttingState& state);
-  void heard(std::uint64_t index);
+  void received(std::uint64_t index);
   void decided(std::uint64_t author_seq) { link_.acknowledge(author_seq); }
   void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
   void move(const Endpoint& to);

@@ -79,25 +79,25 @@ class SimServer::Session final : public SessionSubscriber,
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq place, const Bytes& entry) override { offer(place, entry, {.room_seq = place}); }
-  void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& fast) override {
+  void offer(RoomSeq seq, const Bytes& entry) override { offer(seq, entry, {.room_seq = seq}); }
+  void offer(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
     if (closing_ || done_) return;
-    const auto chance = [&] { return send_queue_.takes(place) && server_.random_.index(8) == 0; };
+    const auto chance = [&] { return send_queue_.takes(seq) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
     if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionEntryKind::supervised &&
         server_.random_.index(2) == 0)
-      return tell(place, noted_entry(place, {}), {.room_seq = place});
+      return tell(seq, noted_entry(seq, {}), {.room_seq = seq});
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
-        held_back_.emplace(HeldBack{place, entry, fast});
+        held_back_.emplace(HeldBack{seq, entry, fast});
         return;
       }
-      tell(place, entry, fast);
-      if (held_back_) tell(held_back_->place, held_back_->entry, held_back_->fast);
+      tell(seq, entry, fast);
+      if (held_back_) tell(held_back_->seq, held_back_->entry, held_back_->fast);
       held_back_.reset();
       return;
     }
-    tell(place, entry, fast);
+    tell(seq, entry, fast);
   }
   void hold(const wire::SessionEntry& supervised) override {
     if (link_) link_->tell(0, supervised);
@@ -180,9 +180,9 @@ class SimServer::Session final : public SessionSubscriber,
   }
   void arrived(std::uint64_t index) override { send_queue_.arrived(index); }
 
-  void tell(RoomSeq place, const Bytes& entry, const wire::SessionEntry& fast) {
+  void tell(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) {
     const std::uint64_t before = send_queue_.index();
-    const bool taken = send_queue_.add(place, entry);
+    const bool taken = send_queue_.add(seq, entry);
     tell_fast(fast, send_queue_.index() > before);
     add(taken);
   }
@@ -239,7 +239,7 @@ class SimServer::Session final : public SessionSubscriber,
   SessionSendQueue send_queue_;
   std::shared_ptr<SimLinks::Link> link_;  // shared with the server's links
   struct HeldBack {
-    RoomSeq place;
+    RoomSeq seq;
     Bytes entry;
     wire::SessionEntry fast;
   };
@@ -326,7 +326,7 @@ std::vector<LogEntry> SimServer::entries() {
     return entries;
   }
   const Result<void> read = opened->read(RoomSeq{1}, [&](const JournalEntry& one) {
-    Result<LogEntry> entry = entry_from_bytes(one.place, std::chrono::nanoseconds(one.at_ns), one.bytes);
+    Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
     ledger_.check(entry.has_value(), Invariant::replay, entry ? "" : entry.error().message);
     if (entry) entries.push_back(std::move(*entry));
     return entry.has_value();
@@ -437,7 +437,7 @@ void SimServer::restart() {
   boot_later();
 }
 
-void SimServer::note_kept() { ledger_.kept_up_to(store_->head().place); }
+void SimServer::note_kept() { ledger_.kept_up_to(store_->head().seq); }
 
 void SimServer::lose_power_at(std::uint64_t nth) {
   if (!runtime_ || power_fails_ || disk_fails_) return;

@@ -287,9 +287,9 @@ class Simulation {
     const BoneStatus status = server_.runtime().bone_status();
     for (const auto& client : clients_) {
       if (!client->here() || !client->settled()) continue;
-      const std::string place = std::to_string(status.room_seq.value);
+      const std::string seq = std::to_string(status.room_seq.value);
       ledger_.check(client->hash() == status.field_hash && client->room_seq() <= status.room_seq, Invariant::one_bone,
-                    "a client holds another bone than the room at " + place + ": " + client->standing());
+                    "a client holds another bone than the room at " + seq + ": " + client->standing());
     }
     const Digest live = server_.live();
     entries_ = server_.entries();

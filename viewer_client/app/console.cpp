@@ -616,7 +616,7 @@ Console::Answer Console::wait(const Words& words) {
   if (!in_time)
     return failure(ErrorCode::unavailable, name_of(person->author) + " has not acknowledged event " +
                                                std::to_string(person->decided.value) + " yet");
-  return at(person->heard);
+  return at(person->acknowledged);
 }
 
 Console::Answer Console::status(const Words& words) {

@@ -62,7 +62,7 @@ Result<PersonSeen> person_of(const v1::Person& sent) {
   }
   person.decided = RoomSeq{sent.decided_room_seq()};
   person.decided_by = AuthorId{sent.decided_by()};
-  person.heard = RoomSeq{sent.acknowledged_room_seq()};
+  person.acknowledged = RoomSeq{sent.acknowledged_room_seq()};
   if (sent.has_look()) {
     const Result<ViewFrustum> look = wire::from_wire(sent.look());
     if (!look) return tl::unexpected(look.error());

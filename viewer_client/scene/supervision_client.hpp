@@ -25,11 +25,11 @@ struct PersonSeen {
   bool here = false, hand = false;
   Restrictions supervision;  // what is in force for the hand
   // sequence numbers: of the newest decision (null: none), and the newest that their client acknowledged
-  RoomSeq decided, heard;
+  RoomSeq decided, acknowledged;
   AuthorId decided_by;              // who decided it; null: unknown
   std::optional<ViewFrustum> look;  // their view, if it is known
   std::uint32_t cuts = 0;           // accepted
-  [[nodiscard]] bool pending() const { return decided && heard < decided; }
+  [[nodiscard]] bool pending() const { return decided && acknowledged < decided; }
 };
 
 struct WordsSeen {

@@ -57,7 +57,7 @@ TEST(CutsUnderway, AreBounded) {
 
 struct Heard {
   std::vector<std::string> events;
-  std::vector<std::uint64_t> decided, partners, places;
+  std::vector<std::uint64_t> decided, partners, seqs;
   int free = 0;  // times that a stream began with nothing decided about this hand
   SessionReader reader{
       AuthorId{7},
@@ -65,44 +65,44 @@ struct Heard {
       {.complete =
            [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
        .committed =
-           [this](RoomSeq place, const Cut& cut) {
-             events.push_back(std::to_string(place.value) + " of " + std::to_string(cut.author.value));
+           [this](RoomSeq seq, const Cut& cut) {
+             events.push_back(std::to_string(seq.value) + " of " + std::to_string(cut.author.value));
            },
        .rejected =
-           [this](RoomSeq place, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
-             events.push_back(std::to_string(place.value) + " rejects " + std::to_string(seq) + " until " +
+           [this](RoomSeq seq, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
+             events.push_back(std::to_string(seq.value) + " rejects " + std::to_string(seq) + " until " +
                               std::to_string(lease) + ": " + why);
            },
-       .scene = [this](RoomSeq place,
-                       const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(place.value)); },
+       .scene = [this](RoomSeq seq,
+                       const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(seq.value)); },
        .supervised =
            [this](const HandSupervised& now) {
-             if (now.place.value == 0 && now.supervision == Restrictions{}) return ++free;
-             events.push_back(std::to_string(now.place.value) + (now.supervision.stopped ? " stops" : " frees") +
+             if (now.seq.value == 0 && now.supervision == Restrictions{}) return ++free;
+             events.push_back(std::to_string(now.seq.value) + (now.supervision.stopped ? " stops" : " frees") +
                               " until " + std::to_string(now.lease_epoch) + now.supervision.words);
              return free;
            },
        .said =
            [this](const WordsSaid& said) {
-             events.push_back(std::to_string(said.place.value) + ": " + std::to_string(said.from.value) + " says " +
+             events.push_back(std::to_string(said.seq.value) + ": " + std::to_string(said.from.value) + " says " +
                               said.words);
            },
        .partner = [this](const CuttingState& state) { partners.push_back(100 * state.author.value + state.state_seq); },
-       .bone = [this](const MountPose& seen) { places.push_back(seen.seen_seq); }},
+       .bone = [this](const MountPose& seen) { seqs.push_back(seen.seen_seq); }},
       [this](std::uint64_t seq) { decided.push_back(seq); },
       [this](std::uint64_t seq) { decided.push_back(seq); }};
 };
 
-v1::SessionResponse row(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
+v1::SessionResponse row(std::uint64_t index, std::uint64_t seq, std::uint64_t author, std::uint64_t author_seq) {
   v1::SessionResponse response;
   response.set_index(index);
-  response.mutable_committed()->set_room_seq(place);
+  response.mutable_committed()->set_room_seq(seq);
   *response.mutable_committed()->mutable_cut() = wire::to_wire(cut_of(author, author_seq));
   return response;
 }
-wire::IndexedRow fast(std::uint64_t index, std::uint64_t place, std::uint64_t author, std::uint64_t author_seq) {
+wire::IndexedRow fast(std::uint64_t index, std::uint64_t seq, std::uint64_t author, std::uint64_t author_seq) {
   return {index,
-          {.room_seq = RoomSeq{place}, .kind = wire::SessionEntryKind::committed, .cut = cut_of(author, author_seq)}};
+          {.room_seq = RoomSeq{seq}, .kind = wire::SessionEntryKind::committed, .cut = cut_of(author, author_seq)}};
 }
 
 TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
@@ -147,21 +147,21 @@ TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
   v1::SessionResponse complete;
   complete.mutable_complete()->set_room_seq(30);
   complete.mutable_complete()->set_decided_author_seq(5);
-  for (const std::uint64_t place : {21u, 0u, 28u}) complete.mutable_complete()->add_decided_room_seqs(place);
+  for (const std::uint64_t seq : {21u, 0u, 28u}) complete.mutable_complete()->add_decided_room_seqs(seq);
   ASSERT_TRUE(reader.take(complete));
   ASSERT_TRUE(told);
-  EXPECT_EQ(told->place_of(5), RoomSeq{28});
-  EXPECT_EQ(told->place_of(4), RoomSeq{}) << "rejected";
-  EXPECT_EQ(told->place_of(3), RoomSeq{21});
-  for (const std::uint64_t seq : {0u, 1u, 2u, 6u}) EXPECT_EQ(told->place_of(seq), std::nullopt) << seq;
+  EXPECT_EQ(told->seq_of(5), RoomSeq{28});
+  EXPECT_EQ(told->seq_of(4), RoomSeq{}) << "rejected";
+  EXPECT_EQ(told->seq_of(3), RoomSeq{21});
+  for (const std::uint64_t seq : {0u, 1u, 2u, 6u}) EXPECT_EQ(told->seq_of(seq), std::nullopt) << seq;
   complete.mutable_complete()->clear_decided_room_seqs();
   ASSERT_TRUE(reader.take(complete));
-  EXPECT_EQ(told->place_of(5), std::nullopt) << "a room of before says nothing";
+  EXPECT_EQ(told->seq_of(5), std::nullopt) << "a room of before says nothing";
 }
 
-wire::IndexedRow word(std::uint64_t index, std::uint64_t place, bool stopped) {
-  wire::IndexedRow row{
-      index, {.room_seq = RoomSeq{place}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = place + 1}};
+wire::IndexedRow word(std::uint64_t index, std::uint64_t seq, bool stopped) {
+  wire::IndexedRow row{index,
+                       {.room_seq = RoomSeq{seq}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = seq + 1}};
   row.row.supervision.stopped = stopped;
   return row;
 }
@@ -192,7 +192,7 @@ TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
   ASSERT_TRUE(heard.reader.take(said));
   EXPECT_EQ(heard.events,
             (std::vector<std::string>{"10 of 7", "11 stops until 12", "12: 4 says look here", "13 frees until 14"}));
-  EXPECT_EQ(heard.reader.place(), RoomSeq{13});
+  EXPECT_EQ(heard.reader.seq(), RoomSeq{13});
 }
 
 // What held when the stream began is said before its leaves are complete; where nothing is said, nothing holds any
@@ -238,15 +238,15 @@ TEST(SessionReader, TakesTheNewestOfAPartnersTool) {
 TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
   Heard heard;
   heard.reader.begin();
-  v1::SessionResponse place;
-  *place.mutable_bone() = wire::to_wire(MountPose{4, {Vec3(1, 2, 3), Vec3::Zero()}, 0, 0, 0});
-  ASSERT_TRUE(heard.reader.take(place));
-  EXPECT_EQ(heard.places, (std::vector<std::uint64_t>{4}));
-  place.mutable_bone()->clear_turn();
-  const Result<void> refused = heard.reader.take(place);
+  v1::SessionResponse seq;
+  *seq.mutable_bone() = wire::to_wire(MountPose{4, {Vec3(1, 2, 3), Vec3::Zero()}, 0, 0, 0});
+  ASSERT_TRUE(heard.reader.take(seq));
+  EXPECT_EQ(heard.seqs, (std::vector<std::uint64_t>{4}));
+  seq.mutable_bone()->clear_turn();
+  const Result<void> refused = heard.reader.take(seq);
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("bone.turn"), std::string::npos) << refused.error().message;
-  EXPECT_EQ(heard.places.size(), 1u);
+  EXPECT_EQ(heard.seqs.size(), 1u);
 }
 
 // A server that was killed may have lost what an earlier one told: of its order, nothing has been heard yet. What was
@@ -256,25 +256,25 @@ TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
   v1::SessionResponse kept;
-  kept.mutable_kept()->set_room_seq(9);
-  kept.mutable_kept()->set_chain(std::string(32, 'c'));
+  kept.mutable_durable()->set_room_seq(9);
+  kept.mutable_durable()->set_chain(std::string(32, 'c'));
   ASSERT_TRUE(heard.reader.take(kept));
-  EXPECT_EQ(heard.reader.place(), RoomSeq{10});
+  EXPECT_EQ(heard.reader.seq(), RoomSeq{10});
   heard.reader.begin();
-  EXPECT_EQ(heard.reader.place(), RoomSeq{0});
+  EXPECT_EQ(heard.reader.seq(), RoomSeq{0});
   EXPECT_EQ(heard.reader.kept().value().room_seq, RoomSeq{9});
   // The scene goes before the leaves, which are not there yet.
   v1::SessionResponse scene, complete;
   scene.mutable_scene()->set_room_seq(8);
   ASSERT_TRUE(heard.reader.take(scene));
-  EXPECT_EQ(heard.reader.place(), RoomSeq{0});
+  EXPECT_EQ(heard.reader.seq(), RoomSeq{0});
   complete.mutable_complete()->set_room_seq(8);
   ASSERT_TRUE(heard.reader.take(complete));
-  EXPECT_EQ(heard.reader.place(), RoomSeq{8});
+  EXPECT_EQ(heard.reader.seq(), RoomSeq{8});
   scene.set_index(1);
   scene.mutable_scene()->set_room_seq(9);
   ASSERT_TRUE(heard.reader.take(scene));
-  EXPECT_EQ(heard.reader.place(), RoomSeq{9});
+  EXPECT_EQ(heard.reader.seq(), RoomSeq{9});
 }
 
 TEST(SessionReader, BeginsAnewWithEachStream) {

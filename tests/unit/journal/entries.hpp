@@ -25,7 +25,7 @@ inline std::vector<JournalEntry> some_entries(std::uint64_t seed, std::size_t co
 
 inline bool equal(const std::vector<JournalEntry>& a, const std::vector<JournalEntry>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const JournalEntry& x, const JournalEntry& y) {
-    return x.place == y.place && x.at_ns == y.at_ns && x.bytes == y.bytes;
+    return x.seq == y.seq && x.at_ns == y.at_ns && x.bytes == y.bytes;
   });
 }
 
@@ -48,7 +48,7 @@ inline void append(Journal& journal, const std::vector<JournalEntry>& entries, s
 // The file of a checkpoint, found by its place.
 inline std::filesystem::path checkpoint_path(const test::MemoryDisk& disk, const JournalHead& at) {
   for (const auto& [name, bytes] : disk.image())
-    if (name.find("-" + std::to_string(at.place.value) + "-") != std::string::npos && name.ends_with(".checkpoint"))
+    if (name.find("-" + std::to_string(at.seq.value) + "-") != std::string::npos && name.ends_with(".checkpoint"))
       return name;
   return {};
 }

@@ -31,7 +31,7 @@ class ErasingTest : public ::testing::Test {
     ASSERT_TRUE(journal->close());
   }
   static std::optional<std::string> every_third(const JournalEntry& entry) {
-    return entry.place.value % 3 == 0 ? std::optional<std::string>("-") : std::nullopt;
+    return entry.seq.value % 3 == 0 ? std::optional<std::string>("-") : std::nullopt;
   }
   void sql(const std::string& what) const {
     sqlite3* database = nullptr;
@@ -68,7 +68,7 @@ TEST_F(ErasingTest, TheChainAndItsSignaturesHold) {
 TEST_F(ErasingTest, NoByteOfWhatWasErasedIsLeft) {
   const std::string word = "Wilhelmina";
   std::vector<JournalEntry> rows = some_rows(2, 2000, 60);
-  for (JournalEntry& row : rows) row.bytes = (row.place.value % 3 == 0 ? word : "Other") + row.bytes;
+  for (JournalEntry& row : rows) row.bytes = (row.seq.value % 3 == 0 ? word : "Other") + row.bytes;
   auto journal = Journal::create(file_, "genesis", {.keys = keys_});
   ASSERT_TRUE(journal) << journal.error().message;
   for (std::size_t i = 0; i < rows.size(); i += 20) append(*journal, rows, i, i + 20);

@@ -44,7 +44,7 @@ TEST(JournalChain, IsTheOneThatIsWrittenDown) {
   EXPECT_EQ(to_hex(one.chain), "a2fb508b017c3da4f05b3ad7c3efa0f09ce3d65466b578c5141cc399c7fcc098");
   const JournalHead two = next_head(one, {RoomSeq{2}, -1, ""});
   EXPECT_EQ(to_hex(two.chain), "7095729f8ccdba13c88177a1c3fd27d6162c0df3c0e06fbd380899036dad1611");
-  EXPECT_EQ(two.place, RoomSeq{2});
+  EXPECT_EQ(two.seq, RoomSeq{2});
 }
 
 TEST_F(JournalTest, GivesBackWhatItWasGivenAfterItsProcessWasKilledAndAfterItWasClosed) {
@@ -100,7 +100,7 @@ TEST_F(JournalTest, TakesNoRowAboveTheLimitAndGoesOn) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
   EXPECT_THAT(refused.error().message, HasSubstr("entry 2 has 101 bytes"));
-  EXPECT_EQ(journal.head().place, RoomSeq{0});
+  EXPECT_EQ(journal.head().seq, RoomSeq{0});
   EXPECT_EQ(journal.closed_because(), nullptr);
   EXPECT_TRUE(journal.append({entries.data(), 1}));
 }
@@ -203,7 +203,7 @@ TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
   }
   const auto report = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(report) << report.error().message;
-  EXPECT_EQ(report->head.place, RoomSeq{5});
+  EXPECT_EQ(report->head.seq, RoomSeq{5});
   EXPECT_EQ(report->lost(), 4u);
   Journal journal = std::move(Journal::open("/room/new", options()).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
@@ -243,7 +243,7 @@ TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
     EXPECT_EQ(failed.error().code, ErrorCode::unavailable);
     EXPECT_THAT(failed.error().message, HasSubstr("cannot sync /room/journal-log: Input/output error"));
     EXPECT_EQ(journal.append({&entries[2], 1}).error().message, failed.error().message);
-    EXPECT_EQ(journal.head().place, RoomSeq{2});
+    EXPECT_EQ(journal.head().seq, RoomSeq{2});
     EXPECT_TRUE(equal(entries_of(journal), {entries.begin(), entries.begin() + 2}));
   }
   {
@@ -254,7 +254,7 @@ TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
   ASSERT_TRUE(salvage_journal(kFile, "/room/new", &disk_));
   Journal journal = std::move(Journal::open("/room/new", options()).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
-  EXPECT_GE(journal.head().place, RoomSeq{2});
+  EXPECT_GE(journal.head().seq, RoomSeq{2});
 }
 
 // Linux shows pages as written whose write has failed; a page that is read again then is as it was, or empty.

@@ -7,9 +7,9 @@
 
 namespace osteon {
 
-inline JournalEntry kill_entry(std::uint64_t place) {
-  std::string bytes(1 + place * 7919 % 1500, static_cast<char>(place));
-  return {RoomSeq{place}, static_cast<std::int64_t>(place * 8'000'000), std::move(bytes)};
+inline JournalEntry kill_entry(std::uint64_t seq) {
+  std::string bytes(1 + seq * 7919 % 1500, static_cast<char>(seq));
+  return {RoomSeq{seq}, static_cast<std::int64_t>(seq * 8'000'000), std::move(bytes)};
 }
 
 }  // namespace osteon

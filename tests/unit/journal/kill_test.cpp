@@ -66,7 +66,7 @@ TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
       ASSERT_LE(entries.size(), told + 4) << "more than the batch that was under way";
       for (std::size_t i = 0; i < entries.size(); ++i) {
         const JournalEntry expected = kill_entry(i + 1);
-        ASSERT_EQ(entries[i].place, expected.place);
+        ASSERT_EQ(entries[i].seq, expected.seq);
         ASSERT_EQ(entries[i].at_ns, expected.at_ns);
         ASSERT_EQ(entries[i].bytes, expected.bytes);
       }
@@ -143,7 +143,7 @@ TEST(JournalKill, DamageAfterItIsHarmlessOrNamed) {
       ASSERT_FALSE(report && report->sound());
     } else {
       ++whole;
-      ASSERT_GE(journal->head().place.value, told);
+      ASSERT_GE(journal->head().seq.value, told);
     }
   }
   std::printf("%d damages: %d harmless, %d named, %d refused, 0 silent\n", kDamages, whole, named, refused);

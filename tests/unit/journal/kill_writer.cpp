@@ -22,17 +22,17 @@ int main(int argc, char** argv) {
                  journal ? journal->closed_because()->message.c_str() : journal.error().message.c_str());
     return 1;
   }
-  std::uint64_t place = journal->head().place.value;
+  std::uint64_t seq = journal->head().seq.value;
   for (;;) {
     random = random * 6364136223846793005u + 1442695040888963407u;
     std::vector<JournalEntry> entries;
-    for (std::uint64_t i = 0; i <= (random >> 33) % 4; ++i) entries.push_back(kill_entry(++place));
+    for (std::uint64_t i = 0; i <= (random >> 33) % 4; ++i) entries.push_back(kill_entry(++seq));
     if (const auto done = journal->append(entries); !done) {
       std::fprintf(stderr, "%s\n", done.error().message.c_str());
       return 1;
     }
     char line[32];
-    const int length = std::snprintf(line, sizeof line, "%llu\n", static_cast<unsigned long long>(place));
+    const int length = std::snprintf(line, sizeof line, "%llu\n", static_cast<unsigned long long>(seq));
     if (::write(STDOUT_FILENO, line, static_cast<std::size_t>(length)) != length) return 1;
     if ((random >> 40) % 8 == 0) {
       auto checkpoint = journal->begin_checkpoint(journal->head(), "");

@@ -118,7 +118,7 @@ TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
               HasSubstr("goes to event 50, but its log vouches for event 60: 10 entries are missing"));
   const auto recovered = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(recovered);
-  EXPECT_EQ(recovered->head.place, RoomSeq{50});
+  EXPECT_EQ(recovered->head.seq, RoomSeq{50});
   EXPECT_EQ(recovered->lost(), 10u);
   Journal journal = std::move(Journal::open("/room/new", options()).value());
   EXPECT_GT(journal.next_server_epoch().value(), 1000u);
@@ -188,7 +188,7 @@ TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
   EXPECT_THAT(expect_closed(20),
               HasSubstr("goes to event 20, but its log vouches for event 60: 40 entries are missing"));
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
-  EXPECT_EQ(Journal::open(kFile, options())->head().place, RoomSeq{20})
+  EXPECT_EQ(Journal::open(kFile, options())->head().seq, RoomSeq{20})
       << "an older copy of all files: only witnesses know more";
 }
 
@@ -328,7 +328,7 @@ TEST_P(EarlierVersion, OpensAsItIs) {
   ASSERT_TRUE(verified) << verified.error().message;
   EXPECT_THAT(verified->faults, IsEmpty());
   EXPECT_EQ(verified->version, GetParam());
-  EXPECT_EQ(verified->head.place, RoomSeq{30});
+  EXPECT_EQ(verified->head.seq, RoomSeq{30});
   EXPECT_EQ(contents_of(folder.path()), before);
   {
     Journal journal = std::move(Journal::open(file).value());

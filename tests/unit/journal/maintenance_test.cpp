@@ -31,11 +31,11 @@ class UpkeepTest : public ::testing::Test {
     ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
     ASSERT_TRUE(journal.set_register("retention_days", "30"));
     ASSERT_TRUE(journal.next_server_epoch());
-    for (const std::size_t place : {10, 25}) {
+    for (const std::size_t seq : {10, 25}) {
       const JournalHead at =
-          plain_head("bone", {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(place)});
+          plain_head("bone", {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(seq)});
       auto file = journal.begin_checkpoint(at, "meta");
-      ASSERT_TRUE(file && file->write("room at " + std::to_string(place)) && file->finish());
+      ASSERT_TRUE(file && file->write("room at " + std::to_string(seq)) && file->finish());
       ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
     }
     if (closed) {
@@ -90,7 +90,7 @@ TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
   EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::invalid_input);
   const auto recovered = salvage_journal(kFile, kTo, &disk_);
   ASSERT_TRUE(recovered) << recovered.error().message;
-  EXPECT_EQ(recovered->head.place, RoomSeq{17});
+  EXPECT_EQ(recovered->head.seq, RoomSeq{17});
   EXPECT_EQ(recovered->lost(), 23u) << "of the 40 that the footer vouches for";
   for (const auto& [name, content] : before) EXPECT_EQ(disk_.image().at(name), content) << name;
   Journal journal = open(kTo);

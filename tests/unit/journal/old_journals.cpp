@@ -51,7 +51,7 @@ void make_old_journal(const std::filesystem::path& file, int version, const std:
   std::vector<JournalEntry> so_far;
   for (const JournalEntry& entry : entries) {
     so_far.push_back(entry);
-    run("INSERT INTO rows VALUES(" + std::to_string(entry.place.value) + ", " +
+    run("INSERT INTO rows VALUES(" + std::to_string(entry.seq.value) + ", " +
         (timed ? std::to_string(entry.at_ns) + ", " : "") + hex(entry.bytes) + ", " +
         hex(test::plain_head("bone", so_far).chain.bytes) + ")");
   }

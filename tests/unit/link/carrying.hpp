@@ -89,7 +89,7 @@ class Peer {
       window_.set_round_trip(fastest_);
       rate_.set_round_trip(fastest_);
     }
-    rate_.heard(newest, received);
+    rate_.acknowledge(newest, received);
     window_.acknowledge(acknowledged, beyond);
     for (std::uint32_t number = 0; !in.bytes.empty(); ++number) {
       auto length = in.get<std::uint8_t>();

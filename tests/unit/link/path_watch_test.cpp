@@ -24,7 +24,7 @@ FillRandom seeded(std::uint64_t seed) {
 // A watch of a peer that has proven kHome.
 PathWatch at_home(const PathRules& rules = {}) {
   PathWatch watch(seeded(1), rules);
-  watch.heard(kHome, true, 100, 0ms);
+  watch.received(kHome, true, 100, 0ms);
   const auto challenge = watch.challenge_due(kChallengeBytes, 0ms);
   EXPECT_TRUE(challenge && challenge->to == kHome);
   EXPECT_TRUE(watch.echoed(kHome, challenge->token, 1ms));
@@ -35,7 +35,7 @@ PathWatch at_home(const PathRules& rules = {}) {
 TEST(PathWatch, BelievesNoAddressBeforeItIsProven) {
   PathWatch watch(seeded(1));
   EXPECT_FALSE(watch.challenge_due(kChallengeBytes, 0ms));
-  watch.heard(kHome, true, 100, 0ms);
+  watch.received(kHome, true, 100, 0ms);
   EXPECT_FALSE(watch.address().is_set());
   const auto challenge = watch.challenge_due(kChallengeBytes, 0ms);
   ASSERT_TRUE(challenge);
@@ -46,7 +46,7 @@ TEST(PathWatch, BelievesNoAddressBeforeItIsProven) {
 
 TEST(PathWatch, MovesWhenTheNewAddressEchoes) {
   PathWatch watch = at_home();
-  watch.heard(kAway, true, 100, 10ms);
+  watch.received(kAway, true, 100, 10ms);
   const auto challenge = watch.challenge_due(kChallengeBytes, 10ms);
   ASSERT_TRUE(challenge);
   EXPECT_EQ(challenge->to, kAway);
@@ -65,7 +65,7 @@ TEST(PathWatch, MovesWhenTheNewAddressEchoes) {
 
 TEST(PathWatch, IsNotMovedByWhatIsNotNewer) {
   PathWatch watch = at_home();
-  watch.heard(kAway, false, 1000, 10ms);
+  watch.received(kAway, false, 1000, 10ms);
   EXPECT_FALSE(watch.challenge_due(kChallengeBytes, 10ms));
   EXPECT_FALSE(watch.echoed(kAway, PathToken{}, 10ms));
   EXPECT_EQ(watch.address(), kHome);
@@ -73,7 +73,7 @@ TEST(PathWatch, IsNotMovedByWhatIsNotNewer) {
 
 TEST(PathWatch, ChallengesThriceAndForgets) {
   PathWatch watch = at_home();
-  watch.heard(kAway, true, 1000, 0ms);
+  watch.received(kAway, true, 1000, 0ms);
   PathToken token{};
   std::vector<Time> sent;
   for (Time now = 0ms; now < 5s; now += 1ms)
@@ -84,7 +84,7 @@ TEST(PathWatch, ChallengesThriceAndForgets) {
   EXPECT_EQ(sent, (std::vector<Time>{0ms, 200ms, 400ms}));
   EXPECT_FALSE(watch.echoed(kAway, token, 5s));
   // It may begin anew, with another token.
-  watch.heard(kAway, true, 100, 6s);
+  watch.received(kAway, true, 100, 6s);
   const auto again = watch.challenge_due(kChallengeBytes, 6s);
   ASSERT_TRUE(again);
   EXPECT_NE(again->token, token);
@@ -94,35 +94,35 @@ TEST(PathWatch, ChallengesThriceAndForgets) {
 
 TEST(PathWatch, HasOneCandidateTheNewest) {
   PathWatch watch = at_home();
-  watch.heard(kAway, true, 100, 10ms);
+  watch.received(kAway, true, 100, 10ms);
   const auto away = watch.challenge_due(kChallengeBytes, 10ms);
-  watch.heard(kFar, true, 100, 11ms);
+  watch.received(kFar, true, 100, 11ms);
   const auto far = watch.challenge_due(kChallengeBytes, 11ms);
   ASSERT_TRUE(away && far);
   EXPECT_EQ(far->to, kFar);
-  watch.heard(kAway, false, 100, 12ms);  // late on its way: changes nothing
+  watch.received(kAway, false, 100, 12ms);  // late on its way: changes nothing
   EXPECT_FALSE(watch.echoed(kAway, away->token, 13ms));
   EXPECT_TRUE(watch.echoed(kFar, far->token, 13ms));
 }
 
 TEST(PathWatch, DropsTheCandidateWhenThePeerIsHeardWhereItWas) {
   PathWatch watch = at_home();
-  watch.heard(kAway, true, 100, 10ms);
+  watch.received(kAway, true, 100, 10ms);
   const auto challenge = watch.challenge_due(kChallengeBytes, 10ms);
   ASSERT_TRUE(challenge);
-  watch.heard(kHome, false, 100, 11ms);  // sent before it moved
-  watch.heard(kHome, true, 100, 12ms);   // sent after: it has come back
+  watch.received(kHome, false, 100, 11ms);  // sent before it moved
+  watch.received(kHome, true, 100, 12ms);   // sent after: it has come back
   EXPECT_FALSE(watch.echoed(kAway, challenge->token, 13ms));
   EXPECT_EQ(watch.address(), kHome);
 }
 
 TEST(PathWatch, WaitsWithAChallengeUntilEnoughHasCome) {
   PathWatch watch = at_home();
-  watch.heard(kAway, true, 30, 10ms);
+  watch.received(kAway, true, 30, 10ms);
   EXPECT_FALSE(watch.challenge_due(91, 10ms));
   EXPECT_TRUE(watch.challenge_due(90, 10ms));
   EXPECT_FALSE(watch.challenge_due(kChallengeBytes, 300ms));
-  watch.heard(kAway, false, 16, 300ms);
+  watch.received(kAway, false, 16, 300ms);
   EXPECT_TRUE(watch.challenge_due(48, 300ms));
 }
 
@@ -147,7 +147,7 @@ TEST(PathWatch, KeepsItsRulesUnderAnyOrderOfEvents) {
       if (random() % 3 > 0) {
         const bool newest = random() % 4 > 0;
         const std::size_t bytes = 29 + random() % 10;
-        watch.heard(from, newest, bytes, now);
+        watch.received(from, newest, bytes, now);
         if (newest && newest_from != from) {
           newest_from = from;
           received[from] = sent[from] = 0;

@@ -112,7 +112,7 @@ TEST(SendRate, RepeatsAsOftenAsTheLossAsksFor) {
       for (std::uint64_t counter = 1; counter <= 4000; ++counter) {
         if (random.unit() < loss) continue;
         ++received;
-        if (random.unit() >= loss) rate.heard(counter, received);
+        if (random.unit() >= loss) rate.acknowledge(counter, received);
       }
       EXPECT_NEAR(rate.loss(), loss, 4.0 * std::sqrt(loss * (1 - loss) / 128.0));
       const double in_flight = std::chrono::duration<double>(round_trip).count() / 0.008;
@@ -128,18 +128,18 @@ TEST(SendRate, RepeatsAsOftenAsTheLossAsksFor) {
     }
   }
   SendRate good;
-  for (std::uint64_t counter = 1; counter <= 4000; ++counter) good.heard(counter, counter);
+  for (std::uint64_t counter = 1; counter <= 4000; ++counter) good.acknowledge(counter, counter);
   EXPECT_NEAR(good.loss(), 0.0, 1e-9);
   EXPECT_LE(good.repeats(), 3);
 }
 
 TEST(SendRate, IgnoresReportsThatGoBack) {
   SendRate rate;
-  rate.heard(1000, 900);
+  rate.acknowledge(1000, 900);
   const double loss = rate.loss();
-  rate.heard(999, 100);
-  rate.heard(1000, 1000);
-  rate.heard(1001, 899);
+  rate.acknowledge(999, 100);
+  rate.acknowledge(1000, 1000);
+  rate.acknowledge(1001, 899);
   EXPECT_EQ(rate.loss(), loss);
   EXPECT_NEAR(loss, 0.1, 1e-6);
 }

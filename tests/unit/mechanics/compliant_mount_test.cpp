@@ -58,7 +58,7 @@ TEST(MountServer, WouldMakeEnergyWithoutTheController) {
   TwoUsersRun run = over_line(50.0, 50.0, 60'000);
   run.hand_stiffness = 3.0;
   run.shaken = true;
-  run.client.allowance_mj = run.client.kept_mj = 1e9;
+  run.client.allowance_mj = run.client.reserve_mj = 1e9;
   const auto result = test::push_each_other(run);
   EXPECT_EQ(result.held_back, 0);
   EXPECT_GT(result.most_created_mj, 1000.0);

@@ -102,7 +102,7 @@ Room begun_like(const Room& room) {
 
 // As a journal keeps it.
 LogEntry through_bytes(const LogEntry& entry) {
-  Result<LogEntry> read = entry_from_bytes(entry.place, entry.at, to_bytes(entry));
+  Result<LogEntry> read = entry_from_bytes(entry.seq, entry.at, to_bytes(entry));
   EXPECT_TRUE(read) << read.error().message;
   return std::move(*read);
 }
@@ -428,7 +428,7 @@ TEST(RoomMark, IsFoundAgainAndUndoneTo) {
   EXPECT_EQ(room.marks()[0].second, "before the deep one");
   const auto undone = room.undo_to(hand, room.marks()[0].first);
   ASSERT_TRUE(undone);
-  EXPECT_EQ(undone->places.size(), 3u);
+  EXPECT_EQ(undone->seqs.size(), 3u);
   EXPECT_EQ(room.field_hash(), then);
   EXPECT_EQ(room.undo_to(hand, room.marks()[0].first).error().code, ErrorCode::unavailable) << "nothing stands since";
   EXPECT_FALSE(room.undo_to(hand, RoomSeq{99}));

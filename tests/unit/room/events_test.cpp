@@ -51,16 +51,16 @@ TEST(RoomUndo, LeavesTheBoneOfTheOtherCuts) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 5, 31);
-  std::vector<RoomSeq> places;
-  for (const Cut& cut : cuts) places.push_back(commit(room, cut));
+  std::vector<RoomSeq> seqs;
+  for (const Cut& cut : cuts) seqs.push_back(commit(room, cut));
   const Digest all = room.field_hash();
   EXPECT_EQ(all, bone_after(cuts));
 
-  const RoomSeq second[] = {places[1]};
+  const RoomSeq second[] = {seqs[1]};
   const auto undone = room.undo(surgeon, second);
   ASSERT_TRUE(undone) << undone.error().message;
   EXPECT_EQ(undone->room_seq.value, 7u) << "after a surgeon who came and five cuts";
-  EXPECT_EQ(undone->places, std::vector<RoomSeq>{places[1]});
+  EXPECT_EQ(undone->seqs, std::vector<RoomSeq>{seqs[1]});
   EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2], cuts[3], cuts[4]}));
   EXPECT_FALSE(room.undo(surgeon, second)) << "it is undone already";
   ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
@@ -110,9 +110,9 @@ TEST(RoomUndo, RefusesWhatCannotBeTakenBackWithoutAPlaceInTheOrder) {
   const RoomSeq cut = commit(room, strokes(surgeon, 1, 35)[0]);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   const RoomSeq undo = room.room_seq(), unknown{77};
-  for (const RoomSeq place : {cut, undo, unknown}) {
-    const RoomSeq places[] = {place};
-    EXPECT_FALSE(room.undo(surgeon, places)) << place.value;
+  for (const RoomSeq seq : {cut, undo, unknown}) {
+    const RoomSeq seqs[] = {seq};
+    EXPECT_FALSE(room.undo(surgeon, seqs)) << seq.value;
   }
   EXPECT_FALSE(room.undo(surgeon, {}));
   EXPECT_FALSE(room.undo_last(surgeon, 0, {}));
@@ -186,7 +186,7 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   const RoomSeq oldest[] = {saw};
   const auto undone = room.undo(surgeon, oldest);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places, (std::vector<RoomSeq>{saw, split->room_seq}));
+  EXPECT_EQ(undone->seqs, (std::vector<RoomSeq>{saw, split->room_seq}));
   EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
   EXPECT_EQ(room.field_hash(), bone_after({cuts[1], across}));
 
@@ -242,8 +242,8 @@ TEST(RoomSplit, DebrisVanishesInTheSameEvent) {
   ASSERT_TRUE(split);
   EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
   EXPECT_GT(room.field().solid_mm({6, 0, -6}), 0.0);
-  const RoomSeq places[] = {split->room_seq};
-  ASSERT_TRUE(room.undo(room.join(MemberKind::watcher), places));
+  const RoomSeq seqs[] = {split->room_seq};
+  ASSERT_TRUE(room.undo(room.join(MemberKind::watcher), seqs));
   EXPECT_LT(room.field().solid_mm({6, 0, -6}), 0.0);
 }
 
@@ -293,7 +293,7 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   const RoomSeq named[] = {first->room_seq};
   const auto undone = room.undo(surgeon, named);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places, (std::vector<RoomSeq>{first->room_seq, second->room_seq}));
+  EXPECT_EQ(undone->seqs, (std::vector<RoomSeq>{first->room_seq, second->room_seq}));
   EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
   EXPECT_EQ(room.field_hash(), bone_after(cuts));
   EXPECT_NEAR(room.field().removed_mm3(), apart_mm3, 0.03 * room.bone().volume_mm3());
@@ -304,7 +304,7 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   const RoomSeq later[] = {second->room_seq};
   const auto one = room.undo(surgeon, later);
   ASSERT_TRUE(one) << one.error().message;
-  EXPECT_EQ(one->places, std::vector<RoomSeq>{second->room_seq});
+  EXPECT_EQ(one->seqs, std::vector<RoomSeq>{second->room_seq});
   EXPECT_EQ(room.bodies().size(), 2u);
 }
 
@@ -319,7 +319,7 @@ TEST(RoomSplit, UndoneItBringsBackTheBodyThatWasTakenAwayFromItsPiece) {
   const RoomSeq parting[] = {split->room_seq};
   const auto undone = room.undo(surgeon, parting);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places, (std::vector<RoomSeq>{split->room_seq, away->room_seq}));
+  EXPECT_EQ(undone->seqs, (std::vector<RoomSeq>{split->room_seq, away->room_seq}));
   EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
   EXPECT_EQ(room.field_hash(), whole);
   ASSERT_TRUE(room.redo_last(surgeon, 1));
@@ -583,8 +583,8 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
         default: {
           Cut& cut = cuts[who][next[who]++];
           cut.lease_epoch = room.lease_epoch(cut.author);
-          const RoomSeq place = commit(room, cut);
-          for (Replica& holder : holders) holder.commit(place, cut, false);
+          const RoomSeq seq = commit(room, cut);
+          for (Replica& holder : holders) holder.commit(seq, cut, false);
         }
       }
       if (event)

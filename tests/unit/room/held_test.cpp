@@ -87,7 +87,7 @@ TEST(CarriedOver, OnlyToTheSamePersonsHand) {
   EXPECT_TRUE(all.cut(all.again(kCy, Role::collaborator)).committed());
   EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed()) << "nobody knows who that is";
   // A hand of the server itself, which shows something, is nobody's that comes back.
-  EXPECT_EQ(all.room.people().supervised(all.room.join(MemberKind::surgeon, kBen, {}, Role::collaborator)).place,
+  EXPECT_EQ(all.room.people().supervised(all.room.join(MemberKind::surgeon, kBen, {}, Role::collaborator)).seq,
             RoomSeq{});
   EXPECT_EQ(all.room.room_seq().value, before.value + 6) << "four joins, two cuts and nothing else";
   // Nor do those whom nobody knows hold each other.
@@ -120,7 +120,7 @@ TEST(CarriedOver, ItsRowsReplay) {
   all.decide(all.ben, {});
   Room replayed(test_block());
   for (const LogEntry& entry : all.room.take_entries()) {
-    const Result<LogEntry> read = entry_from_bytes(entry.place, entry.at, to_bytes(entry));
+    const Result<LogEntry> read = entry_from_bytes(entry.seq, entry.at, to_bytes(entry));
     ASSERT_TRUE(read) << read.error().message;
     ASSERT_TRUE(replayed.replay(*read));
   }
@@ -136,7 +136,7 @@ TEST(CarriedOver, NothingInAReplay) {
   const AuthorId next{replayed.authors() + 1};
   ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next,
                                JoinEntry{next, MemberKind::surgeon, kBen, kSecret, Role::trainee}}));
-  EXPECT_EQ(replayed.people().supervised(next).place, RoomSeq{});
+  EXPECT_EQ(replayed.people().supervised(next).seq, RoomSeq{});
   Cut cut = strokes(next, 1, 5).front();
   ASSERT_TRUE(replayed.replay({RoomSeq{replayed.room_seq().value + 1}, replayed.time(), next, CutEntry{cut}}));
 }
@@ -157,7 +157,7 @@ TEST(Held, TakesNothingBackAndPlacesNothing) {
     const auto placed = all.room.set_item(all.ben, guide());
     ASSERT_TRUE(placed) << placed.error().message;
     all.decide(all.ben, taken ? Restrictions{.taken_by = all.cy} : Restrictions{.stopped = true});
-    const RoomSeq place = all.room.room_seq();
+    const RoomSeq seq = all.room.room_seq();
     const Digest bone = all.room.field_hash();
     const RoomSeq first[] = {RoomSeq{5}};
     for (const AuthorId by : {all.ben, all.viewer}) {
@@ -170,7 +170,7 @@ TEST(Held, TakesNothingBackAndPlacesNothing) {
       EXPECT_EQ(all.refused(all.room.remove_item(by, placed->item)), ErrorCode::denied);
       EXPECT_EQ(all.refused(all.room.remove_body(by, BodyId{0})), ErrorCode::denied);
     }
-    EXPECT_EQ(all.room.room_seq(), place);
+    EXPECT_EQ(all.room.room_seq(), seq);
     EXPECT_EQ(all.room.field_hash(), bone);
     EXPECT_TRUE(all.room.say(all.ben, {}, "why?")) << "to speak is no work on the bone";
     all.decide(all.ben, {});
@@ -231,7 +231,7 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
   for (const AuthorId by : {all.viewer, again}) {
     const auto undone = all.room.undo_last(by, 1, {});
     ASSERT_TRUE(undone) << undone.error().message;
-    EXPECT_EQ(undone->places, std::vector{own}) << "the newest of all is another's";
+    EXPECT_EQ(undone->seqs, std::vector{own}) << "the newest of all is another's";
     ASSERT_TRUE(all.room.redo_last(all.viewer, 1)) << "whoever of them took it back";
     ASSERT_TRUE(all.room.undo(by, named));
     ASSERT_TRUE(all.room.redo_last(all.ben, 1));
@@ -239,7 +239,7 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
   ASSERT_TRUE(all.cut(again).committed());
   const auto older = all.room.undo_last(all.cy, 1, all.ben);
   ASSERT_TRUE(older) << older.error().message;
-  EXPECT_EQ(older->places, std::vector{own}) << "of that author alone";
+  EXPECT_EQ(older->seqs, std::vector{own}) << "of that author alone";
   EXPECT_EQ(all.refused(all.room.redo_last(all.viewer, 1)), ErrorCode::denied) << "another's undo";
   // Whom nobody knows has only their own number.
   const AuthorId nobody = all.again(0, Role::trainee),
@@ -256,9 +256,9 @@ class Placed final : public SessionSubscriber {
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq place, const Bytes&) override { places.push_back(place.value); }
-  void offer(RoomSeq place, const Bytes&, const wire::SessionEntry& fast) override {
-    places.push_back(place.value);
+  void offer(RoomSeq seq, const Bytes&) override { seqs.push_back(seq.value); }
+  void offer(RoomSeq seq, const Bytes&, const wire::SessionEntry& fast) override {
+    seqs.push_back(seq.value);
     if (fast.kind == wire::SessionEntryKind::supervised) told.push_back(fast.supervision);
   }
   void hold(const wire::SessionEntry& supervised) override { held = supervised.supervision; }
@@ -268,7 +268,7 @@ class Placed final : public SessionSubscriber {
   void end(const std::string&) override {}
   std::size_t waiting() const override { return 0; }
 
-  std::vector<std::uint64_t> places;
+  std::vector<std::uint64_t> seqs;
   std::vector<Restrictions> told;
   std::optional<Restrictions> held;
 
@@ -313,9 +313,9 @@ void expect_held(HeldRuntime& lesson) {
   EXPECT_EQ(lesson.session(again)->held, word);
   EXPECT_EQ(lesson.session(lesson.join(MemberKind::surgeon, "Dora", Role::trainee))->held, std::nullopt);
   // Who is there misses no place of the order.
-  ASSERT_FALSE(session->places.empty());
-  EXPECT_EQ(session->places.back(), lesson.runtime.room_seq().value);
-  for (std::size_t i = 1; i < session->places.size(); ++i) EXPECT_EQ(session->places[i], session->places[i - 1] + 1);
+  ASSERT_FALSE(session->seqs.empty());
+  EXPECT_EQ(session->seqs.back(), lesson.runtime.room_seq().value);
+  for (std::size_t i = 1; i < session->seqs.size(); ++i) EXPECT_EQ(session->seqs[i], session->seqs[i - 1] + 1);
   // And the board of people shows it.
   PresenceCursor cursor;
   v1::WatchPeopleResponse news;
@@ -329,7 +329,7 @@ void expect_held(HeldRuntime& lesson) {
   lesson.supervise(ada, again, {});
   ASSERT_EQ(own->told.size(), 1u);
   EXPECT_EQ(own->told.front(), Restrictions{});
-  EXPECT_EQ(session->places.back(), lesson.runtime.room_seq().value);
+  EXPECT_EQ(session->seqs.back(), lesson.runtime.room_seq().value);
 }
 
 TEST(CarriedOver, IsToldByAHostThatKeepsNothing) {

@@ -33,9 +33,9 @@ class FakeSession final : public SessionSubscriber {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void offer(RoomSeq place, const Bytes& entry) override {
+  void offer(RoomSeq seq, const Bytes& entry) override {
     const std::lock_guard lock(mutex_);
-    ASSERT_TRUE(send_queue_.add(place, entry));
+    ASSERT_TRUE(send_queue_.add(seq, entry));
     read();
   }
   void answer(const Bytes&) override {}

@@ -71,10 +71,10 @@ struct KeptCuts {
 inline std::vector<LogEntry> plain_entries(RoomSeq after, std::size_t count, std::size_t bytes = 20) {
   std::vector<LogEntry> entries;
   for (std::size_t i = 1; i <= count; ++i) {
-    const RoomSeq place{after.value + i};
-    std::string label = std::to_string(place.value) + ".";
+    const RoomSeq seq{after.value + i};
+    std::string label = std::to_string(seq.value) + ".";
     entries.push_back(
-        {place, std::chrono::nanoseconds(place.value), AuthorId{1}, MarkEntry{label + std::string(bytes, 'x')}});
+        {seq, std::chrono::nanoseconds(seq.value), AuthorId{1}, MarkEntry{label + std::string(bytes, 'x')}});
   }
   return entries;
 }

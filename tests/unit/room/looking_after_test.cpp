@@ -174,7 +174,7 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   ASSERT_NE(at, std::string::npos);
   disk.flip_bit(file, 8 * at + 1);
   kept.open(file);
-  ASSERT_EQ(kept.store->head().place.value, head.place.value - 1) << "the rest can be looked at";
+  ASSERT_EQ(kept.store->head().seq.value, head.seq.value - 1) << "the rest can be looked at";
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   RoomRuntime& host = (*rooms.find("femur"))->host();
@@ -187,7 +187,7 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   EXPECT_EQ(told.of(""), true);
   ASSERT_EQ(rooms.list().size(), 1u);
   EXPECT_FALSE(rooms.list()[0].open) << "nobody can join it";
-  EXPECT_EQ(rooms.list()[0].room_seq.value, head.place.value - 1);
+  EXPECT_EQ(rooms.list()[0].room_seq.value, head.seq.value - 1);
   const auto joined = host.join(MemberKind::watcher);
   ASSERT_FALSE(joined);
   EXPECT_EQ(joined.error().code, ErrorCode::unavailable);

@@ -64,10 +64,10 @@ class Surgeon {
                             interrupted_ = false;
                             complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies;
                             own_ = std::max(own_, room.decided_author_seq);
-                            for (std::uint64_t seq = 1; seq <= room.decided_author_seq; ++seq) {
-                              const RoomSeq place = room.place_of(seq).value_or(RoomSeq{});
-                              if (!place) continue;
-                              EXPECT_EQ(acknowledged_.emplace(seq, place).first->second, place) << "another before";
+                            for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own) {
+                              const RoomSeq seq = room.seq_of(own).value_or(RoomSeq{});
+                              if (!seq) continue;
+                              EXPECT_EQ(acknowledged_.emplace(own, seq).first->second, seq) << "another before";
                             }
                           });
                         },
@@ -89,9 +89,9 @@ class Surgeon {
                     .change =
                         [this](BonePart&& part) {
                           on([&] {
-                            replica_->change(part.place, part.bodies, part.leaves);
+                            replica_->change(part.seq, part.bodies, part.leaves);
                             if (part.last)
-                              seq_ = part.place, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
+                              seq_ = part.seq, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
                           });
                         },
                     .scene =

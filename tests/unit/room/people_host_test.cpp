@@ -31,14 +31,14 @@ class HeardSession final : public SessionSubscriber {
     complete_ = parsed(complete);
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq place, const Bytes& entry) override {
+  void offer(RoomSeq seq, const Bytes& entry) override {
     const std::lock_guard lock(mutex_);
     take(entry, entries_);
-    places_.push_back(place);
+    seqs_.push_back(seq);
     fast_.push_back({});
   }
-  void offer(RoomSeq place, const Bytes& entry, const wire::SessionEntry& fast) override {
-    offer(place, entry);
+  void offer(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
+    offer(seq, entry);
     const std::lock_guard lock(mutex_);
     fast_.back() = fast;
   }
@@ -65,9 +65,9 @@ class HeardSession final : public SessionSubscriber {
     const std::lock_guard lock(mutex_);
     return fast_;
   }
-  std::vector<RoomSeq> places() const {
+  std::vector<RoomSeq> seqs() const {
     const std::lock_guard lock(mutex_);
-    return places_;
+    return seqs_;
   }
   std::vector<CuttingState> partners() const {
     const std::lock_guard lock(mutex_);
@@ -86,7 +86,7 @@ class HeardSession final : public SessionSubscriber {
   mutable std::mutex mutex_;
   std::vector<v1::SessionResponse> entries_;
   std::vector<wire::SessionEntry> fast_;
-  std::vector<RoomSeq> places_;
+  std::vector<RoomSeq> seqs_;
   std::vector<CuttingState> partners_;
 };
 
@@ -180,8 +180,8 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
     const auto entries = session->entries();
     EXPECT_EQ(entries[entries.size() - 2].said().words(), "all");
     EXPECT_TRUE(entries.back().has_noted()) << "a drawing";
-    const auto places = session->places();
-    for (std::size_t i = 1; i < places.size(); ++i) EXPECT_EQ(places[i].value, places[i - 1].value + 1) << "no gap";
+    const auto seqs = session->seqs();
+    for (std::size_t i = 1; i < seqs.size(); ++i) EXPECT_EQ(seqs[i].value, seqs[i - 1].value + 1) << "no gap";
   }
 }
 
@@ -230,21 +230,21 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   EXPECT_FALSE(ben->has_supervision());
   EXPECT_FALSE(Lesson::person(first, lesson.instructor)->here()) << "joined, and no stream is open";
 
-  const RoomSeq place = lesson.supervise(lesson.trainee, {.stopped = true})->room_seq;
+  const RoomSeq seq = lesson.supervise(lesson.trainee, {.stopped = true})->room_seq;
   v1::WatchPeopleResponse next = lesson.news(cursor, lesson.instructor);
   EXPECT_FALSE(next.complete());
   ASSERT_EQ(next.people_size(), 1) << "nobody else has changed";
-  EXPECT_EQ(next.people(0).decided_room_seq(), place.value);
+  EXPECT_EQ(next.people(0).decided_room_seq(), seq.value);
   EXPECT_EQ(next.people(0).decided_by(), lesson.instructor.value);
-  EXPECT_LT(next.people(0).acknowledged_room_seq(), place.value);
+  EXPECT_LT(next.people(0).acknowledged_room_seq(), seq.value);
   EXPECT_TRUE(next.people(0).supervision().stopped());
   EXPECT_EQ(lesson.runtime.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";
 
-  lesson.runtime.people().heard(lesson.trainee, place);
-  lesson.runtime.people().heard(lesson.trainee, RoomSeq{1});
+  lesson.runtime.people().acknowledged(lesson.trainee, seq);
+  lesson.runtime.people().acknowledged(lesson.trainee, RoomSeq{1});
   next = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(next.people_size(), 1);
-  EXPECT_EQ(next.people(0).acknowledged_room_seq(), place.value) << "what was heard later was said earlier";
+  EXPECT_EQ(next.people(0).acknowledged_room_seq(), seq.value) << "what was heard later was said earlier";
 
   lesson.runtime.leave(*lesson.sessions[lesson.trainee]);
   next = lesson.news(cursor, lesson.instructor);
@@ -389,7 +389,7 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
     return RoomStore::open(folder / "room.journal", test::test_block(), RoomStore::Options{}).value();
   };
   AuthorId trainee;
-  RoomSeq place;
+  RoomSeq seq;
   {
     PersistedRoom kept = open();
     RoomRuntime runtime(std::move(kept.room), {.tick = 1ms, .mesh = 1s, .pieces = 0ns}, {}, Detail::automatic,
@@ -404,7 +404,7 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
           return room.annotate(instructor, {.points = {{1, 2, 3}}, .words = "here"});
         },
         [&](const Result<RoomEvent>& event) { decided.set_value(event.value().room_seq); });
-    place = decided.get_future().get();
+    seq = decided.get_future().get();
     runtime.stop();
     ASSERT_TRUE(kept.store->close());
   }
@@ -420,7 +420,7 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   EXPECT_EQ(ben->role(), v1::ROLE_TRAINEE);
   EXPECT_TRUE(ben->hand() && !ben->here());
   EXPECT_TRUE(ben->supervision().stopped());
-  EXPECT_EQ(ben->decided_room_seq(), place.value - 1);
+  EXPECT_EQ(ben->decided_room_seq(), seq.value - 1);
   ASSERT_EQ(news.annotations_size(), 1);
   EXPECT_EQ(news.annotations(0).words(), "here");
   runtime.stop();

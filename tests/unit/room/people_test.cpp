@@ -58,7 +58,7 @@ TEST(Supervise, AFrozenHandCutsNothingUntilItIsFreed) {
   EXPECT_GT(all.room.lease_epoch(all.trainee), before);
   EXPECT_EQ(frozen->lease_epoch, all.room.lease_epoch(all.trainee));
   EXPECT_EQ(all.room.lease_epoch(all.other), others) << "nobody else's lease";
-  EXPECT_EQ(all.room.people().supervised(all.trainee).place, frozen->room_seq);
+  EXPECT_EQ(all.room.people().supervised(all.trainee).seq, frozen->room_seq);
   EXPECT_EQ(all.room.people().supervised(all.trainee).supervision.words, "look here");
   EXPECT_EQ(all.room.people().supervised(all.trainee).by, all.instructor);
 
@@ -140,12 +140,12 @@ TEST(TakeBack, ATraineeTakesBackOnlyTheirOwn) {
   EXPECT_EQ(all.refused(all.room.undo_to(all.trainee, RoomSeq{own.value - 1})), ErrorCode::denied);
   const auto undone = all.room.undo_last(all.trainee, 1, {});
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places, std::vector{own}) << "the newest of all is another's";
+  EXPECT_EQ(undone->seqs, std::vector{own}) << "the newest of all is another's";
   EXPECT_EQ(all.refused(all.room.redo_last(all.other, 1)), ErrorCode::denied) << "another's undo";
   EXPECT_TRUE(all.room.redo_last(all.trainee, 1));
   const auto any = all.room.undo_last(all.collaborator, 1, {});
   ASSERT_TRUE(any);
-  EXPECT_EQ(any->places, std::vector{others});
+  EXPECT_EQ(any->seqs, std::vector{others});
 }
 
 // However it is asked for, and whatever they have done themselves.
@@ -176,7 +176,7 @@ TEST(TakeBack, ACollaboratorTakesBackAnyonesButNeverAllThatTheOthersDid) {
   // Their own at any count.
   const auto undone = all.room.undo_last(by, 1'000'000, by);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places, std::vector{own});
+  EXPECT_EQ(undone->seqs, std::vector{own});
   ASSERT_TRUE(all.room.redo_last(by, 2)) << "what a collaborator took back, and others'";
   EXPECT_EQ(all.room.field_hash(), bone);
 
@@ -199,7 +199,7 @@ TEST(TakeBack, ACollaboratorTakesBackAllOfTheirOwnAlsoOfAnEarlierJoin) {
   const AuthorId anew = all.room.join(MemberKind::surgeon, 2, {}, Role::collaborator);
   const auto undone = all.room.undo_last(anew, 100, {});
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places.size(), 1u);
+  EXPECT_EQ(undone->seqs.size(), 1u);
   EXPECT_TRUE(all.room.redo_last(anew, 100));
 }
 
@@ -213,12 +213,12 @@ TEST(TakeBack, WhatWasDoneSinceATime) {
   for (int i = 0; i < 4; ++i) later.push_back(all.cut(i % 2 ? all.trainee : all.other).room_seq);
   const auto undone = all.room.undo_since(all.instructor, since);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->places, later);
+  EXPECT_EQ(undone->seqs, later);
   EXPECT_EQ(all.room.field_hash(), then);
   EXPECT_EQ(all.refused(all.room.undo_since(all.instructor, since)), ErrorCode::unavailable);
   const auto all_of_it = all.room.undo_since(all.instructor, 0s);
   ASSERT_TRUE(all_of_it);
-  EXPECT_EQ(all_of_it->places.size(), 3u);
+  EXPECT_EQ(all_of_it->seqs.size(), 3u);
   EXPECT_EQ(all.room.field_hash(), Room(test_block()).field_hash());
   EXPECT_EQ(all.refused(all.room.undo_since(all.instructor, all.room.time() + 1h)), ErrorCode::unavailable);
 }
@@ -292,7 +292,7 @@ TEST(Words, HaveAPlaceAndALength) {
 }
 
 LogEntry through_bytes(const LogEntry& entry) {
-  Result<LogEntry> read = entry_from_bytes(entry.place, entry.at, to_bytes(entry));
+  Result<LogEntry> read = entry_from_bytes(entry.seq, entry.at, to_bytes(entry));
   EXPECT_TRUE(read) << read.error().message;
   return std::move(*read);
 }

@@ -12,10 +12,10 @@ namespace {
 using namespace std::chrono_literals;
 
 Playback of(std::deque<std::chrono::nanoseconds> times, double speed) {
-  std::uint64_t place = 0;
-  return {[times, place]() mutable -> std::optional<LogEntry> {
+  std::uint64_t seq = 0;
+  return {[times, seq]() mutable -> std::optional<LogEntry> {
             if (times.empty()) return {};
-            LogEntry entry{.place = RoomSeq{++place}, .at = times.front(), .author = {}, .what = MarkEntry{"now"}};
+            LogEntry entry{.seq = RoomSeq{++seq}, .at = times.front(), .author = {}, .what = MarkEntry{"now"}};
             times.pop_front();
             return entry;
           },
@@ -33,7 +33,7 @@ TEST(Player, GivesRowsAtTheirTimesOverItsSpeed) {
     EXPECT_FALSE(player.take(at(1.99)));
     const auto second = player.take(at(2.01));
     ASSERT_TRUE(second);
-    EXPECT_EQ(second->place.value, 2u);
+    EXPECT_EQ(second->seq.value, 2u);
     EXPECT_FALSE(player.take(at(5.99)));
     EXPECT_TRUE(player.take(at(6.01)));
     EXPECT_FALSE(player.take(at(1000.0)));

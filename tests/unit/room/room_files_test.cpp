@@ -206,7 +206,7 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   EXPECT_THAT(report->notes, ElementsAre(HasSubstr("text was erased from")));
   kept.open(kFile);
   EXPECT_EQ(kept.room->field_hash(), later);
-  EXPECT_EQ(test::replay_of(test::entries_of(*kept.store, head.place)).field_hash(), bone);
+  EXPECT_EQ(test::replay_of(test::entries_of(*kept.store, head.seq)).field_hash(), bone);
   EXPECT_FALSE(anywhere("Zwetschge"));
 }
 
@@ -288,7 +288,7 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
   KeptCuts live(kFile, &disk_, "femur");
   EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "of entries that are in its file";
   live.cut(2);
-  const RoomSeq newest = live.store->head().place;
+  const RoomSeq newest = live.store->head().seq;
   ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
   EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists)
       << "nobody but the store can know";
@@ -333,8 +333,8 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   {
     KeptCuts kept(kFile, &disk_, "femur");
     kept.keep();
-    ASSERT_TRUE(kept.store->write(test::plain_entries(kept.store->head().place, 40)));
-    last = kept.store->head().place;
+    ASSERT_TRUE(kept.store->write(test::plain_entries(kept.store->head().seq, 40)));
+    last = kept.store->head().seq;
     ASSERT_TRUE(kept.store->close());
   }
   const std::size_t at = disk_.image().at(kFile).find("30." + std::string(20, 'x'));
@@ -349,7 +349,7 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   EXPECT_FALSE(disk_.size("/rooms/b").value());
   const auto confirmed = branch_journal(kFile, "/rooms/b", RoomSeq{29}, "b", {}, &disk_);
   ASSERT_TRUE(confirmed) << confirmed.error().message;
-  EXPECT_EQ(confirmed->place, RoomSeq{29});
+  EXPECT_EQ(confirmed->seq, RoomSeq{29});
 }
 
 // Not closed, so that its last entries are only in its log; the power fails at every write and sync of the deletion in
@@ -361,7 +361,7 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
     kept.cut(4);
     kept.checkpoint();
     kept.cut(4);
-    head = kept.store->head().place;
+    head = kept.store->head().seq;
     ASSERT_TRUE(kept.store->branch("/rooms/b", {}, "b"));
   }
   const MemoryDisk::Image before = disk_.image();
@@ -378,7 +378,7 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
       Result<Journal> left = Journal::open(file, {.disk = &disk_});
       if (left) {
         ++whole;
-        EXPECT_EQ(left->head().place, head) << file << " after " << cases;
+        EXPECT_EQ(left->head().seq, head) << file << " after " << cases;
         EXPECT_EQ(left->closed_because(), nullptr);
       } else {
         ++none;

@@ -61,19 +61,19 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
     ASSERT_FALSE(result);
     errors.push_back(result.error());
   };
-  note(store.write(plain_entries(head.place, 1)));
+  note(store.write(plain_entries(head.seq, 1)));
   note(store.person("Anna"));
   note(store.people());
   note(store.forget(1));
   note(store.forget_old());
   note(store.check_witness(store.witness()));
   note(store.has_head(head));
-  note(store.read(RoomSeq{1}, head.place, [](const LogEntry&) { return true; }));
+  note(store.read(RoomSeq{1}, head.seq, [](const LogEntry&) { return true; }));
   note(store.export_person(1, [](const std::string&) { return true; }));
   note(store.verify(test_block(), std::nullopt));
   note(store.backup(kTo));
   note(store.branch(kTo, {}, "branch"));
-  note(store.checkpoint(head.place, kept.room->all_leaves()));
+  note(store.checkpoint(head.seq, kept.room->all_leaves()));
   note(store.close());
   for (const Error& error : errors) {
     EXPECT_EQ(error.code, ErrorCode::unavailable) << error.message;
@@ -92,7 +92,7 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   const MemoryDisk::Image image = disk_.image();
   kept.cut(3);
   const Witness late = kept.store->witness();
-  ASSERT_GT(late.head.place, early.head.place);
+  ASSERT_GT(late.head.seq, early.head.seq);
   EXPECT_TRUE(kept.store->check_witness(early));
   EXPECT_TRUE(kept.store->check_witness({early.head, {}})) << "what it has needs no seal";
   Witness other = early;
@@ -104,7 +104,7 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   disk_.load(image);
   kept.open(kFile);
   Witness far = late;
-  far.head.place = RoomSeq{1'000'000};
+  far.head.seq = RoomSeq{1'000'000};
   for (const Witness& lie : {Witness{late.head, {}}, Witness{late.head, early.seal}, far}) {
     const Result<void> told = kept.store->check_witness(lie);
     ASSERT_FALSE(told);
@@ -117,28 +117,27 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   kept.open(kFile);
   const Result<void> lost = kept.store->check_witness(late);
   EXPECT_EQ(lost.error().code, ErrorCode::unavailable);
-  const std::uint64_t told = late.head.place.value, less = told - early.head.place.value;
+  const std::uint64_t told = late.head.seq.value, less = told - early.head.seq.value;
   EXPECT_THAT(lost.error().message,
               HasSubstr("the room femur has lost " + std::to_string(less) + " of the " + std::to_string(told) +
                         " events that were acknowledged to you, and takes no more cuts"));
   EXPECT_EQ(kept.store->check_witness(late).error().message, lost.error().message) << "so does the next";
-  EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 1))) << "entries were lost: it takes no more";
+  EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().seq, 1))) << "entries were lost: it takes no more";
   kept.store.reset();
   kept.open(kFile);
-  EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 1))) << "nor when it is opened again";
+  EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().seq, 1))) << "nor when it is opened again";
 }
 
 // Whatever has become of the journal: the sentence names it, and what is lost.
 TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(2);
-  const RoomSeq copied = kept.store->head().place;
+  const RoomSeq copied = kept.store->head().seq;
   const MemoryDisk::Image image = disk_.image();
   kept.cut(3);
   const Witness late = kept.store->witness();
-  const std::string of_all =
-      " of the " + std::to_string(late.head.place.value) + " events that were acknowledged to you";
-  const std::string lost = "the room femur has lost " + std::to_string(late.head.place.value - copied.value) + of_all;
+  const std::string of_all = " of the " + std::to_string(late.head.seq.value) + " events that were acknowledged to you";
+  const std::string lost = "the room femur has lost " + std::to_string(late.head.seq.value - copied.value) + of_all;
   const auto told = [&](const fs::path& file, MemoryDisk& disk) {
     KeptCuts room(file, &disk, "femur", 2);  // with other cuts
     const auto say = [&] {
@@ -198,28 +197,28 @@ TEST_F(KeeperTest, IsReadWhileItIsWritten) {
   int written = 0;
   const Result<void> read = kept.store->read(RoomSeq{1}, RoomSeq{1'000'000}, [&](const LogEntry& entry) {
     EXPECT_TRUE(replayed.replay(entry));
-    if (entry.place.value % 20 == 0 && ++written) kept.cut(1);
+    if (entry.seq.value % 20 == 0 && ++written) kept.cut(1);
     return true;
   });
   ASSERT_TRUE(read) << read.error().message;
-  EXPECT_EQ(replayed.room_seq(), bone.place) << "the head as it was when the reading began";
+  EXPECT_EQ(replayed.room_seq(), bone.seq) << "the head as it was when the reading began";
   EXPECT_EQ(replayed.room_hash(), hash);
   EXPECT_GT(written, 30);
-  EXPECT_GT(kept.store->head().place, bone.place);
+  EXPECT_GT(kept.store->head().seq, bone.seq);
 
-  std::vector<std::uint64_t> places;
+  std::vector<std::uint64_t> seqs;
   const auto note = [&](const LogEntry& entry) {
-    places.push_back(entry.place.value);
-    return places.size() < 4;
+    seqs.push_back(entry.seq.value);
+    return seqs.size() < 4;
   };
   ASSERT_TRUE(kept.store->read(RoomSeq{257}, RoomSeq{259}, note));
-  EXPECT_THAT(places, ::testing::ElementsAre(257, 258, 259));
-  places.clear();
+  EXPECT_THAT(seqs, ::testing::ElementsAre(257, 258, 259));
+  seqs.clear();
   ASSERT_TRUE(kept.store->read(RoomSeq{}, RoomSeq{600}, note));
-  EXPECT_THAT(places, ::testing::ElementsAre(1, 2, 3, 4)) << "until it was told to stop";
-  places.clear();
+  EXPECT_THAT(seqs, ::testing::ElementsAre(1, 2, 3, 4)) << "until it was told to stop";
+  seqs.clear();
   ASSERT_TRUE(kept.store->read(RoomSeq{10'000}, RoomSeq{20'000}, note));
-  EXPECT_THAT(places, IsEmpty());
+  EXPECT_THAT(seqs, IsEmpty());
 }
 
 TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
@@ -240,15 +239,15 @@ TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
   EXPECT_EQ(report->head, head);
   EXPECT_EQ(report->first_bad, std::nullopt);
   EXPECT_EQ(report->checkpoints, 2u);
-  EXPECT_EQ(report->replayed.place, live.place);
+  EXPECT_EQ(report->replayed.seq, live.seq);
   EXPECT_EQ(report->replayed.field_hash, live.field_hash);
   EXPECT_GT(written, 1);
-  EXPECT_GT(kept.store->head().place, head.place);
+  EXPECT_GT(kept.store->head().seq, head.seq);
 
   const Result<RoomReport> entries_only = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(entries_only);
   EXPECT_TRUE(entries_only->sound());
-  EXPECT_EQ(entries_only->replayed.place, RoomSeq{});
+  EXPECT_EQ(entries_only->replayed.seq, RoomSeq{});
   EXPECT_EQ(entries_only->head, kept.store->head());
 
   BoneAt other = live;
@@ -258,7 +257,7 @@ TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
   ASSERT_THAT(wrong->faults, SizeIs(1));
   EXPECT_THAT(wrong->faults[0], HasSubstr("make another bone"));
 
-  const RoomSeq later{kept.store->head().place.value + 1};
+  const RoomSeq later{kept.store->head().seq.value + 1};
   EXPECT_EQ(kept.store->verify(test_block(), BoneAt{later, {}}).error().code, ErrorCode::unavailable);
   const Case another = test::plain_block(24.0, 12.0, test::kBlockPitch_mm, 1.2);
   EXPECT_EQ(kept.store->verify(another, live).error().code, ErrorCode::unsupported);
@@ -320,7 +319,7 @@ TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
 TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
-  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().place, 600, 20'000)));
+  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().seq, 600, 20'000)));
   const JournalHead head = kept.store->head();
   const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find("100." + std::string(50, 'x'));
@@ -329,11 +328,11 @@ TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   const Result<RoomReport> report = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{100});
-  EXPECT_EQ(report->head.place, RoomSeq{99});
+  EXPECT_EQ(report->head.seq, RoomSeq{99});
   ASSERT_FALSE(report->sound());
   EXPECT_THAT(report->faults[0], HasSubstr("entry 100 does not fit the chain of hashes"));
   std::size_t seen = 0;
-  const Result<void> read = kept.store->read(RoomSeq{1}, head.place, [&](const LogEntry&) { return ++seen > 0; });
+  const Result<void> read = kept.store->read(RoomSeq{1}, head.seq, [&](const LogEntry&) { return ++seen > 0; });
   EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
   EXPECT_EQ(seen, 99u);
   EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::invalid_input);
@@ -346,7 +345,7 @@ TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
 TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(3);
-  const RoomSeq before = kept.store->head().place;
+  const RoomSeq before = kept.store->head().seq;
   ASSERT_TRUE(kept.store->write(plain_entries(before, 20)));
   ASSERT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
   const std::string entry = std::to_string(before.value + 7) + "." + std::string(20, 'x');
@@ -365,17 +364,17 @@ TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   const auto file_bytes = [&] { return disk_.size(kFile).value().value(); };
   ASSERT_TRUE(kept.store->tidy_if_idle());
   const std::uint64_t before = file_bytes();
-  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().place, 20, 20'000)));
+  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().seq, 20, 20'000)));
   ASSERT_TRUE(kept.store->tidy_if_idle());
   EXPECT_EQ(file_bytes(), before) << "entries have come since it was asked";
   ASSERT_TRUE(kept.store->tidy_if_idle());
   EXPECT_GT(file_bytes(), before + 20u * 20'000);
-  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().place, 3)));
+  ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().seq, 3)));
   EXPECT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
 
   // One that takes no entries is left alone, and nobody is told of that every few seconds.
   disk_.fail_write_at(1, EIO);
-  ASSERT_FALSE(kept.store->write(plain_entries(kept.store->head().place, 200, 20'000)));
+  ASSERT_FALSE(kept.store->write(plain_entries(kept.store->head().seq, 200, 20'000)));
   const MemoryDisk::Image failed = disk_.image();
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(kept.store->tidy_if_idle());
   EXPECT_EQ(disk_.image(), failed);
@@ -388,11 +387,11 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   KeptCuts kept(folder.path() / "room", nullptr, "room");
   kept.keep();
   RoomStore& store = *kept.store;
-  ASSERT_TRUE(store.write(plain_entries(store.head().place, 20'000)));
+  ASSERT_TRUE(store.write(plain_entries(store.head().seq, 20'000)));
   std::atomic<bool> end = false;
   std::atomic<std::uint64_t> written = 0;
   std::thread writer([&] {
-    for (RoomSeq at = store.head().place; !end; ++at.value, ++written) ASSERT_TRUE(store.write(plain_entries(at, 1)));
+    for (RoomSeq at = store.head().seq; !end; ++at.value, ++written) ASSERT_TRUE(store.write(plain_entries(at, 1)));
   });
   const auto wait_for_a_entry = [&](double) {
     for (const std::uint64_t before = written; written == before;) std::this_thread::yield();
@@ -408,18 +407,18 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
     if (copied) {
       const Result<JournalHead> made = store.backup(folder.path() / "copy", calls);
       ASSERT_TRUE(made) << made.error().message;
-      EXPECT_GE(made->place, head.place);
+      EXPECT_GE(made->seq, head.seq);
       EXPECT_TRUE(*store.has_head(*made));
       EXPECT_GE(waits, 20'000 / 256);
     } else {
       const Result<RoomReport> report = store.verify(test_block(), std::nullopt, calls);
       ASSERT_TRUE(report) << report.error().message;
       EXPECT_TRUE(report->sound()) << report->faults[0];
-      EXPECT_GE(report->head.place, head.place);
+      EXPECT_GE(report->head.seq, head.seq);
     }
     EXPECT_GE(written - before, static_cast<std::uint64_t>(waits / 20));
     std::printf("%s of %llu entries: %llu entries written meanwhile, %d waited for\n", copied ? "a copy" : "a check",
-                static_cast<unsigned long long>(head.place.value), static_cast<unsigned long long>(written - before),
+                static_cast<unsigned long long>(head.seq.value), static_cast<unsigned long long>(written - before),
                 waits / 20);
   }
   // Without any waiting: how often is the scheduler's to say.
@@ -448,7 +447,7 @@ TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(*made, head);
   EXPECT_GT(written, 2);
-  EXPECT_GT(kept.store->head().place, head.place);
+  EXPECT_GT(kept.store->head().seq, head.seq);
   const Result<VerifyReport> copy = verify_journal(kTo, &disk_);
   ASSERT_TRUE(copy);
   EXPECT_TRUE(copy->sound());
@@ -457,7 +456,7 @@ TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
     const Result<PersistedRoom> again = RoomStore::open(kTo, test_block(), kept.options);
     ASSERT_TRUE(again) << again.error().message;
     EXPECT_EQ(again->room.room_hash(), hash);
-    EXPECT_EQ(again->store->evaluated(), head.place.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied, too";
+    EXPECT_EQ(again->store->evaluated(), head.seq.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied, too";
     EXPECT_THAT(again->store->people().value(), SizeIs(1));
   }
   EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::exists);
@@ -515,19 +514,19 @@ TEST_F(KeeperTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
 TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(40);
-  const RoomSeq place = kept.room->room_seq();
+  const RoomSeq seq = kept.room->room_seq();
   const std::vector<FieldLeaf> leaves = kept.room->all_leaves();
   EXPECT_EQ(kept.store->changes_since_checkpoint(), 48u) << "40 cuts, 8 undos";
   kept.cut(10);
   int written = 0;
-  const Result<void> done = kept.store->checkpoint(place, leaves, writing(kept, written));
+  const Result<void> done = kept.store->checkpoint(seq, leaves, writing(kept, written));
   ASSERT_TRUE(done) << done.error().message;
   EXPECT_GT(written, 0);
   EXPECT_EQ(kept.store->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
   const std::size_t files = files_of(kFile);
-  ASSERT_TRUE(kept.store->checkpoint(place, leaves)) << "there is one";
+  ASSERT_TRUE(kept.store->checkpoint(seq, leaves)) << "there is one";
   ASSERT_TRUE(kept.store->checkpoint(RoomSeq{5}, leaves)) << "there is a newer one";
-  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{kept.store->head().place.value + 1}, leaves)) << "not kept yet";
+  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{kept.store->head().seq.value + 1}, leaves)) << "not kept yet";
   EXPECT_EQ(files_of(kFile), files);
   EXPECT_EQ(
       kept.store->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
@@ -535,11 +534,11 @@ TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
   EXPECT_EQ(files_of(kFile), files);
 
   const Digest hash = kept.room->room_hash();
-  const RoomSeq head = kept.store->head().place;
+  const RoomSeq head = kept.store->head().seq;
   ASSERT_TRUE(kept.store->verify(test_block(), kept.bone())->sound());
   kept.store.reset();  // as if it had been killed
   kept.open(kFile);
-  EXPECT_EQ(kept.store->evaluated(), head.value - place.value);
+  EXPECT_EQ(kept.store->evaluated(), head.value - seq.value);
   EXPECT_EQ(kept.store->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
   EXPECT_EQ(kept.room->room_hash(), hash);
 }
@@ -618,26 +617,26 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
   kept.cut(200);
   kept.checkpoint();
   kept.cut(10);
-  const RoomSeq place{1 + 440 + 5};
-  const std::vector<LogEntry> before = entries_of(*kept.store, place);
+  const RoomSeq seq{1 + 440 + 5};
+  const std::vector<LogEntry> before = entries_of(*kept.store, seq);
   const Room expected = replay_of(before);
   int written = 0;
-  const Result<JournalHead> live = kept.store->branch("/else/live", place, "second try", writing(kept, written));
+  const Result<JournalHead> live = kept.store->branch("/else/live", seq, "second try", writing(kept, written));
   ASSERT_TRUE(live) << live.error().message;
   EXPECT_GT(written, 1);
   const Result<RoomGenesis> peeked = peek_genesis("/else/live", &disk_);
   ASSERT_TRUE(peeked);
   EXPECT_EQ(peeked->room, "second try");
   EXPECT_EQ(peeked->parent, "femur");
-  EXPECT_EQ(peeked->parent_room_seq, place);
-  EXPECT_TRUE(kept.store->has_head({place, peeked->parent_chain}).value());
-  EXPECT_EQ(kept.store->branch("/else/live", place, "second try").error().code, ErrorCode::exists);
-  const RoomSeq beyond{kept.store->head().place.value + 1};
+  EXPECT_EQ(peeked->parent_room_seq, seq);
+  EXPECT_TRUE(kept.store->has_head({seq, peeked->parent_chain}).value());
+  EXPECT_EQ(kept.store->branch("/else/live", seq, "second try").error().code, ErrorCode::exists);
+  const RoomSeq beyond{kept.store->head().seq.value + 1};
   EXPECT_EQ(kept.store->branch("/else/beyond", beyond, "b").error().code, ErrorCode::invalid_input);
-  EXPECT_EQ(branch_journal(kFile, "/else/file", place, "b", {}, &disk_).error().code, ErrorCode::exists) << "in use";
+  EXPECT_EQ(branch_journal(kFile, "/else/file", seq, "b", {}, &disk_).error().code, ErrorCode::exists) << "in use";
 
   ASSERT_TRUE(kept.store->close());
-  const Result<JournalHead> from_file = branch_journal(kFile, "/else/file", place, "second try", {}, &disk_);
+  const Result<JournalHead> from_file = branch_journal(kFile, "/else/file", seq, "second try", {}, &disk_);
   ASSERT_TRUE(from_file) << from_file.error().message;
   EXPECT_EQ(*from_file, *live) << "the same, by the other road";
   EXPECT_TRUE(verify_journal(kFile, &disk_)->closed_cleanly);
@@ -656,7 +655,7 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
   }
   const Result<JournalHead> whole = branch_journal(kFile, "/else/whole", {}, "all", {}, &disk_);
   ASSERT_TRUE(whole);
-  EXPECT_EQ(whole->place, kept.store->head().place);
+  EXPECT_EQ(whole->seq, kept.store->head().seq);
   int asked = 0;
   const std::size_t files = files_of("/");
   EXPECT_EQ(branch_journal(kFile, "/else/no", {}, "no", {{}, [&] { return ++asked > 1; }}, &disk_).error().code,

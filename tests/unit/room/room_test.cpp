@@ -31,10 +31,10 @@ TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
   EXPECT_FALSE(room.knows(AuthorId{}));
 
   const auto of_a = strokes(a, 3, 1), of_b = strokes(b, 3, 2);
-  std::uint64_t place = 3;  // those who came have each a place too
+  std::uint64_t seq = 3;  // those who came have each a place too
   for (int i = 0; i < 3; ++i) {
-    EXPECT_EQ(commit(room, of_b[static_cast<std::size_t>(i)]).room_seq.value, ++place);
-    EXPECT_EQ(commit(room, of_a[static_cast<std::size_t>(i)]).room_seq.value, ++place);
+    EXPECT_EQ(commit(room, of_b[static_cast<std::size_t>(i)]).room_seq.value, ++seq);
+    EXPECT_EQ(commit(room, of_a[static_cast<std::size_t>(i)]).room_seq.value, ++seq);
   }
   EXPECT_EQ(room.room_seq().value, 9u);
 }
@@ -77,9 +77,9 @@ TEST(Room, AnswersACutSentAgainWithItsFirstOutcome) {
   EXPECT_EQ(room.field_hash(), hash);
   EXPECT_EQ(room.counts().repeated, 2u);
   // As whoever comes back is told them.
-  EXPECT_EQ(room.decided_places(cuts[0].author, 8), (std::vector<RoomSeq>{first, RoomSeq{}, RoomSeq{4}}));
-  EXPECT_EQ(room.decided_places(cuts[0].author, 2), (std::vector<RoomSeq>{RoomSeq{}, RoomSeq{4}})) << "the newest";
-  EXPECT_TRUE(room.decided_places(AuthorId{9}, 8).empty());
+  EXPECT_EQ(room.decided_seqs(cuts[0].author, 8), (std::vector<RoomSeq>{first, RoomSeq{}, RoomSeq{4}}));
+  EXPECT_EQ(room.decided_seqs(cuts[0].author, 2), (std::vector<RoomSeq>{RoomSeq{}, RoomSeq{4}})) << "the newest";
+  EXPECT_TRUE(room.decided_seqs(AuthorId{9}, 8).empty());
 }
 
 TEST(Room, RefusesWhatBreaksTheOrderOfAnAuthor) {

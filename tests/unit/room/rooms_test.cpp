@@ -361,7 +361,7 @@ TEST_F(RoomsTest, AJournalIsCheckedAndCopiedWhileItsRoomIsCut) {
   const auto report = verify_journal(dir_ / "rooms" / copied->file);
   ASSERT_TRUE(report.has_value()) << report.error().message;
   EXPECT_TRUE(report->sound());
-  EXPECT_EQ(report->head.place, copied->room_seq);
+  EXPECT_EQ(report->head.seq, copied->room_seq);
   EXPECT_GE(copied->room_seq, checked->room_seq);
   EXPECT_FALSE(client_->back_up("anna", "../anna.backup").has_value());
   EXPECT_FALSE(client_->back_up("anna", "anna.journal").has_value());

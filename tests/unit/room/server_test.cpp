@@ -100,7 +100,7 @@ TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn)
 TEST_F(RoomServerTest, ACutOfAnEarlierSessionIsAnsweredAgainWithItsFirstOutcome) {
   const wire::JoinedRoom room = join(address(), wire::ClientKind::haptic);
   const auto stub = v1::CuttingService::NewStub(room.channel);
-  std::vector<RoomSeq> places;
+  std::vector<RoomSeq> seqs;
   for (int session = 0; session < 2; ++session) {
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kPatience);
@@ -118,11 +118,11 @@ TEST_F(RoomServerTest, ACutOfAnEarlierSessionIsAnsweredAgainWithItsFirstOutcome)
     while (stream->Read(&response) && response.message_case() != v1::SessionResponse::kCommitted)
       ;
     ASSERT_EQ(response.message_case(), v1::SessionResponse::kCommitted) << "session " << session;
-    places.push_back(RoomSeq{response.committed().room_seq()});
+    seqs.push_back(RoomSeq{response.committed().room_seq()});
     context.TryCancel();
     (void)stream->Finish();
   }
-  EXPECT_EQ(places[0], places[1]);
+  EXPECT_EQ(seqs[0], seqs[1]);
 }
 
 TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {

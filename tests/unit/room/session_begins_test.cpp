@@ -37,8 +37,8 @@ class Told final : public SessionSubscriber {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void offer(RoomSeq place, const Bytes& entry) override {
-    ASSERT_TRUE(send_queue_.add(place, entry));
+  void offer(RoomSeq seq, const Bytes& entry) override {
+    ASSERT_TRUE(send_queue_.add(seq, entry));
     read();
   }
   void answer(const Bytes& entry) override {
@@ -132,24 +132,24 @@ std::size_t count(const Told& subscriber, v1::SessionResponse::MessageCase kind)
 
 // The newest place that it was told that the room stands at.
 std::uint64_t furthest(const Told& subscriber) {
-  std::uint64_t place = 0;
+  std::uint64_t seq = 0;
   for (const v1::SessionResponse& one : subscriber.told)
-    place = std::max({place, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(),
-                      one.supervised().room_seq()});
-  return place;
+    seq = std::max({seq, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(),
+                    one.supervised().room_seq()});
+  return seq;
 }
 
 TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
-  const RoomSeq kept = store->head().place;
+  const RoomSeq kept = store->head().seq;
   change_all();
   ASSERT_EQ(host->room_seq().value, kept.value + 3) << "all of it is decided";
-  ASSERT_EQ(store->head().place, kept) << "and none of it kept";
+  ASSERT_EQ(store->head().seq, kept) << "and none of it kept";
   const auto hand = session();
   tick(false);
   tick(false);
   EXPECT_TRUE(hand->told.empty()) << hand->told.front().ShortDebugString();
   tick(true);
-  ASSERT_EQ(store->head().place.value, kept.value + 3);
+  ASSERT_EQ(store->head().seq.value, kept.value + 3);
   EXPECT_GT(count(*hand, v1::SessionResponse::kTool), 0u);
   EXPECT_GT(count(*hand, v1::SessionResponse::kLeaf), 0u);
   ASSERT_EQ(count(*hand, v1::SessionResponse::kScene), 1u);

@@ -29,7 +29,7 @@ TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
   std::vector<std::thread> people;
   for (int i = 0; i < 2; ++i)
     people.emplace_back([&, i] {
-      for (std::uint64_t place = 20; place < 380; place += 20) EXPECT_TRUE(readers[i]->read_to(RoomSeq{place}));
+      for (std::uint64_t seq = 20; seq < 380; seq += 20) EXPECT_TRUE(readers[i]->read_to(RoomSeq{seq}));
     });
   // One whose stream ends now and then, in the middle of a surface or behind it.
   people.emplace_back([&] {

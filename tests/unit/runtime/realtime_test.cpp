@@ -26,7 +26,7 @@ MachineFacts good_machine() {
   facts.governors = {"performance", "performance"};
   facts.preemption = "rt";
   facts.rt_runtime_us = 950'000;
-  facts.rt_runtime_told = true;
+  facts.rt_runtime_known = true;
   facts.timer_resolution_ns = 1;
   facts.clock_source = "tsc";
   return facts;
@@ -88,7 +88,7 @@ TEST(Machine, WhatIsNotToldIsNoLack) {
   facts.rt_runtime_us = -1;
   facts.governors.clear();
   facts.clock_source.clear();
-  facts.rt_runtime_told = true;
+  facts.rt_runtime_known = true;
   EXPECT_EQ(complaints(facts), "");
 }
 

@@ -285,7 +285,7 @@ TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   EXPECT_NE(say("people").find(" pending decided by #1"), std::string::npos) << say("people");
   EXPECT_EQ(say("wait acknowledged Ben 2"), "error #2 \"Ben\" has not acknowledged event 9 yet");
   EXPECT_EQ(desk.patience_, 2s);
-  desk.people_[1].heard = RoomSeq{12};
+  desk.people_[1].acknowledged = RoomSeq{12};
   EXPECT_EQ(say("wait acknowledged Ben"), "ok at 12");
 }
 

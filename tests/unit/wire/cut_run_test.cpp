@@ -638,7 +638,7 @@ TEST(PacketFiller, BytesOfTheWayUp) {
       ++packets[cutting ? 0 : 1];
       if (random.unit() < loss) continue;
       ++received;
-      rate.heard(counter, received);
+      rate.acknowledge(counter, received);
       for (const std::uint64_t number : picked.numbers) in.offer(number, 0);
       while (in.take()) {
       }

@@ -470,7 +470,7 @@ TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
   };
   for (std::uint64_t n = 1; n <= kEntries; ++n) {
     (void)pair.server.push(entry(n));
-    pair.client.heard(n);
+    pair.client.received(n);
   }
   EXPECT_FALSE(pair.client.take_entry());
   pair.run(500ms);

@@ -12,23 +12,23 @@ namespace osteon {
 
 // The times that a committed cut takes in a room, one stage after the other.
 struct StageTimes {
-  DurationHistogram wait;    // from its arrival until the tick took it
-  DurationHistogram decide;  // to judge and apply it
-  DurationHistogram commit;  // until it was durable; short if nothing is written
-  DurationHistogram tell;    // until it was handed to every session
+  DurationHistogram wait;     // from its arrival until the tick took it
+  DurationHistogram decide;   // to judge and apply it
+  DurationHistogram commit;   // until it was durable; short if nothing is written
+  DurationHistogram publish;  // until it was handed to every session
 };
 using RejectionCounts = std::array<std::uint64_t, kRejections>;  // by the number of the reason
 
-class CutFigures {
+class CutMetrics {
  public:
   using Time = std::chrono::steady_clock::time_point;
   // [tick]
   void committed(Time arrived, Time taken, Time decided);
   void rejected(Rejection reason) { ++own_.rejections.at(static_cast<std::size_t>(reason)); }
-  // [tick] Makes the figures visible to readers, unless one is reading at this moment. With `last` it always does.
+  // [tick] Makes the numbers visible to readers, unless one is reading at this moment. With `last` it always does.
   void publish(bool last);
   // [committing thread]
-  void told(Time decided, Time kept, Time told);
+  void acknowledged(Time decided, Time durable, Time acknowledged);
 
   [[nodiscard]] StageTimes stages() const;
   [[nodiscard]] RejectionCounts rejections() const;
@@ -41,7 +41,7 @@ class CutFigures {
   OfTick own_;  // of the tick thread
   mutable std::mutex mutex_;
   OfTick shown_;
-  DurationHistogram commit_, tell_;
+  DurationHistogram commit_, publish_;
 };
 
 }  // namespace osteon
