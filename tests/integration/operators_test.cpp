@@ -208,7 +208,7 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
                              "osteon_connections_refused_total",
                              "osteon_streams_ended_total"})
     EXPECT_NE(text.find("# TYPE " + std::string(family) + " "), std::string::npos) << family;
-  for (const char* stage_name : {"wait", "decide", "commit", "tell"}) {
+  for (const char* stage_name : {"wait", "decide", "commit", "publish"}) {
     const std::string labels = R"(room="anna",stage=")" + std::string(stage_name) + "\"";
     EXPECT_EQ(value_of(text, "osteon_cut_stage_seconds_count{" + labels + "}"), 5) << stage_name;
     EXPECT_EQ(value_of(text, "osteon_cut_stage_seconds_bucket{" + labels + ",le=\"+Inf\"}"), 5) << stage_name;
