@@ -65,11 +65,8 @@ struct PartnerSolids {
   }
 };
 
-inline GuideSeen guide_among(const Partners& partners, AuthorId guide) {
-  for (const Partners::Partner& partner : partners.of)
-    if (guide && partner.author == guide) return {true, partner.state_seq, partner.pose_bone_device.position_mm};
-  return {};
-}
+// What is known of the tool that guides this one; nothing: its author holds none.
+[[nodiscard]] GuideSeen guide_among(const Partners& partners, AuthorId guide);
 
 // Pose of the bone on its mount. Connections to the room are counted from 1.
 struct MountUpdate {

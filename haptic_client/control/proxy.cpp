@@ -760,8 +760,7 @@ ProxyStep Proxy::step(const ToolModel& model, const Patch& patch, const Pose& po
   Tick tick{model, patch, around, stiffness_n_per_mm, spindle_rpm, false, dt_s};
   for (const PlacedGuide& item : around.items) tick.scene |= item.solid && !(item.id != 0 && item.id == around.guide);
 
-  // A tool that cuts in any direction is tested at its faces. Where those are not deep, what is within them is not deep
-  // either.
+  // A tool that cuts in any direction is tested at its faces. Where they are not deep, nothing within them is.
   const bool turns = may_cut && model.feed != Feeding::none && spindle_rpm >= kMinCuttingRpm;
   tick.lift_mm = turns && model.feed != Feeding::along && !returned_ ? model.inset : 0.0;
   look(tick, pose_, Against::all, here_);

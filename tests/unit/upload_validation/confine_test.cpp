@@ -133,9 +133,8 @@ TEST_F(ConfineTest, TheProcessThatLooksCasesThroughIsConfined) {
   ASSERT_TRUE(test::plain_block(6, 3, 0.5).save(temp_ / "case"));
   ASSERT_TRUE(pack_case(temp_ / "case", own_ / "upload.zip"));
   fs::copy_file(own_ / "upload.zip", temp_ / "elsewhere.zip");
-  const std::string quota =
-      R"({"archive_bytes":1000000000,"unpacked_bytes":1000000000,"entries":16,"ratio":200.0,)"
-      R"("ratio_free_bytes":1000000})";
+  const std::string quota = R"({"archive_bytes":1000000000,"unpacked_bytes":1000000000,"entries":16,"ratio":200.0,)"
+                            R"("ratio_free_bytes":1000000})";
   const auto looked = [&](const fs::path& archive) {
     fs::remove_all(own_ / "sent");
     return test::run(test::program("osteon-server"), {"check-case", archive, own_, quota}, std::chrono::seconds(60),

@@ -141,7 +141,6 @@ class RoomServiceImpl final : public RoomBase {
     }
     room->runtime().run_slowly([this, room, reactor, context, request, response, caller = *caller] {
       RoomRuntime& runtime = room->runtime();
-      const Case& bone = runtime.bone();
       const bool again = request->resume_author() != 0;
       const Authorizer::Coming coming = again ? Authorizer::Coming::again : Authorizer::Coming::anew;
       // First checks what was acknowledged to the caller: after a loss, the caller's number may belong to another
@@ -173,18 +172,7 @@ class RoomServiceImpl final : public RoomBase {
                            {"kind", v1::ClientKind_Name(request->kind())},
                            {"again", again},
                            {"protocol_version", request->protocol_version()}});
-      response->set_author(author->value);
-      response->set_room(room->name);
-      response->set_server_epoch(room->server_epoch);
-      response->set_lease_epoch(runtime.lease_epoch(*author));
-      response->set_case_hash(wire::to_wire(bone.hash()));
-      response->set_case_title(bone.info().title);
-      response->set_pitch_mm(bone.pitch_mm());
-      const Box bounds = bone.bounds();
-      *response->mutable_bounds_min_mm() = wire::to_wire(bounds.min_mm);
-      *response->mutable_bounds_max_mm() = wire::to_wire(bounds.max_mm);
-      response->set_room_seq(runtime.room_seq().value);
-      response->set_role(static_cast<v1::Role>(caller.role));
+      describe(*room, *author, caller.role, *response);
       reactor->Finish(Status::OK);
     });
     return reactor;
@@ -438,6 +426,22 @@ class RoomServiceImpl final : public RoomBase {
     // Programs from before there were seals send none.
     const Result<Digest> seal = wire::digest_from_wire(request.durable_seal());
     return runtime.check_witness({{RoomSeq{request.durable_room_seq()}, *chain}, seal ? *seal : Digest{}});
+  }
+  // What a client needs to know of the room that it has joined.
+  static void describe(OpenRoom& room, AuthorId author, Role role, v1::JoinResponse& response) {
+    const Case& bone = room.runtime().bone();
+    response.set_author(author.value);
+    response.set_room(room.name);
+    response.set_server_epoch(room.server_epoch);
+    response.set_lease_epoch(room.runtime().lease_epoch(author));
+    response.set_case_hash(wire::to_wire(bone.hash()));
+    response.set_case_title(bone.info().title);
+    response.set_pitch_mm(bone.pitch_mm());
+    const Box bounds = bone.bounds();
+    *response.mutable_bounds_min_mm() = wire::to_wire(bounds.min_mm);
+    *response.mutable_bounds_max_mm() = wire::to_wire(bounds.max_mm);
+    response.set_room_seq(room.runtime().room_seq().value);
+    response.set_role(static_cast<v1::Role>(role));
   }
   // Called after check_witness(). `role`: the caller's role now; nothing: not checked.
   static Result<AuthorId> come_back(RoomRuntime& runtime, const v1::JoinRequest& request, std::optional<Role> role) {

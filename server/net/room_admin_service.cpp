@@ -209,6 +209,6 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_rooms_service(Rooms& rooms) { return std::make_unique<RoomsServiceImpl>(rooms); }
+std::unique_ptr<grpc::Service> make_room_admin_service(Rooms& rooms) { return std::make_unique<RoomsServiceImpl>(rooms); }
 
 }  // namespace osteon
