@@ -120,7 +120,7 @@ Result<void> show(const Arguments& given) {
 }
 
 Result<void> erase_from_audit(const Arguments& given) {
-  const AuditEvent event{.action = "audit-forget", .result = kOk};
+  const AuditEvent event{.action = "audit-erase-person", .result = kOk};
   return run_audited(given.file, given.signing_key, event, [&]() -> Result<void> {
     const Result<std::size_t> gone = erase_person(system_disk(), given.file, given.person);
     if (!gone) return tl::unexpected(gone.error());

@@ -27,8 +27,8 @@
 #include "server/journal/journal_file.hpp"
 #include "server/journal/maintenance.hpp"
 #include "server/journal/signing.hpp"
-#include "server/net/forgetting.hpp"
 #include "server/net/journal_entries.hpp"
+#include "server/net/people_erasing.hpp"
 #include "server/net/room_files.hpp"
 
 namespace osteon {
@@ -399,18 +399,18 @@ Result<void> list_people(const Arguments& given) {
 // By number: erases that person in the audit log too, if the journal knows the name. By age: erases nobody there, since
 // these people may work in other rooms.
 Result<void> erase_in_audit_too(const Arguments& given, const std::vector<std::string>& names) {
-  std::size_t forgotten = 0;
+  std::size_t erased = 0;
   for (const std::string& name : names) {
     const Result<std::size_t> gone = erase_person(system_disk(), folder_of(given.file) / kAuditLogFile, name);
     if (!gone) return tl::unexpected(gone.error());
-    forgotten += *gone;
+    erased += *gone;
   }
-  if (forgotten > 0)
-    say("audit log", std::to_string(forgotten) + " identities erased (what they did stays, under pseudonyms)");
+  if (erased > 0)
+    say("audit log", std::to_string(erased) + " identities erased (what they did stays, under pseudonyms)");
   return {};
 }
 
-Result<void> erase_people(const Arguments& given) {
+Result<void> erase_from_journal(const Arguments& given) {
   if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input,
                    "erase-person needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
@@ -422,17 +422,16 @@ Result<void> erase_people(const Arguments& given) {
     const auto came_before = [&](const Person& person) {
       return given.days && person.joined_day < static_cast<std::int32_t>(today.count()) - *given.days;
     };
-    const Result<Forgotten> forgotten = forget_people(journal, came_before, given.person);
-    if (!forgotten) return tl::unexpected(forgotten.error());
-    if (const Result<void> gone = forget_owner(given.file, *forgotten); !gone) return gone;
-    if (given.person != 0 && forgotten->people == 0 && forgotten->entries == 0)
+    const Result<ErasedPeople> erased = erase_people(journal, came_before, given.person);
+    if (!erased) return tl::unexpected(erased.error());
+    if (const Result<void> gone = erase_owner(given.file, *erased); !gone) return gone;
+    if (given.person != 0 && erased->people == 0 && erased->entries == 0)
       return failure(ErrorCode::not_found, "nobody in " + given.file.string() + " has the number " +
                                                std::to_string(given.person) + "; \"people\" lists those it knows");
-    say("erased",
-        "the names of " + std::to_string(forgotten->people) + " people (what they did stays, under a number)");
-    say("erased", "the words of " + std::to_string(forgotten->entries) + " events");
+    say("erased", "the names of " + std::to_string(erased->people) + " people (what they did stays, under a number)");
+    say("erased", "the words of " + std::to_string(erased->entries) + " events");
     say("not erased", "backups and branches made before: they have names and words, or words");
-    if (given.person != 0) names = forgotten->names;
+    if (given.person != 0) names = erased->names;
     return {};
   });
   return done.and_then([&] { return erase_in_audit_too(given, names); });
@@ -516,7 +515,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
                     "Number of a person, as \"people\" lists it: exports only this person's data");
   lines->add_option("--to", given->at, "room_seq of the last event; all by default");
   command("people", "Lists the people whose numbers the events have", list_people);
-  CLI::App* gone = command("erase-person", "Erases who people were; what they did stays", erase_people);
+  CLI::App* gone = command("erase-person", "Erases who people were; what they did stays", erase_from_journal);
   gone->add_option("--person", given->person, "Number of a person, as \"people\" lists it");
   gone->add_option("--older-than", given->days,
                    "Everybody who joined more than this many days ago; 0: everybody who joined before today")

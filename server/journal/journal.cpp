@@ -540,15 +540,15 @@ Result<std::size_t> Journal::keep_people(const std::function<bool(const Person&)
   return all->size() - staying;
 }
 
-Result<std::size_t> Journal::forget_person(std::string_view pseudonym) {
+Result<std::size_t> Journal::erase_person(std::string_view pseudonym) {
   return keep_people([&](const Person& person) { return person.pseudonym != pseudonym; });
 }
 
-Result<std::size_t> Journal::forget_people_before(std::int32_t day) {
+Result<std::size_t> Journal::erase_people_before(std::int32_t day) {
   return keep_people([&](const Person& person) { return person.joined_day >= day; });
 }
 
-Result<std::size_t> Journal::forget_people_if(const std::function<bool(const Person&)>& whom) {
+Result<std::size_t> Journal::erase_people_if(const std::function<bool(const Person&)>& whom) {
   return keep_people([&](const Person& person) { return !whom(person); });
 }
 

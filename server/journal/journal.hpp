@@ -113,9 +113,9 @@ class Journal {
   // still have them.
   [[nodiscard]] Result<void> set_person(const Person& person);
   [[nodiscard]] Result<std::vector<Person>> people();
-  [[nodiscard]] Result<std::size_t> forget_person(std::string_view pseudonym);
-  [[nodiscard]] Result<std::size_t> forget_people_before(std::int32_t day);  // those who joined before it
-  [[nodiscard]] Result<std::size_t> forget_people_if(const std::function<bool(const Person&)>& whom);
+  [[nodiscard]] Result<std::size_t> erase_person(std::string_view pseudonym);
+  [[nodiscard]] Result<std::size_t> erase_people_before(std::int32_t day);  // those who joined before it
+  [[nodiscard]] Result<std::size_t> erase_people_if(const std::function<bool(const Person&)>& whom);
 
   // Replaces each entry for which `without` returns something. `without` is asked about all entries, in their order.
   // The chain, its signatures and the witnesses stay valid. The journal's files contain no byte of the replaced

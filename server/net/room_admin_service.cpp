@@ -30,9 +30,9 @@ v1::RoomInfo to_wire(const RoomListing& listing) {
   return info;
 }
 
-class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
+class RoomAdminServiceImpl final : public v1::RoomsService::CallbackService {
  public:
-  explicit RoomsServiceImpl(Rooms& rooms) : rooms_(rooms) {}
+  explicit RoomAdminServiceImpl(Rooms& rooms) : rooms_(rooms) {}
   using Context = grpc::CallbackServerContext;
   using Reactor = grpc::ServerUnaryReactor;
 
@@ -209,6 +209,8 @@ class RoomsServiceImpl final : public v1::RoomsService::CallbackService {
 
 }  // namespace
 
-std::unique_ptr<grpc::Service> make_room_admin_service(Rooms& rooms) { return std::make_unique<RoomsServiceImpl>(rooms); }
+std::unique_ptr<grpc::Service> make_room_admin_service(Rooms& rooms) {
+  return std::make_unique<RoomAdminServiceImpl>(rooms);
+}
 
 }  // namespace osteon

@@ -5,7 +5,7 @@
 
 #include "common/field/field_hash.hpp"
 #include "server/journal/journal_file.hpp"
-#include "server/net/forgetting.hpp"
+#include "server/net/people_erasing.hpp"
 #include "server/net/room_store.hpp"
 
 namespace osteon {
@@ -171,24 +171,23 @@ Result<std::vector<Person>> RoomStore::people() {
   return with_journal([](Journal& journal) { return journal.people(); });
 }
 
-Result<bool> RoomStore::forget(std::uint32_t person) {
+Result<bool> RoomStore::erase_person(std::uint32_t person) {
   return with_journal([&](Journal& journal) {
-           return forget_people(
+           return erase_people(
                journal, [](const Person&) { return false; }, person);
          })
-      .and_then([&](const Forgotten& forgotten) {
-        return forget_owner(file_, forgotten).map([&] { return forgotten.people + forgotten.entries > 0; });
+      .and_then([&](const ErasedPeople& erased) {
+        return erase_owner(file_, erased).map([&] { return erased.people + erased.entries > 0; });
       });
 }
 
-Result<std::size_t> RoomStore::forget_old() {
+Result<std::size_t> RoomStore::erase_old_people() {
   return with_journal([&](Journal& journal) -> Result<std::size_t> {
     if (retention_days_ <= 0) return 0;
     const std::int32_t day = today_() - retention_days_;
-    return forget_people(journal, [&](const Person& person) { return person.joined_day < day; })
-        .and_then([&](const Forgotten& forgotten) {
-          return forget_owner(file_, forgotten).map([&] { return forgotten.people; });
-        });
+    return erase_people(journal, [&](const Person& person) { return person.joined_day < day; })
+        .and_then(
+            [&](const ErasedPeople& erased) { return erase_owner(file_, erased).map([&] { return erased.people; }); });
   });
 }
 

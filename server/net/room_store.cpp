@@ -128,9 +128,9 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
   if (Result<void> key = store->find_witness_key(options); !key) return tl::unexpected(key.error());
   store->retention_days_ = options.retention_days;
   store->today_ = options.today ? options.today : computers_day;
-  if (const auto forgotten = store->forget_old(); !forgotten)
+  if (const auto erased = store->erase_old_people(); !erased)
     log::warn("people whose retention time is over were not erased",
-              {{"file", file.string()}, {"reason", forgotten.error().message}});
+              {{"file", file.string()}, {"reason", erased.error().message}});
   const Fields fields = store->newest_fields();
   Result<Room> room = store->replay(bone, options.limits, fields, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);

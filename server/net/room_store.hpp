@@ -121,10 +121,10 @@ class RoomStore {
   [[nodiscard]] Result<std::vector<Person>> people();
   // Erases who a person is, here and not in copies. What the person did stays, under the number. Returns false if
   // nobody has that number.
-  [[nodiscard]] Result<bool> forget(std::uint32_t person);
+  [[nodiscard]] Result<bool> erase_person(std::uint32_t person);
   // Erases everybody who joined too long ago for Options::retention_days, as open() does. Call it once a day. Returns
   // how many.
-  [[nodiscard]] Result<std::size_t> forget_old();
+  [[nodiscard]] Result<std::size_t> erase_old_people();
   // Exports everything about a person: a line of JSON that says who it is, then a line for each of the person's events,
   // until `take` returns false. Error not_found: no event and no name has that number.
   [[nodiscard]] Result<void> export_person(std::uint32_t person, const std::function<bool(const std::string&)>& take);

@@ -178,7 +178,7 @@ void OpenRoom::maintain(const std::function<bool()>& stop) {
   if (!store_ || store_->closed_to_entries()) return;
   if (Clock::now() - forgotten_ > std::chrono::hours(24)) {
     forgotten_ = Clock::now();
-    if (const Result<std::size_t> gone = store_->forget_old(); !gone)
+    if (const Result<std::size_t> gone = store_->erase_old_people(); !gone)
       log::warn("people were not erased", {{"room", name}, {"reason", gone.error().message}});
   }
   if (const Result<void> tidied = store_->tidy_if_idle(); !tidied)

@@ -136,7 +136,7 @@ bool JournalWriter::work(int count) {
       case 3: {
         const std::string pseudonym = "p" + std::to_string(below(6));
         person_asked_ = pseudonym;
-        done = journal_->forget_person(pseudonym).has_value();
+        done = journal_->erase_person(pseudonym).has_value();
         if (done) people_.erase(pseudonym);
         if (done) person_asked_.reset();
         break;

@@ -205,7 +205,7 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   EXPECT_THAT(content(rooms() / "audit.people"), Not(HasSubstr("anna")));
   EXPECT_THAT(audit({"show", log()}).out,
               HasSubstr("Join hall: ok (CLIENT_KIND_VIEWER author 1)  by somebody who was erased"));
-  command({"audit", "forget", log(), "--person", "olga"});
+  command({"audit", "erase-person", log(), "--person", "olga"});
   EXPECT_THAT(content(rooms() / "audit.people"), Not(HasSubstr("olga")));
   verify_is_sound();
 

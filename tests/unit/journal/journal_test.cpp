@@ -360,11 +360,11 @@ void forget(Journal& journal, int people, const std::function<std::size_t(std::s
   const std::vector<JournalEntry> entries = some_entries(7, 50);
   append(journal, entries, 0, 50);
   EXPECT_GT(found(name), 0u);
-  EXPECT_EQ(journal.forget_people_before(101).value(), static_cast<std::size_t>(people / 2 - 1));
+  EXPECT_EQ(journal.erase_people_before(101).value(), static_cast<std::size_t>(people / 2 - 1));
   EXPECT_EQ(found(name + std::to_string(2)), 0u);
   EXPECT_GT(found(name + " renamed"), 0u);
-  EXPECT_EQ(journal.forget_person("p0").value(), 1u);
-  EXPECT_EQ(journal.forget_person("p0").value(), 0u);
+  EXPECT_EQ(journal.erase_person("p0").value(), 1u);
+  EXPECT_EQ(journal.erase_person("p0").value(), 0u);
   EXPECT_EQ(found(name), 0u);
   EXPECT_THAT(journal.people().value(), SizeIs(people / 2));
   EXPECT_TRUE(equal(entries_of(journal), entries));
@@ -400,7 +400,7 @@ TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
       set(i);
       if (random() % 3 == 0) set(order[random() % order.size()]);
     }
-    EXPECT_EQ(journal.forget_people_before(1).value(), 750u);
+    EXPECT_EQ(journal.erase_people_before(1).value(), 750u);
     for (const auto& [file, bytes] : disk.image())
       EXPECT_EQ(bytes.find("Wilhelmina"), std::string::npos) << seed << ", " << file;
   }

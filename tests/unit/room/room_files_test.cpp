@@ -136,10 +136,10 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   ASSERT_EQ(kept.store->person("Bela Neu").value(), 2u);
   ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u) << "she is still known";
   today = 130;
-  EXPECT_EQ(kept.store->forget_old().value(), 0u) << "30 days are not more than 30";
+  EXPECT_EQ(kept.store->erase_old_people().value(), 0u) << "30 days are not more than 30";
   EXPECT_TRUE(anywhere("Anna Alt"));
   today = 131;
-  EXPECT_EQ(kept.store->forget_old().value(), 1u);
+  EXPECT_EQ(kept.store->erase_old_people().value(), 1u);
   EXPECT_FALSE(anywhere("Anna Alt"));
   EXPECT_TRUE(anywhere("Bela Neu"));
   EXPECT_EQ(kept.store->person("Anna Alt").value(), 3u) << "nobody knows any more that this was 1";
@@ -155,10 +155,10 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   today = 100'000;
   kept.options.retention_days = 0;
   kept.open(kFile);
-  EXPECT_EQ(kept.store->forget_old().value(), 0u);
+  EXPECT_EQ(kept.store->erase_old_people().value(), 0u);
   EXPECT_TRUE(anywhere("Anna Alt")) << "for ever";
-  EXPECT_TRUE(kept.store->forget(3).value());
-  EXPECT_FALSE(kept.store->forget(3).value());
+  EXPECT_TRUE(kept.store->erase_person(3).value());
+  EXPECT_FALSE(kept.store->erase_person(3).value());
   EXPECT_FALSE(anywhere("Anna Alt"));
 }
 
@@ -188,12 +188,12 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   const Digest bone = room.field_hash();
   ASSERT_TRUE(anywhere("Zwetschge"));
 
-  ASSERT_TRUE(kept.store->forget(1).value());
+  ASSERT_TRUE(kept.store->erase_person(1).value());
   for (const char* gone : {"Zwetschge", "Anna Alt", "as anna alt said"}) EXPECT_FALSE(anywhere(gone)) << gone;
   for (const char* stays : {"Bela Neu", "of another", "anna altmann is somebody else"})
     EXPECT_TRUE(anywhere(stays)) << stays;
   EXPECT_EQ(kept.store->head(), head);
-  EXPECT_FALSE(kept.store->forget(1).value()) << "nothing is left to forget";
+  EXPECT_FALSE(kept.store->erase_person(1).value()) << "nothing is left to forget";
 
   // The room goes on, and what it was is made again from its entries.
   kept.cut(2);
@@ -239,7 +239,7 @@ TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
   EXPECT_THAT(lines[12], HasSubstr("\"rejection\""));
   for (const std::string& line : lines) EXPECT_THAT(line, ::testing::Not(HasSubstr("of another")));
 
-  ASSERT_TRUE(kept.store->forget(1));
+  ASSERT_TRUE(kept.store->erase_person(1));
   lines.clear();
   ASSERT_TRUE(kept.store->export_person(1, take));
   EXPECT_THAT(lines, SizeIs(12)) << "what it did stays, under its number";

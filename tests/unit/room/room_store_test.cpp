@@ -64,8 +64,8 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
   note(store.write(plain_entries(head.seq, 1)));
   note(store.person("Anna"));
   note(store.people());
-  note(store.forget(1));
-  note(store.forget_old());
+  note(store.erase_person(1));
+  note(store.erase_old_people());
   note(store.check_witness(store.witness()));
   note(store.has_head(head));
   note(store.read(RoomSeq{1}, head.seq, [](const LogEntry&) { return true; }));

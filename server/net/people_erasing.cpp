@@ -1,4 +1,4 @@
-#include "server/net/forgetting.hpp"
+#include "server/net/people_erasing.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -70,8 +70,8 @@ std::optional<std::string> WordEraser::operator()(const JournalEntry& entry) {
   return to_bytes(*read);
 }
 
-Result<Forgotten> forget_people(Journal& journal, const std::function<bool(const Person&)>& whom,
-                                std::uint32_t number) {
+Result<ErasedPeople> erase_people(Journal& journal, const std::function<bool(const Person&)>& whom,
+                                  std::uint32_t number) {
   const Result<std::vector<Person>> all = journal.people();
   if (!all) return tl::unexpected(all.error());
   std::set<std::uint32_t> people;
@@ -83,21 +83,21 @@ Result<Forgotten> forget_people(Journal& journal, const std::function<bool(const
       pseudonyms.push_back(person.pseudonym);
     }
   if (number != 0) people.insert(number);  // the name may be erased already
-  if (people.empty()) return Forgotten{};
+  if (people.empty()) return ErasedPeople{};
   const Result<std::size_t> entries = journal.erase_entries(WordEraser(std::move(people), names));
   if (!entries) return tl::unexpected(entries.error());
-  Forgotten forgotten{0, *entries, names};
-  if (pseudonyms.empty()) return forgotten;
-  const Result<std::size_t> gone = journal.forget_people_if(
+  ErasedPeople erased{0, *entries, names};
+  if (pseudonyms.empty()) return erased;
+  const Result<std::size_t> gone = journal.erase_people_if(
       [&](const Person& person) { return std::ranges::find(pseudonyms, person.pseudonym) != pseudonyms.end(); });
   if (!gone) return tl::unexpected(gone.error());
-  forgotten.people = *gone;
-  return forgotten;
+  erased.people = *gone;
+  return erased;
 }
 
-Result<void> forget_owner(const std::filesystem::path& journal, const Forgotten& forgotten) {
+Result<void> erase_owner(const std::filesystem::path& journal, const ErasedPeople& erased) {
   const std::string owner = owner_of(journal);
-  if (owner.empty() || std::ranges::find(forgotten.names, owner) == forgotten.names.end()) return {};
+  if (owner.empty() || std::ranges::find(erased.names, owner) == erased.names.end()) return {};
   return note_owner(journal, {});
 }
 

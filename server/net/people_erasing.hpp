@@ -36,18 +36,18 @@ class WordEraser {
   std::set<AuthorId> authors_ = {};  // the authors that these people were
 };
 
-struct Forgotten {
+struct ErasedPeople {
   std::size_t people = 0;   // people whose names are erased
   std::size_t entries = 0;  // entries whose words are erased
   std::vector<std::string> names = {};
 };
 // Erases words and names of the people that `whom` selects and of the person with that number (0: nobody). Words are
 // erased first, so that an interrupted call can be repeated. Errors: those of Journal::erase_entries() and of
-// Journal::forget_person().
-[[nodiscard]] Result<Forgotten> forget_people(Journal& journal, const std::function<bool(const Person&)>& whom,
-                                              std::uint32_t number = 0);
+// Journal::erase_person().
+[[nodiscard]] Result<ErasedPeople> erase_people(Journal& journal, const std::function<bool(const Person&)>& whom,
+                                                std::uint32_t number = 0);
 
 // Removes the note of who made the journal, if that is one of these people.
-[[nodiscard]] Result<void> forget_owner(const std::filesystem::path& journal, const Forgotten& forgotten);
+[[nodiscard]] Result<void> erase_owner(const std::filesystem::path& journal, const ErasedPeople& erased);
 
 }  // namespace osteon
