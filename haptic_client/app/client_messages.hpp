@@ -8,8 +8,12 @@
 #include <variant>
 #include <vector>
 
-#include "haptic_client/control/guiding.hpp"
-#include "haptic_client/control/replica.hpp"
+#include "common/field/cut.hpp"
+#include "common/mechanics/compliant_mount.hpp"
+#include "common/tools/scene.hpp"
+#include "haptic_client/control/guidance_spring.hpp"
+#include "haptic_client/control/obstacle.hpp"
+#include "haptic_client/net/room_callbacks.hpp"
 
 namespace osteon::haptic {
 

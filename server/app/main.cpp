@@ -59,7 +59,7 @@ void log_health(const std::string& room, const RuntimeHealth& health) {
 
 void log_health(RoomServer& server) {
   for (const std::shared_ptr<OpenRoom>& room : server.rooms().open_rooms())
-    log_health(room->name, room->host().health());
+    log_health(room->name, room->runtime().health());
   const LinkServerHealth links = server.link_health();
   log::info("fast path", {{"links", links.links},
                           {"links_alive", links.alive},

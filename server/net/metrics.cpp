@@ -17,8 +17,8 @@
 #include "common/field/rejection.hpp"
 #include "common/wire/host_port.hpp"
 #include "server/journal/journal_file.hpp"
-#include "server/net/certificate.hpp"
 #include "server/net/room_server.hpp"
+#include "server/net/server_certificate.hpp"
 
 namespace osteon {
 namespace {

@@ -14,12 +14,12 @@
 #include "server/net/audited_calls.hpp"
 #include "server/net/authorizer.hpp"
 #include "server/net/call_flood.hpp"
-#include "server/net/certificate.hpp"
 #include "server/net/cipher_order.hpp"
 #include "server/net/health_watch.hpp"
 #include "server/net/link_server.hpp"
 #include "server/net/listener.hpp"
 #include "server/net/refused_calls.hpp"
+#include "server/net/server_certificate.hpp"
 #include "server/net/services.hpp"
 
 namespace osteon {

@@ -300,7 +300,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (version_ == wire::kProtocolVersion) return entry;
     v1::SessionResponse said;
     (void)said.ParseFromString(*entry);
-    const std::optional<v1::SessionResponse> older = wire::entry_in(version_, said);
+    const std::optional<v1::SessionResponse> older = wire::entry_for_version(version_, said);
     if (!older) return nullptr;
     return older->message_case() == said.message_case() ? entry : serialised(*older);
   }

@@ -310,10 +310,10 @@ class Server {
     const std::shared_ptr<OpenRoom> room = made(kRoom);
     (void)made(kSpare);
     epoch_ = room->server_epoch;
-    OSTEON_CHECK(room->host().join(MemberKind::surgeon) == AuthorId{1});
+    OSTEON_CHECK(room->runtime().join(MemberKind::surgeon) == AuthorId{1});
     hands_.clear();
     for (std::size_t i = 0; i < kHands; ++i)
-      hands_.push_back(*room->host().join(MemberKind::surgeon, "hand", digest_of_secret(kSecret)));
+      hands_.push_back(*room->runtime().join(MemberKind::surgeon, "hand", digest_of_secret(kSecret)));
   }
 
   test::TempDir dir_;

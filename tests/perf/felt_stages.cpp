@@ -48,7 +48,7 @@ struct Times {
 };
 
 // A hand's client and its end in the room, put together as the programs do.
-class Line final : public SessionSubscriber, private SessionLink::Sink, public std::enable_shared_from_this<Line> {
+class Line final : public SessionSubscriber, private SessionLink::Receiver, public std::enable_shared_from_this<Line> {
  public:
   // `port`: at which the client's datagrams reach the links, 0 for their own.
   Line(RoomRuntime& runtime, LinkServer& links, AuthorId author, std::uint16_t port, std::size_t cuts)
@@ -102,8 +102,9 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {
     link_ = links_.add(author_, 1, *this);
-    auto opened = FastPath::open("127.0.0.1", port_, link_->keys(), 1,
-                                 {.row = [this](wire::IndexedEntry row) { hear(std::move(row)); }, .dead = [] {}});
+    auto opened =
+        FastPath::open("127.0.0.1", port_, link_->keys(), 1,
+                       {.entry = [this](wire::IndexedEntry entry) { receive(std::move(entry)); }, .dead = [] {}});
     OSTEON_CHECK(opened.has_value());
     path_ = std::move(*opened);
   }
@@ -112,7 +113,7 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
     path_->know_tool(number, tool);
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"rows come with what goes in few bytes of them"); }
+  void offer(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"entries come with what goes in few bytes of them"); }
   void offer(RoomSeq, const Bytes&, const wire::SessionEntry& fast) override {
     const bool committed = fast.kind == wire::SessionEntryKind::committed;
     if (committed && fast.cut.author == author_) times.note(told, fast.cut.author_seq);
@@ -145,33 +146,34 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   void arrived(std::uint64_t) override {}
 
   // --- the client's side
-  void hear(wire::IndexedEntry row) {
-    if (row.row.kind != wire::SessionEntryKind::committed) return;
-    if (row.row.cut.author == other_->author_) other_->times.note(came, row.row.cut.author_seq);
+  void receive(wire::IndexedEntry indexed) {
+    if (indexed.entry.kind != wire::SessionEntryKind::committed) return;
+    if (indexed.entry.cut.author == other_->author_) other_->times.note(came, indexed.entry.cut.author_seq);
     const std::lock_guard lock(mutex_);
-    rows_.push_back(std::move(row.row));
+    entries_.push_back(std::move(indexed.entry));
     wake_.notify_one();
   }
   // As the client's replica thread.
   void follow() {
-    std::deque<wire::SessionEntry> rows;
+    std::deque<wire::SessionEntry> entries;
     while (true) {
       Pose tip;
       {
         std::unique_lock lock(mutex_);
-        wake_.wait(lock, [&] { return over_ || !rows_.empty(); });
+        wake_.wait(lock, [&] { return over_ || !entries_.empty(); });
         if (over_) return;
-        rows.swap(rows_);
+        entries.swap(entries_);
         tip = tip_;
       }
-      for (const wire::SessionEntry& row : rows) replica_.commit(row.room_seq, row.cut, row.cut.author == author_);
+      for (const wire::SessionEntry& entry : entries)
+        replica_.commit(entry.room_seq, entry.cut, entry.cut.author == author_);
       replica_.settle();
       for (const haptic::ChangedLeaves& change : replica_.take_changes())
         builder_.changed(runtime_.bone().pitch_mm(), change.level, change.origins);
       builder_.build(replica_.bodies(), model_, tip, patch_);
-      for (const wire::SessionEntry& row : rows)
-        if (row.cut.author == other_->author_) other_->times.note(felt, row.cut.author_seq);
-      rows.clear();
+      for (const wire::SessionEntry& entry : entries)
+        if (entry.cut.author == other_->author_) other_->times.note(felt, entry.cut.author_seq);
+      entries.clear();
     }
   }
 
@@ -182,11 +184,11 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   Line* other_ = nullptr;
   std::shared_ptr<SessionLink> link_;
   std::unique_ptr<FastPath> path_;
-  std::uint64_t index_ = 0;  // of rows; by one thread at a time
+  std::uint64_t index_ = 0;  // of entries; by one thread at a time
 
   std::mutex mutex_;
   std::condition_variable wake_;
-  std::deque<wire::SessionEntry> rows_;
+  std::deque<wire::SessionEntry> entries_;
   Pose tip_;
   bool over_ = false;
   haptic::Replica replica_;  // of its thread, as all that follows

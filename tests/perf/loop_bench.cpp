@@ -169,7 +169,7 @@ class Blackout {
     };
     std::deque<OnTheWay> way;
     PatchBuilder builder;
-    RoomSubscription watch;
+    ConfirmationMonitor watch;
     std::uint64_t place = 0;
     while (!over_) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));

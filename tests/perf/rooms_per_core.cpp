@@ -80,10 +80,10 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
   }
   held.runtime = std::make_unique<RoomRuntime>(
       std::move(*room), RuntimeRates{}, [](double) {}, Detail::automatic, held.store.get());
-  const Result<AuthorId> author = held.host->join(MemberKind::surgeon, "tool");
+  const Result<AuthorId> author = held.runtime->join(MemberKind::surgeon, "tool");
   OSTEON_CHECK(author.has_value());
   held.listener = std::make_shared<Listener>(*author);
-  OSTEON_CHECK(held.host->open_session(held.listener).has_value());
+  OSTEON_CHECK(held.runtime->open_session(held.listener).has_value());
   OSTEON_CHECK(wait_until([&] { return held.listener->open.load(); }, 20s));
   return held;
 }
@@ -97,7 +97,7 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
     rooms.push_back(make_room(bone, folder / ("room" + std::to_string(i) + ".journal"), kept));
   std::this_thread::sleep_for(300ms);
   std::vector<RuntimeHealth> before;
-  for (const HeldRoom& room : rooms) before.push_back(room.host->health());
+  for (const HeldRoom& room : rooms) before.push_back(room.runtime->health());
 
   // Each room's cuts come at their own times within the time between two.
   const double cpu_before = cpu_of_process(), own_before = cpu_of_thread();
@@ -111,8 +111,8 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
       Cut cut = stroke[(room.sent + i * 17) % stroke.size()];
       cut.author = room.listener->author();
       cut.author_seq = ++room.sent;
-      cut.lease_epoch = room.host->lease_epoch(cut.author);
-      room.host->queue_cut(room.listener, std::move(cut), Clock::now());
+      cut.lease_epoch = room.runtime->lease_epoch(cut.author);
+      room.runtime->queue_cut(room.listener, std::move(cut), Clock::now());
     }
   const double wall = std::chrono::duration<double>(Clock::now() - start).count();
   const double cpu = cpu_of_process() - cpu_before - (cpu_of_thread() - own_before);
@@ -121,7 +121,7 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
 
   double late_p99 = 0, work_p99 = 0, commit_p99 = 0, committed = 0, missed = 0, ticks = 0, rejected = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    const RuntimeHealth health = rooms[i].host->health();
+    const RuntimeHealth health = rooms[i].runtime->health();
     const TickStats tick = health.tick.since(before[i].tick);
     late_p99 = std::max(late_p99, 1e-3 * tick.lateness.percentile_us(99));
     work_p99 = std::max(work_p99, 1e-3 * tick.work.percentile_us(99));
@@ -130,7 +130,7 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
     ticks += static_cast<double>(tick.work.count());
     committed += static_cast<double>(health.counts.committed - before[i].counts.committed);
     rejected += static_cast<double>(health.counts.rejected - before[i].counts.rejected);
-    rooms[i].host->stop();
+    rooms[i].runtime->stop();
   }
   return {{"rooms", count},
           {"cuts_per_s_and_room", rounded(committed / wall / static_cast<double>(count))},

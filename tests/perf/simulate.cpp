@@ -126,13 +126,13 @@ class Sum {
   void add(const SimulationReport& one) {
     ++seeds_;
     fast_path_ += one.fast_path ? 1 : 0;
-    cuts_ += one.cuts, rows_ += one.rows, committed_ += one.committed, rejected_ += one.rejected;
+    cuts_ += one.cuts, entries_ += one.entries, committed_ += one.committed, rejected_ += one.rejected;
     decisions_ += one.decisions, forbidden_ += one.forbidden;
     undone_ += one.undone, splits_ += one.splits, acknowledged_ += one.acknowledged, crashes_ += one.crashes;
     disk_failures_ += one.disk_failures, breaks_ += one.breaks, resumed_ += one.resumed, programs_ += one.programs;
     datagrams_.sent += one.datagrams.sent, datagrams_.opened += one.datagrams.opened,
         datagrams_.forged += one.datagrams.forged;
-    datagrams_.rows += one.datagrams.rows, datagrams_.cuts += one.datagrams.cuts,
+    datagrams_.entries += one.datagrams.entries, datagrams_.cuts += one.datagrams.cuts,
         datagrams_.moves += one.datagrams.moves;
     virtual_s_ += one.virtual_s;
     cpu_ms_.push_back(one.cpu_ms);
@@ -152,7 +152,7 @@ class Sum {
             {"broken_invariants", broken_},
             {"fast_path_seeds", fast_path_},
             {"cuts", cuts_},
-            {"rows", rows_},
+            {"entries", entries_},
             {"commits", committed_},
             {"rejections", rejected_},
             {"undos", undone_},
@@ -170,7 +170,7 @@ class Sum {
               {"opened", datagrams_.opened},
               {"forged", datagrams_.forged},
               {"cuts", datagrams_.cuts},
-              {"rows", datagrams_.rows},
+              {"entries", datagrams_.entries},
               {"moves", datagrams_.moves}}},
             {"virtual_s", virtual_s_},
             {"back_s", percentiles(back_s_)},
@@ -182,7 +182,7 @@ class Sum {
   }
 
  private:
-  std::uint64_t seeds_ = 0, failures_ = 0, fast_path_ = 0, cuts_ = 0, rows_ = 0, committed_ = 0, rejected_ = 0,
+  std::uint64_t seeds_ = 0, failures_ = 0, fast_path_ = 0, cuts_ = 0, entries_ = 0, committed_ = 0, rejected_ = 0,
                 undone_ = 0, decisions_ = 0, forbidden_ = 0, splits_ = 0, acknowledged_ = 0, crashes_ = 0,
                 disk_failures_ = 0, breaks_ = 0, resumed_ = 0, programs_ = 0;
   osteon::test::DatagramCounts datagrams_;
@@ -196,10 +196,10 @@ void say(const SimulationReport& one, const Arguments& arguments) {
   if (arguments.verbose)
     std::fprintf(
         stderr,
-        "seed %llu: %s, %llu cuts, %llu rows, %llu crashes, %llu breaks; back after %.2f s, settled in %.2f s; "
+        "seed %llu: %s, %llu cuts, %llu entries, %llu crashes, %llu breaks; back after %.2f s, settled in %.2f s; "
         "%.1f ms\n",
         static_cast<unsigned long long>(one.seed), one.fast_path ? "datagrams" : "streams",
-        static_cast<unsigned long long>(one.cuts), static_cast<unsigned long long>(one.rows),
+        static_cast<unsigned long long>(one.cuts), static_cast<unsigned long long>(one.entries),
         static_cast<unsigned long long>(one.crashes), static_cast<unsigned long long>(one.breaks), one.back_s,
         one.settled_s, one.cpu_ms);
   const std::size_t count = std::min<std::size_t>(one.faults.size(), arguments.verbose ? 20 : 1);

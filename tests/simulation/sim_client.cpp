@@ -331,8 +331,8 @@ void SimClient::hear(const std::string& bytes) {
     lost("it sent what no correct server sends: " + taken.error().message);
 }
 
-RoomEvents SimClient::events() {
-  RoomEvents events;
+RoomCallbacks SimClient::events() {
+  RoomCallbacks events;
   events.leaf = [this](const FieldLeaf& leaf) { pass(leaf); };
   events.complete = [this](const RoomAtJoin& room) {
     ledger_.told_up_to(room.contained);

@@ -118,7 +118,7 @@ class SimClient {
   void set_ways();  // of the present address
   void hear_entry(wire::IndexedEntry entry);
   void compare(const v1::SessionResponse& response);  // compares with what a datagram has said of the same entry
-  [[nodiscard]] RoomEvents events();
+  [[nodiscard]] RoomCallbacks events();
 
   void pass(FromRoom event);
   void work();  // the replica's thread wakes up

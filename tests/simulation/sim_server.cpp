@@ -68,7 +68,7 @@ class SimServer::Session final : public SessionSubscriber,
     v1::SessionResponse said;
     if (server_.links_ && said.ParseFromString(*complete)) {
       link_ = server_.links_->add(author_, said.complete().decided_author_seq() + 1, *this);
-      before.insert(before.begin(), link_entry(link_->keys(), node(Datagrams::kServer).port));
+      before.insert(before.begin(), link_message(link_->keys(), node(Datagrams::kServer).port));
     }
     if (server_.condition_.breakage == Breakage::hasty && !server_.power_is_out())
       for (const Bytes& entry : std::exchange(before, {})) stream_->write(SimStream::server, *entry);

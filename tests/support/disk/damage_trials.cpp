@@ -96,7 +96,7 @@ std::string damage(Random& random, const std::string& name, const Life& life, co
 bool same_entries(const std::vector<JournalEntry>& found, const std::vector<JournalEntry>& known, std::size_t count) {
   return std::equal(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(count), known.begin(),
                     [](const JournalEntry& a, const JournalEntry& b) {
-                      return a.place == b.place && a.at_ns == b.at_ns && a.bytes == b.bytes;
+                      return a.seq == b.seq && a.at_ns == b.at_ns && a.bytes == b.bytes;
                     });
 }
 
@@ -145,7 +145,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
   // The reported missing entries are at least the acknowledged ones, and at most those asked for.
   const auto recovered = salvage_journal(file, "/room/recovered", &disk);
   if (!recovered) return {Verdict::Kind::named, ""};
-  const std::uint64_t end = recovered->head.place.value + recovered->lost();
+  const std::uint64_t end = recovered->head.seq.value + recovered->lost();
   const bool told = foreign || (end >= life.acknowledged.size() && end <= known.size());
   const bool cannot_tell = std::ranges::any_of(recovered->faults, [](const std::string& fault) {
     return fault.find("cannot be told") != fault.npos || fault.find("is damaged") != fault.npos ||
@@ -154,7 +154,7 @@ Verdict judge(const std::filesystem::path& file, const Life& life, MemoryDisk& d
   });
   if (told || cannot_tell) return {Verdict::Kind::named, ""};
   return {Verdict::Kind::named, "it says that " + std::to_string(recovered->lost()) + " entries after " +
-                                    std::to_string(recovered->head.place.value) + " are missing, of " +
+                                    std::to_string(recovered->head.seq.value) + " are missing, of " +
                                     std::to_string(life.acknowledged.size()) + ": " + why};
 }
 

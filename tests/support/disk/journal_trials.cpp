@@ -26,7 +26,7 @@ Digest sha256(const std::string& bytes) {
 std::string raw(const Digest& digest) { return {digest.bytes.begin(), digest.bytes.end()}; }
 
 bool same(const JournalEntry& a, const JournalEntry& b) {
-  return a.place == b.place && a.at_ns == b.at_ns && a.bytes == b.bytes;
+  return a.seq == b.seq && a.at_ns == b.at_ns && a.bytes == b.bytes;
 }
 
 void add(Tally& tally, const JournalWriter& writer, std::uint64_t seed, bool failed) {
@@ -47,9 +47,9 @@ JournalHead plain_head(const std::string& genesis, const std::vector<JournalEntr
   const std::string name = "osteon journal";
   JournalHead head{RoomSeq{0}, sha256(little_endian(name.size()) + name + little_endian(genesis.size()) + genesis)};
   for (const JournalEntry& entry : entries)
-    head = {entry.place, sha256(raw(head.chain) + little_endian(entry.place.value) +
-                                little_endian(static_cast<std::uint64_t>(entry.at_ns)) +
-                                little_endian(entry.bytes.size()) + entry.bytes)};
+    head = {entry.seq, sha256(raw(head.chain) + little_endian(entry.seq.value) +
+                              little_endian(static_cast<std::uint64_t>(entry.at_ns)) +
+                              little_endian(entry.bytes.size()) + entry.bytes)};
   return head;
 }
 
@@ -104,9 +104,9 @@ bool JournalWriter::write_checkpoint() {
     bytes += piece;
     if (!file->write(piece)) return false;
   }
-  const std::uint64_t place = journal_->head().place.value;
+  const std::uint64_t seq = journal_->head().seq.value;
   if (!file->finish() || !journal_->add_checkpoint(std::move(*file))) return false;
-  checkpoints_[place] = bytes;
+  checkpoints_[seq] = bytes;
   return true;
 }
 
@@ -206,14 +206,14 @@ void JournalWriter::check() {
   for (const Checkpoint& checkpoint : *checkpoints) {
     const auto bytes = journal_->read_checkpoint(checkpoint);
     if (!bytes) fault(bytes.error().message);
-    const auto known = checkpoints_.find(checkpoint.at.place.value);
+    const auto known = checkpoints_.find(checkpoint.at.seq.value);
     if (bytes && known != checkpoints_.end() && known->second != *bytes) fault("a checkpoint differs");
   }
 }
 
 void JournalWriter::check_failed() {
   if (!journal_ || journal_->closed_because() == nullptr) return;
-  const JournalEntry next{RoomSeq{journal_->head().place.value + 1}, 0, "late"};
+  const JournalEntry next{RoomSeq{journal_->head().seq.value + 1}, 0, "late"};
   if (journal_->append({&next, 1}) || journal_->next_server_epoch()) fault("goes on after a write that failed");
 }
 

@@ -45,7 +45,7 @@ class GoingOn : public ::testing::Test {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
   }
-  RoomRuntime& host() { return (*server_->rooms().find("ward"))->host(); }
+  RoomRuntime& host() { return (*server_->rooms().find("ward"))->runtime(); }
   wire::JoinedRoom join(const wire::ClientCredentials& credentials) {
     auto joined =
         wire::join_room(server_->address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);

@@ -261,7 +261,7 @@ class Matrices : public ::testing::Test {
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     return joined.value_or(wire::JoinedRoom{});
   }
-  RoomRuntime& host() { return server_->rooms().find("ward").value()->host(); }
+  RoomRuntime& host() { return server_->rooms().find("ward").value()->runtime(); }
   void happen(std::function<Result<RoomEvent>(Room&)> event) {
     std::promise<std::string> done;
     host().queue_event(std::move(event), [&](const Result<RoomEvent>& decided) {
@@ -441,13 +441,13 @@ TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
     EXPECT_EQ(end.error_code(), StatusCode::PERMISSION_DENIED);
     EXPECT_THAT(end.error_message(), HasSubstr("may not call Session"));
     // With keys of one's own making: counted, and not answered.
-    const std::uint64_t strangers = server_->link_health().strangers;
+    const std::uint64_t unauthenticated = server_->link_health().unauthenticated;
     Line line(make_session_keys(0x01020304, system_random()), server_->link_port(), address());
     CuttingState state;
     EXPECT_TRUE(line.drive([&] {
       ++state.state_seq;
       line.link().set_state(state, 0);
-      return server_->link_health().strangers > strangers;
+      return server_->link_health().unauthenticated > unauthenticated;
     }));
     (void)line.drive([] { return false; }, 200ms);
     EXPECT_EQ(line.datagrams, 0u);

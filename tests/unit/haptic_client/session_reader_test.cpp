@@ -69,8 +69,8 @@ struct Heard {
              events.push_back(std::to_string(seq.value) + " of " + std::to_string(cut.author.value));
            },
        .rejected =
-           [this](RoomSeq seq, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
-             events.push_back(std::to_string(seq.value) + " rejects " + std::to_string(seq) + " until " +
+           [this](RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease, const std::string& why) {
+             events.push_back(std::to_string(seq.value) + " rejects " + std::to_string(author_seq) + " until " +
                               std::to_string(lease) + ": " + why);
            },
        .scene = [this](RoomSeq seq,
@@ -93,14 +93,14 @@ struct Heard {
       [this](std::uint64_t seq) { decided.push_back(seq); }};
 };
 
-v1::SessionResponse row(std::uint64_t index, std::uint64_t seq, std::uint64_t author, std::uint64_t author_seq) {
+v1::SessionResponse entry(std::uint64_t index, std::uint64_t seq, std::uint64_t author, std::uint64_t author_seq) {
   v1::SessionResponse response;
   response.set_index(index);
   response.mutable_committed()->set_room_seq(seq);
   *response.mutable_committed()->mutable_cut() = wire::to_wire(cut_of(author, author_seq));
   return response;
 }
-wire::IndexedRow fast(std::uint64_t index, std::uint64_t seq, std::uint64_t author, std::uint64_t author_seq) {
+wire::IndexedEntry fast(std::uint64_t index, std::uint64_t seq, std::uint64_t author, std::uint64_t author_seq) {
   return {index,
           {.room_seq = RoomSeq{seq}, .kind = wire::SessionEntryKind::committed, .cut = cut_of(author, author_seq)}};
 }
@@ -114,18 +114,18 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   ASSERT_TRUE(heard.reader.take(complete));
   ASSERT_TRUE(heard.reader.take(fast(2, 11, 7, 6)));  // the first has not come yet
   EXPECT_EQ(heard.events, std::vector<std::string>{"complete 3"});
-  ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
-  ASSERT_TRUE(heard.reader.take(row(2, 11, 7, 6)));  // again, over the stream
+  ASSERT_TRUE(heard.reader.take(entry(1, 10, 2, 1)));
+  ASSERT_TRUE(heard.reader.take(entry(2, 11, 7, 6)));  // again, over the stream
   ASSERT_TRUE(heard.reader.take(fast(1, 10, 2, 1)));
   // A change of the scene comes over the stream alone; what the fast path has after it waits.
   ASSERT_TRUE(
-      heard.reader.take(wire::IndexedRow{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionEntryKind::streamed}}));
-  ASSERT_TRUE(heard.reader.take(wire::IndexedRow{4,
-                                                 {.room_seq = RoomSeq{13},
-                                                  .kind = wire::SessionEntryKind::rejected,
-                                                  .author_seq = 7,
-                                                  .reason = static_cast<std::uint32_t>(Rejection::place),
-                                                  .lease_epoch = 14}}));
+      heard.reader.take(wire::IndexedEntry{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionEntryKind::streamed}}));
+  ASSERT_TRUE(heard.reader.take(wire::IndexedEntry{4,
+                                                   {.room_seq = RoomSeq{13},
+                                                    .kind = wire::SessionEntryKind::rejected,
+                                                    .author_seq = 7,
+                                                    .reason = static_cast<std::uint32_t>(Rejection::place),
+                                                    .lease_epoch = 14}}));
   EXPECT_EQ(heard.reader.taken(), 2u);
   v1::SessionResponse scene;
   scene.set_index(3);
@@ -159,18 +159,18 @@ TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
   EXPECT_EQ(told->seq_of(5), std::nullopt) << "a room of before says nothing";
 }
 
-wire::IndexedRow word(std::uint64_t index, std::uint64_t seq, bool stopped) {
-  wire::IndexedRow row{index,
-                       {.room_seq = RoomSeq{seq}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = seq + 1}};
-  row.row.supervision.stopped = stopped;
-  return row;
+wire::IndexedEntry word(std::uint64_t index, std::uint64_t seq, bool stopped) {
+  wire::IndexedEntry row{
+      index, {.room_seq = RoomSeq{seq}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = seq + 1}};
+  entry.entry.supervision.stopped = stopped;
+  return entry;
 }
-v1::SessionResponse streamed_word(const wire::IndexedRow& row) {
+v1::SessionResponse streamed_word(const wire::IndexedEntry& entry) {
   v1::SessionResponse response;
-  response.set_index(row.index);
-  response.mutable_supervised()->set_room_seq(row.row.room_seq.value);
-  response.mutable_supervised()->set_lease_epoch(row.row.lease_epoch);
-  *response.mutable_supervised()->mutable_supervision() = wire::to_wire(row.row.supervision);
+  response.set_index(entry.index);
+  response.mutable_supervised()->set_room_seq(entry.entry.room_seq.value);
+  response.mutable_supervised()->set_lease_epoch(entry.entry.lease_epoch);
+  *response.mutable_supervised()->mutable_supervision() = wire::to_wire(entry.entry.supervision);
   return response;
 }
 
@@ -181,7 +181,7 @@ TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
   ASSERT_TRUE(heard.reader.take(word(2, 11, true)));  // a cut before it has not come
   EXPECT_TRUE(heard.events.empty());
   ASSERT_TRUE(heard.reader.take(streamed_word(word(2, 11, true))));
-  ASSERT_TRUE(heard.reader.take(row(1, 10, 7, 1)));
+  ASSERT_TRUE(heard.reader.take(entry(1, 10, 7, 1)));
   ASSERT_TRUE(heard.reader.take(word(2, 11, true)));
   ASSERT_TRUE(heard.reader.take(word(4, 13, false)));
   v1::SessionResponse said;
@@ -202,8 +202,8 @@ TEST(SessionReader, EveryStreamSaysWhatHoldsForTheHand) {
   v1::SessionResponse complete;
   complete.mutable_complete()->set_room_seq(3);
   heard.reader.begin();
-  wire::IndexedRow before = word(0, 0, true);
-  before.row.lease_epoch = 5;
+  wire::IndexedEntry before = word(0, 0, true);
+  before.entry.lease_epoch = 5;
   ASSERT_TRUE(heard.reader.take(streamed_word(before)));
   ASSERT_TRUE(heard.reader.take(complete));
   EXPECT_EQ(heard.events, (std::vector<std::string>{"0 stops until 5", "complete 3"}));
@@ -254,7 +254,7 @@ TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
 TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
   Heard heard;
   heard.reader.begin();
-  ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
+  ASSERT_TRUE(heard.reader.take(entry(1, 10, 2, 1)));
   v1::SessionResponse kept;
   kept.mutable_durable()->set_room_seq(9);
   kept.mutable_durable()->set_chain(std::string(32, 'c'));
@@ -280,10 +280,10 @@ TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
 TEST(SessionReader, BeginsAnewWithEachStream) {
   Heard heard;
   heard.reader.begin();
-  ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
-  ASSERT_TRUE(heard.reader.take(row(3, 12, 2, 3)));  // never to be passed on: the stream breaks
+  ASSERT_TRUE(heard.reader.take(entry(1, 10, 2, 1)));
+  ASSERT_TRUE(heard.reader.take(entry(3, 12, 2, 3)));  // never to be passed on: the stream breaks
   heard.reader.begin();
-  ASSERT_TRUE(heard.reader.take(row(1, 13, 2, 4)));
+  ASSERT_TRUE(heard.reader.take(entry(1, 13, 2, 4)));
   EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 2", "13 of 2"}));
 }
 
@@ -292,7 +292,7 @@ TEST(SessionReader, BeginsAnewWithEachStream) {
 TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
   Heard heard;
   heard.reader.begin();
-  ASSERT_TRUE(heard.reader.take(row(0, 4, 7, 3)));
+  ASSERT_TRUE(heard.reader.take(entry(0, 4, 7, 3)));
   v1::SessionResponse rejected;
   rejected.mutable_rejected()->set_author_seq(4);
   ASSERT_TRUE(heard.reader.take(rejected));
@@ -303,13 +303,13 @@ TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
 TEST(SessionReader, RefusesWhatNoCorrectServerSendsAndWaitsForToolsThatItDoesNotKnow) {
   Heard heard;
   heard.reader.begin();
-  v1::SessionResponse strange = row(1, 10, 2, 1);
+  v1::SessionResponse strange = entry(1, 10, 2, 1);
   strange.mutable_committed()->mutable_cut()->set_tool_hash(std::string(32, 'x'));
   EXPECT_FALSE(heard.reader.take(strange));
   EXPECT_FALSE(heard.reader.take(v1::SessionResponse{}));
-  wire::IndexedRow unknown = fast(2, 11, 2, 2);
-  unknown.row.cut.tool.bytes[0] ^= 1;
-  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the row";
+  wire::IndexedEntry unknown = fast(2, 11, 2, 2);
+  unknown.entry.cut.tool.bytes[0] ^= 1;
+  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the entry";
   EXPECT_TRUE(heard.events.empty());
 }
 

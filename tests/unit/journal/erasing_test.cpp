@@ -67,7 +67,7 @@ TEST_F(ErasingTest, TheChainAndItsSignaturesHold) {
 // end.
 TEST_F(ErasingTest, NoByteOfWhatWasErasedIsLeft) {
   const std::string word = "Wilhelmina";
-  std::vector<JournalEntry> rows = some_rows(2, 2000, 60);
+  std::vector<JournalEntry> rows = some_entries(2, 2000, 60);
   for (JournalEntry& row : rows) row.bytes = (row.seq.value % 3 == 0 ? word : "Other") + row.bytes;
   auto journal = Journal::create(file_, "genesis", {.keys = keys_});
   ASSERT_TRUE(journal) << journal.error().message;
@@ -87,7 +87,7 @@ TEST_F(ErasingTest, NoByteOfWhatWasErasedIsLeft) {
     if (bytes) bytes->assign(200, '-');
     return bytes;
   };
-  EXPECT_EQ(journal->erase_rows(longer).value(), 666u);
+  EXPECT_EQ(journal->erase_entries(longer).value(), 666u);
   EXPECT_EQ(found(), 0u) << "while it is open";
   ASSERT_TRUE(journal->close());
   EXPECT_EQ(found(), 0u);

@@ -12,10 +12,10 @@
 #include <optional>
 
 #include "common/wire/host_port.hpp"
-#include "server/net/certificate.hpp"
 #include "server/net/health_watch.hpp"
 #include "server/net/metrics.hpp"
 #include "server/net/refusals.hpp"
+#include "server/net/server_certificate.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/unit/room/kept_room.hpp"
 #include "tests/unit/room/served_room.hpp"
@@ -125,7 +125,7 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
     EXPECT_TRUE(says("tibia", false) && says("femur", true));
     ASSERT_TRUE(rooms.create("tibia", nullptr));
     EXPECT_TRUE(says("tibia", true));
-    EXPECT_FALSE((*rooms.find("femur"))->host().join(MemberKind::watcher).has_value());
+    EXPECT_FALSE((*rooms.find("femur"))->runtime().join(MemberKind::watcher).has_value());
     EXPECT_TRUE(says("femur", false) && says("tibia", true) && says("", true));
     rooms.begin_drain(1s, "the server is stopping");
     EXPECT_TRUE(says("", false) && says("tibia", false));
@@ -177,7 +177,7 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   ASSERT_EQ(kept.store->head().seq.value, head.seq.value - 1) << "the rest can be looked at";
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
-  RoomRuntime& host = (*rooms.find("femur"))->host();
+  RoomRuntime& host = (*rooms.find("femur"))->runtime();
   EXPECT_TRUE(host.stopped());
   EXPECT_FALSE(host.health().serving);
   Told told;
@@ -211,7 +211,7 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   kept.cut(1);
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
-  RoomRuntime& host = (*rooms.find("femur"))->host();
+  RoomRuntime& host = (*rooms.find("femur"))->runtime();
   const auto hand = std::make_shared<Hand>(kept.hand);
   ASSERT_TRUE(host.open_session(hand));
   EXPECT_TRUE(host.health().serving);

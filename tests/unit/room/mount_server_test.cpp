@@ -23,7 +23,7 @@ class Pusher {
     auto joined = RoomSession::join({.address = address, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
-    RoomEvents events;
+    RoomCallbacks events;
     events.bone = [this](const MountPose& seen) {
       const std::lock_guard lock(mutex_);
       first_ = first_.value_or(seen.seen_seq);

@@ -93,27 +93,27 @@ class BegunSession : public ::testing::Test {
     store.reset();
     subscribers.clear();
   }
-  void tick(bool keep) { host->tick(now += 8ms, keep); }
+  void tick(bool keep) { runtime->tick(now += 8ms, keep); }
   AuthorId join(MemberKind kind, const std::string& name, Role role) {
     AuthorId author;
-    host->join(kind, name, kSecret, role, [&](const Result<AuthorId>& given) { author = given.value(); });
+    runtime->join(kind, name, kSecret, role, [&](const Result<AuthorId>& given) { author = given.value(); });
     tick(true);
     return author;
   }
   std::shared_ptr<Told> session() {
     auto subscriber = std::make_shared<Told>(ben);
-    EXPECT_TRUE(host->open_session(subscriber, kSecret));
+    EXPECT_TRUE(runtime->open_session(subscriber, kSecret));
     return subscribers.emplace_back(std::move(subscriber));
   }
   // A mark, a cut and a word about the hand: decided, and on no disk yet.
   void change_all() {
     const auto ask = [&](std::function<Result<RoomEvent>(Room&)> change) {
-      host->queue_event(std::move(change), [](const Result<RoomEvent>&) {});
+      runtime->queue_event(std::move(change), [](const Result<RoomEvent>&) {});
     };
     ask([this](Room& room) { return room.mark(ada, "here"); });
     Cut cut = strokes(ben, 1, 3)[0];
-    cut.lease_epoch = host->lease_epoch(ben);
-    host->queue_cut(std::make_shared<Told>(ben), cut, {});
+    cut.lease_epoch = runtime->lease_epoch(ben);
+    runtime->queue_cut(std::make_shared<Told>(ben), cut, {});
     ask([this](Room& room) { return room.supervise(ada, ben, {.stopped = true, .words = "wait"}); });
     tick(false);
   }
@@ -142,7 +142,7 @@ std::uint64_t furthest(const Told& subscriber) {
 TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
   const RoomSeq kept = store->head().seq;
   change_all();
-  ASSERT_EQ(host->room_seq().value, kept.value + 3) << "all of it is decided";
+  ASSERT_EQ(runtime->room_seq().value, kept.value + 3) << "all of it is decided";
   ASSERT_EQ(store->head().seq, kept) << "and none of it kept";
   const auto hand = session();
   tick(false);
@@ -168,11 +168,11 @@ TEST_F(BegunSession, OfARoomThatIsKilledSaysNoMoreThanWasLeft) {
   const auto again = session();  // the same hand, over another line
   tick(false);
   const std::uint64_t heard = std::max(furthest(*before), furthest(*again));
-  const RoomSeq decided = host->room_seq();
+  const RoomSeq decided = runtime->room_seq();
   kill();
   open();
-  EXPECT_LT(host->room_seq(), decided) << "something was lost";
-  EXPECT_LE(heard, host->room_seq().value);
+  EXPECT_LT(runtime->room_seq(), decided) << "something was lost";
+  EXPECT_LE(heard, runtime->room_seq().value);
   EXPECT_EQ(count(*before, v1::SessionResponse::kComplete), 1u);
   const auto after = session();
   tick(true);

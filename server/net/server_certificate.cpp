@@ -1,4 +1,4 @@
-#include "server/net/certificate.hpp"
+#include "server/net/server_certificate.hpp"
 
 #include <openssl/bio.h>
 #include <openssl/pem.h>
