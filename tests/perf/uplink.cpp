@@ -138,7 +138,7 @@ json run_tool(const BadNetwork& network, double seconds) {
   // By bins of samples: what was sent, and how many cuts were closed.
   std::vector<Sent> cutting, idle;
   Clock::time_point last_cut{};
-  for (const haptic::CutEntry& cut : done.cuts)
+  for (const haptic::RecordedCut& cut : done.cuts)
     last_cut = std::max(last_cut, Clock::time_point(std::chrono::nanoseconds(cut.closed_mono_ns)));
   const std::chrono::duration<double> resting(kIdle_s - 1.5);
   const auto idle_from = samples.back().at - std::chrono::duration_cast<Clock::duration>(resting);

@@ -160,7 +160,7 @@ TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
 }
 
 wire::IndexedEntry word(std::uint64_t index, std::uint64_t seq, bool stopped) {
-  wire::IndexedEntry row{
+  wire::IndexedEntry entry{
       index, {.room_seq = RoomSeq{seq}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = seq + 1}};
   entry.entry.supervision.stopped = stopped;
   return entry;

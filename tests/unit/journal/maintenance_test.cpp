@@ -255,7 +255,7 @@ TEST(Migration, RefusesTablesThatAreNotThoseOfTheVersion) {
   const auto opened = Journal::open(folder / "journal");
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::invalid_input);
-  EXPECT_THAT(opened.error().message, HasSubstr("how its tables of version 4 are made"));
+  EXPECT_THAT(opened.error().message, HasSubstr("the definition of its tables of version 4 is damaged"));
 }
 
 }  // namespace

@@ -39,7 +39,7 @@ class JournalCommands : public ::testing::Test {
       ASSERT_TRUE(
           kept.room->mark(kept.hand, std::to_string(kept.room->room_seq().value + 1) + "." + std::string(20, 'x')));
     kept.keep();
-    last_ = kept.store->head().place.value;
+    last_ = kept.store->head().seq.value;
     ASSERT_TRUE(kept.store->close());
     whole_ = bytes_of(file_);
   }
@@ -158,7 +158,7 @@ TEST_F(JournalCommands, ADamagedJournalIsSaidToBeOneAndGivesWhatIsConfirmed) {
   EXPECT_EQ(replayed.exit_code, 0) << replayed.err;
   EXPECT_THAT(replayed.out, AllOf(HasSubstr(fault), HasSubstr("room hash")));
   done("branch", {file("b"), "--at", confirmed});
-  EXPECT_EQ(verify_journal(dir_ / "b")->head.place.value, bad_ - 1);
+  EXPECT_EQ(verify_journal(dir_ / "b")->head.seq.value, bad_ - 1);
   done("export", {file("lines"), "--to", confirmed});
   const std::string lines = bytes_of(dir_ / "lines");
   EXPECT_EQ(std::ranges::count(lines, '\n'), static_cast<std::ptrdiff_t>(bad_ - 1));
