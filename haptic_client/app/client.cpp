@@ -107,7 +107,7 @@ class Client {
         recorder_.finish({hash, replica_.room_seq().value, outcome_.rows_dropped, outcome_.lost.has_value()});
     if (const Result<void> written = log_.finish(); !written && !outcome_.lost) outcome_.lost = written.error();
     outcome_.restrictions.insert(outcome_.restrictions.end(), loop_notes_.begin(), loop_notes_.end());
-    std::ranges::stable_sort(outcome_.restrictions, {}, &OversightNote::mono_ns);
+    std::ranges::stable_sort(outcome_.restrictions, {}, &RestrictionNote::mono_ns);
     outcome_.coupling_n_per_mm = session_.loop().coupling_n_per_mm();
     outcome_.workspace_scale = session_.loop().mapping().scale();
     outcome_.steps = session_.results();
@@ -162,7 +162,7 @@ class Client {
     };
     events.supervised = [this, pass](const HandSupervised& decided) {
       // Passed to the loop at once: it must not wait for earlier work of the replica.
-      oversights_.store(
+      restrictions_.store(
           haptic_restrictions(decided.supervision, decided.seq, decided.lease_epoch, session_.plan().tools));
       pass(decided);
     };
@@ -204,7 +204,7 @@ class Client {
   // [haptic] Applies an instructor's restrictions and guidance.
   void supervise() {
     HapticLoop& loop = session_.loop();
-    if (oversights_.refresh()) loop.supervise(oversights_.value());
+    if (restrictions_.refresh()) loop.supervise(restrictions_.value());
     loop.supervise(unpacked(stop_flag_.load(std::memory_order_relaxed)));
     partners_.refresh();
     loop.see_guide(guide_among(partners_.value(), loop.guard().now().guide));
@@ -550,7 +550,7 @@ class Client {
         any = true;
         log_.write(row, tool_name(row));
         note_range(row);
-        note_oversight(row);
+        note_restrictions(row);
         recorder_.push(row);
       }
       if (realtime_refused_.exchange(false))
@@ -603,7 +603,7 @@ class Client {
   }
 
   // Notes the effects in the loop, tick by tick: the time of a stop is known to the millisecond.
-  void note_oversight(const TickRow& row) {
+  void note_restrictions(const TickRow& row) {
     const LoopReport& r = row.report;
     const bool forbidden = (r.events & kForbidden) != 0, led = (r.events & kHandGuided) != 0;
     if (forbidden != was_forbidden_) loop_notes_.push_back({row.mono_ns, 0, forbidden ? "may not cut" : "may cut"});
@@ -681,7 +681,7 @@ class Client {
   TripleBuffer<ToolPlace> places_;                                // haptic → replica
   TripleBuffer<std::vector<PlacedGuide>> guides_;                 // all items of the room's scene, replica → haptic
   std::map<Digest, std::shared_ptr<const SolidLattice>> solids_;  // of its definitions; replica thread
-  TripleBuffer<HapticRestrictions> oversights_;                   // an instructor's restrictions, session → haptic
+  TripleBuffer<HapticRestrictions> restrictions_;                 // an instructor's restrictions, session → haptic
   TripleBuffer<MountUpdate> places_of_bone_;                      // session → haptic
   std::atomic<std::uint64_t> line_{1};                            // number of the present connection
   TripleBuffer<MountLoad> pushes_;                                // haptic → reporter
@@ -722,7 +722,7 @@ class Client {
   Clock::time_point lag_asked_{};
   bool was_forbidden_ = false, was_led_ = false;
   double force_before_n_ = 0;
-  std::vector<OversightNote> loop_notes_;
+  std::vector<RestrictionNote> loop_notes_;
   // Replica thread.
   bool supervised_ = false;    // the hand is restricted
   std::string guard_;          // by whom, as far as the room says it

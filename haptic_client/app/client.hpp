@@ -25,7 +25,7 @@ struct ClientOptions {
 };
 
 // An instructor's decision about the hand, or what the haptic loop did because of it.
-struct OversightNote {
+struct RestrictionNote {
   std::int64_t mono_ns = 0;
   std::uint64_t room_seq = 0;  // of the decision; 0: the loop's own note
   std::string what;
@@ -54,7 +54,7 @@ struct ClientOutcome {
   std::size_t unconfirmed = 0;  // own cuts that are not in it, because the room never confirmed them
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
   std::uint64_t held_for_room_ticks = 0;    // ticks in which the spindle was held because the room was silent or behind
-  std::vector<OversightNote> restrictions;  // in the order received
+  std::vector<RestrictionNote> restrictions;  // in the order received
   std::vector<WordsNote> words;
   std::int64_t began_ns = 0;          // the session's first time
   std::uint64_t forbidden_ticks = 0;  // ticks in which the tool was not permitted to cut

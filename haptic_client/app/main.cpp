@@ -101,7 +101,7 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
 json haptic_restrictions(const ClientOutcome& outcome) {
   const auto seconds = [&](std::int64_t mono_ns) { return 1e-9 * static_cast<double>(mono_ns - outcome.began_ns); };
   json notes = json::array(), words = json::array();
-  for (const OversightNote& note : outcome.restrictions) {
+  for (const RestrictionNote& note : outcome.restrictions) {
     notes.push_back({{"at_s", seconds(note.mono_ns)}, {"what", note.what}});
     if (!note.by.empty()) notes.back()["by"] = note.by;
     if (note.room_seq != 0) notes.back()["room_seq"] = note.room_seq;

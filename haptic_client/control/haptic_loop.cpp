@@ -337,9 +337,9 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   // console and have a hand with another number. And the guiding hand is where this hand is.
   std::array<PartnerTool, PartnerContact::kMost> others;
   std::size_t count = 0;
-  const HapticRestrictions& oversight = guard_.now();
+  const HapticRestrictions& restrictions = guard_.now();
   for (const PartnerTool& partner : partners_)
-    if (count < others.size() && !oversight.taken_by && partner.author != oversight.guide.value)
+    if (count < others.size() && !restrictions.taken_by && partner.author != restrictions.guide.value)
       others[count++] = partner;
   const PartnerForce felt = partner_contact_.step(touch_points_[static_cast<std::size_t>(tool_)],
                                                   report.pose_bone_proxy, std::span(others).first(count), params_.dt_s);
@@ -352,15 +352,15 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
 }
 
 void HapticLoop::lead(const LoopInput& input, const Left& left, LoopReport& report) noexcept {
-  const HapticRestrictions& oversight = guard_.now();
+  const HapticRestrictions& restrictions = guard_.now();
   GuideSeen seen = guide_seen_;
-  seen.there &= static_cast<bool>(oversight.guide);
+  seen.there &= static_cast<bool>(restrictions.guide);
   guide_pull_.see(seen);
   const Vec3& guide_mm = guide_pull_.smoothed_mm();
   GuideMoment moment;
   moment.handle_mm = input.pose_device_tool.position_mm;
   moment.guide_mm = mapping_.pose_device_tool({bone_.point(guide_mm), Eigen::Quaterniond::Identity()}).position_mm;
-  moment.share = input.room == RoomLink::over ? 0.0 : oversight.guide_share;
+  moment.share = input.room == RoomLink::over ? 0.0 : restrictions.guide_share;
   moment.room_n = left.room_n;
   moment.slew_n = left.slew_n;
   moment.rest_n = report.coupling_device_n + report.partner_device_n;

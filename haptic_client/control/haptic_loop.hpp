@@ -129,7 +129,7 @@ class HapticLoop {
   // at rest.
   void take_up(int tool, const Pose& pose_rest_tool, const WorkspaceMapping& mapping) noexcept;
   // [haptic] Takes effect from the next tick on, until the next call.
-  void supervise(const HapticRestrictions& oversight) noexcept { guard_.set(oversight); }
+  void supervise(const HapticRestrictions& restrictions) noexcept { guard_.set(restrictions); }
   void supervise(const StopFlag& flag) noexcept { guard_.set(flag); }
   void see_guide(const GuideSeen& seen) noexcept { guide_seen_ = seen; }  // of the person that the restrictions name
   // Pose of the bone on its mount, relative to its rest pose, which is in its own frame. Without a call the bone is at

@@ -58,7 +58,7 @@ class SupervisionGuard {
   // one tick.
   static constexpr double kEdge_mm = 0.4;
 
-  void set(const HapticRestrictions& oversight) noexcept { now_ = oversight; }
+  void set(const HapticRestrictions& restrictions) noexcept { now_ = restrictions; }
   void set(const StopFlag& flag) noexcept { flag_ = flag; }
   [[nodiscard]] const HapticRestrictions& now() const noexcept { return now_; }
   // By a log entry or, before it has arrived, by a datagram.

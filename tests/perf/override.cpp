@@ -115,7 +115,8 @@ json run_line(const Line& line, int times) {
   auto note = done.restrictions.begin();
   for (std::size_t i = 0; i < words.size(); ++i) {
     const std::int64_t until = i + 1 < words.size() ? words[i + 1].asked_ns : now_ns();
-    while (note != done.restrictions.end() && (note->what != "may not cut" || note->mono_ns < words[i].asked_ns)) ++note;
+    while (note != done.restrictions.end() && (note->what != "may not cut" || note->mono_ns < words[i].asked_ns))
+      ++note;
     if (note == done.restrictions.end() || note->mono_ns >= until) continue;
     after_answer.push_back(1e-6 * static_cast<double>(note->mono_ns - words[i].answered_ns) - line.one_way_ms);
     after_asking.push_back(1e-6 * static_cast<double>(note->mono_ns - words[i].asked_ns) - line.one_way_ms);
