@@ -1,4 +1,4 @@
-// A room in a journal, as processes see it: killed servers, a stop and a start, files that are none.
+// Tests a room with a journal, as processes see it: killed servers, a stop and a start, and files that are no journals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -34,7 +34,7 @@ TEST(Kept, AHundredKilledServersLoseNothingTheyAcknowledged) {
               static_cast<unsigned long long>(report.kept), static_cast<unsigned long long>(report.lost));
 }
 
-// A stop and a start in between: the same bone, and what was cut before can still be undone.
+// After a stop and a start the bone is the same, and cuts from before can still be undone.
 TEST(Kept, ARoomGoesOnWithAllThatCanBeUndone) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
@@ -70,7 +70,7 @@ TEST(Kept, ARoomGoesOnWithAllThatCanBeUndone) {
   EXPECT_EQ(status_of(late.session().room()).field_hash(), uncut);
 }
 
-// What osteon-server rooms prints; empty where it fails.
+// Output of `osteon-server rooms`. Empty if it fails.
 std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "rooms");
   arguments.insert(arguments.end(), {"--server", stage.address()});
@@ -78,7 +78,7 @@ std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
   return result.exit_code == 0 ? result.out : "";
 }
 
-// As a person at the command line makes them, with hands in two of them at the moment of the kill.
+// Rooms as a person makes them on the command line. Hands are in two of them when the server is killed.
 TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
   TempDir folder;
   const std::string kept = (folder / "rooms").string();
@@ -117,7 +117,7 @@ TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
   EXPECT_EQ(summary.at("rooms").size(), 2u);
 }
 
-// A room that somebody makes beside the server's own changes nothing of how that one is kept.
+// A room made beside the server's own room does not change how that one is saved.
 TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
   TempDir folder;
   const std::string file = (folder / "bone.vdb").string();
@@ -130,7 +130,7 @@ TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
     ASSERT_TRUE(hand.session().send(cut));
     ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience));
   }
-  ASSERT_NE(rooms(stage, {"create", "anna"}), "");  // before "room" in the order of names
+  ASSERT_NE(rooms(stage, {"create", "anna"}), "");  // before "room" in alphabetical order
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   const auto saved = load_fields(file);
   ASSERT_TRUE(saved.has_value()) << saved.error().message;
@@ -162,7 +162,7 @@ void expect_refused(const std::vector<std::string>& arguments, const std::vector
     EXPECT_NE(server.err.find(word), std::string::npos) << word << " in " << server.err;
 }
 
-// Of all files but the audit log, which names each command that was refused.
+// Of all files but the audit log, which names each refused command.
 std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder) {
   std::map<std::string, std::string> all;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -174,8 +174,8 @@ std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder)
   return all;
 }
 
-// Whoever works on the journal of a running server, also after removing what looks like a lock, changes nothing and is
-// told.
+// A program on the journal of a running server changes nothing and reports the reason, even after somebody removed what
+// looks like a lock.
 TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   TempDir folder;
   const std::filesystem::path kept = folder / "kept", file = kept / "room.journal", to = folder / "new";
@@ -224,7 +224,7 @@ TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   EXPECT_NE(replayed.out.find(to_hex(hash)), std::string::npos) << replayed.out;
 }
 
-// Two rooms of one case, whose files somebody has exchanged.
+// Two rooms of one case whose files somebody has exchanged.
 TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
   TempDir folder;
   const std::filesystem::path kept = folder / "rooms", a = kept / "anna.journal", b = kept / "berta.journal";
@@ -252,7 +252,7 @@ TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
   ASSERT_EQ(stage.server().terminate(), 0);
 }
 
-// Whoever knows how the chain is made can go on with it. They do not have the server's key.
+// Anybody who knows how the chain is made can continue it. They do not have the server's key.
 TEST(Kept, InventedEventsAreSignedByNobody) {
   TempDir folder;
   const std::filesystem::path file = folder / "room.journal", key_file = folder / "signing.key";
@@ -306,7 +306,7 @@ TEST(Kept, InventedEventsAreSignedByNobody) {
   verified = server({"verify", file.string()});
   EXPECT_EQ(verified.out.find("sound"), std::string::npos) << verified.out;
 
-  // Another server's key, a new key of the same server, a key that is none.
+  // Another server's key, a new key of the same server, and a file that is not a key.
   const auto rotated = server({"key", "rotate", key_file.string()});
   ASSERT_EQ(rotated.exit_code, 0) << rotated.err;
   EXPECT_NE(rotated.out.substr(0, 64), key);
