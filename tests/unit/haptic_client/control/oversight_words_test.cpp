@@ -1,4 +1,4 @@
-// What a log says of a decision about the hand, and of who made it.
+// Tests what a log says of a decision about the hand, and of who made it.
 #include <gtest/gtest.h>
 
 #include "haptic_client/control/supervision_guard.hpp"
