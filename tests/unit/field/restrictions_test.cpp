@@ -31,7 +31,7 @@ TEST(ZoneLimit, IsABall) {
   EXPECT_FALSE(zone.contains({1400, -2400, 3400})) << "within the cube, not the ball";
 }
 
-// As far apart as numbers go, squares do not wrap round.
+// At the largest possible distances, squares do not overflow.
 TEST(ZoneLimit, HoldsAtTheEndsOfTheNumbers) {
   constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min(),
                          kHigh = std::numeric_limits<std::int32_t>::max();

@@ -51,7 +51,7 @@ struct Welded {
   double area = 0.0, volume = 0.0;
 };
 
-// Joins vertices only where their bits are equal: what makes the surface closed must be exact.
+// Joins vertices only if their bits are equal, because the surface must be closed exactly.
 Welded weld(const std::map<BlockKey, BlockPayload>& blocks, double pitch) {
   Welded all;
   for (const auto& [key, payload] : blocks) {
@@ -88,7 +88,7 @@ TEST(MarchingCubes, ASphereAcrossBlocksIsOneClosedSurface) {
   const int edges = static_cast<int>(mesh.edges.size()) / 2;
   EXPECT_EQ(static_cast<int>(mesh.points.size()) - edges + mesh.triangles, 2);  // Euler characteristic of a sphere
   EXPECT_NEAR(mesh.area, 4.0 * kPi * 25.0, 0.01 * 4.0 * kPi * 25.0);
-  // Positive: triangles are counter-clockwise seen from outside.
+  // Positive if triangles are counter-clockwise as seen from outside.
   EXPECT_NEAR(mesh.volume, 4.0 / 3.0 * kPi * 125.0, 0.01 * 4.0 / 3.0 * kPi * 125.0);
 }
 
@@ -108,7 +108,7 @@ vtkIdType flying_edges_triangles(const std::vector<float>& values, int n) {
   vtkNew<vtkImageData> image;
   image->SetDimensions(n, n, n);
   image->AllocateScalars(VTK_FLOAT, 1);
-  // VTK's x is fastest; which axis is called x does not change the count.
+  // VTK's x is fastest. Which axis is called x does not change the count.
   std::ranges::copy(values, static_cast<float*>(image->GetScalarPointer()));
   vtkNew<vtkFlyingEdges3D> contour;
   contour->SetInputData(image);
@@ -145,7 +145,7 @@ TEST(MarchingCubes, NoiseToo) {
   std::vector<float> gathered(static_cast<std::size_t>(kBlockApron * kBlockApron * kBlockApron));
   for (float& v : gathered) v = noise(random);
   const Mesh mesh = *decode_block({}, encode_block(gathered, gathered, 0, 1.0), 1.0);
-  // Every crossed edge has its vertex, however wild the field is.
+  // Every crossed edge has its vertex, however irregular the field is.
   std::size_t crossings = 0;
   const std::vector<float> f = inner_samples(gathered);
   const auto at = [&](int x, int y, int z) {
