@@ -1,4 +1,4 @@
-// What the console makes of a line, at a desk that keeps what it was asked.
+// Tests how the console carries out a line, with a supervision client that records what it was asked.
 #include "viewer_client/app/console.hpp"
 
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ class FakeDesk final : public SupervisionClient {
   }
 
   mutable std::vector<PersonSeen> people_;
-  mutable std::optional<PersonSeen> late_;  // who is in the list of people once it was waited for
+  mutable std::optional<PersonSeen> late_;  // who is in the list of people after a wait for it
   std::vector<Annotation> drawn_;
   std::vector<WordsSeen> words_;
   std::vector<std::pair<AuthorId, Restrictions>> asked_;
@@ -148,7 +148,7 @@ TEST_F(ConsoleTest, SaysWhatIsKnownWhereItKnowsNothing) {
   EXPECT_FALSE(console.over());
 }
 
-// A name is the hand's rather than the viewer's of the same person, and never a guess.
+// A name means the person's hand rather than their viewer, and the console never guesses.
 TEST_F(ConsoleTest, FindsWhoIsMeant) {
   EXPECT_EQ(say("freeze Ben"), "ok at 11");
   EXPECT_EQ(desk.asked_.back().first, AuthorId{2});
@@ -162,7 +162,7 @@ TEST_F(ConsoleTest, FindsWhoIsMeant) {
   EXPECT_EQ(desk.asked_.size(), 3u);
 }
 
-// All that holds for a hand is said each time, so that one decision does not undo another.
+// All restrictions of a hand are sent each time, so that one decision does not undo another.
 TEST_F(ConsoleTest, DecisionsAddUp) {
   EXPECT_EQ(say("limit force Ben 2.5").find("ok"), 0u);
   EXPECT_EQ(say("limit zone Ben 1 -2 3 10").find("ok"), 0u);
@@ -195,7 +195,8 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
   EXPECT_EQ(say("guide Ben along Ada share 2").find("error"), 0u);
 }
 
-// Who has a hand here takes the tool into that one; not into one that is away, nor another's of the same name.
+// A person with a hand in the room takes the tool into that hand. It must not be a hand that is away, or another
+// person's hand with the same name.
 TEST_F(ConsoleTest, ATakenToolIsInTheHandOfWhoTypes) {
   desk.people_.push_back({.author = {7}, .name = "Ada", .role = Role::instructor, .hand = true});
   desk.people_.push_back({.author = {8}, .name = "Ada", .role = Role::trainee, .here = true, .hand = true});
@@ -289,7 +290,7 @@ TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   EXPECT_EQ(say("wait acknowledged Ben"), "ok at 12");
 }
 
-// The answer comes before the list of people has the demonstrator: what is said next may name it all the same.
+// The answer comes before the demonstrator is in the list of people. The next command may still name it.
 TEST_F(ConsoleTest, Demonstrates) {
   EXPECT_EQ(say("demonstrate"), "ok demonstrator #9 cuts 12");
   EXPECT_EQ(say("demonstrate \"the other room\" of Ben from 3 to 77 speed 0.5"), "ok demonstrator #9 cuts 12");

@@ -33,7 +33,7 @@ PeopleSeen all_three() {
   return {{person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")}, {}, {}};
 }
 
-// Ada under what was decided about her.
+// Ada with the restrictions that were decided about her.
 PeopleSeen about_ada(const Restrictions& supervision) {
   PeopleSeen seen = all_three();
   seen.people[0].supervision = supervision;
@@ -132,7 +132,7 @@ TEST(PeopleView, WhatAlreadyHoldsIsToldToWhoComesLater) {
   change.people[0].supervision.stopped = true;
   view.take(change, kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), 1u);
-  // After a connection was lost everything is told once more: nothing of it is new.
+  // After a lost connection everything is sent once more. Nothing of it is new.
   view.take(change, kSelf, kNow + 60s);
   EXPECT_THAT(view.notices(kNow + 60s), IsEmpty());
   EXPECT_EQ(view.holding(), "Your hand is stopped");
@@ -185,7 +185,7 @@ TEST(PeopleView, PeopleAreFoundByNameOrNumber) {
   }
   EXPECT_EQ(view.names().at(AuthorId{10}), "#10");
   EXPECT_EQ(view.name_of(kCy), "Cy");
-  // Who came back under the same name is the newer one.
+  // A person who came back under the same name is the newer one.
   change.people[0].here = false;
   change.people[3].here = true;
   view.take(change, kSelf, kNow);
@@ -255,7 +255,7 @@ TEST(CameraView, LooksAsSomebodyElse) {
   EXPECT_EQ(looking_as(look, own).eye_mm, own.eye_mm);
 }
 
-// Who follows sees the picture as the other does, also where they have rolled it.
+// A person who follows sees the same picture as the other, also where the other has rolled it.
 TEST(CameraView, RollsAsSomebodyElseDoes) {
   CameraView theirs;
   theirs.eye_mm = Vec3(10, -200, 0);
@@ -271,7 +271,7 @@ TEST(CameraView, RollsAsSomebodyElseDoes) {
   EXPECT_FALSE(look_of(theirs, 800, 600).up);
 }
 
-// A turn of the picture is told as any other move of the camera is.
+// A roll of the picture is sent like any other move of the camera.
 TEST(CameraView, LooksThatRollAreNotNearEachOther) {
   ViewFrustum look{Vec3(0, -200, 0), Vec3::Zero(), 0.001, 0.4, Vec3(0, 0, 1)}, other = look;
   EXPECT_TRUE(nearly_equal(look, other));
