@@ -26,7 +26,7 @@ std::vector<std::string> plus(std::vector<std::string> arguments, const std::vec
   return arguments;
 }
 
-class DoorsOfPrograms : public ::testing::Test {
+class AuthenticatedPrograms : public ::testing::Test {
  protected:
   // Makes a ticket with the operator's own command.
   std::filesystem::path ticket(const std::string& user, const std::string& role, const std::string& room = "room") {
@@ -77,7 +77,7 @@ class DoorsOfPrograms : public ::testing::Test {
   Stage stage_{30.0, {"--certificates", people_.server()}};
 };
 
-TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
+TEST_F(AuthenticatedPrograms, AdmitWhoMayEnterAndKeepOthersFromDisturbingThem) {
   Process sue = haptic("sue", "sue", "trainee", {{"steps", {drill_at(0, 0, "rig")}}});
   Process dora = haptic("dora", "dora", "collaborator", {{"steps", {drill_at(9, 9, "rig")}}});
   Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"},
@@ -137,7 +137,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
 }
 
 // An instructor supervises with a console and watches in a viewer. Both use one certificate.
-TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
+TEST_F(AuthenticatedPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen) << "Xvfb, of Debian's package xvfb, did not start";
   const auto ida = credentials("ida", ticket("ida", "instructor"));

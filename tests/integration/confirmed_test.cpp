@@ -84,7 +84,7 @@ class Confirmed : public ::testing::Test {
 
 // The room takes cuts whose acknowledgements are lost with the connection. It sends their sequence numbers when the
 // client comes back.
-TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
+TEST_F(Confirmed, TheCutLogHasEachCutsSequenceNumber) {
   ImpairProcess line({"--tcp", stage_.address()});
   ASSERT_FALSE(line.tcp().empty()) << line.process().err();
   Process hand = drill("hand", line.tcp(), {"--udp", "off", "--timeout", "30"});
@@ -181,7 +181,7 @@ class ConfirmedBeforeAnOlderCopy : public Confirmed {
   std::optional<Surgeon> hand_;
 };
 
-TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCuts) {
+TEST_F(ConfirmedBeforeAnOlderCopy, ReportsTheLossToItsClientsAndTakesNoCuts) {
   for (const auto& entry : fs::directory_iterator(copy_.path() / "copy")) fs::copy(entry.path(), folder_.path());
   EXPECT_THAT(what_the_hand_is_told(),
               HasSubstr("has lost 3 of the 3 events that were acknowledged to you, and takes no more cuts"));
@@ -191,7 +191,7 @@ TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCu
   EXPECT_TRUE(wait_until(operator_is_told, 10s)) << stage_.server().err();
 }
 
-TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAfterARecovery) {
+TEST_F(ConfirmedBeforeAnOlderCopy, ReportsTheLossToItsClientsAfterASalvage) {
   const RunResult recovered =
       run(program("osteon-server"), {"salvage", copy_.path() / "copy" / "room.journal", journal()}, 30s);
   ASSERT_EQ(recovered.exit_code, 0) << recovered.err;

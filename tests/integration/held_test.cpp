@@ -68,7 +68,7 @@ TEST(Held, AHandThatIsStartedAgain) {
   expect_held(stage);
 }
 
-TEST(Held, AHandThatIsStartedAgainInAKeptRoom) {
+TEST(Held, AHandThatIsStartedAgainInAPersistedRoom) {
   const TempDir folder;
   Stage stage(24.0, {"--journal", (folder / "room.journal").string()});
   expect_held(stage);

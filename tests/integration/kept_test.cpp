@@ -18,7 +18,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(Kept, AHundredKilledServersLoseNothingTheyAcknowledged) {
+TEST(PersistedRooms, AHundredKilledServersLoseNothingTheyAcknowledged) {
   const KilledServers report = kill_servers(100, 1);
   EXPECT_EQ(report.fault, "");
   EXPECT_EQ(report.kills, 100);
@@ -35,7 +35,7 @@ TEST(Kept, AHundredKilledServersLoseNothingTheyAcknowledged) {
 }
 
 // After a stop and a start the bone is the same, and cuts from before can still be undone.
-TEST(Kept, ARoomGoesOnWithAllThatCanBeUndone) {
+TEST(PersistedRooms, ARoomGoesOnWithAllThatCanBeUndone) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
   Stage stage(12.0, {"--journal", file});
@@ -79,7 +79,7 @@ std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
 }
 
 // Rooms as a person makes them on the command line. Hands are in two of them when the server is killed.
-TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
+TEST(PersistedRooms, TheRoomsOfAKilledServerAreOpenAgain) {
   TempDir folder;
   const std::string kept = (folder / "rooms").string();
   Stage stage(12.0, {"--rooms", kept});
@@ -118,7 +118,7 @@ TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
 }
 
 // A room made beside the server's own room does not change how that one is saved.
-TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
+TEST(PersistedRooms, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
   TempDir folder;
   const std::string file = (folder / "bone.vdb").string();
   Stage stage(12.0, {"--save", file});
@@ -138,7 +138,7 @@ TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
   EXPECT_EQ(read_json(stage / "server.json").at("rooms").size(), 2u);
 }
 
-TEST(Kept, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
+TEST(PersistedRooms, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
   TempDir folder;
   const std::filesystem::path file = folder / "my room.2026.journal";
   Stage stage(12.0, {"--journal", file.string()});
@@ -176,7 +176,7 @@ std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder)
 
 // A program on the journal of a running server changes nothing and reports the reason, even after somebody removed what
 // looks like a lock.
-TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
+TEST(PersistedRooms, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   TempDir folder;
   const std::filesystem::path kept = folder / "kept", file = kept / "room.journal", to = folder / "new";
   std::filesystem::create_directory(kept);
@@ -225,7 +225,7 @@ TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
 }
 
 // Two rooms of one case whose files somebody has exchanged.
-TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
+TEST(PersistedRooms, ARoomIsServedOnlyUnderItsOwnName) {
   TempDir folder;
   const std::filesystem::path kept = folder / "rooms", a = kept / "anna.journal", b = kept / "berta.journal";
   Stage stage(12.0, {"--rooms", kept.string()});
@@ -253,7 +253,7 @@ TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
 }
 
 // Anybody who knows how the chain is made can continue it. They do not have the server's key.
-TEST(Kept, InventedEventsAreSignedByNobody) {
+TEST(PersistedRooms, InventedEventsAreSignedByNobody) {
   TempDir folder;
   const std::filesystem::path file = folder / "room.journal", key_file = folder / "signing.key";
   Stage stage(12.0, {"--journal", file.string()});
@@ -317,7 +317,7 @@ TEST(Kept, InventedEventsAreSignedByNobody) {
   expect_refused({"key", "show", key_file.string()}, {"chmod 600 " + key_file.string()});
 }
 
-TEST(Kept, SaysWhatIsWrongWithAJournal) {
+TEST(PersistedRooms, SaysWhatIsWrongWithAJournal) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
   Stage stage(12.0, {"--journal", file}), other(14.0);

@@ -355,7 +355,7 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
     EXPECT_NE(stage.server().err().find(event), std::string::npos) << event;
 }
 
-TEST(Operators, AClientOfAnotherVersionIsToldBothVersionsAndTheRemedy) {
+TEST(Operators, AClientOfAnotherVersionGetsBothVersionsAndTheRemedy) {
   Stage stage(12.0);
   const auto channel = grpc::CreateChannel(stage.address(), grpc::InsecureChannelCredentials());
   v1::JoinRequest request;

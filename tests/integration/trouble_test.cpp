@@ -275,7 +275,7 @@ TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
   EXPECT_NE(haptic.out().find("0 of 1 steps done"), std::string::npos) << haptic.out();
 }
 
-TEST(Trouble, AHandWithoutRealTimePriorityIsToldSo) {
+TEST(Trouble, AHandWithoutRealTimePriorityIsWarned) {
   Stage stage(16.0);
   nlohmann::json step = drill_at(0, 0, "rig");
   step["to_mm"] = 1.0;

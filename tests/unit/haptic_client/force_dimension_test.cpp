@@ -172,7 +172,7 @@ TEST_F(ForceDimensionArm, UnpluggedItHasNoForceAndComesBack) {
   arm()->closed = arm()->opened - 1;
 }
 
-TEST_F(ForceDimensionArm, ADeviceErrorIsToldWithItsRemedy) {
+TEST_F(ForceDimensionArm, ADeviceErrorIsReportedWithItsRemedy) {
   ASSERT_TRUE(device_->open());
   arm()->next_error = 7;
   push({}, 100);

@@ -235,7 +235,7 @@ TEST_F(Phantom, UnpluggedItHasNoForceAndComesBack) {
   EXPECT_EQ(static_cast<std::size_t>(connection.losses()), heard.count(DeviceEvent::lost));
 }
 
-TEST_F(Phantom, ADeviceErrorEndsTheForceAndIsTold) {
+TEST_F(Phantom, ADeviceErrorEndsTheForceAndIsReported) {
   Heard heard;
   DeviceConnection connection(*device_, heard.notice(), {10ms, 10ms});
   ASSERT_TRUE(connection.start());

@@ -417,7 +417,7 @@ TEST(Recording, NamesItsEvents) {
 }
 
 // A contact is reported once, however the hand trembles on it. The next contact is reported again.
-TEST(MetalWatch, TellsEachContactOnce) {
+TEST(MetalWatch, ReportsEachContactOnce) {
   const ToolModel model(*find_tool("drill-3.2"), 0.5);
   MetalWatch watch;
   int told = 0;
@@ -455,7 +455,7 @@ struct RangeTicks {
 };
 
 // Each law is reported once in a session, if it stays outside. Everything after that is counted.
-TEST(RangeWatch, TellsOfEachLawOnce) {
+TEST(RangeWatch, ReportsEachLawOnce) {
   const ToolModel drill(*find_tool("drill-3.2"), 0.5), other(*find_tool("drill-3.5"), 0.5);
   const ToolModel saw(*find_tool("saw-oscillating-1"), 0.5);
   RangeTicks ticks;
@@ -478,7 +478,7 @@ TEST(RangeWatch, TellsOfEachLawOnce) {
 
 // A cone that enters is outside for less than 0.2 s. Nothing is reported, however many holes follow, but each tick is
 // counted. A law that is outside in two ticks of three is still reported: it gains one tick in three.
-TEST(RangeWatch, TellsOnlyOfWhatLasts) {
+TEST(RangeWatch, ReportsOnlyWhatLasts) {
   const ToolModel drill(*find_tool("drill-3.2"), 0.5);
   RangeTicks holes;
   for (int hole = 0; hole < 30; ++hole) {

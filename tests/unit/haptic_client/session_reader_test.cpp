@@ -139,7 +139,7 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
 }
 
 // Sequence numbers of the cuts that a rejoin acknowledges. A number that the room does not send stays unknown.
-TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
+TEST(SessionReader, SaysTheSequenceNumbersOfDecidedCuts) {
   std::optional<RoomAtJoin> told;
   SessionReader reader(
       AuthorId{7}, builtin_tool_box(), {.complete = [&](const RoomAtJoin& room) { told = room; }}, [](std::uint64_t) {},
@@ -176,7 +176,7 @@ v1::SessionResponse streamed_word(const wire::IndexedRow& row) {
 
 // Each entry arrives once and in the room's order, whichever way is first. An entry that only the stream brings keeps
 // its position among them.
-TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
+TEST(SessionReader, AnInstructorsDecisionKeepsItsSequenceNumber) {
   Heard heard;
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(word(2, 11, true)));  // a cut before it has not come
@@ -252,7 +252,7 @@ TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
 
 // A killed server may have lost what it had sent, so nothing of the new stream's order has been received yet. The
 // durable sequence number shows the loss.
-TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
+TEST(SessionReader, ItsSequenceNumberIsThatOfThePresentStream) {
   Heard heard;
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));

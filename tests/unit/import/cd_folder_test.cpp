@@ -167,7 +167,7 @@ TEST_F(CdFolder, ALargerOneOfAKindThatCannotBeImportedIsNotTaken) {
 }
 
 // The larger series is most likely the wanted one: the smaller one may be another bone.
-TEST_F(CdFolder, ALargerOneWithAMissingSliceIsToldAndNoOtherTaken) {
+TEST_F(CdFolder, ALargerOneWithAMissingSliceIsReportedAndNoOtherTaken) {
   fs::remove(series("SE1") / "slice-0010.dcm");
   const auto scan = read_dicom_series(cd_, keep_going);
   ASSERT_FALSE(scan);

@@ -116,7 +116,7 @@ TEST(CtImport, HollowLeavesTheMarrowOut) {
 }
 
 // A shaft that is broken right through. The marrow space bridges a narrow gap, and the import reports it.
-TEST(CtImport, PiecesThatOnlyMarrowJoinsAreTold) {
+TEST(CtImport, PiecesThatOnlyMarrowJoinsAreReported) {
   const auto broken = [](double gap_mm) {
     CtScan scan;
     scan.volume.dims = {60, 60, 60};

@@ -211,7 +211,7 @@ TEST(TemporaryFolder, GoesWithItsScope) {
   EXPECT_FALSE(fs::exists(path));
 }
 
-TEST(Isolated, ADeadChildIsToldWithItsFile) {
+TEST(Isolated, ADeadChildIsReportedWithItsFile) {
   std::vector<std::string> heard;
   IsolatedWork work;
   work.run = [](ChildChannel& channel) -> Result<void> {

@@ -65,7 +65,7 @@ TEST(MountServer, WouldMakeEnergyWithoutTheController) {
 }
 
 // Random loads that no hand would make, and bones that jump.
-TEST(MountFollower, PaysForWhatItGivesWhateverIsTold) {
+TEST(MountFollower, PaysForWhatItGivesWhateverIsSent) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> even(-1.0, 1.0);
   const auto any = [&] { return Vec3(even(random), even(random), even(random)); };

@@ -68,7 +68,7 @@ TEST(Hand, ScalingForcesKeepsMotion) {
   EXPECT_GT(full.position_mm().x(), 0.5);
 }
 
-TEST(Hand, ARigGoesExactlyWhereItIsTold) {
+TEST(Hand, ARigGoesExactlyToItsTarget) {
   Hand hand(expert_hand(), Vec3::Zero());
   hand.step({HandMode::rig, {1, 2, 3}, Vec3::UnitX()}, {-1000, 0, 0}, kDt);
   EXPECT_EQ(hand.position_mm(), Vec3(1, 2, 3));

@@ -167,7 +167,7 @@ TEST_F(Company, TheCameraFollowsEveryLookUntilItIsLetGo) {
   EXPECT_EQ(status_["camera"]["eye_mm"], (std::vector<double>{0, -200, 100}));
 }
 
-TEST_F(Company, TheHandBeforeTheWindowIsToldWhatWasDecided) {
+TEST_F(Company, TheHandBeforeTheWindowSeesWhatWasDecided) {
   room_.people_here[0].supervision.stopped = true;
   EXPECT_EQ(why(obey("", "Ada")), "ok");
   EXPECT_THAT(status_["said"], ElementsAre("Dr. Berg has stopped your hand"));

@@ -275,7 +275,7 @@ TEST_F(ConsoleTest, SpeaksToOneOrToAll) {
   EXPECT_EQ(say("said").find("ok at 11 #1 \"Ada\" to #2 \"Ben\" \"a little slower\"; at 12"), 0u);
 }
 
-TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
+TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveAcknowledged) {
   EXPECT_EQ(say("view Ben").find("error nobody knows"), 0u);
   desk.people_[2].look = ViewFrustum{.eye_mm = {1, 2, 3}, .target_mm = {4, 5, -6}};
   EXPECT_EQ(say("view Ben"), "ok eye 1.000 2.000 3.000 target 4.000 5.000 -6.000") << "by the viewer of the same name";

@@ -46,7 +46,7 @@ PeopleSeen said(std::uint64_t place, AuthorId from, AuthorId to, const std::stri
   return seen;
 }
 
-TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
+TEST(PeopleView, TheHandSeesWhatWasDecidedAboutIt) {
   PeopleView view("Ada");
   view.take(all_three(), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), IsEmpty());
@@ -62,7 +62,7 @@ TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
   EXPECT_EQ(view.holding(), "");
 }
 
-TEST(PeopleView, OthersAreToldOfWhom) {
+TEST(PeopleView, OthersSeeWhomItConcerns) {
   PeopleView view("Cy");
   view.take(all_three(), kSelf, kNow);
   Restrictions stopped;
@@ -126,7 +126,7 @@ TEST(PeopleView, TheRoomSaysWhoDecided) {
   EXPECT_EQ(view.holding(), "") << "nothing holds that anybody has decided";
 }
 
-TEST(PeopleView, WhatAlreadyHoldsIsToldToWhoComesLater) {
+TEST(PeopleView, WhoComesLaterSeesWhatAlreadyHolds) {
   PeopleView view("Ada");
   PeopleSeen change = all_three();
   change.people[0].supervision.stopped = true;

@@ -188,7 +188,7 @@ TEST_F(Picture, IsSavedAsPng) {
 }
 
 // Tests the render loop between a network thread's render queue and the window.
-TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
+TEST_F(Picture, TheLoopShowsWhatTheRenderQueueBrings) {
   const test::TempDir folder;
   ViewerOptions options;
   options.bounds = {Vec3(-20, -20, -20), Vec3(20, 20, 20)};

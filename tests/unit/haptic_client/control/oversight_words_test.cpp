@@ -6,7 +6,7 @@
 namespace osteon::haptic {
 namespace {
 
-TEST(OversightWords, SayAllThatHolds) {
+TEST(RestrictionWords, SayAllThatHolds) {
   EXPECT_EQ(in_words({}), "");
   EXPECT_EQ(in_words({.stopped = true, .words = "look here"}), "stopped");
   EXPECT_EQ(in_words({.stopped = true,
@@ -21,7 +21,7 @@ TEST(OversightWords, SayAllThatHolds) {
             "with 2 tools only");
 }
 
-TEST(OversightWords, SayWhoDecided) {
+TEST(RestrictionWords, SayWhoDecided) {
   EXPECT_EQ(called({AuthorId{7}, "Dr. Weber"}), "Dr. Weber");
   EXPECT_EQ(called({AuthorId{7}, ""}), "#7");
   EXPECT_EQ(called({}), "") << "of a server that does not say it";

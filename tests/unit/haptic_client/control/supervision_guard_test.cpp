@@ -22,7 +22,7 @@ ZoneLimit ball(const Vec3& centre_mm, double radius_mm) {
           static_cast<std::int32_t>(radius_mm / kQuantum_mm)};
 }
 
-TEST(SupervisionGuard, ADatagramsWordHoldsUntilANewerRow) {
+TEST(SupervisionGuard, ADatagramsFlagHoldsUntilANewerLogEntry) {
   SupervisionGuard guard;
   EXPECT_TRUE(guard.may_cut(0, Vec3::Zero()));
   guard.set(StopFlag{7, true});
