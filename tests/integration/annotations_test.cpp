@@ -97,7 +97,7 @@ TEST_F(Annotations, WhatOneDrawsTheOtherSeesUntilItIsWiped) {
   for (int x = line.width / 2 - 30; x <= line.width / 2 + 30; ++x)
     along += difference(line.at(x, line.height / 2), bare.at(x, bare.height / 2)) > 60 ? 1 : 0;
   EXPECT_EQ(along, 61);
-  EXPECT_LT(changed_in_middle(line, bare, 30), 61 * 16) << "a line, no more";
+  EXPECT_LT(changed_in_middle(line, bare, 30), 61 * 16) << "only a line is drawn";
 
   // Only the author of an annotation can remove it.
   ASSERT_TRUE(ada.tell("wipe all"));
@@ -150,7 +150,7 @@ TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
   EXPECT_TRUE(becomes(other, [&](const json&) {
     EXPECT_TRUE(other.tell("look as Dr. Berg"));
     return !looks_from(-70, -80, 40)(status(other));
-  })) << "the room knows of the new look";
+  })) << "the room has the new view";
   EXPECT_TRUE(looks_from(-70, -80, 40)(status(ada)));
 }
 

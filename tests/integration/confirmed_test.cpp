@@ -111,7 +111,7 @@ TEST_F(Confirmed, TheCutLogHasEachCutsSequenceNumber) {
     elsewhere += cuts["room_seq"][i] != (seq == kept.end() ? 0.0 : static_cast<double>(seq->second));
   }
   EXPECT_GT(confirmed, 150);
-  EXPECT_EQ(elsewhere, 0) << "cuts that the log has at another place than the journal";
+  EXPECT_EQ(elsewhere, 0) << "cuts with another sequence number in the log than in the journal";
 }
 
 // The hand cuts for two more seconds. The server never acknowledges those cuts.
@@ -145,7 +145,7 @@ TEST_F(Confirmed, AJournalThatIsGoneIsSaidToItsClients) {
   EXPECT_THAT(said, ContainsRegex("the room room begins anew: its journal has none of the [1-9][0-9]* events"));
   EXPECT_THAT(said, HasSubstr("start again to join it as it is now"));
   EXPECT_THAT(said, Not(HasSubstr("secret")));
-  EXPECT_THAT(stage_.server().err(), HasSubstr("begins anew")) << "the server's log says it too";
+  EXPECT_THAT(stage_.server().err(), HasSubstr("begins anew")) << "the server's log reports it too";
 }
 
 // A hand joins and cuts after the journal was copied. Then the copy replaces the journal.

@@ -335,7 +335,7 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   const fs::path marked = people_.ticket_file(
       "\xef\xbb\xbf"
       "osteon1.AAAA.AAAA");
-  EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "which would end the client";
+  EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "a refusal here would end the client";
   const std::map<std::string, fs::path> tickets{{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}};
   for (const auto& [what, file] : tickets) {
     said[what] = wire::client_credentials({.plain = false, .certificates = people_.person("anna"), .ticket = file})

@@ -192,7 +192,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   (void)told("guide trainee along #" + demonstrator + " share 1", "^ok at ([0-9]+)");
   ASSERT_TRUE(wait_until(
       [&] { return std::regex_search(ask("people"), std::regex("#" + demonstrator + " [^;]* away")); }, 120s));
-  EXPECT_EQ(told("people", "\"trainee\"[^;]* cuts ([0-9]+)"), cuts_before) << "led, and stopped all the same";
+  EXPECT_EQ(told("people", "\"trainee\"[^;]* cuts ([0-9]+)"), cuts_before) << "guided, but still stopped";
   ASSERT_TRUE(trainee.terminate(20s).has_value());
   EXPECT_EQ(ask("quit"), "ok");
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
@@ -224,7 +224,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   std::printf("95 %% of %zu moments within %.2f mm of where the demonstrator was, over %.1f mm\n", led.size(), apart_mm,
               high.y_mm - low.y_mm);
   EXPECT_LT(apart_mm, kWithin_mm);
-  EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "of the 18 mm that the expert went to and fro";
+  EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "part of the 18 mm that the expert moved to and fro";
 }
 
 // A person without a name never counts as one who comes back: restrictions of one unnamed hand do not hold for the
@@ -248,7 +248,7 @@ TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   Process second = stage.start_haptic("second", {{"steps", steps}});
   ASSERT_TRUE(there("#3 \"\" here hand")) << second.err();
   EXPECT_TRUE(there("#2 \"\" here hand frozen"));
-  EXPECT_EQ(ask("people").find("#3 \"\" here hand frozen"), std::string::npos) << "nobody has stopped this one";
+  EXPECT_EQ(ask("people").find("#3 \"\" here hand frozen"), std::string::npos) << "this hand is not stopped";
   ASSERT_TRUE(second.terminate(20s).has_value());
 
   Process ben = start_hand(stage, "ben", steps);
@@ -257,7 +257,7 @@ TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   ASSERT_TRUE(ben.terminate(20s).has_value());
   std::filesystem::remove(stage / "ben.h5");
   Process again = start_hand(stage, "ben", steps);
-  EXPECT_TRUE(there("#5 \"ben\" here hand frozen")) << "one person, by the name";
+  EXPECT_TRUE(there("#5 \"ben\" here hand frozen")) << "the same person, by the name";
   ASSERT_TRUE(again.terminate(20s).has_value());
   ASSERT_TRUE(first.terminate(20s).has_value());
   EXPECT_EQ(ask("quit"), "ok");

@@ -56,7 +56,7 @@ void expect_held(Stage& stage) {
   };
   ASSERT_TRUE(wait_until(held, 60s)) << ada.person(kAgain) << again.err();
   std::this_thread::sleep_for(1s);
-  EXPECT_EQ(ada.cuts(kAgain), 0u) << "it has its plan to carry out, and may not";
+  EXPECT_EQ(ada.cuts(kAgain), 0u) << "it must not carry out its plan";
   EXPECT_TRUE(ada.ask("free #3").starts_with("ok at "));
   EXPECT_TRUE(wait_until([&] { return ada.cuts(kAgain) >= 5; }, 60s)) << again.err();
   EXPECT_TRUE(again.terminate(20s).has_value());

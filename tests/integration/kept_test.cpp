@@ -22,7 +22,7 @@ TEST(PersistedRooms, AHundredKilledServersLoseNothingTheyAcknowledged) {
   const KilledServers report = kill_servers(100, 1);
   EXPECT_EQ(report.fault, "");
   EXPECT_EQ(report.kills, 100);
-  EXPECT_LT(report.killed_idle, 50) << "most are killed at work";
+  EXPECT_LT(report.killed_idle, 50) << "most kills are during work";
   EXPECT_GT(report.acknowledged, 1000u);
   EXPECT_EQ(report.lost, 0u);
   EXPECT_EQ(report.twice, 0u);

@@ -51,8 +51,8 @@ TEST(Mount, TwoHandsPressOneBone) {
     // A drill is pushed with about 29 N, and the mount yields by 1 mm per 5 N.
     EXPECT_GT(mount.at("most_mm").get<double>(), 1.0) << name;
     EXPECT_LT(mount.at("most_mm").get<double>(), 20.0) << name;
-    EXPECT_GT(mount.at("granted_mj").get<double>(), 0.0) << name << " is granted what the other gives";
-    EXPECT_GT(mount.at("low_pass_s").get<double>(), 0.5) << name << " waits for the slowest line";
+    EXPECT_GT(mount.at("granted_mj").get<double>(), 0.0) << name << " is granted what the other puts in";
+    EXPECT_GT(mount.at("low_pass_s").get<double>(), 0.5) << name << " waits for the slowest connection";
     EXPECT_EQ(hand.at("rejected"), 0) << name;
     EXPECT_TRUE(hand.at("steps").at(0).at("completed")) << name;
     put_in_mj += mount.at("put_in_mj").get<double>();
@@ -61,9 +61,9 @@ TEST(Mount, TwoHandsPressOneBone) {
   EXPECT_GT(put_in_mj, 10.0);
   const json idle_mount = read_json(stage / "idle.json").at("mount");
   std::printf("idle: %s\n", idle_mount.dump().c_str());
-  EXPECT_GT(idle_mount.at("most_mm").get<double>(), 1.0) << "the bone moves for whoever is there";
+  EXPECT_GT(idle_mount.at("most_mm").get<double>(), 1.0) << "the bone moves for everybody in the room";
   EXPECT_EQ(idle_mount.at("put_in_mj"), 0.0);
-  EXPECT_LE(released_mj, put_in_mj + 2.0 * 2.0) << "no more than was put in, and the allowances";
+  EXPECT_LE(released_mj, put_in_mj + 2.0 * 2.0) << "no more than what was put in, plus the allowances";
 }
 
 // Without a compliant mount, nobody receives messages about one.

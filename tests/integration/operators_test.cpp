@@ -84,7 +84,7 @@ TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
   EXPECT_NE(refused.exit_code, 0);
   EXPECT_NE(refused.err.find("--rooms " + folder + " is another osteon-server's"), std::string::npos) << refused.err;
   EXPECT_EQ(std::ranges::count(refused.err, '\n'), 1) << refused.err;
-  EXPECT_TRUE(std::filesystem::exists(stage / "address")) << "which is the first one's";
+  EXPECT_TRUE(std::filesystem::exists(stage / "address")) << "the first server's file stays";
   // Commands on journals depend only on each journal, as before.
   const auto verify = [&] { return run(program("osteon-server"), {"verify", folder + "/anna.journal"}, 60s); };
   EXPECT_NE(verify().err.find("is in use by another process"), std::string::npos);
@@ -278,7 +278,7 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   EXPECT_EQ(health_of(channel, ""), 1);
   for (const char* name : {"anna", "berta"})
     EXPECT_TRUE(wait_until([&] { return health_of(channel, name) == 1; }, kPatience)) << name;
-  EXPECT_EQ(health_of(channel, "nobody"), 0) << "a name that never was";
+  EXPECT_EQ(health_of(channel, "nobody"), 0) << "a name that does not exist";
   ASSERT_EQ(run(program("osteon-server"), {"rooms", "close", "berta", "--server", stage.address()}, 60s).exit_code, 0);
   EXPECT_TRUE(wait_until([&] { return health_of(channel, "berta") == 2; }, kPatience));
   EXPECT_EQ(health_of(channel, "anna"), 1);
@@ -292,7 +292,7 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   ASSERT_FALSE(late.has_value());
   EXPECT_NE(late.error().message.find("the server is stopping; connect again"), std::string::npos)
       << late.error().message;
-  EXPECT_TRUE(stage.server().running()) << "somebody is still there";
+  EXPECT_TRUE(stage.server().running()) << "a client is still there";
   // A second signal ends the server at once.
   stage.server().signal(SIGTERM);
   EXPECT_EQ(stage.server().wait(60s), 0) << stage.server().err();
@@ -338,7 +338,7 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   EXPECT_GE(acknowledged.size(), 30u);
   for (const auto& [number, seq] : acknowledged) {
     const auto entry = kept.find(number);
-    ASSERT_NE(entry, kept.end()) << "cut " << number << " was acknowledged and is not kept";
+    ASSERT_NE(entry, kept.end()) << "cut " << number << " was acknowledged and is not in the journal";
     EXPECT_EQ(entry->second, seq);
   }
 
@@ -438,7 +438,7 @@ TEST(Operators, TheContainerRunsItUnprivileged) {
   const std::string text = read_text(std::filesystem::path(OSTEON_DEPLOY) / "container" / "Containerfile");
   ASSERT_NE(text.rfind("\nUSER "), std::string::npos);
   EXPECT_EQ(text.find("\nUSER root"), std::string::npos);
-  EXPECT_GT(text.rfind("\nUSER "), text.rfind("\nRUN ")) << "the last word on who runs it";
+  EXPECT_GT(text.rfind("\nUSER "), text.rfind("\nRUN ")) << "the last line that decides who runs it";
   for (const char* word :
        {"FROM debian:12", "deploy/install", "deploy/build", "ENTRYPOINT [\"osteon-server\"]", "STOPSIGNAL SIGTERM"})
     EXPECT_NE(text.find(word), std::string::npos) << word;

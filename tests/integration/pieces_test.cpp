@@ -157,7 +157,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_NE(viewed().at("scene_mesh_hash"), parted_hash);
   ASSERT_TRUE(viewer.tell("redo 1"));
   const std::string all = ": " + std::to_string(cuts.size() + 1) + " events";
-  EXPECT_EQ(viewer.ask("undo 5000"), "ok undo 5000" + all) << "the cuts and what they separated";
+  EXPECT_EQ(viewer.ask("undo 5000"), "ok undo 5000" + all) << "the cuts and the fragments that they separated";
   EXPECT_EQ(viewer.ask("redo 1"), "ok redo 1" + all);
   ASSERT_TRUE(viewer.tell("wait bodies 2"));
   EXPECT_FALSE(viewer.tell("redo 9 times"));
@@ -193,7 +193,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
     ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));
     EXPECT_EQ(resumed.hash(), at_the_end) << file;
     EXPECT_EQ(resumed.bodies().size(), 2u);
-    EXPECT_EQ(resumed.seq().value, last.value + 1) << "who came has a place too";
+    EXPECT_EQ(resumed.seq().value, last.value + 1) << "a join has a sequence number too";
     ASSERT_EQ(stage.server().terminate(), 0);
     EXPECT_EQ(read_json(stage / "server.json").at("field_hash"), to_hex(at_the_end));
   }

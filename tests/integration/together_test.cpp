@@ -166,7 +166,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   std::this_thread::sleep_for(500ms);
   EXPECT_EQ(console.cuts(kFirst), cut_before);
   const std::uint64_t back_at = console.decide("give-back #2");
-  ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= cut_before + 5; }, 60s)) << "and goes on again";
+  ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= cut_before + 5; }, 60s)) << "it goes on again";
 
   // Undo by time brings back all recent cuts, whoever made them. Tools that are in the bone are then stuck and must be
   // drawn out.
@@ -182,16 +182,16 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   ASSERT_TRUE(wait_until([&] { return console.person(away.author().value).find(" away") != std::string::npos; }, 20s));
   (void)console.decide("freeze " + who + " wait for me");
   EXPECT_NE(console.person(away.author().value).find("pending"), std::string::npos);
-  EXPECT_TRUE(console.ask("wait acknowledged " + who + " 0.3").starts_with("error")) << "nobody has told them";
+  EXPECT_TRUE(console.ask("wait acknowledged " + who + " 0.3").starts_with("error")) << "they have not received it";
   away.come_again();
-  ASSERT_TRUE(away.held()) << "the first thing that they hear";
+  ASSERT_TRUE(away.held()) << "the first message that they receive";
   EXPECT_EQ(away.held()->room_seq(), 0u);
   EXPECT_TRUE(away.held()->supervision().stopped());
   EXPECT_EQ(away.held()->supervision().words(), "wait for me");
   EXPECT_NE(away.lease(), lease_before);
   away.say_heard();
   EXPECT_TRUE(console.ask("wait acknowledged " + who + " 10").starts_with("ok"));
-  EXPECT_EQ(away.cut(lease_before), sentence(Rejection::lease)) << "what it had cut meanwhile";
+  EXPECT_EQ(away.cut(lease_before), sentence(Rejection::lease)) << "its cut under the old lease";
   EXPECT_EQ(away.cut(away.lease()), sentence(Rejection::frozen));
   (void)console.decide("free " + who);
   // The rejection has ended that lease too, and so has the decision.
@@ -232,7 +232,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   EXPECT_EQ(of_first.at("field_hash"), hash[1].str());
   EXPECT_EQ(of_second.at("field_hash"), hash[1].str());
   EXPECT_NE(of_first.at("words").dump().find("the drill wanders"), std::string::npos);
-  EXPECT_EQ(of_second.at("words").dump().find("the drill wanders"), std::string::npos) << "said to the other";
+  EXPECT_EQ(of_second.at("words").dump().find("the drill wanders"), std::string::npos) << "words for the other hand";
   // Each hand knows who made the decision.
   for (const json* of : {&of_first, &of_second}) {
     std::size_t told = 0;
@@ -279,7 +279,7 @@ TEST(Together, TheConsoleSaysWhatItDoesNotUnderstand) {
   EXPECT_EQ(console.ask("draw 0 0 0 1 0 0"), "ok drawing 1");
   EXPECT_EQ(console.ask("wipe all"), "ok");
   EXPECT_EQ(console.ask("drawn"), "ok 0 drawings");
-  EXPECT_TRUE(console.ask("demonstrate").starts_with("error ")) << "a room that is not kept has no journal";
+  EXPECT_TRUE(console.ask("demonstrate").starts_with("error ")) << "a room that is not persisted has no journal";
   console.process().close_input();
   EXPECT_EQ(console.process().wait(10s), 0);
   // A server that does not exist.

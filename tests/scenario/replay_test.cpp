@@ -33,7 +33,7 @@ TEST(Replay, ARoomComesToTheRecordedField) {
     ASSERT_TRUE(outcome->committed());
   }
   EXPECT_EQ(to_hex(room.field_hash()), to_hex(session.field_hash));
-  EXPECT_EQ(room.room_seq().value, session.cuts.size() + 1) << "who cut has a place too";
+  EXPECT_EQ(room.room_seq().value, session.cuts.size() + 1) << "a join has a sequence number too";
 }
 
 TEST(Replay, AnyOrderAndRepetitionComesToTheRecordedField) {

@@ -103,7 +103,7 @@ TEST(PacedOutput, AsksForFramesAtTheSoundCardsPace) {
   EXPECT_GE(took_s, (24000.0 - 2 * 256) / 48000.0);
   EXPECT_EQ((*output)->failure_reason(), "");
   std::this_thread::sleep_for(30ms);
-  EXPECT_EQ(source.frames, frames) << "stopped means stopped";
+  EXPECT_EQ(source.frames, frames) << "no frames after the stop";
 }
 
 TEST(PulseOutput, MissingSoundServerIsOneSentenceWithTheRemedy) {

@@ -92,7 +92,7 @@ TEST(DrillSound, GrowsFromFreeOverCancellousToCortical) {
   // 8.6.3: 3 dB to 5 dB are an obvious difference in loudness.
   EXPECT_GT(cancellous_db, free_db + 3);
   EXPECT_GT(cortical_db, cancellous_db + 4);
-  EXPECT_LT(cortical_db, -10) << "room for other tools";
+  EXPECT_LT(cortical_db, -10) << "leaves level for other tools";
 }
 
 TEST(DrillSound, CorticalIsBrighterThanCancellous) {
@@ -350,7 +350,7 @@ TEST(DrillSound, ProcessDoesNotAllocate) {
   synth.reset();
   EXPECT_EQ(heap.count(), 0);
   delete static_cast<int*>(::operator new(sizeof(int)));
-  EXPECT_GT(heap.count(), 0) << "the counter counts";
+  EXPECT_GT(heap.count(), 0) << "the counter works";
 }
 
 TEST(Limiter, LeavesWhatFitsAndHoldsWhatDoesNot) {

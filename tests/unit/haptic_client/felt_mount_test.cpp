@@ -329,7 +329,7 @@ TEST(FeltMount, GoesOnInAnotherSession) {
   seen = {0, {Vec3(2, 0, 0), Vec3::Zero()}, 0, 0, 0};
   user.mounted.see(1, seen);
   user.tick();
-  EXPECT_NEAR(user.mounted.shown().shift().place_mm.x(), before_mm, 0.1) << "an old number of the same session";
+  EXPECT_NEAR(user.mounted.shown().shift().place_mm.x(), before_mm, 0.1) << "an old sequence number";
   see(2);
   EXPECT_NEAR(user.mounted.shown().shift().place_mm.x(), 2.0, 1e-2);
 }

@@ -82,8 +82,8 @@ TEST(Metal, HoldsADrillAsSteelWould) {
   EXPECT_GT(deepest_mm, kPlate_mm - kPitch_mm);
   EXPECT_LT(deepest_mm, kPlate_mm);
   EXPECT_GT(strongest_n, 30.0);
-  EXPECT_LE(densest, 2.1 + 1e-6) << "metal is no dense bone";
-  EXPECT_EQ(cuts_last, cuts_then) << "a tool that stands sends nothing";
+  EXPECT_LE(densest, 2.1 + 1e-6) << "metal does not count as dense bone";
+  EXPECT_EQ(cuts_last, cuts_then) << "a stopped tool sends nothing";
   EXPECT_TRUE(metal_is_whole(bench.replica().committed()));
   EXPECT_EQ(refused(bench.cuts(), CutField(plate_case(), BodyId{})), 0);
   // The hole: a cylinder that ends in the point's cone of 118 degrees.

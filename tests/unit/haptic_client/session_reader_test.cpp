@@ -22,7 +22,7 @@ TEST(CutsUnderway, GoOnceOverEachLineUntilTheyAreDecided) {
   CutsUnderway underway(8);
   for (std::uint64_t i = 1; i <= 4; ++i) ASSERT_TRUE(underway.push(cut_of(1, i)));
   underway.push(CuttingState{});
-  EXPECT_FALSE(underway.take_cut()) << "the room has not said yet what it has";
+  EXPECT_FALSE(underway.take_cut()) << "the room has not yet sent what it has";
   EXPECT_FALSE(underway.something_to_send());
   underway.go_on(1);
   EXPECT_EQ(underway.take_cut()->author_seq, 2u);
@@ -50,7 +50,7 @@ TEST(CutsUnderway, AreBounded) {
     EXPECT_TRUE(underway.push(cut_of(1, i)));
     EXPECT_TRUE(underway.take_cut());
   }
-  EXPECT_FALSE(underway.push(cut_of(1, 4))) << "sent is not decided";
+  EXPECT_FALSE(underway.push(cut_of(1, 4))) << "a sent cut is not yet decided";
   underway.decided(1);
   EXPECT_TRUE(underway.push(cut_of(1, 4)));
 }
@@ -156,7 +156,7 @@ TEST(SessionReader, SaysTheSequenceNumbersOfDecidedCuts) {
   for (const std::uint64_t seq : {0u, 1u, 2u, 6u}) EXPECT_EQ(told->seq_of(seq), std::nullopt) << seq;
   complete.mutable_complete()->clear_decided_room_seqs();
   ASSERT_TRUE(reader.take(complete));
-  EXPECT_EQ(told->seq_of(5), std::nullopt) << "a room of before says nothing";
+  EXPECT_EQ(told->seq_of(5), std::nullopt) << "an older room does not send it";
 }
 
 wire::IndexedRow word(std::uint64_t index, std::uint64_t seq, bool stopped) {
@@ -310,7 +310,7 @@ TEST(SessionReader, RefusesWhatNoCorrectServerSendsAndWaitsForToolsThatItDoesNot
   EXPECT_FALSE(heard.reader.take(v1::SessionResponse{}));
   wire::IndexedRow unknown = fast(2, 11, 2, 2);
   unknown.row.cut.tool.bytes[0] ^= 1;
-  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the row";
+  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the log entry";
   EXPECT_TRUE(heard.events.empty());
 }
 

@@ -92,7 +92,7 @@ TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
     const auto made =
         import_ct({d.volume, "test"},
                   {.threshold_hu = d.threshold_hu, .keep_all = seed % 5 == 0, .hollow = seed % 7 == 0}, count);
-    ASSERT_LT(questions, kMostQuestions) << "it does not end";
+    ASSERT_LT(questions, kMostQuestions) << "the import does not end";
     const bool any = std::ranges::any_of(d.volume.values, [&](std::int16_t hu) { return hu >= d.threshold_hu; });
     if (!any) {
       ASSERT_FALSE(made);
@@ -153,7 +153,7 @@ TEST(RandomSeries, StopsAtEveryQuestionOfEveryStage) {
     for (const double until : fractions) {
       bool stopped = false;
       const auto made = import_ct({d.volume, "test"}, {.threshold_hu = d.threshold_hu}, [&](double done) {
-        EXPECT_FALSE(stopped && done > until + 0.02) << "it went on after it was stopped";
+        EXPECT_FALSE(stopped && done > until + 0.02) << "the import went on after it was stopped";
         stopped = stopped || done >= until;
         return !stopped;
       });

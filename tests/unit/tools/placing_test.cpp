@@ -74,7 +74,7 @@ TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
   EXPECT_NEAR(home->item.pose_bone_item.position_mm.z(), length, 0.01);
   EXPECT_NEAR(home->item.turns - 2.0, length / pitch, 0.01 / pitch);
   EXPECT_TRUE(set_by_rules({}, &screw, {home->item, screw.tool}, reamed(0.0)))
-      << "its way is its pitch times its turns";
+      << "it moves by its pitch times its turns";
 
   const auto out = placed(ByThread{-0.5}, &screw, screw, reamed(0.0));
   ASSERT_TRUE(out);

@@ -189,7 +189,7 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
     EXPECT_EQ(say(line).find("ok"), 0u) << line;
   EXPECT_EQ(desk.asked_.back().second, Restrictions{});
   EXPECT_EQ(say("limit force Ben 0").find("ok"), 0u);
-  EXPECT_EQ(desk.asked_.back().second.force_limit, 1) << "nothing at all is not the same as no limit";
+  EXPECT_EQ(desk.asked_.back().second.force_limit, 1) << "a limit of zero differs from no limit";
   EXPECT_EQ(say("limit force Ben 1000").find("error"), 0u);
   EXPECT_EQ(say("limit tools Ben saw"), "error the room knows no tool \"saw\"");
   EXPECT_EQ(say("guide Ben along Ada share 2").find("error"), 0u);
@@ -215,7 +215,7 @@ TEST_F(ConsoleTest, AllAreDecidedAboutAtOnceUnlessMoreHoldsForOne) {
   EXPECT_EQ(say("limit force Ben 3"), "ok at 13");
   desk.asked_.clear();
   EXPECT_EQ(say("freeze all"), "ok at 17");
-  ASSERT_EQ(desk.asked_.size(), 4u) << "each hand but the instructor's";
+  ASSERT_EQ(desk.asked_.size(), 4u) << "each hand except the instructor's";
   EXPECT_EQ(desk.asked_[0], (std::pair(AuthorId{2}, Restrictions{.stopped = true, .force_limit = 300})));
 }
 
@@ -267,7 +267,7 @@ TEST_F(ConsoleTest, SpeaksToOneOrToAll) {
   EXPECT_EQ(desk.words_.back().words, "a little slower");
   EXPECT_EQ(say("say all stop please"), "ok at 12 to all");
   EXPECT_EQ(desk.words_.back().words, "stop please");
-  EXPECT_EQ(say("say well done"), "ok at 13 to all") << "nobody is called well";
+  EXPECT_EQ(say("say well done"), "ok at 13 to all") << "nobody has the name well";
   EXPECT_EQ(desk.words_.back().words, "well done");
   EXPECT_EQ(say("say hello"), "ok at 14 to all");
   EXPECT_EQ(say("say #77 hello").find("error"), 0u);
@@ -299,7 +299,7 @@ TEST_F(ConsoleTest, Demonstrates) {
   EXPECT_EQ(desk.shown_.from, RoomSeq{3});
   EXPECT_EQ(desk.shown_.to, RoomSeq{77});
   EXPECT_DOUBLE_EQ(desk.shown_.speed, 0.5);
-  EXPECT_EQ(say("demonstrate of #1234"), "ok demonstrator #9 cuts 12") << "who is known in the other room alone";
+  EXPECT_EQ(say("demonstrate of #1234"), "ok demonstrator #9 cuts 12") << "a person known only in the other room";
   EXPECT_EQ(desk.shown_.of, AuthorId{1234});
   EXPECT_EQ(say("demonstrate speed 0").find("error"), 0u);
   EXPECT_EQ(say("guide Ben along #9 share 1"), "ok at 11");

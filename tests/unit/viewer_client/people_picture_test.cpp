@@ -147,7 +147,7 @@ TEST_F(PeoplePicture, TwoLabelsAtOnePlaceDoNotCoverEachOther) {
                    same = mark(3, AnnotationKind::label, {point}, "first");
   const int one = green_pixels(with({first})), two = green_pixels(with({first, same}));
   const int other = green_pixels(with({first, mark(3, AnnotationKind::label, {on_front(0.0, -0.6)}, "first")}));
-  EXPECT_GT(two, 1.3 * one) << "the second frame is seen too";
+  EXPECT_GT(two, 1.3 * one) << "the second frame is visible too";
   EXPECT_GT(two, 0.8 * other - 60);
 }
 
@@ -270,7 +270,7 @@ class Drawing : public PeoplePicture {
 TEST_F(Drawing, APressesPThenClicksWhereToPoint) {
   press_key(XK_p);
   EXPECT_TRUE(window_->events().redraw);
-  EXPECT_GT(differing_pixels(drawn_now(), bare_), 50) << "it says what to do";
+  EXPECT_GT(differing_pixels(drawn_now(), bare_), 50) << "a hint is shown";
   button(ButtonPress, Vec3(40, 0, 0));  // beside the bone
   button(ButtonRelease, Vec3(40, 0, 0));
   EXPECT_FALSE(window_->events().pointed);
@@ -292,7 +292,7 @@ TEST_F(Drawing, ALineFollowsTheMouseOverTheSurface) {
   button(ButtonPress, on_front(-0.5, 0.0));
   for (int i = -49; i <= 50; ++i) move(on_front(0.01 * i, 0.0));
   EXPECT_TRUE(moved_);
-  EXPECT_GT(yellow_pixels(drawn_now()), yellow_pixels(bare_) + 100) << "it is seen while it is drawn";
+  EXPECT_GT(yellow_pixels(drawn_now()), yellow_pixels(bare_) + 100) << "the line is visible while it is drawn";
   button(ButtonRelease, on_front(0.5, 0.0));
   const std::vector<Vec3> line = window_->events().drawn;
   ASSERT_GE(line.size(), 3u) << "it bends";

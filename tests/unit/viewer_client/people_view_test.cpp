@@ -69,7 +69,7 @@ TEST(PeopleView, OthersSeeWhomItConcerns) {
   stopped.stopped = true;
   view.take(about_ada(stopped), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Berg has stopped Ada's hand"));
-  EXPECT_EQ(view.holding(), "") << "it is not Cy's hand";
+  EXPECT_EQ(view.holding(), "") << "this is not Cy's hand";
 }
 
 TEST(PeopleView, EveryKindOfDecisionHasItsSentence) {
@@ -123,7 +123,7 @@ TEST(PeopleView, TheRoomSaysWhoDecided) {
   change.people[0].decided_by = kBerg;
   view.take(change, kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre(testing::_, "Dr. Berg has set your hand free"));
-  EXPECT_EQ(view.holding(), "") << "nothing holds that anybody has decided";
+  EXPECT_EQ(view.holding(), "") << "no decision holds";
 }
 
 TEST(PeopleView, WhoComesLaterSeesWhatAlreadyHolds) {
@@ -150,7 +150,7 @@ TEST(PeopleView, WordsSayWhoSpeaksToWhom) {
               ElementsAre("Dr. Berg: good morning", "Dr. Berg to you: slower", "Dr. Berg to you: turn the bone",
                           "Cy to Dr. Berg: may I?", "#77: hello"));
   view.take(said(5, AuthorId{77}, {}, "hello"), kSelf, kNow);
-  EXPECT_EQ(view.notices(kNow).front(), "Dr. Berg: good morning") << "what is told again is not new";
+  EXPECT_EQ(view.notices(kNow).front(), "Dr. Berg: good morning") << "a message sent again is not new";
   view.take(said(6, kCy, {}, "one more"), kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), PeopleView::kMostNotices);
   EXPECT_EQ(view.notices(kNow).back(), "Cy: one more");
@@ -229,7 +229,7 @@ TEST(PeopleView, DrawingsAreThoseOfTheRoom) {
 
 TEST(Wrapped, BreaksAtBlanksAndCutsOff) {
   EXPECT_EQ(wrapped("one two three", 7, 9), "one two\nthree");
-  EXPECT_EQ(wrapped("  a \n b\t c ", 80, 9), "a b c") << "what is said is one line";
+  EXPECT_EQ(wrapped("  a \n b\t c ", 80, 9), "a b c") << "words are shown as one line";
   EXPECT_EQ(wrapped("abcdefghij", 4, 9), "abcd\nefgh\nij");
   EXPECT_EQ(wrapped("x abcdefghij", 4, 9), "x\nabcd\nefgh\nij");
   EXPECT_EQ(wrapped("äöü äöü", 3, 9), "äöü\näöü") << "characters, not bytes";
@@ -266,7 +266,7 @@ TEST(CameraView, RollsAsSomebodyElseDoes) {
   EXPECT_LT((*look.up - Vec3(1, 0, 1).normalized()).norm(), 1e-9) << "across the line of sight, of length 1";
   EXPECT_LT((looking_as(look, CameraView()).up - *look.up).norm(), 1e-9);
   theirs.up = Vec3(0, 1, 0);
-  EXPECT_FALSE(look_of(theirs, 800, 600).up) << "along the line of sight nothing is up";
+  EXPECT_FALSE(look_of(theirs, 800, 600).up) << "there is no up direction along the line of sight";
   theirs.eye_mm = theirs.target_mm;
   EXPECT_FALSE(look_of(theirs, 800, 600).up);
 }

@@ -15,7 +15,7 @@ TEST(Stroke, AStraightLineIsItsEnds) {
   const auto line = stroke.line(1024);
   ASSERT_EQ(line.size(), 2u);
   EXPECT_EQ(line.front(), Vec3::Zero());
-  EXPECT_NEAR(line.back().x(), 40.0, 1e-9) << "where the hand let go, however near to the point before";
+  EXPECT_NEAR(line.back().x(), 40.0, 1e-9) << "the point of release, however near to the point before";
 }
 
 TEST(Stroke, PointsAreAMillimetreApartAndKeepTheirCorners) {

@@ -125,9 +125,9 @@ TEST(Settled, AHundredOrdersOfFortyCutsWithDebrisLeaveOneBone) {
   RecordProperty("debris", debris);
   RecordProperty("pieces", pieces);
   RecordProperty("bones_as_they_fell", static_cast<int>(fallen.size()));
-  EXPECT_GE(debris, 2 * kOrders) << "else debris is not what is tried here";
+  EXPECT_GE(debris, 2 * kOrders) << "otherwise this does not test debris";
   EXPECT_LT(orders_without, kOrders / 10);
-  EXPECT_GT(fallen.size(), 1u) << "else settling would have nothing to do";
+  EXPECT_GT(fallen.size(), 1u) << "otherwise there is nothing to settle";
   EXPECT_EQ(settled.size(), 1u);
 }
 

@@ -211,7 +211,7 @@ TEST(GuidanceSpring, MakesUpForContactOutOfWhatTheHandHasPaid) {
   }
   ASSERT_GT(far_mm, 1.0);
   ASSERT_LT(far_mm, 5.0);
-  EXPECT_GT(aside_n, 2.0) << "it makes up for contact";
+  EXPECT_GT(aside_n, 2.0) << "it compensates for contact";
   EXPECT_LE(most_mj, kBudget_mj);
   std::printf("  %.2f mm away, %.5f mJ given at most, %.2f mJ in the end; %.2f N aside\n", far_mm, most_mj, given_mj,
               aside_n);

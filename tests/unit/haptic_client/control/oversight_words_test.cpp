@@ -24,8 +24,8 @@ TEST(RestrictionWords, SayAllThatHolds) {
 TEST(RestrictionWords, SayWhoDecided) {
   EXPECT_EQ(called({AuthorId{7}, "Dr. Weber"}), "Dr. Weber");
   EXPECT_EQ(called({AuthorId{7}, ""}), "#7");
-  EXPECT_EQ(called({}), "") << "of a server that does not say it";
-  EXPECT_EQ(called({AuthorId{7}, "Ada\x1b[2J\n"}), "Ada?[2J?") << "nobody's name moves the cursor";
+  EXPECT_EQ(called({}), "") << "from a server that does not send it";
+  EXPECT_EQ(called({AuthorId{7}, "Ada\x1b[2J\n"}), "Ada?[2J?") << "a name must not move the cursor";
   EXPECT_EQ(called({AuthorId{7}, "Jörg"}), "Jörg");
 }
 

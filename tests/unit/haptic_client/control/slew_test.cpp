@@ -41,7 +41,7 @@ TEST(Slew, TheWholeNeverGrowsFasterNorLargerThanItMay) {
     ASSERT_LE(whole.norm(), std::max(before.norm(), (rest + pull).norm()) + 1e-12);
     most_n = std::max(most_n, growth(rest + pull, before).norm());
   }
-  EXPECT_GT(most_n, 3.0) << "where the pull stays as it is";
+  EXPECT_GT(most_n, 3.0) << "if the pull does not change";
 }
 
 }  // namespace

@@ -175,7 +175,7 @@ TEST_P(Overseen, StopsInTheBoneAndGoesOn) {
     pressed.work(run_.delay_ms);  // on its way
     const std::size_t cuts = hand.cuts().size();
     EXPECT_FALSE(pressed.work(1200)) << round;
-    EXPECT_LE(hand.cuts().size(), cuts + 2) << "what was open is closed, and no more";
+    EXPECT_LE(hand.cuts().size(), cuts + 2) << "only open cuts are closed";
     EXPECT_EQ(hand.last().spindle_rpm, 0.0);
     EXPECT_TRUE(hand.last().events & kForbidden);
     EXPECT_EQ(hand.replica().unconfirmed(), 0u);
