@@ -168,7 +168,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   const std::uint64_t back_at = console.decide("give-back #2");
   ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= cut_before + 5; }, 60s)) << "it goes on again";
 
-  // Undo by time brings back all recent cuts, whoever made them. Tools that are in the bone are then stuck and must be
+  // Undo by time takes back all recent cuts, whoever made them. Tools that are in the bone are then stuck and must be
   // drawn out.
   const std::string undone = console.ask("undo 1 s");
   EXPECT_TRUE(std::regex_search(undone, std::regex("^ok at [0-9]+ events [1-9]"))) << undone;

@@ -48,7 +48,7 @@ struct Times {
   std::vector<std::array<std::atomic<std::int64_t>, kMoments>> of;
 };
 
-// A hand's client and its end in the room, assembled as in the programs.
+// A hand's client and its end in the room, put together as the programs do.
 class Line final : public SessionSubscriber, private SessionLink::Sink, public std::enable_shared_from_this<Line> {
  public:
   // `port`: UDP port at which the client's datagrams reach the links. 0: their own port.
@@ -183,7 +183,7 @@ class Line final : public SessionSubscriber, private SessionLink::Sink, public s
   Line* other_ = nullptr;
   std::shared_ptr<SessionLink> link_;
   std::unique_ptr<FastPath> path_;
-  std::uint64_t index_ = 0;  // of log entries; used by one thread at a time
+  std::uint64_t index_ = 0;  // of rows; by one thread at a time
 
   std::mutex mutex_;
   std::condition_variable wake_;

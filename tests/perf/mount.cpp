@@ -1,6 +1,6 @@
 // osteon-mount TICKS: two users push a bone on its compliant mount against each other, for TICKS each. Their
-// connections have 0, 50 and 150 ms, or one of each, with jitter and loss. Virtual time: the same numbers on every
-// machine. Prints JSON.
+// connections have 0, 50 and 150 ms, or 0 ms for one user and 150 ms for the other, with jitter and loss. Virtual time:
+// the same numbers on every machine. Prints JSON.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>

@@ -393,7 +393,7 @@ FIGURES = [
            ("==", 0), full=True),
     Figure("stability_six_torque_largest", "nmm", "the largest torque", "haptic_stability", full=True),
     # Two users push a bone on its compliant mount against each other, on virtual time: connections of 0, 50 and 150 ms
-    # one way, and one of each. All but the first have 30 ms of jitter and 30 % loss.
+    # one way, and 0 ms for one user with 150 ms for the other. All but the first have 30 ms of jitter and 30 % loss.
     *[figure for line, what in (("0", "lines without delay"), ("50", "lines of 50 ms"), ("150", "lines of 150 ms"),
                                 ("0_and_150", "a line without delay and one of 150 ms")) for figure in (
         Figure(f"mount_rest_error_{line}ms", "percent",

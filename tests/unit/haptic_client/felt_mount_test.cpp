@@ -23,8 +23,7 @@ namespace {
 constexpr double kTick = 1e-3;
 constexpr double kThickness_mm = 12.0;
 
-// The block extends equally along ±z, so that two hands that press from both sides do it along a line through its
-// middle.
+// The block has one thickness along z, so two hands that press from both sides do it along a line through its middle.
 const Case& block() {
   static const Case bone = test::plain_block(24.0, kThickness_mm, 0.5);
   return bone;

@@ -282,7 +282,7 @@ TEST(SessionReader, BeginsAnewWithEachStream) {
   Heard heard;
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(row(1, 10, 2, 1)));
-  ASSERT_TRUE(heard.reader.take(row(3, 12, 2, 3)));  // never to be passed on: the stream ends
+  ASSERT_TRUE(heard.reader.take(row(3, 12, 2, 3)));  // never to be passed on: the stream breaks
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(row(1, 13, 2, 4)));
   EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 2", "13 of 2"}));
@@ -310,7 +310,7 @@ TEST(SessionReader, RefusesWhatNoCorrectServerSendsAndWaitsForToolsThatItDoesNot
   EXPECT_FALSE(heard.reader.take(v1::SessionResponse{}));
   wire::IndexedRow unknown = fast(2, 11, 2, 2);
   unknown.row.cut.tool.bytes[0] ^= 1;
-  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the log entry";
+  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the row";
   EXPECT_TRUE(heard.events.empty());
 }
 
