@@ -47,7 +47,8 @@ void visit_methods(const Protocol& protocol, const std::function<void(const pb::
   }
 }
 
-// Truth values, and messages that hold their own units, need none; points and poses have one of their holder.
+// Truth values need no unit, and neither do messages that hold their own units. Points and poses need the unit of the
+// message that holds them.
 bool needs_unit(const pb::FieldDescriptor* field) {
   if (field->type() == pb::FieldDescriptor::TYPE_BOOL) return false;
   if (field->type() != pb::FieldDescriptor::TYPE_MESSAGE) return true;
@@ -152,7 +153,7 @@ std::vector<std::string> comment_faults(const Protocol& protocol) {
     return comment;
   };
   visit_messages(protocol, [&](const pb::Descriptor* message) {
-    // The messages of an RPC are explained with it.
+    // The comment of an RPC also explains its messages.
     const bool of_rpc = message->name().ends_with("Request") || message->name().ends_with("Response");
     if (!of_rpc) require(message);
     for (int i = 0; i < message->field_count(); ++i) {

@@ -1,4 +1,4 @@
-// Holds the protocol to its rules, and shows on small wrong protocols that each rule can fail.
+// Checks the protocol by its rules, and shows with small wrong protocols that each rule can fail.
 #include <gmock/gmock.h>
 #include <google/protobuf/compiler/parser.h>
 #include <google/protobuf/descriptor.pb.h>

@@ -1,4 +1,4 @@
-"""Every source that code or documents name stands in deploy/docs/references.md."""
+"""Checks that every source named by code or documents is in deploy/docs/references.md."""
 import re
 from pathlib import Path
 
@@ -14,11 +14,11 @@ SECTION = re.compile(r"(.{0,11})§")
 
 
 def reference_faults(path: str, text: str, listed: str):
-    """One sentence for each source of `text` that the list `listed` does not have, and each section of no source."""
+    """One sentence for each source in `text` that the list `listed` lacks, and for each section without a source."""
     faults = []
     keys = set(re.findall(r"^- \*\*([^*]+)\*\*:", listed, re.MULTILINE))
     standards = set(STANDARD.findall(listed))
-    joined = re.sub(r"\s*\n\s*(?://|#|\*)?\s*", " ", text)  # a citation may go on in the next line of a comment
+    joined = re.sub(r"\s*\n\s*(?://|#|\*)?\s*", " ", text)  # a citation may continue in the next line of a comment
     for name, year in CITATION.findall(joined):
         if f"{name} {year}" not in keys:
             faults.append(f"{path}: names {name} {year}, which {LIST} does not list")

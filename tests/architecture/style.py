@@ -1,4 +1,4 @@
-"""Rules of style that a program can judge: widths, replaced names, CMake lists, lengths, subjects of commits."""
+"""Rules of style that a program can check: widths, replaced names, CMake lists, lengths, subjects of commits."""
 import re
 import subprocess
 from pathlib import Path
@@ -10,7 +10,7 @@ SINCE = "c2cd851a7372"  # subjects of commits after this one
 GLOSSARY = "deploy/docs/glossary.md"
 MAY_NAME_THEM = (GLOSSARY, "tests/architecture/tree_test.py")
 LONG_FUNCTIONS = "tests/architecture/long_functions.txt"
-# No text that people write.
+# Files without text written by people.
 NO_TEXT = {".jpg", ".png", ".journal", ".bin", ".zip", ".gz", ".vdb", ".dcm", ".stl"}
 NO_FUNCTION = r"(namespace|class|struct|enum|union|extern|if|for|while|switch|do|else|try|return|case)\b"
 SOURCE_FILE = re.compile(r"[\w./${}-]+\.(?:cpp|hpp|inl)\b")
@@ -50,14 +50,14 @@ def name_faults(path: str, text: str, retired):
 
 
 def long_functions(path: str, text: str):
-    """(name, lines) of functions in C++ that is formatted: a body ends at the indent at which it began."""
+    """(name, lines) of each function in formatted C++. A body ends at the indent at which it began."""
     if not path.endswith((".cpp", ".hpp", ".inl")):
         return []
     lines, found = text.splitlines(), []
     for number, line in enumerate(lines):
         if not line.endswith("{"):
             continue
-        # The declaration begins after the end of what stands before it.
+        # The declaration begins after the end of the code before it.
         begin = number
         while begin > 0 and lines[begin - 1].strip() and not re.search(r"([;{}:]|^\s*(//|#).*)$", lines[begin - 1]):
             begin -= 1

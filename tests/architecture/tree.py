@@ -1,8 +1,8 @@
-"""The rules for source files: who may include whom, which headers are heavy, how long files are."""
+"""The rules for source files: which folders may include which, which headers are heavy, and how long files are."""
 import re
 from pathlib import Path
 
-# Folder of common/ -> the folders of common/ that it may include beside itself.
+# Folder of common/ -> the other folders of common/ that it may include.
 LAYERS = {
     "core": set(),
     "geometry": {"core"},
@@ -20,10 +20,11 @@ LAYERS = {
     "wire": {"core", "geometry", "tools", "field", "surface", "mechanics", "access", "link"},
 }
 PROGRAMS = ("server", "haptic_client", "viewer_client", "audio_client")
-# Inside a program: folders that only the program's app (and tests) put together.
+# Inside a program: folders that only the program's app folder (and tests) may combine.
 OUTER = {"app": set(), "net": {"app"}}
 
-# What is slow to compile or leaks a library's habits: kept out of headers, and within the folders named here.
+# Headers that are slow to compile or impose a library's conventions. They must stay out of headers, and within the
+# folders named here.
 HEAVY = {
     "OpenVDB": (re.compile(r"^openvdb/"), ("common/volume",)),
     "VTK": (re.compile(r"^vtk"), ("viewer_client", "common/volume")),
@@ -108,11 +109,11 @@ def size_faults(path: str, text: str):
 
 
 def declaration_faults(path: str, cmake_text: str, source_text=None):
-    """A source that no target lists is never built. A header that none lists is not compiled alone by
+    """A source that no target lists is never built. A header that no target lists is not compiled alone by
     architecture.headers, unless its own source (`source_text`) includes it first."""
     name = path.rsplit("/", 1)[-1]
     if path.startswith("tests/unit/") and name.endswith(".hpp"):
-        return []  # a helper of the one test program beside it
+        return []  # a helper of the only test program beside it
     if re.search(rf"(?<![\w/.-]){re.escape(name)}(?![\w.-])", cmake_text):
         return []
     if name.endswith(".hpp") and source_text is not None and includes(source_text)[:1] == [path]:

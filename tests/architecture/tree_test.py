@@ -1,4 +1,4 @@
-"""Holds every source file to the layers and sizes of the design; and shows that each rule can fail."""
+"""Checks every source file by the layers and sizes of the design, and shows that each rule can fail."""
 import os
 import re
 import shutil

@@ -35,7 +35,7 @@ using google::protobuf::Reflection;
 
 constexpr int kDeepest = 5;
 
-// What the numbers of its fields alone would not make: values of which a server takes some further step.
+// Fills a message with known values. Field numbers alone would not make values that the server processes further.
 bool fill_known(Message& message) {
   static const auto known = std::make_tuple(
       wire::to_wire(a_cut()), wire::to_wire(an_item()), wire::to_wire(a_supervision()), wire::to_wire(an_annotation()),
@@ -58,7 +58,7 @@ std::string sound_text(const FieldDescriptor& field) {
   return of_rooms(field) ? kSpare : kRoom;
 }
 
-// Sets a field, or adds one to those that it has.
+// Sets a field, or adds a value to a repeated field.
 template <class Value>
 using Put = void (Reflection::*)(Message*, const FieldDescriptor*, Value) const;
 template <class Value>

@@ -1,5 +1,6 @@
-// Requests of every call that a server takes, as inputs: the first byte says which call, the others are the request.
-// For the sources of targets alone: generated types stay out of headers.
+// Makes requests of every call that a server offers, as fuzz inputs. The first byte of an input selects the call. The
+// other bytes are the request.
+// Only the source files of targets include this header: generated types stay out of headers.
 #pragma once
 #include <cstdint>
 #include <random>
@@ -15,21 +16,22 @@ class MethodDescriptor;
 
 namespace osteon::fuzz {
 
-inline constexpr const char* kRoom = "room";    // that calls are to
-inline constexpr const char* kSpare = "spare";  // that calls may close or delete
+inline constexpr const char* kRoom = "room";    // the room that calls go to
+inline constexpr const char* kSpare = "spare";  // a room that calls may close or delete
 
-[[nodiscard]] const Case& served_bone();  // whose hash such requests name
+[[nodiscard]] const Case& served_bone();  // the case whose hash these requests name
 
 [[nodiscard]] const std::vector<const google::protobuf::MethodDescriptor*>& methods();
 [[nodiscard]] const google::protobuf::MethodDescriptor& method_of(std::uint8_t which);
-// The one beyond the last method: what is said in a session that was opened before.
+// True for the number after the last method: a message in a session that was opened before.
 [[nodiscard]] bool is_in_session(std::uint8_t which);
 
-// Sound requests of all methods: one with everything in it, and one more for each further choice that it offers.
+// Valid requests of all methods. Each method has one request with all fields set, and one more for each alternative of
+// a oneof.
 [[nodiscard]] std::vector<Bytes> request_inputs(bool in_sessions);
-// Changes one field, somewhere in it, to what is rare or wrong.
+// Changes one field at a random depth to a rare or wrong value.
 void change_message(google::protobuf::Message& message, std::mt19937& random);
-// The same of a request; nothing where the bytes are no message.
+// Does the same with a request. Leaves bytes alone that are not a message.
 void change_request(Bytes& input, std::mt19937& random);
 
 }  // namespace osteon::fuzz

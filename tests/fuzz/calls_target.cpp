@@ -32,16 +32,16 @@ namespace {
 using google::protobuf::MethodDescriptor;
 
 constexpr std::size_t kMostRooms = 3;
-constexpr std::size_t kUnderWay = 192;  // calls at once
-constexpr std::size_t kLines = 4;       // a connection takes 64 streams
+constexpr std::size_t kUnderWay = 192;  // concurrent calls
+constexpr std::size_t kLines = 4;       // connections; each takes 64 streams
 constexpr int kMostAnswerBytes =
-    64 * 1024;  // of a status with what it says: more than there may be, so that all is read
+    64 * 1024;  // of a status with its message: more than allowed, so that the whole message is read
 constexpr std::size_t kMostSaidBytes = 1100;
-constexpr std::size_t kHands = 8;              // whose sessions are opened before the input comes
-constexpr std::uint64_t kRenewEvery = 10'000;  // what a room keeps of everything that happened in it is not for ever
+constexpr std::size_t kHands = 8;              // whose sessions are opened before the input is sent
+constexpr std::uint64_t kRenewEvery = 10'000;  // a room keeps all its events, so it is replaced from time to time
 constexpr std::uint64_t kLookEvery = 16;
-constexpr long kSessionRounds = 10;  // opening a session costs as much as fifty other calls
-constexpr int kTries = 100;          // a room that nobody else makes or takes
+constexpr long kSessionRounds = 10;  // opening a session is as expensive as fifty other calls
+constexpr int kTries = 100;          // attempts to make a room while other calls make or delete it
 constexpr const char* kSecret = "of a hand";
 
 grpc::ByteBuffer buffer_of(const std::string& bytes) {
@@ -56,7 +56,7 @@ std::string hex_of(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-// One call, from its beginning until its slot is free for another.
+// One call, from its start until its slot is free for another.
 struct Call {
   enum class Step { free, unary, opening, opened, said, answered, ended };
   Step step = Step::free;
@@ -74,7 +74,7 @@ struct Call {
 
 std::array<Call, kUnderWay> slots;
 
-// What was under way when the process fell: one of them, with what came before, is why.
+// Prints the calls that were under way when the process crashed. One of them, with those before it, is the cause.
 void tell_calls(int signal) {
   static std::atomic<bool> told = false;
   if (!told.exchange(true))
@@ -87,15 +87,15 @@ void tell_calls(int signal) {
   std::raise(signal);
 }
 
-// A server in this process with a room, somebody in it, and hands.
+// A server in this process, with a room, an author in it, and simulated hands.
 class Server {
  public:
   Server() : bone_(served_bone()) {
     OSTEON_CHECK(bone_.save(dir_ / "case").has_value());
-    // No cases are taken: each upload would be looked through by a process of its own. The target upload gives any
-    // bytes to that.
+    // Accepts no cases: each upload would be validated in a process of its own. The target `upload` gives any bytes to
+    // that validation.
     RoomsOptions options{.cases = {{bone_, dir_ / "case"}}};
-    options.rates.tick = std::chrono::milliseconds(2);  // who waits for one waits less
+    options.rates.tick = std::chrono::milliseconds(2);  // shortens the wait for a tick
     auto started = RoomServer::start(std::make_unique<Rooms>(std::move(options)), "127.0.0.1:0");
     OSTEON_CHECK(started.has_value());
     server_ = std::move(*started);
@@ -119,8 +119,8 @@ class Server {
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
-  // Whatever it is, it is answered: an open stream by its first message or its end, and the server goes on. Returns
-  // while it is under way.
+  // Starts a call. Every call must be answered: an open stream by its first message or its end. The server must go on.
+  // Returns while the call is under way.
   void call(std::span<const std::uint8_t> data) {
     if (data.empty()) return;
     if (calls_++ % kRenewEvery == kRenewEvery - 1) {
@@ -184,7 +184,7 @@ class Server {
       call.answer_of_one->Finish(&call.answer, &call.status, &call);
       return;
     }
-    call.context->set_initial_metadata_corked(true);  // it goes with the first message
+    call.context->set_initial_metadata_corked(true);  // sent with the first message
     call.line = stub.PrepareCall(&*call.context, name, &queue_);
     call.line->StartCall(nullptr);
     call.step = call.hand ? Step::opening : Step::said;
@@ -196,7 +196,7 @@ class Server {
     call.line->Write(buffer_of(open.SerializeAsString()), &call);
   }
 
-  // [reader] What the server has answered or taken, and what comes next.
+  // [reader] Handles what the server has answered or accepted, and starts the next step.
   void go_on(Call& call, bool ok) {
     switch (call.step) {
       case Step::opening:
@@ -215,7 +215,7 @@ class Server {
         return call.line->Read(&call.answer, &call);
       case Step::answered:
         call.answered = call.answered || ok;
-        // A session tells all that there is to tell, since it was said that nothing follows.
+        // A session sends all its messages, because the client has said that it sends no more.
         if (ok && call.hand) return call.line->Read(&call.answer, &call);
         if (ok && call.method->server_streaming()) call.context->TryCancel();
         return end(call);
@@ -228,7 +228,7 @@ class Server {
     call.line->Finish(&call.status, &call);
   }
 
-  // A cut or a state of author 1 is the hand's own, and its next.
+  // Replaces author 1 in a cut or state by the hand's own author. The cut becomes the hand's next cut.
   static std::string as_hand(const Call& call, const v1::FieldComplete& told) {
     v1::SessionRequest request;
     if (!request.ParseFromString(call.request)) return call.request;
@@ -248,11 +248,11 @@ class Server {
   void done(Call& call) {
     using grpc::StatusCode;
     const StatusCode code = call.status.error_code();
-    // Nothing that is sent is an accident of the server's, and none of it is waited for without end.
+    // No request may cause an internal error of the server, and every request must be answered in time.
     const bool sound =
         code != StatusCode::INTERNAL && code != StatusCode::UNKNOWN && code != StatusCode::DEADLINE_EXCEEDED;
-    // Bytes that are no message at all are refused by gRPC itself, which says no more than that.
-    // Where they are refused by the server it says a sentence, which no client's limit of 8 kB cuts off.
+    // gRPC itself refuses bytes that are not a message, and gives no further reason.
+    // If the server refuses them, it gives a sentence. The sentence must fit into any client's limit of 8 kB.
     const std::string said = call.status.error_message();
     const bool told = (call.status.ok() || call.answered || !said.empty() || code == StatusCode::UNIMPLEMENTED) &&
                       said.size() <= kMostSaidBytes;
@@ -279,7 +279,7 @@ class Server {
     while (queue_.Next(&tag, &ok)) go_on(*static_cast<Call*>(tag), ok);
   }
 
-  // There is a room to call, and not one more for every input that made one.
+  // Keeps a room for the calls, and removes rooms that inputs have made.
   void look_after() {
     Rooms& rooms = server_->rooms();
     const auto room = rooms.find(kRoom);
@@ -293,7 +293,8 @@ class Server {
       if (other->name != kRoom && other->name != kSpare) (void)rooms.remove(other->name, true);
   }
 
-  // Nothing is under way but what lost its connection: that is still carried out, and may be one more room.
+  // Replaces the rooms. The only calls under way are those that lost their connection. They are still carried out, and
+  // may make one more room.
   void renew() {
     Rooms& rooms = server_->rooms();
     const auto made = [&](const char* name) {
@@ -321,12 +322,12 @@ class Server {
   std::unique_ptr<RoomServer> server_;
   std::vector<std::unique_ptr<grpc::GenericStub>> stubs_;
   grpc::CompletionQueue queue_;
-  std::uint64_t calls_ = 0, epoch_ = 0;          // of the caller, as the next
+  std::uint64_t calls_ = 0, epoch_ = 0;          // caller's thread, as the next
   std::map<std::string, std::uint64_t> counts_;  // by request
   std::mutex mutex_;
   std::condition_variable freed_;
   std::vector<Call*> free_;      // under mutex_, as the next two
-  std::vector<AuthorId> hands_;  // that have no session
+  std::vector<AuthorId> hands_;  // hands without a session
   std::map<int, std::uint64_t> statuses_;
   std::thread reader_;
 };

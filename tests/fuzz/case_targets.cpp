@@ -1,4 +1,4 @@
-// Files of a case, and the fields that were carved from it.
+// Targets for the files of a case and for its cut fields.
 #include <cmath>
 #include <filesystem>
 #include <span>
@@ -25,7 +25,7 @@ const Case& a_case() {
   return made;
 }
 
-// A sound case in a folder, one of whose files is replaced by the input.
+// A valid case in a folder. The input replaces one of its files.
 class CaseFolder {
  public:
   CaseFolder() { OSTEON_CHECK(a_case().save(folder_ / "case")); }
@@ -54,7 +54,7 @@ void read_with(std::span<const std::uint8_t> data, const char* name) {
   load_case(changed.folder());
 }
 
-// What ends a file of fields. Every input gets a sound one: else the seal alone would be tried.
+// The end of a file of fields. Every input gets a valid one, because otherwise only the seal would be tested.
 constexpr std::string_view kSeal = "osteon-fields-1\n";
 
 Bytes sealed(std::span<const std::uint8_t> data) {

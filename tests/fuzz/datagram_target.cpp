@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::uint32_t kSession = 7;
-constexpr std::uint64_t kSeeds = 3;  // datagrams sealed as seeds, with the counters from 1 and a key each
+constexpr std::uint64_t kSeeds = 3;  // sealed datagrams as seeds, with counters from 1 and one key each
 
 SealKey the_key() {
   SealKey key;
@@ -34,7 +34,8 @@ std::vector<Bytes> seeds() {
   return sealed;
 }
 
-// Without the key nothing can be made that is opened: what is opened is one of the seeds, byte for byte.
+// Without the key nobody can make a datagram that is opened. Whatever is opened must be one of the seeds, byte for
+// byte.
 void as_datagram(std::span<const std::uint8_t> data) {
   Opener opener(kSession, the_key());
   DatagramBuffer plain;
@@ -49,7 +50,7 @@ void as_datagram(std::span<const std::uint8_t> data) {
   OSTEON_CHECK(!opener.open(data, 0s, plain) && opener.counts().replayed == 1);
 }
 
-// Whatever a peer says comes out as it was said, and goes on.
+// Whatever a peer sends must come out unchanged, and goes to the layer above.
 void as_plain(std::span<const std::uint8_t> data, const PlainTarget& above) {
   const auto said = data.first(std::min(data.size(), kMostPlainBytes));
   Sealer sealer(kSession, the_key());

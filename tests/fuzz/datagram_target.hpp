@@ -1,4 +1,5 @@
-// Datagrams as a fuzz target: any bytes at the opener, and the same bytes as what a peer with the key says.
+// Fuzz target for datagrams. It gives any bytes to the opener, and the same bytes as plain text from a peer with the
+// key.
 #pragma once
 #include <functional>
 
@@ -6,10 +7,10 @@
 
 namespace osteon::fuzz {
 
-// What stands above the opener: takes any plain bytes of an authentic datagram.
+// The layer above the opener. It takes any plain bytes of an authentic datagram.
 using PlainTarget = std::function<void(std::span<const std::uint8_t>)>;
 
-// `above`: what the plain bytes go on to; none: they are only compared. `plain_seeds`: valid ones, for it.
+// `above`: receives the plain bytes. If empty, the bytes are only compared. `plain_seeds`: valid inputs for `above`.
 [[nodiscard]] Target datagram_target(PlainTarget above = {}, const std::vector<Bytes>& plain_seeds = {});
 
 }  // namespace osteon::fuzz

@@ -11,7 +11,7 @@
 namespace osteon::fuzz {
 namespace {
 
-constexpr std::size_t kHead = 4;  // bytes of a record before its own
+constexpr std::size_t kHead = 4;  // bytes of a record before the entry's own bytes
 
 class Changes {
  public:

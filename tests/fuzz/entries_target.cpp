@@ -21,8 +21,8 @@ constexpr double kPitch_mm = 1.0, kFirst_mm = 37.0, kLast_mm = 42.0, kMiddle_mm 
 constexpr std::int32_t kFirstLeaf = 32, kSecondLeaf = 40;  // along each axis
 constexpr CutLimits kLimits{.time_slack = 1s, .swept_voxels_per_s = 5e8, .power_w = 500.0};
 
-// A cube of 2 x 2 x 2 leaves, all in one branch of the volumes' trees, and a box of two tools: so that a room is made
-// and compared in microseconds.
+// A cube of 2 x 2 x 2 leaves, all in one branch of the volumes' trees, and a box of two tools. It is so small that a
+// room is made and compared in microseconds.
 const Case& bone() {
   static const Case made = [] {
     const Box extent{Vec3::Constant(kFirst_mm), Vec3::Constant(kLast_mm)};
@@ -64,14 +64,15 @@ void expect_same(const Room& one, const Room& other) {
   OSTEON_CHECK(items.size() <= kMostItems && std::ranges::is_sorted(items, std::less_equal{}, &SceneItem::id));
 }
 
-// As the surface's thread asks it after any event: the work is bounded by the bone, whatever the entries said.
+// Asks for the surface as the surface's thread does after an event. The bone bounds the work, whatever the entries
+// contain.
 void draw(Room& room) {
   const std::vector<BlockKey> blocks = room.bone_blocks();
   OSTEON_CHECK(blocks.size() <= 1000 * kMostBodies);
   for (std::size_t i = 0; i < std::min<std::size_t>(blocks.size(), 2); ++i) (void)room.gather_block(blocks[i]);
 }
 
-// Both do it, and end alike.
+// Gives both rooms the same events. Both must end in the same state.
 void go_on(Room& one, Room& other) {
   const AuthorId someone{1};
   for (Room* room : {&one, &other}) (void)room->undo_to(someone, RoomSeq{0});
@@ -80,8 +81,8 @@ void go_on(Room& one, Room& other) {
   expect_same(one, other);
 }
 
-// `room` is given every entry, `other` what was taken, through its bytes once more: so that a refused entry that
-// changed anything shows in the end.
+// `room` receives every entry. `other` receives the accepted entries, encoded and decoded once more. If a refused entry
+// changes anything, the two rooms differ at the end.
 void replay_any_entries(std::span<const std::uint8_t> data, bool evaluate) {
   const EntriesInput input = entries_input(data);
   const unsigned how = input.how;
@@ -128,7 +129,7 @@ void begin_any_room(std::span<const std::uint8_t> data) {
   expect_same(*room, *again);
 }
 
-// Seeds: what a real room has decided.
+// Seeds: decisions of a real room.
 
 EntriesInput as_input(Room& room, unsigned how, std::uint8_t checkpoint) {
   EntriesInput input{static_cast<std::uint8_t>(how), checkpoint, {}};
@@ -150,7 +151,7 @@ void cut_down(Room& room, AuthorId hand, double x_mm) {
   OSTEON_CHECK(room.submit(cut).has_value());
 }
 
-// The bone in two along x, by masks that take whole leaves.
+// Half of the bone along x, by masks that take whole leaves.
 Fragment half(bool upper) {
   Fragment fragment;
   fragment.volume_mm3 = 100;
@@ -213,7 +214,7 @@ std::vector<Bytes> rooms() {
     OSTEON_CHECK(again.room_hash() == room.room_hash() && std::ranges::all_of(seen, std::identity{}));
     inputs.push_back(to_bytes(input));
   }
-  {  // cuts, taken back and done again
+  {  // cuts, undo and redo
     Room room = begun();
     const AuthorId one = room.join(MemberKind::surgeon), two = room.join(MemberKind::surgeon);
     cut_down(room, one, -2);
@@ -223,7 +224,7 @@ std::vector<Bytes> rooms() {
     OSTEON_CHECK(room.redo_last(two, 1).has_value());
     inputs.push_back(to_bytes(as_input(room, kFromCheckpoint | kGoOn, 5)));
   }
-  {  // pieces, of which one goes
+  {  // fragments, one of which is removed
     Room room = begun();
     const AuthorId hand = room.join(MemberKind::surgeon);
     OSTEON_CHECK(room.split(BodyId{0}, {half(false)}, room.bone_epoch()).has_value());

@@ -1,4 +1,4 @@
-// What the targets of the import have in common: the file that a reader opens, and what a refusal must be.
+// What the targets of the import share: the file that a reader opens, and the check of an error.
 #pragma once
 #include <filesystem>
 #include <random>
@@ -11,7 +11,7 @@
 
 namespace osteon::fuzz {
 
-// A file in a folder of its own, written anew for each input.
+// A file in a folder of its own. It is written anew for each input.
 class InputFile {
  public:
   explicit InputFile(const std::string& name) : path_(folder_ / name) {}
@@ -26,10 +26,10 @@ class InputFile {
 [[nodiscard]] Bytes bytes_of_file(const std::filesystem::path& file);
 [[nodiscard]] Bytes bytes_of_text(std::string_view text);
 
-// A refusal says something, and never repeats a whole file.
+// Checks that an error has a message, and that the message does not repeat a whole file.
 void expect_bounded(const Error& error);
 
-// For targets that read text: replaces one number of it by one that is hard to take.
+// Replaces one number of a text by a dangerous one. For targets that read text.
 void change_number(Bytes& input, std::mt19937& random);
 
 }  // namespace osteon::fuzz

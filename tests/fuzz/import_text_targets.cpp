@@ -1,4 +1,4 @@
-// Text that a person writes for the import: a tool, a list of cuts, a legend.
+// Targets for text that a person writes for the import: a tool, a list of cuts, a legend.
 #include <set>
 #include <string>
 #include <string_view>
@@ -13,7 +13,7 @@
 namespace osteon::fuzz {
 namespace {
 
-// What is accepted has the same hash when it is written and read again.
+// An accepted tool must have the same hash when it is written and read again.
 void read_tool(std::span<const std::uint8_t> data) {
   const auto tool = parse_tool({reinterpret_cast<const char*>(data.data()), data.size()}, "tool.yaml");
   if (!tool) return expect_bounded(tool.error());
@@ -51,7 +51,7 @@ Target text_target(std::string name, void (*read)(std::span<const std::uint8_t>)
 
 Target tool_file_target() {
   std::vector<Bytes> seeds;
-  std::set<ToolKind> kinds;  // one of each
+  std::set<ToolKind> kinds;  // one of each kind
   for (const Tool& tool : builtin_tools())
     if (kinds.insert(tool.kind).second) seeds.push_back(bytes_of_text(to_yaml(tool)));
   return text_target("tool_file", read_tool, std::move(seeds));

@@ -33,7 +33,7 @@ void append(Journal& journal, std::size_t from, std::size_t to) {
   OSTEON_CHECK(journal.append(std::span(all_entries()).subspan(from, to - from)).has_value());
 }
 
-// With a checkpoint; its last entries in SQLite's log where it was not `closed`. Small pages keep it small.
+// A journal with a checkpoint. If not `closed`, its last entries are still in SQLite's log. Small pages keep it small.
 MemoryDisk::Image a_journal(bool closed) {
   MemoryDisk disk(1, 512);
   Journal journal =
@@ -55,8 +55,9 @@ const MemoryDisk::Image& sound(bool closed) {
   return made[closed];
 }
 
-// An input's first byte chooses the journal; then each five are a damage: which file and what, where (two bytes), how
-// much, and with what. Places wrap round the file's end, so that every damage meets it.
+// The first byte of an input selects the journal. Then five bytes describe each damage: file and kind, position (two
+// bytes), length, and value.
+// Positions wrap round the file's end, so that every damage hits the file.
 void damage(MemoryDisk::Image& image, std::span<const std::uint8_t> what) {
   const auto file = std::next(image.begin(), what[0] % static_cast<std::ptrdiff_t>(image.size()));
   std::string& bytes = file->second;
@@ -85,7 +86,7 @@ void damage(MemoryDisk::Image& image, std::span<const std::uint8_t> what) {
   }
 }
 
-// What was written, up to some entry.
+// The journal must hold what was written, up to some entry.
 void expect_prefix(Journal& journal) {
   std::size_t entries = 0;
   const Result<void> read = journal.read(RoomSeq{1}, [&](const JournalEntry& entry) {

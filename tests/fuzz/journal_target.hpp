@@ -1,16 +1,19 @@
-// What a journal may hold as fuzz targets: entries of a room, what a room began as, and the files themselves.
+// Fuzz targets for the contents of a journal: log entries of a room, its initial state, and the files themselves.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 
 namespace osteon::fuzz {
 
-// Any bytes as a sequence of entries, each with its place and time: what is refused changes nothing, what is taken
-// makes the same room again. Without the bone's fields, ten times as fast as with them.
+// Takes any bytes as a sequence of log entries, each with its sequence number and time. A refused entry must change
+// nothing.
+// The accepted entries must make the same room again. Does not compute the bone's fields, and is therefore ten times as
+// fast.
 [[nodiscard]] Target entries_target();
-// The same with them: from a checkpoint too, and gone on with.
+// The same with the bone's fields. Also starts from a checkpoint, and continues afterwards.
 [[nodiscard]] Target evaluated_entries_target();
 [[nodiscard]] Target genesis_target();
-// Any bytes as a list of damages to a small journal: what is read or recovered is what was written, up to some entry.
+// Takes any bytes as a list of damages to a small journal. What is read or salvaged must equal what was written, up to
+// some entry.
 [[nodiscard]] Target journal_file_target();
 
 }  // namespace osteon::fuzz

@@ -1,4 +1,4 @@
-// Label volumes: a PNG slice.
+// Target for label volumes: a PNG slice.
 #include <png.h>
 
 #include <array>
@@ -16,7 +16,7 @@ namespace osteon::fuzz {
 namespace {
 
 constexpr int kWidth = 6, kHeight = 5;
-constexpr std::size_t kSmall = 4096;  // voxels: what is larger is read, and made no case
+constexpr std::size_t kSmall = 4096;  // voxels: larger volumes are read, but no case is made of them
 
 Bytes a_slice(png_uint_32 format) {
   constexpr std::array<png_byte, 4> kBone{255, 249, 219, 255};
@@ -36,7 +36,7 @@ Bytes a_slice(png_uint_32 format) {
   return bytes_of_file(path);
 }
 
-// Whether these labels come for the first time: making a case of them takes a hundred times as long as reading them.
+// True if these labels come for the first time. Making a case of them takes a hundred times as long as reading them.
 bool is_new(const imaging::LabelVolume& volume) {
   static std::set<Digest> seen;
   Hasher hasher;

@@ -1,5 +1,6 @@
-// osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]: one target under libFuzzer, which
-// looks for inputs that reach what no input has reached. --seeds writes the target's own seeds into that folder first.
+// osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]
+// Runs one target under libFuzzer, which searches for inputs that reach new code. --seeds first writes the target's own
+// seeds into that folder.
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -19,7 +20,7 @@ namespace {
 
 const Target* chosen = nullptr;
 constexpr std::size_t kNoLimit = std::numeric_limits<std::size_t>::max();
-std::atomic<std::size_t> most_bytes_at_once = kNoLimit;  // libFuzzer itself takes more between two inputs
+std::atomic<std::size_t> most_bytes_at_once = kNoLimit;  // between two inputs libFuzzer itself allocates more
 
 [[noreturn]] void usage(const std::vector<Target>& all) {
   std::fprintf(stderr, "osteon-fuzz --target=NAME [--seeds=FOLDER] [OPTIONS OF LIBFUZZER] [FOLDER...]; targets:");
@@ -36,7 +37,7 @@ void write_seeds(const Target& target, const std::filesystem::path& folder) {
   }
 }
 
-// libFuzzer passes over options that begin with two dashes.
+// libFuzzer ignores options that begin with two dashes.
 void choose(std::span<char*> arguments) {
   static const std::vector<Target> all = targets();
   constexpr std::string_view kTarget = "--target=", kSeeds = "--seeds=";
@@ -55,8 +56,9 @@ void choose(std::span<char*> arguments) {
 }  // namespace
 }  // namespace osteon::fuzz
 
-// GDCM and OpenVDB ask for what a damaged file claims. The child that the import reads it in has a limit of memory and
-// takes std::bad_alloc for a damaged file; under the address sanitizer the limit is here.
+// GDCM and OpenVDB allocate what a damaged file claims. The import reads files in a child process with a memory limit,
+// where std::bad_alloc is handled as a damaged file.
+// The address sanitizer allows no such limit, so the limit is here.
 void* operator new(std::size_t bytes) {
   const bool too_many = bytes > osteon::fuzz::most_bytes_at_once;
   void* memory = too_many ? nullptr : std::malloc(std::max<std::size_t>(bytes, 1));
@@ -86,7 +88,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const osteon::fuzz::Target& target = *osteon::fuzz::chosen;
   osteon::fuzz::most_bytes_at_once = target.most_bytes_at_once;
   target.run({data, size});
-  // Calls go on beside those of the next inputs: some are answered after seconds.
+  // Calls overlap with those of the next inputs: some are answered after seconds.
   static int begun = 0;
   constexpr int kSettleEvery = 4096;
   if (target.settle && ++begun % kSettleEvery == 0) target.settle();

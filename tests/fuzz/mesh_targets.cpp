@@ -1,4 +1,4 @@
-// Triangle meshes: an STL as a bone and as a tool.
+// Targets for triangle meshes: an STL as a bone and as a tool.
 #include <algorithm>
 #include <cmath>
 #include <string>
@@ -46,7 +46,7 @@ void read_mesh(std::span<const std::uint8_t> data) {
   if (!mesh) return expect_bounded(mesh.error());
   for (const auto& triangle : mesh->triangles)
     for (const std::uint32_t vertex : triangle) OSTEON_CHECK(vertex < mesh->positions_mm.size());
-  // Every mesh has about as many samples, whatever its size.
+  // Gives every mesh about the same number of samples, whatever its size.
   const double pitch_mm = std::max(0.5, bounds(*mesh).size_mm().maxCoeff() / 16.0);
   CaseInfo info;
   info.title = "Mesh";

@@ -1,6 +1,7 @@
-// Every target on seeded mutations of its valid inputs; OSTEON_FUZZ_RUNS in the environment asks for more of them, in
-// all of a target's seeds together, OSTEON_FUZZ_TARGET for one target alone, OSTEON_FUZZ_SEED for other mutations (1 if
-// it is not set), and OSTEON_FUZZ_INPUT, in hexadecimal digits, for nothing but that input.
+// Runs every target on seeded mutations of its valid inputs. Environment variables change this:
+// OSTEON_FUZZ_RUNS asks for more inputs, in all seeds of a target together. OSTEON_FUZZ_TARGET selects one target.
+// OSTEON_FUZZ_SEED selects other mutations (1 if it is not set). OSTEON_FUZZ_INPUT, in hexadecimal digits, runs only
+// that input.
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -57,14 +58,14 @@ double resident_mb() {
 }
 
 Bytes changed(const Target& target, const Bytes& seed, std::mt19937& random) {
-  // A few changes of form on top of each other, or changes of bytes.
+  // Applies a few changes of format on top of each other, or changes bytes.
   if (!target.change || random() % 4 == 0) return mutated(seed, random);
   Bytes input = seed;
   for (std::size_t changes = 1 + random() % 6; changes > 0; --changes) target.change(input, random);
   return input;
 }
 
-// The seeds by turns, so that what they do meets: at least `count` inputs. Returns how many there were.
+// Uses the seeds in turn, so that their effects combine. Runs at least `count` inputs and returns how many there were.
 long run_asked(const Target& target, long count, std::mt19937& random) {
   const auto has = [&](const Bytes& seed, long round) { return !target.rounds || round % target.rounds(seed) == 0; };
   long done = 0;
@@ -104,7 +105,7 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
     }
     const long count = std::atol(asked);
     long done = run_asked(target, count / 10, random);
-    const double memory_mb = resident_mb();  // what a start takes is there by then
+    const double memory_mb = resident_mb();  // by now the memory of the start is allocated
     done += run_asked(target, count - done, random);
     settle();
     std::printf("fuzzed: %s %ld inputs; memory after a tenth of them %.1f MB, at the end %.1f MB\n",

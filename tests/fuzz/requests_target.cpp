@@ -27,17 +27,17 @@ using google::protobuf::FieldDescriptor;
 using google::protobuf::Message;
 
 struct Count {
-  std::uint64_t runs = 0, messages = 0;  // of the runs, what could be read at all
+  std::uint64_t runs = 0, messages = 0;  // messages: runs whose input could be parsed
 };
 std::map<std::string, Count> counts;   // by request
-std::uint64_t taken = 0, refused = 0;  // values that the checks took, and did not
+std::uint64_t taken = 0, refused = 0;  // values that the checks accepted, and refused
 
 template <class Kind>
 bool is(const Message& message) {
   return message.GetDescriptor() == Kind::descriptor();
 }
 
-// What is accepted must come back the same when it is sent on; what is not is refused with a sentence.
+// An accepted value must come back the same when it is sent on. A refused one must have a sentence as its reason.
 template <class Kind>
 bool converts(const Message& message) {
   if (!is<Kind>(message)) return false;

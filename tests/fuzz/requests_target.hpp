@@ -1,12 +1,11 @@
-// Requests of every call as a fuzz target, as far as they go before a room is asked: read, and taken apart by the
-// checks of the wire. No server, so that millions of inputs take minutes; the target calls gives fewer to a server
-// itself.
+// Fuzz target for the requests of every call, before they reach a room: they are parsed and checked by the wire layer.
+// It runs no server, so millions of inputs take minutes. The target `calls` gives fewer inputs to a real server.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 
 namespace osteon::fuzz {
 
-// Inputs as of calls_target().
+// Takes the same inputs as calls_target().
 [[nodiscard]] Target requests_target();
 
 }  // namespace osteon::fuzz

@@ -1,4 +1,4 @@
-// Sound values of what travels, for targets to begin with.
+// Valid values of each type that is sent. Targets use them as seeds.
 #pragma once
 #include "common/field/cut.hpp"
 #include "common/field/restrictions.hpp"
@@ -9,7 +9,7 @@
 
 namespace osteon::fuzz {
 
-[[nodiscard]] Cut a_cut();  // of author 1, the first, with a drill
+[[nodiscard]] Cut a_cut();  // the first cut of author 1, with a drill
 [[nodiscard]] SceneItem an_item();
 [[nodiscard]] Restrictions a_supervision();
 [[nodiscard]] Annotation an_annotation();

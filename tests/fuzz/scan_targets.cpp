@@ -1,4 +1,4 @@
-// Scans: a DICOM slice, an InVesalius project, and archives of slices.
+// Targets for scans: a DICOM slice, an InVesalius project, and archives of slices.
 #include <gdcmTrace.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -30,12 +30,13 @@ namespace fs = std::filesystem;
 constexpr const char* kExplicit = "1.2.840.10008.1.2.1";
 constexpr const char* kImplicit = "1.2.840.10008.1.2";
 constexpr int kRows = 4, kColumns = 5;
-// GDCM allocates and clears what a damaged length claims, and an assertion leaves it behind. No sound input needs this.
+// GDCM allocates and clears what a damaged length claims. When an assertion fails, this memory is leaked. No valid
+// input needs more than this.
 constexpr std::size_t kMostBytesAtOnce = std::size_t{4} << 20;
 
 bool keep_going(double) { return true; }
 
-// Elements of a data set, little endian.
+// Elements of a DICOM data set, little endian.
 class DataSet {
  public:
   explicit DataSet(bool explicit_vr) : explicit_vr_(explicit_vr) {}
@@ -84,7 +85,8 @@ std::string a_slice(const std::string& syntax) {
   return std::string(128, '\0') + "DICM" + head + meta.bytes() + data.bytes();
 }
 
-// As the slice and one 2 mm beside it would be read: headers, series, and the pixels of what can be imported.
+// Reads the slice and a second one 2 mm beside it, as the import does: headers, series, and the pixels of what can be
+// imported.
 void read_slice(const fs::path& file) {
   import::DicomHeader header = import::read_header(file);
   import::DicomHeader beside = header;
@@ -106,19 +108,19 @@ void read_slice(const fs::path& file) {
   if (!read) expect_bounded(read.error());
 }
 
-// GDCM aborts by assert() on some damaged files, so the import reads them in processes that may die. Here such an input
-// is left instead, and what the library held is lost.
+// GDCM aborts by assert() on some damaged files, so the import reads them in child processes. Here the target leaves
+// such an input by longjmp, and the library's memory is leaked.
 std::jmp_buf on_assertion;
 bool in_library = false;
 
-// What the library may allocate while it reads one input, as in the child that the import starts. Returns what was
-// allowed before.
+// Limits what the library may allocate while it reads one input, as in the import's child process. Returns the limit
+// before.
 rlimit allow_memory(rlim_t more_bytes) {
   rlimit before{}, limit{};
   ::getrlimit(RLIMIT_AS, &before);
   std::ifstream file("/proc/self/statm");
   rlim_t pages = 0;
-  if (!import::limits_memory() || !(file >> pages)) return before;  // sanitizers have an option for it
+  if (!import::limits_memory() || !(file >> pages)) return before;  // sanitizers have an option for this
   limit = before;
   limit.rlim_cur = std::min(before.rlim_max, pages * static_cast<rlim_t>(::sysconf(_SC_PAGESIZE)) + more_bytes);
   ::setrlimit(RLIMIT_AS, &limit);
@@ -148,7 +150,7 @@ void read_project(std::span<const std::uint8_t> data) {
 }
 
 void read_archive(std::span<const std::uint8_t> data) {
-  // Small, so that an input can go beyond each.
+  // Small limits, so that an input can exceed each.
   constexpr import::ArchiveLimits kLimits{.entries = 8, .bytes = 1 << 16, .spare_bytes = 0};
   static const InputFile file("scan");
   const test::TempDir into;
@@ -179,7 +181,7 @@ Bytes a_project(bool gzip) {
 
 }  // namespace
 
-// [any thread] Takes the C library's place for the library's assertions alone.
+// [any thread] Replaces the C library's function, only for the assertions of the library.
 extern "C" [[noreturn]] void __assert_fail(const char* expression, const char* file, unsigned line,
                                            const char*) noexcept {
   if (std::exchange(in_library, false)) std::longjmp(on_assertion, 1);

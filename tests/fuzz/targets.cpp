@@ -30,7 +30,7 @@ using namespace std::chrono_literals;
 
 Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
-// What is accepted must come back the same when it is sent on.
+// An accepted message must come back the same when it is sent on.
 template <class Message>
 void parse_and_convert(std::span<const std::uint8_t> data) {
   Message message;
@@ -47,8 +47,8 @@ BlockPayload a_block() {
   return encode_block(sphere, sphere, 0, 0.5);
 }
 
-// Coarser surroundings on several sides and corners; rough, so that entries of solid bits are coded in each of their
-// ways.
+// A block with coarser neighbours on several sides and corners. It is rough, so that rows of solid bits use each of
+// their codings.
 BlockPayload a_seamed_block() {
   BlockSamples block;
   block.key = {{}, 2, {}};
@@ -88,7 +88,7 @@ void decode_any_block(std::span<const std::uint8_t> data) {
     for (const std::uint32_t vertex : triangle) OSTEON_CHECK(vertex < mesh->positions_mm.size());
 }
 
-// What a peer with the key says, whatever it is, neither ends the other end of the fast path nor makes it grow.
+// Keys of the fast path. Whatever a peer with the key sends must neither stop the other end nor make it grow.
 SessionKeys link_keys() {
   return make_session_keys(3, [](std::span<std::uint8_t> bytes) { std::ranges::fill(bytes, std::uint8_t{0x3c}); });
 }
@@ -97,8 +97,8 @@ wire::ServerLink server_end() {
   return {link_keys(), {1}, [](std::span<std::uint8_t> bytes) { std::ranges::fill(bytes, std::uint8_t{0x7e}); }};
 }
 
-// Of the packets that were given to an end, with the key: what it could read, and what a correct peer would not have
-// said.
+// Counts the packets that an end received with the key: those it could read, and those that a correct peer would not
+// send.
 struct PacketCounts {
   std::uint64_t taken = 0, refused = 0;
   void add(const wire::LinkCounts& counts) { ++(counts.malformed == 0 ? taken : refused); }
@@ -141,7 +141,7 @@ void as_down_packet(std::span<const std::uint8_t> plain) {
   down_packets.add(link.half().counts());
 }
 
-// Packets as the two ends make them, with everything in them that there is.
+// Packets as the two ends make them, with all fields set.
 Bytes an_up_packet() {
   SendWindow window;
   const wire::ToolNumbers tools;
@@ -175,7 +175,8 @@ Bytes a_down_packet() {
   return bytes_of(packet.SerializeAsString());
 }
 
-// One field, somewhere in the packet; one bit of what is none, as datagrams are.
+// Changes one field at a random depth of the packet, or one bit of bytes that are not a packet. Datagrams are changed
+// the same way.
 template <class Packet>
 void change_packet(Bytes& input, std::mt19937& random) {
   Packet packet;
@@ -203,7 +204,7 @@ Target packet_target(std::string name, PlainTarget end, Bytes packet, const Pack
 }  // namespace
 
 std::vector<Target> targets() {
-  google::protobuf::SetLogHandler(nullptr);  // it writes a line for every text that is none
+  google::protobuf::SetLogHandler(nullptr);  // it logs a line for every text that is not UTF-8
   FieldLeaf leaf{{}, 1, {8, -16, 0}, std::vector<std::int16_t>(kLeafVoxels, 7)};
   return {
       {"cut", parse_and_convert<v1::Cut>, {bytes_of(wire::to_wire(a_cut()).SerializeAsString())}},

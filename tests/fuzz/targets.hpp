@@ -1,5 +1,7 @@
-// What untrusted bytes can reach. Each target takes any bytes and must neither crash nor break a promise; sanitizers
-// see the rest. Run by libFuzzer (osteon-fuzz, of the preset fuzz) and, in every test run, on seeded mutations.
+// Fuzz targets for everything that untrusted bytes can reach. A target takes any bytes. It must not crash or break a
+// promise.
+// Sanitizers find other errors. libFuzzer runs the targets (osteon-fuzz, preset `fuzz`). Every test run gives them
+// seeded mutations.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -16,18 +18,19 @@ using Bytes = std::vector<std::uint8_t>;
 struct Target {
   std::string name;
   std::function<void(std::span<const std::uint8_t>)> run;
-  std::vector<Bytes> seeds;  // valid inputs, to mutate
-  long mutations = 2000;     // of each seed in a test run
-  // Changes an input as only who knows its form can; none: bytes are changed.
+  std::vector<Bytes> seeds;  // valid inputs to mutate
+  long mutations = 2000;     // number for each seed in a test run
+  // Changes an input with knowledge of its format. If empty, bytes are changed.
   std::function<void(Bytes&, std::mt19937&)> change = nullptr;
-  // Waits for what run() has only begun; none: it has done all when it returns.
+  // Waits for work that run() has only started. If empty, run() has done all its work when it returns.
   std::function<void()> settle = nullptr;
-  // Of how many rounds through the seeds one has this seed, where millions of inputs are asked for: more than 1 where
-  // it costs as much as many others, or tells less. None: every round has all.
+  // For runs of millions of inputs: this seed is used in one of so many rounds through the seeds.
+  // More than 1 for a seed that is as expensive as many others, or that finds less. If empty, every round uses all
+  // seeds.
   std::function<long(const Bytes& seed)> rounds = nullptr;
-  // What one allocation may take under libFuzzer: more of it throws std::bad_alloc.
+  // Largest single allocation under libFuzzer, bytes. A larger one throws std::bad_alloc.
   std::size_t most_bytes_at_once = std::size_t{256} << 20;
-  // A line for whoever looks on: what was run how often.
+  // A line for the reader of the test's output: what was run, and how often.
   std::function<std::string()> figures = nullptr;
 };
 

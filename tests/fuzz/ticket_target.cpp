@@ -31,7 +31,7 @@ std::string base64(std::span<const std::uint8_t> bytes) {
   return text;
 }
 
-// A ticket that is let in is, to the letter, one that the key signs: nobody has another way to write it.
+// An accepted ticket is exactly the text that the key signs. No other spelling of it is accepted.
 void open_text(std::string_view text) {
   static const TicketCheckKey check_key = check_key_of(fixed_key());
   const Result<Ticket> ticket = open_ticket(text, check_key);

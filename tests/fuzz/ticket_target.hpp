@@ -1,11 +1,11 @@
-// What comes in the hand of somebody who wants to be let in.
+// Fuzz targets for what a client shows to be admitted.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 
 namespace osteon::fuzz {
 
-[[nodiscard]] Target ticket_target();           // the text, whoever wrote it
-[[nodiscard]] Target ticket_contents_target();  // contents that the server's own key has signed
-[[nodiscard]] Target access_list_target();      // the file of who was revoked
+[[nodiscard]] Target ticket_target();           // the text, from any source
+[[nodiscard]] Target ticket_contents_target();  // contents signed by the server's own key
+[[nodiscard]] Target access_list_target();      // the file of revoked people and tickets
 
 }  // namespace osteon::fuzz

@@ -11,7 +11,7 @@
 namespace osteon::fuzz {
 namespace {
 
-// Small, so that an input of a few hundred bytes can go beyond each.
+// Small limits, so that an input of a few hundred bytes can exceed each.
 constexpr UploadQuota kQuota{.unpacked_bytes = 1 << 16, .entries = 4, .ratio = 50, .ratio_free_bytes = 1 << 10};
 
 void unpack(std::span<const std::uint8_t> data) {

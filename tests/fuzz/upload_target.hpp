@@ -1,5 +1,4 @@
-// Uploaded archives as a fuzz target: whatever they are, they come out as files of a case within the quota, or not at
-// all.
+// Fuzz target for uploaded archives. An archive must come out as files of a case within the quota, or not at all.
 #pragma once
 #include "tests/fuzz/targets.hpp"
 

@@ -1,5 +1,5 @@
-// Windows of one room as processes: what somebody draws and says in one is seen in the others, and one goes where
-// another looks.
+// Runs several viewers of one room as processes. What a person draws and says in one viewer appears in the others, and
+// one viewer follows another's view.
 #include <gtest/gtest.h>
 #include <png.h>
 
@@ -40,7 +40,7 @@ int difference(const std::array<int, 3>& a, const std::array<int, 3>& b) {
   return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
 }
 
-// How many pixels of a square in the middle of the picture are another's.
+// Number of pixels that differ in a square in the middle of the picture.
 int changed_in_middle(const Photo& a, const Photo& b, int half) {
   int changed = 0;
   for (int y = a.height / 2 - half; y < a.height / 2 + half; ++y)
@@ -55,7 +55,7 @@ class Annotations : public testing::Test {
     screen_ = Xvfb::start();
     ASSERT_TRUE(screen_) << "Xvfb, of Debian's package xvfb, did not start";
   }
-  // From above on the block, whose top is at z = 0 and round the origin.
+  // View from above on the block. Its top is at z = 0, round the origin.
   static constexpr const char* kFromAbove = "look at 0 0 0 from 0 0 120 up 0 1 0";
 
   Photo photo(ScriptedViewer& viewer, const std::string& name) {
@@ -66,7 +66,7 @@ class Annotations : public testing::Test {
     EXPECT_TRUE(viewer.tell("status " + (stage_ / "status.json").string()));
     return read_json(stage_ / "status.json");
   }
-  // Asks again until it is so, as long as a minute.
+  // Asks again until the condition holds, for at most a minute.
   template <class Is>
   bool becomes(ScriptedViewer& viewer, Is is) {
     for (int i = 0; i < 600; ++i) {
@@ -92,14 +92,14 @@ TEST_F(Annotations, WhatOneDrawsTheOtherSeesUntilItIsWiped) {
   ASSERT_TRUE(drawn.starts_with("ok")) << drawn;
   ASSERT_TRUE(ada.tell("wait drawn 1"));
   const Photo line = photo(ada, "line.png");
-  // 16 mm over the middle of the picture, along its middle entry.
+  // 16 mm over the middle of the picture, along its middle row of pixels.
   int along = 0;
   for (int x = line.width / 2 - 30; x <= line.width / 2 + 30; ++x)
     along += difference(line.at(x, line.height / 2), bare.at(x, bare.height / 2)) > 60 ? 1 : 0;
   EXPECT_EQ(along, 61);
-  EXPECT_LT(changed_in_middle(line, bare, 30), 61 * 16) << "a line, no more";
+  EXPECT_LT(changed_in_middle(line, bare, 30), 61 * 16) << "only a line is drawn";
 
-  // Only whose it is takes it off.
+  // Only the author of an annotation can remove it.
   ASSERT_TRUE(ada.tell("wipe all"));
   EXPECT_EQ(status(ada)["drawn"], 1);
   ASSERT_TRUE(berg.tell("wipe all"));
@@ -141,7 +141,8 @@ TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
   EXPECT_TRUE(becomes(ada, looks_from(-70, -80, 40)));
   EXPECT_EQ(status(ada)["camera"]["target_mm"], (json{1.0, 2.0, 3.0}));
 
-  // Let go, the camera stays: the room tells a third window of Dr. Berg's next look, and the second has not moved.
+  // After "follow off" the camera stays. The room sends Dr. Berg's next view to a third viewer, but the second has not
+  // moved.
   ASSERT_TRUE(ada.tell("follow off"));
   ASSERT_TRUE(berg.tell("look overview"));
   ScriptedViewer other(stage_.address(), *screen_, {"--name", "other"});
@@ -149,7 +150,7 @@ TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
   EXPECT_TRUE(becomes(other, [&](const json&) {
     EXPECT_TRUE(other.tell("look as Dr. Berg"));
     return !looks_from(-70, -80, 40)(status(other));
-  })) << "the room knows of the new look";
+  })) << "the room has the new view";
   EXPECT_TRUE(looks_from(-70, -80, 40)(status(ada)));
 }
 

@@ -1,5 +1,5 @@
-// A server with certificates and tickets, a surgeon at work in it, and all who may not come in, or not any more. What
-// they try must not be felt by the surgeon.
+// Runs a server with certificates and tickets. A surgeon works in it, while clients without a valid right try to enter
+// or lose their right. The surgeon must not feel these attempts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -26,9 +26,9 @@ std::vector<std::string> plus(std::vector<std::string> arguments, const std::vec
   return arguments;
 }
 
-class DoorsOfPrograms : public ::testing::Test {
+class AuthenticatedPrograms : public ::testing::Test {
  protected:
-  // A ticket as whoever runs the server makes it.
+  // Makes a ticket with the operator's own command.
   std::filesystem::path ticket(const std::string& user, const std::string& role, const std::string& room = "room") {
     const RunResult made = run(program("osteon-server"), {"ticket", "--key", people_.ticket_key(), "--room", room,
                                                           "--user", user, "--role", role, "--hours", "1"});
@@ -39,7 +39,7 @@ class DoorsOfPrograms : public ::testing::Test {
   std::vector<std::string> credentials(const std::string& user, const std::filesystem::path& with) {
     return {"--certificates", people_.person(user), "--ticket", with};
   }
-  // An audio client that is turned away: one sentence that says why, and an exit code.
+  // Starts an audio client that is refused. It must end with one sentence that gives the reason, and an exit code.
   std::string turned_away(const std::vector<std::string>& by, ProcessOptions options = {}) {
     const RunResult result =
         run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--timeout", "1"}, by),
@@ -57,7 +57,7 @@ class DoorsOfPrograms : public ::testing::Test {
                                                stage_ / (name + ".json"), "--cache", stage_ / "cache"},
                                               credentials(user, ticket(user, role))));
   }
-  // Connects and says what is neither TLS nor HTTP.
+  // Connects and sends bytes that are neither TLS nor HTTP.
   void say_nonsense() {
     const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_in at{};
@@ -77,13 +77,13 @@ class DoorsOfPrograms : public ::testing::Test {
   Stage stage_{30.0, {"--certificates", people_.server()}};
 };
 
-TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
+TEST_F(AuthenticatedPrograms, AdmitWhoMayEnterAndKeepOthersFromDisturbingThem) {
   Process sue = haptic("sue", "sue", "trainee", {{"steps", {drill_at(0, 0, "rig")}}});
   Process dora = haptic("dora", "dora", "collaborator", {{"steps", {drill_at(9, 9, "rig")}}});
   Process ben = stage_.start("osteon-audio", plus({"--server", stage_.address(), "--output", "none"},
                                                   credentials("ben", ticket("ben", "observer"))));
 
-  // With nothing, with plain text, with what another authority has made.
+  // Without credentials, with plain text, and with the certificates of another authority.
   EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}),
               HasSubstr("--certificates DIR with --ticket FILE"));
   EXPECT_THAT(turned_away({"--plain"}), HasSubstr("asks for a certificate"));
@@ -92,7 +92,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
               HasSubstr("is not of the authority in"));
   say_nonsense();
 
-  // With a certificate, and a ticket that does not fit.
+  // With a certificate, but with a ticket that does not fit.
   EXPECT_THAT(turned_away(credentials("eve", people_.ticket("eve", "room", Role::observer, -5s))),
               HasSubstr("the ticket expired"));
   EXPECT_THAT(turned_away(credentials("eve", ticket("sue", "trainee"))),
@@ -107,7 +107,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   EXPECT_NE(closing.exit_code, 0);
   EXPECT_THAT(closing.err, HasSubstr("an instructor may not call CloseRoom"));
 
-  // In the middle of it: one is revoked, another's role is taken away.
+  // During the work one person is revoked, and another loses their role.
   EXPECT_TRUE(ben.running()) << ben.err();
   EXPECT_TRUE(dora.running()) << dora.err();
   people_.certs({"revoke", "ben"});
@@ -121,7 +121,7 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   EXPECT_NE(*dora_ended, 0);
   EXPECT_THAT(dora.err(), HasSubstr("an observer may not call Session"));
 
-  // She has noticed nothing.
+  // The surgeon has noticed nothing.
   ASSERT_EQ(sue.wait(120s), 0) << sue.err();
   const nlohmann::json summary = read_json(stage_ / "sue.json");
   EXPECT_EQ(summary["steps"][0]["completed"], true);
@@ -130,14 +130,14 @@ TEST_F(DoorsOfPrograms, LetInWhoMayComeAndKeepTheOthersFromDisturbingThem) {
   EXPECT_EQ(summary["lost"], nullptr);
   EXPECT_EQ(summary["fast_path"]["alive"], true);
   ASSERT_EQ(stage_.server().terminate(30s), 0) << stage_.server().err();
-  // Each of those who were refused is in the server's log, once.
+  // The server's log names each refused client once.
   const std::string log = stage_.server().err();
   EXPECT_THAT(log, HasSubstr("who=eve from=ipv4:127.0.0.1 reason=person"));
   EXPECT_THAT(log, HasSubstr("who=ben reason=revoked"));
 }
 
-// An instructor supervises by their console what they see in their window, both with one certificate.
-TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
+// An instructor supervises with a console and watches in a viewer. Both use one certificate.
+TEST_F(AuthenticatedPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen) << "Xvfb, of Debian's package xvfb, did not start";
   const auto ida = credentials("ida", ticket("ida", "instructor"));
@@ -155,7 +155,7 @@ TEST_F(DoorsOfPrograms, AConsoleAndAWindowOfOnePersonStayBesideEachOther) {
   EXPECT_EQ(ask(first, "draw 0 0 0 1 0 0"), "ok drawing 1");
   EXPECT_TRUE(window.tell("wait drawn 1"));
 
-  // A second console takes the place of the first, not of the window.
+  // A second console replaces the first one, but not the viewer.
   Process second = start();
   EXPECT_TRUE(ask(second, "people").starts_with("ok 3 people")) << second.err();
   const auto ended = first.wait(20s);

@@ -18,11 +18,10 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-// What a hand has of the bone under its tool, made by a thread of its own as in a client; here the tool is where the
-// other has cut last.
+// Builds the patch of a hand on a thread of its own, as a client does. The tool is where the other hand has cut last.
 class Felt {
  public:
-  // `in_patch`: called on that thread for every cut that the patch has.
+  // `in_patch`: called on that thread for every cut that is in the patch.
   Felt(const Case& bone, std::function<void(const Cut&)> in_patch)
       : in_patch_(std::move(in_patch)),
         replica_(bone, BodyId{}),
@@ -67,7 +66,7 @@ class Felt {
   std::condition_variable wake_;
   std::vector<Cut> came_;
   bool over_ = false;
-  haptic::Replica replica_;  // of its thread, as what follows
+  haptic::Replica replica_;  // of its thread, as the members below
   const haptic::ToolModel model_;
   haptic::PatchBuilder builder_;
   haptic::Patch patch_;
@@ -79,7 +78,7 @@ class Felt {
 std::string udp_port_of(Process& server) {
   std::string log;
   std::size_t at = std::string::npos;
-  // What a process has written reaches us a moment later.
+  // A process's output reaches us a moment later.
   (void)wait_until(
       [&] {
         return log = server.err(),
@@ -103,7 +102,7 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     address = relay->tcp();
     if (fast_path.empty()) fast_path = relay->udp();
   }
-  // Joined on a good network, as one joins before the operation.
+  // The hands join on a good network, as people join before an operation.
   std::vector<std::unique_ptr<Hand>> hands;
   std::mutex felt_mutex;
   for (std::uint64_t i = 0; i < 2; ++i)
@@ -115,7 +114,7 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
     run.fault = "a hand did not join";
   if (relay) {
     for (const std::string& command : network.impairment) (void)relay->command(command);
-    std::this_thread::sleep_for(1500ms);  // in some hundred packets both ends learn what is lost
+    std::this_thread::sleep_for(1500ms);  // after some hundred packets both ends know the loss rate
   }
   std::vector<std::unique_ptr<Felt>> felt;
   for (std::size_t i = 0; i < 2; ++i)
@@ -145,7 +144,7 @@ BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
   };
   if (!wait_until(converged, 30s)) run.fault = "the hands do not hold one bone";
   run.converged_s = std::chrono::duration<double>(Clock::now() - quiet).count();
-  // The server's own word, over its own address.
+  // Asks the server itself, at its own address.
   const wire::JoinedRoom watcher = join(stage.address(), wire::ClientKind::viewer);
   if (status_of(watcher).field_hash() != hash && run.fault.empty()) run.fault = "the server holds another bone";
   for (const auto& hand : hands) {

@@ -1,4 +1,4 @@
-// A room over a bad network, with real processes and sockets.
+// Tests a room over a bad network, with real processes and sockets.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -58,7 +58,7 @@ struct Breaker::Parts {
     if (verdict.outcome == Outcome::named && verdict.without_number) ++tally.without_number;
   }
 
-  // Changes one file. Gives what was done.
+  // Changes one file. Returns what it did.
   [[nodiscard]] std::string break_one(Random& random, const Life& life, Image& image) const {
     const std::string room = std::string(BreakerStage::kRoom) + ".journal";
     std::vector<std::string> names;
@@ -70,7 +70,7 @@ struct Breaker::Parts {
     const std::string name = names[random.index(names.size())];
     const std::string kind = name.ends_with(".checkpoint") ? ".checkpoint" : name.substr(room.size());
     const std::string end = kind.empty() ? " database" : " " + kind;
-    // Each file of the log makes good what the other lacks. Without both nobody knows how far the journal went.
+    // Each file of the log replaces what the other lacks. Without both nobody knows how far the journal went.
     if ((kind == "-log" || kind == "-mirror") && random.index(4) == 0) {
       const bool deleted = random.index(2) == 0;
       for (const char* log : {"-log", "-mirror"}) {
@@ -82,7 +82,7 @@ struct Breaker::Parts {
       return deleted ? "delete -log and -mirror" : "truncate -log and -mirror";
     }
     std::string& bytes = image.at(name);
-    // Most of a log is zeros that were never written to.
+    // Most of a log is zeros that were never overwritten.
     std::size_t used = bytes.size();
     while (random.index(4) != 0 && used > 0 && bytes[used - 1] == '\0') {
       const std::size_t last = bytes.find_last_not_of('\0');
@@ -129,7 +129,7 @@ struct Breaker::Parts {
     return "delete" + end;
   }
 
-  // Each command that takes a journal. `to`: where there is nothing.
+  // Each command that takes a journal. `to`: a path that does not exist.
   [[nodiscard]] std::vector<std::vector<std::string>> commands(const std::string& file, const std::string& to) const {
     return {{"verify", file},
             {"verify", file, "--case", stage.bone()},
@@ -147,10 +147,10 @@ struct Breaker::Parts {
             {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key(), "--audit", stage.audit()}};
   }
 
-  // A command of osteon-server that nobody tries here; empty: there is none.
+  // A command of osteon-server that this test does not know. Empty: there is none.
   [[nodiscard]] std::string find_untried() const {
     std::istringstream help(stage.command({"--help"}).out);
-    std::vector<std::string> known{"rooms", "cases", "ticket", "key", "audit"};  // which take no journal
+    std::vector<std::string> known{"rooms", "cases", "ticket", "key", "audit"};  // commands without a journal
     for (const std::vector<std::string>& one : commands("", "")) known.push_back(one.front());
     bool listed = false;
     std::size_t found = 0;
@@ -164,19 +164,20 @@ struct Breaker::Parts {
     return found < 10 ? "(--help lists no commands)" : "";
   }
 
-  // Commands that take a journal, on one that a server has. So many of them, in a random order. What one of them does
-  // that it must not; empty: nothing. `removed`: of the journal, by its end.
+  // Runs at most `most` of the commands that take a journal, in random order, on the journal of a running server.
+  // Returns a command's fault. Empty: none.
+  // `removed`: ending of the journal's file that was removed.
   [[nodiscard]] std::string try_second(Random& random, const fs::path& folder, Server& server, std::size_t most,
                                        const std::optional<std::string>& removed) const {
     const std::string file = (folder / (std::string(BreakerStage::kRoom) + ".journal")).string();
     const std::string to = (stage.new_folder() / "second").string();
     std::vector<std::vector<std::string>> all = commands(file, to);
-    // What is left of a room without its database is what a deletion that was cut short leaves.
+    // Without its database, a room looks like an interrupted deletion, so `delete` may finish it.
     if (removed == "") std::erase_if(all, [](const auto& one) { return one.front() == "delete"; });
     for (std::size_t i = all.size() - 1; i > 0; --i) std::swap(all[i], all[random.index(i + 1)]);
     all.resize(std::min(most, all.size()));
     for (const std::vector<std::string>& one : all) {
-      // While it stands still nobody but the command can have changed anything.
+      // While the server is frozen, only the command can have changed anything.
       const bool still = removed || random.index(4) != 0;
       if (still) BreakerStage::freeze(server);
       const Image before = still ? image_of(folder) : Image{};
@@ -242,7 +243,7 @@ void Breaker::older_copy(std::uint64_t seed) {
   hand->reset();
   for (const auto& entry : fs::directory_iterator(folder)) fs::remove(entry.path());
   put(then, folder);
-  // Nothing in the files contradicts them. Who comes back does, and from then on nobody goes on.
+  // Nothing in the files shows that they are old. A client that comes back shows it, and from then on nobody can go on.
   const Verified found = parts_->stage.verify(file);
   if (verdict.fault.empty() && !found.sound) verdict.fault = "verify of a whole older copy: " + found.text;
   server = parts_->stage.start(folder);
@@ -272,7 +273,8 @@ void Breaker::second_openers(std::uint64_t seed) {
     auto hand = LightHand::come(server.address, "", oracle, seed);
     Verdict verdict;
     std::string what = "second openers";
-    // SQLite's own log has what the database lacks only while entries are carried into it: a kill may hit that.
+    // SQLite's own log has entries that the database lacks only while entries are carried into the database. A kill may
+    // hit that moment.
     bool loses_nothing = true;
     if (const std::string untried = parts_->find_untried(); !untried.empty())
       verdict.fault = "nobody tries the command " + untried;
@@ -337,14 +339,14 @@ void Breaker::write_error(std::uint64_t seed, Random random) {
   parts_->stage.load(seed, server, **hand, oracle, 150);
   life.earlier.push_back(image_of(folder));
   failing.begin(reason, kinds, static_cast<int>(random.index(20)));
-  // What happens then may be a commit, or a person who comes, for whom the log begins anew.
+  // At the failure there may be a commit, or a person who joins, for whom the log begins anew.
   parts_->stage.load(seed, server, **hand, oracle, 50);
   Verdict verdict;
   verdict.fault = BreakerJudge::unsaid_failure(server, **hand, file);
   const std::string why = (*hand)->ended().value_or("");
   if (verdict.fault.empty() && reason == ENOSPC && !has(why, "make room on the disk"))
     verdict.fault = "no remedy: " + why;
-  // A disk that works again makes no difference to a server that has seen it fail.
+  // A server that has seen its disk fail stays failed, even if the disk works again.
   const bool again = random.index(2) == 0;
   if (again) failing.end();
   if (again && verdict.fault.empty()) verdict.fault = BreakerJudge::unsaid_failure(server, **hand, file);
@@ -360,7 +362,7 @@ void Breaker::write_error(std::uint64_t seed, Random random) {
   if (verdict.fault.empty()) {
     Trial trial{
         .folder = folder, .oracle = &oracle, .most_entries = oracle.most(), .member = member, .loses_nothing = true};
-    // What the failure has left may be damaged too.
+    // The files that the failure leaves may be damaged too.
     if (random.index(3) == 0) {
       Image image = image_of(folder);
       what += ", then " + parts_->break_one(random, life, image);
@@ -394,7 +396,7 @@ bool Breaker::full_disk(std::uint64_t seed) {
     while (filler << std::string(4096, 'x') << std::flush) {
     }
   }
-  // Its log has room that it took before. Who comes makes it begin anew, in the database.
+  // The room's log uses space that it allocated before. A person who joins makes the log begin anew, in the database.
   for (int i = 0; i < 50 && !(*hand)->ended(); ++i) {
     const std::string name = std::string(200, 'p') + std::to_string(i);
     oracle.asked();
@@ -451,7 +453,7 @@ bool Breaker::read_only(std::uint64_t seed) {
     for (const auto& entry : fs::directory_iterator(folder)) fs::permissions(entry.path(), fs::perms(0444));
     fs::permissions(folder, fs::perms(0555));
     {
-      // Root would write to them as well.
+      // Root could write to them as well.
       const std::vector<std::string> anybody{"setpriv", "--bounding-set", "-all", "--inh-caps", "-all"};
       const Behind behind(parts_->stage, ::geteuid() == 0 ? anybody : std::vector<std::string>{}, "/");
       judge(folder, "read-only files");

@@ -28,7 +28,7 @@ std::string BreakerJudge::unsaid(const std::string& what, const std::string& tex
                                  std::uint64_t lost, const Trial& trial, bool* without_number) {
   const std::uint64_t acknowledged = trial.oracle->acknowledged();
   if (events >= acknowledged) return {};
-  // Only what it calls a fault counts, and the most that one of them says.
+  // Counts only what it calls a fault, and of the faults the largest number of missing entries.
   std::string faults;
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);)
@@ -103,7 +103,7 @@ std::string BreakerJudge::try_recover(const Trial& trial, const Verified& found,
     if (fault.empty() && own)
       if (const std::string lacks = stage_->check_export(to, *trial.oracle, events); !lacks.empty())
         fault = "recovered: " + lacks;
-    // A database that is another room's is recovered as that.
+    // A database of another room is salvaged as that room.
     if (fault.empty() && serve && own && events > 0) {
       Server server = stage_->start(folder, trial.name);
       Oracle later;
@@ -139,7 +139,7 @@ std::string BreakerJudge::try_serve(const Trial& trial, const Verified& found, O
       fault = "verify finds it sound, and it lets nobody come back: " + hand.error().message;
     else if (hand.error().message.empty())
       fault = "a client is refused without a word";
-    // Whoever comes anew must not go on either.
+    // A new client must not go on either.
     Oracle anew;
     if (auto stranger = LightHand::come(server.address, "", anew, 1); fault.empty() && stranger)
       if (wait_until([&] { return (*stranger)->decided() > 0 || (*stranger)->ended(); }, BreakerStage::kPatience) &&
@@ -210,7 +210,7 @@ std::string BreakerJudge::unsaid_failure(Server& server, LightHand& hand, const 
   const std::string why = *hand.ended();
   Oracle later;
   const auto stranger = LightHand::come(server.address, "", later, 1);
-  // The client learns the file's name. Where it lies is in the server's log alone.
+  // The client receives the file's name. Only the server's log has its path.
   if (!has(why, "the room takes no more cuts") || !has(why, fs::path(file).filename().string()) || !has(why, "salvage"))
     return "a client is told no reason, file or remedy: " + why;
   if (!stranger)

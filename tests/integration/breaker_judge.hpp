@@ -1,4 +1,4 @@
-// Whether what is left of a journal keeps every promise, by what clients were told.
+// Decides whether the rest of a journal keeps every promise, compared with what clients received.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -8,14 +8,14 @@
 
 namespace osteon::test {
 
-// What a judgement goes by.
+// Input of a judgement.
 struct Trial {
   std::filesystem::path folder;
   const Oracle* oracle;
-  std::uint64_t most_entries;  // that there can be
+  std::uint64_t most_entries;  // that are possible
   wire::JoinedRoom member;
-  bool loses_nothing = false;  // whatever is said, every acknowledged entry must be there
-  bool only_verify = false;    // and export, where that finds nothing
+  bool loses_nothing = false;  // every acknowledged entry must be there, whatever is reported
+  bool only_verify = false;    // and export, if verify finds nothing
   std::string name = BreakerStage::kRoom;
   [[nodiscard]] std::string file() const { return (folder / (name + ".journal")).string(); }
 };
@@ -30,27 +30,29 @@ struct Verdict {
 
 class BreakerJudge {
  public:
-  // `thorough`: every command in every trial, not some of them.
+  // `thorough`: runs every command in every trial, not only some.
   BreakerJudge(const BreakerStage& stage, bool thorough) : stage_(&stage), thorough_(thorough) {}
 
-  // Commands that read, recovery, and last a server, to which a client comes back with what it was told.
+  // Runs the commands that read, then salvage, and last a server, to which a client comes back with the state it had
+  // received.
   [[nodiscard]] Verdict judge(Random& random, const Trial& trial) const;
-  // The room has failed: it says so to who is in it and to who comes, with file and remedy. What it does otherwise.
+  // After a failure of the room, it must report file and remedy to its members and to new clients. Returns what it does
+  // instead.
   [[nodiscard]] static std::string unsaid_failure(Server& server, LightHand& hand, const std::string& file);
-  // A command that failed must have said why, and about which file. What it does otherwise.
+  // A command that failed must have given a reason and the file. Returns what it does instead.
   [[nodiscard]] static std::string refusal(const std::string& what, const RunResult& result, const std::string& file);
 
  private:
-  // What `said` leaves unsaid of what is lost; empty: nothing.
+  // The losses that `text` does not report. Empty: it reports all.
   [[nodiscard]] static std::string unsaid(const std::string& what, const std::string& text, std::uint64_t events,
                                           std::uint64_t lost, const Trial& trial, bool* without_number);
   [[nodiscard]] std::string try_export(const Trial& trial) const;
   [[nodiscard]] std::string try_replay(const Trial& trial) const;
   [[nodiscard]] std::string try_copy(const Trial& trial, const std::string& how) const;  // backup and branch
-  // `serve`: what was recovered takes cuts again.
+  // `serve`: also checks that the salvaged room takes cuts again.
   [[nodiscard]] std::string try_recover(const Trial& trial, const Verified& found, bool serve,
                                         bool* without_number) const;
-  // A client comes back with what it was told, cuts, and the server is killed once more.
+  // A client comes back with the state it had received, and cuts. Then the server is killed once more.
   [[nodiscard]] std::string try_serve(const Trial& trial, const Verified& found, Outcome* outcome) const;
 
   const BreakerStage* stage_;

@@ -36,7 +36,7 @@ std::string read_bytes(const fs::path& file) {
 
 Image image_of(const fs::path& folder) {
   Image image;
-  std::error_code error;  // files come and go while a server runs
+  std::error_code error;  // files appear and vanish while a server runs
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
     image[entry->path().filename().string()] = read_bytes(entry->path());
   return image;
@@ -47,7 +47,7 @@ void put(const Image& image, const fs::path& folder) {
   for (const auto& [name, bytes] : image) std::ofstream(folder / name, std::ios::binary) << bytes;
 }
 
-// What differs, as "NAME was changed"; empty: nothing.
+// What differs, as "NAME was changed". Empty: nothing.
 std::string difference(const Image& before, const Image& after) {
   for (const auto& [name, bytes] : before) {
     const auto now = after.find(name);
@@ -161,7 +161,7 @@ void BreakerStage::freeze(Server& server) {
 
 void BreakerStage::load(std::uint64_t seed, const Server& server, LightHand& hand, Oracle& oracle,
                         std::size_t most_ms) const {
-  Random random(seed);  // of its own: how often it is asked depends on the machine
+  Random random(seed);  // of its own, because the number of calls depends on the machine
   if (longer_) most_ms *= 5;
   const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(20 + random.index(most_ms));
   while (std::chrono::steady_clock::now() < until && !hand.ended()) {

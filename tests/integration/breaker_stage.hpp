@@ -1,4 +1,4 @@
-// What the breaker works with: servers on a case, the files that they leave, and commands on these.
+// Tools for the breaker: servers on a case, the files that they leave, and commands on these files.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -16,52 +16,52 @@
 
 namespace osteon::test {
 
-using Image = std::map<std::string, std::string>;  // bytes of the files of a folder by their names
+using Image = std::map<std::string, std::string>;  // bytes of the files of a folder, by name
 
 [[nodiscard]] std::string read_bytes(const std::filesystem::path& file);
 [[nodiscard]] Image image_of(const std::filesystem::path& folder);
 void put(const Image& image, const std::filesystem::path& folder);
-// What differs, as "NAME was changed"; empty: nothing.
+// What differs, as "NAME was changed". Empty: nothing.
 [[nodiscard]] std::string difference(const Image& before, const Image& after);
 [[nodiscard]] std::string said(const RunResult& result);
 
 // A server on FOLDER/NAME.journal.
 struct Server {
   std::unique_ptr<Process> process;
-  std::string address;  // empty: it ended before it listened
+  std::string address;  // empty: the server ended before it listened
 };
 
 // What a killed server leaves.
 struct Life {
   Image image;
-  std::vector<Image> earlier;  // of moments before
+  std::vector<Image> earlier;  // of earlier moments
   Oracle oracle;
   wire::JoinedRoom member;    // of a client that may come back
-  std::uint64_t entries = 0;  // that the journal has, as the killed server left it
-  std::string fault;          // in what needed no damage
+  std::uint64_t entries = 0;  // that the journal has after the kill
+  std::string fault;          // a fault that appeared without any damage
 };
 
-// What `verify` says.
+// Result of `verify`.
 struct Verified {
   bool sound = false;
-  bool read = false;  // it says how far the events go
+  bool read = false;  // verify reports how far the events go
   std::uint64_t events = 0, witnessed = 0;
   std::string text;
-  // A checkpoint may be lost: the one before it, or the entries, then serve instead.
+  // True if at most a checkpoint is lost. The checkpoint before it, or the entries, then serve instead.
   [[nodiscard]] bool only_checkpoint() const;
 };
 
-// A shell in a mount namespace of its own, and programs beside it.
+// A shell in a mount namespace of its own. Programs can run in the same namespace.
 class Mounter {
  public:
   explicit Mounter(std::filesystem::path place);
-  // A disk in memory. False: this machine lets nobody mount one.
+  // Mounts a disk in memory. False: this machine does not allow mounts.
   [[nodiscard]] bool mount(const std::string& size);
   [[nodiscard]] bool make_read_only();
   [[nodiscard]] const std::filesystem::path& place() const { return place_; }
-  // What a program begins with to see the mounts.
+  // Command prefix with which a program sees the mounts.
   [[nodiscard]] std::vector<std::string> prefix() const;
-  // By which those outside see them.
+  // Path by which programs outside see the mounts.
   [[nodiscard]] std::filesystem::path root() const;
 
  private:
@@ -78,13 +78,14 @@ class BreakerStage {
   // `longer`: servers work longer before they are killed.
   explicit BreakerStage(bool longer);
 
-  // Of all servers here; not among the files that are damaged.
+  // Signing key of all servers here. It is not among the files that are damaged.
   [[nodiscard]] std::string key() const { return (temp_ / "signing.key").string(); }
-  [[nodiscard]] std::string audit() const { return (temp_ / "audit.log").string(); }  // not among what is damaged
+  // not among the files that are damaged
+  [[nodiscard]] std::string audit() const { return (temp_ / "audit.log").string(); }
   [[nodiscard]] const std::string& bone() const { return bone_; }
   [[nodiscard]] std::filesystem::path new_folder() const;
-  [[nodiscard]] std::filesystem::path new_name() const;  // of a file that is not there
-  // As seen from here, of a folder as servers and commands see it.
+  [[nodiscard]] std::filesystem::path new_name() const;  // of a file that does not exist
+  // Path in this process for a folder that servers and commands see.
   [[nodiscard]] std::filesystem::path seen(const std::filesystem::path& folder) const {
     return root_ / folder.relative_path();
   }
@@ -94,14 +95,15 @@ class BreakerStage {
   [[nodiscard]] Server start(const std::filesystem::path& folder, const std::string& name = kRoom,
                              ProcessOptions options = {}) const;
   static void kill(Server& server);
-  // Stops a server in the middle of whatever it does. What it has asked of the disk is over when this returns.
+  // Stops a server at any point of its work. Its disk requests are finished when this returns.
   static void freeze(Server& server);
-  // At most so long, with moments that are marked and people who come, for whom the log begins anew.
+  // Works for a limited time, with marked moments and people who join. The log begins anew for people who join.
   void load(std::uint64_t seed, const Server& server, LightHand& hand, Oracle& oracle, std::size_t most_ms) const;
-  // A server that works for a while, in one to three lives, and is killed at a random moment.
+  // Runs a server for a while, in one to three lives, and kills it at a random moment.
   void live(std::uint64_t seed, const std::string& name, Life& life) const;
   [[nodiscard]] Verified verify(const std::string& file) const;
-  // What an export of the journal lacks up to a place; empty: nothing. `all`: nobody says how far it is to go.
+  // What an export of the journal lacks up to a sequence number. Empty: nothing. `all`: nothing reports how far the
+  // export must go.
   [[nodiscard]] std::string check_export(const std::string& file, const Oracle& oracle, std::uint64_t up_to,
                                          bool all = true) const;
 
@@ -118,8 +120,7 @@ class BreakerStage {
   std::filesystem::path root_ = "/";
 };
 
-// For as long as it lives, servers and commands of a stage run behind a prefix, and see under / what is under `root`
-// here.
+// While an object lives, servers and commands of a stage run behind a command prefix. Their `/` is `root` here.
 class Behind {
  public:
   Behind(BreakerStage& stage, std::vector<std::string> prefix, std::filesystem::path root);

@@ -1,4 +1,4 @@
-// The breaker for half a minute. deploy/test --soak lets it go on, with other seeds.
+// Runs the breaker for half a minute. deploy/test --soak runs it longer, with other seeds.
 #include "tests/integration/breaker.hpp"
 
 #include <gtest/gtest.h>

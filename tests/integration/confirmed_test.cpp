@@ -1,4 +1,5 @@
-// What a haptic client says of its cuts: after a line that broke, without a server, and after the loss of a journal.
+// Tests what a haptic client reports about its cuts: after a lost connection, without a server, and after the loss of a
+// journal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +29,7 @@ using ::testing::Not;
 class Confirmed : public ::testing::Test {
  protected:
   std::string journal() const { return (folder_ / "room.journal").string(); }
-  // The journal's files: the log and its mirror lie beside it.
+  // The journal's files. The log and its mirror lie beside the database.
   std::vector<fs::path> files() const {
     std::vector<fs::path> found;
     for (const auto& entry : fs::directory_iterator(folder_.path())) found.push_back(entry.path());
@@ -44,7 +45,7 @@ class Confirmed : public ::testing::Test {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return stage_.start("osteon-haptic", arguments);
   }
-  // Waits until the room has so many events more than now.
+  // Waits until the room has `count` more events than now.
   [[nodiscard]] bool events_more(std::uint64_t count) {
     const wire::JoinedRoom watcher = join(stage_.address(), wire::ClientKind::viewer);
     const std::uint64_t now = status_of(watcher).room_seq();
@@ -55,7 +56,7 @@ class Confirmed : public ::testing::Test {
     ASSERT_TRUE(stage_.server().wait(10s).has_value());
   }
   void start_again() { stage_.start_server({"--journal", journal(), "--listen", stage_.address()}); }
-  // Places of the hands' cuts by their numbers. One hand has cut.
+  // Sequence numbers of the hand's cuts, by their author sequence numbers. Only one hand has cut.
   std::map<std::uint64_t, std::uint64_t> seqs() {
     const fs::path lines = stage_ / "events.jsonl";
     const RunResult written = run(program("osteon-server"), {"export", journal(), lines}, 30s);
@@ -70,7 +71,7 @@ class Confirmed : public ::testing::Test {
     }
     return seqs;
   }
-  // One sentence ends the program.
+  // The one sentence with which the program ends.
   static std::string last_sentence(const Process& process, const std::string& name) {
     const std::string err = process.err();
     const std::size_t at = err.rfind("\n" + name + ": ");
@@ -81,8 +82,9 @@ class Confirmed : public ::testing::Test {
   Stage stage_{16.0, {"--journal", journal()}};
 };
 
-// The room takes cuts whose acknowledgements are lost with the line. It says their places when the client comes back.
-TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
+// The room takes cuts whose acknowledgements are lost with the connection. It sends their sequence numbers when the
+// client comes back.
+TEST_F(Confirmed, TheCutLogHasEachCutsSequenceNumber) {
   ImpairProcess line({"--tcp", stage_.address()});
   ASSERT_FALSE(line.tcp().empty()) << line.process().err();
   Process hand = drill("hand", line.tcp(), {"--udp", "off", "--timeout", "30"});
@@ -109,10 +111,10 @@ TEST_F(Confirmed, TheCutLogHasEachCutsOwnPlace) {
     elsewhere += cuts["room_seq"][i] != (seq == kept.end() ? 0.0 : static_cast<double>(seq->second));
   }
   EXPECT_GT(confirmed, 150);
-  EXPECT_EQ(elsewhere, 0) << "cuts that the log has at another place than the journal";
+  EXPECT_EQ(elsewhere, 0) << "cuts with another sequence number in the log than in the journal";
 }
 
-// The hand cuts for two seconds more. The server never confirms those cuts.
+// The hand cuts for two more seconds. The server never acknowledges those cuts.
 TEST_F(Confirmed, WhoGivesUpReportsOnlyWhatIsConfirmed) {
   Process hand = drill("hand", stage_.address());
   ASSERT_TRUE(events_more(60));
@@ -143,10 +145,10 @@ TEST_F(Confirmed, AJournalThatIsGoneIsSaidToItsClients) {
   EXPECT_THAT(said, ContainsRegex("the room room begins anew: its journal has none of the [1-9][0-9]* events"));
   EXPECT_THAT(said, HasSubstr("start again to join it as it is now"));
   EXPECT_THAT(said, Not(HasSubstr("secret")));
-  EXPECT_THAT(stage_.server().err(), HasSubstr("begins anew")) << "the server's log says it too";
+  EXPECT_THAT(stage_.server().err(), HasSubstr("begins anew")) << "the server's log reports it too";
 }
 
-// A hand joins and cuts after the journal was copied. Then the copy takes the journal's place.
+// A hand joins and cuts after the journal was copied. Then the copy replaces the journal.
 class ConfirmedBeforeAnOlderCopy : public Confirmed {
  protected:
   void SetUp() override {
@@ -156,7 +158,7 @@ class ConfirmedBeforeAnOlderCopy : public Confirmed {
     start_again();
     hand_.emplace(stage_.address(), stage_ / "cache");
     ASSERT_TRUE(wait_until([&] { return hand_->complete(); }, kPatience));
-    // A room says about once a second how much is kept. So the second cut is waited for.
+    // A room sends the durable sequence number about once a second. So the test waits for the second cut.
     for (std::uint64_t i = 1; i <= 2; ++i) {
       const Vec3 at{-4.0 + static_cast<double>(i), 0, 0};
       Cut cut = straight_cut(find_tool("burr-round-5").value(), at, at, {0, 0, -1}, i);
@@ -179,7 +181,7 @@ class ConfirmedBeforeAnOlderCopy : public Confirmed {
   std::optional<Surgeon> hand_;
 };
 
-TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCuts) {
+TEST_F(ConfirmedBeforeAnOlderCopy, ReportsTheLossToItsClientsAndTakesNoCuts) {
   for (const auto& entry : fs::directory_iterator(copy_.path() / "copy")) fs::copy(entry.path(), folder_.path());
   EXPECT_THAT(what_the_hand_is_told(),
               HasSubstr("has lost 3 of the 3 events that were acknowledged to you, and takes no more cuts"));
@@ -189,7 +191,7 @@ TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAndTheRoomTakesNoCu
   EXPECT_TRUE(wait_until(operator_is_told, 10s)) << stage_.server().err();
 }
 
-TEST_F(ConfirmedBeforeAnOlderCopy, ItsClientsAreToldOfTheLossAfterARecovery) {
+TEST_F(ConfirmedBeforeAnOlderCopy, ReportsTheLossToItsClientsAfterASalvage) {
   const RunResult recovered =
       run(program("osteon-server"), {"salvage", copy_.path() / "copy" / "room.journal", journal()}, 30s);
   ASSERT_EQ(recovered.exit_code, 0) << recovered.err;

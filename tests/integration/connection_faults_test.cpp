@@ -1,5 +1,5 @@
-// Everything by which a client gets no connection to a server, tried with real servers: what the client says, and what
-// the server's log says, stand in deploy/docs/troubleshooting.md, and no two mistakes share a sentence.
+// Tries with real servers every fault that prevents a connection. The client's and the server's sentences must stand in
+// deploy/docs/troubleshooting.md, and no two faults may share a sentence.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -37,7 +37,7 @@ namespace fs = std::filesystem;
 constexpr auto kDay = 24h;
 constexpr auto kPatience = 10s;
 
-// A text in which what is in capitals stands for anything.
+// Makes a pattern of a text in which known words in capitals match anything.
 std::regex pattern_of(const std::string& text) {
   static const std::set<std::string> kAnything{"ADDRESS", "DATE",  "DIR",    "FILE", "HOST",
                                                "NAME",    "NAMES", "REASON", "ROOM", "STATUS"};
@@ -53,9 +53,9 @@ std::regex pattern_of(const std::string& text) {
   return std::regex(pattern);
 }
 
-// An entry of the page's tables.
+// A row of the page's tables.
 struct Listed {
-  std::string sentence, log;  // of the client, whole; of the server: empty: nothing
+  std::string sentence, log;  // sentence: of the client, whole; log: of the server, empty: nothing
 };
 
 std::vector<Listed> listed() {
@@ -84,11 +84,11 @@ int loopback_socket(sockaddr_in& at, int waiting) {
   return socket;
 }
 
-// A port of this machine where something else than Osteon is.
+// A port of this machine on which something other than Osteon runs.
 class OtherPort {
  public:
   enum class Kind { nobody, full, silent, answering };
-  // `answer`: what whoever connects and says something is told before the connection is closed.
+  // `answer`: sent to anybody who connects and sends something, before the connection is closed.
   explicit OtherPort(Kind kind, std::string answer = {}) : answer_(std::move(answer)) {
     socket_ = loopback_socket(at_, kind == Kind::nobody ? -1 : kind == Kind::full ? 0 : 64);
     if (kind == Kind::full) fill();
@@ -105,7 +105,7 @@ class OtherPort {
   [[nodiscard]] std::string address() const { return "127.0.0.1:" + std::to_string(ntohs(at_.sin_port)); }
 
  private:
-  // The system drops what comes when nobody accepts: as a machine that is off.
+  // Fills the queue of connections. As nobody accepts, the system drops what comes, like a machine that is off.
   void fill() {
     for (int i = 0; i < 4; ++i) {
       filling_.push_back(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
@@ -134,16 +134,16 @@ class OtherPort {
 
 class ConnectionFaults : public ::testing::Test {
  protected:
-  // One mistake: where a client goes, with what, and whose log says so too.
+  // One fault: address and credentials of a client, and the server whose log also names the fault.
   struct Mistake {
     std::string what;
     std::string address;
     wire::ClientCredentials credentials;
-    Process* server = nullptr;  // null: it hears nothing of it
+    Process* server = nullptr;  // null: the server receives nothing of it
     std::string room = "room";
   };
 
-  // Another server of the same case, with a folder of certificates, or with plain text.
+  // Another server of the same case, with a folder of certificates or with plain text.
   struct Served {
     std::unique_ptr<Process> process;
     std::string address;
@@ -157,14 +157,14 @@ class ConnectionFaults : public ::testing::Test {
     served.address = wait_for_address(file, 60s).value_or("127.0.0.1:1");
     return served;
   }
-  // A server's folder of the other authority, of which no server runs, for `host`.
+  // A server's folder for `host` from the other authority. No server uses it.
   fs::path folder_of_server(const std::string& name, const std::string& host) {
     others_.certs({"server", host});
     const fs::path copy = stage_ / (name + "-server");
     fs::copy(others_.server(), copy);
     return copy;
   }
-  // A copy of a person's folder, to be altered.
+  // A copy of a person's folder that a test can alter.
   fs::path copy_of(const std::string& person, const std::string& name) {
     const fs::path copy = stage_ / name;
     fs::copy(people_.person(person), copy);
@@ -186,7 +186,7 @@ class ConnectionFaults : public ::testing::Test {
   std::vector<Mistake> of_files();
   std::vector<Mistake> of_tickets();
 
-  // Tries all at the same time. Each client's sentence by the mistake's name.
+  // Tries all faults at the same time. Returns each client's sentence by the fault's name.
   static std::map<std::string, std::string> say_all(const std::vector<Mistake>& mistakes) {
     std::map<std::string, std::future<std::string>> saying;
     for (const Mistake& one : mistakes)
@@ -204,7 +204,7 @@ class ConnectionFaults : public ::testing::Test {
   Stage stage_{12.0, {"--certificates", people_.server()}};
   Served plain_ = serve("plain", {"--plain"});
   Served dated_, early_, named_, of_a_person_, old_authority_;
-  // A web server, one that speaks TLS of another kind, one that is there and says nothing.
+  // A web server, a server with another kind of TLS, and one that is there but sends nothing.
   OtherPort nobody_{OtherPort::Kind::nobody}, full_{OtherPort::Kind::full}, silent_{OtherPort::Kind::silent},
       closing_{OtherPort::Kind::answering}, web_{OtherPort::Kind::answering, "HTTP/1.1 400 Bad Request\r\n\r\n"},
       tls_{OtherPort::Kind::answering, std::string("\x15\x03\x01\x00\x02\x02\x46", 7)};
@@ -236,7 +236,7 @@ std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_the_server() {
   early_ = serve("early", {"--certificates", early});
   named_ = serve("named", {"--certificates", named});
   of_a_person_ = serve("person", {"--certificates", person});
-  // Eve trusts another authority than the first server's; Anna's own copy of the right one is over.
+  // Eve trusts another authority than the first server's. Anna's own copy of the right authority has expired.
   const fs::path old = copy_of("anna", "old-authority");
   resign(old / "ca.pem", authority_of(people_), -2 * kDay, -kDay);
   return {{"server expired", dated_.address, eve, dated_.process.get()},
@@ -296,7 +296,7 @@ std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_files() {
 std::vector<ConnectionFaults::Mistake> ConnectionFaults::of_tickets() {
   std::vector<Mistake> all;
   const auto ticket = [&](const std::string& what, const fs::path& file) -> Mistake& {
-    // Each by a person of its own: the log has one line for a person and reason.
+    // Each fault uses a person of its own, because the log has one line for a person and reason.
     const std::string person = "t" + std::to_string(all.size());
     return all.emplace_back(
         Mistake{what, stage_.address(), {.certificates = people_.person(person), .ticket = file}, &stage_.server()});
@@ -315,7 +315,7 @@ std::string lines_of(const std::map<std::string, std::string>& said) {
   return all;
 }
 
-// Whether a server's log refused somebody of this machine for that reason.
+// True if a server's log refused somebody of this machine for that reason.
 bool has_refusal(const std::string& log, const std::string& reason) {
   static const std::regex kRefused("refused who=[^\n]+ from=[^\n]*ipv4:127.0.0.1[^\n]* said=[^\n]*");
   const std::regex said = pattern_of(reason);
@@ -335,7 +335,7 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
   const fs::path marked = people_.ticket_file(
       "\xef\xbb\xbf"
       "osteon1.AAAA.AAAA");
-  EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "which would end the client";
+  EXPECT_EQ(wire::ticket_text({.certificates = {}, .ticket = marked}), "") << "a refusal here would end the client";
   const std::map<std::string, fs::path> tickets{{"no ticket", stage_ / "none"}, {"ticket of another encoding", marked}};
   for (const auto& [what, file] : tickets) {
     said[what] = wire::client_credentials({.plain = false, .certificates = people_.person("anna"), .ticket = file})
@@ -363,7 +363,7 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
         << one.server->err();
     EXPECT_THAT(sentence, testing::Not(testing::HasSubstr(people_.server().string()))) << "a path of the server";
   }
-  // Only a proxy says those that are left.
+  // Only a proxy sends the remaining ones.
   for (std::size_t i = 0; i < page.size(); ++i) {
     if (met.contains(i)) continue;
     EXPECT_THAT(page[i].sentence,
@@ -404,7 +404,7 @@ TEST_F(ConnectionFaults, AreTheSameSentencesThroughAProxy) {
         1)
         << what << ": " << said.at(what);
   }
-  // The proxy's log says from where, and which fault by openssl verify's number.
+  // The proxy's log gives the source, and the fault by openssl verify's number.
   for (const char* fault : {"9", "10", "20", "23", "26"})
     EXPECT_THAT(proxy.log(), testing::ContainsRegex(std::string("127.0.0.1:.* certificate fault ") + fault + ","));
 }

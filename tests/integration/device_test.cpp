@@ -1,5 +1,6 @@
-// A person's hand at a PHANToM, our stand-in for its library with a simulated arm and hand behind it, in real processes
-// on this machine: drilling with button and clutch, a cable that is pulled while it drills, and every end of it.
+// Tests the user's hand at a PHANToM, with real processes on this machine. A stand-in for the device's library has a
+// simulated arm and hand behind it. Covers drilling with button and clutch, a cable that is pulled during drilling, and
+// every way to end.
 #include <gmock/gmock.h>
 
 #include <cmath>
@@ -44,7 +45,7 @@ class PhantomInRoom : public ::testing::Test {
     all.insert(all.end(), more.begin(), more.end());
     return stage.start("osteon-haptic", all);
   }
-  // The simulated hand moves its wish steadily.
+  // The simulated hand moves its target at a steady speed.
   void move_hand(double x_mm, double y_mm, double z_mm, double mm_per_s) const {
     const double from[3] = {arm_->hand_mm[0], arm_->hand_mm[1], arm_->hand_mm[2]};
     const double way = std::hypot(x_mm - from[0], y_mm - from[1], z_mm - from[2]);
@@ -66,7 +67,7 @@ TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
   EXPECT_EQ(arm_->scheduler_starts, 1u);
   EXPECT_EQ(arm_.force_n(), 0.0);  // the tool waits over the bone
 
-  // The clutch moves the handle, not the tool; then down to the bone with the spindle on.
+  // The clutch moves the handle but not the tool. Then the tool goes down to the bone with the spindle on.
   arm_->buttons = kClutch;
   std::this_thread::sleep_for(100ms);
   move_hand(0, 0, 10, 50.0);
@@ -77,19 +78,19 @@ TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
   move_hand(0, 0, -3, 8.0);  // 14 mm of the bone's: 10 mm of air and into the near cortex
   ASSERT_TRUE(wait_until([&] { return arm_.force_n() > 0.2; }, 10s)) << haptic.out();
 
-  // The cable is pulled while it drills.
+  // The cable is pulled during drilling.
   arm_->plugged = 0;
   EXPECT_TRUE(wait_until([&] { return haptic.err().find("device lost") != std::string::npos; }, 10s));
   EXPECT_EQ(arm_.force_n(), 0.0);
   EXPECT_TRUE(haptic.running());
   arm_->plugged = 1;
   EXPECT_TRUE(wait_until([&] { return haptic.err().find("device back") != std::string::npos; }, 10s));
-  // The handle is tied to the tool where both now are, so the hand presses on from there.
+  // The handle is coupled to the tool where both now are, so the hand presses on from there.
   arm_->peak_n = 0.0;
   move_hand(0, 0, -14, 6.0);
   std::this_thread::sleep_for(3s);
   EXPECT_GT(arm_->peak_n, 0.2);
-  // Out of the hole, spindle off, and the end.
+  // Draws the drill out of the hole, stops the spindle, and ends.
   move_hand(0, 0, 20, 30.0);
   arm_->buttons = 0;
   std::this_thread::sleep_for(1s);
@@ -106,9 +107,9 @@ TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
   EXPECT_EQ(summary["device_losses"], 1);
   EXPECT_EQ(summary["device_limits"]["continuous_n"], Arm::kContinuous_n);
   EXPECT_NEAR(summary["force_scale"].get<double>(), Arm::kContinuous_n / 30.0, 1e-12);
-  EXPECT_EQ(summary["stopped"], false);  // how a hand that is free ends
+  EXPECT_EQ(summary["stopped"], false);  // how a session of a free hand ends
 
-  // Where the clutch was held or the device away, the tip stood still; it began over the place that was named.
+  // The tip stood still while the clutch was held or the device was away. It began over the given position.
   const Table log = read_table(stage / "hand.csv");
   ASSERT_GT(log.entries(), 5000u);
   std::size_t first = 0;
@@ -119,8 +120,8 @@ TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
   double deepest = 0.0;
   for (const double z : log["tip_z_mm"]) deepest = std::max(deepest, -z);
   EXPECT_GT(deepest, 4.0);
-  // A hole of the drill's width as deep as its tip went; its cone takes a little less, the wobble of the hand a little
-  // more.
+  // The hole is a cylinder of the drill's width, as deep as the tip went. The drill's cone takes a little less, and the
+  // hand's wobble a little more.
   const double cylinder = std::numbers::pi * 1.6 * 1.6 * std::min(deepest, 30.0);
   EXPECT_GT(summary["removed_mm3"].get<double>(), 0.75 * cylinder - 10.0);
   EXPECT_LT(summary["removed_mm3"].get<double>(), 1.3 * cylinder + 5.0);
@@ -166,7 +167,7 @@ TEST_F(PhantomInRoom, AToolThatTheRoomHasNotIsNamed) {
   EXPECT_EQ(arm_->is_open, 0);
 }
 
-// The recording of a hand moves the tool again, with the force scale it was made with, and the session ends with it.
+// A hand's recording moves the tool again, with the force scale of the recording. The session ends with the recording.
 TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
   const Stage stage(16.0);
   Process haptic = start(stage, {"--scale", "0.07", "--record", stage / "hand.h5"});

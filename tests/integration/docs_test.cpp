@@ -1,5 +1,5 @@
-// Runs the shell commands of the documentation as they are written, each page from an empty folder. Only the ports are
-// others, which the system chooses.
+// Runs the shell commands of the documentation as they are written, each page from an empty folder. Only the ports
+// differ: the system chooses them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -25,7 +25,7 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-// A fenced block of a page: what its first line says, and the lines in it.
+// A fenced block of a page: its first line, and its other lines.
 struct Block {
   std::string language, file;
   std::vector<std::string> lines;
@@ -51,12 +51,12 @@ std::vector<Block> blocks_of(const std::string& page) {
 }
 
 struct Script {
-  std::string commands;              // what a shell is given
-  std::vector<std::string> answers;  // what the console answers, by the page
+  std::string commands;              // input of a shell
+  std::vector<std::string> answers;  // answers of the console, by the page
 };
 
-// The program before runs beside the script. Each typed line is repeated until the program answers "ok", as a person
-// would wait until the others are there.
+// Runs the program of the line before beside the script. Repeats each typed line until the program answers "ok", as a
+// person would wait until the others are there.
 constexpr const char* kType = R"(
 type_line() {
   local answer=
@@ -69,7 +69,7 @@ type_line() {
 }
 )";
 
-// Appends a block of a console: a command, then typed lines, which begin with "> ", each followed by its answer.
+// Appends a block of a console: a command, then typed lines that begin with "> ", each followed by its answer.
 void add_console(const Block& block, Script& script) {
   std::string program;
   for (const std::string& line : block.lines) {
@@ -88,8 +88,8 @@ void add_console(const Block& block, Script& script) {
   }
 }
 
-// An answer with the same number in the place of each of its numbers, since a hand may have cut by then, and its parts
-// in order, since either may come first.
+// Makes answers comparable. All numbers become the same number, because a hand may have cut by then. The parts are
+// sorted, because either may come first.
 std::string without_chance(const std::string& answer) {
   std::istringstream all(
       std::regex_replace(std::regex_replace(answer, std::regex("[0-9]+"), "N"), std::regex(": "), ";"));
@@ -111,13 +111,13 @@ std::string replaced(std::string text, const std::string& what, const std::strin
 // Commands that install services need root.
 bool is_for_root(const std::string& line) { return line.starts_with("cp ") || line.starts_with("systemctl "); }
 
-// Commands that build everything, or run everything: CI does that with each change.
+// Commands that build or run everything. CI does that with each change.
 bool builds(const std::string& line) {
   return std::ranges::any_of(std::initializer_list<std::string>{"deploy/demo", "deploy/test", "deploy/build"},
                              [&](const std::string& command) { return line.starts_with(command); });
 }
 
-// A folder with the links that the commands expect.
+// Makes a folder with the links that the commands expect.
 void prepare(const TempDir& folder) {
   std::filesystem::create_symlink(source_dir() / "deploy", folder / "deploy");
   std::filesystem::create_symlink(source_dir() / "common", folder / "common");
@@ -145,7 +145,7 @@ TEST_P(SecurityPage, LeadsFromNothingToATraineeAndAnInstructor) {
   }
   ASSERT_EQ(script.answers.size(), 6u);
   ASSERT_FALSE(serve.empty()) << "the page starts no proxy";
-  // The page says that the one stands in place of the other.
+  // The page says that the proxy replaces the server's address.
   const std::regex server("[^\\n]* --listen [^\\n]*");
   ASSERT_TRUE(std::regex_search(script.commands, server)) << "the page starts no server";
   if (with_proxy) script.commands = std::regex_replace(script.commands, server, serve);
@@ -183,7 +183,7 @@ TEST_P(SecurityPage, LeadsFromNothingToATraineeAndAnInstructor) {
 INSTANTIATE_TEST_SUITE_P(Both, SecurityPage, testing::Values(Start::server, Start::server_and_proxy),
                          [](const auto& one) { return one.param == Start::server ? "Server" : "ServerAndProxy"; });
 
-// What a reader has: a scan, a mesh and labelled slices.
+// Files that a reader has: a scan, a mesh and labelled slices.
 constexpr const char* kInputs = R"(
 build/dev/bin/osteon-import phantom block --layers 5:1.9,20:0.3,5:1.9 --width 40 --out scanned --dicom MY_CD
 build/dev/bin/osteon-import surface scanned --out femur.stl
@@ -218,7 +218,7 @@ TEST_P(Pages, RunFromAnEmptyFolder) {
     if (block.language == "sh") commands += text;
   }
   ASSERT_GT(count, 5) << "the page has hardly a command";
-  // What the page leaves running ends with it.
+  // Programs that the page leaves running end with it.
   std::ofstream(folder / "commands.sh") << commands << "kill $(jobs -p) 2>/dev/null || true\nwait\n";
   ProcessOptions options = screen->options();
   options.folder = folder.path();

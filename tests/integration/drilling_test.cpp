@@ -1,5 +1,5 @@
-// Every program on this machine, one room: a rig, an expert and a novice drill through the layered block of
-// force-laws.md one after the other. What is checked is what the programs left behind, against closed forms.
+// Runs every program on this machine in one room. A rig, an expert and a novice drill through the layered block of
+// force-laws.md one after the other. Compares what the programs leave behind with closed forms.
 #include <gtest/gtest.h>
 #include <sndfile.h>
 
@@ -23,7 +23,7 @@ using nlohmann::json;
 constexpr double kThickness_mm = 30.0;
 constexpr double kCone_mm = 0.961;  // height of a 118° point of 3.2 mm
 
-// Reads the pixels of a PNG by its decompressed bytes being equal: the same encoder wrote both.
+// Compares the pixels of two PNG files by their bytes: the same encoder wrote both.
 std::string bytes_of(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
@@ -62,7 +62,7 @@ class DrillingRoom : public testing::Test {
     ASSERT_TRUE(viewer.tell(look));
     ASSERT_TRUE(viewer.tell("screenshot " + (stage / "before.png").string()));
 
-    // Two that will be killed in the middle of the work.
+    // A viewer and an audio client that are killed during the work.
     ScriptedViewer doomed_viewer(stage.address(), *screen);
     Process doomed_audio = stage.start("osteon-audio", {"--server", stage.address(), "--output", "none"});
     ASSERT_TRUE(doomed_viewer.tell("wait surface"));
@@ -111,7 +111,7 @@ class DrillingRoom : public testing::Test {
   }
   static void TearDownTestSuite() { results_.reset(); }
 
-  // Mean of a column where the tip is between two depths on its way in.
+  // Mean of a column while the tip is between two depths on its way in.
   static double mean(const Hole& hole, const std::string& column, double from_mm, double to_mm) {
     double sum = 0.0;
     int count = 0;
@@ -127,7 +127,7 @@ class DrillingRoom : public testing::Test {
     EXPECT_GT(count, 0) << column << " between " << from_mm << " and " << to_mm;
     return sum / std::max(1, count);
   }
-  // Whole cone in the near cortex, the medulla, the far cortex.
+  // The whole cone is in the near cortex, in the medulla, or in the far cortex.
   static double near_cortex(const Hole& hole, const std::string& column) { return mean(hole, column, 1.5, 4.8); }
   static double medulla(const Hole& hole, const std::string& column) { return mean(hole, column, 6.5, 24.5); }
   static double far_cortex(const Hole& hole, const std::string& column) { return mean(hole, column, 26.5, 29.5); }
@@ -145,14 +145,14 @@ std::unique_ptr<DrillingRoom::Results> DrillingRoom::results_;
 
 TEST_F(DrillingRoom, ServerAndHapticClientHoldTheSameField) {
   EXPECT_EQ(results_->holes["novice"].summary["field_hash"], results_->server["field_hash"]);
-  // Who only watched came later.
+  // Observers who joined later may have raised the server's number.
   EXPECT_LE(results_->holes["novice"].summary["room_seq"], results_->server["room_seq"]);
   EXPECT_EQ(results_->server["rejected"], 0);
   EXPECT_GT(results_->server["committed"], 100);
 }
 
 TEST_F(DrillingRoom, ThreeHolesAreGoneFromTheBone) {
-  // Each tool has gone on beyond the far side, so each hole is a cylinder. The bone is 30 mm thick.
+  // Each tool has gone beyond the far side, so each hole is a cylinder. The bone is 30 mm thick.
   const double exact = 3.0 * std::numbers::pi * 1.6 * 1.6 * kThickness_mm;
   EXPECT_NEAR(results_->server["removed_mm3"].get<double>(), exact, 0.02 * exact);
 }
@@ -182,7 +182,7 @@ TEST_F(DrillingRoom, TheDrillSoundsDifferentInAirCortexAndMedulla) {
   const Hole& rig = results_->holes["rig"];
   const std::vector<float>& sound = results_->sound;
   const double start_s = 1e-9 * results_->audio.at("first_frame_mono_ns").get<double>();
-  // The middle half second of a stretch of the rig's log, as it sounds.
+  // The middle half second of the sound for a range of depths in the rig's log.
   const auto heard = [&](double from_mm, double to_mm) {
     std::vector<double> times;
     for (std::size_t i = 0; i < rig.log.entries(); ++i) {
@@ -201,7 +201,7 @@ TEST_F(DrillingRoom, TheDrillSoundsDifferentInAirCortexAndMedulla) {
   EXPECT_GT(sound::rms_db(cancellous), sound::rms_db(free) + 1.0);
   EXPECT_GT(sound::rms_db(cortical), sound::rms_db(cancellous) + 3.0);
 
-  // The output set's gear mesh, 48 for each turn of the spindle: 800 Hz at 1000 rpm. Load slows the spindle.
+  // The output set's gear mesh has 48 periods for each turn of the spindle: 800 Hz at 1000 rpm. Load slows the spindle.
   const auto mesh_hz = [](std::span<const float> s) { return sound::find_tone(s, 48000.0, 700.0, 830.0).hz; };
   EXPECT_NEAR(mesh_hz(free), 800.0, 4.0);
   EXPECT_LT(mesh_hz(cancellous), mesh_hz(free) - 0.3);
@@ -222,7 +222,7 @@ TEST_F(DrillingRoom, EveryProgramEndsCleanlyOnSigterm) {
 
 TEST_F(DrillingRoom, AKilledViewerAndAKilledAudioClientDisturbNobody) {
   EXPECT_TRUE(results_->killed_were_running);
-  // Every cut that was made after they were gone was confirmed, and its entry came to the others in order.
+  // Every cut made after the kill was acknowledged, and its log entry reached the others in order.
   const Hole& rig = results_->holes["rig"];
   EXPECT_EQ(rig.summary["rejected"], 0);
   ASSERT_EQ(rig.cuts.entries(), rig.summary["cuts"].get<std::size_t>());
@@ -235,7 +235,7 @@ TEST_F(DrillingRoom, AKilledViewerAndAKilledAudioClientDisturbNobody) {
     after_the_kill += 1e-9 * rig.cuts["closed_mono_ns"][i] > results_->killed_s;
   }
   EXPECT_GT(after_the_kill, 1000);  // 25 s of drilling, a cut every 8 ms
-  // The viewer and the audio client that were left went on to the end; their own tests look at what they show and play.
+  // The remaining viewer and audio client ran to the end. Their own tests check what they show and play.
   EXPECT_GT(results_->sound.size(), 48000u * 60u);
 }
 

@@ -1,5 +1,5 @@
-// Guided drilling with all programs: a trembling hand drills through a sleeve that it has set on the bone, and leaves a
-// pin and a screw. What is checked is what the server saved: the hole by what is solid, the scene by its items.
+// Tests guided drilling with all programs. A trembling hand drills through a guide's sleeve that it has set on the
+// bone, and leaves a pin and a screw. Checks what the server saved: the hole by what is solid, the scene by its items.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ CutField field_of(const Case& bone, const SavedFields& saved) {
 }
 
 TEST(Guided, ATremblingHandDrillsWhereTheGuideSays) {
-  constexpr double kLimit_mm = 0.15;  // an eighth of a voxel of the case beside what the field resolves
+  constexpr double kLimit_mm = 0.15;  // an eighth of a voxel of the case, and what the field resolves
   const TempDir kept;
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
@@ -69,8 +69,8 @@ TEST(Guided, ATremblingHandDrillsWhereTheGuideSays) {
   EXPECT_EQ(saved->items[2].tool, find_tool("screw-1")->hash());
   EXPECT_GT(saved->items[2].turns, 1.0);
 
-  // Beyond a bore of length L the axis stays within c (1 + 2 l / L) of the middle, c the play; so the hole, which all
-  // its ways together make, stays within that of the drill's radius.
+  // Beyond a bore of length L the drill's axis stays within c (1 + 2 l / L) of the middle, where c is the play. All its
+  // paths together make the hole, so the hole stays within that distance plus the drill's radius.
   const GuideBore bore = guide_shape(*find_tool("guide-1")).bores.at(0);
   const double radius = 1.6, play = 0.5 * (bore.diameter_mm - 2.0 * radius);
   ASSERT_GT(play, 0.0);
@@ -107,7 +107,7 @@ Answer standing_of(const std::string& line) {
   return answer;
 }
 
-// A demonstration is a session of the server's own: nobody could ask it to leave.
+// A demonstration is a session of the server's own, so nobody could ask it to leave.
 TEST(Demonstration, IsOverWhenTheServerIsToStop) {
   const TempDir kept;
   Stage stage(16.0, {"--journal", kept / "room.journal", "--drain-seconds", "300"});
@@ -126,7 +126,7 @@ TEST(Demonstration, IsOverWhenTheServerIsToStop) {
   const wire::JoinedRoom instructor = join(stage.address(), wire::ClientKind::viewer);
   v1::DemonstrateRequest request;
   request.set_author(instructor.author.value);
-  request.set_speed(0.001);  // far longer than anybody waits here
+  request.set_speed(0.001);  // far longer than the test waits
   v1::DemonstrateResponse response;
   grpc::ClientContext context;
   const grpc::Status shown = v1::PeopleService::NewStub(instructor.channel)->Demonstrate(&context, request, &response);
@@ -136,8 +136,8 @@ TEST(Demonstration, IsOverWhenTheServerIsToStop) {
   EXPECT_NE(stage.server().err().find("drained sessions_left=0"), std::string::npos) << stage.server().err();
 }
 
-// A person at a viewer's script sets down, moves, turns, drives home and takes away what stands on the bone. The
-// block's top is z = 0; the cup and the reamer that makes its cavity are tools of the box, edited to 36 mm.
+// A person with a viewer's script places, moves, turns, drives home and removes items on the bone. The block's top is z
+// = 0. The cup and the reamer that makes its cavity are tools of the tool box, edited to 36 mm.
 TEST(Scene, IsArrangedFromAViewersScript) {
   const TempDir tools;
   for (const auto& [tool, file] :
@@ -151,14 +151,14 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   ScriptedViewer viewer(stage.address(), *screen);
   ASSERT_TRUE(viewer.tell("wait surface"));
   const Vec3 into(0, 0, -1);
-  const double on_surface_mm = 0.02;  // the answers' last digit beside the field's rounding
+  const double on_surface_mm = 0.02;  // the last digit of the answers, and the field's rounding
   const auto refused = [&](const std::string& command, const std::string& named) {
     const std::string line = viewer.ask(command);
     EXPECT_TRUE(line.starts_with("error ")) << command << ": " << line;
     EXPECT_NE(line.find(named), std::string::npos) << line;
   };
 
-  // A guide finds the surface by itself, pins fix it, and then it stays.
+  // A guide finds the surface by itself. When pins fix it, it stays.
   const Answer block = standing_of(viewer.ask("place guide-2 near 0 20 4 across 1 0 0"));
   EXPECT_EQ(block.item, 1u);
   EXPECT_LT((block.at - Vec3(0, 20, 0)).norm(), on_surface_mm);
@@ -168,7 +168,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   EXPECT_LT((leaning.along - Vec3(0.1, 0, -1).normalized()).norm(), 2e-3);
   EXPECT_EQ(standing_of(viewer.ask("move 1 at 0 20 0 along 0 0 -1")).item, 1u);
   for (const GuideBore& hole : guide_shape(*find_tool("guide-2")).pin_holes) {
-    // The guide's x is the bone's, its z goes down.
+    // The guide's x is the bone's x. Its z points down.
     const Vec3 tip = hole.entry_mm + (hole.length_mm + 15.0) * hole.direction;
     const auto line = viewer.ask("place pin-1 at " + std::to_string(tip.x()) + " " + std::to_string(20.0 - tip.y()) +
                                  " " + std::to_string(-tip.z()) + " along 0 0 -1");
@@ -195,7 +195,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   EXPECT_TRUE(standing_of(home).seated) << home;
   refused("turn " + number + " 1000", "100 mm");
 
-  // The cup goes home in a hemisphere of its own size.
+  // The cup fits into a hemisphere of its own size.
   {
     Surgeon hand(stage.address(), stage / "cache");
     ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
@@ -203,7 +203,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
     const auto reamer =
         std::ranges::find(entries, "reamer-36", [](const ToolBox::Entry* entry) { return entry->tool.name; });
     ASSERT_NE(reamer, entries.end());
-    // As a motor of 500 W could, 0.2 mm in 60 ms: more bone at once would be refused.
+    // As a motor of 500 W could do: 0.2 mm in 60 ms. The room would reject more bone at once.
     constexpr std::uint64_t kCuts = 95;
     for (std::uint64_t i = 1; i <= kCuts; ++i) {
       const double from_mm = 1.0 - 0.2 * static_cast<double>(i - 1);
@@ -227,7 +227,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   refused("seat " + number, "no implant");
   refused("seat 99", "99");
 
-  // All of it can be taken back, and everyone is told.
+  // All of it can be undone, and everyone receives the undo.
   EXPECT_EQ(viewer.ask("undo 1"), "ok undo 1: 1 event");
   ASSERT_TRUE(viewer.tell("status " + (stage / "viewer.json").string()));
   const json standing = read_json(stage / "viewer.json").at("standing");
@@ -237,7 +237,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   refused("place drill-3.2 near 0 0 3", "hand-held");
 }
 
-// The shape of a tool of the box, written as triangles, comes back from a folder as a tool of its own.
+// The shape of a tool of the tool box is written as triangles. It is loaded from a folder as a tool of its own.
 TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   const TempDir tools, kept;
   constexpr double kRadius_mm = 2.5;
@@ -286,10 +286,10 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   }
   ASSERT_EQ(stage.server().terminate(), 0);
   const double whole = 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius_mm, 3);
-  // Chords of the triangles and the lattice of 0.25 mm both make it a little smaller.
+  // The chords of the triangles and the lattice of 0.25 mm both make it a little smaller.
   EXPECT_NEAR(read_json(stage / "server.json").at("removed_mm3").get<double>(), whole, 0.02 * whole);
 
-  // The tool is in the file: without its folder the bone goes on, and can be cut with it.
+  // The file contains the tool. Without the tool's folder the bone is still usable, and the tool can cut it.
   stage.start_server({"--resume", kept / "bone.vdb"});
   Surgeon resumed(stage.address(), stage / "cache");
   ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));

@@ -1,4 +1,4 @@
-// A hand of a test, in its process: a client with a replica that cuts without end.
+// A simulated hand of a test, in the test's process: a client with a replica that cuts without end.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -13,10 +13,10 @@
 
 namespace osteon::test {
 
-// Cuts without end, as fast as the session takes them, up to some that wait.
+// Cuts without end, as fast as the session takes the cuts, with a limited number of undecided cuts.
 class Hand {
  public:
-  // `apart`: between cuts.
+  // `apart`: time between two cuts.
   Hand(const std::string& address, const std::filesystem::path& cache, std::uint64_t seed,
        std::chrono::microseconds apart = std::chrono::microseconds(500), const std::string& fast_path = {})
       : surgeon_(address, cache, fast_path),
@@ -31,7 +31,7 @@ class Hand {
   }
   Surgeon& surgeon() { return surgeon_; }
   [[nodiscard]] std::uint64_t sent() const { return sent_; }
-  // When a cut was sent, on the steady clock; of the last thousands.
+  // When a cut was sent, on the steady clock. Only for the last 8192 cuts.
   [[nodiscard]] std::chrono::steady_clock::time_point sent_at(std::uint64_t author_seq) const {
     return std::chrono::steady_clock::time_point(
         std::chrono::nanoseconds(sent_at_[author_seq % sent_at_.size()].load()));
@@ -46,7 +46,7 @@ class Hand {
         std::this_thread::sleep_for(std::chrono::milliseconds(1));
         continue;
       }
-      // Dimples of a bur in the upper face: of these no crumb comes off.
+      // A bur makes dimples in the upper face. They separate no fragments.
       const Vec3 at{random_.between(-5, 5), random_.between(-5, 5), random_.between(-0.5, 0.5)};
       Cut cut = straight_cut(burr_, at, at, {0, 0, -1}, sent_ + 1);
       cut.author = surgeon_.author();

@@ -1,5 +1,5 @@
-// Two hands of one room as processes: where their tools touch both feel it, and a hand is led along what an expert did
-// before. Judged by what each program recorded, on the clock of the machine that all of them share, and by the journal.
+// Runs two simulated hands of one room as processes. Both feel it where their tools touch, and a hand is guided along
+// what an expert did before. Compares what each program recorded, on the machine's common clock, and the journal.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -29,8 +29,8 @@ Process start_hand(const Stage& stage, const std::string& name, const json& step
 
 // Every 10th millisecond of a recording.
 struct Moment {
-  double time_ms, x_mm, y_mm, z_mm;  // of the tool as the hand holds it, bone frame
-  double force_x_n, force_y_n;       // shown, less the motor's, bone frame
+  double time_ms, x_mm, y_mm, z_mm;  // of the tool's pose as held by the hand, bone frame
+  double force_x_n, force_y_n;       // displayed force without the motor's, bone frame
   bool touched, led;
 };
 std::vector<Moment> recorded(const std::filesystem::path& file) {
@@ -60,7 +60,7 @@ std::vector<Moment> recorded(const std::filesystem::path& file) {
   return moments;
 }
 
-// Where a tool of an author's was at the end of each cut, by a journal, on the room's clock.
+// The position of an author's tool at the end of each cut, by a journal, on the room's clock.
 struct Place {
   double time_ms, x_mm, y_mm, z_mm;  // bone frame
 };
@@ -80,7 +80,7 @@ std::vector<Place> cuts_of(const std::filesystem::path& journal, const std::stri
   return places;
 }
 
-// How far apart a hand and such a tool were at most, for a part of the time in which both were there.
+// Largest distance between a hand and such a tool, for a part of the time in which both were there.
 double apart_mm_for(double part, const std::vector<Moment>& hand, const std::vector<Place>& tool, double ahead_ms) {
   std::vector<double> apart;
   for (const Moment& moment : hand) {
@@ -107,7 +107,7 @@ Touches touches_of(const std::vector<Moment>& hand) {
 
 TEST(Hands, WhoseToolsTouchBothFeelIt) {
   Stage stage(40.0);
-  // Drills of 3.2 mm, side by side into the same bone, 2.6 mm between their axes; and one that is far from both.
+  // Two drills of 3.2 mm enter the same bone side by side, 2.6 mm between their axes. A third one is far from both.
   constexpr double kDiameter_mm = 3.2;
   Process left = start_hand(stage, "left", json::array({drill_at(-1.3, 0, "rig")}));
   Process right = start_hand(stage, "right", json::array({drill_at(1.3, 0, "rig")}));
@@ -115,7 +115,7 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   for (Process* hand : {&left, &right, &far}) {
     const auto code = hand->wait(150s);
     ASSERT_TRUE(code.has_value());
-    EXPECT_LE(*code, 1) << hand->err();  // 1: a drill that is pushed aside may not come to its end
+    EXPECT_LE(*code, 1) << hand->err();  // 1: a drill that is pushed aside may not reach its depth
   }
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
 
@@ -126,7 +126,7 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   EXPECT_GT(felt_left.count, 50) << "half a second";
   EXPECT_GT(felt_right.count, 50);
   EXPECT_EQ(touches_of(recorded(stage / "far.h5")).count, 0);
-  // Wherever one felt it, the other's tool was there, by the other's own recording.
+  // Wherever one hand felt it, the other's tool was there, by the other's own recording.
   std::map<long, const Moment*> others;
   for (const Moment& moment : of_right) others[std::lround(moment.time_ms / 10.0)] = &moment;
   int there = 0, compared = 0;
@@ -138,16 +138,16 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   }
   EXPECT_GT(compared, 25);
   EXPECT_GE(there, compared * 9 / 10) << "of " << compared;
-  // Each is pushed away from the other, though the walls of the holes take most of it.
+  // Each is pushed away from the other, though the walls of the holes take most of the force.
   EXPECT_LT(felt_left.force_x_n, 0.0);
   EXPECT_GT(felt_right.force_x_n, 0.0);
 }
 
-// What an expert did is shown again from the journal by a demonstrator, and a trainee's hand is led along it. The
-// trainee's own work is elsewhere, and they are stopped: their hand is soft, but left alone it stays where it is.
+// A demonstrator repeats an expert's work from the journal, and a trainee's hand is guided along it. The trainee's own
+// work is elsewhere, and an instructor has stopped them: their hand is soft, but without guidance it stays where it is.
 TEST(Hands, AreLedAlongWhatAnExpertDid) {
   constexpr double kWithin_mm =
-      3.0;  // half a second behind, at the speed at which it is shown, and what the own hold costs
+      3.0;  // half a second behind, at the demonstration's speed, and what the hand's own hold costs
   TempDir folder;
   Stage stage(40.0, {"--journal", (folder / "room.journal").string()});
   const auto burr = [](double y_mm, double width_mm, double sweep_mm_per_s) {
@@ -168,7 +168,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
     console.write(command + "\n");
     return console.read_line(60s).value_or("");
   };
-  // What an answer has at the pattern's place; fails where it is another.
+  // Returns the part of an answer that matches the pattern's group. Fails if the answer does not match.
   const auto told = [&](const std::string& command, const std::string& pattern) {
     const std::string answer = ask(command);
     std::smatch found;
@@ -192,12 +192,12 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   (void)told("guide trainee along #" + demonstrator + " share 1", "^ok at ([0-9]+)");
   ASSERT_TRUE(wait_until(
       [&] { return std::regex_search(ask("people"), std::regex("#" + demonstrator + " [^;]* away")); }, 120s));
-  EXPECT_EQ(told("people", "\"trainee\"[^;]* cuts ([0-9]+)"), cuts_before) << "led, and stopped all the same";
+  EXPECT_EQ(told("people", "\"trainee\"[^;]* cuts ([0-9]+)"), cuts_before) << "guided, but still stopped";
   ASSERT_TRUE(trainee.terminate(20s).has_value());
   EXPECT_EQ(ask("quit"), "ok");
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
 
-  // The expert's own recording and entries tell how far the room's clock is off that of the recordings.
+  // The expert's own recording and entries give the offset between the room's clock and that of the recordings.
   const std::vector<Moment> by_expert = recorded(stage / "expert.h5");
   const std::vector<Place> cut_by_expert = cuts_of(folder / "room.journal", of);
   const std::vector<Place> shown = cuts_of(folder / "room.journal", demonstrator);
@@ -215,7 +215,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   std::vector<Moment> led = recorded(stage / "trainee.h5");
   std::erase_if(led, [](const Moment& moment) { return !moment.led; });
   ASSERT_FALSE(led.empty());
-  const double began_ms = led.front().time_ms + 1500.0;  // until then the hand is on its way there
+  const double began_ms = led.front().time_ms + 1500.0;  // before that the hand is on its way there
   std::erase_if(led,
                 [&](const Moment& m) { return m.time_ms < began_ms || m.time_ms > shown.back().time_ms + ahead_ms; });
   ASSERT_GT(led.size(), 300u) << "three seconds";
@@ -224,11 +224,11 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   std::printf("95 %% of %zu moments within %.2f mm of where the demonstrator was, over %.1f mm\n", led.size(), apart_mm,
               high.y_mm - low.y_mm);
   EXPECT_LT(apart_mm, kWithin_mm);
-  EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "of the 18 mm that the expert went to and fro";
+  EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "part of the 18 mm that the expert moved to and fro";
 }
 
-// Who gives no name is nobody's second coming: what holds for one unnamed hand does not hold for the next. Of a name it
-// does.
+// A person without a name never counts as one who comes back: restrictions of one unnamed hand do not hold for the
+// next. For a named person they do.
 TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   Stage stage(24.0);
   Process console = stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"});
@@ -241,14 +241,14 @@ TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   };
   ASSERT_TRUE(there("#1 \"Ada\" here you")) << console.err();
   const json steps = json::array({drill_at(0, 0, "rig"), drill_at(0, 8, "rig")});
-  // Each in its turn, so that their numbers are known: 1 is the console's.
+  // They join one after the other, so that their numbers are known. 1 is the console.
   Process first = stage.start_haptic("first", {{"steps", steps}});
   ASSERT_TRUE(there("#2 \"\" here hand")) << first.err();
   ASSERT_TRUE(ask("freeze #2").starts_with("ok"));
   Process second = stage.start_haptic("second", {{"steps", steps}});
   ASSERT_TRUE(there("#3 \"\" here hand")) << second.err();
   EXPECT_TRUE(there("#2 \"\" here hand frozen"));
-  EXPECT_EQ(ask("people").find("#3 \"\" here hand frozen"), std::string::npos) << "nobody has stopped this one";
+  EXPECT_EQ(ask("people").find("#3 \"\" here hand frozen"), std::string::npos) << "this hand is not stopped";
   ASSERT_TRUE(second.terminate(20s).has_value());
 
   Process ben = start_hand(stage, "ben", steps);
@@ -257,7 +257,7 @@ TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   ASSERT_TRUE(ben.terminate(20s).has_value());
   std::filesystem::remove(stage / "ben.h5");
   Process again = start_hand(stage, "ben", steps);
-  EXPECT_TRUE(there("#5 \"ben\" here hand frozen")) << "one person, by the name";
+  EXPECT_TRUE(there("#5 \"ben\" here hand frozen")) << "the same person, by the name";
   ASSERT_TRUE(again.terminate(20s).has_value());
   ASSERT_TRUE(first.terminate(20s).has_value());
   EXPECT_EQ(ask("quit"), "ok");

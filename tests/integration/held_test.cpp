@@ -1,5 +1,5 @@
-// A hand that an instructor has stopped, and whose program is started again: as processes, of a room that nothing keeps
-// and of one with a journal.
+// Tests, with processes, a hand that an instructor has stopped and whose program is started again: in a room without a
+// journal and in one with a journal.
 #include <gtest/gtest.h>
 
 #include <regex>
@@ -21,7 +21,7 @@ class Instructor {
     process_.write(command + "\n");
     return process_.read_line(60s).value_or("");
   }
-  // What `people` says of one author; empty where there is no such.
+  // What `people` prints for one author. Empty if there is none.
   std::string person(std::uint64_t author) {
     const std::string all = ask("people");
     std::smatch found;
@@ -41,7 +41,7 @@ class Instructor {
 void expect_held(Stage& stage) {
   Instructor ada(stage);
   ASSERT_TRUE(ada.ask("people").starts_with("ok 1 people"));
-  // Numbers are known: 1 is the instructor's.
+  // The numbers are known. 1 is the instructor.
   constexpr std::uint64_t kFirst = 2, kAgain = 3;
   const json plan = {{"steps", json::array({drill_at(-8.0, 0.0, "expert"), drill_at(-8.0, 8.0, "expert")})}};
   Process first = stage.start_haptic("first", plan, "Ben");
@@ -56,7 +56,7 @@ void expect_held(Stage& stage) {
   };
   ASSERT_TRUE(wait_until(held, 60s)) << ada.person(kAgain) << again.err();
   std::this_thread::sleep_for(1s);
-  EXPECT_EQ(ada.cuts(kAgain), 0u) << "it has its plan to carry out, and may not";
+  EXPECT_EQ(ada.cuts(kAgain), 0u) << "it must not carry out its plan";
   EXPECT_TRUE(ada.ask("free #3").starts_with("ok at "));
   EXPECT_TRUE(wait_until([&] { return ada.cuts(kAgain) >= 5; }, 60s)) << again.err();
   EXPECT_TRUE(again.terminate(20s).has_value());
@@ -68,7 +68,7 @@ TEST(Held, AHandThatIsStartedAgain) {
   expect_held(stage);
 }
 
-TEST(Held, AHandThatIsStartedAgainInAKeptRoom) {
+TEST(Held, AHandThatIsStartedAgainInAPersistedRoom) {
   const TempDir folder;
   Stage stage(24.0, {"--journal", (folder / "room.journal").string()});
   expect_held(stage);

@@ -1,4 +1,4 @@
-"""Every program's --help, --version, man page and completion. OSTEON_BIN: the folder of the programs."""
+"""Checks every program's --help, --version, man page and completion. OSTEON_BIN: the folder of the programs."""
 import os
 import re
 import shutil
@@ -26,7 +26,7 @@ def subcommands(text):
 
 
 def all_helps(*command):
-    """(command, its help) of a program and everything below it."""
+    """Yields (command, its help) of a program and of all its subcommands."""
     text = said(*command, "--help")
     yield command, text
     for name in subcommands(text):

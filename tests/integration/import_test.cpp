@@ -1,4 +1,5 @@
-// osteon-import alone, as real processes: a phantom, five kinds of tools, a closed surface, the same hash every time.
+// Tests osteon-import alone, as real processes: a phantom, five kinds of tools, a closed surface, and the same hash
+// every time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,7 +38,7 @@ class Import : public ::testing::Test {
     return run(program("osteon-import"), arguments, 120s);
   }
 
-  // Exit code 1, one sentence that names what is wrong, nothing new in the folder.
+  // Expects exit code 1, one sentence that names the fault, and nothing new in the folder.
   void refused(const std::vector<std::string>& arguments, const std::string& named) {
     const auto before = names();
     const auto result = start(arguments);
@@ -71,7 +72,7 @@ TEST_F(Import, FiveToolsLeaveOneClosedSurfaceAndOneHash) {
     ASSERT_TRUE(mesh) << mesh.error().message;
     EXPECT_EQ(open_edges(*mesh), 0u);
     EXPECT_GT(enclosed_mm3(*mesh), 0.9 * 40 * 40 * 20);
-    EXPECT_LT(enclosed_mm3(*mesh), 40 * 40 * 20 - 1000.0);  // the reamer alone takes more than that
+    EXPECT_LT(enclosed_mm3(*mesh), 40 * 40 * 20 - 1000.0);  // the reamer alone removes more than that
   }
   EXPECT_EQ(hashes[0], hashes[1]);
   EXPECT_EQ(hashes[0].size(), 65u);
@@ -83,7 +84,7 @@ TEST_F(Import, ItsSurfaceIsACaseAgain) {
   ASSERT_EQ(again.exit_code, 0) << again.err;
   const auto bone = again.out.find("bone       ");
   ASSERT_NE(bone, std::string::npos) << again.out;
-  EXPECT_NEAR(std::stod(again.out.substr(bone + 11)), 32.0, 0.2) << again.out;  // cm3: edges are rounded over a cell
+  EXPECT_NEAR(std::stod(again.out.substr(bone + 11)), 32.0, 0.2) << again.out;  // cm3: edges are rounded over one cell
 }
 
 TEST_F(Import, WrongFilesAreRefused) {
@@ -105,7 +106,7 @@ TEST_F(Import, WrongFilesAreRefused) {
 }
 
 TEST_F(Import, CtrlCLeavesNothingBehind) {
-  // A way of many thousand cuts.
+  // A path of many thousand cuts.
   std::ofstream script(folder_ / "long.yaml");
   script << "steps:\n  - tool: reamer-sphere\n    axis: [0, 0, -1]\n    path:\n";
   for (int i = 0; i < 2000; ++i)

@@ -1,4 +1,4 @@
-// A room in a journal, as processes see it: killed servers, a stop and a start, files that are none.
+// Tests a room with a journal, as processes see it: killed servers, a stop and a start, and files that are no journals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,11 +18,11 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(Kept, AHundredKilledServersLoseNothingTheyAcknowledged) {
+TEST(PersistedRooms, AHundredKilledServersLoseNothingTheyAcknowledged) {
   const KilledServers report = kill_servers(100, 1);
   EXPECT_EQ(report.fault, "");
   EXPECT_EQ(report.kills, 100);
-  EXPECT_LT(report.killed_idle, 50) << "most are killed at work";
+  EXPECT_LT(report.killed_idle, 50) << "most kills are during work";
   EXPECT_GT(report.acknowledged, 1000u);
   EXPECT_EQ(report.lost, 0u);
   EXPECT_EQ(report.twice, 0u);
@@ -34,8 +34,8 @@ TEST(Kept, AHundredKilledServersLoseNothingTheyAcknowledged) {
               static_cast<unsigned long long>(report.kept), static_cast<unsigned long long>(report.lost));
 }
 
-// A stop and a start in between: the same bone, and what was cut before can still be undone.
-TEST(Kept, ARoomGoesOnWithAllThatCanBeUndone) {
+// After a stop and a start the bone is the same, and cuts from before can still be undone.
+TEST(PersistedRooms, ARoomGoesOnWithAllThatCanBeUndone) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
   Stage stage(12.0, {"--journal", file});
@@ -70,7 +70,7 @@ TEST(Kept, ARoomGoesOnWithAllThatCanBeUndone) {
   EXPECT_EQ(status_of(late.session().room()).field_hash(), uncut);
 }
 
-// What osteon-server rooms prints; empty where it fails.
+// Output of `osteon-server rooms`. Empty if it fails.
 std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "rooms");
   arguments.insert(arguments.end(), {"--server", stage.address()});
@@ -78,8 +78,8 @@ std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
   return result.exit_code == 0 ? result.out : "";
 }
 
-// As a person at the command line makes them, with hands in two of them at the moment of the kill.
-TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
+// Rooms as a person makes them on the command line. Hands are in two of them when the server is killed.
+TEST(PersistedRooms, TheRoomsOfAKilledServerAreOpenAgain) {
   TempDir folder;
   const std::string kept = (folder / "rooms").string();
   Stage stage(12.0, {"--rooms", kept});
@@ -117,8 +117,8 @@ TEST(Kept, TheRoomsOfAKilledServerAreOpenAgain) {
   EXPECT_EQ(summary.at("rooms").size(), 2u);
 }
 
-// A room that somebody makes beside the server's own changes nothing of how that one is kept.
-TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
+// A room made beside the server's own room does not change how that one is saved.
+TEST(PersistedRooms, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
   TempDir folder;
   const std::string file = (folder / "bone.vdb").string();
   Stage stage(12.0, {"--save", file});
@@ -130,7 +130,7 @@ TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
     ASSERT_TRUE(hand.session().send(cut));
     ASSERT_TRUE(wait_until([&] { return hand.own() == 1; }, kPatience));
   }
-  ASSERT_NE(rooms(stage, {"create", "anna"}), "");  // before "room" in the order of names
+  ASSERT_NE(rooms(stage, {"create", "anna"}), "");  // before "room" in alphabetical order
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   const auto saved = load_fields(file);
   ASSERT_TRUE(saved.has_value()) << saved.error().message;
@@ -138,7 +138,7 @@ TEST(Kept, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
   EXPECT_EQ(read_json(stage / "server.json").at("rooms").size(), 2u);
 }
 
-TEST(Kept, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
+TEST(PersistedRooms, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
   TempDir folder;
   const std::filesystem::path file = folder / "my room.2026.journal";
   Stage stage(12.0, {"--journal", file.string()});
@@ -162,7 +162,7 @@ void expect_refused(const std::vector<std::string>& arguments, const std::vector
     EXPECT_NE(server.err.find(word), std::string::npos) << word << " in " << server.err;
 }
 
-// Of all files but the audit log, which names each command that was refused.
+// Of all files but the audit log, which names each refused command.
 std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder) {
   std::map<std::string, std::string> all;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -174,9 +174,9 @@ std::map<std::string, std::string> bytes_in(const std::filesystem::path& folder)
   return all;
 }
 
-// Whoever works on the journal of a running server, also after removing what looks like a lock, changes nothing and is
-// told.
-TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
+// A program on the journal of a running server changes nothing and reports the reason, even after somebody removed what
+// looks like a lock.
+TEST(PersistedRooms, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   TempDir folder;
   const std::filesystem::path kept = folder / "kept", file = kept / "room.journal", to = folder / "new";
   std::filesystem::create_directory(kept);
@@ -224,8 +224,8 @@ TEST(Kept, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   EXPECT_NE(replayed.out.find(to_hex(hash)), std::string::npos) << replayed.out;
 }
 
-// Two rooms of one case, whose files somebody has exchanged.
-TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
+// Two rooms of one case whose files somebody has exchanged.
+TEST(PersistedRooms, ARoomIsServedOnlyUnderItsOwnName) {
   TempDir folder;
   const std::filesystem::path kept = folder / "rooms", a = kept / "anna.journal", b = kept / "berta.journal";
   Stage stage(12.0, {"--rooms", kept.string()});
@@ -252,8 +252,8 @@ TEST(Kept, ARoomIsServedOnlyUnderItsOwnName) {
   ASSERT_EQ(stage.server().terminate(), 0);
 }
 
-// Whoever knows how the chain is made can go on with it. They do not have the server's key.
-TEST(Kept, InventedEventsAreSignedByNobody) {
+// Anybody who knows how the chain is made can continue it. They do not have the server's key.
+TEST(PersistedRooms, InventedEventsAreSignedByNobody) {
   TempDir folder;
   const std::filesystem::path file = folder / "room.journal", key_file = folder / "signing.key";
   Stage stage(12.0, {"--journal", file.string()});
@@ -306,7 +306,7 @@ TEST(Kept, InventedEventsAreSignedByNobody) {
   verified = server({"verify", file.string()});
   EXPECT_EQ(verified.out.find("sound"), std::string::npos) << verified.out;
 
-  // Another server's key, a new key of the same server, a key that is none.
+  // Another server's key, a new key of the same server, and a file that is not a key.
   const auto rotated = server({"key", "rotate", key_file.string()});
   ASSERT_EQ(rotated.exit_code, 0) << rotated.err;
   EXPECT_NE(rotated.out.substr(0, 64), key);
@@ -317,7 +317,7 @@ TEST(Kept, InventedEventsAreSignedByNobody) {
   expect_refused({"key", "show", key_file.string()}, {"chmod 600 " + key_file.string()});
 }
 
-TEST(Kept, SaysWhatIsWrongWithAJournal) {
+TEST(PersistedRooms, SaysWhatIsWrongWithAJournal) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
   Stage stage(12.0, {"--journal", file}), other(14.0);

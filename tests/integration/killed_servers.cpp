@@ -17,7 +17,7 @@ using namespace std::chrono_literals;
 
 constexpr double kWidth_mm = 12.0;
 
-// What the journal has of each author: the places of his cuts, by their numbers.
+// The journal's cuts of each author: the room's sequence numbers, by author sequence number.
 std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> read_seqs(const std::filesystem::path& file,
                                                                KilledServers& report) {
   std::map<AuthorId, std::map<std::uint64_t, RoomSeq>> seqs;

@@ -1,5 +1,5 @@
-// A bone with a plate of metal in it, as real processes: a rig drills onto the plate and stands there, and a client
-// that sends cuts as it likes is refused.
+// Tests a bone with a metal plate, with real processes. A rig drills onto the plate and stops there. The room rejects
+// the cuts of a client that sends any cut.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,7 +53,7 @@ TEST(Metal, IsLeftByRigAndServer) {
   EXPECT_GT(done["deepest_mm"].get<double>(), kPlate_mm - kPitch_mm);
   EXPECT_LT(done["deepest_mm"].get<double>(), kPlate_mm);
   EXPECT_EQ(summary["rejected"], 0);
-  // The force goes up to what the rig pushes: far above any thrust of the cut, up to what the device shows.
+  // The force rises to what the rig pushes: far above any thrust of the cut, up to what the device can display.
   const Table log = read_table(stage / "rig.csv");
   EXPECT_GT(std::ranges::max(log["force_physical_n"]), 55.0);
 

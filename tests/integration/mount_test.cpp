@@ -1,5 +1,5 @@
-// A bone on its mount between real programs: two simulated hands press it, one of them behind a line of 150 ms each
-// way.
+// Tests a bone on its compliant mount between real programs. Two simulated hands press it, one of them over a
+// connection with 150 ms each way.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -34,7 +34,7 @@ TEST(Mount, TwoHandsPressOneBone) {
   Process far =
       start_hand(stage, "far", drill_at(-8, 0, "expert"), line.tcp(), {"--udp", line.udp(), "--timeout", "30"});
   Process near = start_hand(stage, "near", drill_at(8, 0, "expert"), stage.address(), {});
-  // Somebody who touches nothing, and whose datagrams do not get through.
+  // A person who touches nothing, and whose datagrams do not get through.
   Process idle = start_hand(stage, "idle", {{"action", "wait"}, {"seconds", 9.0}}, stage.address(), {"--udp", "off"});
   ASSERT_EQ(near.wait(120s), 0) << near.err();
   ASSERT_EQ(far.wait(120s), 0) << far.err();
@@ -48,11 +48,11 @@ TEST(Mount, TwoHandsPressOneBone) {
     const json hand = read_json(stage / (std::string(name) + ".json")), mount = hand.at("mount");
     std::printf("%s: %s\n", name, mount.dump().c_str());
     EXPECT_TRUE(mount.at("there"));
-    // A drill is pushed with some 29 N, and the mount gives way by 5 N/mm.
+    // A drill is pushed with about 29 N, and the mount yields by 1 mm per 5 N.
     EXPECT_GT(mount.at("most_mm").get<double>(), 1.0) << name;
     EXPECT_LT(mount.at("most_mm").get<double>(), 20.0) << name;
-    EXPECT_GT(mount.at("granted_mj").get<double>(), 0.0) << name << " is granted what the other gives";
-    EXPECT_GT(mount.at("low_pass_s").get<double>(), 0.5) << name << " waits for the slowest line";
+    EXPECT_GT(mount.at("granted_mj").get<double>(), 0.0) << name << " is granted what the other puts in";
+    EXPECT_GT(mount.at("low_pass_s").get<double>(), 0.5) << name << " waits for the slowest connection";
     EXPECT_EQ(hand.at("rejected"), 0) << name;
     EXPECT_TRUE(hand.at("steps").at(0).at("completed")) << name;
     put_in_mj += mount.at("put_in_mj").get<double>();
@@ -61,12 +61,12 @@ TEST(Mount, TwoHandsPressOneBone) {
   EXPECT_GT(put_in_mj, 10.0);
   const json idle_mount = read_json(stage / "idle.json").at("mount");
   std::printf("idle: %s\n", idle_mount.dump().c_str());
-  EXPECT_GT(idle_mount.at("most_mm").get<double>(), 1.0) << "the bone moves for whoever is there";
+  EXPECT_GT(idle_mount.at("most_mm").get<double>(), 1.0) << "the bone moves for everybody in the room";
   EXPECT_EQ(idle_mount.at("put_in_mj"), 0.0);
-  EXPECT_LE(released_mj, put_in_mj + 2.0 * 2.0) << "no more than was put in, and the allowances";
+  EXPECT_LE(released_mj, put_in_mj + 2.0 * 2.0) << "no more than what was put in, plus the allowances";
 }
 
-// Where there is no mount nobody is told of one.
+// Without a compliant mount, nobody receives messages about one.
 TEST(Mount, ABoneWithoutOneStands) {
   Stage stage(40.0);
   Process hand = start_hand(stage, "hand", drill_at(0, 0, "expert"), stage.address(), {});

@@ -1,4 +1,4 @@
-// A server as its operator sees it: a checked configuration, health, figures, and an end in good order.
+// Tests a server as its operator sees it: a checked configuration, health, metrics, and an orderly end.
 #include <grpcpp/generic/generic_stub.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -50,7 +50,7 @@ TEST(Operators, AWrongConfigurationIsNamedWithFileFieldAndRemedy) {
       const RunResult said = check(text, how);
       EXPECT_NE(said.exit_code, 0) << text;
       EXPECT_FALSE(said.timed_out) << text;
-      // Without --check a server that would start otherwise names the place alone, wherever it was told of.
+      // Without --check, an error that belongs to no line of the file does not name the file.
       for (const std::string& word : words) {
         if (how.empty() && word == "server.yaml") continue;
         EXPECT_NE(said.err.find(word), std::string::npos) << word << " in " << said.err;
@@ -71,7 +71,7 @@ TEST(Operators, TheCommandLineWinsOverTheFile) {
   EXPECT_FALSE(std::filesystem::exists(stage / "of-the-file.json"));
 }
 
-// A second server would open the rooms that the first has closed, and write its list of those that are open.
+// A second server would open the rooms that the first has closed, and overwrite its list of open rooms.
 TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
   TempDir temp;
   const std::string folder = (temp / "rooms").string();
@@ -84,20 +84,20 @@ TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
   EXPECT_NE(refused.exit_code, 0);
   EXPECT_NE(refused.err.find("--rooms " + folder + " is another osteon-server's"), std::string::npos) << refused.err;
   EXPECT_EQ(std::ranges::count(refused.err, '\n'), 1) << refused.err;
-  EXPECT_TRUE(std::filesystem::exists(stage / "address")) << "which is the first one's";
-  // Commands on journals go by each journal, as ever.
+  EXPECT_TRUE(std::filesystem::exists(stage / "address")) << "the first server's file stays";
+  // Commands on journals depend only on each journal, as before.
   const auto verify = [&] { return run(program("osteon-server"), {"verify", folder + "/anna.journal"}, 60s); };
   EXPECT_NE(verify().err.find("is in use by another process"), std::string::npos);
   ASSERT_EQ(run(program("osteon-server"), {"rooms", "close", "anna", "--server", stage.address()}, 60s).exit_code, 0);
   EXPECT_EQ(verify().exit_code, 0);
-  // Also after one that could not say that it is over.
+  // This also works after a server that could not report its end.
   stage.server().signal(SIGKILL);
   ASSERT_TRUE(stage.server().wait(60s).has_value());
   stage.start_server({"--rooms", folder});
   EXPECT_EQ(stage.server().terminate(), 0);
 }
 
-// grpc.health.v1.Health/Check by hand: 1 SERVING, 2 NOT_SERVING; 0 where the call itself fails.
+// Calls grpc.health.v1.Health/Check without generated code: 1 SERVING, 2 NOT_SERVING; 0 if the call itself fails.
 int health_of(const std::shared_ptr<grpc::Channel>& channel, const std::string& name) {
   std::string request;
   if (!name.empty()) request = std::string("\x0a") + static_cast<char>(name.size()) + name;
@@ -122,7 +122,7 @@ int health_of(const std::shared_ptr<grpc::Channel>& channel, const std::string& 
   return text.size() == 2 && text[0] == '\x08' ? text[1] : 0;
 }
 
-// What an address of this machine answers to GET /metrics.
+// The answer of an address of this machine to GET /metrics.
 std::string get_metrics(const std::string& address) {
   const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in to{};
@@ -171,7 +171,7 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
   }
   ASSERT_TRUE(wait_until([&] { return hand.own() == 5 && !hand.rejected().empty(); }, kPatience));
   std::string text;
-  // The room's tick shows its figures a moment later.
+  // The room's tick updates its metrics a moment later.
   ASSERT_TRUE(wait_until(
       [&] {
         text = get_metrics(address);
@@ -180,7 +180,7 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
       },
       kPatience))
       << text;
-  // Comments, and NAME{LABELS} VALUE.
+  // Comments, and lines of NAME{LABELS} VALUE.
   const std::regex line(R"(# (HELP|TYPE) [a-z_]+ ?.*|[a-z_]+(\{([a-z]+="[^"]*",?)+\})? [-+0-9.eInf]+)");
   std::istringstream lines(text);
   for (std::string one; std::getline(lines, one);) {
@@ -220,7 +220,7 @@ TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
   EXPECT_EQ(value_of(text, "osteon_rooms"), 1);
 }
 
-// A session of the version before: it is told nothing of the drain, and stays.
+// A session of the previous version. It does not receive the drain message, and stays.
 class OlderSession {
  public:
   explicit OlderSession(const std::string& address)
@@ -278,7 +278,7 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   EXPECT_EQ(health_of(channel, ""), 1);
   for (const char* name : {"anna", "berta"})
     EXPECT_TRUE(wait_until([&] { return health_of(channel, name) == 1; }, kPatience)) << name;
-  EXPECT_EQ(health_of(channel, "nobody"), 0) << "a name that never was";
+  EXPECT_EQ(health_of(channel, "nobody"), 0) << "a name that does not exist";
   ASSERT_EQ(run(program("osteon-server"), {"rooms", "close", "berta", "--server", stage.address()}, 60s).exit_code, 0);
   EXPECT_TRUE(wait_until([&] { return health_of(channel, "berta") == 2; }, kPatience));
   EXPECT_EQ(health_of(channel, "anna"), 1);
@@ -292,8 +292,8 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   ASSERT_FALSE(late.has_value());
   EXPECT_NE(late.error().message.find("the server is stopping; connect again"), std::string::npos)
       << late.error().message;
-  EXPECT_TRUE(stage.server().running()) << "somebody is still there";
-  // A second signal: at once.
+  EXPECT_TRUE(stage.server().running()) << "a client is still there";
+  // A second signal ends the server at once.
   stage.server().signal(SIGTERM);
   EXPECT_EQ(stage.server().wait(60s), 0) << stage.server().err();
   const grpc::Status end = stays.end();
@@ -301,7 +301,7 @@ TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   EXPECT_LE(stays.newest_kind(), 10) << "a kind of message that version 3 does not know";
 }
 
-// The places of one author's cuts, as a journal has them.
+// The sequence numbers of one author's cuts in a journal.
 std::map<std::uint64_t, RoomSeq> kept_cuts(const std::filesystem::path& file, AuthorId author) {
   std::map<std::uint64_t, RoomSeq> seqs;
   Result<Journal> journal = Journal::open(file);
@@ -326,7 +326,7 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   Hand hand(stage.address(), folder / "cache", 5);
   Surgeon& surgeon = hand.surgeon();
   ASSERT_TRUE(wait_until([&] { return surgeon.own() >= 30; }, kPatience));
-  // At work, before any limit of time: the hand leaves by itself.
+  // The server is stopped during work, before any time limit: the hand leaves by itself.
   ASSERT_EQ(stage.server().terminate(60s), 0) << stage.server().err();
   EXPECT_NE(stage.server().err().find("drained sessions_left=0"), std::string::npos) << stage.server().err();
   const RunResult verified = run(program("osteon-server"), {"verify", file}, 60s);
@@ -338,7 +338,7 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   EXPECT_GE(acknowledged.size(), 30u);
   for (const auto& [number, seq] : acknowledged) {
     const auto entry = kept.find(number);
-    ASSERT_NE(entry, kept.end()) << "cut " << number << " was acknowledged and is not kept";
+    ASSERT_NE(entry, kept.end()) << "cut " << number << " was acknowledged and is not in the journal";
     EXPECT_EQ(entry->second, seq);
   }
 
@@ -348,14 +348,14 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   EXPECT_TRUE(wait_until([&] { return surgeon.own() >= hand.sent(); }, 60s));
   EXPECT_EQ(surgeon.interruptions(), 1);
   EXPECT_EQ(surgeon.lost(), "");
-  // Who did what, for whoever reads the log.
+  // The log must say who did what.
   ASSERT_EQ(stage.server().terminate(60s), 0);
   for (const char* event :
        {"listening", "room open", "joined", "session over", "draining", "drained", "stopping", "room closed"})
     EXPECT_NE(stage.server().err().find(event), std::string::npos) << event;
 }
 
-TEST(Operators, AClientOfAnotherVersionIsToldBothVersionsAndTheRemedy) {
+TEST(Operators, AClientOfAnotherVersionGetsBothVersionsAndTheRemedy) {
   Stage stage(12.0);
   const auto channel = grpc::CreateChannel(stage.address(), grpc::InsecureChannelCredentials());
   v1::JoinRequest request;
@@ -369,13 +369,13 @@ TEST(Operators, AClientOfAnotherVersionIsToldBothVersionsAndTheRemedy) {
   EXPECT_NE(refused.error_message().find("version 2 and the server protocol version 4, or 3; install a newer Osteon"),
             std::string::npos)
       << refused.error_message();
-  // The operator hears the same.
+  // The operator gets the same message.
   EXPECT_TRUE(
       wait_until([&] { return stage.server().err().find(refused.error_message()) != std::string::npos; }, kPatience))
       << stage.server().err();
 }
 
-// A server of the version before, as it answers a client of this one.
+// A server of the previous version, as it answers a client of this version.
 class OlderServer final : public v1::RoomService::Service {
  public:
   OlderServer() {
@@ -414,7 +414,7 @@ std::string read_text(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// Asked of systemd's own checker, where it is there, with this build's program in the place of the installed one.
+// Asks systemd's own checker, if it is installed. This build's program replaces the installed one.
 TEST(Operators, TheServiceIsAsSystemdWantsIt) {
   const std::string unit = read_text(std::filesystem::path(OSTEON_DEPLOY) / "systemd" / "osteon-server.service");
   for (const char* line :
@@ -428,7 +428,7 @@ TEST(Operators, TheServiceIsAsSystemdWantsIt) {
   write(file, std::regex_replace(unit, std::regex("/usr/local/bin/osteon-server"), program("osteon-server").string()));
   const RunResult verified = run("systemd-analyze", {"verify", file}, 60s);
   EXPECT_EQ(verified.exit_code, 0) << verified.err;
-  // It warns of what it does not know, and is content all the same.
+  // The checker warns of unknown settings but still succeeds.
   EXPECT_EQ(verified.err, "");
   const RunResult exposed = run("systemd-analyze", {"security", "--offline=true", "--threshold=20", file}, 60s);
   EXPECT_EQ(exposed.exit_code, 0) << exposed.out << exposed.err;
@@ -438,7 +438,7 @@ TEST(Operators, TheContainerRunsItUnprivileged) {
   const std::string text = read_text(std::filesystem::path(OSTEON_DEPLOY) / "container" / "Containerfile");
   ASSERT_NE(text.rfind("\nUSER "), std::string::npos);
   EXPECT_EQ(text.find("\nUSER root"), std::string::npos);
-  EXPECT_GT(text.rfind("\nUSER "), text.rfind("\nRUN ")) << "the last word on who runs it";
+  EXPECT_GT(text.rfind("\nUSER "), text.rfind("\nRUN ")) << "the last line that decides who runs it";
   for (const char* word :
        {"FROM debian:12", "deploy/install", "deploy/build", "ENTRYPOINT [\"osteon-server\"]", "STOPSIGNAL SIGTERM"})
     EXPECT_NE(text.find(word), std::string::npos) << word;

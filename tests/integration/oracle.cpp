@@ -128,7 +128,7 @@ Result<std::unique_ptr<LightHand>> LightHand::come_again(const std::string& addr
   auto channel = wire::reach_server(address, wire::ClientKind::haptic, 5s, {});
   if (!channel) return tl::unexpected(channel.error());
   room.channel = std::move(*channel);
-  // A machine under load may take more than the second that one attempt has.
+  // A machine under load may take longer than the second of one attempt.
   for (int attempt = 0;; ++attempt) {
     auto again = wire::join_again(room, wire::ClientKind::haptic, oracle.kept());
     if (again) return std::unique_ptr<LightHand>(new LightHand(std::move(*again), oracle, seed));
@@ -219,7 +219,7 @@ void LightHand::read() {
     }
   }
   over_ = true;
-  cutter_.join();  // which may be in a call of the same stream
+  cutter_.join();  // the reader may be in a call of the same stream
   const grpc::Status status = stream_->calls->Finish();
   const std::lock_guard lock(mutex_);
   ended_ = status.error_message();
@@ -237,7 +237,7 @@ void LightHand::cut() {
       std::this_thread::sleep_for(500us);
       continue;
     }
-    // Dimples of a bur in the upper face: of these no crumb comes off.
+    // A bur makes dimples in the upper face. They separate no fragments.
     const Vec3 at{random.between(-5, 5), random.between(-5, 5), random.between(-0.5, 0.5)};
     Cut cut = straight_cut(burr, at, at, {0, 0, -1}, sent + 1);
     cut.author = room_.author;

@@ -1,4 +1,4 @@
-// What a server has acknowledged, kept outside of it: by what its clients heard.
+// Records outside of the server what it has acknowledged, from what its clients received.
 #pragma once
 #include <atomic>
 #include <cstdint>
@@ -23,35 +23,35 @@ class Oracle {
   Oracle(const Oracle& other);
   Oracle& operator=(const Oracle&) = delete;
 
-  void asked();                                      // for something that becomes an entry at most
+  void asked();                                      // a request that becomes at most one log entry
   void heard(RoomSeq place);                         // of any event
   void heard_cut(RoomSeq place, std::string bytes);  // of a v1::Cut
   void heard_mark(RoomSeq place, std::string label);
-  void heard_join(AuthorId author);  // its place is not told
+  void heard_join(AuthorId author);  // its sequence number is not sent
   void heard_kept(const wire::DurableSeq& kept);
 
-  [[nodiscard]] std::uint64_t acknowledged() const;            // the furthest place that anybody heard of
-  [[nodiscard]] std::uint64_t most() const;                    // entries that there can be
+  [[nodiscard]] std::uint64_t acknowledged() const;            // the largest sequence number that any client received
+  [[nodiscard]] std::uint64_t most() const;                    // largest possible number of log entries
   [[nodiscard]] std::optional<wire::DurableSeq> kept() const;  // the newest witness
-  // What the lines of an export lack or have otherwise, up to a place. Empty: nothing.
+  // What the lines of an export lack or have changed, up to a sequence number. Empty: nothing.
   [[nodiscard]] std::string lacks(std::string_view lines, std::uint64_t up_to) const;
 
  private:
   mutable std::mutex mutex_;
   std::uint64_t asked_ = 0, furthest_ = 0;
-  std::map<std::uint64_t, std::string> cuts_, marks_;  // by place
+  std::map<std::uint64_t, std::string> cuts_, marks_;  // by sequence number
   std::set<std::uint64_t> joins_;                      // authors
   std::optional<wire::DurableSeq> kept_;
 };
 
-// A haptic client without a bone: it cuts without end, as fast as its room takes it, and tells the oracle what it
-// hears.
+// A haptic client without a bone. It cuts without end, as fast as its room takes the cuts. It reports to the oracle
+// what it receives.
 class LightHand {
  public:
   // Errors: those of wire::join_room.
   [[nodiscard]] static Result<std::unique_ptr<LightHand>> come(const std::string& address, const std::string& name,
                                                                Oracle& oracle, std::uint64_t seed);
-  // The same author again, at the server that is now at `address`, with what the oracle knows to be kept.
+  // The same author again, at the server that is now at `address`. It brings what the oracle knows to be durable.
   [[nodiscard]] static Result<std::unique_ptr<LightHand>> come_again(const std::string& address,
                                                                      const wire::JoinedRoom& before, Oracle& oracle,
                                                                      std::uint64_t seed);
@@ -61,10 +61,10 @@ class LightHand {
 
   [[nodiscard]] const wire::JoinedRoom& room() const { return room_; }
   [[nodiscard]] std::uint64_t decided() const { return decided_; }  // own cuts
-  // Why its stream ended; nothing: it has not.
+  // Why its stream ended. Empty: it has not ended.
   [[nodiscard]] std::optional<std::string> ended() const;
-  [[nodiscard]] std::string rejected() const;  // why its newest rejected cut was
-  // Marks the moment. False: it was not answered.
+  [[nodiscard]] std::string rejected() const;  // reason of its newest rejected cut
+  // Marks the moment. False: there was no answer.
   [[nodiscard]] bool mark(const std::string& label);
 
  private:

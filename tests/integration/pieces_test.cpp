@@ -1,5 +1,5 @@
-// Every program in one room beside plain drilling: a block is sawn in two, a piece is taken away and brought back,
-// tools and guides come in, and the bone is saved and resumed. The hands are clients in this process that hold
+// Runs every program in one room, for more than plain drilling. A block is sawn in two, a piece is removed and brought
+// back, tools and guides are added, and the bone is saved and resumed. The hands are clients in this process that hold
 // replicas.
 #include <gtest/gtest.h>
 #include <vtkImageData.h>
@@ -49,8 +49,8 @@ std::string bytes_of(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-// Seen from (60, -80, 60) the shank of a tool that points down at the origin goes straight up from the picture's
-// middle, 20 pixels wide; the gauges are to the left of it.
+// Seen from (60, -80, 60), the shank of a tool that points down at the origin goes straight up from the picture's
+// middle. It is 20 pixels wide. The gauges are to the left of it.
 constexpr int kShankLeft = 316, kShankRight = 324, kShankTop = 100, kShankBottom = 150;
 constexpr int kShankPixels = (kShankRight - kShankLeft) * (kShankBottom - kShankTop);
 
@@ -62,7 +62,7 @@ int differing_on_the_shank(const std::filesystem::path& one, const std::filesyst
   int differing = 0;
   for (int x = kShankLeft; x < kShankRight; ++x)
     for (int y = kShankTop; y < kShankBottom; ++y) {
-      // Rows from below.
+      // Rows of pixels from below.
       const auto at = [&](std::size_t i, int channel) {
         return readers[i]->GetOutput()->GetScalarComponentAsDouble(x, 479 - y, 0, channel);
       };
@@ -117,7 +117,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_EQ(viewed().at("bodies"), nlohmann::json::array({0, 1}));
   const std::string parted = picture("parted.png");
 
-  // The viewer draws a tool that it has never heard of.
+  // The viewer draws a tool that it did not know before.
   CuttingState state;
   state.author = hand.author();
   state.state_seq = 1;
@@ -126,7 +126,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   state.pose_bone_tool = state.pose_bone_device = pose_along({0, 0, 10}, {0, 0, -1});
   hand.session().send(state);
   ASSERT_TRUE(viewer.tell("wait surface"));
-  // The gauges of a tool that nobody knows are in the picture, but nothing stands on the bone.
+  // The gauges of a tool of unknown force are in the picture, but no item is on the bone.
   ASSERT_TRUE(wait_until([&] { return picture("gauges.png") != parted; }, kPatience));
   EXPECT_EQ(differing_on_the_shank(stage / "gauges.png", stage / "parted.png"), 0);
   ++state.state_seq;
@@ -141,7 +141,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
       << "the tool is in the picture";
   ASSERT_TRUE(viewer.tell("tool off"));
 
-  // Someone else takes the piece away, changes their mind, and undoes the whole of it.
+  // Another person removes the piece, brings it back, and undoes everything.
   ASSERT_TRUE(viewer.tell("take-away 1"));
   ASSERT_TRUE(viewer.tell("wait bodies 1"));
   EXPECT_NE(picture("taken.png"), parted);
@@ -157,14 +157,14 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_NE(viewed().at("scene_mesh_hash"), parted_hash);
   ASSERT_TRUE(viewer.tell("redo 1"));
   const std::string all = ": " + std::to_string(cuts.size() + 1) + " events";
-  EXPECT_EQ(viewer.ask("undo 5000"), "ok undo 5000" + all) << "the cuts and what they separated";
+  EXPECT_EQ(viewer.ask("undo 5000"), "ok undo 5000" + all) << "the cuts and the fragments that they separated";
   EXPECT_EQ(viewer.ask("redo 1"), "ok redo 1" + all);
   ASSERT_TRUE(viewer.tell("wait bodies 2"));
   EXPECT_FALSE(viewer.tell("redo 9 times"));
   EXPECT_FALSE(viewer.tell("take-away 7")) << "no such body";
   EXPECT_EQ(viewed().at("scene_mesh_hash"), parted_hash);
 
-  // A guide stands for everyone, also for who comes later.
+  // A guide is visible to everyone, also to those who join later.
   const std::string without_guide = picture("without-guide.png");
   ASSERT_TRUE(viewer.tell("place guide-1 at 0 0 2 along 0 0 -1"));
   ASSERT_TRUE(viewer.tell("wait items 1"));
@@ -180,7 +180,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   ASSERT_TRUE(viewer.tell("save asked-for.vdb"));
   EXPECT_FALSE(viewer.tell("save ../asked-for.vdb"));
 
-  // A clean stop saves; the next server goes on from there.
+  // A clean stop saves the bone. The next server continues from there.
   EXPECT_EQ(viewer.process().terminate(), 0);
   const Digest at_the_end = hand.hash();
   ASSERT_EQ(stage.server().terminate(), 0);
@@ -193,13 +193,13 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
     ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));
     EXPECT_EQ(resumed.hash(), at_the_end) << file;
     EXPECT_EQ(resumed.bodies().size(), 2u);
-    EXPECT_EQ(resumed.seq().value, last.value + 1) << "who came has a place too";
+    EXPECT_EQ(resumed.seq().value, last.value + 1) << "a join has a sequence number too";
     ASSERT_EQ(stage.server().terminate(), 0);
     EXPECT_EQ(read_json(stage / "server.json").at("field_hash"), to_hex(at_the_end));
   }
   EXPECT_NE(whole_hash, parted_hash);
 
-  // Another case is refused in one sentence.
+  // A case other than the saved one is refused with one sentence.
   ASSERT_EQ(run(program("osteon-import"),
                 {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", stage / "other"})
                 .exit_code,
@@ -211,7 +211,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   const RunResult broken = run(program("osteon-server"), {"--case", stage / "case", "--tools", tools / ""});
   EXPECT_GT(broken.exit_code, 0);
   EXPECT_NE(broken.err.find("broken.yaml"), std::string::npos) << broken.err;
-  // So is a folder with a tool that names a law which there is not, or not for it.
+  // A folder is also refused if a tool names a force law that does not exist, or does not fit the tool.
   std::filesystem::remove(tools / "broken.yaml");
   Tool lawless = *find_tool("drill-3.2");
   lawless.name = "lawless";

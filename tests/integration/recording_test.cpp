@@ -1,4 +1,5 @@
-// Recordings of the real haptic client: whole, of a killed process, on a full disk, and played again in another room.
+// Tests recordings of the real haptic client: a complete one, one of a killed process, one on a full disk, and one
+// played again in another room.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -18,7 +19,7 @@ using nlohmann::json;
 
 class RecordedRoom : public testing::Test {
  protected:
-  // What the haptic client is given to drill quickly through the block at a place.
+  // Arguments for a haptic client that drills quickly through the block at a position.
   std::vector<std::string> arguments(const Stage& stage, const std::string& name, double x_mm) {
     json step = drill_at(x_mm, 0.0, "rig");
     step["feed_mm_per_s"] = 4.0;
@@ -28,7 +29,7 @@ class RecordedRoom : public testing::Test {
             "--summary", stage / (name + ".json"), "--cache", stage / "cache",
             "--record",  stage / (name + ".h5")};
   }
-  // What Debian's Python says of a recording `f`, as JSON.
+  // Result of a Python expression on a recording `f`, as JSON.
   static json ask(const std::filesystem::path& file, const std::string& expression) {
     const RunResult answer =
         run(OSTEON_PYTHON, {"-c",
@@ -54,10 +55,10 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   EXPECT_EQ(ask(file, "int(f['metadata/finished'][()])"), 1);
   EXPECT_EQ(ask(file, "f['metadata'].attrs['device']"), "simulated");
   EXPECT_EQ(ask(file, "f['metadata/tools'][0].decode()"), "drill-3.2");
-  // 1 kHz: the ticks' own clock says so, whatever the machine held up.
+  // The ticks' own clock shows 1 kHz, even if the machine was delayed.
   EXPECT_NEAR(ask(file, "float(np.median(np.diff(f['data/time'][:])))").get<double>(), 1e-3, 5e-5);
-  // Chi (7.3) at 1000 rpm and 4 mm/s in the far cortex, along the tool's axis: the bone pushes back, against +z of the
-  // tool.
+  // Chi (7.3) at 1000 rpm and 4 mm/s in the far cortex, along the tool's axis. The bone pushes back, against the tool's
+  // +z.
   const double thrust_n = 134.6 * std::pow(1000.0, -0.3327) * std::pow(4.0, 0.5189) * std::pow(1.9, 1.1841);
   const std::string far = "(lambda d: (d > 26.5) & (d < 29.5) & (d >= np.maximum.accumulate(d)))(f['data/depth'][:])";
   EXPECT_NEAR(ask(file, "float(np.mean(np.linalg.norm(f['drill_force_physical/wrench'][:, :3], axis=1)[" + far + "]))")
@@ -71,8 +72,7 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   Process replay = stage.start("osteon-haptic", again);
   ASSERT_EQ(replay.wait(120s), 0) << replay.err();
   const json replayed = read_json(stage / "again.json");
-  // The same handle, tick by tick; patches come when real threads bring them, so cuts agree to their size, not to the
-  // bit.
+  // The handle is the same tick by tick. Real threads deliver the patches, so cuts agree in size but not bit by bit.
   EXPECT_EQ(ask(stage / "again.h5", "int((f['high_frequency_poses/handle_pose/pose'][:n] == h5py.File('" +
                                         file.string() + "', 'r')['high_frequency_poses/handle_pose/pose'][:n]).all())"),
             1);
@@ -80,7 +80,7 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
               0.01 * summary["removed_mm3"].get<double>());
   EXPECT_GT(summary["removed_mm3"].get<double>(), 200.0);
 
-  // That room's bone is cut now: the handle would go through the hole that is there.
+  // That room's bone is already cut, so the handle would go through the existing hole.
   EXPECT_EQ(ask(stage / "again.h5", "f['metadata/field_hash_at_start'][()].decode()"),
             ask(file, "f['metadata/field_hash_at_start'][()].decode()"));
   std::vector<std::string> third = arguments(stage, "third", 0.0);
@@ -120,7 +120,7 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeReadAndPlayedToWhereItEnds) {
   EXPECT_EQ(summary["loop"]["ticks"], ask(file, "n"));
 }
 
-// Whoever plays or plots it later can tell it from one that was done to its end.
+// Whoever plays or plots it later can see that it did not end normally.
 TEST_F(RecordedRoom, OfALostRoomSaysThatItDidNotEndAsItShould) {
   Stage stage(24.0);
   Process haptic = stage.start("osteon-haptic", arguments(stage, "lost", 0.0));
@@ -141,12 +141,12 @@ TEST_F(RecordedRoom, OfALostRoomSaysThatItDidNotEndAsItShould) {
 
 TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   const Stage stage(24.0);
-  // The case is fetched first, where files may be large.
+  // The case is fetched first, while files may still be large.
   std::ofstream(stage / "wait.json") << json{{"steps", json::array({{{"action", "wait"}, {"seconds", 0.1}}})}};
   Process first = stage.start("osteon-haptic",
                               {"--server", stage.address(), "--plan", stage / "wait.json", "--cache", stage / "cache"});
   ASSERT_EQ(first.wait(60s), 0) << first.err();
-  // Files may not grow beyond 400 kB; the signal that comes with it is ignored, as where a disk is full.
+  // Files may not grow beyond 400 kB. The signal of this limit is ignored, so writing fails as on a full disk.
   const std::string command = "trap '' XFSZ; ulimit -f 800; exec \"$@\"";
   std::vector<std::string> all{"-c", command, "sh", program("osteon-haptic"), "--plain"};
   const std::vector<std::string> given = arguments(stage, "full", 0.0);

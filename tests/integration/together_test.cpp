@@ -1,5 +1,5 @@
-// An instructor at the console and hands in their room, as processes: what the instructor decides holds at once, is
-// told to whom it concerns, and for whoever was away when they come back.
+// Tests an instructor at the console and hands in the room, as processes. A decision of the instructor holds at once.
+// It is sent to those concerned, and to those who were away when they come back.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -23,14 +23,14 @@ class ConsoleProcess {
     process_.write(command + "\n");
     return process_.read_line(60s).value_or("");
   }
-  // The place of the event that followed.
+  // The sequence number of the event that followed.
   std::uint64_t decide(const std::string& command) {
     const std::string answer = ask(command);
     std::smatch found;
     EXPECT_TRUE(std::regex_search(answer, found, std::regex("^ok at ([0-9]+)"))) << command << ": " << answer;
     return found.empty() ? 0 : std::stoull(found[1]);
   }
-  // What `people` says of one author; empty where there is no such.
+  // What `people` prints for one author. Empty if there is none.
   std::string person(std::uint64_t author) {
     const std::string all = ask("people");
     std::smatch found;
@@ -48,14 +48,14 @@ class ConsoleProcess {
   Process process_;
 };
 
-// A hand without a replica, which comes and goes.
+// A hand without a replica that can leave and come back.
 class BareHand {
  public:
   explicit BareHand(const std::string& address) : room_(join(address, wire::ClientKind::haptic)) { open(); }
   ~BareHand() { leave(); }
   AuthorId author() const { return room_.author; }
   std::uint64_t lease() const { return lease_; }
-  // What it was told before the leaves, of itself.
+  // The restrictions of itself that it received before the leaves.
   const std::optional<v1::Supervised>& held() const { return held_; }
   RoomSeq contained() const { return contained_; }
 
@@ -70,13 +70,13 @@ class BareHand {
   void come_again() {
     const auto again = wire::join_again(room_, wire::ClientKind::haptic, {});
     ASSERT_TRUE(again.has_value()) << again.error().message;
-    // Of a channel's further joins the secret stays.
+    // The secret of the first join stays valid for further joins.
     const std::string secret = room_.secret;
     room_ = *again;
     room_.secret = secret;
     open();
   }
-  // The answer to its next cut: empty where it is taken, else why it is not.
+  // The answer to its next cut. Empty if the room takes it, else the reason for the rejection.
   std::string cut(std::uint64_t epoch) {
     Cut cut = straight_cut(find_tool("burr-round-5").value(), {-15, -15, 0}, {-15, -15, 0}, {0, 0, -1}, ++cuts_);
     cut.author = room_.author;
@@ -140,14 +140,14 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   ConsoleProcess console(stage, "Ada Instructor");
   ASSERT_TRUE(console.ask("people").starts_with("ok 1 people")) << console.process().err();
 
-  // Each in its turn, so that their numbers are known: 1 is the console's.
+  // They join one after the other, so that their numbers are known. 1 is the console.
   constexpr std::uint64_t kFirst = 2, kSecond = 3;
   Process first = stage.start_haptic("first", plan_at(-8.0));
   ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= 10; }, 60s)) << first.err();
   Process second = stage.start_haptic("second", plan_at(8.0));
   ASSERT_TRUE(wait_until([&] { return console.cuts(kSecond) >= 10; }, 60s)) << second.err();
 
-  // One is stopped and the other goes on.
+  // One is stopped, and the other goes on.
   const std::uint64_t frozen_at = console.decide("freeze #2 look at me");
   EXPECT_TRUE(console.ask("wait acknowledged #2 10").starts_with("ok"));
   EXPECT_NE(console.person(kFirst).find("frozen words \"look at me\" acknowledged decided by #1"), std::string::npos)
@@ -166,13 +166,14 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   std::this_thread::sleep_for(500ms);
   EXPECT_EQ(console.cuts(kFirst), cut_before);
   const std::uint64_t back_at = console.decide("give-back #2");
-  ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= cut_before + 5; }, 60s)) << "and goes on again";
+  ASSERT_TRUE(wait_until([&] { return console.cuts(kFirst) >= cut_before + 5; }, 60s)) << "it goes on again";
 
-  // What was done of late comes back, whoever did it; tools that are in it then are stuck, and have to be drawn out.
+  // Undo by time takes back all recent cuts, whoever made them. Tools that are in the bone are then stuck and must be
+  // drawn out.
   const std::string undone = console.ask("undo 1 s");
   EXPECT_TRUE(std::regex_search(undone, std::regex("^ok at [0-9]+ events [1-9]"))) << undone;
 
-  // About one who is away: pending until they have come back and heard.
+  // A decision about a person who is away is pending until they have come back and received it.
   BareHand away(stage.address());
   EXPECT_EQ(away.cut(away.lease()), "");
   const std::string who = "#" + std::to_string(away.author().value);
@@ -181,26 +182,27 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   ASSERT_TRUE(wait_until([&] { return console.person(away.author().value).find(" away") != std::string::npos; }, 20s));
   (void)console.decide("freeze " + who + " wait for me");
   EXPECT_NE(console.person(away.author().value).find("pending"), std::string::npos);
-  EXPECT_TRUE(console.ask("wait acknowledged " + who + " 0.3").starts_with("error")) << "nobody has told them";
+  EXPECT_TRUE(console.ask("wait acknowledged " + who + " 0.3").starts_with("error")) << "they have not received it";
   away.come_again();
-  ASSERT_TRUE(away.held()) << "the first thing that they hear";
+  ASSERT_TRUE(away.held()) << "the first message that they receive";
   EXPECT_EQ(away.held()->room_seq(), 0u);
   EXPECT_TRUE(away.held()->supervision().stopped());
   EXPECT_EQ(away.held()->supervision().words(), "wait for me");
   EXPECT_NE(away.lease(), lease_before);
   away.say_heard();
   EXPECT_TRUE(console.ask("wait acknowledged " + who + " 10").starts_with("ok"));
-  EXPECT_EQ(away.cut(lease_before), sentence(Rejection::lease)) << "what it had cut meanwhile";
+  EXPECT_EQ(away.cut(lease_before), sentence(Rejection::lease)) << "its cut under the old lease";
   EXPECT_EQ(away.cut(away.lease()), sentence(Rejection::frozen));
   (void)console.decide("free " + who);
-  // The rejection has ended that lease too, and so has the word.
+  // The rejection has ended that lease too, and so has the decision.
   EXPECT_EQ(away.cut(away.lease()), sentence(Rejection::lease));
   away.leave();
   away.come_again();
   EXPECT_EQ(away.cut(away.lease()), "");
   away.leave();
 
-  // Everybody stops; the bone of the import, and on it what the second hand did at first, by a demonstrator.
+  // Everybody is stopped. The bone is reset to the import, and a demonstrator repeats on it what the second hand did at
+  // first.
   (void)console.decide("freeze all");
   EXPECT_TRUE(console.ask("wait acknowledged #2 10").starts_with("ok"));
   EXPECT_TRUE(console.ask("wait acknowledged #3 10").starts_with("ok"));
@@ -218,7 +220,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
       << "it is over";
   EXPECT_TRUE(console.ask("end-demonstration " + std::to_string(demonstrator)).starts_with("error"));
 
-  // One bone everywhere.
+  // All have the same bone.
   const std::string status = console.ask("status");
   std::smatch hash;
   ASSERT_TRUE(std::regex_search(status, hash, std::regex("hash ([0-9a-f]{64})"))) << status;
@@ -230,8 +232,8 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   EXPECT_EQ(of_first.at("field_hash"), hash[1].str());
   EXPECT_EQ(of_second.at("field_hash"), hash[1].str());
   EXPECT_NE(of_first.at("words").dump().find("the drill wanders"), std::string::npos);
-  EXPECT_EQ(of_second.at("words").dump().find("the drill wanders"), std::string::npos) << "said to the other";
-  // Each hand knows whose word it was.
+  EXPECT_EQ(of_second.at("words").dump().find("the drill wanders"), std::string::npos) << "words for the other hand";
+  // Each hand knows who made the decision.
   for (const json* of : {&of_first, &of_second}) {
     std::size_t told = 0;
     for (const json& note : of->at("restrictions")) {
@@ -244,7 +246,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   EXPECT_EQ(read_json(stage / "server.json").at("field_hash"), hash[1].str());
 
-  // The journal says so too: no cut of the hand while it was stopped, or without its tool.
+  // The journal agrees: no cut of the hand while it was stopped, or without its tool.
   const std::string lines = (folder / "room.jsonl").string();
   ASSERT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s,
                 {.environment = {}, .without = {}, .folder = {}, .as_given = true})
@@ -277,10 +279,10 @@ TEST(Together, TheConsoleSaysWhatItDoesNotUnderstand) {
   EXPECT_EQ(console.ask("draw 0 0 0 1 0 0"), "ok drawing 1");
   EXPECT_EQ(console.ask("wipe all"), "ok");
   EXPECT_EQ(console.ask("drawn"), "ok 0 drawings");
-  EXPECT_TRUE(console.ask("demonstrate").starts_with("error ")) << "a room that is not kept has no journal";
+  EXPECT_TRUE(console.ask("demonstrate").starts_with("error ")) << "a room that is not persisted has no journal";
   console.process().close_input();
   EXPECT_EQ(console.process().wait(10s), 0);
-  // Of a server that is not there.
+  // A server that does not exist.
   const RunResult nobody =
       run(program("osteon-viewer"), {"--console", "--connect", "127.0.0.1:1", "--plain", "--timeout", "0.2"}, 30s);
   EXPECT_NE(nobody.exit_code, 0);

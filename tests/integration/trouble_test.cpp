@@ -1,5 +1,5 @@
-// What goes wrong at a person's desk: every program says one sentence that names what is wrong and what to do, and
-// ends with a code that is not zero.
+// Tests what goes wrong for a person at the command line. Every program prints one sentence that names the fault and
+// the remedy, and ends with a code that is not zero.
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
 #include <netinet/in.h>
@@ -19,7 +19,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// The lines of standard error that are meant for the person, not the log: "PROGRAM: sentence".
+// The lines of standard error for the person, without the log: "PROGRAM: sentence".
 std::vector<std::string> sentences(const std::string& err, const std::string& name) {
   std::vector<std::string> found;
   std::istringstream lines(err);
@@ -59,7 +59,7 @@ class ListeningSocket {
   int port_ = 0;
 };
 
-// An address on which nobody listens: the system chose the port, and it was let go.
+// An address on which nothing listens. The system chose the port, and it was released.
 std::string deserted_address() { return ListeningSocket().address(); }
 
 void write_plan(const std::filesystem::path& file) {
@@ -142,7 +142,7 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
                       "osteon-haptic", {"missing.json"});
   expect_one_sentence(with_plan("{"), "osteon-haptic", {"plan.json"});
   expect_one_sentence(with_plan(R"({"steps":[{"action":"saw"}]})"), "osteon-haptic", {"plan.json", "action"});
-  // What is misspelt is told with what could be meant.
+  // For a misspelt word the message gives the word that could be meant.
   expect_one_sentence(with_plan(R"({"steps":[{"action":"drill","tool":"drill-3.2","entry":{"at_mm":[0,0,0]}}]})"),
                       "osteon-haptic", {"plan.json", "step 1", "at_mm", "point_mm"});
   const auto drill = [&](const std::string& more, const std::string& entry = R"({"toward":[0,0,1]})") {
@@ -151,7 +151,7 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   expect_one_sentence(drill(R"("law":"hooke",)"), "osteon-haptic", {"law", "hooke", "choose one of"});
   expect_one_sentence(drill(R"("tool":"my-drill","law":"hooke",)"), "osteon-haptic",
                       {"law", "hooke", "osteon-haptic laws"});
-  // No number that fills the line.
+  // A long number must not fill the line.
   const RunResult far = drill("", R"({"toward":[1e300,0,1]})");
   expect_one_sentence(far, "osteon-haptic", {"toward", "from -100000 to 100000"});
   EXPECT_LT(far.err.size(), 300u);
@@ -166,7 +166,7 @@ TEST(Trouble, AnAddressThatIsNoneIsSaidWithOneThatIs) {
                       "osteon-haptic", {"nonsense is not HOST:PORT", "osteon-server prints"});
 }
 
-// Nothing that was asked for is left out without a word.
+// No option is ignored silently.
 TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
   const TempDir temp;
   write_plan(temp / "plan.json");
@@ -190,7 +190,7 @@ TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
   EXPECT_EQ(std::filesystem::file_size(temp / "mine.h5"), 13u);
 }
 
-// A tool of the server's own, with a law of its own, in the hand of a plan.
+// A plan uses a tool of the server's own, with a force law of its own.
 TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   const TempDir tools;
   std::ofstream(tools / "my-drill.yaml")
@@ -210,10 +210,10 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   auto summary = read_json(stage / "own-summary.json");
   EXPECT_EQ(summary["steps"][0]["tool"], "my-drill");
   EXPECT_EQ(summary["steps"][0]["completed"], true);
-  // A cylinder of 4 mm to within its point, 1.2 mm high.
+  // A cylinder of 4 mm, except for its point of 1.2 mm.
   const double cylinder_mm3 = 3.14159 * 4.0 * (summary["steps"][0]["deepest_mm"].get<double>() - 2.0 / 3.0 * 1.2);
   EXPECT_NEAR(summary["removed_mm3"].get<double>(), cylinder_mm3, 0.1 * cylinder_mm3);
-  EXPECT_EQ(summary["steps"][0]["law"], "allotta");  // its file says so
+  EXPECT_EQ(summary["steps"][0]["law"], "allotta");  // by the tool's file
 
   const auto refused = [&](const nlohmann::json& wrong) {
     std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({wrong})}}.dump();
@@ -225,7 +225,7 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   step["law"] = "saw";
   expect_one_sentence(refused(step), "osteon-haptic", {"own.json", "step 1", "my-drill", "not for a drill"});
 
-  // The recording of one tool or place is not played with another.
+  // A recording of one tool or entry site cannot be played with another.
   const std::string recorded = "recorded:" + (stage / "own.h5").string();
   step.erase("law");
   const auto played = [&](const nlohmann::json& with) {
@@ -253,10 +253,10 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
                       "osteon-haptic", {"another bone"});
 }
 
-// A step that gives up ends the session with what was done, a sentence and no success.
+// A step that gives up ends the session. The session reports what was done, one sentence, and no success.
 TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
   Stage stage(16.0);
-  // So blunt and slow a drill advances by a millimetre or two while it is waited for.
+  // So blunt and slow a drill advances by only a millimetre or two in the time limit.
   nlohmann::json step = drill_at(0, 0, "rig");
   step["to_mm"] = 29.0;
   step["feed_mm_per_s"] = 20.0;
@@ -275,12 +275,12 @@ TEST(Trouble, AStepThatDoesNotFinishIsSaid) {
   EXPECT_NE(haptic.out().find("0 of 1 steps done"), std::string::npos) << haptic.out();
 }
 
-TEST(Trouble, AHandWithoutRealTimePriorityIsToldSo) {
+TEST(Trouble, AHandWithoutRealTimePriorityIsWarned) {
   Stage stage(16.0);
   nlohmann::json step = drill_at(0, 0, "rig");
   step["to_mm"] = 1.0;
   std::ofstream(stage / "plan.json") << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
-  // Root may always, unless that is taken from it.
+  // Root always may, unless the limit is taken from it.
   std::vector<std::string> line{"--rtprio=0"};
   if (::geteuid() == 0) line.insert(line.end(), {"setpriv", "--bounding-set", "-sys_nice"});
   line.insert(line.end(), {program("osteon-haptic"), "--server", stage.address(), "--plan", stage / "plan.json",
@@ -292,7 +292,7 @@ TEST(Trouble, AHandWithoutRealTimePriorityIsToldSo) {
   EXPECT_NE(haptic.err().find("osteon-haptic check"), std::string::npos) << haptic.err();
 }
 
-// What it has just measured goes into what it says: here it was stopped in the middle of it.
+// The check's own measurement is part of its answer: here the program was stopped during the check.
 TEST(Trouble, ACheckThatMissedTicksDoesNotSayThatNothingIsLacking) {
   Process check(program("osteon-haptic"), {"check", "--seconds", "2"});
   std::this_thread::sleep_for(1s);
@@ -313,7 +313,7 @@ TEST(Trouble, ADeviceThatIsNotThereIsNamed) {
                       "osteon-haptic", {"phantom", "simulated"});
 }
 
-// A server that hears this signal in the middle of work: its clients say so and end, however silently it went.
+// A server gets this signal during work. Its clients must report it and end, even if the server vanishes silently.
 void expect_all_notice(int signal) {
   Stage stage(16.0);
   const auto screen = Xvfb::start("640x480");
@@ -334,7 +334,7 @@ void expect_all_notice(int signal) {
     ASSERT_TRUE(code) << name << " did not notice";
     expect_one_sentence({*code, false, process->out(), process->err()}, name, {});
   }
-  // What was done until then is told all the same.
+  // The summary still has what was done until then.
   auto summary = read_json(stage / "work.json");
   ASSERT_TRUE(summary.is_object());
   EXPECT_TRUE(summary["lost"].is_string()) << summary["lost"];
@@ -345,10 +345,10 @@ void expect_all_notice(int signal) {
 
 TEST(Trouble, AKilledServerIsNoticedByAllItsClients) { expect_all_notice(SIGKILL); }
 
-// Its connections stay open, as those of a machine that lost its network do.
+// Its connections stay open, like those of a machine that lost its network.
 TEST(Trouble, AServerThatHangsIsNoticedByAllItsClients) { expect_all_notice(SIGSTOP); }
 
-// A room that is silent for ten seconds is felt on as it was, nothing is cut meanwhile, and then the work goes on.
+// A room is silent for ten seconds. The hand still feels the bone as it was, nothing is cut, and then the work goes on.
 TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
   Stage stage(16.0);
   Process haptic = stage.start_haptic("silent", {{"steps", nlohmann::json::array({drill_at(0, 0, "expert")})}});
@@ -363,8 +363,8 @@ TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
   auto summary = read_json(stage / "silent.json");
   EXPECT_EQ(summary["steps"][0]["completed"], true);
   EXPECT_GT(summary["held_for_room_ticks"].get<int>(), 5000);
-  // The hand never went through bone: no farther from the tool than the expert's push stretches the coupling, and then
-  // some.
+  // The hand never went through bone: it was no farther from the tool than the expert's push stretches the coupling,
+  // with a margin.
   std::ifstream log(stage / "silent.csv");
   std::string line;
   std::getline(log, line);
@@ -403,7 +403,7 @@ TEST(Trouble, AHapticClientStopsCleanlyInTheMiddleOfWork) {
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});
   std::this_thread::sleep_for(4s);
   ASSERT_TRUE(haptic.running()) << haptic.err();
-  // A machine that stops it is told of, whatever else comes.
+  // If the machine stops the program, that is reported, whatever other errors come.
   for (int i = 0; i < 5; ++i) {
     haptic.signal(SIGSTOP);
     std::this_thread::sleep_for(50ms);
@@ -412,7 +412,7 @@ TEST(Trouble, AHapticClientStopsCleanlyInTheMiddleOfWork) {
   }
   EXPECT_EQ(haptic.terminate(), 0);
   EXPECT_NE(haptic.err().find("the haptic loop has stalled"), std::string::npos) << haptic.err();
-  // What it had cut is in the bone, and its own record agrees with the server's.
+  // Its cuts are in the bone, and its own record agrees with the server's.
   EXPECT_EQ(stage.server().terminate(), 0);
   auto work = read_json(stage / "work.json");
   EXPECT_EQ(work["field_hash"], read_json(stage / "server.json")["field_hash"]);

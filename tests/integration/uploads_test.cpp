@@ -1,4 +1,4 @@
-// Cases on their way to a server that runs: what is sound gets rooms of its own, and what is not is one sentence.
+// Tests uploads of cases to a running server. A valid case can be opened in rooms. An invalid one causes one sentence.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -67,26 +67,26 @@ TEST_F(Uploads, WhatIsNoSoundCaseIsOneSentenceAndNothingIsKept) {
   std::ofstream(stage_ / "broken" / "bone.vdb") << std::string(5000, 'x');
   expect_refused(stage_ / "broken", "not sound");
 
-  // A bomb: a thousand times its size.
+  // A decompression bomb: a thousand times its size.
   fs::create_directory(stage_ / "bomb");
   fs::copy_file(stage_ / "other" / "case.json", stage_ / "bomb" / "case.json");
   std::ofstream(stage_ / "bomb" / "bone.vdb");
   fs::resize_file(stage_ / "bomb" / "bone.vdb", 300 << 20);
   expect_refused(stage_ / "bomb", "times its size");
 
-  // The server has taken no harm.
+  // The server still works.
   EXPECT_TRUE(stage_.server().running());
   EXPECT_EQ(ask("cases", {"upload", stage_ / "other"}).exit_code, 0);
   EXPECT_EQ(kept(), 1U);
 }
 
-// Where files lie on the server, and in which process, is nobody's business elsewhere. The log keeps it.
+// Paths and processes of the server must not appear at clients. Only the log has them.
 TEST_F(Uploads, ErrorsNameNoPathsAndNoProcesses) {
   const std::string pid = std::to_string(stage_.server().pid());
   std::vector<std::string> told;
   const auto expect_told = [&](const RunResult& refused, const std::string& what) {
     EXPECT_NE(refused.exit_code, 0) << what;
-    // What the client says of its own files is its own business.
+    // The client may name its own files.
     for (const fs::path& folder : {rooms_.path(), uploads_.path()})
       EXPECT_EQ(refused.err.find(folder.string()), std::string::npos) << what << ": " << refused.err;
     EXPECT_EQ(refused.err.find(pid), std::string::npos) << what << ": " << refused.err;

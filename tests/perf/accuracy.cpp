@@ -1,5 +1,5 @@
-// How true cuts are: volume and surface of a sphere, a drilled hole and a saw's kerf against their closed forms, at
-// falling pitches and many random places on the lattice. Takes the number of trials and prints JSON.
+// Measures the accuracy of cuts: volume and surface of a sphere, a drilled hole and a saw's kerf against their closed
+// forms, at falling pitches and many random positions on the lattice. Takes the number of trials and prints JSON.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -25,7 +25,7 @@ using Make = std::function<KnownCut(double pitch_mm, Random& random)>;
 void measure(const char* name, const std::string& tool, int trials, const Make& make, bool last) {
   std::printf("\"%s\": {\"tool\": \"%s\", \"pitches\": [", name, tool.c_str());
   for (const double pitch : kPitches_mm) {
-    // Every pitch has its own places: equal ones would not be equal on another lattice.
+    // Every pitch has its own positions: equal positions would not be equal on another lattice.
     Random random(static_cast<std::uint64_t>(1e4 * pitch));
     std::vector<double> errors, deviations;
     double sum = 0.0;

@@ -1,6 +1,6 @@
-// osteon-bad-network [RUNS]: real processes and sockets, good and bad networks between them: how soon all hold one bone
-// once it is quiet, and how soon what one hand cuts is in the patch that another feels. A fifth as many runs without a
-// bad network. The hands are simulated. JSON.
+// osteon-bad-network [RUNS]: real processes and sockets, with good and bad networks between them. Measures how soon all
+// hold one bone after the network is quiet, and how soon one hand's cut is in the patch that another feels.
+// Makes a fifth as many runs without a bad network. The hands are simulated. Prints JSON.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -23,12 +23,13 @@ namespace {
 using namespace osteon::test;
 using Clock = std::chrono::steady_clock;
 
-// What the machine does to whoever waits for his time and for the disk: now and then a few bytes synced.
+// Measures the machine itself: the delay of a thread that waits for its time and for the disk. It syncs a few bytes
+// from time to time.
 class Machine {
  public:
   Machine() : thread_([this] { run(); }) {}
   ~Machine() { (void)stop(); }
-  // How long after its time each was done.
+  // Returns the delay of each.
   std::vector<double> stop() {
     over_ = true;
     if (thread_.joinable()) thread_.join();
@@ -37,7 +38,7 @@ class Machine {
 
  private:
   void run() {
-    constexpr std::chrono::milliseconds kTick{50};  // so rarely that it does not keep the disk from the server
+    constexpr std::chrono::milliseconds kTick{50};  // so rare that the server still gets the disk
     const TempDir folder;
     const int file = ::open((folder / "probe").c_str(), O_RDWR | O_CREAT, 0600);
     const std::vector<char> bytes(4096, 'x');

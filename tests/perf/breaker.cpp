@@ -1,5 +1,5 @@
-// osteon-breaker [MINUTES [SEED]]: breaks real servers' journals with one seed after the other, until it is stopped or
-// the time is over. Exit code 1 where a promise was broken.
+// osteon-breaker [MINUTES [SEED]]: damages the journals of real servers with one seed after the other, until it is
+// stopped or the time is over. Exit code 1 if a promise was broken.
 #include <unistd.h>
 
 #include <chrono>

@@ -1,5 +1,5 @@
-// Damaged cases, each looked through by a process of its own as an upload is: takes how many of a small case and of a
-// large one, and prints JSON. "unchanged": a change of bytes that say nothing, so that it is the same case.
+// Damaged cases, each validated by a process of its own like an upload. Takes the number of changes of a small case and
+// of a large one, and prints JSON. "unchanged": the changed bytes have no meaning, so it is the same case.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ long peak_mib() {
   return used.ru_maxrss / 1024;
 }
 
-// Solid, of densities that nothing compresses: a file of 65 MB.
+// A solid case whose densities cannot be compressed: a file of 65 MB.
 Result<Case> large_case() {
   std::mt19937 random(7);
   std::uniform_real_distribution<float> density(0.2f, 1.0f);

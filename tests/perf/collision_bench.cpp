@@ -1,5 +1,5 @@
-// Collision of a tool's points with bone on the cells of a segmentation (Niu 2008, §7.2) and by the distance field: how
-// far the surface that each shows lies from a ball's, in pitches, and what a point costs. Prints JSON.
+// Collision of a tool's points with bone, by the cells of a segmentation (Niu 2008, §7.2) and by the distance field.
+// Measures the distance between each method's surface and a ball's, in pitches, and the cost of a point. Prints JSON.
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,6 +1,6 @@
-// One collision and force evaluation of a tool of 4096 points with density, against OpenVDB's sampler doing the same
-// with central differences: a bur half immersed in bone that it has cut, the same points, poses and sums, in turns.
-// Prints JSON.
+// One collision and force evaluation of a tool of 4096 points with density, compared with OpenVDB's sampler and central
+// differences. A bur is half immersed in bone that it has cut. Points, poses and sums are the same, and the two take
+// turns. Prints JSON.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
@@ -27,7 +27,7 @@ struct Sums {
   Vec3 force = Vec3::Zero(), torque = Vec3::Zero();
 };
 
-// The same evaluation by samplers of any kind.
+// The same evaluation with any kind of sampler.
 template <class Solid, class Density>
 Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& query, double step_mm,
                  const DensityTable& strength, double least_arm_mm, const Solid& solid, const Density& density,
@@ -66,7 +66,7 @@ Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& qu
     sums.force += push;
     sums.torque += tool_mm.cross(push);
   }
-  if (!(gradients.norm() >= 0.0)) std::abort();  // they are used
+  if (!(gradients.norm() >= 0.0)) std::abort();  // prevents that they are optimised away
   return sums;
 }
 
@@ -83,7 +83,7 @@ int run() {
   const Tool tool = *find_tool("burr-round");
   const CutField start(osteon::test::plain_block(40.0, 12.0, kPitch_mm), {});
   CutField field(start.bone(), {});
-  // A groove that the bur has made, half as deep as it is wide; it stands at its end.
+  // A groove that the bur has made, half as deep as it is wide. The bur is at its end.
   field.apply(osteon::test::straight_cut(tool, {-12, 0, -3}, {0, 0, -3}, -Vec3::UnitZ()));
 
   ToolModel model(tool, kPitch_mm, 1.0, kPoints);
@@ -104,10 +104,10 @@ int run() {
     query.direction_bone = Vec3(1, 0, -0.3).normalized();
     query.ahead_mm = model.inset + 0.25 * model.fine_pitch_mm;
     query.most_mm = 2.0 * model.fine_pitch_mm;
-    query.least_facing = -1.0;  // every point is looked at
+    query.least_facing = -1.0;  // every point is evaluated
     query.strength = &model.strength;
-    // Each asks a quarter pitch before its own face, where the groove's walls are: those that look back are not to be
-    // moved along the direction.
+    // Each point looks a quarter pitch ahead of its own face, where the groove's walls are. Points that face backwards
+    // must not be moved along the direction.
     query.lift_mm = query.ahead_mm;
     query.ahead_mm = 0.0;
     queries.push_back(query);
@@ -117,7 +117,7 @@ int run() {
   ContactValues values;
   values.make_room(kPoints);
 
-  // The same field for OpenVDB: f at the tool's pitch round the tool, density at h.
+  // The same field for OpenVDB: f at the tool's pitch round the tool, and density at h.
   openvdb::FloatGrid::Ptr solid = openvdb::FloatGrid::create(static_cast<float>(kBandVoxels * kPitch_mm)),
                           density = openvdb::FloatGrid::create(0.0f);
   solid->setTransform(openvdb::math::Transform::createLinearTransform(model.fine_pitch_mm));
@@ -153,7 +153,7 @@ int run() {
   int touching = 0, compared = 0;
   for (int round = 0; round < kRounds; ++round) {
     const ContactQuery& query = queries[static_cast<std::size_t>(round % kPoses)];
-    // Hot: the caches hold the patch, as in a loop that does this every millisecond and little else.
+    // Hot: the caches hold the patch, as in a loop that does almost nothing else every millisecond.
     double mine = 1e9;
     ContactSums sums;
     for (int i = 0; i < 5; ++i) {
@@ -168,7 +168,7 @@ int run() {
     accessor.push_back(us(began));
     ratios.push_back(accessor.back() / ours[ours.size() - 3]);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (std::abs(distances[i]) > 0.4) continue;  // beyond, samples are clipped in other ways
+      if (std::abs(distances[i]) > 0.4) continue;  // beyond this, samples are clipped differently
       worst_mm = std::max(worst_mm, std::abs(distances[i] - static_cast<double>(values.distance_mm[i])));
       ++compared;
     }

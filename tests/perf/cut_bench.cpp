@@ -1,5 +1,5 @@
-// What one cut of a haptic client (8 ms of tool path) costs at a pitch of 0.125 mm, against the plain way of writing
-// it; and what a cut costs with each of the tools at its own level, with the memory that its field takes.
+// Cost of one cut of a haptic client (8 ms of tool path) at a pitch of 0.125 mm, compared with the plain way to compute
+// it. Also the cost of a cut with each tool at its own level, and the memory that its field takes.
 #include <benchmark/benchmark.h>
 #include <openvdb/openvdb.h>
 #include <sys/resource.h>
@@ -41,7 +41,7 @@ Tool tool_at_finest(const char* name) {
   return *tool;
 }
 
-// A burr half in bone moving sideways, and a drill going in.
+// A burr half in bone that moves sideways, and a drill that goes in.
 Cut burr_cut(const Vec3& at = Vec3::Zero()) {
   return straight_cut(tool_at_finest("burr-round-3.2"), at + Vec3(0, 0, -1.6), at + Vec3(15 * kCutSeconds, 0, -1.6),
                       {0, 0, -1});
@@ -71,7 +71,7 @@ void count_samples(benchmark::State& state, double visited, double computed, dou
   state.counters["modified"] = modified;
 }
 
-// The same cut again and again, after a first that removed: every distance is evaluated, nothing changes.
+// The same cut again and again, after a first one that removed bone. Every distance is evaluated, and nothing changes.
 void hot(benchmark::State& state, const Cut& cut) {
   const Threads threads(state.range(0));
   CutField field(bone(), BodyId{});
@@ -96,37 +96,36 @@ struct Times {
   }
 };
 
-// Other work of the process: every line of 96 MiB, three times the largest cache, is read and written, so that code,
-// tools, bone and cut field all come from memory again.
+// Simulates other work of the process. Reads and writes every line of 96 MiB, three times the largest cache, so that
+// code, tools, bone and cut field all come from memory again.
 void flush_caches() {
   static std::vector<std::uint64_t> memory(std::size_t{12} << 20);
   for (std::size_t i = 0; i < memory.size(); i += 8) memory[i] += i;
   benchmark::ClobberMemory();
 }
 
-// Wide enough for many cuts that know nothing of each other.
+// Wide enough for many independent cuts.
 const Case& wide_bone() {
   static const Case block = plain_block(120, 16, kPitch_mm);
   return block;
 }
 
-// Pages that the system gave to this process for the first time.
+// Number of pages that the system gave to this process for the first time.
 long new_pages() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return usage.ru_minflt;
 }
 
-// Where memory for what the cuts add comes from: from a reserve that is refilled between cuts, as the server and the
-// haptic client do; or from the system, page by page, while it cuts.
+// Source of the memory for what cuts add. `reserved`: a reserve that is refilled between cuts, as in the server and the
+// haptic client. `given`: from the system, page by page, during the cut.
 enum class Heap { reserved, given };
 
-// A place in untouched bone for every cut, and caches that hold other work. A 3.5 mm drill with its band reaches 2.3 mm
-// to each side and a leaf is 1 mm wide, so of places 7 mm apart no two share a leaf: every leaf that a cut changes is
-// new.
+// Each cut is made in untouched bone, and the caches hold other work. A 3.5 mm drill with its band reaches 2.3 mm to
+// each side and a leaf is 1 mm wide, so positions 7 mm apart share no leaf: every leaf that a cut changes is new.
 void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
   constexpr int kPlaces = 200, kRow = 15;
-  constexpr double kApart_mm = 8.0, kScatter_mm = 0.5;  // at least 7 mm, and everywhere between the leaves' faces
+  constexpr double kApart_mm = 8.0, kScatter_mm = 0.5;  // at least 7 mm, at any position relative to the leaves' faces
   const Threads threads(state.range(0));
   std::vector<Cut> cuts;
   Random random(5);
@@ -141,7 +140,7 @@ void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
   long pages = 0;
   for (auto _ : state) {
     const Case& bone = wide_bone();
-    // Kept, so that no pass finds memory that another one gave back.
+    // Kept alive, so that no pass gets memory that another one gave back.
     static std::vector<std::unique_ptr<CutField>> fields;
     CutField& field = *fields.emplace_back(std::make_unique<CutField>(bone, BodyId{}));
     std::optional<MemoryReserve> reserve;
@@ -171,9 +170,9 @@ void cold(benchmark::State& state, Cut (*cut_at)(const Vec3&), Heap heap) {
   state.counters["new_pages"] = static_cast<double>(pages) / count;
 }
 
-// The plain way (Niu 2008, §5.4): walk the voxels of the World Bounding Block, here of the swept tool and grown
-// by the band; reject those outside the Local Bounding Block, compute the tool's distance for the others, and write the
-// lower of it and the voxel's value by an accessor. For balls, and turned bodies that move along their axis.
+// The plain way (Niu 2008, §5.4): visits the voxels of the World Bounding Block, here of the swept tool and grown by
+// the band. Rejects those outside the Local Bounding Block. Computes the tool's distance for the others, and writes the
+// lower of it and the voxel's value by an accessor. For balls, and for turned bodies that move along their axis.
 class PlainCut {
  public:
   explicit PlainCut(const Cut& cut) : body_(body_of(cut)) {
@@ -197,7 +196,7 @@ class PlainCut {
                       (corner & 4 ? local.max_mm : local.min_mm).z()}));
     box_ = covering_samples(world.grown(band_), pitch_);
     local_ = local.grown(band_);
-    // The outline's edges, as the tool's implicit function has them. Of a drill going in, the back stays where it was.
+    // The outline's edges, as in the tool's implicit function. When a drill goes in, its back stays where it was.
     const double lowest_z = body_.lowest[2] * kQuantum_mm;
     for (std::size_t i = 0; i < body_.profile.size(); ++i) {
       const ProfileCorner &a = body_.profile[i], &b = body_.profile[(i + 1) % body_.profile.size()];
@@ -291,7 +290,7 @@ void world_box(benchmark::State& state, const Cut& cut) {
                 static_cast<double>(first.modified));
 }
 
-// A tool at work: cuts of 8 ms, each from where the last one ended, always into fresh bone.
+// A working tool: cuts of 8 ms, each from where the last one ended, always into fresh bone.
 std::vector<Cut> at_work(const char* tool_name, const Vec3& from, const Vec3& way_mm_s, int count) {
   const Tool tool = tool_at_finest(tool_name);
   std::vector<Cut> cuts;
@@ -309,14 +308,14 @@ double middle_of(std::vector<double> values) {
   return values[values.size() / 2];
 }
 
-// The same cuts by our field with one and with two threads and by the plain way on a grid of its own, in turns of some
-// cuts each. All three must hold the same bone in the end. `ratio` is that of the medians of single cuts, its least and
-// most over several passes through the whole sequence.
+// Makes the same cuts with our field with one and with two threads, and in the plain way on a grid of its own. They
+// take turns after some cuts each. All three must hold the same bone at the end. `ratio` is that of the medians of
+// single cuts, with its least and most over several passes through the whole sequence.
 void work(benchmark::State& state, const std::vector<Cut>& cuts) {
   constexpr int kPasses = 5;
   constexpr std::size_t kTurn = 20;
   std::vector<PlainCut> plain_cuts(cuts.begin(), cuts.end());
-  std::array<Times, 3> all;  // one thread, two, plain
+  std::array<Times, 3> all;  // one thread, two threads, plain way
   std::array<std::vector<double>, 2> ratios;
   PlainCut::Count plain_count;
   double computed = 0, modified = 0, visited = 0;
@@ -356,7 +355,7 @@ void work(benchmark::State& state, const std::vector<Cut>& cuts) {
       for (std::size_t who = 0; who < 3; ++who) all[who].us.insert(all[who].us.end(), us[who].begin(), us[who].end());
       for (std::size_t who = 0; who < 2; ++who) ratios[who].push_back(middle_of(us[2]) / middle_of(us[who]));
       if (pass > 0) continue;
-      // The plain way computes in doubles: a quantum apart where the two round a half to different sides.
+      // The plain way computes in doubles: it differs by a quantum where the two round a half to different sides.
       OSTEON_CHECK(fields[0].hash() == fields[1].hash());
       for (const FieldLeaf& leaf : fields[0].leaves())
         for (std::int32_t i = 0; i < kLeafVoxels; ++i) {
@@ -387,8 +386,8 @@ void work(benchmark::State& state, const std::vector<Cut>& cuts) {
   }
 }
 
-// The accessor again, but with the kernel's own distances and only for leaves near the tool: what is left when the
-// plain way is given our culling.
+// The accessor again, but with the kernel's own distances and only for leaves near the tool. This is the plain way with
+// our culling.
 void near_leaves(benchmark::State& state, const Cut& cut) {
   const auto tools = builtin_tool_box();
   const SweptTool swept(cut, tools->find(cut.tool)->body, kPitch_mm);
@@ -417,8 +416,8 @@ void near_leaves(benchmark::State& state, const Cut& cut) {
   count_samples(state, samples, samples, static_cast<double>(first_modified));
 }
 
-// Working motion, tip and axis: what turns in bone along its axis goes in at a millimetre a second (20 for what is
-// driven by blows), what mills and saws moves across at 15; all with the tilt of a hand, 0.1 rad/s.
+// Working motion, tip and axis. A tool that turns in bone along its axis goes in at a millimetre a second (20 for one
+// driven by blows). A tool that mills or saws moves across at 15 mm/s. All have the tilt of a hand, 0.1 rad/s.
 struct Motion {
   Vec3 way_mm_s;
   double tilt_rad_s = 0.1;
@@ -449,7 +448,7 @@ const Case& big_bone() {
   return block;
 }
 
-// Where a tool's cuts begin: with half a millimetre of its tip in the bone, or seated, with all of its cutting part in.
+// Where a tool's cuts begin: with half a millimetre of its tip in the bone, or with its whole cutting part in it.
 enum class Begin { entering, seated };
 
 double first_depth_mm(const Tool& tool, Begin begin, double on_the_way_mm) {
@@ -462,13 +461,14 @@ double first_depth_mm(const Tool& tool, Begin begin, double on_the_way_mm) {
     case ToolKind::oscillating_saw:
       return 20.0;  // the plate follows its teeth
     case ToolKind::broach:
-      return tool.cutting_length_mm - on_the_way_mm;  // whole at the end: then it stops
+      return tool.cutting_length_mm - on_the_way_mm;  // whole at the end, where it stops
     default:
       return tool.cutting_length_mm;
   }
 }
 
-// Each cut goes on from the one before it, inwards. What a seated tool took on its way in is taken before, in one cut.
+// Each cut continues from the one before it, inwards. What a seated tool has removed on its way in is removed before,
+// in one cut.
 void cut_with(benchmark::State& state, const Tool& tool, Begin begin) {
   constexpr int kCuts = 120;
   const Threads threads(state.range(0));
@@ -489,7 +489,7 @@ void cut_with(benchmark::State& state, const Tool& tool, Begin begin) {
     };
     const auto pose_at = [&](int i) {
       const double t = i * kCutSeconds, tilt = motion.tilt_rad_s * t;
-      // Tilted from one rotation, so that it does not spin: a blade that spins is another motion.
+      // Tilted from one rotation, so that it does not spin: a spinning blade is another motion.
       Pose pose = pose_along(Vec3(0, 0, -depth) + t * motion.way_mm_s, {0, 0, -1});
       pose.rotation = Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vec3(0.3, 1.0, 0.0).normalized())) * pose.rotation;
       return pose;

@@ -1,5 +1,5 @@
-// A 1 kHz loop that does nothing: what this machine makes of a periodic thread before any work is in it. Takes the
-// seconds to run and prints JSON.
+// A 1 kHz loop that does nothing. Shows how this machine runs a periodic thread without any work. Takes the seconds to
+// run and prints JSON.
 #include <cstdio>
 #include <cstdlib>
 #include <string>

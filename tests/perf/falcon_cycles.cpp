@@ -1,5 +1,5 @@
-// Many frames each way between the Falcon's driver and an emulated device, with what goes wrong on the way: prints one
-// JSON object. Everything is emulated: rates say what this machine's emulation takes, not what a device does.
+// Exchanges many frames in both directions between the Falcon's driver and an emulated device, with faults on the way.
+// Prints one JSON object. Everything is emulated: rates show what this machine's emulation can do, not a device.
 #include <nlohmann/json.hpp>
 
 #include <atomic>
@@ -21,14 +21,14 @@ using namespace osteon::haptic;
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kReach_m = 0.02;  // of the circle that the grip goes round
+constexpr double kReach_m = 0.02;  // radius of the grip's circle
 
 struct Counted {
   std::uint64_t reads = 0, usable = 0, unplugged = 0, wrong_places = 0;
   std::uint64_t force_after_loss = 0;
 };
 
-// Until it has been so; the emulation is slow, never stuck.
+// Waits until the condition has been true. The emulation is slow, but never stuck.
 template <class Condition>
 bool until(const Condition& condition) {
   const auto deadline = Clock::now() + 60s;
@@ -76,7 +76,7 @@ int main(int argc, char** argv) {
     if (usb.falcon_told().with_force > 0) ++counted.force_after_loss;
     const auto begun = Clock::now();
     const std::uint64_t first = falcon->read().sample, wanted = cycles / static_cast<std::uint64_t>(unplugs + 1) + 1;
-    // The haptic thread: reads and writes a thousand times a second. The grip goes round meanwhile.
+    // The haptic thread reads and writes a thousand times a second, while the grip moves in a circle.
     std::uint64_t last = first;
     while (last < first + wanted) {
       if (counted.reads % 200 == 0) go_round();

@@ -1,6 +1,7 @@
-// What drilling, burring and guided drilling feel like in numbers: the reference simulations of the feed rig and of the
-// hands on virtual time, how they change with push, wear, stiffness, damping, tick and pitch, and the forces of a burr
-// over time. Takes what to run (rig, hands, steps, profiles, guided) and prints JSON with the numbers and the curves.
+// The feel of drilling, burring and guided drilling in numbers. Runs the reference simulations of the feed rig and of
+// the hands on virtual time. Shows how they change with push, wear, stiffness, damping, tick and pitch, and the forces
+// of a burr over time.
+// Takes what to run (rig, hands, steps, profiles, guided) and prints JSON with the numbers and the curves.
 #include <tbb/parallel_for.h>
 #include <algorithm>
 #include <cmath>
@@ -18,7 +19,7 @@ namespace {
 using nlohmann::json;
 
 constexpr double kCone_mm = 0.961;  // height of a 118° point of 3.2 mm
-// Depths of the tip between which the whole point is in one layer, clear of where the densities of neighbours mix.
+// Depths of the tip between which the whole point is in one layer, away from where neighbouring densities mix.
 constexpr double kFrom_mm[] = {1.5, 7.0, 27.0}, kTo_mm[] = {3.9, 23.9, 28.9};
 
 double rounded(double value) { return std::round(1e4 * value) / 1e4; }
@@ -33,8 +34,8 @@ PlanStep drill_step(HandKind hand) {
 // A hole through the layered block.
 struct Hole {
   double force_n[3] = {}, feed_mm_per_s[3] = {};  // near cortex, medulla, far cortex
-  double ramp_mm = 0;                             // of the tip while more and more of the point is engaged: see Ramp
-  double after_exit_n = 0;                        // the largest force once the cone has left
+  double ramp_mm = 0;                             // of the tip while the point becomes engaged: see Ramp
+  double after_exit_n = 0;                        // the largest force after the cone's exit
   double plunge_mm = 0, after_exit_mm = 0;
   bool completed = false;
   json curve = {
@@ -52,7 +53,7 @@ struct Hole {
   }
 };
 
-// The engaged share of a cone grows as ((z - z0) / height)²: the height by the straight line through its root.
+// The engaged share of a cone grows as ((z - z0) / height)². Gives the height by the straight line through its root.
 struct Ramp {
   double n = 0, z = 0, r = 0, zz = 0, zr = 0;
   void see(double tip_mm, double engaged) {
@@ -64,7 +65,7 @@ struct Ramp {
 };
 
 Hole drill(const PlanStep& step, double dt_s = 1e-3, double pitch_mm = 0.5, bool keep_curve = false) {
-  // The room's delays are times, not ticks.
+  // The room's delays are times and not ticks.
   const auto ticks = [&](double s) { return static_cast<int>(std::lround(s / dt_s)); };
   Bench bench(block_case(12.0, pitch_mm), {step}, {}, 0.0, {ticks(0.012), ticks(0.025)}, dt_s);
   Hole hole;
@@ -100,7 +101,7 @@ Hole drill(const PlanStep& step, double dt_s = 1e-3, double pitch_mm = 0.5, bool
   return hole;
 }
 
-// Independent runs, side by side.
+// Independent runs in parallel.
 std::vector<Hole> drill_all(const std::vector<PlanStep>& steps) {
   std::vector<Hole> holes(steps.size());
   tbb::parallel_for(std::size_t{0}, steps.size(), [&](std::size_t i) { holes[i] = drill(steps[i]); });
@@ -114,7 +115,7 @@ json rig() {
   return out;
 }
 
-// Plunges as one parameter of the hand or the drill is changed.
+// Plunges while one parameter of the hand or the drill is changed.
 json sweep(const char* name, const std::vector<double>& values, double PlanStep::*field) {
   json out;
   out["values"] = values;
@@ -176,7 +177,7 @@ json steps() {
   return runs;
 }
 
-// The force on the tool over time while a burr goes to and fro over cortical bone: x along its lines, z into the bone.
+// The force on the tool over time while a burr moves to and fro over cortical bone: x along its lines, z into the bone.
 json profile(const PlanStep& step) {
   Bench bench(block_case(24.0), {step});
   json out{{"tool", step.tool}, {"sweep_mm_per_s", step.sweep_mm_per_s}};
@@ -205,7 +206,7 @@ json profile(const PlanStep& step) {
 }
 
 json profiles() {
-  // Surface burring takes a layer off; milling makes a slot as deep as the tool's radius, in passes.
+  // Surface burring takes a layer off. Milling makes a slot as deep as the tool's radius, in passes.
   PlanStep surface;
   surface.action = Action::burr;
   surface.tool = "burr-round-5";
@@ -235,7 +236,8 @@ Result<Tool> find_with_sleeve(std::string_view name) {
 
 double play_mm(double depth_mm) { return kPlay_mm * (1.0 + 2.0 * depth_mm / kSleeve_mm); }
 
-// A trembling hand drills along a planned line, through a sleeve and by eye: how far the tips of its cuts lie off it.
+// A trembling hand drills along a planned line, through a sleeve and by eye. Measures how far the tips of its cuts are
+// from the line.
 json guided() {
   PlanStep place;
   place.action = Action::place;

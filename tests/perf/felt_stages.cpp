@@ -1,7 +1,8 @@
-// osteon-felt-stages [SECONDS]: where the time goes from a cut that one hand makes until it is in the patch that
-// another feels: two clients' fast paths and replicas, a room with a journal on the disk, real sockets and threads, all
-// in one process so that one clock sees every stage; on the loopback, and at 40 +- 10 ms with 30 % lost, 10 %
-// reordered, 5 % twice. Hands and the bad network are simulated. JSON, milliseconds.
+// osteon-felt-stages [SECONDS]: shows the time of each stage from a cut of one hand until it is in the patch that
+// another feels. It uses two clients' fast paths and replicas, a room with a journal on the disk, and real sockets and
+// threads.
+// All is in one process, so that one clock sees every stage. It runs on the loopback, and at 40 +- 10 ms with 30 %
+// lost, 10 % reordered, 5 % twice. Hands and the bad network are simulated. Prints JSON, milliseconds.
 #include <array>
 #include <atomic>
 #include <condition_variable>
@@ -33,12 +34,12 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-// What happens to a cut of one hand until the other feels it.
+// Stages of a cut of one hand until the other feels it.
 enum Moment { sent, at_server, tick_began, decided, told, came, felt, kMoments };
 constexpr std::array<const char*, kMoments> kStages{"",       "uplink",   "wait_for_tick",    "decide",
                                                     "commit", "downlink", "replica_and_patch"};
 
-// Of one hand's cuts, by author_seq - 1.
+// Times of one hand's cuts, by author_seq - 1.
 struct Times {
   explicit Times(std::size_t cuts) : of(cuts) {}
   void note(Moment what, std::uint64_t author_seq) {
@@ -50,7 +51,7 @@ struct Times {
 // A hand's client and its end in the room, put together as the programs do.
 class Line final : public SessionSubscriber, private SessionLink::Receiver, public std::enable_shared_from_this<Line> {
  public:
-  // `port`: at which the client's datagrams reach the links, 0 for their own.
+  // `port`: UDP port at which the client's datagrams reach the links. 0: their own port.
   Line(RoomRuntime& runtime, LinkServer& links, AuthorId author, std::uint16_t port, std::size_t cuts)
       : runtime_(runtime),
         links_(links),
@@ -70,7 +71,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
     runtime_.leave(*this);
     if (link_) links_.remove(link_);
   }
-  // Before any cut; `other` is the line whose cuts are felt here.
+  // Called before any cut. `other` is the line whose cuts are felt here.
   void feel(Line& other) {
     other_ = &other;
     thread_ = std::thread([this] { follow(); });
@@ -90,7 +91,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
       tip_ = state.pose_bone_tool;
     }
     times.note(sent, cut.author_seq);
-    // What does not go in datagrams goes over the stream, which is not in here: it counts.
+    // A cut that does not fit into datagrams goes over the stream, which is not in this program. It is counted.
     if (!path_->send(cut)) {
       ++streamed;
       link_->offer(cut);
@@ -129,7 +130,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
   void take(Cut cut) override {
     const std::uint64_t number = cut.author_seq;
     times.note(at_server, number);
-    // Events beside the cut in the room's queue see when its tick comes to it.
+    // Events beside the cut in the room's queue note when its tick handles it.
     const auto note = [this, number](Moment what) {
       runtime_.queue_event(
           [this, number, what](Room&) {
@@ -153,7 +154,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
     entries_.push_back(std::move(indexed.entry));
     wake_.notify_one();
   }
-  // As the client's replica thread.
+  // The work of the client's replica thread.
   void follow() {
     std::deque<wire::SessionEntry> entries;
     while (true) {
@@ -191,7 +192,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
   std::deque<wire::SessionEntry> entries_;
   Pose tip_;
   bool over_ = false;
-  haptic::Replica replica_;  // of its thread, as all that follows
+  haptic::Replica replica_;  // of its thread, as all members below
   const haptic::ToolModel model_;
   haptic::PatchBuilder builder_;
   haptic::Patch patch_;
@@ -268,7 +269,7 @@ json run_stages(const Case& bone, const std::vector<Cut>& stroke, const std::vec
   json out{{"cuts", 2 * cuts},          {"all_felt", there}, {"streamed", lines[0]->streamed + lines[1]->streamed},
            {"whole", spread(whole)},    {"stages", stages},  {"round_trip_ms", rounded(path.round_trip_ms)},
            {"loss", rounded(path.loss)}};
-  // Of one client; those that came, where some are lost on the way down.
+  // Datagrams of one client. `packets` are those that arrived, if some are lost on the way down.
   const auto line = [&](std::uint64_t packets, std::uint64_t bytes) -> json {
     return {{"packets_per_s", rounded(static_cast<double>(packets) / seconds)},
             {"kbit_per_s", rounded(8e-3 * static_cast<double>(bytes + 28 * packets) / seconds)}};

@@ -1,6 +1,6 @@
-// Forged, flipped, cut, extended and replayed datagrams against the class that a server opens them with
-// (wire::ServerLink): how many it takes, and how many bytes it answers. Takes their number (10 million if none is
-// given) and prints JSON.
+// Sends forged, flipped, cut, extended and replayed datagrams to the class with which a server opens them
+// (wire::ServerLink). Counts how many it accepts, and how many bytes it answers. Takes their number (10 million if none
+// is given) and prints JSON.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>

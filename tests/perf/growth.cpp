@@ -1,5 +1,4 @@
-// What a cut costs as the bone grows, and what memory cuts take. Takes the bones' sizes in samples an axis, prints
-// JSON.
+// Cost of a cut as the bone grows, and the memory of cuts. Takes the bones' sizes in samples per axis and prints JSON.
 #include <malloc.h>
 #include <tbb/global_control.h>
 
@@ -23,10 +22,10 @@ namespace {
 constexpr double kPitch_mm = 0.5;
 constexpr std::size_t kCuts = 400, kBatch = 50;
 
-// Memory that the system gives for the first time costs more than a cut, and a server has it before the first. Keeps so
-// much of it ready in the heap.
+// Memory that the system gives for the first time costs more than a cut, and a server has it before the first cut.
+// Keeps `bytes` of it ready in the heap.
 void warm_heap(std::size_t bytes) {
-  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // more is refused
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);  // larger values are refused
   mallopt(M_TRIM_THRESHOLD, 2'000'000'000);
   constexpr std::size_t kPart = 1 << 20;
   std::vector<std::unique_ptr<char[]>> parts;
@@ -36,7 +35,7 @@ void warm_heap(std::size_t bytes) {
   }
 }
 
-// What the heap holds; this program has one thread, so all of it is in the main arena or mapped.
+// Bytes in the heap. This program has one thread, so all of it is in the main arena or mapped.
 double heap_bytes() {
   const struct mallinfo2 info = mallinfo2();
   return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
@@ -65,7 +64,7 @@ Cut burr_stroke(const Tool& burr, const Vec3& middle, const Vec3& way) {
   return straight_cut(burr, middle - 0.5 * way, middle + 0.5 * way, {0, 0, -1});
 }
 
-// A cube of bone of so many samples an axis, made in parts: the largest would not fit into memory as a whole.
+// A cube of bone with `samples` per axis, made in parts: the largest would not fit into memory as a whole.
 Case cube_of_bone(int samples) {
   const std::int32_t half = samples / 2 - 5;
   const double reach = half * kPitch_mm, band = kBandVoxels * kPitch_mm;
@@ -92,8 +91,8 @@ Case cube_of_bone(int samples) {
   return *built;
 }
 
-// Places for cuts that are farther apart than a bur and its bands reach, so that every cut finds the same: bone that
-// nothing has touched. As many in every bone, spread over all of it.
+// Positions for cuts that are farther apart than the reach of a bur and its bands, so that every cut finds the same
+// untouched bone. The number is the same in every bone, spread over all of it.
 std::vector<Vec3> apart(double width_mm, Random& random) {
   constexpr double kCell_mm = 6.0;
   const auto cells = static_cast<std::size_t>((width_mm - 4.0) / kCell_mm);
@@ -111,7 +110,7 @@ std::vector<Vec3> apart(double width_mm, Random& random) {
   return places;
 }
 
-// The same number of cuts in every bone, in turn.
+// Makes the same number of cuts in every bone, in turn.
 void cost_of_size(const std::vector<int>& sizes, const Tool& burr) {
   std::vector<Grown> bones;
   for (const int samples : sizes) {
@@ -135,7 +134,8 @@ void cost_of_size(const std::vector<int>& sizes, const Tool& burr) {
   std::printf("\"sizes\": [");
   for (std::size_t b = 0; b < bones.size(); ++b) {
     Grown& bone = bones[b];
-    // The sizes' cuts take turns, so what disturbs the machine for long disturbs all: medians of batches, compared.
+    // The cuts of all sizes take turns, so a lasting disturbance of the machine affects all. Compares medians of
+    // batches.
     std::vector<double> ratios;
     for (std::size_t i = 0; i + kBatch <= kCuts; i += kBatch)
       ratios.push_back(median_of(bone.us, i) / median_of(bones[0].us, i));
@@ -162,7 +162,7 @@ void memory_of_cuts(const Tool& burr) {
       const double length = random.between(1.0, 40.0);
       if (x + length > 0.5 * width - row) break;
       const double before = heap_bytes();
-      // The ball's centre is in the bone's face, so half of a capsule is cut.
+      // The ball's centre is on the bone's face, so half of a capsule is cut.
       field.apply(straight_cut(burr, {x, y, -radius}, {x + length, y, -radius}, {0, 0, -1}));
       const double bytes = heap_bytes() - before;
       const double area = std::numbers::pi * radius * length + 2.0 * std::numbers::pi * radius * radius;

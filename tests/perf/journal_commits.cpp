@@ -1,5 +1,6 @@
-// osteon-journal-commits FILE ROWS PER_COMMIT: how long a journal's commits take, and how many bytes they write. JSON.
-// It uses only what every version of the journal has, so that an earlier one can be built with it.
+// osteon-journal-commits FILE ROWS PER_COMMIT: measures how long a journal's commits take, and how many bytes they
+// write. Prints JSON. It uses only what every version of the journal has, so that an earlier version can be built with
+// it.
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -18,7 +19,7 @@
 
 namespace {
 
-// As a server has it: signed, where this version signs.
+// Options as on a server: signed, if this version signs.
 osteon::JournalOptions options() {
   osteon::JournalOptions made;
 #if __has_include("server/journal/signing.hpp")
@@ -29,7 +30,7 @@ osteon::JournalOptions options() {
 
 constexpr std::size_t kEntryBytes = 150;  // of a cut
 
-// Bytes that this process handed to the system to be written.
+// Bytes that this process has given to the system to write.
 std::uint64_t written_bytes() {
   std::ifstream io("/proc/self/io");
   std::string name;

@@ -1,5 +1,5 @@
-// osteon-journal-trials [SEEDS] [OPERATIONS] [DAMAGES]: journals on a disk that loses its power, fills up and fails,
-// and whose files are damaged; what was lost, and what was lost in silence. JSON.
+// osteon-journal-trials [SEEDS] [OPERATIONS] [DAMAGES]: runs journals on a disk that loses its power, fills up and
+// fails, and damages their files. Counts what was lost, and what was lost silently. Prints JSON.
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>

@@ -1,6 +1,7 @@
-// What a tick of the haptic loop costs, and what a silent network does to its deadlines. `tick`: one thread, as fast as
-// it goes, replica and patches between the ticks. `blackout SECONDS`: the loop at 1 kHz beside the replica's thread, so
-// long with a room that answers, so long with one that is silent, and so long again with it. Prints JSON.
+// Cost of a tick of the haptic loop, and the effect of a silent network on its deadlines. `tick`: one thread at full
+// speed, with replica and patches between the ticks.
+// `blackout SECONDS`: the loop at 1 kHz beside the replica's thread, in three parts of this length: with a room that
+// answers, with a silent one, and with one that answers again. Prints JSON.
 #include <algorithm>
 #include <atomic>
 #include <cstdio>
@@ -37,7 +38,7 @@ struct Cost {
   DurationHistogram all, cutting;
 };
 
-// Ticks of a plan, in turns with what its other thread would do.
+// Ticks of a plan, in turns with the work of the other thread.
 void measure(const char* name, const PlanStep& step, double width_mm, int rounds) {
   auto cost = std::make_unique<Cost>();
   for (int round = 0; round < rounds; ++round) {
@@ -59,7 +60,7 @@ void measure(const char* name, const PlanStep& step, double width_mm, int rounds
       cost->cutting.percentile_us(99));
 }
 
-// A tool that turns in the cut that it has made while the hand rocks, twists and pulls it from side to side there.
+// A tool turns in the cut that it has made, while the hand rocks, twists and pulls it from side to side.
 void measure_wedged(const char* name, const char* tool_name) {
   constexpr int kRest = 600, kIn = 2500, kTicks = 6000;
   const Tool tool = *find_tool(tool_name);
@@ -112,7 +113,7 @@ void measure_wedged(const char* name, const char* tool_name) {
               cost->all.percentile_us(99), name, cost->all.max_us());
 }
 
-// The client's two threads that matter, and a room that answers after 20 ms or is silent.
+// The client's two important threads, and a room that answers after 20 ms or is silent.
 class Blackout {
  public:
   explicit Blackout(double seconds)

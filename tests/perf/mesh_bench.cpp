@@ -1,4 +1,4 @@
-// What surface costs to make and to send: blocks, whole bones, and what the cuts of a frame make stale, against VTK's
+// Cost to make and send the surface: blocks, whole bones, and what the cuts of a frame make stale, compared with VTK's
 // flying edges in the same run. Benchmarks named "versus" time both in turn and give medians as counters.
 #include <benchmark/benchmark.h>
 #include <vtkFlyingEdges3D.h>
@@ -63,7 +63,7 @@ Cut burr_cut(const Vec3& from, const Vec3& to) {
 // On the head, 1 mm deep, at an angle along a meridian.
 Vec3 on_head(double angle) { return (kHead_mm - 1.0) * Vec3(std::sin(angle), -0.2, std::cos(angle)).normalized(); }
 
-// 33 cuts are one frame of a burr led at 10 mm/s.
+// 33 cuts are one frame of a burr that moves at 10 mm/s.
 constexpr int kFrameCuts = 33;
 constexpr double kFrameAngle = 0.33 / kHead_mm;
 
@@ -95,7 +95,7 @@ std::vector<BlockKey> bone_blocks(const CutField& field) {
   return keys;
 }
 
-// Every sample of a box as VTK wants it; its x is our z.
+// Every sample of a box in VTK's layout: its x is our z.
 void fill(vtkImageData& image, const CutField& field, int level, const CoordBox& box) {
   const Coord d = box.dims();
   image.SetDimensions(d.z, d.y, d.x);
@@ -133,8 +133,8 @@ double seconds(Call call) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Both in turn, after one of each that does not count. The spread is that of eleven parts of the run, by their medians:
-// a call of microseconds that was interrupted says nothing.
+// Runs both in turn, after one uncounted run of each. The spread is that of the medians of eleven parts of the run,
+// because an interrupted call of microseconds shows nothing.
 template <class Ours, class Theirs>
 void versus(benchmark::State& state, int rounds, const char* unit, double per_second, Ours ours, Theirs theirs) {
   std::vector<double> a, b, ratio;
@@ -199,7 +199,7 @@ void mesh_block_versus_flying_edges(benchmark::State& state) {
   state.counters["flying_edges_triangles"] = flying_edges.triangles();
 }
 
-// All blocks on so many threads.
+// Makes all blocks on `threads` threads.
 void mesh_all(const Scene& scene, const std::vector<BlockKey>& keys, int threads, std::vector<Mesh>& meshes) {
   meshes.resize(keys.size());
   std::atomic<std::size_t> next{0};
@@ -269,7 +269,7 @@ void mesh_frame_of_33_cuts(benchmark::State& state) {
       with_cuts.push_back(frames.back() + cutting.back());
       blocks.push_back(static_cast<double>(stale.size()));
     }
-    // The whole bone where everything is as fine as the cuts.
+    // The whole bone with everything as fine as the cuts.
     const CoordBox coarse = scene.field.bone().bounds_samples();
     vtkNew<vtkImageData> image;
     fill(*image, scene.field, 2, {4 * coarse.min, 4 * coarse.max});
@@ -280,9 +280,9 @@ void mesh_frame_of_33_cuts(benchmark::State& state) {
   }
   state.counters["frame_ms"] = median(frames) * 1e3;
   state.counters["frame_max_ms"] = *std::ranges::max_element(frames) * 1e3;
-  state.counters["touch_ms"] = median(touches) * 1e3;  // of it: naming what is stale, with each cut
-  state.counters["blocks_ms"] = median(meshed) * 1e3;  // of it: gathering and encoding
-  state.counters["cuts_ms"] = median(cutting) * 1e3;   // not of it: the 33 cuts themselves
+  state.counters["touch_ms"] = median(touches) * 1e3;  // part of it: naming what is stale, with each cut
+  state.counters["blocks_ms"] = median(meshed) * 1e3;  // part of it: gathering and encoding
+  state.counters["cuts_ms"] = median(cutting) * 1e3;   // not part of it: the 33 cuts themselves
   state.counters["flying_edges_ms"] = median(whole) * 1e3;
   state.counters["with_cuts"] = median(whole) / median(with_cuts);
   state.counters["with_cuts_min"] = *std::ranges::min_element(whole) / *std::ranges::max_element(with_cuts);
@@ -323,7 +323,7 @@ void mesh_bytes_per_triangle_bone(benchmark::State& state) {
   bytes_per_triangle(state, scene, bone_blocks(scene.field));
 }
 
-// The surface that a 5 mm burr leaves: a sphere of its radius through the block, solid outside.
+// The surface of a cut with a 5 mm burr: a sphere of its radius through the block, solid outside.
 constexpr double kPitch_mm = 0.125;
 constexpr double kRadius_mm = 2.5;
 const BlockKey kKey{.body = {}, .level = 2, .index = {0, 0, 0}};

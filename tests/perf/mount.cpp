@@ -1,5 +1,6 @@
-// osteon-mount TICKS: two users push a bone on its mount against each other over lines of 0, 50 and 150 ms, and over
-// one line of each, with jitter and loss, TICKS each. Virtual time: the same numbers on every machine. JSON.
+// osteon-mount TICKS: two users push a bone on its compliant mount against each other, for TICKS each. Their
+// connections have 0, 50 and 150 ms, or 0 ms for one user and 150 ms for the other, with jitter and loss. Virtual time:
+// the same numbers on every machine. Prints JSON.
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
@@ -55,7 +56,7 @@ int main(int argc, char** argv) {
   for (const Line& line : kLines) {
     TwoUsersRun run = over(line, ticks);
     print("push", line, run, &line == kLines);
-    // Hands that never rest, and three times as stiff.
+    // Hands that never rest and are three times as stiff.
     run.shaken = true;
     print("shake", line, run, false);
     run.hand_stiffness = 3.0;

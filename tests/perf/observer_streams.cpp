@@ -19,7 +19,7 @@ namespace {
 
 using grpc::ByteBuffer;
 
-// What a WatchMeshResponse or a WatchCuttingResponse says of itself, found by stepping over all else.
+// The numbers of a WatchMeshResponse or a WatchCuttingResponse. The parser skips all other fields.
 struct Head {
   std::uint64_t room_seq = 0;
   bool snapshot_complete = false;
@@ -47,7 +47,7 @@ Head head_of(const ByteBuffer& message) {
   Head head;
   while (at < end) {
     const std::uint64_t tag = number();
-    const std::uint64_t value = number();  // both messages have numbers and fields of a stated length only
+    const std::uint64_t value = number();  // both messages have only numbers and length-delimited fields
     if (tag == (1 << 3)) head.room_seq = value;
     if (tag == (3 << 3)) head.snapshot_complete = value != 0;
     if ((tag & 7) == 2) at += value;
@@ -55,7 +55,7 @@ Head head_of(const ByteBuffer& message) {
   return head;
 }
 
-// One subscription; reads as fast as messages come, or never.
+// One subscription. It reads as fast as messages come, or never.
 class Stream final : public grpc::ClientBidiReactor<ByteBuffer, ByteBuffer> {
  public:
   Stream(const std::shared_ptr<grpc::Channel>& channel, const char* method, const google::protobuf::Message& request,
@@ -117,7 +117,7 @@ Observers::Observers(const std::string& address, int count, int stalled, int sta
     auto observer = std::make_unique<Observer>();
     observer->reads = i >= stalled;
     grpc::ChannelArguments arguments;
-    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // or all would share one connection
+    arguments.SetInt(GRPC_ARG_USE_LOCAL_SUBCHANNEL_POOL, 1);  // otherwise all would share one connection
     arguments.SetMaxReceiveMessageSize(4 << 20);
     observer->channel = grpc::CreateCustomChannel(address, grpc::InsecureChannelCredentials(), arguments);
     v1::JoinRequest join;

@@ -1,4 +1,5 @@
-// Many observers of one room in one process, as cheap as they can be: what arrives is counted and timed, never decoded.
+// Many observers of one room in one process, each as cheap as possible. Messages are counted and timed, but not
+// decoded.
 #pragma once
 #include <chrono>
 #include <cstdint>
@@ -10,7 +11,7 @@
 
 namespace osteon::test {
 
-// A message that an observer has received, on the clock that all processes of a machine share.
+// A message that an observer has received, on the machine's clock, which all processes share.
 struct Arrival {
   std::chrono::nanoseconds at{};
   RoomSeq contains;
@@ -26,8 +27,8 @@ struct Received {
   return std::chrono::steady_clock::now().time_since_epoch();
 }
 
-// Each has a connection of its own, as people on different machines would. The first `stalled` of them never read. They
-// want the tools' states `states_hz` times a second, 0: all.
+// Each observer has a connection of its own, as people on different machines would. The first `stalled` of them never
+// read. They ask for the tools' states `states_hz` times a second. 0: all states.
 class Observers {
  public:
   Observers(const std::string& address, int count, int stalled, int states_hz);
@@ -35,10 +36,10 @@ class Observers {
   Observers(const Observers&) = delete;
   Observers& operator=(const Observers&) = delete;
 
-  // Until everyone who reads has the whole surface, at this place of the room's order or a later one. False: not in
+  // Waits until every reading observer has the whole surface, at this sequence number or a later one. False: not in
   // time.
   [[nodiscard]] bool wait_for(RoomSeq place, std::chrono::milliseconds patience) const;
-  // Ends all streams and says what those who read have received.
+  // Ends all streams and returns what the reading observers have received.
   [[nodiscard]] std::vector<Received> finish();
 
  private:

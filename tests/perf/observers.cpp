@@ -1,7 +1,7 @@
-// A room that many watch: one hand burs steadily while observers are sent the surface and the tools' states, some of
-// them stalled. How long a committed cut takes to everyone, how many frames a second they have, and what that costs the
-// server. Measured with a few observers, with all, and with some of these stalled, each on a server of its own. Prints
-// JSON.
+// A room with many observers. One hand burs steadily while observers get the surface and the tools' states. Some of
+// them are stalled. Measures how long a committed cut takes to reach everyone, how many frames a second they get, and
+// the cost for the server.
+// Measured with a few observers, with all, and with some of these stalled, each on a server of its own. Prints JSON.
 #include <unistd.h>
 #include <CLI/CLI.hpp>
 
@@ -35,7 +35,7 @@ using std::chrono::nanoseconds;
 
 constexpr nanoseconds kBetweenCuts{1'000'000'000 / 120}, kFrame{1'000'000'000 / 30};
 constexpr double kFeed_mm_per_s = 20.0, kRow_mm = 30.0, kBetweenRows_mm = 1.0, kDepth_mm = 0.2;
-constexpr nanoseconds kWarmUp = 1s;  // what is committed until then is not measured
+constexpr nanoseconds kWarmUp = 1s;  // cuts committed before are not measured
 
 double ms(nanoseconds time) { return 1e-6 * static_cast<double>(time.count()); }
 double rounded(double value) { return std::round(1e3 * value) / 1e3; }
@@ -51,7 +51,7 @@ json spread(std::vector<double> values) {
           {"max", rounded(values.empty() ? 0.0 : values.back())}};
 }
 
-// What the system says of a process.
+// Resource use of a process, from the system.
 struct Usage {
   double cpu_s = 0, resident_mb = 0;
 };
@@ -124,7 +124,7 @@ class Author {
       std::this_thread::sleep_until(next += kBetweenCuts);
     }
   }
-  // Until the room has decided about every cut.
+  // Waits until the room has decided every cut.
   [[nodiscard]] RoomSeq wait_for_all() {
     OSTEON_CHECK(wait_until([&] { return commits().size() == author_seq_; }, 20s));
     return RoomSeq{newest_};
@@ -154,8 +154,8 @@ class Author {
   std::map<RoomSeq, Times> committed_;
 };
 
-// [a process of its own] Observers that say when they are there, wait for a place of the order, and write what they
-// got.
+// [a process of its own] Runs observers. They report when they have joined, wait for a sequence number, and write what
+// they received.
 int watch(const std::string& address, int count, int stalled, int states_hz, const std::string& file) {
   Observers observers(address, count, stalled, states_hz);
   if (!observers.wait_for(RoomSeq{0}, 60s)) return 1;
@@ -197,14 +197,14 @@ std::vector<double> delays_ms(const std::map<RoomSeq, Author::Times>& commits, c
     auto arrival = (observer.*stream).begin();
     for (const auto& [place, times] : commits) {
       while (arrival != (observer.*stream).end() && arrival->contains < place) ++arrival;
-      if (arrival == (observer.*stream).end()) break;  // the last ones may come without a change of any state
+      if (arrival == (observer.*stream).end()) break;  // the last cuts may come without a change of any state
       if (times.committed >= from) delays.push_back(ms(arrival->at - times.*since));
     }
   }
   return delays;
 }
 
-// Messages a second of each observer, and the longest pause between two, while there were cuts.
+// Messages a second of each observer, and the longest pause between two messages, while there were cuts.
 template <class Stream>
 json rates(const std::vector<Received>& received, Stream stream, nanoseconds from, nanoseconds until) {
   std::vector<double> rates, pauses;

@@ -1,9 +1,12 @@
-// osteon-override [TIMES | touch]: how soon and how gently an instructor's word takes hold of a hand. A real server and
-// a haptic client's own threads with osteon-impair between them, one way 0, 50 and 150 ms late, and with 30 % of the
-// datagrams lost: from the answer to Supervise, which is given when the row is kept, until the 1 kHz loop cuts no more,
-// less the time of the way. And on virtual time (that alone with `touch`) what the hand feels of being stopped, taken
-// over, given back, limited, led and undone under, at both kinds of device, on bone that stands and on a mount that
-// another user pushes too. Hands, devices and the bad line are simulated. JSON, milliseconds, newtons and millijoules.
+// osteon-override [TIMES | touch]: measures how soon and how gently an instructor's decision acts on a hand. It runs a
+// real server and a haptic client's own threads with osteon-impair between them. One way is 0, 50 and 150 ms late, also
+// with 30 % of the datagrams lost.
+// The time is from the answer to Supervise, which is given when the log entry is durable, until the 1 kHz loop cuts no
+// more, less the one-way delay.
+// On virtual time (only this with `touch`) it measures what the hand feels when it is stopped, taken over, given back,
+// limited, guided and its cuts are undone, at both kinds of device, on fixed bone and on a mount that another user
+// pushes too.
+// Hands, devices and the bad connection are simulated. Prints JSON, milliseconds, newtons and millijoules.
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
@@ -34,9 +37,8 @@ using namespace std::chrono_literals;
 using nlohmann::json;
 using Clock = std::chrono::steady_clock;
 
-// Of one contact, as of the coupling's alone (stability_worst_contact): the ledger lets none give more than 0.008 mJ
-// beyond what it got (deploy/decisions/0021), and a quarter of that is granted to how it is reckoned here from outside
-// [A].
+// Budget of one contact, as for the coupling alone (stability_worst_contact). The ledger lets no contact give more than
+// 0.008 mJ beyond what it got (deploy/decisions/0021). A quarter of that is added for the computation from outside [A].
 constexpr double kBudget_mj = 0.01;
 
 struct Line {
@@ -83,7 +85,7 @@ json run_line(const Line& line, int times) {
   const auto rest = std::chrono::milliseconds(150 + 2 * line.one_way_ms + (line.loss > 0.0 ? 200 : 0));
   const double seconds = 2.4e-3 * static_cast<double>(rest.count()) * times;
   WorkingHand client(options, burr_then_rest(seconds, 0.0, 0.5 * seconds));
-  // Joined on a good line, as one joins before the operation.
+  // The hand joins on a good connection, as people join before an operation.
   while (!client.over() && !client.room().fast_path().alive) std::this_thread::sleep_for(20ms);
   if (line.one_way_ms > 0) OSTEON_CHECK(relay.command("delay " + std::to_string(line.one_way_ms) + " 0") == "ok");
   if (line.loss > 0.0) OSTEON_CHECK(relay.command("loss " + std::to_string(line.loss)) == "ok");
@@ -135,7 +137,7 @@ json run_line(const Line& line, int times) {
           {"lost", done.lost ? json(done.lost->message) : json()}};
 }
 
-// One hand at one bone: decisions at random, of every kind, while it works.
+// One hand at one bone: random decisions of every kind while it works.
 Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
   OverseenHand hand(run);
   Random random(seed);
@@ -148,8 +150,8 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
   std::uint64_t seq = 0;
   double down = 0;
   for (int i = 0; i < 1000 * seconds; ++i, ++down) {
-    // Now and then it is drawn out, as a hand does whose tool is held by bone that came back, or has come through, and
-    // goes to another place.
+    // Sometimes the tool is drawn out and goes to another position, as when it is held by bone that came back, or has
+    // come through.
     const Vec3 at_mm = hand.handle_mm();
     if (i % 5000 == 4000 || (drills && down >= 0.0 && at_mm.z() > kThrough_mm)) {
       down = -1500.0;
@@ -157,8 +159,8 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
       from_mm = at_mm;
     }
     if (down < 0.0) {
-      // From what it pushed with: no hand lets go of that within a tick, and what the ledger promises is for hands that
-      // accelerate a handle by no more than 10 m/s^2 (deploy/decisions/0021).
+      // Begins with the force that it pushed with. No hand lets go of that within a tick, and the ledger's promise is
+      // for hands that accelerate a handle by no more than 10 m/s^2 (deploy/decisions/0021).
       if (hand.command.mode == HandMode::push)
         hand.command.target_mm.z() = at_mm.z() + expert_hand().push_n / expert_hand().stiffness_n_per_mm;
       hand.command.mode = HandMode::carry;
@@ -196,12 +198,13 @@ Crossed run_touch(const OverseenRun& run, std::uint64_t seed, int seconds) {
       }
       hand.decide(now);
     }
-    // The other user on a bone that yields pushes as suddenly as a push can be told, on either side of it, and lets go.
+    // On a bone that yields, the other user pushes as suddenly as a load can be sent, on either side of it, and lets
+    // go.
     if (run.mount && i % 700 == 350) {
       const Vec3 push_n = random.unit() < 0.3 ? Vec3(Vec3::Zero()) : random.in_cube(15.0);
       hand.other = Load::at(push_n, random.in_cube(8.0));
     }
-    // Of the leading hand now and then a state comes, one in three is lost, and sometimes there is silence.
+    // States of the guiding hand come irregularly, one in three is lost, and sometimes there is silence.
     if (i % 16 == 0 && random.unit() > 0.3 && i % 7000 < 6000)
       hand.guide = {true, ++seq,
                     Vec3(6.0 * std::cos(1.3e-3 * i), 4.0 * std::sin(0.9e-3 * i), 1.0 + 3.0 * std::sin(2.1e-3 * i))};
@@ -215,7 +218,7 @@ json in_contact(const InContact& held) {
           {"let_go", held.let_go},   {"limited", held.limited}, {"undone", held.undone}};
 }
 
-// Each tool at each device over a line of that length: on bone that stands, or that another user pushes too.
+// Each tool at each device over a connection of that delay, on fixed bone or on bone that another user pushes too.
 json run_touches(bool mount, int delay_ms, int seconds) {
   Crossed worst;
   InContact& held = worst.in_contact;

@@ -8,7 +8,7 @@
 
 namespace osteon::test {
 
-// 0 where there is nothing.
+// 0 if there are no values.
 [[nodiscard]] inline double percentile(const std::vector<double>& sorted, double percent) {
   return sorted.empty()
              ? 0.0

@@ -1,5 +1,5 @@
-// What it costs to know of pieces: labelling a ball of bone at first, keeping the labels up to date over cuts, and
-// taking a half that a kerf parted; and to build the ball's case part by part. Takes the ball's size in samples. Prints
+// Cost of finding fragments: labelling a ball of bone at first, updating the labels after cuts, and taking a half that
+// a kerf separated. Also the cost of building the ball's case part by part. Takes the ball's size in samples. Prints
 // JSON.
 #include <sys/resource.h>
 #include <tbb/global_control.h>

@@ -1,6 +1,7 @@
-// A room with a real bone, burred for some seconds of frames of 33 cuts each: time of the cuts and of the blocks that
-// they made stale, and memory. Takes the case's folder, the number of frames, and a file for the vertices that are then
-// there, from which a picture can be made: x, y, z, the normal, and 1 on cuts, as floats. Prints JSON.
+// A room with a real bone, burred for some seconds of frames of 33 cuts each. Measures the time of the cuts and of the
+// blocks that they made stale, and the memory.
+// Takes the case's folder, the number of frames, and a file for the final vertices, from which a picture can be made:
+// x, y, z, the normal, and 1 on cuts, as floats. Prints JSON.
 #include <malloc.h>
 #include <tbb/global_control.h>
 
@@ -44,7 +45,7 @@ Mesh mesh_of(const Room& room, const BlockKey& key) {
   return std::move(*mesh);
 }
 
-// Anywhere on the bone, as often as there are triangles.
+// A random point on the bone, in proportion to the number of triangles.
 SurfacePoint point_on(const Room& room, const std::vector<BlockKey>& blocks, Random& random) {
   while (true) {
     const Mesh mesh = mesh_of(room, blocks[random.index(blocks.size())]);

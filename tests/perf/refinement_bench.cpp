@@ -1,6 +1,6 @@
-// The two methods of raising the resolution (Niu 2008, §5.5, Table 5.4), at twice and four times: time of a cut that
-// touches new bone and of the later ones, memory, unconnected areas, and the finest pitch that a given memory allows.
-// Prints JSON.
+// The two methods of raising the resolution (Niu 2008, §5.5, Table 5.4), at twice and four times. Measures the time of
+// a cut that touches new bone and of later cuts, memory, unconnected areas, and the finest pitch that a given memory
+// allows. Prints JSON.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -30,7 +30,7 @@ void print(const std::string& name, std::vector<double> values) {
               name.c_str(), values.front(), name.c_str(), values.back());
 }
 
-// A bur at four sites of the bone, at each some tenths of a second of strokes of 8 ms.
+// A bur at four sites of the bone, with some tenths of a second of 8 ms strokes at each.
 std::vector<std::vector<Cut>> strokes(int level) {
   const auto burr = find_tool("burr-round-5");
   OSTEON_CHECK(burr.has_value());
@@ -54,7 +54,7 @@ struct Difference {
   std::size_t compared = 0, differing = 0, cut = 0;  // samples; `cut`: those that the cuts changed
 };
 
-// The bone f that each of the methods gives, on every sample of the level: read from what was resampled, or computed
+// Compares the bone f of both methods on every sample of the level. One reads what was resampled, the other computes it
 // from the coarse bone and the cuts. The boxes lie across the sub-volumes' faces.
 Difference difference_of(const SubVolumeField& whole, const CutField& local, int level) {
   const CoordBox bounds = local.bone().bounds_samples();
@@ -86,7 +86,7 @@ void compare(const Case& bone, int level) {
   const std::vector<std::vector<Cut>> sites = strokes(level);
   SubVolumeField whole(bone, level);
   CutField local(bone, {});
-  // Before anything is timed: code and pages that both share.
+  // Runs once before anything is timed, to load the code and pages that both share.
   {
     CutField warm(bone, {});
     for (const Cut& cut : sites.front()) warm.apply(cut);
@@ -108,7 +108,8 @@ void compare(const Case& bone, int level) {
     print(name + "later_us", later[method]);
     const double bytes = static_cast<double>(method == 0 ? whole.memory_bytes() : local.memory_bytes());
     std::printf("\"%smegabytes\": %.3f, ", name.c_str(), bytes * 1e-6);
-    // What the same strokes would reach with 1 GB: memory of samples goes with the cube of the pitch.
+    // Pitch that the same strokes would reach with 1 GB: the memory of samples grows with the inverse cube of the
+    // pitch.
     std::printf("\"%sreachable_mm\": %.4f, ", name.c_str(), level_pitch_mm(kPitch_mm, level) * std::cbrt(bytes / 1e9));
   }
   const Difference difference = difference_of(whole, local, level);

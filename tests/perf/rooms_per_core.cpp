@@ -1,5 +1,6 @@
-// osteon-rooms-per-core [SECONDS]: processor time of rooms in one process, each with a journal on the disk and one tool
-// that a simulated hand leads, whose cuts were made beforehand. Clients, and the network to them, are not in it. JSON.
+// osteon-rooms-per-core [SECONDS]: measures the processor time of rooms in one process. Each has a journal on the disk
+// and one tool of a simulated hand, whose cuts were made beforehand. Clients, and the network to them, are not
+// included. Prints JSON.
 #include <sys/resource.h>
 #include <time.h>
 
@@ -59,7 +60,7 @@ class Listener final : public SessionSubscriber {
   const AuthorId author_;
 };
 
-// One room, and who works in it.
+// One room with its author.
 struct HeldRoom {
   std::unique_ptr<RoomStore> store;
   std::unique_ptr<RoomRuntime> runtime;
@@ -88,7 +89,7 @@ HeldRoom make_room(const Case& bone, const std::filesystem::path& file, bool kep
   return held;
 }
 
-// `cutting` false: the rooms are there, and nobody works.
+// `cutting` false: the rooms are open, and nobody works.
 json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t count, double seconds, bool kept,
                bool cutting) {
   const TempDir folder;
@@ -99,7 +100,7 @@ json run_rooms(const Case& bone, const std::vector<Cut>& stroke, std::size_t cou
   std::vector<RuntimeHealth> before;
   for (const HeldRoom& room : rooms) before.push_back(room.runtime->health());
 
-  // Each room's cuts come at their own times within the time between two.
+  // Each room's cuts have their own phase within the interval between two cuts.
   const double cpu_before = cpu_of_process(), own_before = cpu_of_thread();
   const auto start = Clock::now();
   const auto periods = static_cast<std::uint64_t>(seconds / std::chrono::duration<double>(kCutsApart).count());

@@ -1,5 +1,5 @@
-// osteon-server-kills [COUNT] [SEED]: kills a server of a journalled room so often at work, and says what was lost.
-// JSON.
+// osteon-server-kills [COUNT] [SEED]: kills a server of a room with a journal COUNT times during work, and reports what
+// was lost. Prints JSON.
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,8 @@
-// Whether a bone is a function of the set of its cuts: applies random cuts of all tools in random orders, some of them
-// again, and compares the names of the fields. Takes cuts, orders, threads that share a cut and, if wanted, the number
-// of the first order (each number is another order) and how many samples the kernel computes at once; prints JSON, and
-// progress to stderr. Linked with differently built kernels it must print the same name.
+// Tests that a bone is a function of the set of its cuts. Applies random cuts of all tools in random orders, some of
+// them again, and compares the hashes of the fields.
+// Takes cuts, orders, threads that share a cut and, if wanted, the number of the first order (each number is another
+// order) and how many samples the kernel computes at once. Prints JSON, and progress to stderr. Linked with differently
+// built kernels it must print the same hash.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -20,11 +21,11 @@
 namespace osteon::test {
 namespace {
 
-// Shared by the threads: guarded by `mutex`.
+// Shared by the threads. Guarded by `mutex`.
 struct Tally {
   std::mutex mutex;
   std::set<Digest> names;
-  std::set<std::uint64_t> orders;  // by a number made of each
+  std::set<std::uint64_t> orders;  // by a hash of each
   int done = 0, differing = 0;
 };
 
@@ -34,7 +35,7 @@ CutField apply_in_order(const Case& bone, const std::vector<Cut>& cuts, const st
   return field;
 }
 
-// FNV-1a over the places of an order.
+// FNV-1a over the indices of an order.
 std::uint64_t number_of(const std::vector<std::size_t>& order) {
   std::uint64_t number = 0xcbf29ce484222325u;
   for (const std::size_t place : order) number = (number ^ place) * 0x100000001b3u;
@@ -50,7 +51,7 @@ int run(std::size_t count, int orders, int threads, int first_order, int lanes) 
   const auto start = std::chrono::steady_clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(); };
 
-  // What all orders must give: the order in which the cuts were made.
+  // The expected result of all orders: the order in which the cuts were made.
   std::vector<std::size_t> plain(count);
   for (std::size_t i = 0; i < count; ++i) plain[i] = i;
   const CutField reference = apply_in_order(bone, cuts, plain);
@@ -82,8 +83,7 @@ int run(std::size_t count, int orders, int threads, int first_order, int lanes) 
         std::fprintf(stderr, "%d of %d orders, %d differ, %.0f s\n", tally.done, orders, tally.differing, seconds());
     }
   };
-  // Where each cut has one thread, as many orders are applied at once as there are processors; else one after the
-  // other.
+  // If each cut has one thread, as many orders run at once as there are processors. Otherwise one after the other.
   const int at_once = threads == 1 ? std::max(1, static_cast<int>(std::thread::hardware_concurrency())) : 1;
   std::vector<std::jthread> pool;
   for (int i = 0; i < at_once; ++i) pool.emplace_back(work);

@@ -1,4 +1,4 @@
-// Simulates rooms, one seed after the other; osteon-simulate --help says how.
+// Simulates rooms, one seed after the other. See osteon-simulate --help.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -86,7 +86,7 @@ bool parse(int argc, char** argv, Arguments& arguments) {
   return true;
 }
 
-// What runs this seed alone.
+// The command that runs only this seed.
 std::string again(const Arguments& arguments, std::uint64_t seed) {
   std::string command = "osteon-simulate --verbose --seeds " + std::to_string(seed);
   if (arguments.options.full) command += " --full";
@@ -94,12 +94,12 @@ std::string again(const Arguments& arguments, std::uint64_t seed) {
   return command;
 }
 
-// For a promise that is broken in the midst of a seed: which one it was.
+// If a promise is broken during a seed, this line names the seed.
 std::array<char, 256> abort_line{};
 int real_stderr = STDERR_FILENO;
 void say_which(int) { (void)!::write(real_stderr, abort_line.data(), std::strlen(abort_line.data())); }
 
-// What rooms and journals log of the trouble that they are given is no news.
+// Suppresses the logs of rooms and journals: their faults are intended.
 class Silence {
  public:
   explicit Silence(bool on) {
@@ -175,7 +175,7 @@ class Sum {
             {"virtual_s", virtual_s_},
             {"back_s", percentiles(back_s_)},
             {"settled_s", percentiles(settled_s_)},
-            // Through all the trouble: partitions, crashes and a slow disk too.
+            // During all faults: partitions, crashes and a slow disk too.
             {"felt_ms",
              {{"by_datagram", percentiles(felt_by_datagram_ms_)}, {"by_stream", percentiles(felt_by_stream_ms_)}}},
             {"cpu_ms", percentiles(cpu_ms_)}};

@@ -1,5 +1,5 @@
-// What a room's tick has to do when a piece comes off a ball of bone, and when many cuts are undone. Takes the ball's
-// size in samples. Prints JSON.
+// Work of a room's tick when a fragment comes off a ball of bone, and when many cuts are undone. Takes the ball's size
+// in samples. Prints JSON.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -51,7 +51,7 @@ int run(int samples) {
   OSTEON_CHECK(watch.look().empty());
   std::printf("{\"samples\": %d, \"first_look_ms\": %.1f, ", samples, ms_since(start));
 
-  // A bur saws a cap 6 mm high off, in rows 1.5 mm apart.
+  // A bur removes a cap 6 mm high, in rows 1.5 mm apart.
   const auto burr = find_tool("burr-round-5");
   OSTEON_CHECK(burr.has_value());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
@@ -83,7 +83,7 @@ int run(int samples) {
       "\"split_bytes\": %zu, \"field_mb_before\": %.2f, \"field_mb\": %.2f, ",
       static_cast<unsigned long long>(cuts), look_ms, mask, split_ms, split->leaves.size(), rows_ms, split_bytes,
       before, field_megabytes(room));
-  // Cuts elsewhere are undone; they leave the split alone.
+  // Undoes cuts elsewhere. They do not affect the split.
   for (int i = 0; i < 100; ++i) {
     Cut cut = straight_cut(*burr, {-radius_mm + 1.5, -10.0 + 0.2 * i, 0}, {-radius_mm + 1.5, -9.8 + 0.2 * i, 0},
                            {1, 0, 0}, ++cuts);
@@ -94,7 +94,7 @@ int run(int samples) {
   start = std::chrono::steady_clock::now();
   const auto undone = room.undo_last(surgeon, 100, {});
   std::printf("\"undo_100_ms\": %.2f, \"undo_leaves\": %zu, ", ms_since(start), undone->leaves.size());
-  // And one of the kerf, with which the split falls.
+  // Undoes a cut of the kerf, which also undoes the split.
   start = std::chrono::steady_clock::now();
   const auto back = room.undo_last(surgeon, 1, {});
   std::printf("\"undo_split_ms\": %.2f, ", ms_since(start));

@@ -1,6 +1,6 @@
-// A million ticks of a hand at the haptic loop on virtual time: stroking, pressing into a cavity and a thin wall,
-// burring and drilling, while others cut and bone is taken back, with 0 to 200 ms on the way to the room; and as many
-// again on devices that show torque to a hand that turns. Takes the number of ticks of each and prints JSON.
+// A million ticks of a hand at the haptic loop on virtual time. It strokes, presses into a cavity and a thin wall, burs
+// and drills, while others cut and bone is undone, with 0 to 200 ms to the room. Runs as many again on devices that
+// show torque, with a hand that turns. Takes the number of ticks of each and prints JSON.
 #include <cstdio>
 #include <cstdlib>
 #include <utility>

@@ -1,5 +1,5 @@
-// The cuts of a bur that a simulated hand leads to and fro over a block, as the haptic loop closes them: made once, on
-// virtual time, and then given to rooms at the loop's own rate.
+// The cuts of a bur that a simulated hand moves to and fro over a block, as the haptic loop closes them. They are made
+// once, on virtual time, and then sent to rooms at the loop's own rate.
 #pragma once
 #include <chrono>
 #include <vector>
@@ -10,7 +10,7 @@ namespace osteon::test {
 
 inline constexpr std::chrono::milliseconds kCutsApart{haptic::CutRecorder::kTicksPerCut};  // while the tool cuts
 
-// On haptic::test::block_case(40); by no author yet, and of no lease.
+// On haptic::test::block_case(40). The cuts have no author and no lease yet.
 [[nodiscard]] inline std::vector<Cut> burred_stroke(double seconds) {
   haptic::PlanStep step;
   step.action = haptic::Action::burr;

@@ -1,5 +1,5 @@
-// What it costs to take one cut back, by rebuilding the leaves that it reached, against applying all the others again.
-// Takes the numbers of cuts and of trials, prints JSON.
+// Cost of undoing one cut by rebuilding the leaves that it reached, compared with applying all the others again. Takes
+// the numbers of cuts and of trials, and prints JSON.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ void print(const char* name, const std::vector<double>& values) {
               quantile(values, 0), name, quantile(values, 1));
 }
 
-// A bur that mills a field of 30 by 30 mm in overlapping strokes, as a hand does in 8 ms each.
+// A bur that mills a field of 30 by 30 mm in overlapping strokes of 8 ms each, as a hand does.
 std::vector<Cut> milling(const Tool& burr, std::size_t count) {
   std::vector<Cut> cuts;
   Vec3 at{-15.0, -15.0, -1.0};

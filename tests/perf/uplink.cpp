@@ -1,6 +1,8 @@
-// osteon-uplink [SECONDS]: what one tool costs its line and its room's disk: a real server with a journal, and a haptic
-// client that burs without pause and then rests, with the real loop's cuts and poses; on a clean line, and at 40 +- 10
-// ms with 30 % of the datagrams lost, 10 % reordered and 5 % twice. The hand and the bad line are simulated. JSON.
+// osteon-uplink [SECONDS]: measures the load of one tool on its connection and on its room's disk. It runs a real
+// server with a journal, and a haptic client that burs without pause and then rests, with the real loop's cuts and
+// poses.
+// It runs on a clean connection, and at 40 +- 10 ms with 30 % of the datagrams lost, 10 % reordered and 5 % twice. The
+// hand and the bad connection are simulated. Prints JSON.
 #include <linux/tcp.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -37,8 +39,8 @@ constexpr std::uint64_t kCutsInBin = 10;                            // of 14: th
 constexpr std::uint64_t kDatagramHeader = 28, kSegmentHeader = 52;  // IPv4 with UDP, and with TCP and its time stamps
 constexpr double kIdle_s = 8.0;
 
-// Bytes that this process has sent so far, headers included: in datagrams, and over the stream, acknowledgements of
-// what came down included.
+// Bytes that this process has sent so far, headers included: in datagrams, and over the stream, where acknowledgements
+// of received data count too.
 struct Sent {
   std::uint64_t datagrams = 0, stream = 0;
   [[nodiscard]] std::uint64_t all() const { return datagrams + stream; }
@@ -86,10 +88,10 @@ json rates(const std::vector<Sent>& bins) {
           {"busiest_second", rounded(worst)}};
 }
 
-// The journal's files by what they are.
+// The journal's bytes by kind of file.
 std::map<std::string, std::uint64_t> journal_bytes(const fs::path& folder) {
   std::map<std::string, std::uint64_t> bytes{{"database", 0}, {"log", 0}, {"checkpoints", 0}};
-  std::error_code gone;  // files come and go meanwhile
+  std::error_code gone;  // files come and go during this
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (!entry.is_regular_file(gone)) continue;
     const std::string name = entry.path().filename();
@@ -123,7 +125,7 @@ json run_tool(const BadNetwork& network, double seconds) {
   std::uint64_t log_bytes = 0;
   for (auto next = Clock::now(); !client.over(); std::this_thread::sleep_until(next += kBin)) {
     const FastPathHealth path = client.room().fast_path();
-    // Joined on a good network, as one joins before the operation.
+    // The hand joins on a good network, as people join before an operation.
     if (!impaired && path.alive) {
       for (const std::string& command : network.impairment) OSTEON_CHECK(relay->command(command) == "ok");
       impaired = true;
@@ -146,7 +148,7 @@ json run_tool(const BadNetwork& network, double seconds) {
   for (std::size_t i = 1; i < samples.size(); ++i) {
     std::uint64_t closed = 0;
     for (; cut != done.cuts.end() && cut->closed_mono_ns < samples[i].at.time_since_epoch().count(); ++cut) ++closed;
-    // The line of the fast path is gone with the session.
+    // The fast path's connection ends with the session.
     const Sent &before = samples[i - 1].sent, &after = samples[i].sent;
     if (after.datagrams < before.datagrams || after.stream < before.stream) continue;
     const Sent sent{after.datagrams - before.datagrams, after.stream - before.stream};

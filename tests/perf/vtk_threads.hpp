@@ -3,7 +3,7 @@
 
 namespace osteon::test {
 
-// From now on; the name of what runs them.
+// Sets the number from now on. Returns the name of VTK's thread backend.
 const char* vtk_threads(int count);
 
 }  // namespace osteon::test

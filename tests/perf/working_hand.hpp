@@ -1,4 +1,4 @@
-// A simulated hand that burs in a real room, on a haptic client's own threads, for measurements of that room.
+// A simulated hand that burs in a real room, on a haptic client's own threads. Programs measure the room with it.
 #pragma once
 #include <algorithm>
 #include <atomic>
@@ -12,7 +12,7 @@
 
 namespace osteon::test {
 
-// A bur to and fro over the block's upper face, deeper with each pass, for about so long; then nobody moves.
+// A bur moves to and fro over the block's upper face, deeper with each pass, for about `seconds`. Then nothing moves.
 [[nodiscard]] inline std::vector<haptic::PlanStep> burr_then_rest(double seconds, double tremor_mm, double rest_s) {
   haptic::PlanStep burr;
   burr.action = haptic::Action::burr;
@@ -30,7 +30,7 @@ namespace osteon::test {
   return {burr, rest};
 }
 
-// Works from the start on until its plan is done. A room that cannot be joined ends the program.
+// Works from its construction until its plan is done. A room that cannot be joined ends the program.
 class WorkingHand {
  public:
   WorkingHand(const RoomSessionOptions& options, const std::vector<haptic::PlanStep>& plan)
@@ -43,7 +43,7 @@ class WorkingHand {
   }
   [[nodiscard]] RoomSession& room() { return room_; }
   [[nodiscard]] bool over() const { return over_; }
-  // When it is over.
+  // Waits for the end.
   [[nodiscard]] const haptic::ClientOutcome& outcome() {
     thread_.join();
     OSTEON_CHECK(outcome_.has_value() && outcome_->has_value());
@@ -67,7 +67,7 @@ class WorkingHand {
   const StopSignal stop_;
   std::optional<Result<haptic::ClientOutcome>> outcome_;
   std::atomic<bool> over_{false};
-  std::thread thread_;  // last: it uses the rest
+  std::thread thread_;  // last: it uses the other members
 };
 
 }  // namespace osteon::test

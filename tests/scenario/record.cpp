@@ -1,4 +1,4 @@
-// osteon-record-scenarios FOLDER: lets the simulated surgeon work on virtual time and keeps what was cut.
+// osteon-record-scenarios FOLDER: runs the simulated surgeon on virtual time and saves its cuts.
 #include <cstdio>
 
 #include "tests/scenario/recording.hpp"

@@ -1,5 +1,5 @@
 // A recorded session: its cuts in the order in which they were made, and the hash of the field that they leave in the
-// scene's bone. Replayed by tests; made again by osteon-record-scenarios after a change of the kernel.
+// scene's bone. Tests replay it. osteon-record-scenarios makes it again after a change of the kernel.
 #pragma once
 #include <filesystem>
 #include <vector>

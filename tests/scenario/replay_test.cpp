@@ -1,4 +1,4 @@
-// Recorded sessions replayed: every way of bringing their cuts to a bone must leave the one field that was recorded.
+// Replays recorded sessions. Every way to apply their cuts to a bone must give the recorded field.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -33,7 +33,7 @@ TEST(Replay, ARoomComesToTheRecordedField) {
     ASSERT_TRUE(outcome->committed());
   }
   EXPECT_EQ(to_hex(room.field_hash()), to_hex(session.field_hash));
-  EXPECT_EQ(room.room_seq().value, session.cuts.size() + 1) << "who cut has a place too";
+  EXPECT_EQ(room.room_seq().value, session.cuts.size() + 1) << "a join has a sequence number too";
 }
 
 TEST(Replay, AnyOrderAndRepetitionComesToTheRecordedField) {
@@ -50,7 +50,7 @@ TEST(Replay, AnyOrderAndRepetitionComesToTheRecordedField) {
   }
 }
 
-// Two surgeons make half of the cuts each, at the same time, on replicas that hear of each other's late.
+// Two surgeons make half of the cuts each, at the same time. Their replicas receive the other's cuts late.
 TEST(Replay, TwoReplicasThatHearOfEachOtherLateComeToTheRecordedField) {
   const Recording session = recorded();
   Room room(recorded_bone());

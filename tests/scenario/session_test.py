@@ -1,4 +1,4 @@
-"""The session's own reckoning and housekeeping: what the demo's report and the figures rest on."""
+"""Tests the session's calculations and clean-up, on which the demo's report and the figures depend."""
 import os
 import struct
 import subprocess
@@ -134,7 +134,7 @@ class Housekeeping(unittest.TestCase):
     @staticmethod
     def has_ended(pid):
         try:
-            return " Z " in Path(f"/proc/{pid}/stat").read_text()  # a zombie has ended, whoever its parent is now
+            return " Z " in Path(f"/proc/{pid}/stat").read_text()  # a zombie has ended, whatever its parent is now
         except OSError:
             return True
 
@@ -146,7 +146,8 @@ class Housekeeping(unittest.TestCase):
 
 
 class Commands(unittest.TestCase):
-    """What deploy/'s commands say to wrong arguments: one sentence, at once, from any folder, without surroundings."""
+    """Tests what the commands in deploy/ answer to wrong arguments: one sentence, at once, from any folder, without
+    an environment."""
 
     def setUp(self):
         self.folder = tempfile.TemporaryDirectory(prefix="with space ")

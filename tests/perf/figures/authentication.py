@@ -1,5 +1,4 @@
-"""Figures of closed certificates: strangers who knock as often as they like, and bytes of every kind. Hands are
-simulated."""
+"""Figures of authentication: many unauthenticated connections, and bytes of every kind. Hands are simulated."""
 import functools
 import json
 import os
@@ -22,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[3]
 KNOCKS = 100_000
 OPEN_KNOCKS = 60
 QUIET_S = 8.0
-PATIENCE_S = 10.0   # the server's own with who does not show who they are is half of it
-SILENT_S = 0.002    # a door without TLS speaks first, and at once
+PATIENCE_S = 10.0   # the server closes an unauthenticated connection in half of this time
+SILENT_S = 0.002    # a port without TLS sends first, and at once
 TLS_ALERT, MOST_ALERT_BYTES = 0x15, 16
 HTTP2 = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
 FUZZ_SOAK = 10_000_000  # of every target
@@ -36,8 +35,8 @@ def resident_mb(pid):
 
 
 def is_refused(line, may_stay=False):
-    """Hung up on with nothing, or with one alert of TLS; with `may_stay` also who hears nothing as long as they
-    wait."""
+    """True if the connection was closed with no answer, or with one alert of TLS. With `may_stay` also if nothing
+    came in the whole wait."""
     said = b""
     try:
         while more := line.recv(4096):
@@ -52,14 +51,13 @@ def is_refused(line, may_stay=False):
 
 
 def knock(address, kind, waits=False):
-    """One stranger: who says nothing (0), speaks plain HTTP/2 (1), sends noise (2), or begins TLS without a
-    certificate (3). True
-    when they were refused: whatever else is answered counts as let in, and so does a line that stays open behind what
-    was said. Who
-    says nothing hears whether the door speaks first, and where it `waits`, that it hangs up at last.
+    """One unauthenticated connection: silent (0), plain HTTP/2 (1), noise (2), or TLS without a certificate (3).
+    True if it was refused.
+    Any other answer counts as admitted, and so does a connection that stays open after the bytes. A silent one
+    notes whether the server sends first. With `waits` it also expects that the server closes in the end.
     """
     with socket.create_connection(address, timeout=PATIENCE_S) as line:
-        line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")  # no port stays occupied behind it
+        line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")  # leaves no port occupied
         try:
             if kind == 0:
                 if not waits:
@@ -84,12 +82,12 @@ def knock(address, kind, waits=False):
 
 
 def knocks(address, count):
-    """How many of so many strangers of all kinds were refused."""
+    """Number of refused ones among `count` unauthenticated connections of all kinds."""
     return sum(knock(address, 3 if i % 100 == 0 else i % 3, waits=i % 9999 == 3) for i in range(count))
 
 
 def open_door(run, household, out):
-    """Strangers at a door that was left open on purpose: how many of them are noticed to be let in."""
+    """Unauthenticated connections at a port that is open on purpose. Returns how many the test counts as admitted."""
     address_file = out / "logs" / "open-address"
     address_file.unlink(missing_ok=True)
     server = household.start("open-server",
@@ -107,7 +105,7 @@ def knocking(run):
     run.say(f"{KNOCKS} strangers at the door of a server in which a hand works")
     out = run.folder / "knocking"
     (out / "logs").mkdir(parents=True, exist_ok=True)
-    certificates = Certificates(run.programs, out)  # of a folder that is new with every run
+    certificates = Certificates(run.programs, out)  # of a folder that is new in every run
     with Household(out / "logs") as household:
         noticed = open_door(run, household, out)
         address_file = out / "logs" / "address"
@@ -120,7 +118,7 @@ def knocking(run):
         address = household.wait_for_file(address_file, "osteon-server", 60.0)
         host, port = address.rsplit(":", 1)
         plan = out / "plan.json"
-        # Slow enough that it is at work all the while.
+        # Slow enough that it works during the whole test.
         plan.write_text(json.dumps(plans.drill("rig", feed_mm_per_s=0.14, beyond_mm=1)), encoding="utf-8")
         hand = household.start("hand",
                                [run.programs / "osteon-haptic", "--server", address,
@@ -173,8 +171,8 @@ def knocking(run):
 
 
 def fuzz(target, inputs, run):
-    """So many changed inputs of one target, in as many processes as there are processors, each with changes of its
-    own."""
+    """Runs changed inputs of one target, in as many processes as there are processors. Each process makes different
+    changes."""
     inputs = max(inputs, FUZZ_SOAK) if run.soak else inputs
     many = len(os.sched_getaffinity(0))
     run.say(f"{inputs} changed inputs: {target}")
@@ -191,7 +189,7 @@ def fuzz(target, inputs, run):
         codes = [process.wait() for process in processes]
     finally:
         for process in processes:
-            process.kill()  # those that still run: it was stopped
+            process.kill()  # those that still run after a stop
             process.wait()
     done, rows = 0, [("seconds", round(time.monotonic() - began))]
     for code, text in zip(codes, texts):
@@ -199,7 +197,7 @@ def fuzz(target, inputs, run):
         said = [line for line in lines if line.startswith("fuzzed: ")]
         rows += [(target, line.removeprefix("fuzzed: ")) for line in said]
         if code == 0 and (last := FUZZED.match(said[0]) if said else None) and last[1] == target:
-            done += int(last[2])  # which it says after the last of them
+            done += int(last[2])  # printed after the last of them
         else:
             run.tables.append((f"fuzzing {target} failed", [(line,) for line in lines[-5:] or ["it says nothing"]]))
     run.tables.append(("Changed inputs", rows))
@@ -207,7 +205,7 @@ def fuzz(target, inputs, run):
 
 
 def damaged_cases(run):
-    """Cases with a few bytes changed, uploaded."""
+    """Cases with a few changed bytes, uploaded."""
     run.say(f"{DAMAGED_SMALL} damaged small cases and {DAMAGED_LARGE} large ones")
     out = json.loads(run.output("osteon-case-changes", DAMAGED_SMALL, DAMAGED_LARGE))
     run.tables.append(("damaged cases", list(out.items())))

@@ -1,6 +1,6 @@
-"""A long line: passes on what comes over TCP after a fixed time, and bounds neither rate nor bytes on the way.
+"""A long connection. Passes on TCP data after a fixed time, and limits neither rate nor bytes under way.
 
-osteon-impair does not serve here: it holds 256 KiB of each direction, which is less than a fast long line does."""
+osteon-impair cannot be used here: it holds 256 KiB of each direction, less than a fast long connection does."""
 import queue
 import socket
 import threading

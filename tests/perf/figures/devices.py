@@ -1,4 +1,4 @@
-"""Figures of devices on an emulated USB: that nothing is lost on the way. Rates are the emulation's, not a device's."""
+"""Figures of devices on an emulated USB: nothing may be lost on the way. Rates are the emulation's, not a device's."""
 import json
 
 CYCLES = 100_000

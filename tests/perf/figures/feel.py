@@ -1,6 +1,6 @@
-"""Figures of what drilling and burring feel like, by osteon-feel: the reference simulations of the feed rig and of the
-hands
-on virtual time, what changes them and what must not, a burr's forces, guided drilling. Each group leaves a picture."""
+"""Figures of the feel of drilling and burring, by osteon-feel: the reference simulations of the feed rig and of the
+hands on virtual time, what changes them and what must not, a burr's forces, and guided drilling. Each group
+leaves a picture."""
 import json
 
 import numpy as np
@@ -11,7 +11,7 @@ CONE_MM = 0.961
 DRILL_PITCH_MM = 0.125   # of the level that a drill of 3.2 mm cuts
 PLUNGE_MM = {"expert": 6.0, "novice": 14.4}
 COUPLING_N_PER_MM = 50.0
-# What a plunge does when a parameter rises.
+# Direction in which a plunge must change when a parameter rises.
 DIRECTIONS = {"push_n": 1, "wear": 1, "stiffness_n_per_mm": -1, "damping_n_s_per_mm": -1}
 
 
@@ -25,7 +25,7 @@ def ask(run, part):
 
 
 def leave(run, part, draw, out):
-    import feel_pictures  # draws with matplotlib
+    import feel_pictures  # uses matplotlib
     picture = run.folder / f"feel-{part}.png"
     getattr(feel_pictures, draw)(out, picture)
     return picture
@@ -48,7 +48,7 @@ def rig(run):
 
 
 def wrong_ways(out):
-    """Sweeps in which the plunge somewhere goes the wrong way."""
+    """Sweeps in which the plunge changes in the wrong direction somewhere."""
     return [(name, who) for name, sign in DIRECTIONS.items() for who in PLUNGE_MM
             if (sign * np.diff(out[name][who]["plunge_mm"]) <= 0).any()]
 
@@ -65,7 +65,7 @@ def hands(run):
     rows += [(f"{who} over {name}", "", "", " ".join(f"{v:.2f}" for v in out[name][who]["plunge_mm"]),
               " ".join(f"{v:g}" for v in out[name]["values"])) for name in DIRECTIONS for who in PLUNGE_MM]
     run.tables.append((f"hands, simulated device; picture: {picture}", rows))
-    # What was let go on the spring of the hand and on the coupling: F / K + F / K_c after the cone's exit.
+    # Released stretch of the hand's spring and of the coupling: F / K + F / K_c after the cone's exit.
     closed = {who: out[who]["force_n"][2] * (1 / out[who]["stiffness_n_per_mm"] + 1 / COUPLING_N_PER_MM)
               for who in PLUNGE_MM}
     return {
@@ -77,7 +77,7 @@ def hands(run):
 
 
 def steps(run):
-    """The largest change of any force, feed and plunge against 1 kHz and 0.5 mm."""
+    """The largest change of any force, feed and plunge compared with 1 kHz and 0.5 mm."""
     out = ask(run, "steps")
     worst = {"tick": 0.0, "pitch": 0.0}
     rows = [("case", "hand", "force N", "feed mm/s", "plunge mm", "after exit mm", "largest change %")]

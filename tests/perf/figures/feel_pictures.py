@@ -1,5 +1,5 @@
-"""The pictures of osteon-feel: force over depth and time, plunges over what changes them, a burr's forces, a guide's
-play."""
+"""The pictures of osteon-feel: force over depth and time, plunges over the parameters, a burr's forces, and a
+guide's play."""
 import sys
 from pathlib import Path
 
@@ -80,7 +80,7 @@ def hands(out, file):
 
 
 def profile(out, file):
-    """Total force and its parts along X, Y and Z over time, as Figures 7.7 and 7.8 of the dissertation show them."""
+    """Total force and its parts along X, Y and Z over time, as in Figures 7.7 and 7.8 of the dissertation."""
     figure, axes = plt.subplots(4, 1, figsize=(10, 8), sharex=True, constrained_layout=True)
     parts = [("total_n", "(a) total", ACCENT), ("x_n", "(b) X, along the sweep", STEEL),
              ("y_n", "(c) Y, across it", STEEL),

@@ -1,4 +1,4 @@
-"""deploy/figures after building: runs what the asked figures need and prints one line for each."""
+"""deploy/figures after building: runs the groups of the requested figures and prints one line for each figure."""
 import argparse
 import json
 import math
@@ -66,7 +66,7 @@ def saved(figure, measured):
 
 
 def print_tables(tables):
-    """Lists beside the figures, as of all tools: every column as wide as it needs."""
+    """Tables beside the figures, for example of all tools. Every column is as wide as needed."""
     for title, rows in tables:
         print(f"# {title}")
         widths = [max(len(str(row[i])) for row in rows) for i in range(len(rows[0]))]
@@ -75,17 +75,17 @@ def print_tables(tables):
 
 
 def results(figures, values, soak, machine, load):
-    """What is committed under tests/perf/results: numbers with the commit and the conditions."""
+    """Contents of tests/perf/results: numbers with the commit and the conditions."""
     return {
         "commit": commit(), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"), "machine": machine,
         "size": "soak" if soak else "quick", "build": "perf",
-        "load_before": round(load, 2),  # processes that wanted a processor in the minute before
+        "load_before": round(load, 2),  # processes that waited for a processor in the minute before
         "figures": {f.name: saved(f, values[f.name]) for f in figures},
     }
 
 
 def results_file(machine):
-    """One file for each kind of machine, named by processor and cores; no host names."""
+    """One file for each kind of machine, named by processor and cores, without host names."""
     words = re.sub(r"[^a-z0-9]+", "-", f"{machine['processor']} {machine['cores']} cores".lower()).strip("-")
     return ROOT / "tests" / "perf" / "results" / f"{words}.json"
 
@@ -97,12 +97,12 @@ def rounded(value):
 
 
 def skip_reason(figure, skipped):
-    """Why a figure was left out, where its data is not on this machine; None when it was measured."""
+    """Reason why a figure was left out, if its data is not on this machine. None if it was measured."""
     return next((reason for name, reason in skipped.items() if figure.name.startswith(name)), None)
 
 
 def measure(figures, run, groups):
-    """{figure: (value, baseline)} of the asked figures, group by group."""
+    """{figure: (value, baseline)} of the requested figures, group by group."""
     values = {}
     wanted = {f.group for f in figures}
     for name, produce in groups.items():
@@ -139,9 +139,9 @@ def main():
         list_figures(figures, options.json)
         return 0
     if options.build is None:
-        return 0  # the caller only asked whether the arguments are right
+        return 0  # the caller only asked if the arguments are valid
 
-    import groups  # needs numpy, which --list does not
+    import groups  # needs numpy, but --list does not
     signal.signal(signal.SIGTERM, stop)
     if options.save and commit().endswith("changes"):
         print("deploy/figures: --save needs all changes committed, so that its numbers can be traced", file=sys.stderr)

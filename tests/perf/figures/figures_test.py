@@ -1,4 +1,4 @@
-"""The figures' own rules: the printed form, the verdicts, and that the registry is complete."""
+"""Tests the rules of the figures: the printed form, the verdicts, and that the registry is complete."""
 import re
 import sys
 import unittest

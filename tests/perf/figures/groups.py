@@ -49,15 +49,15 @@ def error_percent(value, expected):
 
 @dataclass
 class Run:
-    """One invocation of deploy/figures; keeps what several groups need."""
+    """One run of deploy/figures. Holds what several groups need."""
     programs: Path
     folder: Path
     soak: bool
     say: object
-    sessions: list = field(default_factory=list)   # numbers of every session so far
+    sessions: list = field(default_factory=list)   # numbers of all sessions so far
     plunges: dict = field(default_factory=dict)
     tables: list = field(default_factory=list)     # (title, rows) printed beside the figures
-    skipped: dict = field(default_factory=dict)    # what was left out: name or its beginning, and why
+    skipped: dict = field(default_factory=dict)    # what was left out: name or its beginning, and reason
     _loop: dict = None
 
     def empty_loop(self):
@@ -67,7 +67,7 @@ class Run:
         return self._loop
 
     def output(self, program, *arguments, progress=False):
-        """What a program prints; `progress`: what it says meanwhile is for the user."""
+        """Output of a program. `progress`: the user sees its messages during the run."""
         command = [self.programs / program, *map(str, arguments)]
         result = subprocess.run(command, stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE,
                                 text=True,
@@ -77,7 +77,7 @@ class Run:
         return result.stdout
 
     def outcome(self, program, *arguments):
-        """What a program prints and its exit code, where another than 0 says something too."""
+        """Output and exit code of a program, if an exit code other than 0 is also a result."""
         result = subprocess.run([self.programs / program, *map(str, arguments)], capture_output=True, text=True,
                                 check=False)
         if not result.stdout:
@@ -126,7 +126,7 @@ INSIDE = {"near cortex": (1.5, 4.8), "medulla": (6.5, 24.5), "far cortex": (26.5
 
 
 def inside(session, layer):
-    """Rows whose whole cone is in a layer, on the way in."""
+    """Rows of the log while the whole cone is in a layer, on the way in."""
     low, high = INSIDE[layer]
     depth = session["depth_mm"]
     advancing = depth >= np.maximum.accumulate(depth)
@@ -162,7 +162,7 @@ def latency_figures(numbers):
 
 
 def over_sessions(sessions):
-    """Several sessions' figures as one: of what has a bound the worst, of all else the median."""
+    """Combines several sessions' figures: the worst value for a figure with a bound, otherwise the median."""
     targets = {figure.name: figure.target for figure in registry.FIGURES}
     combined = {}
     for name in sessions[0]:
@@ -179,7 +179,7 @@ def over_sessions(sessions):
 
 
 def rig(run):
-    """The feed rig through the phantom, all programs running; in a soak several times."""
+    """Drills with the feed rig through the phantom, with all programs running. In a soak, several times."""
     sessions = []
     for repetition in range(5 if run.soak else 1):
         folder, numbers = run.session(f"rig-{repetition + 1}", plans.drill("rig", feed_mm_per_s=1.0, beyond_mm=5))
@@ -208,7 +208,7 @@ def rig_physics(folder, numbers):
 
 
 def hand(run, who):
-    """One hand through the phantom: its feeds and its plunge behind the far cortex."""
+    """Drills with one hand through the phantom: its feeds and its plunge behind the far cortex."""
     folder, _ = run.session(who, plans.drill(who))
     session = record.read_table(folder / "session.csv")
     feeds = {layer: float(np.mean(session["feed_mm_per_s"][inside(session, layer)])) for layer in INSIDE}
@@ -238,9 +238,9 @@ def novice(run):
     }
 
 
-# In the order in which they run: agreement is counted after every session.
+# In the order in which they run. Agreement is counted after every session.
 def scan(run):
-    """The feed rig through the same bone, but imported from a CT scan of it."""
+    """Drills with the feed rig through the same bone, imported from a CT scan of it."""
     folder, numbers = run.session("scan", plans.drill("rig", feed_mm_per_s=1.0, beyond_mm=5), imports.scanned_slab(run))
     physics = rig_physics(folder, numbers)
     forces = ("force_cortical_error", "force_medullary_error")

@@ -1,6 +1,5 @@
-"""Figures of the haptic loop: what its coupling does with energy, what a tick costs, what a silent network does to it.
-All
-with simulated devices and hands."""
+"""Figures of the haptic loop: the energy of its coupling, the cost of a tick, and the effect of a silent network.
+All devices and hands are simulated."""
 import json
 
 from registry import Measured
@@ -10,7 +9,7 @@ PERIOD_US = 1000.0
 
 
 def stability(run):
-    """A million ticks on virtual time, and a million with torque and turns; the same numbers on every machine."""
+    """A million ticks on virtual time, and a million with torque and turns. The same numbers on every machine."""
     run.say("stability: two million ticks of stroking, pressing and cutting")
     out = json.loads(run.output("osteon-stability", 10_000_000 if run.soak else 1_000_000, progress=True))
     names = ("axes", "scene", "delay_ms", "episodes", "touching", "generated_mj", "worst_mj", "net_mj", "cutting_mj",
@@ -68,9 +67,8 @@ def tick(run):
 
 
 def blackout(run):
-    """The middle of three parts without a network. Missed periods come in bursts when the machine stops a virtual one,
-    so
-    what decides is whether the difference is beyond what such counts scatter by."""
+    """The middle of three parts is without a network. Missed periods come in bursts when the host suspends a virtual
+    machine. So the test is whether the difference exceeds the scatter of such counts."""
     run.say("a network blackout of 10 s")
     out = json.loads(run.output("osteon-loop-bench", "blackout", 30 if run.soak else 10))
     rows = [("part", "ticks", "missed", "late us p50", "p99", "p99.9", "max", "work us p50", "p99", "cutting", "held")]
@@ -94,7 +92,7 @@ def blackout(run):
 
 
 def mount(run):
-    """Two users on one bone, a million ticks over each line; the same numbers on every machine."""
+    """Two users on one bone, a million ticks over each connection. The same numbers on every machine."""
     run.say("mount: two users push a bone against each other, a million ticks over each of four lines")
     out = json.loads(run.output("osteon-mount", 10_000_000 if run.soak else 1_000_000, progress=True))
     names = ("kind", "line_ms", "rests", "worst_percent", "mean_percent", "made_mj", "force_n", "growth", "held_back",

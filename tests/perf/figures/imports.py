@@ -1,4 +1,4 @@
-"""Figures of the import of CT scans: what it takes of real ones, and what a known bone has become on the way."""
+"""Figures of the import of CT scans: the cost for real ones, and how a known bone changes by scan and import."""
 import json
 import os
 import subprocess
@@ -10,7 +10,7 @@ from registry import Measured
 
 LAYERS_MM_DENSITY = "5:1.9,20:0.3,5:1.9"
 SLAB_MM3 = 20.0 * 20.0 * 30.0
-# The skull is Debian's example; the others lie beside the checkout, if anywhere.
+# The skull is Debian's example. The others lie beside the checkout, if they exist.
 SCANS = {"skull": None, "tibia": "tibia-dicom", "body": "body-j2k-dicom"}
 
 
@@ -18,7 +18,7 @@ def find_scan(run, name):
     return run.example("Cranium.inv3") if SCANS[name] is None else run.shared_data(SCANS[name])
 
 
-# A process counts the memory of the one that it was forked from, so a small one starts the import.
+# A process's peak memory includes that of the process from which it was forked, so a small process starts the import.
 MEASURE = """import os, sys
 child = os.fork()
 if child == 0:
@@ -31,7 +31,7 @@ print(os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime, used.ru_
 
 
 def cost(program, scan, out):
-    """CPU seconds and peak memory, MB, of one import and its child processes; none where it fails."""
+    """CPU seconds and peak memory, MB, of one import and its child processes. None if it fails."""
     measured = subprocess.run([sys.executable, "-S", "-c", MEASURE, program, "ct", scan, "--out", out],
                               stdout=subprocess.PIPE, text=True, check=True)
     code, seconds, megabytes = measured.stdout.split()

@@ -1,6 +1,6 @@
-"""One attacker: insider_attack.py killing|resets HOST PORT SOURCE PERSON SECONDS; prints how often it tried.
+"""One attacker: insider_attack.py killing|resets HOST PORT SOURCE PERSON SECONDS. Prints how often it tried.
 
-PERSON is the folder of a certificate; empty: none is shown."""
+PERSON is the folder of a certificate. Empty: no certificate is shown."""
 import random
 import ssl
 import sys
@@ -11,8 +11,8 @@ import raw_http2
 
 GET_STATUS = "/osteon.v1.RoomService/GetStatus"
 RESETS = 20_000  # over a connection
-START_S = 1.0  # in which the program itself starts: somebody else's machine does that
-PAUSE_S = (0.5, 1.5)  # before it comes again, by chance: more often the proxy lets no address connect
+START_S = 1.0  # start time of the program itself; a real attacker's machine bears that
+PAUSE_S = (0.5, 1.5)  # random pause before the next try; more often, the proxy lets no address connect
 
 
 def attack_once(kind, address, source, person):
@@ -20,7 +20,7 @@ def attack_once(kind, address, source, person):
         if kind == "killing":
             line.finish(line.call(GET_STATUS, (("grpclb_client_stats", "x"),)))
             return
-        # In parts, so that the end of the connection is noticed.
+        # In parts, so that it notices when the connection ends.
         for _ in range(RESETS // 500):
             line.resets(GET_STATUS, 500)
 
@@ -32,7 +32,7 @@ def attack(kind, host, port, source, person, seconds):
         try:
             attack_once(kind, (host, port), source, person)
         except (OSError, ssl.SSLError):
-            pass  # it was closed, as it should be
+            pass  # the server closed it, as it should
         times += 1
         time.sleep(random.uniform(*PAUSE_S))
     print(times)

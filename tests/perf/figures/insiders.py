@@ -1,4 +1,4 @@
-"""Figures of people who have, or once had, a certificate and attack with it, at the server and through the proxy."""
+"""Figures of attackers who have, or once had, a certificate. They attack the server directly and through the proxy."""
 import os
 import re
 import shutil
@@ -23,9 +23,9 @@ MISSING = "haproxy is not installed; deploy/install does that"
 WAYS = ("direct", "proxied")
 ATTACKS = ("killing", "resets")
 HOLDERS = ("valid", "revoked", "none")   # of a certificate
-ATTACKERS = 4                            # connections at a time, each begun again when it was closed
-REVOKED_S = 1.5                          # until it holds: the lists are looked at at least twice a second
-ATTACK_S, CALL_EVERY_S = 12.0, 0.0125   # the server lets a person ask 100 times a second
+ATTACKERS = 4                            # connections at a time, each opened again after it was closed
+REVOKED_S = 1.5                          # until it holds: the lists are read at least twice a second
+ATTACK_S, CALL_EVERY_S = 12.0, 0.0125   # the server allows a person 100 calls a second
 DELAY_S = 0.075                          # one way
 UPLOADS, UPLOAD_MIB = 3, 32
 
@@ -37,7 +37,7 @@ def free_port():
 
 
 class Place:
-    """A server with a room and, `proxied`, the proxy in front of it, on certificates of their own."""
+    """A server with a room and, if `proxied`, the proxy in front of it, with certificates of their own."""
 
     def __init__(self, run, household, folder, proxied, *more):
         folder.mkdir(parents=True, exist_ok=True)
@@ -66,7 +66,7 @@ class Place:
         wait_for_port(self.host, self.port)
 
     def person(self, name, role):
-        """Options of a client of theirs; their folder; their ticket."""
+        """Options of a client of a person, with the person's folder and ticket."""
         options = self.certificates.person(name, role)
         return options, options[1], options[3].read_text(encoding="utf-8").split()[0]
 
@@ -95,10 +95,10 @@ def resident_mib(pid):
     return int(re.search(r"^VmRSS:\s+(\d+)", text, re.M)[1]) / 1024.0
 
 
-# What somebody else notices meanwhile.
+# What another person notices during an attack.
 
 def call_times_ms(line, headers, seconds):
-    """Of a person's calls, one after the other."""
+    """Measures a person's calls, one after the other."""
     until, times = time.monotonic() + seconds, []
     while (began := time.monotonic()) < until:
         if not line.finish(line.call(GET_STATUS, headers)):
@@ -113,7 +113,7 @@ def p99(times):
 
 
 def is_named(said, holder, who, source):
-    """Whether a line of the logs says whose attack it was and from where; without a certificate, from where alone."""
+    """True if a line of the logs names the attacker and the source address. Without a certificate, only the address."""
     place = re.escape(source)
     if holder == "none":
         return re.search(rf"\b{place}\b", said) is not None
@@ -122,7 +122,7 @@ def is_named(said, holder, who, source):
 
 
 def attacked(run, household, place, way, kind, holder):
-    """One attack; what it did, as a row."""
+    """Runs one attack. Returns its result as a row."""
     who = f"{kind}-{holder}"
     source = f"127.0.1.{1 + 3 * ATTACKS.index(kind) + HOLDERS.index(holder)}"  # each has an address of its own
     _, person, _ = place.person(who, "observer")
@@ -136,7 +136,7 @@ def attacked(run, household, place, way, kind, holder):
     with raw_http2.Connection((place.host, place.port), bystander) as line:
         quiet = call_times_ms(line, headers, ATTACK_S / 2)
         memory = place.memory_mib()
-        # Attackers have machines of their own: they get what the others leave of this one.
+        # Real attackers have machines of their own. Here they get the processor time that the others leave.
         attackers = [household.start(f"{way}-{who}-{i}", ["chrt", "--idle", "0", *command])
                      for i in range(ATTACKERS)]
         call_times_ms(line, headers, START_S / 2)
@@ -148,7 +148,7 @@ def attacked(run, household, place, way, kind, holder):
         if attacker.wait(30.0) != 0:
             raise Failure("an attacker failed:", attacker.last_words())
     attempts = sum(int(attacker.next_line(5.0)) for attacker in attackers)
-    household.check()  # the process lives
+    household.check()  # the process is alive
     return {"way": way, "attack": kind, "certificate": holder, "attempts": attempts, "quiet": p99(quiet),
             "p99": p99(times), "memory": grown, "named": is_named(place.said(), holder, who, source)}
 
@@ -183,7 +183,8 @@ def attacks(run):
 
 
 def uploads(run):
-    """Time to send bytes over a line of 150 ms, direct over proxied; the relay delays and does not bound."""
+    """Time to send bytes over a connection of 150 ms, direct over proxied. The relay delays and does not limit the
+    rate."""
     if not HAPROXY:
         run.skip("proxy_upload_ratio", MISSING)
         return {}
@@ -208,7 +209,8 @@ def uploads(run):
 
 
 def upload(place, archive):
-    """Seconds from the first byte until the server has said, after the last one, that these bytes are no archive."""
+    """Seconds from the first byte until the server has answered, after the last one, that these bytes are not an
+    archive."""
     options = place.certificates.person("olga", "operator", room="*")
     began, said = None, []
     with DelayLine((place.host, place.port), DELAY_S) as line:

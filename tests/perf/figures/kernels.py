@@ -13,7 +13,7 @@ TOOL_BUDGET_US = 2000.0
 
 
 def plain_name(b):
-    """A benchmark's name without how it was run."""
+    """A benchmark's name without the suffixes of how it was run."""
     return re.sub(r"/(iterations|repeats|min_time):[0-9.]+|/(manual_time|real_time)", "", b["name"])
 
 
@@ -24,14 +24,13 @@ def benchmarks(run, pattern):
 
 
 def spread(counters, name="ratio", threads=None):
-    """A benchmark's counter with its smallest and largest; without that benchmark there is no value."""
+    """A benchmark's counter with its smallest and largest value. No value if the benchmark is missing."""
     return Measured(counters.get(name), None, counters.get(f"{name}_min"), counters.get(f"{name}_max"), threads)
 
 
 def repeated(run, pattern, repetitions):
-    """{name: [counters of each repetition]}, the benchmarks in random turns, so that what disturbs the machine for a
-    while
-    disturbs all."""
+    """{name: [counters of each repetition]}. The benchmarks take random turns, so that a lasting disturbance of the
+    machine affects all."""
     out = json.loads(run.output("osteon-bench", "--benchmark_format=json", f"--benchmark_filter={pattern}",
                                 "--benchmark_min_time=0.1", f"--benchmark_repetitions={repetitions}",
                                 "--benchmark_enable_random_interleaving=true"))
@@ -43,14 +42,13 @@ def repeated(run, pattern, repetitions):
 
 
 def over(values, baseline=None, threads=None):
-    """The median of several, with the smallest and the largest."""
+    """The median of several values, with the smallest and the largest."""
     return Measured(float(np.median(values)), baseline, float(min(values)), float(max(values)), threads)
 
 
 def cutting(run):
-    """Decided at work: successive cuts through fresh bone. The same cut again and again, and what is left when the
-    plain
-    way walks none but the leaves near the tool, inform."""
+    """The verdict is for working cuts: successive cuts through fresh bone. Two other values are for information: the
+    same cut again and again, and the plain way restricted to the leaves near the tool."""
     run.say("cutting, a burr and a drill at work")
     work = {tool: {} for tool in ("burr", "drill")}
     for name, passes in repeated(run, "^cut_(burr|drill)/work", 3 if run.soak else 1).items():
@@ -85,7 +83,7 @@ def cutting(run):
     run.tables.append(("cuts of 8 ms at work, in turns with the accessor's; equal bones in the end", rows))
 
     run.say("cutting with every tool")
-    # Of several runs the middle one by its 99th percentile: what else the machine does must not decide.
+    # Of several runs, takes the one with the median 99th percentile, so that other load on the machine does not decide.
     tools = {}
     for name, passes in repeated(run, "^cut_tool/", 7 if run.soak else 5).items():
         _, tool, way, threads = name.split("/")
@@ -149,7 +147,7 @@ def surface(run):
 
 
 def convergence_order(pitches, errors):
-    """The power of the pitch that errors fall with: slope of the line through their logarithms."""
+    """The power of the pitch with which errors fall: slope of the line through their logarithms."""
     return float(np.polyfit(np.log(pitches), np.log(errors), 1)[0])
 
 
@@ -161,7 +159,7 @@ def accuracy(run):
     values = {}
     rows = [("body", "tool", "pitch mm", "error % median", "max", "deviation pitches p50", "p99", "max", "vertices")]
     for body in ("sphere", "hole", "kerf"):
-        if body not in out:  # no tool of the box cuts it
+        if body not in out:  # no tool of the tool box cuts it
             values |= {f"accuracy_{body}_{what}": Measured(None) for what in ("volume", "order", "surface")}
             continue
         pitches = out[body]["pitches"]
@@ -184,11 +182,11 @@ def accuracy(run):
     return values
 
 
-# Kernels as the same program may choose them: samples computed at once, 4 without AVX.
+# Kernels that the same program may choose: samples computed at once, 4 without AVX.
 LANES = (4, 8, 16)
 
 
-# What a build of the kernel may compute at once: one without AVX has no more than 4 samples in a register.
+# What a build of the kernel may compute at once. A build without AVX has no more than 4 samples in a register.
 LANES_OF_BUILD = {"plain": 4, "avx2": 8}
 
 
@@ -200,13 +198,12 @@ def set_property_run(run, cuts, orders, threads, first=0, program="osteon-set-pr
 
 
 def kernels_tried(run, cuts, expected):
-    """Kernels of other compilers and settings, and the program's own with fewer lanes, two orders each: how many
-    compilers
-    built all three (unoptimised, optimised without AVX, with AVX), how many builds, how many widths, how many
-    differ."""
+    """Kernels of other compilers and settings, and the program's own with fewer lanes, two orders each. Returns how
+    many compilers built all three (unoptimised, optimised without AVX, with AVX), how many builds and widths
+    there were, and how many differ."""
     programs = sorted(path.name for path in Path(run.programs).glob("osteon-set-property-*"))
     own = [set_property_run(run, cuts, 2, 2, lanes=lanes) for lanes in LANES]
-    own = {f"as built, {o['lanes']} lanes": o for o in own}  # a width that the processor has not is another one again
+    own = {f"as built, {o['lanes']} lanes": o for o in own}  # a width that the processor lacks repeats another one
     builds = {}
     for program in programs:
         name = program.removeprefix("osteon-set-property-")
@@ -227,8 +224,8 @@ def kernels_tried(run, cuts, expected):
 
 
 def orders_tried(run, cuts, orders):
-    """As many orders again with two threads as with one, each another: how many gave another bone, how many were
-    distinct."""
+    """As many orders again with two threads as with one, all different. Returns how many gave another bone, and how
+    many were distinct."""
     one = set_property_run(run, cuts, orders // 2, 1)
     two = set_property_run(run, cuts, orders - orders // 2, 2, first=orders // 2)
     differing = one["differing"] + two["differing"] + int(one["name"] != two["name"])
@@ -264,7 +261,7 @@ def growth(run):
     run.say("growth")
     out = json.loads(run.output("osteon-growth", 128, 256, 512, 1024, progress=True))
     sizes = {s["samples"]: s for s in out["sizes"]}
-    # Groove by groove: sums of them would rise together whatever they were.
+    # Compares groove by groove: sums of them would rise together in any case.
     burs = []
     rows = [("bur", "grooves", "mm3 least", "mm3 most", "bytes a mm3", "bytes a mm2", "correlation with volume",
              "with area")]
@@ -281,7 +278,7 @@ def growth(run):
     fits = [through_zero(both[key], both["bytes"]) for key in ("volume", "area")]
     rows.append(("both", len(both["bytes"]), "", "", *(f"{slope:.0f}" for slope, _ in fits),
                  *(f"{fit:.4f}" for _, fit in fits)))
-    import pictures  # draws with matplotlib, which no other group needs
+    import pictures  # uses matplotlib, which no other group needs
     pictures.growth(out, burs, run.folder / "growth.png")
     run.tables.append(("memory that each groove adds, slopes through zero", rows))
     run.tables.append((f"growth, {out['sizes'][0]['cuts']} cuts of {out['tool']} in each bone, in turn; picture: "
@@ -315,13 +312,13 @@ def undo(run):
 
 
 def of(out, name, beside, threads=None):
-    """What a program prints as NAME_p50, NAME_min, NAME_max."""
+    """Values that a program prints as NAME_p50, NAME_min, NAME_max."""
     return Measured(out[f"{name}_p50"], out[f"{beside}_p50"], out[f"{name}_min"], out[f"{name}_max"], threads)
 
 
 def refinement(run):
-    """The dissertation's Table 5.4: method 1 resamples the whole sub-volume that a tool meets, method 2 where it
-    cuts."""
+    """The dissertation's Table 5.4: method 1 resamples the whole sub-volume that a tool meets, method 2 resamples
+    where it cuts."""
     run.say("adaptive resolution")
     out = json.loads(run.output("osteon-refinement-bench"))
     rows = [("resolution, method", "first cut us", "later cuts us", "memory MB", "finest mm in 1 GB", "areas",
@@ -346,7 +343,7 @@ def refinement(run):
 
 
 def collision(run):
-    """Section 7.2: segmentation cells, all in, all out or mixed, against the distance field."""
+    """Section 7.2: segmentation cells (all in, all out or mixed) compared with the distance field."""
     run.say("collision")
     out = json.loads(run.output("osteon-collision-bench"))
     ways = ("nearest", "trilinear", "distance")
@@ -364,7 +361,7 @@ def collision(run):
 
 
 def contact(run):
-    """Thousands of points of a tool against the bone round it, beside OpenVDB's sampler."""
+    """Thousands of points of a tool against the bone round it, compared with OpenVDB's sampler."""
     run.say("contact")
     out = json.loads(run.output("osteon-contact-bench"))
     run.tables.append((f"contact of {out['points']} points, {out['lanes']} at a time, {100.0 * out['in_bone']:.0f} % "
@@ -385,7 +382,7 @@ FRAME_MS = 1000.0 / 30.0
 
 
 def real_case(run, name, make_case):
-    """A bone from real images, burred in frames of 33 cuts; skipped, and said so, where its images are not."""
+    """A bone from real images, burred in frames of 33 cuts. Skipped with a message if its images are not there."""
     case = run.folder / name
     reason = make_case(case)
     names = ("frame", "frame_budget", "cut_p99", "memory", "memory_cut")
@@ -395,14 +392,14 @@ def real_case(run, name, make_case):
     run.say(f"burring {name}")
     vertices, picture = run.folder / f"{name}.vertices", run.folder / f"{name}.png"
     out = json.loads(run.output("osteon-real-case", case, 200 if run.soak else 60, vertices))
-    import pictures  # draws with matplotlib
+    import pictures  # uses matplotlib
     pictures.burred_bone(vertices, out["pitch_mm"], picture)
     vertices.unlink()
     run.tables.append((f"{name}: bone of {'x'.join(map(str, out['samples']))} samples at {out['pitch_mm']:.4g} mm, "
                        "cut at "
                        f"{out['cut_pitch_mm']:.4g} mm; picture: {picture}",
                        [(key, value) for key, value in out.items()]))
-    # A frame's whole work, cuts and blocks, beside the surface of the whole bone by the same mesher.
+    # A frame's whole work, cuts and blocks, compared with the surface of the whole bone by the same mesher.
     return {
         f"real_{name}_frame": Measured(out["frame_ms_p50"], out["whole_ms"], out["frame_ms_min"], out["frame_ms_max"],
                                        1),

@@ -1,13 +1,13 @@
-"""Figures of the force laws, as `osteon-haptic laws --json` computes them, against the points of comparison of the
-reference page: 1000 rpm, 1 mm/s, the whole point of the drill in bone."""
+"""Figures of the force laws, as `osteon-haptic laws --json` computes them. Compares them with the reference page's
+points of comparison: 1000 rpm, 1 mm/s, the whole point of the drill in bone."""
 import json
 
 # Density g/cm3 to thrust N; diameter mm to thrust N and torque N mm in cortical bone.
 CHI_N = {0.3: 3.2, 0.5: 5.9, 1.0: 13.5, 1.8: 27.1, 2.0: 30.7}
 ALLOTTA = {2.5: (41.8, 30.5), 3.2: (53.5, 49.9), 4.5: (75.2, 98.7), 7.94: (132.7, 307.0)}
-# K_s = 5 R_u of cortical bone, N/mm2: what the torque's work must be for each mm3 of the hole.
+# K_s = 5 R_u of cortical bone, N/mm2: the torque's required work for each mm3 of the hole.
 ALLOTTA_ENERGY = 650.0
-# Fitted to Chi there.
+# Fitted to Chi at that point.
 CORTICAL_N = 28.9
 FITTED = ("spring-damper", "multi-point")
 
@@ -17,7 +17,7 @@ def percent(value, expected):
 
 
 def point(points, law, **where):
-    """The one point of a law at a place; without it the figure has no value and is short."""
+    """The one point of a law at these values. Without it the figure has no value and is short."""
     found = [p for p in points if p["law"] == law and all(abs(p[key] - value) < 1e-9 for key, value in where.items())]
     if len(found) != 1:
         raise KeyError(f"{law} at {where}: {len(found)} points")

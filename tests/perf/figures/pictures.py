@@ -10,7 +10,7 @@ from plots import ACCENT, STEEL, plt  # noqa: E402  (the sessions' style; found 
 
 
 def growth(out, burs, file):
-    """Cost of a cut over the bone's size; memory that each groove added over its volume, and over its area."""
+    """Cost of a cut over the bone's size. Memory that each groove added, over its volume and over its area."""
     figure, (cost, by_volume, by_area) = plt.subplots(1, 3, figsize=(15, 4.2), constrained_layout=True)
     sizes = [s["samples"] for s in out["sizes"]]
     cost.plot(sizes, [s["us_p50"] for s in out["sizes"]], "o-", color=ACCENT, label="median")
@@ -39,8 +39,8 @@ def growth(out, burs, file):
 
 
 def burred_bone(vertices, pitch_mm, file, width=1000):
-    """A bone from in front by its mesh's vertices, each as large as a voxel, the nearest on top; what was cut in
-    red."""
+    """A bone from the front, drawn by its mesh's vertices. Each is as large as a voxel, and the nearest is on top.
+    Cut faces are red."""
     rows = np.fromfile(vertices, dtype=np.float32).reshape(-1, 7)
     x, depth, y = rows[:, 0], rows[:, 1], rows[:, 2]
     scale = max(np.ptp(x), np.ptp(y)) / (width - 40)
@@ -49,7 +49,7 @@ def burred_bone(vertices, pitch_mm, file, width=1000):
     shade = np.clip(0.25 + 0.75 * np.clip(rows[:, 3:6] @ light, 0, 1), 0, 1)
     colour = np.where(rows[:, 6:] > 0.5, np.array([200, 85, 61]), np.array([236, 220, 190])) * shade[:, None]
     image = np.full((line.max() + 21, column.max() + 21, 3), 255, np.uint8)
-    order = np.argsort(-depth)  # the patient's front is at small y: painted last
+    order = np.argsort(-depth)  # the patient's front is at small y, so it is painted last
     order = order[rows[order, 4] < 0.2]
     half = max(1, int(np.ceil(0.6 * pitch_mm / scale)))
     nearest = np.full(image.shape[:2], np.inf, np.float32)

@@ -1,4 +1,4 @@
-"""A client that speaks HTTP/2 frame by frame over TLS (RFC 9113, RFC 7541), to say what no gRPC client would."""
+"""A client that speaks HTTP/2 frame by frame over TLS (RFC 9113, RFC 7541), to send what no gRPC client would send."""
 import base64
 import socket
 import ssl
@@ -9,7 +9,7 @@ DATA, HEADERS, RESET, SETTINGS, PING, GOAWAY, WINDOW_UPDATE = 0, 1, 3, 4, 6, 7, 
 WIDEST_WINDOW = struct.pack(">I", 2**31 - 1 - 65535)  # beyond the first one
 END_STREAM, END_HEADERS, ACK = 0x1, 0x4, 0x1
 CANCEL = struct.pack(">I", 8)
-EMPTY_MESSAGE = bytes(5)  # of gRPC: not compressed, no bytes
+EMPTY_MESSAGE = bytes(5)  # a gRPC message: not compressed, no bytes
 
 
 def frame(kind, flags, stream, payload=b""):
@@ -40,7 +40,8 @@ def admission(ticket, room):
 
 
 class Connection:
-    """Errors: OSError (ssl.SSLError among them) where the other side closes it or does not shake hands."""
+    """Errors: OSError (ssl.SSLError among them) if the other side closes the connection or does not complete the
+    handshake."""
 
     def __init__(self, address, person=None, patience_s=10.0, source="127.0.0.1"):
         context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
@@ -66,14 +67,14 @@ class Connection:
         return self.stream
 
     def call(self, path, more=(), message=EMPTY_MESSAGE):
-        """Begins a call and says all that it has to say; its stream."""
+        """Begins a call and sends its whole request. Returns its stream."""
         stream = self.next_stream()
         self.line.sendall(frame(HEADERS, END_HEADERS, stream, header_block(path, more)) +
                           frame(DATA, END_STREAM, stream, message))
         return stream
 
     def resets(self, path, count, more=()):
-        """So many calls that are begun and reset, as fast as they go out."""
+        """Begins and resets `count` calls, as fast as they can be sent."""
         block, out = header_block(path, more), bytearray()
         for _ in range(count):
             stream = self.next_stream()
@@ -81,7 +82,8 @@ class Connection:
         self.line.sendall(out)
 
     def read(self):
-        """The next frame as (kind, flags, stream, payload), answered where it asks; None at the end."""
+        """Returns the next frame as (kind, flags, stream, payload). Answers it if it needs an answer. None at the
+        end."""
         while True:
             while len(self.arrived) < 9 or len(self.arrived) < 9 + int.from_bytes(self.arrived[:3], "big"):
                 more = self.line.recv(65536)
@@ -96,7 +98,7 @@ class Connection:
             return kind, flags, stream, payload
 
     def finish(self, stream):
-        """Reads until that call is over: whether it was answered with a message."""
+        """Reads until that call is over. Returns whether it was answered with a message."""
         answered = False
         while (next_frame := self.read()) is not None:
             kind, flags, of, _ = next_frame

@@ -1,13 +1,13 @@
-"""Every number that this project promises, by name: what it measures, in which unit, and what it must be.
+"""Every number that this project promises, by name: what it measures, its unit, and its target.
 
-A figure is decided ("ok" or "short") only when it is a ratio, a count or a bound; absolute times depend on the machine
-and are printed as "info", beside a baseline that was measured on the same machine in the same run."""
+A figure has a verdict ("ok" or "short") only if it is a ratio, a count or a bound. Absolute times depend on the
+machine and are printed as "info", beside a baseline that was measured on the same machine in the same run."""
 from dataclasses import dataclass
 from typing import NamedTuple, Optional
 
 
 class Measured(NamedTuple):
-    """What a group gives for a figure: its value, mostly a median, and what it was measured beside and with."""
+    """A group's result for a figure: its value, usually a median, with its baseline and conditions."""
     value: object
     baseline: object = None
     low: object = None              # smallest and largest of the values that `value` stands for
@@ -20,10 +20,11 @@ class Figure:
     name: str
     unit: str
     measures: str
-    group: str                      # what produces it, see groups.py; a group runs once for all of its figures
-    target: Optional[tuple] = None  # (comparison, bound); None: information
-    baseline: str = ""              # what `baseline` is; empty: there is none
-    full: bool = False              # measured when it is named or everything is asked for, as it takes minutes
+    # the group that produces it, see groups.py; a group runs once for all of its figures
+    group: str
+    target: Optional[tuple] = None  # (comparison, bound); None: for information
+    baseline: str = ""              # what `baseline` is; empty: none
+    full: bool = False              # takes minutes: measured only if it is named, or if all figures are requested
 
     def verdict(self, value):
         if self.target is None:
@@ -43,9 +44,10 @@ COMPARISONS = {
 
 ACCESSOR = "voxel by voxel through an OpenVDB accessor"
 EMPTY_LOOP = "the same of an empty 1 kHz loop"
-# Target of fuzz.mutations, what is changed in it, who takes that, and inputs; ten million of each with --soak. A
-# million where each
-# input costs a millisecond: the bone is cut, or SQLite opens a file three times and recovers it.
+# Target of fuzz.mutations, what is changed in it, which code takes that, and number of inputs; ten million of each with
+# --soak.
+# A million if each input costs a millisecond, because the bone is cut, or SQLite opens a file three times and salvages
+# it.
 FUZZED = (
     ("ticket", "tickets", "the authorizer", 10_000_000),
     ("upload", "archives", "the upload validation", 10_000_000),
@@ -75,7 +77,7 @@ FIGURES = [
            baseline=EMPTY_LOOP),
     Figure("patch_build_p50", "us", "gathering the bone round the tool for the haptic loop, median", "rig"),
     Figure("patch_build_p99", "us", "gathering the bone round the tool for the haptic loop, 99th percentile", "rig"),
-    # How quickly the others learn of a cut.
+    # How quickly the other clients receive a cut.
     Figure("cut_to_commit_p50", "ms", "from a cut's end until its confirmation, median", "rig"),
     Figure("mesh_update_p50", "ms", "from a cut's end until the viewer has the new surface, median", "rig",
            baseline="period of the mesh stream"),
@@ -87,7 +89,7 @@ FIGURES = [
            baseline="period of the mesh stream"),
     Figure("cut_to_sound_p50", "ms", "from a cutting state until it is in the sound, median", "rig"),
     Figure("cut_to_sound_p99", "ms", "from a cutting state until it is in the sound, 99th percentile", "rig"),
-    # What the physics must be, phantom 5/20/5 mm at 1.9/0.3/1.9 g/cm3, drill 3.2 mm, 1000 rpm.
+    # Required physics: phantom 5/20/5 mm at 1.9/0.3/1.9 g/cm3, drill 3.2 mm, 1000 rpm.
     Figure("rig_force_cortical_error", "percent", "thrust in the cortical layers at 1 mm/s against Chi's law (28.9 N)",
            "rig", ("<=", 3.0)),
     Figure("rig_force_medullary_error", "percent", "thrust in the medullary layer at 1 mm/s against Chi's law (3.25 N)",
@@ -105,7 +107,7 @@ FIGURES = [
     Figure("plunge_novice_error", "percent", "the same against the reference simulation", "novice", ("<=", 15.0)),
     Figure("plunge_novice_over_expert", "ratio", "novice's plunge over the expert's", "novice", (">=", 1.5),
            baseline="of the reference simulation"),
-    # The same on virtual time, with a simulated device, and what changes it; and what guides and burrs do.
+    # The same on virtual time with a simulated device, and what changes it. Also guides and burrs.
     Figure("feel_rig_cortical_error", "percent",
            "feed rig on virtual time: thrust in the cortical layers against 28.9 N",
            "feel_rig", ("<=", 3.0)),
@@ -169,9 +171,8 @@ FIGURES = [
     Figure("mesh_hash_differences", "count",
            "viewers, one of them late, that held another surface than the server at the end",
            "rig", ("==", 0)),
-    # Cutting at 0.125 mm, cuts of a haptic client (8 ms) at work: each goes on from the one before, into fresh bone.
-    # Single
-    # threads unless they say otherwise.
+    # Cutting at 0.125 mm: working cuts of a haptic client (8 ms). Each continues from the one before, into fresh bone.
+    # Single threads unless stated otherwise.
     *[figure for tool, what, least in (("burr", "a 3.2 mm burr going sideways, half immersed", 7.0),
                                        ("drill", "a 3.5 mm drill going straight in", 15.0))
       for figure in (
@@ -226,7 +227,7 @@ FIGURES = [
            baseline="vtkFlyingEdges3D on the same samples"),
     Figure("mesh_decode", "us", "rebuilding one block of surface from its bytes", "surface",
            baseline="vtkFlyingEdges3D on the same samples"),
-    # How true cuts are, at random places and orientations: the worst trial decides.
+    # Accuracy of cuts at random positions and orientations. The worst trial decides.
     *[figure for body,
       what in (("sphere", "a sphere cut by the 3.2 mm burr"), ("hole", "a hole drilled through a slab"),
                                 ("kerf", "a saw's kerf through a shaft")) for figure in (
@@ -280,14 +281,15 @@ FIGURES = [
            "groove, the lower of two burs", "growth", (">=", 0.95)),
     Figure("growth_memory_bone_ratio", "ratio", "memory of a cut in the largest bone over the smallest, cuts scattered",
            "growth"),
-    # Taking back.
+    # Undo.
     Figure("undo_leaves", "count", "leaves rebuilt to take one of 1000 burr cuts back, median", "undo"),
     Figure("undo_time", "us", "taking one of 1000 burr cuts back, median", "undo",
            baseline="applying all the others again"),
     Figure("undo_share", "ratio", "time to take one cut back over that of applying all the others again", "undo",
            ("<=", 0.1)),
     Figure("undo_differences", "count", "bones that were not as if the cut had never been made", "undo", ("==", 0)),
-    # Adaptive resolution: method 1 resamples a whole sub-volume, method 2, ours, where the tool cuts (Table 5.4).
+    # Adaptive resolution: method 1 resamples a whole sub-volume. Method 2, ours, resamples where the tool cuts (Table
+    # 5.4).
     *[figure for times in ("2x", "4x") for figure in (
         Figure(f"refinement_{times}_first", "us", f"cuts that reach new bone at {times} resolution, method 2",
                "refinement",
@@ -325,11 +327,10 @@ FIGURES = [
            ("<=", 1.0)),
     Figure("contact_force_difference", "ratio", "largest difference of the two in force and torque, against their size",
            "contact", ("<=", 0.01)),
-    # The coupling between hand and tool on simulated devices: a million ticks on virtual time, others cutting and bone
-    # taken back
-    # under the tool, 0 to 200 ms on the way to the room. Energies at the handle, accounted for from outside. The same
-    # again on
-    # devices that show torque, to a hand that tilts its tool by up to 15 degrees.
+    # The coupling between hand and tool on simulated devices: a million ticks on virtual time, with other cuts and
+    # undone bone under the tool, and 0 to 200 ms to the room.
+    # Energies at the handle are computed from outside. The same again on devices that show torque, with a hand that
+    # tilts its tool by up to 15 degrees.
     *[figure for prefix, on in (("stability", ""), ("stability_six", "six axes: ")) for figure in (
         Figure(f"{prefix}_ticks", "count",
                f"{on}ticks of stroking, pressing into a cavity and a thin wall, burring and drilling",
@@ -391,9 +392,8 @@ FIGURES = [
            "haptic_stability",
            ("==", 0), full=True),
     Figure("stability_six_torque_largest", "nmm", "the largest torque", "haptic_stability", full=True),
-    # Two users who push a bone on its mount against each other, on virtual time: lines of 0, 50 and 150 ms one way,
-    # and one of
-    # either; but for the first with 30 ms of jitter and 30 % loss.
+    # Two users push a bone on its compliant mount against each other, on virtual time: connections of 0, 50 and 150 ms
+    # one way, and 0 ms for one user with 150 ms for the other. All but the first have 30 ms of jitter and 30 % loss.
     *[figure for line, what in (("0", "lines without delay"), ("50", "lines of 50 ms"), ("150", "lines of 150 ms"),
                                 ("0_and_150", "a line without delay and one of 150 ms")) for figure in (
         Figure(f"mount_rest_error_{line}ms", "percent",
@@ -416,7 +416,7 @@ FIGURES = [
            ("<=", 1.5), full=True),
     Figure("mount_uncontrolled", "mj", "what the stiff hands would be given without the controller", "haptic_mount",
            (">=", 100.0), baseline="most with it", full=True),
-    # The whole tick, and the loop beside a network that falls silent for 10 s.
+    # The whole tick, and the loop with a network that falls silent for 10 s.
     *[figure for work, what in (
         ("drill", "drilling with a 3.2 mm drill"), ("burr", "burring with a 5 mm burr"), ("pin", "driving a pin"),
         ("saw", "sawing with a wide blade"), ("saw_narrow", "sawing with a narrow blade")) for figure in (
@@ -511,7 +511,7 @@ FIGURES = [
            full=True),
     Figure("felt_bad_p99", "of_budget", "the same at 40 +- 10 ms and 30 % loss, as a part of 150 ms", "bad_network",
            ("<=", 1.0), baseline=MACHINE, full=True),
-    # Where that time goes, on the loopback.
+    # The time of each stage, on the loopback.
     *[Figure(f"felt_stage_{stage}", "ms", f"{what}, median", "felt_stages", baseline="at 40 +- 10 ms and 30 % loss",
              full=True)
       for stage, what in (
@@ -521,7 +521,7 @@ FIGURES = [
           ("all", "all of these together"))],
     Figure("felt_stage_close", "ms", "from a motion until its cut closes, at most, by construction", "felt_stages",
            baseline="at 40 +- 10 ms and 30 % loss", full=True),
-    # An instructor's word.
+    # An instructor's decision.
     Figure("freeze_p99", "of_budget",
            "from the answer to an instructor who stops a hand until its loop cuts no more, less the "
            "time of the way, 99th percentile of the worst of 0, 50 and 150 ms one way, as a part of two ticks of the "
@@ -550,7 +550,7 @@ FIGURES = [
     Figure("override_in_contact", "count",
            "times that each of these took hold of a tool on bone: the rarest, at the delay and on "
            "the bone where it was rarest", "override", (">=", 5), full=True),
-    # Closed certificates.
+    # Authentication.
     Figure("knocks", "count", "strangers at the door while a hand works: silent, in plain HTTP/2, noise, TLS without a "
            "certificate", "knocking", (">=", 100_000), full=True),
     Figure("knocks_let_in", "count", "of them answered but by a refusal, or not hung up on", "knocking", ("==", 0),
@@ -574,8 +574,8 @@ FIGURES = [
            ("<=", 1024), full=True),
     Figure("damaged_cases_sentence", "bytes", "longest sentence of why one was refused", "damaged_cases", ("<=", 4100),
            full=True),
-    # Those who have a certificate, or had one that was revoked, and those without: four connections at a time for six
-    # seconds, at a lower priority of the same machine, while somebody else calls.
+    # Attackers with a valid certificate, with a revoked one, and without one: four connections at a time for six
+    # seconds, at a lower priority on the same machine, while another person calls.
     *[Figure(f"insider{way}_{attack}_p99", "ratio",
              f"a person's calls, 99th percentile, while others {what}{through}, over the same "
              f"before and after; the worst of a valid, a revoked and no certificate",
@@ -598,7 +598,7 @@ FIGURES = [
     Figure("simulated_forbidden", "count", "cuts that were refused for them; one that was taken would be a failure",
            "simulated",
            full=True),
-    # What one tool costs its line and its room's disk.
+    # The load of one tool on its connection and its room's disk.
     Figure("uplink_cutting", "kbit_per_s", "a tool's uplink while it cuts: sealed datagrams and the stream's bytes and "
            "acknowledgements, headers included", "uplink", ("<=", 300.0), full=True),
     Figure("uplink_cutting_loss", "kbit_per_s", "the same at 40 +- 10 ms and 30 % loss", "uplink", ("<=", 300.0),
@@ -635,7 +635,7 @@ FIGURES = [
            full=True),
     Figure("observers_memory", "ratio", "memory of the server with ten stalled ones over that without", "observers",
            ("<=", 1.1), full=True),
-    # What an import makes of a scan, and what it takes.
+    # The result of an import of a scan, and its cost.
     Figure("scan_volume_error", "percent", "volume of the phantom scanned and imported at the default threshold, "
            "against its own", "scan", ("<=", 2.0)),
     Figure("scan_force_cortical_error", "percent", "thrust of the rig in its cortex, both layers, against the law's",
@@ -664,7 +664,7 @@ FIGURES = [
 
 
 def by_name(names, full=False):
-    """The figures of these names, or all that are asked for; ValueError names the first unknown one."""
+    """The figures of these names, or all requested ones. ValueError names the first unknown name."""
     known = {figure.name: figure for figure in FIGURES}
     for name in names:
         if name not in known:

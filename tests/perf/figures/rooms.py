@@ -1,6 +1,5 @@
 """Figures of a room that loses nothing: simulated rooms, journals on failing disks, killed servers, bad networks,
-forgers and
-many observers. All hands are simulated; networks are simulated, or impaired on this machine."""
+forged datagrams and many observers. All hands are simulated. Networks are simulated, or impaired on this machine."""
 import json
 import os
 
@@ -106,7 +105,7 @@ def journal_commits(run):
 
 
 def server_kills(run):
-    # In rooms of 500 kills each: a room opens the later, the longer its journal has become.
+    # In rooms of 500 kills each, because a room opens later as its journal grows.
     rooms = 20 if run.soak else 4
     run.say(f"{500 * rooms} killed servers")
     outs = [json.loads(run.output("osteon-server-kills", 500, 2 + room)) for room in range(rooms)]
@@ -127,7 +126,7 @@ def bad_network(run):
     run.tables.append(("Bad networks", [(name, json.dumps(kind)) for name, kind in out.items()]))
     good, bad = out["loopback"], out["bad"]
 
-    # Of all cuts of all runs together; beside it what the machine itself does to whoever waits, wakes and syncs.
+    # Of all cuts of all runs together. Also measures the machine's own delay of waiting, waking and syncing.
     def felt(kind, bound_ms):
         of = kind["felt_ms"]
         return Measured(of["p99_pooled"] / bound_ms, kind["machine_ms"]["p99"] / bound_ms,

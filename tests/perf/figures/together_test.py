@@ -1,4 +1,4 @@
-"""How deploy/demo --together judges what hands felt: growth of force that neither the hand nor the slew limit
+"""Tests how deploy/demo --together judges what hands felt: growth of force that neither the hand nor the slew limit
 explains."""
 import sys
 import unittest

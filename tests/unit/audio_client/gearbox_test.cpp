@@ -22,7 +22,7 @@ TEST(Gearbox, ShaftsAndMeshesAreThoseOfTheTable) {
 }
 
 TEST(Gearbox, MotorsThirdHarmonicLiesWhereItWasHeard) {
-  // 8.5.4: about 5500 Hz running free, 5400 Hz loaded, and a line near 1800 Hz, at a nominal 1400 rpm.
+  // 8.5.4: about 5500 Hz when running free, 5400 Hz when loaded, and a line near 1800 Hz, at a nominal 1400 rpm.
   constexpr Gearbox gears;
   EXPECT_NEAR(3 * kCommutatorSegments * gears.motor() * kOutput_hz, 5450, 100);
   EXPECT_NEAR(kCommutatorSegments * gears.motor() * kOutput_hz, 1800, 30);

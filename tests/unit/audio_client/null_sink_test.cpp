@@ -1,4 +1,5 @@
-// RtAudio's real PulseAudio backend, run by deploy/with-null-sink: what is rendered arrives at the sink's monitor.
+// RtAudio's real PulseAudio backend, run by deploy/with-null-sink. The rendered sound must arrive at the sink's
+// monitor.
 #include <gtest/gtest.h>
 #include <poll.h>
 
@@ -25,7 +26,7 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-// Records the left channel of the sink's monitor and when each piece came.
+// Records the left channel of the sink's monitor, and when each block arrived.
 class Monitor {
  public:
   Monitor() {
@@ -85,8 +86,8 @@ class Monitor {
   std::jthread thread_;
 };
 
-// A machine that is too busy leaves gaps, which are silence in the monitor: no sound of ours is ever 0 for so long.
-// What lies on both sides of one is shifted, and a tone across it has another frequency.
+// A busy machine causes gaps, which are silence in the monitor. No sound of ours is ever 0 for so long. The sound after
+// a gap is shifted, so a tone across the gap has another frequency.
 bool has_gap(std::span<const float> sound) {
   constexpr int kGap = 32;
   int zeros = 0;
@@ -97,7 +98,7 @@ bool has_gap(std::span<const float> sound) {
   return false;
 }
 
-// Silence until it is told to sound, then a sine whose first sample is already loud, so that its arrival is sharp.
+// Silence until the test starts it, then a sine whose first sample is already loud, so that its arrival is sharp.
 struct ToneSource final : SoundSource {
   std::atomic<bool> on{false};
   std::atomic<std::int64_t> started_ns{0};
@@ -155,7 +156,7 @@ TEST(PulseOutput, DrillIsHeardThroughTheServer) {
   CuttingState state = test::cortical_drill(1200);
   state.state_seq = 9;
   engine.deliver(sound_scene(std::span(&state, 1), Clock::now().time_since_epoch().count()));
-  // A second of running is far past the run-up; the sink's own clock is the machine's.
+  // One second of running is far past the run-up. The sink's own clock is the machine's.
   constexpr std::size_t kRunUp = 56000, kAcknowledged = 40000;
   constexpr int kTries = 40;
   std::vector<float> left;

@@ -1,4 +1,4 @@
-// The engine that the sound card's thread runs, the output without a card, the recorder, and a missing sound server.
+// The engine that runs on the sound card's thread, the output without a card, the recorder, and a missing sound server.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sndfile.h>
@@ -99,16 +99,16 @@ TEST(PacedOutput, AsksForFramesAtTheSoundCardsPace) {
   const double took_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   (*output)->stop();
   const std::uint64_t frames = source.frames;
-  // Never ahead of the clock by more than the buffer it has just begun.
+  // Never ahead of the clock by more than the buffer that it has just begun.
   EXPECT_GE(took_s, (24000.0 - 2 * 256) / 48000.0);
   EXPECT_EQ((*output)->failure_reason(), "");
   std::this_thread::sleep_for(30ms);
-  EXPECT_EQ(source.frames, frames) << "stopped means stopped";
+  EXPECT_EQ(source.frames, frames) << "no frames after the stop";
 }
 
 TEST(PulseOutput, MissingSoundServerIsOneSentenceWithTheRemedy) {
   const test::TempDir temp;
-  // No server can listen in an empty folder, and none shall be started.
+  // No server can listen in an empty folder, and none is started.
   ::setenv("PULSE_SERVER", ("unix:" + (temp / "nobody").string()).c_str(), 1);
   ::setenv("XDG_RUNTIME_DIR", temp.path().c_str(), 1);
   ::setenv("HOME", temp.path().c_str(), 1);

@@ -1,4 +1,4 @@
-// osteon-audio as a process beside a real server: what a haptic client would send is heard, logged and recorded.
+// osteon-audio as a process beside a real server. It plays, logs and records what a haptic client would send.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -77,7 +77,7 @@ class AudioProcess : public testing::Test {
   }
 
   std::vector<std::string> arguments() const {
-    // Run by deploy/with-null-sink with this set, the same goes through RtAudio and PulseAudio.
+    // If deploy/with-null-sink runs the test with this variable, the sound goes through RtAudio and PulseAudio.
     const char* output = std::getenv("OSTEON_TEST_OUTPUT");
     return {"--server",    address_,
             "--output",    output ? output : "none",
@@ -142,7 +142,8 @@ TEST_F(AudioProcess, StatesAreHeardLoggedAndRecorded) {
   std::string header;
   const std::vector<Row> rows = read_log(temp_ / "a.csv", header);
   EXPECT_THAT(header, testing::StartsWith("state_seq,received_mono_ns,sounded_mono_ns"));
-  // The newest state wins where two come within one buffer, so not all 384 are heard; after a stall it is fewer.
+  // If two states come within one buffer, only the newest counts, so not all 384 are played. After a stall there are
+  // fewer.
   ASSERT_GT(rows.size(), 60U);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     EXPECT_GT(rows[i].sounded_ns, rows[i].received_ns);
@@ -163,7 +164,7 @@ TEST_F(AudioProcess, StatesAreHeardLoggedAndRecorded) {
 
   std::printf("%s\n", summary.dump().c_str());
 
-  // The loudest half second is cortical drilling: the output mesh at 48 x 20 Hz stands in it.
+  // The loudest half second is cortical drilling. It contains the output mesh at 48 x 20 Hz.
   std::size_t loudest = 0;
   double loudest_db = sound::kSilence_db;
   for (std::size_t at = 0; at + 24000 <= heard.size(); at += 2400) {

@@ -18,7 +18,7 @@ CuttingState drill(double rpm, CuttingPhase phase) {
 
 double mix(double a, double b, double t) { return a + (b - a) * t; }
 
-// Every number of `a` and `b` mixed: how a layer's edge passes the drill's cone.
+// Mixes every number of `a` and `b`, as when a layer's edge passes the drill's cone.
 CuttingState between(const CuttingState& a, const CuttingState& b, double t) {
   CuttingState state = t < 1 ? (a.phase == CuttingPhase::cutting ? a : b) : b;
   state.spindle_rpm = mix(a.spindle_rpm, b.spindle_rpm, t);
@@ -57,7 +57,7 @@ CuttingState cancellous_drill(double rpm) {
 }
 
 ScriptedDrilling scripted_drilling() {
-  // The speed droops with the load by the twentieth part that the dissertation's motor shows at most.
+  // The speed droops under load by a twentieth, the most that the dissertation's motor shows.
   const CuttingState off = idle_drill(), free = free_drill(1400), cortical = cortical_drill(1345),
                      cancellous = cancellous_drill(1380);
   CuttingState plunge = cortical;  // the far cortex gives way: no force, and the hand goes on

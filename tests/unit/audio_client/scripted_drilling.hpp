@@ -1,4 +1,4 @@
-// A drilling told in states, as the haptic client would send them at 120 Hz: free, cortical, cancellous, cortical,
+// A drilling given as states, as the haptic client would send them at 120 Hz: free, cortical, cancellous, cortical,
 // breakthrough, free, off. The numbers are those of the expert hand in the reference simulations.
 #pragma once
 #include <vector>
@@ -28,7 +28,7 @@ struct ScriptedDrilling {
 
 // Plays the states one after another, kFramesPerState frames each.
 [[nodiscard]] std::vector<float> play(audio::DrillSynth& synth, const std::vector<CuttingState>& states);
-// Plays one state for so long.
+// Plays one state for a given time.
 [[nodiscard]] std::vector<float> play(audio::DrillSynth& synth, const CuttingState& state, double seconds);
 
 }  // namespace osteon::test

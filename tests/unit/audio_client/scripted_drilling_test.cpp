@@ -1,5 +1,5 @@
-// Fifteen seconds of drilling through both cortices: the sound tells the layers apart. With OSTEON_SOUND_DIR set the
-// recording is kept there for listening.
+// Fifteen seconds of drilling through both cortices: the layers can be distinguished by the sound. With
+// OSTEON_SOUND_DIR set, the recording is saved there for listening.
 #include <gtest/gtest.h>
 #include <sndfile.h>
 
@@ -58,7 +58,7 @@ TEST(ScriptedDrilling, TheEarTellsTheLayersApart) {
   ASSERT_TRUE(recorder->close());
   EXPECT_EQ(recorder->frames_lost(), 0U);
 
-  // What was written is what was played, to half a step of 16 bits and its rounding.
+  // The file equals what was played, to half a step of 16 bits and its rounding.
   double rate_hz = 0;
   const std::vector<float> heard = read_left(file, rate_hz);
   ASSERT_EQ(heard.size(), samples.size());
@@ -66,7 +66,7 @@ TEST(ScriptedDrilling, TheEarTellsTheLayersApart) {
 
   std::map<std::string, double> level_db, bright_hz;
   for (const test::ScriptedPart& part : script.parts) {
-    // Past the knock and the run-down of the part before.
+    // After the knock and the run-down of the part before.
     const double from_s = part.from_s + (part.to_s - part.from_s > 1 ? 0.6 : 0.0);
     const auto from = static_cast<std::size_t>(from_s * rate_hz), to = static_cast<std::size_t>(part.to_s * rate_hz);
     const std::span<const float> piece = std::span(heard).subspan(from, to - from);
@@ -83,7 +83,7 @@ TEST(ScriptedDrilling, TheEarTellsTheLayersApart) {
   EXPECT_NEAR(level_db["free again"], level_db["free"], 1);
   EXPECT_GT(bright_hz["cortical"], bright_hz["cancellous"] + 200);
 
-  // 8.5.4: perforation is a short burst whose energy lies round 200 Hz, then the sound drops to free running.
+  // 8.5.4: perforation is a short burst with energy round 200 Hz. Then the sound drops to free running.
   const test::ScriptedPart& far_part = script.parts[4];
   const test::ScriptedPart& burst = script.parts[5];
   const auto low_db = [&](double from_s, double seconds) {
@@ -102,7 +102,7 @@ TEST(ScriptedDrilling, LinesStandWhereARealGearedDrillHasThem) {
   ASSERT_FALSE(real.empty());
   const std::vector<sound::Peak> real_lines =
       sound::strongest_peaks(sound::power_spectrum(real, rate_hz, 8192), 12, 60);
-  // Its strongest line is twice the output mesh, whose pitch tells the spindle's speed: about 1425 rpm.
+  // Its strongest line is twice the output mesh. The mesh's frequency gives the spindle's speed: about 1425 rpm.
   const double twice_hz = real_lines.front().hz;
   const double rpm = 60.0 * twice_hz / (2 * 48);
   EXPECT_NEAR(rpm, 1425, 15);
@@ -112,7 +112,7 @@ TEST(ScriptedDrilling, LinesStandWhereARealGearedDrillHasThem) {
   static_cast<void>(test::play(synth, test::free_drill(rpm), 0.75));
   const std::vector<float> made = test::play(synth, test::free_drill(rpm), 2.0);
   const sound::Spectrum spectrum = sound::power_spectrum(made, test::kRate_hz, 8192);
-  // The real drill's 2:3:6 lines are harmonics of the output mesh, and stand out of ours by 6 dB or more.
+  // The real drill's 2:3:6 lines are harmonics of the output mesh. In our sound they stand out by 6 dB or more.
   for (const int harmonic : {2, 3, 6}) {
     const double hz = harmonic * twice_hz / 2;
     const double line = sound::band_db(spectrum, hz - 20, hz + 20), beside = sound::band_db(spectrum, hz + 30, hz + 70);

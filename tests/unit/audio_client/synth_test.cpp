@@ -1,4 +1,4 @@
-// The drill's sound as a listener would measure it: the synthesised signal goes through common/sound.
+// Measures the drill's sound as a listener would: the synthesised signal goes through common/sound.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ DrillSynth make_synth(std::uint64_t seed = 1, const VoiceParams& voice = {}) {
   return synth;
 }
 
-// Without noise and flutter, what is left is the partials alone.
+// Without noise and flutter, only the partials are left.
 constexpr VoiceParams kPure{.noise = 0, .flutter = 0};
 
 CuttingState burr(double rpm, double density_g_cm3) {
@@ -68,14 +68,14 @@ TEST_P(SpindleSpeed, PartialsAreLockedToTheSpindle) {
   for (const double ratio :
        {gears.output_mesh(), 2 * gears.output_mesh(), gears.motor_mesh(), 3 * kCommutatorSegments * gears.motor()}) {
     const double hz = ratio * spindle_hz;
-    // One second of a line in noise: far better than the 1 Hz of a plain spectrum.
+    // One second of a line in noise: far more accurate than the 1 Hz of a plain spectrum.
     EXPECT_NEAR(sound::find_tone(samples, kRate_hz, hz - 15, hz + 15).hz, hz, 0.05) << "ratio " << ratio;
   }
 }
 INSTANTIATE_TEST_SUITE_P(Drills, SpindleSpeed, testing::Values(600.0, 1000.0, 1345.0, 1400.0));
 
 TEST(DrillSound, PitchDroopsWithTheSpindleUnderLoad) {
-  // The state's spindle speed carries the droop: the sound repeats it, line by line.
+  // The state's spindle speed includes the droop. The sound repeats it, line by line.
   DrillSynth synth = make_synth();
   static_cast<void>(play(synth, free_drill(1000), 0.75));
   const std::vector<float> samples = play(synth, cortical_drill(955), 1.0);
@@ -92,7 +92,7 @@ TEST(DrillSound, GrowsFromFreeOverCancellousToCortical) {
   // 8.6.3: 3 dB to 5 dB are an obvious difference in loudness.
   EXPECT_GT(cancellous_db, free_db + 3);
   EXPECT_GT(cortical_db, cancellous_db + 4);
-  EXPECT_LT(cortical_db, -10) << "room for other tools";
+  EXPECT_LT(cortical_db, -10) << "leaves level for other tools";
 }
 
 TEST(DrillSound, CorticalIsBrighterThanCancellous) {
@@ -110,7 +110,7 @@ TEST(DrillSound, CorticalIsBrighterThanCancellous) {
 }
 
 TEST(DrillSound, MotorLeadsWhereThereIsLoadOrNoneAndTheGearsBetween) {
-  // 8.5.4: 5500 Hz before 4000 Hz free and cortical, the other way round cancellous.
+  // 8.5.4: free and cortical, 5500 Hz is stronger than 4000 Hz. Cancellous, it is the other way round.
   constexpr Gearbox gears;
   const auto lead_db = [&](const CuttingState& state) {
     const std::vector<float> samples = steady(state);
@@ -146,7 +146,7 @@ TEST(DrillSound, SlowlyCutIsQuieterAtEqualDensity) {
 
 TEST(DrillSound, ChipsAreHeardBesideTheLines) {
   const auto noise = [](const VoiceParams& voice) {
-    // A rest of one second at a speed that puts no line between 6300 and 6600 Hz.
+    // The remaining level of one second, at a speed without lines between 6300 and 6600 Hz.
     return sound::band_db(sound::power_spectrum(steady(cortical_drill(1345), voice), kRate_hz), 6300, 6400);
   };
   EXPECT_GT(noise({}), noise(kPure) + 10);
@@ -166,7 +166,7 @@ TEST(BurrSound, PartialsFollowTheSpindleAndGrowWithDensity) {
 }
 
 TEST(BurrSound, HighestSpeedsDoNotFoldBack) {
-  // Every line must lie on a partial; the folded 24 kHz and 32 kHz of a 60 000 rpm burr would stand at 24 and 16 kHz,
+  // Every line must lie on a partial. The folded 24 kHz and 32 kHz of a 60 000 rpm burr would be at 24 and 16 kHz,
   // those of 57 000 rpm at 17.6 kHz.
   for (const double rpm : {57000.0, 60000.0, 90000.0}) {
     const std::vector<float> samples = steady(burr(rpm, 1.9), kPure);
@@ -191,7 +191,7 @@ TEST(BurrSound, HighestSpeedsDoNotFoldBack) {
 TEST(DrillSound, RunsUpAndDownInsteadOfJumping) {
   DrillSynth synth = make_synth();
   const std::vector<float> up = play(synth, free_drill(1400), 0.5);
-  // Half way up after half of the run-up time: the mesh lies near half of its pitch, and the level is below the last.
+  // After half of the run-up time: the mesh is near half of its frequency, and the level is below the final one.
   const auto part = [&](double from_s, double to_s) {
     return std::vector<float>(up.begin() + static_cast<int>(from_s * kRate_hz),
                               up.begin() + static_cast<int>(to_s * kRate_hz));
@@ -205,13 +205,13 @@ TEST(DrillSound, RunsUpAndDownInsteadOfJumping) {
 }
 
 TEST(DrillSound, KnocksWhenBoneGivesWayAndNotWhenDrawnBack) {
-  // 8.5.4: perforation is a burst of energy round 200 Hz, here against the running drill alone.
+  // 8.5.4: perforation is a burst of energy round 200 Hz, compared here with the running drill alone.
   const auto low_after_db = [](const CuttingState& last) {
     DrillSynth synth = make_synth(1, kPure);
     static_cast<void>(play(synth, cortical_drill(1345), 0.75));
     if (last.phase != CuttingPhase::cutting) static_cast<void>(play(synth, last, 1.0));
     const std::vector<float> after = play(synth, free_drill(1345), 0.1);
-    // Past the fall of the load itself, within the knock's decay.
+    // After the fall of the load itself, and within the knock's decay.
     return sound::band_db(sound::power_spectrum(std::span(after).subspan(1200, 2048), kRate_hz, 2048), 100, 300);
   };
   CuttingState drawn_back = cortical_drill(1345);
@@ -267,13 +267,13 @@ TEST(DrillSound, EqualSeedsMakeEqualSamplesWhateverTheBlocks) {
 }
 
 TEST(DrillSound, ParametersMoveWithoutClicks) {
-  // The largest slope of the steady sounds bounds that of a change between them; a click would stand out of it.
+  // The largest slope of the steady sounds bounds that of a change between them. A click would exceed it.
   const auto step_of = [](const CuttingState& state) { return sound::largest_step(steady(state, kPure)); };
   const double steady_step = std::max(step_of(cortical_drill(1345)), step_of(free_drill(1400)));
   DrillSynth synth = make_synth(1, kPure);
   static_cast<void>(play(synth, free_drill(1400), 0.75));
   for (int i = 0; i < 10; ++i) {
-    // Contact lost and found within one state, the worst that a stream can bring.
+    // Contact lost and found again within one state: the worst that a stream can bring.
     EXPECT_LT(sound::largest_step(play(synth, cortical_drill(1345), 0.1)), 1.25 * steady_step);
     EXPECT_LT(sound::largest_step(play(synth, free_drill(1400), 0.1)), 1.25 * steady_step);
   }
@@ -350,7 +350,7 @@ TEST(DrillSound, ProcessDoesNotAllocate) {
   synth.reset();
   EXPECT_EQ(heap.count(), 0);
   delete static_cast<int*>(::operator new(sizeof(int)));
-  EXPECT_GT(heap.count(), 0) << "the counter counts";
+  EXPECT_GT(heap.count(), 0) << "the counter works";
 }
 
 TEST(Limiter, LeavesWhatFitsAndHoldsWhatDoesNot) {

@@ -70,7 +70,7 @@ TEST(BoundedText, IsOneLineOfSoManyBytes) {
   EXPECT_EQ(bounded_text("a\nb\x1b[2J\x7f\t\xc2\x9b"), "a b [2J    ");
   EXPECT_EQ(bounded_text(std::string(5000, 'x')).size(), kMostErrorBytes + 4);
   EXPECT_EQ(bounded_text("abcdef", 3), "abc ...");
-  EXPECT_EQ(bounded_text("abä", 3), "ab ...") << "a letter in halves";
+  EXPECT_EQ(bounded_text("abä", 3), "ab ...") << "a character must not be split";
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 constexpr double kPitch = 0.5;
 constexpr double kFine = 0.125;  // pitch of level 2
 
-// Bodies of this test's own, so that what the kernel gives does not depend on the tool box.
+// Bodies of this test's own, so that the kernel's results do not depend on the tool box.
 std::int32_t q(double mm) { return static_cast<std::int32_t>(std::lround(mm / kQuantum_mm)); }
 
 CutBody ball(double radius) {
@@ -124,7 +124,7 @@ double distance_to(const CutBody& body, const Vec3& p) {
   return body.dome > 0 ? std::max(outline, ball_at_tip(mm(body.dome))) : outline;
 }
 
-// The other road to a sweep's distance: the nearest of many poses between the two.
+// Another way to compute a sweep's distance: the nearest of many poses between the two ends.
 double nearest_pose_distance(const CutBody& body, const Pose& a, const Pose& b, const Vec3& point, int poses) {
   double nearest = 1e9;
   for (int i = 0; i <= poses; ++i) {
@@ -156,8 +156,8 @@ std::vector<Vec3> points_around(const Vec3& centre, double reach, int count, uns
   return points;
 }
 
-// Where the sweep's distance says outside it must be that of the nearest pose. Inside, the swept volume's own surface
-// is at least as far as that of any one pose.
+// Where the sweep's distance says outside, it must be that of the nearest pose. Inside, the surface of the swept volume
+// is at least as far as that of any single pose.
 void expect_sweep_matches(const CutBody& body, const Pose& a, const Pose& b, double tolerance_mm,
                           bool exact_inside = false) {
   const SweptTool swept(cut_along({a, b}), body, kPitch);
@@ -178,9 +178,9 @@ void expect_sweep_matches(const CutBody& body, const Pose& a, const Pose& b, dou
   EXPECT_GT(inside, 5);
 }
 
-// Poses, axes and places are rounded to a quantum each, and 2000 poses leave a little.
+// Poses, axes and positions are each rounded to a quantum, and 2000 poses leave a little error.
 constexpr double kExact_mm = 4.0 * kQuantum_mm;
-// The search of an oblique motion.
+// Tolerance of the search for an oblique motion.
 constexpr double kSearched_mm = 0.03 * kFine + kExact_mm;
 
 TEST(Kernel, ASphereSweptAlongALineIsACapsule) {
@@ -202,7 +202,7 @@ TEST_P(TurnedSweep, AlongItsAxisIsExact) {
 }
 
 TEST_P(TurnedSweep, AcrossItsAxisIsExactWithoutScallops) {
-  const bool ring = GetParam() == hollow_mill;  // in steps of a quarter pitch: off by half of one
+  const bool ring = GetParam() == hollow_mill;  // in steps of a quarter pitch, so wrong by half a step
   expect_sweep_matches(GetParam()(), pose_along({0, 0, 0}, {0, 0, -1}), pose_along({4, 2, 0}, {0, 0, -1}),
                        kExact_mm + (ring ? 0.125 * kFine : 0.0), !ring);
 }
@@ -232,8 +232,8 @@ TEST(Kernel, ATurnedBodysSpinMovesNothing) {
   EXPECT_GT(SweptTool(cut_along({a, b}), blade(), kPitch).sweeps().size(), 20u);
 }
 
-// The zero of a swept hull is that of its poses, and the distance never exceeds the true one: outside no pose's planes
-// are farther, and it grows by no more than the way (below).
+// The zero surface of a swept hull is that of its poses, and the distance never exceeds the true one. Outside, no
+// pose's planes are farther, and the distance grows by no more than the way (below).
 TEST(Kernel, AHullSweptIsTheUnionOfItsPoses) {
   for (const CutBody& body : {blade(), wedge()})
     for (const Vec3& way : {Vec3{3, 0, 0}, Vec3{0, 0, -2}, Vec3{0, 1.5, 0}, Vec3{2, 1, -1}, Vec3{-0.1, 0.02, 0.05}}) {
@@ -259,7 +259,7 @@ TEST(Kernel, AHullSweptIsTheUnionOfItsPoses) {
     }
 }
 
-// Along the blade, across it, and obliquely in its plane: what is left open is its thickness.
+// Along the blade, across it, and obliquely in its plane: the kerf is as wide as the blade's thickness.
 TEST(Kernel, ABladesKerfIsItsThickness) {
   for (const Vec3& way : {Vec3{5, 0, 0}, Vec3{0, 0, -5}, Vec3{3, 0, -4}}) {
     const Pose a = pose_along({0, 0, 0}, {0, 0, -1});
@@ -280,7 +280,7 @@ TEST(Kernel, ASampledBallCutsAsABall) {
   for (const Vec3& p : points_around(a.point({0, 0, -2}), 4.0, 500, 9)) {
     const double ball_mm = static_cast<double>(exact.distance_mm(p)),
                  lattice_mm = static_cast<double>(sampled.distance_mm(p));
-    // Half a step of the sub-poses and the curvature within a cell; beyond the lattice only a bound is known.
+    // Half a step of the sub-poses, and the curvature within a cell. Beyond the lattice only a bound is known.
     if (ball_mm > 0.9) {
       ASSERT_LE(lattice_mm, ball_mm + 0.02);
       ASSERT_GE(lattice_mm, 0.85);
@@ -317,8 +317,8 @@ std::vector<Motion> motions() {
   return all;
 }
 
-// Everything that is passed over without being evaluated (sweeps, leaves, edges, planes, rows) must not matter.
-// A kernel without optimisation takes ten times as long for each leaf. The optimised builds look at all of them.
+// Everything that is skipped without evaluation (sweeps, leaves, edges, planes, rows) must not matter.
+// A kernel without optimisation takes ten times as long for each leaf. The optimised builds check all of them.
 #ifdef OSTEON_KERNEL_IS_SLOW
 constexpr std::int32_t kEveryLeaf = 5;
 #else
@@ -346,13 +346,13 @@ TEST(Kernel, WhatIsPassedOverChangesNothing) {
           for (int i = 0; i < kLeafVoxels; i += 19) {
             const Vec3 p = position_mm(origin + Coord{i / 64, i / 8 % 8, i % 8}, kFine);
             const float exact = std::clamp(swept.distance_mm(p), -band, band);
-            // Beyond the box of the body only a bound is known of hulls, and lattices are off by their interpolation.
+            // Beyond the body's box only a bound is known for hulls, and lattices are wrong by their interpolation.
             if (!listed && exact < band) continue;
             ASSERT_NEAR(values[static_cast<std::size_t>(i)], exact, 0.52 * kQuantum_mm)
                 << motion.name << ' ' << p.transpose();
           }
           if (!listed) continue;
-          // The same after another cut has gone there: the lower of both, whatever the kernel spared itself.
+          // The same after another cut at the same position: the lower of both, whatever the kernel skipped.
           const float level = std::uniform_real_distribution<float>(-band, band)(random);
           after_others.fill(std::round(level * 1024.0f) / 1024.0f);
           const auto before = after_others;
@@ -384,7 +384,7 @@ TEST(Kernel, StoredValuesAreWholeQuantaNeverMinusZeroAndGrowNoFasterThanTheWay) 
         ASSERT_EQ(v * 1024.0f, std::round(v * 1024.0f));
         ASSERT_LE(std::abs(v), band);
         ASSERT_NE(std::bit_cast<std::uint32_t>(v), 0x80000000u);
-        // Two roundings; 0.03 pitches of the search on each side.
+        // Two roundings, and 0.03 pitches of the search on each side.
         const float most = static_cast<float>(kFine * 1.06 + 2.0 * kQuantum_mm);
         if (i % 8 != 7) {
           ASSERT_LE(std::abs(values[i + 1] - v), most) << motion.name;
@@ -400,7 +400,7 @@ TEST(Kernel, StoredValuesAreWholeQuantaNeverMinusZeroAndGrowNoFasterThanTheWay) 
   }
 }
 
-// A 2 mm burr swung by 20 mm in one cut, its tip on an arc: the groove's bottom and sides are those of the arc.
+// A 2 mm burr swung by 20 mm in one cut, with its tip on an arc. The groove's bottom and sides are those of the arc.
 TEST(Kernel, AWideSwingLeavesACleanGroove) {
   const double radius = 25.0;
   const double angle = 20.0 / radius;
@@ -415,16 +415,16 @@ TEST(Kernel, AWideSwingLeavesACleanGroove) {
     const Vec3 out{std::sin(t), 0, -std::cos(t)};
     const double bottom = static_cast<double>(swept.distance_mm(radius * out));  // the tip's path
     const double side =
-        static_cast<double>(swept.distance_mm((radius - 1.0) * out + Vec3(0, 1.0, 0)));  // a radius aside
+        static_cast<double>(swept.distance_mm((radius - 1.0) * out + Vec3(0, 1.0, 0)));  // a radius to the side
     least = std::min({least, bottom, side});
     most = std::max({most, bottom, side});
   }
-  // Chords between the knots leave the arc by l²/8r = 0.014 mm; nothing else may be seen.
+  // Chords between the knots differ from the arc by l²/8r = 0.014 mm. No other error may be visible.
   const double chord = 20.0 / 12, sagitta = chord * chord / (8.0 * (radius - 1.0));
   EXPECT_LE(most, sagitta + 3.0 * kQuantum_mm);
   EXPECT_GE(least, -3.0 * kQuantum_mm);
 
-  // A straight swing has no chords: the groove is true to the rounding.
+  // A straight swing has no chords: the groove is exact to the rounding.
   const SweptTool straight(cut_along({pose_along({-10, 0, 0}, {0, 0, -1}), pose_along({10, 0, 0}, {0, 0, -1})}),
                            ball(1.0), kPitch);
   for (double x = -9.9; x < 9.9; x += 0.013) {
@@ -490,7 +490,8 @@ TEST(Kernel, TheFieldIsAFunctionOfTheSetOfCuts) {
     std::ranges::shuffle(cuts, random);
     CutSet shuffled;
     for (const BodyCut& c : cuts) shuffled.apply(c.cut, c.body);
-    for (std::size_t i = 0; i < cuts.size(); i += 3) shuffled.apply(cuts[i].cut, cuts[i].body);  // some come twice
+    // some are applied twice
+    for (std::size_t i = 0; i < cuts.size(); i += 3) shuffled.apply(cuts[i].cut, cuts[i].body);
     EXPECT_EQ(shuffled.hash(), in_order.hash());
   }
   CutSet fewer;
@@ -498,8 +499,8 @@ TEST(Kernel, TheFieldIsAFunctionOfTheSetOfCuts) {
   EXPECT_NE(fewer.hash(), in_order.hash());
 }
 
-// The value was written down once; gcc and clang, optimised or not, with and without AVX, and every width of registers
-// that the processor has, must all give it. It changes only together with kKernelVersion.
+// The value was recorded once. gcc and clang, optimised or not, with and without AVX, and every register width that the
+// processor has, must all give it. It changes only together with kKernelVersion.
 TEST(Kernel, EqualCutsGiveEqualBytesOnEveryCompilerAndProcessor) {
   for (const int lanes : {4, 8, 16}) {
     const int used = limit_kernel_lanes(lanes);

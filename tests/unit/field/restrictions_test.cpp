@@ -24,14 +24,14 @@ Cut cut_at(std::initializer_list<std::array<std::int32_t, 3>> points, std::uint8
 TEST(ZoneLimit, IsABall) {
   const ZoneLimit zone{{1000, -2000, 3000}, 500};
   EXPECT_TRUE(zone.contains({1000, -2000, 3000}));
-  EXPECT_TRUE(zone.contains({1500, -2000, 3000})) << "its surface is in it";
+  EXPECT_TRUE(zone.contains({1500, -2000, 3000})) << "its surface belongs to the zone";
   EXPECT_FALSE(zone.contains({1501, -2000, 3000}));
   EXPECT_TRUE(zone.contains({1300, -2400, 3000})) << "3 4 5";
   EXPECT_FALSE(zone.contains({1301, -2400, 3000}));
-  EXPECT_FALSE(zone.contains({1400, -2400, 3400})) << "within the cube, not the ball";
+  EXPECT_FALSE(zone.contains({1400, -2400, 3400})) << "in the cube, but not in the ball";
 }
 
-// As far apart as numbers go, squares do not wrap round.
+// At the largest possible distances, squares do not overflow.
 TEST(ZoneLimit, HoldsAtTheEndsOfTheNumbers) {
   constexpr std::int32_t kLow = std::numeric_limits<std::int32_t>::min(),
                          kHigh = std::numeric_limits<std::int32_t>::max();
@@ -45,7 +45,7 @@ TEST(ZoneLimit, HoldsAtTheEndsOfTheNumbers) {
 TEST(Restrictions, WhatItForbids) {
   const Cut cut = cut_at({{0, 0, 0}, {100, 0, 0}});
   EXPECT_EQ(breach({}, cut), Rejection::none);
-  EXPECT_EQ(breach({.force_limit = 1, .words = "gently"}, cut), Rejection::none) << "felt, not judged";
+  EXPECT_EQ(breach({.force_limit = 1, .words = "gently"}, cut), Rejection::none) << "limits the force, not the cut";
   EXPECT_EQ(breach({.stopped = true}, cut), Rejection::frozen);
   EXPECT_EQ(breach({.taken_by = {3}}, cut), Rejection::taken);
   EXPECT_EQ(breach({.stopped = true, .taken_by = {3}}, cut), Rejection::frozen);
@@ -53,7 +53,7 @@ TEST(Restrictions, WhatItForbids) {
   EXPECT_EQ(breach({.tools = {digest(0), digest(2)}}, cut), Rejection::forbidden_tool);
   EXPECT_EQ(breach({.zone = ZoneLimit{{0, 0, 0}, 100}}, cut), Rejection::none);
   EXPECT_EQ(breach({.zone = ZoneLimit{{0, 0, 0}, 99}}, cut), Rejection::zone) << "its last pose is outside";
-  EXPECT_EQ(breach({.zone = ZoneLimit{{100, 0, 0}, 99}}, cut), Rejection::zone) << "its first is";
+  EXPECT_EQ(breach({.zone = ZoneLimit{{100, 0, 0}, 99}}, cut), Rejection::zone) << "its first pose is outside";
   EXPECT_TRUE(Restrictions{}.may_cut());
   EXPECT_FALSE((Restrictions{.stopped = true}.may_cut()));
   EXPECT_FALSE((Restrictions{.taken_by = {1}}.may_cut()));

@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A box from the origin, outwards turned.
+// A box from the origin, with triangles that face outwards.
 TriangleMesh box_mesh(float x, float y, float z) {
   TriangleMesh mesh;
   for (int i = 0; i < 8; ++i) mesh.positions_mm.push_back({i & 1 ? x : 0.0f, i & 2 ? y : 0.0f, i & 4 ? z : 0.0f});
@@ -46,11 +46,11 @@ TEST(TriangleMesh, ABoxIsClosedAndHasItsVolumeAndArea) {
   EXPECT_EQ(open_edges(turned), 3u);
 }
 
-// Two boxes that touch in an edge alone: it has four triangles.
+// Two boxes that touch only in an edge. The edge has four triangles.
 TEST(TriangleMesh, AnEdgeOfFourTrianglesIsClosedAndNotManifold) {
   TriangleMesh mesh = box_mesh(1, 1, 1);
   EXPECT_EQ(to_text(edge_faults(mesh)), "0 open edges");
-  // The second box is turned by half about the edge x = y = 1 of the first, whose corners 3 and 7 it shares.
+  // The second box is turned by half a turn about the edge x = y = 1 of the first, whose corners 3 and 7 it shares.
   const std::array<std::uint32_t, 8> corner = {8, 9, 10, 3, 11, 12, 13, 7};
   for (const float z : {0.0f, 1.0f})
     for (const auto& [x, y] : {std::pair(2.0f, 2.0f), std::pair(1.0f, 2.0f), std::pair(2.0f, 1.0f)})
@@ -61,7 +61,7 @@ TEST(TriangleMesh, AnEdgeOfFourTrianglesIsClosedAndNotManifold) {
   EXPECT_EQ(edge_faults(mesh).open, 0u);
   EXPECT_EQ(edge_faults(mesh).non_manifold, 1u);
   EXPECT_EQ(to_text(edge_faults(mesh)), "0 open edges, 1 non-manifold edge");
-  // Without one of the four triangles it is open, and no longer counted as the other.
+  // Without one of the four triangles the mesh is open, and no longer counts as non-manifold only.
   mesh.triangles.erase(mesh.triangles.begin() + 11);
   EXPECT_EQ(edge_faults(mesh).open, 3u);
   EXPECT_EQ(edge_faults(mesh).non_manifold, 0u);
@@ -110,7 +110,7 @@ TEST(MeshFile, PlyAndObjHoldWhatTheMeshHolds) {
   ASSERT_TRUE(write_mesh(mesh, folder / "b.ply"));
   const std::string shaded = text_of(folder / "b.ply");
   EXPECT_EQ(shaded.size() - shaded.find("end_header\n") - 11, 8u * 24u + 12u * 13u);
-  // The last vertex, (1, 1, 1), lies before its normal and the faces.
+  // The last vertex, (1, 1, 1), is before its normal and the faces.
   float last[3];
   std::memcpy(last, shaded.data() + shaded.size() - 12 * 13 - 24, sizeof last);
   EXPECT_EQ(last[0] + last[1] + last[2], 3.0f);

@@ -9,7 +9,7 @@
 namespace osteon {
 namespace {
 
-// The least distance to points of the triangle that lie densely on it: an upper bound, at most half a step too large.
+// Least distance to points that lie densely on the triangle: an upper bound, at most half a step too large.
 double by_sampling(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c, int steps) {
   double least = 1e300;
   for (int i = 0; i <= steps; ++i)
@@ -45,7 +45,8 @@ TEST(SegmentDistance, IsThatOfThePointWhereBothEndsAreOne) {
   EXPECT_EQ(squared_distance_to_segment<double>(p, end, Vec3(1, 9, 0)), 9.0);
 }
 
-// Corners that coincide, two or all, and corners in a line: what the corner at a voxel on the threshold makes.
+// Two or all corners coincide, or the corners are in a line: triangles that come from a corner at a voxel on the
+// threshold.
 TEST(TriangleDistance, IsFiniteAndRightWithoutArea) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> place(-2.0, 2.0);

@@ -1,4 +1,4 @@
-// Every tool that is fed along its axis makes the hole of its own shape, and comes out of it without jamming.
+// Every tool that is fed along its axis must make a hole of its own shape and come out of it without jamming.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,11 +35,11 @@ TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
   EXPECT_TRUE(bench.session().surgeon().results()[0].completed);
   EXPECT_GE(work_min, 0.0);
   EXPECT_EQ(out_n, 0.0);
-  // The rig lets go when the tool is there; while it draws back, the coupling's stretch still pushes.
+  // The rig stops feeding when the tool is deep enough. While it draws back, the coupling's stretch still pushes.
   EXPECT_GE(deepest, which.to_mm);
   EXPECT_LT(deepest, which.to_mm + 1.5);
 
-  // Another road to the same hole: the tool swept straight from above to the deepest place.
+  // Another way to the same hole: sweeps the tool straight from above to the deepest point.
   const Tool tool = *find_tool(which.tool);
   CutField swept(bone, BodyId{});
   Cut cut;
@@ -66,9 +66,10 @@ INSTANTIATE_TEST_SUITE_P(All, AxialTool,
                            return name;
                          });
 
-// The end drill of 9.5 mm asks for 146 N at 2 mm/s in cortical bone; a device that shows 60 N feeds it as slowly as
-// Chi's law says for that force, however far ahead the rig is: 0.36 mm/s at 600 rpm, less 6 % of the speed under its
-// 142 N mm. The slack rule lets the rest of the way go. At its end the rig waits, with what stretch there is left.
+// The end drill of 9.5 mm needs 146 N at 2 mm/s in cortical bone. A device that shows 60 N feeds it at the speed that
+// Chi's law gives for that force, however far ahead the rig is: 0.36 mm/s at 600 rpm, less the 6 % of the speed lost
+// under its torque of 142 N mm.
+// The slack rule drops the rest of the way. At its end the rig waits with the remaining stretch.
 TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
   PlanStep step = straight_down("end-drill", HandKind::rig);
   step.feed_mm_per_s = 2;
@@ -96,8 +97,8 @@ TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
   EXPECT_NEAR(got, feed, 0.03 * feed);  // it blunts by 1 % on the way
 }
 
-// What the proxy takes for cut is what the kernel cuts: the outline's sign against the field's, on both sides of the
-// wall.
+// What the proxy takes as cut must be what the kernel cuts. Compares the sign of the outline with that of the field on
+// both sides of the wall.
 TEST(SweptOutline, HasTheSignOfTheCut) {
   const Case bone = block_case(24.0);
   for (const char* name : {"drill-3.2", "end-drill", "pin-1", "reamer-cylinder"}) {
@@ -124,7 +125,8 @@ TEST(SweptOutline, HasTheSignOfTheCut) {
   }
 }
 
-// A screw goes in by its pitch a turn, until its head is on the bone, and stays; so does a pin that is left.
+// A screw advances by its pitch per turn until its head is on the bone, and stays there. A pin that is let go stays
+// too.
 TEST(ScrewStep, FollowsItsThreadAndStays) {
   PlanStep step;
   step.action = Action::screw;
@@ -154,8 +156,8 @@ TEST(ScrewStep, FollowsItsThreadAndStays) {
   ASSERT_TRUE(bench.session().done());
   const std::vector<LeftItem>& left = bench.session().surgeon().left();
   ASSERT_EQ(left.size(), 2u);
-  // 240 turns a minute of 1.25 mm each are 5 mm/s: never more, and a little less where the driver droops under its
-  // torque.
+  // 240 turns a minute of 1.25 mm each are 5 mm/s. It is never more, and a little less because the driver droops under
+  // its torque.
   const double advance_mm_per_s = (last_mm - first_mm) / (last_s - first_s),
                thread_mm_per_s = screw.thread_pitch_mm * 4.0;
   EXPECT_LE(advance_mm_per_s, thread_mm_per_s);

@@ -1,4 +1,4 @@
-// A whole haptic client without threads: session, replica and patches on virtual time, with the delays of real ones.
+// A complete haptic client without threads: session, replica and patches on virtual time, with the delays of real ones.
 #pragma once
 #include <deque>
 #include <functional>
@@ -12,16 +12,16 @@
 
 namespace osteon::haptic::test {
 
-// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³. It is entered along +z. `pitch_mm`: h, a part of
-// 5 mm.
+// A block across z = 0 … 30 mm: layers 5/20/5 mm at 1.9/0.3/1.9 g/cm³. It is entered along +z. `pitch_mm`: h, which
+// must divide 5 mm.
 [[nodiscard]] Case block_case(double width_mm = 12.0, double pitch_mm = 0.5);
 
-// A step straight down into it, at a place that falls on no sample.
+// A step straight down into it, at a point that falls on no sample.
 [[nodiscard]] PlanStep straight_down(const std::string& tool, HandKind hand = HandKind::expert);
 
 struct BenchDelays {
   int patch_ticks = 12;   // between two patches
-  int commit_ticks = 25;  // from closing a cut until the room confirms it
+  int commit_ticks = 25;  // from closing a cut until the room acknowledges it
 };
 
 class Bench {
@@ -31,11 +31,12 @@ class Bench {
   Bench(const Case& bone, ReadyPlan plan, const SimulatedDeviceParams& device = {}, double force_scale = 0.0,
         const BenchDelays& delays = {}, double dt_s = 1e-3);
 
-  // One tick of `dt_s`, `periods` of them after the last; `after_tick` sees it before replica and patches follow.
+  // Runs one tick of `dt_s`, `periods` ticks after the last. `after_tick` sees the result before replica and patches
+  // are updated.
   SessionTick tick(int periods = 1);
-  // Until the plan is done and every cut confirmed.
+  // Runs until the plan is done and every cut is acknowledged.
   void run(const std::function<void(const SessionTick&)>& after_tick = {});
-  void follow();  // replica and patch, as their thread would
+  void follow();  // updates replica and patch, as their thread would
 
   [[nodiscard]] SimulatedSession& session() { return session_; }
   [[nodiscard]] const Replica& replica() const { return replica_; }

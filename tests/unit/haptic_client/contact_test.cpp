@@ -1,4 +1,5 @@
-// Many points in one pass find what each finds alone, for every width of registers, and add up to closed forms.
+// Many points in one pass must find what each finds alone, for every width of registers. Their sums must agree with
+// closed forms.
 #include "haptic_client/control/contact.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +22,7 @@ struct Widest {
   ~Widest() { limit_contact_lanes(kAllLanes); }
 };
 
-// A block with a drilled hole, the burr half in it.
+// A block with a drilled hole, and a burr half in it.
 class ContactOnBlock : public ::testing::Test {
  protected:
   ContactOnBlock()
@@ -55,7 +56,7 @@ class ContactOnBlock : public ::testing::Test {
   ContactValues values_;
 };
 
-// To the block: 16 mm square, 30 mm deep.
+// Distance to the block: 16 mm square, 30 mm deep.
 double to_block_mm(const Vec3& p) {
   return Vec3(std::max(0.0, std::abs(p.x()) - 8.0), std::max(0.0, std::abs(p.y()) - 8.0),
               std::max({0.0, -p.z(), p.z() - 30.0}))
@@ -67,7 +68,7 @@ Pose pose_of(osteon::test::Random& random) {
   return {tip, Eigen::Quaterniond(Eigen::AngleAxisd(random.between(-0.6, 0.6), random.direction()))};
 }
 
-// Floats relative to a corner of the patch: a hundred-thousandth of a millimetre in place, slopes of about one.
+// Floats relative to a corner of the patch: a hundred-thousandth of a millimetre in position, slopes of about one.
 TEST_F(ContactOnBlock, FindsWhatEachPointFindsAlone) {
   osteon::test::Random random(3);
   int near = 0, in_bone = 0, coarse = 0;
@@ -99,7 +100,7 @@ TEST_F(ContactOnBlock, FindsWhatEachPointFindsAlone) {
         ++in_bone;
         EXPECT_NEAR(static_cast<double>(values_.density_g_cm3[at]), patch_.density_at(p), 1e-4);
       }
-      // The gradient of the cell, where a step does not leave it.
+      // The gradient of the cell, if the step does not leave the cell.
       const double step = 1e-3;
       const Vec3 gradient(values_.gx[at], values_.gy[at], values_.gz[at]);
       const Vec3 cell = p / model_.fine_pitch_mm, part = cell.array() - cell.array().floor();
@@ -153,7 +154,7 @@ TEST_F(ContactOnBlock, EveryWidthGivesTheSameNumbers) {
   std::printf("  %d comparisons with registers of 4\n", widths);
 }
 
-// The sums against a loop over the points in doubles, and against what a half-immersed ball is known to have.
+// Compares the sums with a loop over the points in doubles, and with the known values of a half-immersed ball.
 TEST_F(ContactOnBlock, SumsAreThoseOfThePoints) {
   osteon::test::Random random(7);
   for (int trial = 0; trial < 20; ++trial) {
@@ -187,7 +188,7 @@ TEST_F(ContactOnBlock, SumsAreThoseOfThePoints) {
       torque -= share * density * p.inset_mm.cross(p.outward);
     }
     EXPECT_NEAR(sums.area_mm2, area, 1e-3 * area);
-    // A point within a ten-thousandth of a millimetre of the surface may count or not.
+    // A point within a ten-thousandth of a millimetre of the surface may or may not count.
     EXPECT_NEAR(sums.engaged_mm2, engaged, 2e-3 * area);
     EXPECT_NEAR(sums.density_mm2, density_mm2, 4e-3 * area);
     EXPECT_NEAR(sums.milling, milling, 3e-3 * (milling + 100.0));
@@ -196,8 +197,8 @@ TEST_F(ContactOnBlock, SumsAreThoseOfThePoints) {
   }
 }
 
-// A ball with its middle on the face of the block, going along the face: half of its disc is in bone, and by symmetry
-// its moment about the line of the feed through its middle is none.
+// A ball with its middle on the face of the block moves along the face. Half of its disc is in bone. By symmetry it has
+// no moment about the line of the feed through its middle.
 TEST_F(ContactOnBlock, AHalfImmersedBallHasHalfItsDisc) {
   ContactQuery query;
   query.pose_bone_tool = {{4.5, 3.0, 2.5}, Eigen::Quaterniond::Identity()};
@@ -216,7 +217,7 @@ TEST_F(ContactOnBlock, AHalfImmersedBallHasHalfItsDisc) {
   EXPECT_LT(sums.force.x(), 0.0);
 }
 
-// Groups that the clearance keeps away are passed over, and nothing that touches is lost by it.
+// Groups that are far by the clearance are skipped. Nothing that touches may be lost by it.
 TEST_F(ContactOnBlock, ClearancePassesOverWhatIsFarOnly) {
   osteon::test::Random random(9);
   int passed = 0;
@@ -236,14 +237,14 @@ TEST_F(ContactOnBlock, ClearancePassesOverWhatIsFarOnly) {
         EXPECT_EQ(with.distance_mm[at], values_.distance_mm[at]);
       } else {
         passed += with.distance_mm[at] != values_.distance_mm[at];
-        // A lower bound, and no point in reach of bone is among them.
+        // The clearance is a lower bound, and none of the skipped points is within reach of bone.
         const Vec3 p = query.pose_bone_tool.point(point(i).inset_mm);
         EXPECT_GT(field_.solid_mm(p), query.margin_mm - 0.2);
       }
     }
   }
   EXPECT_GT(passed, 500);
-  // Where neither bone nor clearance is known, that is said.
+  // The result says when neither bone nor clearance is known.
   ContactQuery query;
   query.pose_bone_tool.position_mm = {0, 0, 200};
   evaluate(query);

@@ -1,4 +1,4 @@
-// The coupling's rules, each from its own arithmetic: the energy account, slack, offset, smoothing; and the motor's
+// Tests the coupling's rules, each by its own arithmetic: energy ledger, slack, offset, smoothing, and the motor's
 // port.
 #include "haptic_client/control/coupling.hpp"
 
@@ -20,9 +20,9 @@ constexpr double kT = 1e-3;
 
 constexpr double kArm_mm = 20.0;  // of a turn
 
-// A sampled wall, spring and damper, whose force is held for a tick: what it gives a handle that is thrown about at
-// random with no more than `most_mm_per_s2`. Most of one contact, mJ. `turned`: the same about an axis, at the arm of a
-// turn.
+// A sampled wall with spring and damper, whose force is held for a tick. Returns the energy that it gives to a handle
+// that is thrown about at random with no more than `most_mm_per_s2`. Most of one contact, mJ. `turned`: the same about
+// an axis, at the arm of a turn.
 struct Wall {
   double worst_mj = -1e9;
   int contacts = 0;
@@ -39,7 +39,7 @@ Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_
   Wall wall;
   bool inside = false;
   for (int i = 0; i < 400'000; ++i) {
-    // Kept near the wall by a soft pull, else random.
+    // A soft pull keeps it near the wall. Otherwise it is random.
     const double a =
         std::clamp(most_mm_per_s2 * random.between(-1.0, 1.0) - 40.0 * v - 4e4 * x, -most_mm_per_s2, most_mm_per_s2);
     v += a * kT;
@@ -67,7 +67,7 @@ Wall bounce(double stiffness_n_per_mm, double damping_share, double most_mm_per_
   return wall;
 }
 
-// Whatever a hand does that accelerates no faster than is assumed, no contact gives more than the allowance.
+// If a hand accelerates no faster than assumed, no contact gives more than the allowance.
 TEST(EnergyLedger, NoContactGivesMoreThanItsAllowance) {
   const EnergyParams params;
   for (const double stiffness : {5.0, 50.0})
@@ -78,12 +78,12 @@ TEST(EnergyLedger, NoContactGivesMoreThanItsAllowance) {
       // A turn is accounted for as the move at its arm.
       EXPECT_NEAR(bounce(stiffness, damping, params.surprise_mm_per_s2, true, true).worst_mj, wall.worst_mj, 1e-6);
     }
-  // The same without the monitor: a spring that is sampled gives energy away.
+  // The same without the monitor: a sampled spring gives energy away.
   EXPECT_GT(bounce(50.0, 0.0, params.surprise_mm_per_s2, false).worst_mj, 0.01);
 }
 
-// Nobody has put anything in: force and torque together may give the allowance over the way and the turn that a handle
-// at rest can make in a tick, 0.01 mm each, of a turn at its arm. Both are held back by one share.
+// Nobody has put anything in. Force and torque together may give the allowance over the way and the turn that a handle
+// at rest can make in a tick: 0.01 mm each, for the turn at its arm. Both are scaled down by one share.
 TEST(EnergyLedger, ForceAndTorqueAreHeldBackTogether) {
   EnergyLedger ledger(EnergyParams{.allowance_mj = 0.006, .surprise_mm_per_s2 = 1e4, .calm_mm_per_s2 = 1e4});
   ledger.observe(Vec3::Zero());
@@ -94,7 +94,7 @@ TEST(EnergyLedger, ForceAndTorqueAreHeldBackTogether) {
   EXPECT_NEAR((shown.force_n - share * wanted.force_n).norm(), 0.0, 1e-12);
   EXPECT_NEAR((shown.torque_nmm - share * wanted.torque_nmm).norm(), 0.0, 1e-12);
   EXPECT_TRUE(ledger.report().held_back);
-  // The hand gives in to both as far as was foreseen: that is the allowance, and no more is shown.
+  // The hand yields to both as far as was foreseen. That uses the allowance, and no more is shown.
   ledger.observe(0.01 * wanted.force_n.normalized(), 0.01 / kArm_mm * Vec3::UnitZ());
   EXPECT_NEAR(ledger.report().episode_mj, 0.006, 1e-12);
   ledger.settle(0.0, 0.0);
@@ -105,7 +105,7 @@ TEST(EnergyLedger, ForceAndTorqueAreHeldBackTogether) {
 TEST(EnergyLedger, CountsWhatTheDamperTook) {
   const double k = 50.0, d = 0.01;
   const int n = 50;
-  EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});  // nothing is held back of so even a motion
+  EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});  // so even a motion is not limited
   double e_before = 0.0, given_mj = 0.0, moved = d;
   for (int i = 1; i <= 2 * n; ++i) {
     moved = i <= n ? d : -d;
@@ -118,7 +118,7 @@ TEST(EnergyLedger, CountsWhatTheDamperTook) {
   }
   given_mj = ledger.report().ended_mj;
   ASSERT_TRUE(ledger.report().ended);
-  // In: force of tick i over the way of tick i + 1. Sum over in and out of k·(e ± d)·d by hand.
+  // Inwards: force of tick i over the way of tick i + 1. The sum over in and out of k·(e ± d)·d was computed by hand.
   double expected = 0.0;
   for (int i = 1; i < n; ++i) expected -= k * d * (i + 1) * d;  // in, i = 1 … n-1
   expected += k * d * (n + 1) * d;                              // turning: the damper still pushes
@@ -127,14 +127,14 @@ TEST(EnergyLedger, CountsWhatTheDamperTook) {
   EXPECT_LT(given_mj, 0.0);
 }
 
-// Feed follows force: the hand goes on steadily, the tool after it under 20 N. What the hand pays goes into cutting, to
-// the last microjoule; what it paid before is in the spring, and lost when that is let go.
+// Feed follows force: the hand goes on steadily, and the tool follows under 20 N. What the hand pays goes into cutting,
+// to the last microjoule. What it paid before is in the spring, and is lost when that is let go.
 TEST(EnergyLedger, CuttingIsPaidByTheHand) {
   const double k = 50.0, feed = 0.002;
   EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});
   double e = 0.0, at_rest = 0.0;
   for (int i = 0; i < 600; ++i) {
-    const bool pressing = i < 200;  // first only the spring is stretched, to 20 N
+    const bool pressing = i < 200;  // first the spring alone is stretched, to 20 N
     ledger.observe({feed, 0, 0});
     if (pressing) e += feed;
     ledger.settle(pressing ? 0.0 : k * e * feed, 0.5 * k * e * e);
@@ -173,13 +173,13 @@ class CouplingAtWall : public ::testing::Test {
   Vec3 handle_mm_ = Vec3::Zero();
 };
 
-// Beyond f_max / k the handle slips; in free air the slip goes back by a tenth of the way.
+// Beyond f_max / k the handle slips. In free air the slip is reduced by a tenth of the way.
 TEST_F(CouplingAtWall, SlackTakesWhatTheDeviceCannotShow) {
   for (int i = 1; i <= 200; ++i) to({0, 0, 0.01 * i}, Vec3::Zero());
   const CouplingForce force = to({0, 0, 2.0}, Vec3::Zero());
   EXPECT_NEAR(force.spring_n.z(), -60.0, 1e-9);
   EXPECT_NEAR(coupling_.offset_mm().z(), -(2.0 - 60.0 / 50.0), 1e-9);
-  // Coming back the force goes down at once: what was beyond is forgotten.
+  // On the way back the force falls at once: the slip beyond the limit is forgotten.
   EXPECT_NEAR(to({0, 0, 1.9}, Vec3::Zero()).spring_n.z(), -55.0, 1e-9);
 
   moment_.touching = false;
@@ -203,7 +203,7 @@ TEST_F(CouplingAtWall, BreakthroughLetsTheWholeStretchGoOnce) {
   EXPECT_TRUE(force.breakthrough);
   EXPECT_EQ(force.spring_n.norm(), 0.0);
   EXPECT_NEAR(coupling_.offset_mm().z(), -0.5, 1e-12);
-  // A hundredth of that is no breakthrough.
+  // A hundredth of that is not a breakthrough.
   step_.breakthrough = false;
   coupling_.reset(Vec3::Zero(), Vec3::Zero());
   to({0, 0, 0.005}, Vec3::Zero());
@@ -211,8 +211,8 @@ TEST_F(CouplingAtWall, BreakthroughLetsTheWholeStretchGoOnce) {
   EXPECT_FALSE(to({0, 0, 0.005}, Vec3::Zero()).breakthrough);
 }
 
-// Bone comes back and pushes the proxy out by 0.3 mm under a handle that stands still: nothing is felt of it, and the
-// stored energy does not rise.
+// Bone comes back and pushes the proxy out by 0.3 mm under a handle that stands still. The hand feels nothing of it,
+// and the stored energy does not rise.
 TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
   CouplingForce force;
   for (int i = 1; i <= 20; ++i) force = to({0, 0, 0.01 * i}, Vec3::Zero());
@@ -223,7 +223,8 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
   EXPECT_NEAR(force.spring_n.norm(), before_n, 1e-9);
   EXPECT_LE(ledger_.report().stored_mj, before_mj + 1e-12);
   EXPECT_NEAR(coupling_.offset_mm().z(), -0.3, 1e-9);
-  // It presses again only as damping pays: over small motions of the hand no more than its work and what the tank held.
+  // It presses again only as fast as damping pays. Small motions of the hand get no more than the hand's work and the
+  // tank's energy.
   double handle = 0.2, paid_mj = tank_mj;
   for (int i = 0; i < 200; ++i) {
     const double next = 0.2 + 0.02 * std::sin(0.2 * i);
@@ -244,9 +245,9 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
   EXPECT_GT(coupling_.offset_mm().norm(), 0.0);
 }
 
-// The end of a shank 80 mm from the tip meets a wall while the hand turns and does not move. With both springs in a row
-// the move bears 1/17 of the way that the end is kept from, and the turn's arm 4/17. Where torque is shown the turn
-// pays for both; where it is not nothing may be stored that nobody paid for.
+// The end of a shank 80 mm from the tip meets a wall while the hand turns and does not move. With both springs in
+// series, the move bears 1/17 of the way that the end is kept from, and the turn's arm 4/17.
+// If torque is shown, the turn pays for both. If it is not, nothing that nobody paid for may be stored.
 TEST_F(CouplingAtWall, ATurnPaysForTheMoveItCauses) {
   for (const bool six_axes : {true, false}) {
     coupling_.reset(Vec3::Zero(), Vec3::Zero());
@@ -270,13 +271,13 @@ TEST_F(CouplingAtWall, ATurnPaysForTheMoveItCauses) {
       EXPECT_NEAR(ledger_.report().stored_mj, 0.5 * expected_n * kept_mm, 1e-9) << i;
     }
     EXPECT_EQ(returned, !six_axes);
-    // Of the turn too k·2 ms, of what it turned in this tick.
+    // The turn is also damped with k·2 ms of its rotation in this tick.
     const double damping_nmm = six_axes ? 2.0 * 50.0 * kArm_mm * kArm_mm * step_rad * 16.0 / 17.0 : 0.0;
     EXPECT_NEAR(force.turn_damping_nmm.y(), -damping_nmm, 1e-9);
   }
 }
 
-// A torque that has come to its limit stores its work, the limit times the way on: what turns back gets no more.
+// A torque at its limit stores its work, the limit times the further turn. Turning back gets no more.
 TEST_F(CouplingAtWall, ATurnStoresNoMoreThanIsShown) {
   moment_.stiffness_nmm_per_rad = 20'000.0;
   moment_.limit_nmm = 600.0;
@@ -294,7 +295,8 @@ TEST_F(CouplingAtWall, ATurnStoresNoMoreThanIsShown) {
   EXPECT_NEAR(work_mj, ledger_.report().stored_mj, 0.05);
 }
 
-// (7.15): a step of the cutting force comes through as 1 - exp(-t / 2 ms); what is no cutting comes at once.
+// (7.15): a step of the cutting force comes through as 1 - exp(-t / 2 ms). A force that is not from cutting comes at
+// once.
 TEST_F(CouplingAtWall, OnlyTheCuttingForceIsSmoothed) {
   for (int i = 1; i < 80; ++i) to({0, 0, 0.005 * i}, Vec3::Zero());  // pressed by a hand, which pays for the spring
   step_.cutting = true;
@@ -323,17 +325,17 @@ MotorMoment turning(double rpm, const Vec3& normal_n) {
   return moment;
 }
 
-// Bone at +x of a tool that points along +z and turns clockwise for its holder: its flank goes towards +y there, and
-// the bone holds it back.
+// Bone is at +x of a tool that points along +z and turns clockwise for its holder. Its flank moves towards +y there,
+// and the bone holds it back.
 TEST(MotorPort, DragsAgainstTheFlank) {
   MotorPort port;
   MotorMoment moment = turning(30000, {-10, 0, 0});
   Vec3 force;
   for (int i = 0; i < 500; ++i) force = port.step(moment, kT);
   EXPECT_NEAR(force.y(), -MotorPortParams{}.drag * 0.3 * 10.0, 1e-3);
-  EXPECT_NEAR(force.x(), 0.0, 1e-9);  // 1 kHz of teeth is for the ear
+  EXPECT_NEAR(force.x(), 0.0, 1e-9);  // vibration of teeth at 1 kHz is for the ear
   EXPECT_NEAR(force.z(), 0.0, 1e-9);
-  // A tool that rubs drags by friction, one that cuts as its law says, the edges of a reamer all round not at all.
+  // A rubbing tool drags by friction, and a cutting tool as its law says. The edges all round a reamer do not drag.
   moment.cutting = false;
   moment.across_n = 0.0;
   EXPECT_NEAR(port.step(moment, kT).y(), -MotorPortParams{}.drag * 0.3 * 10.0, 1e-3);
@@ -343,14 +345,14 @@ TEST(MotorPort, DragsAgainstTheFlank) {
   moment.across_n = 0.0;
   EXPECT_NEAR(port.step(moment, kT).norm(), 0.0, 1e-3);
   moment.across_n = 5.0;
-  moment.normal_n = {0, 0, -10};  // at the pole nothing slides to a side
+  moment.normal_n = {0, 0, -10};  // at the pole nothing slides sideways
   for (int i = 0; i < 500; ++i) force = port.step(moment, kT);
   EXPECT_NEAR(force.norm(), 0.0, 1e-9);
 }
 
-// Teeth that go to and fro 100 times a second pull along their stroke, by the law's force at most, with no mean and
-// nothing to the side or out of the bone; at 12 000 strokes a minute as long as the loop can show it, beyond 300 a
-// second not at all.
+// Teeth that move to and fro 100 times a second pull along their stroke, at most with the law's force. There is no
+// mean, and no force sideways or out of the bone. At 12 000 strokes a minute the pull lasts as long as the loop can
+// show it. Beyond 300 strokes a second there is none.
 TEST(MotorPort, ASawPullsToAndFroAlongItsStroke) {
   for (const auto& [strokes, amplitude_n] : {std::pair{6000.0, 1.5}, {12'000.0, 1.5}, {24'000.0, 0.0}}) {
     MotorPort port;
@@ -399,7 +401,7 @@ TEST(MotorPort, StaysWithinFrictionAndEndsWithThePedal) {
   EXPECT_NEAR(force.norm(), 0.0, 1e-12);
 }
 
-// 1000 rpm and two lips bite 33 times a second: the force's mean over many turns is the drag alone.
+// 1000 rpm and two lips bite 33 times a second. The force's mean over many turns is the drag alone.
 TEST(MotorPort, VibrationHasNoMean) {
   MotorPort port;
   MotorMoment moment = turning(1000, {0, 0, -20});

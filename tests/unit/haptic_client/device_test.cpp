@@ -1,4 +1,5 @@
-// What holds for any device: the exchange between its I/O and the haptic thread, its connection, several as one.
+// Tests what holds for any device: the exchange between its I/O and the haptic thread, its connection, and several
+// devices as one.
 #include "haptic_client/device/haptic_device.hpp"
 
 #include <gtest/gtest.h>
@@ -35,17 +36,17 @@ TEST(DeviceExchange, AForceLastsAsLongAsItIsWritten) {
   EXPECT_EQ(exchange.demanded(start + 1h).force_n, Vec3(0, 0, 0));
   exchange.write({Vec3(4, 0, 0)}, start + 10ms);
   EXPECT_EQ(exchange.demanded(start + 11ms).force_n, Vec3(4, 0, 0));
-  // A force that the device's thread sees late is as old as it is.
+  // The age of a force counts from its writing, even if the device's thread reads it late.
   exchange.write({Vec3(6, 0, 0)}, start + 20ms);
   EXPECT_EQ(exchange.demanded(start + 23ms).force_n, Vec3(0, 0, 0));
-  // What was written before a device was opened again is not shown.
+  // A force written before a device was opened again is not shown.
   exchange.write({Vec3(5, 0, 0)}, start + 30ms);
   exchange.forget_output();
   EXPECT_EQ(exchange.demanded(start + 30ms).force_n, Vec3(0, 0, 0));
 }
 
-// Haptic thread and device at 1 kHz, their ticks apart by any part of one: the last force lasts through two missed
-// ticks and ends with the third. A tick that is late, but not by three, interrupts nothing.
+// Haptic thread and device run at 1 kHz, with any phase between their ticks. The last force lasts through two missed
+// ticks and ends with the third. A tick that is late by less than three periods interrupts nothing.
 TEST(DeviceExchange, TheForceIsZeroAfterThreeMissedTicks) {
   constexpr int kLastTick = 20;
   for (const auto phase : {1us, 250us, 500us, 750us, 999us}) {
@@ -114,7 +115,7 @@ TEST(DeviceExchange, CrossesThreadsWholeAndWithoutAllocation) {
   EXPECT_EQ(allocations, 0);
 }
 
-// A device of which the test says everything.
+// A device that the test controls completely.
 class Puppet final : public HapticDevice {
  public:
   Puppet(std::string name, const DeviceInfo& info) : name_(std::move(name)), info_(info) {}
@@ -276,7 +277,7 @@ TEST(DeviceList, NamesArePutTogetherOrRefusedWithTheRemedy) {
             std::string::npos);
 }
 
-// The list names all that --device takes, and tells of a file that the user named whether it can be used.
+// The list names all that --device takes. For a file that the user named, it says whether it can be used.
 TEST(DeviceList, ShowsEveryKindAndWhatIsWrongWithTheFilesOfTheUser) {
   const DeviceOptions wrong{
       .libhd = "/nowhere/libHD.so", .libdhd = "/nowhere/libdhd.so", .falcon_firmware = "/nowhere/falcon.bin"};

@@ -1,4 +1,5 @@
-// The simulated arm of the stand-in libraries, one for the process, as it was at first for each test.
+// The simulated arm of the stand-in libraries. There is one for the process, and each test gets it in its initial
+// state.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -28,7 +29,7 @@ class WithArm : public ::testing::Test {
   }
 };
 
-// What a connection has said.
+// Messages of a connection.
 class Heard {
  public:
   DeviceNotice notice() {
@@ -37,14 +38,14 @@ class Heard {
       all_.emplace_back(event, sentence);
     };
   }
-  // The last sentence of a kind; empty: there was none.
+  // The last sentence of a kind. Empty: there was none.
   std::string last(DeviceEvent event) {
     const std::lock_guard lock(mutex_);
     for (auto i = all_.rbegin(); i != all_.rend(); ++i)
       if (i->first == event) return i->second;
     return {};
   }
-  // Whether any sentence of a kind had this in it.
+  // True if any sentence of a kind contained `what`.
   bool said(DeviceEvent event, std::string_view what) {
     const std::lock_guard lock(mutex_);
     return std::any_of(all_.begin(), all_.end(), [&](const auto& one) {
@@ -63,7 +64,7 @@ class Heard {
   std::vector<std::pair<DeviceEvent, std::string>> all_;
 };
 
-// Holds a device with a force on another thread, as a haptic loop does, until it is destroyed.
+// Writes a force to a device on another thread, as a haptic loop does, until destroyed.
 class Holding {
  public:
   explicit Holding(HapticDevice& device, const DeviceOutput& output)

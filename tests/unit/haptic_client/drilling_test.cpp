@@ -1,4 +1,4 @@
-// Drilling through the layered block as the dissertation's reference simulations do, on virtual time.
+// Drills through the layered block as the dissertation's reference simulations do, on virtual time.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,7 +21,7 @@ struct Mean {
   [[nodiscard]] double value() const { return count ? sum / count : 0.0; }
 };
 
-// Means over the depths at which the whole point is in one layer, half a voxel of h kept off the boundaries.
+// Means over the depths at which the whole point is in one layer, half a voxel of h away from the boundaries.
 struct Layers {
   Mean force[3], feed[3];
   double crossing_s[3] = {};
@@ -32,7 +32,7 @@ struct Layers {
     const double tip = report.pose_bone_proxy.position_mm.z();
     const double force_n = -report.force_physical_n.z();
     work_min = std::min(work_min, report.cutting_force_n.dot(report.moved_mm));
-    if (tip < 1.3) torque_max = std::max(torque_max, report.torque_nmm);  // later flutes fill up
+    if (tip < 1.3) torque_max = std::max(torque_max, report.torque_nmm);  // later the flutes fill up
     if (tip > 31.2) force_after = std::max(force_after, std::abs(force_n));
     if (tick.order.phase != SurgeonPhase::push && tick.order.phase != SurgeonPhase::feed) return;
     const double kTip = 0.961, kEdge = 0.3;
@@ -73,7 +73,7 @@ TEST(DrillingBlock, FeedRigRampsOverTheConesHeight) {
     const double tip = tick.report.pose_bone_proxy.position_mm.z();
     if (tick.order.phase != SurgeonPhase::feed || tip < 0.2 || tip > 0.9) return;
     ++seen;
-    // As a depth: contact points ask half a pitch ahead, and stand in rings 0.1 mm apart.
+    // As a depth: contact points look half a pitch ahead, and stand in rings 0.1 mm apart.
     EXPECT_NEAR(0.961 * std::sqrt(tick.report.engaged), tip, 0.0625 + 0.1) << tip;
   });
   EXPECT_GT(seen, 300);
@@ -109,7 +109,7 @@ const HandRun& novice() {
   return run;
 }
 
-// Reference table of the hands; 10 % on forces and feeds, 15 % on the plunge.
+// Reference table of the hands: 10 % on forces and feeds, 15 % on the plunge.
 TEST(DrillingBlock, ExpertMatchesTheReference) {
   const HandRun& run = expert();
   const double force[] = {27, 11, 27}, feed[] = {0.89, 10.7, 0.89};
@@ -142,7 +142,7 @@ TEST(DrillingBlock, PlungeRisesWithPushAndFallsWithSkill) {
   EXPECT_LT(expert().result.plunge_mm, drill_by_hand(HandKind::expert, 36).result.plunge_mm);
 }
 
-// A 3.3 N device with the hand made that much lighter drills the same hole.
+// A 3.3 N device whose hand is lighter in proportion drills the same hole.
 TEST(DrillingBlock, AWeakDeviceShowsTheSameBoneLighter) {
   SimulatedDeviceParams weak;
   weak.limits = {3.3, 1.75, 3.0, 100.0};
@@ -158,7 +158,7 @@ TEST(DrillingBlock, AWeakDeviceShowsTheSameBoneLighter) {
   EXPECT_NEAR(layers.feed[0].value(), 0.89, 0.09);
 }
 
-// A desktop device is too soft for the coupling and is helped by moving farther than the tool; one with little room
+// A desktop device is too soft for the coupling, so its handle moves farther than the tool. A device with little room
 // moves less far. The bone under them is the same.
 TEST(DrillingBlock, TheWorkspaceScaleDoesNotChangeTheBone) {
   SimulatedDeviceParams narrow;
@@ -181,14 +181,14 @@ TEST(DrillingBlock, TheWorkspaceScaleDoesNotChangeTheBone) {
     EXPECT_NEAR(layers.force[0].value(), 27, 2.7) << device.name;
     EXPECT_NEAR(layers.feed[0].value(), 0.89, 0.09) << device.name;
     EXPECT_NEAR(layers.force[1].value(), 11, 1.1) << device.name;
-    // Closed form of the released hand: F/K, and the coupling's stretch F/K_c, which is let go at breakthrough and
-    // comes back by at most a tenth of the way.
+    // Closed form of the released hand: F/K, and the coupling's stretch F/K_c. The stretch is let go at breakthrough,
+    // and comes back by at most a tenth of the way.
     const double released = 27 / 5.5 + std::min(27 / coupling, 0.1 * 27 / 5.5);
     EXPECT_NEAR(bench.session().surgeon().results()[0].after_exit_mm, released, 0.15 * released) << device.name;
   }
 }
 
-// Where the bone is gone already the hand goes through and comes back.
+// If the bone is already gone, the hand goes through and comes back.
 TEST(DrillingBlock, TheSameHoleTwiceEnds) {
   const PlanStep step = drill_step(HandKind::expert);
   Bench bench(block_case(), {step, step});
@@ -202,7 +202,8 @@ TEST(DrillingBlock, TheSameHoleTwiceEnds) {
   EXPECT_LT(results[1].peak_force_n, 1.0);
 }
 
-// Whatever the tool reports, a step ends: a spindle that does not start, one that does not stop, bone that never gives.
+// A step ends whatever the tool reports: a spindle that does not start, one that does not stop, or bone that never
+// yields.
 TEST(Surgeon, NoStepGoesOnForEver) {
   for (const HandKind hand : {HandKind::expert, HandKind::rig})
     for (const double rpm : {0.0, 1000.0})
@@ -218,7 +219,7 @@ TEST(Surgeon, NoStepGoesOnForEver) {
       }
 }
 
-// The hole in the block is the drill's cylinder: 30 mm long, its mouth and exit being the block's faces.
+// The hole in the block is the drill's cylinder: 30 mm long. The block's faces are its mouth and exit.
 TEST(DrillingBlock, RemovesTheClosedFormVolume) {
   PlanStep step = drill_step(HandKind::rig);
   step.feed_mm_per_s = 3.0;
@@ -231,7 +232,7 @@ TEST(DrillingBlock, RemovesTheClosedFormVolume) {
   EXPECT_EQ(bench.replica().committed().hash(), bench.replica().predicted().hash());
 }
 
-// Paths hang together, are numbered without gaps and close in time.
+// Paths are connected, numbered without gaps, and closed in time.
 TEST(DrillingBlock, CutsFormOneChain) {
   PlanStep step = drill_step(HandKind::rig);
   step.feed_mm_per_s = 3.0;
@@ -248,7 +249,7 @@ TEST(DrillingBlock, CutsFormOneChain) {
   }
 }
 
-// The force does not depend on how late patches and confirmations come.
+// The force does not depend on how late patches and acknowledgements arrive.
 TEST(DrillingBlock, LatePatchesDoNotChangeTheForce) {
   PlanStep step = drill_step(HandKind::expert);
   double plunge[2], force[2];

@@ -1,5 +1,5 @@
-// The cutting edge that a tool's contact points find in bone: teeth of a saw, millimetres of a reamer's and a bur's
-// edges, against closed forms.
+// Tests the cutting edge that a tool's contact points find in bone, against closed forms: teeth of a saw, and
+// millimetres of the edges of a reamer and a bur.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// What is in bone ahead of a tool at a pose that is pushed along a direction, asked as the proxy does.
+// What is in bone ahead of a tool that is pushed along a direction, queried as the proxy does.
 struct Met {
   double edge = 0, share = 0;
 };
@@ -39,7 +39,7 @@ Met met(const Case& bone, const ToolModel& model, const Pose& pose, const Vec3& 
   return {sums.edge, sums.engaged_mm2 / sums.area_mm2};
 }
 
-// Bone from z = 0 to 30 where `keep` is negative, a distance in mm.
+// Bone from z = 0 to 30 where `keep` is negative. `keep` is a distance in mm.
 Case cut_out(double half_mm, double pitch_mm, const std::function<double(const Vec3&)>& keep) {
   return osteon::test::make_bone(
       {Vec3(-half_mm - 4, -half_mm - 4, -4), Vec3(half_mm + 4, half_mm + 4, 34)}, pitch_mm,
@@ -55,7 +55,8 @@ Case bar(double low_mm, double high_mm) {
 // Deep enough for the arc of a blade's tip.
 const Pose kTouching{{0, 0, 2.0}, Eigen::Quaterniond::Identity()};
 
-// Teeth per length times the length of the kerf's face; where the blade is for a part of its stroke only, by that part.
+// Teeth per length times the length of the kerf's face. If the blade is over the bone for only a part of its stroke,
+// that part counts.
 TEST(EngagedEdge, ASawMeetsTheTeethOverTheBone) {
   for (const char* name : {"saw-oscillating-1", "saw-oscillating-2"}) {
     const Tool saw = *find_tool(name);
@@ -64,27 +65,28 @@ TEST(EngagedEdge, ASawMeetsTheTeethOverTheBone) {
     const auto teeth = [&](double low, double high) {
       return met(bar(low, high), model, kTouching, Vec3::UnitZ()).edge;
     };
-    // Contact points half a millimetre apart: so exact is the length of each face, at both ends.
+    // Contact points are half a millimetre apart, so the length of each face is that exact at both ends.
     const double one = 0.5 / pitch;
     EXPECT_NEAR(teeth(-5.0, 5.0), 10.0 / pitch, one) << name;
     EXPECT_NEAR(teeth(-2.5, 2.5), 5.0 / pitch, one) << name;
-    EXPECT_NEAR(teeth(-24.0, 24.0), saw.teeth, one) << name;  // all of them, though the kerf is wider than the blade
+    EXPECT_NEAR(teeth(-24.0, 24.0), saw.teeth, one) << name;  // all teeth, though the kerf is wider than the blade
     EXPECT_NEAR(teeth(0.0, 24.0), 0.5 * saw.teeth, one) << name;
-    // At the end of the stroke: from w/2 outwards it is there for half of the time at first, for none at its end.
+    // At the end of the stroke: from w/2 outwards, the blade is there for half of the time at first, and for none at
+    // its end.
     EXPECT_NEAR(teeth(0.5 * saw.width_mm, 24.0), 0.25 * reach / pitch, one) << name;
     EXPECT_EQ(teeth(0.5 * saw.width_mm + reach + 0.7, 24.0), 0.0) << name;
   }
   const Tool saw = *find_tool("saw-reciprocating");
   const ToolModel model(saw, 0.5);
-  // Its toothed edge along a bone 8 mm thick, from z = 0 on; fed with its edge, along x of the tool.
+  // Its toothed edge lies along a bone 8 mm thick, from z = 0 on. It is fed with its edge, along x of the tool.
   const Case plate = cut_out(24.0, 0.5, [](const Vec3& p) { return std::max(p.z() - 8.0, 2.0 - p.x()); });
   const Pose along{{2.0 - 0.5 * saw.width_mm + 0.2, 0, 16.0}, Eigen::Quaterniond::Identity()};
   const double per_mm = saw.teeth / saw.cutting_length_mm;
   EXPECT_NEAR(met(plate, model, along, Vec3::UnitX()).edge, 8.0 * per_mm, 0.5 * per_mm);
 }
 
-// Z edges from r to R are Z (R - r) long as seen along the feed, and half of that where half of it is in bone: over a
-// hole of half the radius that is half the edge, though three quarters of the area.
+// Z edges from r to R are Z (R - r) long as seen along the feed, and half of that if half of it is in bone. Over a hole
+// of half the radius that is half the edge, though three quarters of the area.
 TEST(EngagedEdge, AReamersEdgesGoWithTheRadiusNotTheArea) {
   struct Reamer {
     const char* name;
@@ -104,7 +106,7 @@ TEST(EngagedEdge, AReamersEdgesGoWithTheRadiusNotTheArea) {
     EXPECT_NEAR(rim.edge, 0.5 * whole, near) << which.name;
     EXPECT_NEAR(rim.share, 0.75, 0.04) << which.name;
   }
-  // A hollow mill has its edges on its ring only.
+  // A hollow mill has edges only on its ring.
   const Tool ring = *find_tool("reamer-outside");
   const double wall = 0.5 * (ring.diameter_mm - ring.bore_mm);
   const Pose in_bone{{0, 0, 3}, Eigen::Quaterniond::Identity()};
@@ -113,8 +115,8 @@ TEST(EngagedEdge, AReamersEdgesGoWithTheRadiusNotTheArea) {
   EXPECT_NEAR(all.edge, ring.teeth * wall, 0.01 * ring.teeth * wall);
 }
 
-// The meridians of a round bur pushed across its axis: half of them when it is wholly in bone, Z pi R / 2; the half of
-// those when only one half of it is, square to its axis or along it.
+// The meridians of a round bur pushed across its axis. Half of them count if it is wholly in bone: Z pi R / 2. Half of
+// those count if only one half of it is in bone, square to its axis or along it.
 TEST(EngagedEdge, ABursEdgesAreItsMeridians) {
   const Tool burr = *find_tool("burr-round-5");
   const ToolModel model(burr, 0.5, 1.0, 900);
@@ -125,13 +127,13 @@ TEST(EngagedEdge, ABursEdgesAreItsMeridians) {
   const auto all = [](const Vec3&) { return -10.0; };
   EXPECT_NEAR(edge(10.0, all), whole, 0.01 * whole);
   EXPECT_NEAR(edge(10.0, [](const Vec3& p) { return p.y(); }), 0.5 * whole, 0.05 * whole);
-  // The half below the surface has its pole; the other has its shank there, so it is a little less.
+  // The half below the surface has its pole. The other half has its shank there, so it is a little less.
   const double lower = edge(radius, all), upper = edge(30.0 + radius, all);
   EXPECT_NEAR(lower + upper, whole, 0.05 * whole);
   EXPECT_NEAR(lower, 0.5 * whole, 0.1 * whole);
 }
 
-// A drill's lips lean by half the point's angle.
+// A drill's lips are inclined by half the point's angle.
 TEST(EngagedEdge, ADrillsLipsAreAsLongAsItsPoint) {
   const Tool drill = *find_tool("drill-3.2");
   const ToolModel model(drill, 0.5);

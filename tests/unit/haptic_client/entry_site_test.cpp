@@ -1,4 +1,4 @@
-// Sites on bodies whose surface is known in closed form.
+// Entry sites on bodies whose surface is known in closed form.
 #include "haptic_client/control/entry_site.hpp"
 
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@ TEST(EntrySite, OfABlockIsItsFace) {
   EXPECT_LT(site->flatness_mm, 0.02);
 }
 
-// Shell of a sphere: the axis points to the centre, the thickness is the shell's, the far side is not counted in.
+// Shell of a sphere: the axis points to the centre. The thickness is the shell's, and the far side is not included.
 TEST(EntrySite, OfAShellPointsToItsCentre) {
   CaseInfo info;
   info.title = info.source = "shell";
@@ -67,8 +67,8 @@ TEST(Plan, NamesWhatIsWrong) {
   EXPECT_NE(message(step).find("choose a drill"), std::string::npos);
 }
 
-// A tool whose file names a law that there is not, or that is for others, is refused whoever takes it up, in a sentence
-// that names tool, law and remedy; another law that fits can be chosen instead.
+// A tool whose file names a force law that does not exist or is for other tools is refused for every hand. The sentence
+// names tool, law and remedy. Another law that fits can be chosen instead.
 TEST(Plan, RefusesAToolWithALawThatDoesNotFit) {
   const Case bone = block_case();
   for (const char* law : {"hooke", "saw"}) {

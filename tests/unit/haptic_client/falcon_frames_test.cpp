@@ -1,4 +1,4 @@
-// The Falcon's wire, byte by byte.
+// The Falcon's wire format, byte by byte.
 #include "haptic_client/device/falcon_frames.hpp"
 
 #include <gtest/gtest.h>
@@ -70,14 +70,14 @@ TEST(FalconFrames, NoFrameWithAnyLetterOutOfRange) {
 
 TEST(FalconFrames, TheReaderJoinsPiecesAndFindsItsPlaceAgain) {
   FalconFrameReader reader;
-  EXPECT_FALSE(reader.take(bytes("AAA>AA")));  // the end of something before
+  EXPECT_FALSE(reader.take(bytes("AAA>AA")));  // end of an earlier frame
   EXPECT_FALSE(reader.take(bytes("<BAAAAAA")));
   const auto joined = reader.take(bytes("AAAAAAA>"));
   ASSERT_TRUE(joined);
   EXPECT_EQ(joined->encoders[0], 1);
   EXPECT_EQ(reader.broken(), 0u);
 
-  // A lost byte ends one frame, not the next; of two whole ones the newest counts.
+  // A lost byte ends one frame, but not the next. Of two whole frames the newest counts.
   const auto newest =
       reader.take(bytes("<AAAAAAAAAAAAA>"
                         "<CAAAAAAAAAAAAA>"
@@ -91,7 +91,7 @@ TEST(FalconFrames, TheReaderJoinsPiecesAndFindsItsPlaceAgain) {
   EXPECT_TRUE(reader.take(bytes("<AAAAAAAAAAAAAA>")));
 }
 
-// Whatever comes, only whole frames come out: frames among noise that holds no '<' are all found.
+// Only whole frames come out, whatever bytes arrive. Frames among noise without '<' are all found.
 TEST(FalconFrames, FramesAmongNoise) {
   std::mt19937 random(5);
   FalconFrameReader reader;

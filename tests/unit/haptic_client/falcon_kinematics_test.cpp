@@ -1,4 +1,5 @@
-// The Falcon's geometry: given vectors, one road there and another back, and the principle of virtual work.
+// The Falcon's geometry: given vectors, forward and inverse kinematics by different ways, and the principle of virtual
+// work.
 #include "haptic_client/device/falcon_kinematics.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +19,7 @@ using Eigen::Vector3d;
 constexpr double kDegree = std::numbers::pi / 180.0;
 const Vector3d kMiddle(0.0, 0.0, kFalconOriginZ_m);
 
-// Places all over the workspace: 40 mm round its middle, as far as the legs reach.
+// Positions all over the workspace: 40 mm round its middle, as far as the legs reach.
 std::vector<Vector3d> places(int count) {
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> side(-0.040, 0.040);
@@ -50,14 +51,14 @@ TEST(FalconKinematics, CountsAreAngles) {
   EXPECT_NEAR(falcon_counts(falcon_angle_rad(-2345)), -2345.0, 1e-9);
 }
 
-// Turned by a third of a turn about z the three legs stand where their neighbours stood.
+// Turned by a third of a turn about z, the three legs stand where their neighbours stood.
 TEST(FalconKinematics, ThreefoldSymmetry) {
   const Eigen::Matrix3d third = Eigen::AngleAxisd(120.0 * kDegree, Vector3d::UnitZ()).toRotationMatrix();
   for (const Vector3d& place : places(100)) {
     const auto here = falcon_angles(place), there = falcon_angles(third * place);
     ASSERT_TRUE(here);
     if (!there) continue;
-    // Legs at 105, −15 and −135 degrees: a third of a turn brings the second to the first's place.
+    // Legs at 105, −15 and −135 degrees: a third of a turn brings the second to the first's position.
     EXPECT_NEAR((*there)[0], (*here)[1], 1e-12);
     EXPECT_NEAR((*there)[1], (*here)[2], 1e-12);
     EXPECT_NEAR((*there)[2], (*here)[0], 1e-12);
@@ -106,7 +107,7 @@ TEST(FalconKinematics, JacobianIsTheDifferenceQuotient) {
   for (const Vector3d& place : places(200)) {
     const auto angles = falcon_angles(place);
     const auto jacobian = falcon_jacobian(*angles, place);
-    if (!jacobian || jacobian->norm() > 100.0) continue;  // near stretched legs the quotient is no measure
+    if (!jacobian || jacobian->norm() > 100.0) continue;  // near stretched legs the quotient is not a measure
     for (int axis = 0; axis < 3; ++axis) {
       const Vector3d step = kStep * Vector3d::Unit(axis);
       const auto ahead = falcon_angles(place + step), behind = falcon_angles(place - step);
@@ -118,7 +119,7 @@ TEST(FalconKinematics, JacobianIsTheDifferenceQuotient) {
   EXPECT_GT(compared, 400);
 }
 
-// τ·dθ = F·dp for any small move: the angles' change comes from the inverse kinematics alone.
+// τ·dθ = F·dp for any small move. The angles' change comes from the inverse kinematics alone.
 TEST(FalconKinematics, TorquesDoTheWorkOfTheForce) {
   std::mt19937_64 random(11);
   std::normal_distribution<double> normal;
@@ -158,7 +159,7 @@ TEST(FalconKinematics, MotorsKeepTheForcesDirectionAtTheirLimit) {
   EXPECT_EQ(falcon_motors(Vector3d::Constant(std::nan(""))), FalconCounts{});
 }
 
-// What the device promises as its continuous force, no motor's range cuts off, in any direction, anywhere in reach.
+// No motor's range limits the continuous force that the device promises, in any direction, anywhere in reach.
 TEST(FalconKinematics, ContinuousForceIsWithinTheMotorsEverywhere) {
   std::mt19937_64 random(13);
   std::normal_distribution<double> normal;

@@ -1,5 +1,5 @@
-// Two haptic loops at one bone on a mount, a simulated hand at each, lines between them and the server's end: what one
-// hand does is felt by the other, through the bone.
+// Two haptic loops at one bone on a compliant mount, with a simulated hand at each, connections between them, and the
+// server's end. Each hand feels through the bone what the other does.
 #include "haptic_client/control/felt_mount.hpp"
 
 #include <gtest/gtest.h>
@@ -23,14 +23,14 @@ namespace {
 constexpr double kTick = 1e-3;
 constexpr double kThickness_mm = 12.0;
 
-// Of one size along z, so that two who press from both sides do it along a line through its middle.
+// The block has one thickness along z, so two hands that press from both sides do it along a line through its middle.
 const Case& block() {
   static const Case bone = test::plain_block(24.0, kThickness_mm, 0.5);
   return bone;
 }
 const Vec3 kMiddle_mm(0, 0, -0.5 * kThickness_mm);
 
-// One line: packets take `delay_ms` and up to `jitter_ms` more or less, and are lost as often as that says.
+// One connection. Packets take `delay_ms`, with up to `jitter_ms` more or less, and are lost at the given rate.
 struct LineQuality {
   double delay_ms = 0, jitter_ms = 0, loss = 0;
 };
@@ -60,7 +60,7 @@ class Line {
   std::vector<std::pair<int, Message>> under_way_;
 };
 
-// A hand of 5.5 N/mm at a device at a loop, with a burr that does not turn, over the bone or under it.
+// A hand of 5.5 N/mm at a device at a loop. It holds a burr that does not turn, over the bone or under it.
 struct User {
   User(const LineQuality& line, bool from_above, unsigned seed)
       : rotation(Eigen::AngleAxisd(from_above ? std::acos(-1.0) : 0.0, Vec3::UnitX())),
@@ -87,7 +87,7 @@ struct User {
     built_at_mm = at.position_mm;
   }
 
-  // `push_mm`: how far into the resting bone the hand wants to be.
+  // `push_mm`: how far into the resting bone the hand's target is.
   void tick() {
     HandCommand command;
     command.target_mm = loop->mapping().pose_device_tool({face_mm + push_mm * into, rotation}).position_mm;
@@ -112,7 +112,7 @@ struct User {
     moved_before_mm = (handle_mm - handle_before_mm).norm();
     handle_before_mm = handle_mm;
     shown_n = last.force_device_n.norm();
-    // Work of the hand on the bone as shown, by force and way of the point of contact, from outside.
+    // Work of the hand on the displayed bone, computed from outside: force times way of the contact point.
     const Vec3 tip_mm = last.pose_bone_proxy.position_mm;
     put_in_mj += mounted.load().force_n.dot(mounted.pose_rest_bone().point(tip_mm) - before.point(tip_mm));
     least_mj = std::min(least_mj, put_in_mj);
@@ -121,7 +121,7 @@ struct User {
   }
   double force_n() const { return shown_n; }
   double shown_along_n() const { return -loop->mapping().to_bone(last.coupling_device_n).dot(into); }
-  // On the bone, along its push.
+  // Force on the bone, along the hand's push.
   double pressed_n() const { return mounted.load().force_n.dot(into); }
 
   static constexpr double kAway_mm = 2.0;
@@ -176,7 +176,7 @@ struct Room {
   int now_ms = 0;
 };
 
-// Springs of hand and coupling in a row.
+// Springs of hand and coupling in series.
 double felt_n_per_mm(const User& user) {
   return 1.0 / (1.0 / expert_hand().stiffness_n_per_mm + 1.0 / user.loop->coupling_n_per_mm());
 }
@@ -186,7 +186,7 @@ TEST(FeltMount, LetsOneHandFeelTheOtherThroughTheBone) {
   Room fixed({}, {}, false);
   fixed.push(1.2, 2.4);
   fixed.run(4000);
-  // Without a mount nothing is told, nothing moves and nobody feels anybody.
+  // Without a mount no load is sent, nothing moves and nobody feels the other.
   EXPECT_FALSE(fixed.users[0]->mounted.there());
   EXPECT_EQ(fixed.users[0]->mounted.most_mm(), 0.0);
   const double f0[2] = {fixed.users[0]->shown_along_n(), fixed.users[1]->shown_along_n()};
@@ -231,7 +231,7 @@ TEST(FeltMount, LetsOneHandFeelTheOtherThroughTheBone) {
   }
 }
 
-// The bone follows its mount under a hand that holds still: the tool stays on it, and forces turn with it.
+// The bone follows its mount under a hand that holds still. The tool stays on it, and forces turn with it.
 TEST(FeltMount, TurnsForcesWithTheBone) {
   for (const double angle : {0.0, 0.3}) {
     User user({}, true, 1);
@@ -244,19 +244,19 @@ TEST(FeltMount, TurnsForcesWithTheBone) {
       if (i % 12 == 0) user.build(user.last.pose_bone_proxy);
     }
     ASSERT_GT(user.force_n(), 2.0);
-    // The face's normal, as the bone now stands.
+    // The face's normal in the bone's present pose.
     const Vec3 shown = user.loop->mapping().to_bone(user.last.coupling_device_n).normalized();
     const Vec3 normal = bone.direction(Vec3::UnitZ());
     EXPECT_GT(shown.dot(normal), angle == 0.0 ? 0.999 : 0.9);
     EXPECT_GT(shown.dot(normal), shown.dot(Vec3::UnitZ()) - 1e-9);
-    // The tip lies on the face: of the bone, not of the room.
+    // The tip lies on the bone's face, in the bone's frame and not the room's.
     EXPECT_NEAR(user.last.pose_bone_proxy.position_mm.z(), 0.0, angle == 0.0 ? 0.15 : 0.6);
   }
 }
 
-// What a hand is deeper in bone than its device can show lies between hand and tool and stays with them: a bone that
-// turns under the tip of the tool does not swing it about, and the loop counts what that does to hand and bone as one
-// does outside.
+// A hand may be deeper in bone than its device can show. This slack lies between hand and tool and stays with them: a
+// bone that turns under the tool's tip does not swing the slack about. The loop counts the work on hand and bone as an
+// outside observer does.
 TEST(FeltMount, TurnsUnderSlackWithoutIt) {
   User user({}, true, 1);
   user.push_mm = 25.0;
@@ -266,7 +266,7 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
     const Pose before = bone;
     bone.rotation = Eigen::AngleAxisd(angle, Vec3::UnitX());
     for (int i = 0; i < ticks; ++i) {
-      // To the bone as it turns, under what pressed on it until then; to the hand as it moves.
+      // Work on the bone as it turns, under what pressed on it until then. Work on the hand as it moves.
       const Vec3 held_n = user.last.coupling_device_n, tip_mm = user.last.pose_bone_proxy.position_mm;
       if (i == 0) given_mj -= user.loop->mapping().to_bone(held_n).dot(bone.point(tip_mm) - before.point(tip_mm));
       const Vec3 handle_mm = user.handle_before_mm;
@@ -283,7 +283,8 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
   for (int i = 1; i <= 100; ++i) {
     const double angle = 1e-3 * i;
     const Vec3 moved_mm = run(angle, 20) - tip_mm;
-    // It slides a little on a face that tilts, and the hand gives way; the slack would carry it by its whole length.
+    // It slides a little on a tilting face, and the hand yields. Otherwise the slack would carry it by its whole
+    // length.
     if (angle > 0.01) ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.offset_mm.norm()) << angle;
   }
   EXPECT_GT(user.force_n(), 0.9 * before_n);
@@ -292,7 +293,7 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
   EXPECT_NEAR(user.last.energy.episode_mj - before_mj, given_mj, 0.02 * std::abs(given_mj));
 }
 
-// A bone that comes at the hand as fast as one is ever shown, 60 mm/s: what would be 3 N more in every millisecond
+// A bone comes at the hand as fast as a bone is ever shown, 60 mm/s. A force that would rise by 3 N every millisecond
 // comes slowly.
 TEST(FeltMount, WhatMovesTheBoneRaisesTheForceSlowly) {
   User user({}, true, 1);
@@ -311,7 +312,7 @@ TEST(FeltMount, WhatMovesTheBoneRaisesTheForceSlowly) {
   EXPECT_LE(user.step_n, user.loop->params().slew_n_per_ms + 1e-9);
 }
 
-// Numbers of places begin anew with a session, the bone goes on from where it is shown.
+// Sequence numbers of mount poses begin anew with a session. The bone goes on from where it is shown.
 TEST(FeltMount, GoesOnInAnotherSession) {
   User user({}, true, 1);
   MountPose seen{500, {Vec3(1, 0, 0), Vec3::Zero()}, 0, 0, 0};
@@ -327,7 +328,7 @@ TEST(FeltMount, GoesOnInAnotherSession) {
   seen = {0, {Vec3(2, 0, 0), Vec3::Zero()}, 0, 0, 0};
   user.mounted.see(1, seen);
   user.tick();
-  EXPECT_NEAR(user.mounted.shown().shift().place_mm.x(), before_mm, 0.1) << "an old number of the same session";
+  EXPECT_NEAR(user.mounted.shown().shift().place_mm.x(), before_mm, 0.1) << "an old sequence number";
   see(2);
   EXPECT_NEAR(user.mounted.shown().shift().place_mm.x(), 2.0, 1e-2);
 }

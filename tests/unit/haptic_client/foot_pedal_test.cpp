@@ -1,4 +1,4 @@
-// Pedals: the switch's reports and the proportional one's way.
+// Pedals: the switch's reports, and the travel of the proportional one.
 #include "haptic_client/device/foot_pedal.hpp"
 
 #include <gtest/gtest.h>
@@ -49,8 +49,8 @@ TEST(FootPedal, TurnsNothingUntilItWasReleased) {
   EXPECT_EQ(axis.value(), 0.0);
 }
 
-// One that rests at the other end, or in the middle, passes its way's beginning when it is pressed: taken for released
-// there, it would turn the spindle as soon as the foot leaves it.
+// A pedal that rests at the other end, or in the middle, passes the beginning of its travel when it is pressed. If that
+// counted as released, the spindle would turn as soon as the foot leaves it.
 TEST(FootPedal, TurnsNothingWhereItRestsElsewhere) {
   for (const bool inverted : {false, true}) {
     for (const double rest : {1.0, 0.9, 0.5}) {

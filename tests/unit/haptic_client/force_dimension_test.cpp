@@ -1,4 +1,4 @@
-// Force Dimension devices through our stand-in for libdhd: every figure here is of a simulated device.
+// Force Dimension devices through our stand-in for libdhd. Every figure here is of a simulated device.
 #include "haptic_client/device/force_dimension.hpp"
 
 #include <gtest/gtest.h>
@@ -28,8 +28,8 @@ class ForceDimensionArm : public WithArm {
         wait_until([&] { return device_->write(output), (void)device_->read(), arm()->cycles >= until; }, kPatience));
     return device_->read();
   }
-  // Whether the device comes to show this much, while the force is written again and again: a machine that takes the
-  // core from the test for 3 ms sees it end meanwhile.
+  // True if the device comes to show this force while it is written again and again. A machine that suspends the test
+  // for 3 ms lets the force end in between.
   bool shows(const DeviceOutput& output, const std::function<bool()>& enough) {
     return wait_until([&] { return device_->write(output), (void)device_->read(), enough(); }, kPatience);
   }
@@ -92,7 +92,7 @@ TEST_F(ForceDimensionArm, ItsHandleIsReadAsATool) {
   DeviceReading reading = push({}, 3000);
   EXPECT_NEAR((reading.pose_device_tool.position_mm - Vec3(10, -20, 30)).norm(), 0.0, 1e-6);
   EXPECT_NEAR((reading.pose_device_tool.direction(Vec3::UnitZ()) + Vec3::UnitZ()).norm(), 0.0, 1e-9);
-  // A quarter turn about the vendor's z, our y, carries −x to −y there, −z to −x here.
+  // A quarter turn about the vendor's z, our y, carries −x to −y there, and −z to −x here.
   arm()->rotation[0] = arm()->rotation[3] = std::numbers::sqrt2 / 2.0;
   reading = push({}, 100);
   EXPECT_NEAR((reading.pose_device_tool.direction(Vec3::UnitZ()) + Vec3::UnitX()).norm(), 0.0, 1e-9);
@@ -109,7 +109,7 @@ TEST_F(ForceDimensionArm, AHundredThousandCyclesAgainstASpring) {
   };
   const auto begin = arm()->cycles.load();
   while (arm()->cycles < begin + 100000) turn();
-  // A machine that takes the core from us for 3 ms sees the force end, and then return.
+  // If the machine suspends us for 3 ms, the force ends and then returns.
   EXPECT_TRUE(wait_until(
       [&] {
         double y_mm = 0.0;
@@ -163,16 +163,16 @@ TEST_F(ForceDimensionArm, UnpluggedItHasNoForceAndComesBack) {
     ASSERT_TRUE(wait_until([&] { return hand.status() == DeviceStatus::absent; }, kPatience)) << i;
     EXPECT_EQ(arm().force_n(), 0.0);
     EXPECT_NE(heard.last(DeviceEvent::lost).find("check its cable"), std::string::npos);
-    arm()->is_open = 0;  // what an unplugged device forgets
+    arm()->is_open = 0;  // state of an unplugged device
     ++arm()->closed;
     arm()->plugged = 1;
   }
   ASSERT_TRUE(wait_until([&] { return heard.count(DeviceEvent::back) >= 3; }, kPatience));
-  arm()->misuse = 0;  // closing one that is gone
+  arm()->misuse = 0;  // closing a lost device
   arm()->closed = arm()->opened - 1;
 }
 
-TEST_F(ForceDimensionArm, ADeviceErrorIsToldWithItsRemedy) {
+TEST_F(ForceDimensionArm, ADeviceErrorIsReportedWithItsRemedy) {
   ASSERT_TRUE(device_->open());
   arm()->next_error = 7;
   push({}, 100);
@@ -206,7 +206,7 @@ TEST_F(ForceDimensionArm, ItsMotorsEndWithTheProgram) {
     EXPECT_EQ(arm()->emergency_stops, 1u) << how;
     EXPECT_EQ(arm()->motors_on, 0) << how;
     arm()->opened = arm()->closed.load();
-    arm()->misuse = 0;  // its thread may ask once more before the process is gone
+    arm()->misuse = 0;  // its thread may ask once more before the process ends
     arm()->unsafe_forces = 0;
   }
 }

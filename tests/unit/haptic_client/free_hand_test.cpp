@@ -1,5 +1,5 @@
-// A person's hand at a device, on virtual time: where the tool is taken up, what clutch and pedal do, and what becomes
-// of force and tool while the device is away.
+// A user's hand at a device, on virtual time: where the tool starts, what clutch and pedal do, and what happens to
+// force and tool while the device is away.
 #include "haptic_client/control/free_hand.hpp"
 
 #include <gtest/gtest.h>
@@ -28,7 +28,7 @@ class Handle final : public HapticDevice {
 
 class FreeHand : public ::testing::Test {
  protected:
-  // From the top of the block, which is entered along +z: the user looks that way.
+  // Starts at the top of the block, which is entered along +z. The user looks along +z.
   void begin(const char* tool = "drill-3.2", const char* view = "bottom", const Vec3& at_mm = {1, 2, 0}) {
     FreeHandOptions options{.tool = tool, .toward = *read_view(view), .at_mm = at_mm};
     Result<ReadyPlan> plan = make_free_hand(options, bone_);
@@ -71,7 +71,7 @@ TEST_F(FreeHand, TheToolIsTakenUpOverItsPlaceWhereverTheHandleIs) {
   EXPECT_NEAR((first.report.pose_bone_device.position_mm - Vec3(1, 2, -10)).norm(), 0.0, 1e-9);
   // A handle that points away from the user holds a tool that points where the user looks.
   EXPECT_NEAR((first.report.pose_bone_device.direction(Vec3::UnitZ()) - Vec3::UnitZ()).norm(), 0.0, 1e-9);
-  // Pushing it away brings the tool there; scaled, with no force in the air.
+  // Pushing the handle away moves the tool there, scaled, without force in the air.
   const SessionTick later = move_by({0, 0, -4}, 100);
   EXPECT_NEAR((tip() - Vec3(1, 2, -10 + 4 * scale())).norm(), 0.0, 1e-9);
   EXPECT_EQ(handle_.written.force_n.norm(), 0.0);
@@ -86,7 +86,7 @@ TEST_F(FreeHand, TheHeadIsUpOnTheUsersScreen) {
   move_by({0, 3, 0}, 30);  // up
   EXPECT_NEAR((tip() - before - Vec3(0, 0, 3 * scale())).norm(), 0.0, 1e-9);
   before = tip();
-  move_by({3, 0, 0}, 30);  // right of one who looks from the front is the patient's left
+  move_by({3, 0, 0}, 30);  // right of a user who looks from the front is the patient's left
   EXPECT_NEAR((tip() - before - Vec3(3 * scale(), 0, 0)).norm(), 0.0, 1e-9);
 }
 
@@ -131,8 +131,8 @@ TEST_F(FreeHand, TheClutchMovesTheHandleAlone) {
   EXPECT_NEAR((tip() - held).norm(), scale(), 1e-9);
 }
 
-// Pressed on the bone, spindle off: the force ends in the tick in which the device goes, the tool stays, and when it
-// returns, elsewhere, the handle is tied to the tool where that is, without force.
+// Pressed on the bone with the spindle off: the force ends in the tick in which the device is lost, and the tool stays.
+// When the device returns elsewhere, the handle is coupled to the tool where that is, without force.
 TEST_F(FreeHand, ALostDeviceHasNoForceAndTheToolWaits) {
   for (const DeviceStatus gone : {DeviceStatus::fault, DeviceStatus::absent}) {
     handle_ = {};
@@ -157,7 +157,7 @@ TEST_F(FreeHand, ALostDeviceHasNoForceAndTheToolWaits) {
       EXPECT_NEAR(handle_.written.force_n.norm(), 0.0, 1e-6);
     }
     EXPECT_NEAR((tip() - held).norm(), 0.0, 0.02);
-    // It is felt again where it is pressed again.
+    // The force comes back when the handle is pressed again.
     move_by({0, 0, -0.3 / scale()}, 100);
     for (int i = 0; i < 600; ++i) tick();
     EXPECT_GT(handle_.written.force_n.z(), 1.0);
@@ -171,7 +171,7 @@ TEST_F(FreeHand, ADeviceWithoutForceIsShownNone) {
   tick();
   move_by({0, 0, -10.5 / scale()}, 300);
   for (int i = 0; i < 300; ++i) tick();
-  EXPECT_GT(last_.report.force_physical_n.norm(), 5.0);  // what gauges and records show
+  EXPECT_GT(last_.report.force_physical_n.norm(), 5.0);  // what gauges and recordings show
   EXPECT_TRUE(last_.report.force_physical_n.allFinite());
   EXPECT_NEAR(tip().z(), 0.0, 0.1);
 }
@@ -190,7 +190,7 @@ TEST_F(FreeHand, DoesNotAllocate) {
   EXPECT_EQ(heap.count(), 0);
 }
 
-// What was recorded of a hand moves the tool again, force scale and all, and the session ends with it.
+// A hand's recording moves the tool again, including the force scale. The session ends with the recording.
 TEST_F(FreeHand, ARecordingOfAHandIsDoneWhenItIsOver) {
   RecordedSession recorded;
   recorded.limits = handle_.limits_are;
@@ -220,8 +220,8 @@ TEST(FreeHandView, IsNamedOrGiven) {
   EXPECT_NE(read_point("1;2;3", "--at").error().message.find("--at"), std::string::npos);
 }
 
-// Without a place of its own the tool is taken up over the side from which the user looks; over the middle as far as a
-// case knows it, whose bounds are of whole leaves of eight samples.
+// Without an entry site, the tool starts over the side from which the user looks. It starts over the bone's middle, as
+// far as a case knows it: a case's bounds are of whole leaves of eight samples.
 TEST_F(FreeHand, LooksAtTheBonesMiddle) {
   FreeHandOptions options;
   options.tool = "drill-3.2";
@@ -246,7 +246,7 @@ TEST(FreeHandTool, IsNamedWhereItIsNotKnown) {
   EXPECT_NE(plan.error().message.find("drill-99"), std::string::npos);
 }
 
-// What takes no bone is for the scene, not for the hand.
+// A tool that takes no bone belongs into the scene, not into the hand.
 TEST(FreeHandTool, TakesBone) {
   for (const Tool& tool : builtin_tools()) {
     FreeHandOptions options;

@@ -1,4 +1,4 @@
-// Drilling through a guide against drilling by eye, with a hand that trembles, on virtual time.
+// Drilling through a guide compared with drilling by eye, with a hand that trembles, on virtual time.
 #include "haptic_client/control/guiding.hpp"
 
 #include <gtest/gtest.h>
@@ -102,15 +102,15 @@ TEST(GuidedDrilling, StaysWithinTheSleevesPlay) {
     EXPECT_FALSE(free.guided);
     EXPECT_GT(guided.knots, 500);
     EXPECT_LE(guided.worst_excess_mm, 0.01);
-    // Two points within the play, a sleeve's length apart. The hand is kept to that; the drill, which its own hole
-    // holds too, may lean a little more, by less than 0.03 mm at either end of the sleeve.
+    // Two points within the play, a sleeve's length apart. The hand is kept to that. The drill is also held by its own
+    // hole and may lean a little more, by less than 0.03 mm at either end of the sleeve.
     EXPECT_LE(guided.tilt_rad, 2.0 * kPlay_mm / kLength_mm + 2e-3);
     EXPECT_GT(free.worst_mm, kPlay_mm * (1.0 + 2.0));
     EXPECT_GT(free.worst_excess_mm, 0.1);
   }
 }
 
-// The hand feels the sleeve: a sideways spring of the coupling, beyond the play.
+// The hand feels the sleeve as a sideways spring of the coupling, beyond the play.
 TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   const PlacedGuide guide = placed_guide(1, sleeve(), {Vec3(0, 0, 0), Eigen::Quaterniond::Identity()});
   const Case bone = block_case();
@@ -136,7 +136,7 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   EXPECT_NEAR(report.pose_bone_proxy.position_mm.x(), kPlay_mm, 1e-6);
   EXPECT_NEAR(report.force_physical_n.x(), -50.0 * (0.4 - kPlay_mm), 1e-6);
   EXPECT_NEAR(report.force_physical_n.z(), 0.0, 1e-9);
-  // Within the play it feels nothing, and without the guide neither.
+  // Within the play, or without the guide, it feels nothing.
   for (int i = 0; i < 200; ++i) {
     input.pose_device_tool.position_mm.x() = std::max(0.1, 0.4 - 0.002 * i);
     report = loop.tick(input, patch, std::span(&guide, 1));
@@ -148,8 +148,8 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   EXPECT_FALSE(report.events & kGuided);
 }
 
-// A drill about a sleeve that stands on the bone, its top at z = -30: the hand leads it from place to place, on a
-// device so strong that its slack does not keep the hand from reaching through the wall.
+// A drill near a sleeve that stands on the bone, its top at z = -30. The hand moves it from point to point. The device
+// is so strong that its slack does not keep the hand from reaching through the wall.
 class AtASleeve : public ::testing::Test {
  protected:
   AtASleeve()
@@ -169,7 +169,7 @@ class AtASleeve : public ::testing::Test {
       hand_mm += way.norm() > step_mm ? Vec3(way * (step_mm / way.norm())) : way;
       builder_.build(field_, loop_.tool(0), input_.pose_device_tool, patch_);
       const LoopReport now = loop_.tick(input_, patch_, std::span(&guide_, 1));
-      // What the hand's own step may do, and the slew limit: nothing may grow faster.
+      // What the hand's own step and the slew limit allow. Nothing may grow faster.
       const double grown_n = now.force_device_n.norm() - report_.force_device_n.norm();
       worst_n_ = std::max(worst_n_, grown_n - 2.0 * loop_.coupling_n_per_mm() * step_mm);
       fastest_mm_ = std::max(fastest_mm_, now.moved_mm.norm() - step_mm);
@@ -191,8 +191,8 @@ class AtASleeve : public ::testing::Test {
   bool guided_ = false;
 };
 
-// Pressed against the sleeve from outside, as far as its middle and beyond, the drill stays outside: it does not pop
-// in.
+// Pressed against the sleeve from outside, as far as its middle and beyond, the drill stays outside. It does not jump
+// into the bore.
 TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
   take_up({-12, 0, -15});
   lead({-6.5, 0, -15}, 20.0);
@@ -209,8 +209,8 @@ TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
   EXPECT_LT(fastest_mm_, 0.1);
 }
 
-// Pressed on the rim of its mouth and led over it, the drill goes in where the mouth is, no sooner, and the force that
-// it was pressed with is gone.
+// Pressed on the rim of the sleeve's mouth and moved over it, the drill enters at the mouth and no sooner. The force
+// with which it was pressed is then gone.
 TEST_F(AtASleeve, IsEnteredFromItsRimThroughTheMouth) {
   take_up({2.8, 0, -33});
   lead({2.8, 0, -29.6}, 10.0);

@@ -1,5 +1,5 @@
-// Every tool of the box in the hand: what cuts takes bone where it is pushed and leaves force and torque on the hand,
-// what does not cut only touches, and a saw or broach comes out of what it has made.
+// Every tool of the tool box in the hand. A cutting tool takes bone where it is pushed, and the hand feels force and
+// torque. A tool that does not cut only touches. A saw or broach comes out of what it has made.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -18,7 +18,7 @@
 namespace osteon::haptic::test {
 namespace {
 
-// The hand at the loop without a plan: it holds the tool stiffly where it is told to.
+// The hand at the loop without a plan. It holds the tool stiffly at its target.
 class HandStage {
  public:
   HandStage(Case bone, const Tool& tool, const Pose& start)
@@ -37,8 +37,8 @@ class HandStage {
     work_min_ = std::min(work_min_, report.cutting_force_n.dot(report.moved_mm));
     const bool cuts = report.phase == CuttingPhase::cutting;
     cutting_ += cuts;
-    // What cuts has a force; what was cut took work, torque and feed, all or none, also in a tick whose turning pushed
-    // the tool back by more than that. A broach is driven by its blows, not by a force.
+    // Contact of a cutting tool has a force. A cut has work, torque and feed, all or none, even in a tick whose turning
+    // pushed the tool back by more. A broach is driven by its blows, not by a force.
     const bool worked = report.cutting_work_mj > 0.0;
     pushed_ += worked && !cuts;
     if (loop_.tool(0).tool.kind != ToolKind::broach)
@@ -84,7 +84,8 @@ class HandStage {
   std::vector<Cut> cuts_;
 };
 
-// The bone is at z > 0. Cancellous, so that a push that a hand can give goes on. `tissue`: what of it is metal.
+// The bone is at z > 0. It is cancellous, so that a hand's push can advance the tool. `tissue`: which part of it is
+// metal.
 Case block(double pitch_mm, double width_mm, double deep_mm, const std::function<Tissue(const Vec3&)>& tissue = {}) {
   return osteon::test::make_bone(
       {Vec3(-0.5 * width_mm, -0.5 * width_mm, -3), Vec3(0.5 * width_mm, 0.5 * width_mm, deep_mm)}, pitch_mm,
@@ -94,7 +95,7 @@ Case block(double pitch_mm, double width_mm, double deep_mm, const std::function
       [](const Vec3&) { return 0.6; }, tissue);
 }
 
-// How each tool is held against a face that looks along -z, and which way it is pushed: z, into the bone.
+// How each tool is held against a face that looks along -z. It is pushed along z, into the bone.
 Pose held(const Tool& tool) {
   const Eigen::Quaterniond lying = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX());
   switch (tool.kind) {
@@ -127,7 +128,7 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
         "  %-20s cut for %4d of 2700 ticks, pushed back in %3d, %8.2f mm3, at most %6.1f N, %8.1f N mm, %.2f mm deep\n",
         tool.name.c_str(), stage.cutting_, stage.pushed_, removed, stage.force_n_, stage.torque_nmm_,
         pushed.pose_bone_proxy.position_mm.z() - held(tool).position_mm.z() - 0.4);
-    // A broach moves in its blows only: one a second, of some 5 ms.
+    // A broach moves only in its blows: one a second, of about 5 ms.
     if (tool.kind == ToolKind::broach) {
       EXPECT_GE(stage.cutting_, 2 * 5) << tool.name;
       EXPECT_LE(stage.cutting_, 3 * 7) << tool.name;
@@ -138,12 +139,13 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     EXPECT_GT(stage.force_n_, 0.05) << tool.name;
     EXPECT_GE(stage.work_min_, 0.0) << tool.name;
     EXPECT_EQ(stage.disagree_, 0) << tool.name;
-    // A thin bur's shank soon lies on the bone: the bur digs in, its turning back to the hand's lifts it, and so on.
+    // A thin bur's shank soon lies on the bone. The bur digs in, turning back to the hand's rotation lifts it, and so
+    // on.
     const bool lies = held(tool).rotation.angularDistance(Eigen::Quaterniond::Identity()) > 0.1 &&
                       tool.shank_diameter_mm > 0.0 && 0.5 * (tool.diameter_mm - tool.shank_diameter_mm) < 1.0;
     EXPECT_LE(stage.pushed_, (lies ? 1.0 : 0.1) * stage.cutting_) << tool.name;
     EXPECT_EQ(stage.allocations_, 0) << tool.name;
-    // Drawn back it is free: nothing jams in what it has made.
+    // When drawn back it is free: nothing jams in the hole or kerf.
     EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
     EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5)
         << tool.name;
@@ -152,14 +154,14 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
   EXPECT_GE(tried, 21);
 }
 
-// Pushed down on it, aside and turned, no tool takes metal away: nothing that a room would refuse, and nothing of it at
-// all.
+// Pushed down on metal, sideways and turned, no tool takes metal away. It makes no cut that a room would reject, and
+// takes no metal at all.
 TEST(HandTools, NoneThatCutsTakesMetal) {
   for (const Tool& tool : builtin_tools()) {
     if (!tool.cuts()) continue;
     const bool large = tool.cut_level == 0;
     const double pitch_mm = large ? 1.0 : 0.5, metal_mm = 2.0 * pitch_mm;
-    // Metal from there on, and beside small tools a step of it that is higher.
+    // Metal from there on, and beside small tools a higher step of metal.
     const Case bone = block(pitch_mm, large ? 70.0 : 40.0, large ? 24.0 : 12.0, [=](const Vec3& p) {
       return p.z() >= metal_mm || (!large && p.x() > 4.0 && p.y() > 2.0 && p.z() >= pitch_mm) ? Tissue::metal
                                                                                               : Tissue::none;
@@ -182,7 +184,7 @@ TEST(HandTools, NoneThatCutsTakesMetal) {
     see({2.0, 1.0, 0}, -0.3, 0.4);
     see({-4.0, 1.0, 0.5}, 0.25, 0.4);
     EXPECT_GT(stage.replica_.removed_mm3(), 0.02) << tool.name;
-    // The shank of one lies on the bone before it comes so deep.
+    // The shank of this one lies on the bone before it comes so deep.
     if (tool.name != "burr-round-3.2") {
       EXPECT_NE(events & kOnMetal, 0u) << tool.name;
     }
@@ -208,7 +210,7 @@ TEST(HandTools, NoneThatCutsTakesMetal) {
   }
 }
 
-// Dragged over metal under pressure a bur neither cuts nor says that it does.
+// A bur dragged over metal under pressure neither cuts nor reports a cut.
 TEST(HandTools, ABurDraggedOverMetalSendsNothing) {
   const Tool bur = *find_tool("burr-round-5");
   HandStage stage(block(0.5, 40.0, 12.0, [](const Vec3&) { return Tissue::metal; }), bur, held(bur));
@@ -225,8 +227,8 @@ TEST(HandTools, ABurDraggedOverMetalSendsNothing) {
   EXPECT_EQ(stage.replica_.removed_mm3(), 0.0);
 }
 
-// A bur in its groove that a hand rocks hard, by 9 degrees 1.5 times a second: turning cuts nothing and lifts it out,
-// its coupling cuts it in again. Where a tick does more of the first it rubs; but what was cut in it took its work.
+// A hand rocks a bur hard in its groove, by 9 degrees 1.5 times a second. Turning cuts nothing and lifts it out, and
+// its coupling cuts it in again. In a tick with more lifting than cutting it rubs, but the cuts in it had their work.
 TEST(HandTools, ARockedBurIsPushedBackAndCutsAgain) {
   const Tool bur = *find_tool("burr-round-3.2");
   const Case bone = block(0.5, 40.0, 12.0);
@@ -299,7 +301,7 @@ TEST(HandTools, WhatDoesNotCutOnlyTouches) {
   }
 }
 
-// A blade goes on in its own plane and no way across its flat, in its kerf and in the air beside it.
+// A blade goes on in its own plane, and does not move across its flat, in its kerf and in the air beside it.
 TEST(Saw, GoesInItsPlaneOnly) {
   const Tool saw = *find_tool("saw-oscillating-2");
   HandStage stage(block(0.5, 40.0, 12.0), saw, held(saw));
@@ -317,7 +319,7 @@ TEST(Saw, GoesInItsPlaneOnly) {
   EXPECT_EQ(out.force_physical_n.norm(), 0.0);
 }
 
-// In its own hole, drilled at a slant through a face, a drill neither jams nor is held on its way out.
+// In its own hole, drilled at an angle through a face, a drill neither jams nor is held on its way out.
 TEST(OwnHole, DoesNotJamAtAnyAngle) {
   for (const double degrees : {0.0, 10.0, 20.0, 30.0}) {
     PlanStep step;

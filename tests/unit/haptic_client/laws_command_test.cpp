@@ -28,7 +28,7 @@ TEST(LawsCommand, ListsEveryLawWithAllThatIsToBeKnown) {
     for (const char* label :
          {"equation", "source", "units", "constants", "wear", "range", "notes", "fits", "default of"})
       EXPECT_NE(paragraph.find("\n  " + std::string(label) + " "), std::string::npos) << law.name << " " << label;
-    // What it can be chosen for: all that fits, and no more.
+    // The tools for which a law can be chosen: all that fit, and no more.
     for (const auto& [kind, name] : tool_kinds()) {
       Tool tool;
       tool.kind = kind;

@@ -1,4 +1,4 @@
-// What a contact allows, and what a cut leaves, against closed forms and by another road.
+// Tests what a contact allows and what a cut leaves, against closed forms and by other ways of computing.
 #include "haptic_client/control/least_motion.hpp"
 
 #include <gtest/gtest.h>
@@ -29,11 +29,11 @@ double breaks_mm(const Motion& m, const std::vector<Condition>& walls) {
   return most;
 }
 
-// Two walls that nearly face each other, as those of a kerf: what goes down into the wedge between them ends in its
+// Two walls that nearly face each other, like those of a kerf. What goes down into the wedge between them ends in its
 // edge.
 TEST(LeastMotion, AWedgeHoweverNarrowIsExact) {
   for (const double half_angle : {0.5, 0.1, 0.02, 0.004}) {
-    // The wedge opens along +z; its walls are a tenth of a millimetre from the tip along their normals.
+    // The wedge opens along +z. Its walls are a tenth of a millimetre from the tip along their normals.
     const double s = std::sin(half_angle), c = std::cos(half_angle);
     const std::vector<Condition> walls = {wall({c, 0, s}, -0.1), wall({-c, 0, s}, -0.1)};
     bool held = false;
@@ -42,14 +42,14 @@ TEST(LeastMotion, AWedgeHoweverNarrowIsExact) {
     EXPECT_NEAR(down.move_mm.x(), 0.0, 1e-7) << half_angle;
     EXPECT_NEAR(down.move_mm.y(), 0.3, 1e-12) << half_angle;
     EXPECT_NEAR(down.move_mm.z(), -0.1 / s, 1e-6) << half_angle;
-    // Out of it nothing holds.
+    // Nothing holds it on the way out.
     const Motion out = solve({{0.0, 0.0, 1.0}, Vec3::Zero()}, walls, held, {.may_turn = false});
     EXPECT_FALSE(held);
     EXPECT_EQ(out.move_mm.z(), 1.0);
   }
 }
 
-// Both sides of a kerf ask to be let out: it stays between them and goes along as it is led.
+// Both sides of a kerf press on the tool. It stays between them and slides along as it is moved.
 TEST(LeastMotion, WhatIsPressedFromTwoSidesStaysAndSlides) {
   std::vector<Condition> walls;
   for (int i = 0; i < 40; ++i) {
@@ -67,7 +67,7 @@ TEST(LeastMotion, WhatIsPressedFromTwoSidesStaysAndSlides) {
   EXPECT_NEAR(std::hypot(motion.turn_rad.x(), motion.turn_rad.z()), 0.0, 1e-9);
 }
 
-// The nearest of all: no motion that keeps to the conditions, found by going between random ones and it, is nearer.
+// The result is the nearest motion: no allowed motion, found by going between random ones and it, is nearer.
 TEST(LeastMotion, NoAllowedMotionIsNearer) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal;
@@ -92,7 +92,7 @@ TEST(LeastMotion, NoAllowedMotionIsNearer) {
       if (breaks_mm(other, walls) > 0.0) continue;
       EXPECT_GT(off(other), off(found) - 1e-7) << trial;
     }
-    // Standing still is allowed here, so what is found lies on the ball over the wanted motion: x · (x - w) <= 0.
+    // Standing still is allowed here, so the result lies on the ball over the wanted motion: x · (x - w) <= 0.
     const double inward = found.move_mm.dot(found.move_mm - wanted.move_mm) +
                           (limits.may_turn ? 400.0 * found.turn_rad.dot(found.turn_rad - wanted.turn_rad) : 0.0);
     EXPECT_LT(inward, 1e-7) << trial;
@@ -100,7 +100,7 @@ TEST(LeastMotion, NoAllowedMotionIsNearer) {
   EXPECT_GT(pressed, 250);
 }
 
-// A group of points at once says what its points say one by one, for the body of every tool.
+// A group of points at once gives the same result as its points one by one, for the body of every tool.
 TEST(CutShape, AGroupOfPointsIsItsPoints) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> even(-1.0, 1.0);
@@ -135,7 +135,7 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
           const Vec3 at(p[0][i], p[1][i], p[2][i]);
           most_off = std::max(most_off, std::abs(shape.distance_mm(at) - static_cast<double>(distance[i])));
           EXPECT_NEAR(view.way_out(at, by[i]).norm(), 1.0, 1e-4);
-          // Where it was at either end it has taken the bone away.
+          // It has taken the bone away where it was at either end.
           const Vec3 bone = now.point(at);
           double deepest = std::min(shape.distance_mm(sweep.to.inverse().point(bone)), 1e6);
           if (open_behind && !shape.is_ball()) continue;
@@ -150,8 +150,8 @@ TEST(CutShape, AGroupOfPointsIsItsPoints) {
   EXPECT_GE(tried, 40);
 }
 
-// A sweep that begins where the one before is seen to end leaves out that place, and both together leave what they
-// left.
+// A sweep that begins where the one before visibly ends leaves out that position. Both together leave what they left
+// before.
 TEST(SweepView, LeavesOutOnlyWhatTheOneBeforeShows) {
   std::mt19937 random(12);
   std::uniform_real_distribution<double> even(-1.0, 1.0);
@@ -162,7 +162,7 @@ TEST(SweepView, LeavesOutOnlyWhatTheOneBeforeShows) {
   first.reach({{0.5, 0.0, 4.3}, Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Vec3::UnitX()))});
   second.from = first.to;
   second.reach({{-0.4, 0.2, 5.2}, Eigen::Quaterniond(Eigen::AngleAxisd(0.2, Vec3::UnitY()))});
-  Sweep elsewhere = second;  // begins a little off where the first ends
+  Sweep elsewhere = second;  // begins a little off the end of the first
   elsewhere.from.position_mm.x() += 0.5;
   const Pose now = second.to;
   const SweepView before(first, nullptr, now, 0.1), alone(second, nullptr, now, 0.1), after(second, &first, now, 0.1);
@@ -184,7 +184,7 @@ TEST(SweepView, LeavesOutOnlyWhatTheOneBeforeShows) {
       lent += of_after[i] < of_alone[i];
     }
   }
-  EXPECT_GT(lent, 50);  // else it would prove nothing
+  EXPECT_GT(lent, 50);  // otherwise the test would prove nothing
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// The loop's duties towards hand and bone: clutch, limits, walls, lost links, rejected cuts, workspace.
+// The loop's duties towards hand and bone: clutch, limits, walls, lost connections, rejected cuts, workspace.
 #include "haptic_client/control/haptic_loop.hpp"
 
 #include <gtest/gtest.h>
@@ -15,13 +15,14 @@
 namespace osteon::haptic::test {
 namespace {
 
-// A drill held over the middle of the block's face, device and bone frames alike, the handle's place being the tip's.
+// A drill held over the middle of the block's face. Device and bone frames are alike: the handle's position is the
+// tip's.
 class LoopOnBlock : public ::testing::Test {
  protected:
   explicit LoopOnBlock(const char* tool = "drill-3.2", const Vec3& start = {0, 0, -1}) : field_(bone_, BodyId{}) {
     ToolModel model(*find_tool(tool), bone_.pitch_mm());
     LoopParams params;
-    params.ramp_s = 1e-9;  // what comes after connecting has its own test
+    params.ramp_s = 1e-9;  // the ramp after connecting has its own test
     loop_ = std::make_unique<HapticLoop>(params, std::vector<ToolModel>{model});
     loop_->take_up(0, {start, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
     input_.pose_device_tool.position_mm = start;
@@ -38,7 +39,7 @@ class LoopOnBlock : public ::testing::Test {
     }
     return report;
   }
-  // A loop whose force comes and goes within 0.2 s, pressed on the surface once it has come. Returns the force.
+  // A loop whose force comes and goes within 0.2 s, pressed on the surface after the ramp. Returns the force.
   double press_with_ramp() {
     LoopParams params;
     params.ramp_s = 0.2;
@@ -64,8 +65,8 @@ TEST_F(LoopOnBlock, FreeAirHasNoForce) {
   EXPECT_EQ(report.phase, CuttingPhase::idle);
 }
 
-// A tool that was held far from bone while its hand went on, as by a room that stopped: where it is wanted nothing is
-// known of the bone, and what is built about the tool never reaches there. It goes as far as is known, patch by patch.
+// A tool was held far from bone while its hand went on, as by a stopped room. At the hand's target nothing is known of
+// the bone, and patches built round the tool never reach there. The tool goes as far as is known, patch by patch.
 TEST_F(LoopOnBlock, AToolFarBehindItsHandInTheAirComesUp) {
   for (const double height_mm : {-5.0, -20.0, -45.0}) {
     const Vec3 tool_mm(-40, 3, height_mm), hand_mm(30, -10, height_mm);
@@ -113,7 +114,8 @@ TEST_F(LoopOnBlock, TheClutchIsForcelessAndMovesNothing) {
     EXPECT_EQ(report.force_device_n.norm(), 0.0);
     EXPECT_EQ(report.pose_bone_proxy.position_mm, held);
   }
-  // Letting go elsewhere in the workspace goes on from where the tool is, without a jump in force.
+  // When the clutch is released elsewhere in the workspace, motion goes on from where the tool is, without a jump in
+  // force.
   input_.clutch = false;
   const LoopReport report = tick();
   EXPECT_NEAR((report.pose_bone_proxy.position_mm - held).norm(), 0.0, 1e-6);
@@ -135,8 +137,8 @@ TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
   }
 }
 
-// A device that comes back has its handle elsewhere: the tool stays where it was, nothing is felt of the difference,
-// and force comes up over the ramp.
+// A device that comes back has its handle elsewhere. The tool stays where it was, the hand feels nothing of the
+// difference, and force rises over the ramp.
 TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
   ASSERT_GT(press_with_ramp(), 8.0);
   input_.device_ok = false;
@@ -150,11 +152,11 @@ TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
   for (int i = 1; i <= 300; ++i) {
     input_.pose_device_tool.position_mm.z() = 20.0 + 1e-3 * i;
     report = tick();
-    // Spring and damping, of 2 ms, of what was pressed since, by the ramp's share.
+    // Spring and damping, of 2 ms, of what was pressed since, times the ramp's share.
     EXPECT_LE(report.force_device_n.norm(), 50.0 * (1e-3 * i + 2e-3) * std::min(1.0, (i + 1) / 200.0) + 1e-9) << i;
   }
   EXPECT_FALSE(report.events & kRamping);
-  // What the hand went on for while less was shown it has not paid for: that stretch was let go.
+  // While less force was shown, the hand's advance was not paid for. That stretch was let go.
   const double ramped_n = report.force_device_n.norm();
   EXPECT_GT(ramped_n, 5.0);
   EXPECT_LT(ramped_n, 50.0 * 0.301);
@@ -165,7 +167,7 @@ TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
   EXPECT_NEAR(report.force_device_n.norm(), ramped_n + 50.0 * 0.1, 0.1);  // from then on the whole spring
 }
 
-// What the hand did not cause may only grow by 0.5 N a millisecond.
+// A force that the hand did not cause may only grow by 0.5 N a millisecond.
 TEST_F(LoopOnBlock, ForceReturnsGradually) {
   move_to({0, 0, 0.5});
   const double full = tick().force_device_n.norm();
@@ -194,12 +196,12 @@ TEST_F(LoopOnBlock, WhileTheRoomIsSilentTheSpindleRunsDownAndBoneStaysHard) {
     ASSERT_EQ(report.spindle_rpm, 0.0);
     ASSERT_NE(report.phase, CuttingPhase::cutting);
     ASSERT_TRUE(report.events & kRoomHeld);
-    // The spring of what the hand is within the bone, its point a little before it.
+    // The spring of the hand's depth in the bone. Its contact point is slightly before it.
     ASSERT_NEAR(report.force_device_n.norm(), 50.0 * 0.3, 50.0 * 0.1) << i;
   }
 }
 
-// When it has gone for good the hand is let go over the ramp, not at once.
+// When the device is lost for good, the force on the hand falls over the ramp, not at once.
 TEST_F(LoopOnBlock, AtTheEndTheHandIsLetGoOverTheRamp) {
   const double full_n = press_with_ramp();
   ASSERT_GT(full_n, 8.0);
@@ -232,7 +234,7 @@ TEST_F(LoopOnBlock, TheDeviceFeelsNoMoreThanItsStiffness) {
   }
 }
 
-// A tick that comes late is known to the loop: after three missed ones there is no force.
+// The loop knows when a tick is late. After three missed ticks there is no force.
 TEST(Session, LateTicksReachTheLoop) {
   PlanStep step;
   step.action = Action::drill;
@@ -251,7 +253,7 @@ TEST(Session, LateTicksReachTheLoop) {
   EXPECT_TRUE(late.events & kMissedTicks);
 }
 
-// No finer than the case allows: what is cut, what is felt.
+// Cuts and contact are no finer than the case allows.
 TEST(ToolModel, CutsNoFinerThanTheCase) {
   const Tool tool = *find_tool("drill-3.2");
   for (const double h : {0.5, 0.25, 0.15, 0.08}) {
@@ -263,11 +265,11 @@ TEST(ToolModel, CutsNoFinerThanTheCase) {
   EXPECT_LT(ToolModel(tool, 0.15).cut_level, tool.cut_level);
 }
 
-// Bone that only this client has seen go stays little when the room does not answer.
+// If the room does not answer, little bone may be gone that only this client has removed.
 TEST(ConfirmationMonitor, HoldsTheSpindleWhileTheRoomDoesNotFollow) {
   ConfirmationMonitor watch;
   EXPECT_EQ(watch.update(100.0, false, 0), RoomHealth::follows);
-  EXPECT_EQ(watch.update(200.0, false, 0), RoomHealth::follows);  // nobody cuts, nothing need come
+  EXPECT_EQ(watch.update(200.0, false, 0), RoomHealth::follows);  // nobody cuts, so no answer is needed
   EXPECT_EQ(watch.update(201.9, false, 1), RoomHealth::follows);
   EXPECT_EQ(watch.update(202.1, false, 1), RoomHealth::silent);
   EXPECT_EQ(watch.update(202.2, true, 1), RoomHealth::follows);
@@ -275,7 +277,7 @@ TEST(ConfirmationMonitor, HoldsTheSpindleWhileTheRoomDoesNotFollow) {
 
   EXPECT_EQ(watch.update(300.0, true, 512), RoomHealth::follows);
   EXPECT_EQ(watch.update(300.1, true, 513), RoomHealth::behind);
-  EXPECT_EQ(watch.update(300.2, true, 300), RoomHealth::behind);  // not on and off at the limit
+  EXPECT_EQ(watch.update(300.2, true, 300), RoomHealth::behind);  // no switching on and off at the limit
   EXPECT_EQ(watch.update(300.3, true, 256), RoomHealth::follows);
 }
 
@@ -289,7 +291,7 @@ TEST(SimulatedDevice, IsChosenByName) {
   EXPECT_NE(none.error().message.find("simulated"), std::string::npos);
 }
 
-// A drill in its own hole has no play to speak of sideways, does not jam along it, and feels nothing where it has cut.
+// A drill in its own hole has almost no sideways play, does not jam along it, and feels nothing where it has cut.
 TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   PlanStep step;
   step.action = Action::drill;
@@ -309,7 +311,7 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   EXPECT_NEAR(deepest, 10.0, 0.3);  // the rig turns back while the coupling is still stretched
   EXPECT_EQ(force_on_the_way_out, 0.0);
 
-  // Put back into the hole by hand, spindle off.
+  // Put back into the hole by hand, with the spindle off.
   HapticLoop loop(LoopParams{.ramp_s = 1e-9}, {ToolModel(*find_tool("drill-3.2"), 0.5)});
   Patch patch;
   PatchBuilder builder;
@@ -334,7 +336,7 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   EXPECT_EQ(report.force_physical_n.norm(), 0.0);
 }
 
-// A hand at the loop whose cuts go through a replica, as late as a real client's; the device and bone frames are alike.
+// A hand at the loop whose cuts go through a replica, as late as a real client's. Device and bone frames are alike.
 class HandOnBlock {
  public:
   explicit HandOnBlock(const char* tool)
@@ -344,7 +346,7 @@ class HandOnBlock {
     builder_.build(replica_.bodies(), loop_.tool(0), input_.pose_device_tool, patch_);
   }
   void lead(const Vec3& to) { input_.pose_device_tool.position_mm = to; }
-  // One tick in which the handle stretches the coupling a little on towards so far ahead of the tool along z, and to x.
+  // Runs one tick in which the handle moves a little towards a target, so far ahead of the tool along z, and at x.
   LoopReport push(double ahead_mm, double x_mm = 0.0) {
     constexpr double kStep_mm = 0.005;
     ahead_mm_ += std::clamp(ahead_mm - ahead_mm_, -kStep_mm, kStep_mm);
@@ -382,7 +384,7 @@ class HandOnBlock {
   std::int64_t ticks_ = 0;
 };
 
-// However long it is pressed, a drill that does not turn stays where it is, but for what its points are inset, and
+// However long it is pressed, a drill that does not turn stays where it is, except for the inset of its points, and
 // takes nothing away.
 TEST(DrillInItsHole, TakesNothingWhileItStands) {
   HandOnBlock hand("drill-3.2");
@@ -391,7 +393,7 @@ TEST(DrillInItsHole, TakesNothingWhileItStands) {
   for (int i = 0; i < 1000 && hand.report_.spindle_rpm > 1.0; ++i) hand.push(0.0);
   ASSERT_LT(hand.report_.spindle_rpm, 1.0);
   const double from_mm = hand.tip_mm().z();
-  for (int i = 0; i < 100; ++i) hand.push(-0.01);  // lets the last cut close
+  for (int i = 0; i < 100; ++i) hand.push(-0.01);  // closes the last cut
   const double removed_mm3 = hand.replica_.removed_mm3();
   for (int i = 0; i < 1000; ++i) hand.push(0.58);  // 29 N
   EXPECT_NEAR(hand.report_.force_physical_n.z(), -29.0, 0.1);
@@ -399,8 +401,8 @@ TEST(DrillInItsHole, TakesNothingWhileItStands) {
   EXPECT_EQ(hand.replica_.removed_mm3(), removed_mm3);
 }
 
-// Pulled sideways by 35 N while it drills on, it leans in its play, and its hole goes on along it: by the play over the
-// depth for each millimetre drilled. It does not cut its way sideways.
+// Pulled sideways by 35 N while it drills on, it leans in its play, and its hole continues in that direction: by the
+// play over the depth for each millimetre drilled. It does not cut its way sideways.
 TEST(DrillInItsHole, DoesNotCreepAsideWhileItTurns) {
   HandOnBlock hand("drill-3.2");
   constexpr double kDeep_mm = 3.0;
@@ -439,8 +441,8 @@ TEST(Burr, TakesAWindowToItsDepth) {
   EXPECT_GT(bone.solid_mm({0, 0, 1.0}), 0.0);    // taken away
   EXPECT_LT(bone.solid_mm({0, 0, 2.0}), 0.0);    // left
   EXPECT_LT(bone.solid_mm({6.0, 0, 0.3}), 0.0);  // outside the window
-  // Closed form of a sphere swept over a rectangle: cap, half segments along the edges, slab. The hand gives way a
-  // little, so less comes off.
+  // Closed form of a sphere swept over a rectangle: cap, half segments along the edges, slab. The hand yields a little,
+  // so less is removed.
   const double r = 2.5, d = 1.5, a = 8 - 5, b = 7 - 5;
   const double cap = std::numbers::pi * d * d * (3 * r - d) / 3;
   const double segment = r * r * std::acos(1 - d / r) - (r - d) * std::sqrt(2 * r * d - d * d);
@@ -477,7 +479,7 @@ TEST(Replica, ARejectedCutComesBack) {
   EXPECT_EQ(replica.predicted().hash(), replica.committed().hash());
 }
 
-// After a line broke, a cut may be sent and answered twice: the second answer may come after the cut was taken back.
+// After a lost connection, a cut may be sent and answered twice. The second answer may come after the cut was undone.
 TEST(Replica, AnAnswerThatComesAgainBringsNothingBack) {
   const Case bone = block_case();
   const Tool tool = *find_tool("drill-3.2");
@@ -507,8 +509,8 @@ TEST(Replica, AnAnswerThatComesAgainBringsNothingBack) {
   EXPECT_EQ(replica.room_seq(), RoomSeq{2});
 }
 
-// Rejections in a row, among cuts of one's own and of others through the same bone: what is left is the committed field
-// and what is still pending, and the pending cuts are made again once, the committed ones not at all.
+// Several rejections in sequence, among own and other cuts through the same bone. The result is the committed field
+// with the pending cuts. The pending cuts are applied again once, the committed ones not at all.
 TEST(Replica, RejectionsInARowAreSettledOnce) {
   const Case bone = block_case();
   const Tool tool = *find_tool("drill-3.2");
@@ -528,7 +530,7 @@ TEST(Replica, RejectionsInARowAreSettledOnce) {
     replica.commit(RoomSeq{++place}, cut_at(2, 1 + i, -4.0 + 0.1 * i), false);
     expected.apply(cut_at(2, 1 + i, -4.0 + 0.1 * i));
   }
-  // 1 to 6 overlap: what 5 would take is gone by 2 already, which is rejected.
+  // 1 to 6 overlap. What 5 would take is already gone by 2, which is rejected.
   const double x[] = {-2.5, 0.0, 0.6, 2.5, 0.1, 3.5};
   for (std::uint64_t seq = 1; seq <= 6; ++seq) replica.add_own(cut_at(1, seq, x[seq - 1]));
   (void)replica.take_changes();
@@ -542,7 +544,7 @@ TEST(Replica, RejectionsInARowAreSettledOnce) {
   for (const std::uint64_t seq : {1, 5, 6}) expected.apply(cut_at(1, seq, x[seq - 1]));
   EXPECT_EQ(replica.predicted().hash(), expected.hash());
   EXPECT_EQ(replica.cut_again(), 3u);
-  // One that took back what a rejected one had taken may be rejected later.
+  // A cut that removed again what a rejected one had removed may be rejected later.
   replica.reject(RoomSeq{++place}, 5);
   replica.settle();
   replica.commit(RoomSeq{++place}, cut_at(1, 1, x[0]), true);

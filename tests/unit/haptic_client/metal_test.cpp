@@ -1,4 +1,4 @@
-// Metal under the tool, on virtual time: it stands there as on steel, cuts nothing, and goes on beside it.
+// Metal under the tool, on virtual time. The tool stands on it as on steel, cuts nothing, and goes on beside it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,7 +12,7 @@
 namespace osteon::haptic::test {
 namespace {
 
-constexpr double kPitch_mm = 0.5, kPlate_mm = 5.0;  // the plate's first samples are so deep
+constexpr double kPitch_mm = 0.5, kPlate_mm = 5.0;  // depth of the plate's first samples
 constexpr double kRadius_mm = 1.6;
 
 // Compact bone at z > 0 with a plate of metal across it.
@@ -43,14 +43,14 @@ bool metal_is_whole(const CutField& field) {
   return true;
 }
 
-// What a room does not take.
+// Number of cuts that a room would reject.
 int refused(const std::vector<Cut>& cuts, const CutField& field) {
   const CutField* const one = &field;
   return static_cast<int>(std::ranges::count_if(
       cuts, [&](const Cut& cut) { return meets_metal(cut, field.tools()->find(cut.tool)->body, std::span(&one, 1)); }));
 }
 
-// A rig goes where it is told whatever the force: the force on metal is the coupling's stretch.
+// A rig goes to its target whatever the force. The force on metal is the coupling's stretch.
 TEST(Metal, HoldsADrillAsSteelWould) {
   Bench bench(plate_case(), {drill_to(kPlate_mm + 0.8, HandKind::rig)});
   int stands = 0, off = 0;
@@ -62,7 +62,7 @@ TEST(Metal, HoldsADrillAsSteelWould) {
     densest = std::max(densest, r.density_g_cm3);
     if (!(r.events & kOnMetal)) return;
     EXPECT_NE(r.phase, CuttingPhase::idle);
-    // A tick may come to it by a last cut; the cuts that were open then are closed in the ticks after it.
+    // A tick may reach the metal by a last cut. The cuts that were open then are closed in the ticks after it.
     if (r.phase == CuttingPhase::cutting) return;
     if (++stands == 100) cuts_then = bench.cuts().size();
     if (stands >= 100) cuts_last = bench.cuts().size();
@@ -82,15 +82,15 @@ TEST(Metal, HoldsADrillAsSteelWould) {
   EXPECT_GT(deepest_mm, kPlate_mm - kPitch_mm);
   EXPECT_LT(deepest_mm, kPlate_mm);
   EXPECT_GT(strongest_n, 30.0);
-  EXPECT_LE(densest, 2.1 + 1e-6) << "metal is no dense bone";
-  EXPECT_EQ(cuts_last, cuts_then) << "a tool that stands sends nothing";
+  EXPECT_LE(densest, 2.1 + 1e-6) << "metal does not count as dense bone";
+  EXPECT_EQ(cuts_last, cuts_then) << "a stopped tool sends nothing";
   EXPECT_TRUE(metal_is_whole(bench.replica().committed()));
   EXPECT_EQ(refused(bench.cuts(), CutField(plate_case(), BodyId{})), 0);
   // The hole: a cylinder that ends in the point's cone of 118 degrees.
   const double cone_mm = kRadius_mm / std::tan(59.0 / 180.0 * std::numbers::pi);
   const double hole_mm3 = std::numbers::pi * kRadius_mm * kRadius_mm * (deepest_mm - 2.0 / 3.0 * cone_mm);
   EXPECT_NEAR(bench.replica().committed().removed_mm3(), hole_mm3, 0.05 * hole_mm3);
-  // It gives up within its time, and says why.
+  // It gives up within its time limit, and gives the reason.
   EXPECT_FALSE(result.completed);
   ASSERT_TRUE(result.gave_up);
   EXPECT_EQ(*result.gave_up, SurgeonPhase::feed);
@@ -100,7 +100,7 @@ TEST(Metal, HoldsADrillAsSteelWould) {
   EXPECT_EQ(std::string(given_up_words(SurgeonPhase::feed)).find("metal"), std::string::npos);
 }
 
-// A hand that pushes feels what it pushes.
+// A hand that pushes feels its own push.
 TEST(Metal, BearsThePushOfAHand) {
   PlanStep step = drill_to(kPlate_mm + 0.8, HandKind::expert);
   step.push_n = 29.0;
@@ -122,8 +122,8 @@ TEST(Metal, BearsThePushOfAHand) {
   EXPECT_TRUE(metal_is_whole(bench.replica().committed()));
 }
 
-// Two millimetres beside the edge of a plate that covers half the bone the drill does not meet it: the same hole, bit
-// for bit.
+// Two millimetres beside the edge of a plate that covers half the bone, the drill does not meet it. The hole is the
+// same, bit for bit.
 TEST(Metal, DoesNothingBesideIt) {
   const auto half_plate = [](bool metal) {
     return osteon::test::make_bone(
@@ -150,7 +150,7 @@ TEST(Metal, DoesNothingBesideIt) {
   EXPECT_EQ(run(half_plate(true)), run(half_plate(false)));
 }
 
-// A bur that is led over a window half of which is metal takes the other half.
+// A bur moves over a window of which half is metal. It takes the other half.
 TEST(Metal, StaysWhereABurGoesOver) {
   const Case bone = osteon::test::make_bone(
       {Vec3(-10, -10, 0), Vec3(10, 10, 8)}, kPitch_mm,

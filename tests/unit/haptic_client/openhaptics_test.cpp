@@ -1,4 +1,4 @@
-// PHANToMs through our stand-in for libHD: every figure here is of a simulated device.
+// PHANToMs through our stand-in for libHD. Every figure here is of a simulated device.
 #include "haptic_client/device/openhaptics.hpp"
 
 #include <gtest/gtest.h>
@@ -20,21 +20,21 @@ using osteon::test::Arm;
 class Phantom : public WithArm {
  protected:
   Phantom() : device_(make_openhaptics({OSTEON_STAND_IN_HD, {}})) {}
-  // Reads until the servo has made so many cycles more.
+  // Reads until the servo has made `cycles` more cycles.
   DeviceReading after_cycles(std::uint64_t cycles) {
     const std::uint64_t until = arm()->cycles + cycles;
     EXPECT_TRUE(wait_until([&] { return (void)device_->read(), arm()->cycles >= until; }, kPatience));
     return device_->read();
   }
-  // Writes a force until the servo has made so many cycles more.
+  // Writes a force until the servo has made `cycles` more cycles.
   DeviceReading push(const DeviceOutput& output, std::uint64_t cycles) {
     const std::uint64_t until = arm()->cycles + cycles;
     EXPECT_TRUE(
         wait_until([&] { return device_->write(output), (void)device_->read(), arm()->cycles >= until; }, kPatience));
     return device_->read();
   }
-  // Whether the device comes to show this much, while the force is written again and again: a machine that takes the
-  // core from the test for 3 ms sees it end meanwhile.
+  // True if the device comes to show this force while it is written again and again. A machine that suspends the test
+  // for 3 ms lets the force end in between.
   bool shows(const DeviceOutput& output, const std::function<bool()>& enough) {
     return wait_until([&] { return device_->write(output), (void)device_->read(), enough(); }, kPatience);
   }
@@ -57,7 +57,7 @@ TEST_F(Phantom, IsFoundByLooking) {
   EXPECT_EQ(finding.missing, "");
   ASSERT_EQ(finding.found.size(), 1u);
   EXPECT_NE(finding.found[0].find("Stand-in Arm, serial 0001"), std::string::npos);
-  EXPECT_EQ(arm()->scheduler_starts, 0u);  // looking moves no motor
+  EXPECT_EQ(arm()->scheduler_starts, 0u);  // looking for devices moves no motor
   EXPECT_EQ(arm()->opened, 1u);
   arm()->plugged = 0;
   EXPECT_NE(look_for_openhaptics({OSTEON_STAND_IN_HD, {}}).missing.find("check its power and cable"),
@@ -107,7 +107,7 @@ TEST_F(Phantom, ButtonsAreSpindleAndClutch) {
   EXPECT_EQ(after_cycles(50).buttons, std::uint32_t{kClutchButton});
 }
 
-// A spring that the hand is pulled against: at rest hand and spring share the way, k_h (h − x) = k x.
+// The hand is pulled against a spring. At rest hand and spring share the way: k_h (h − x) = k x.
 TEST_F(Phantom, AHundredThousandCycles) {
   arm()->fast = 1;
   arm().hand(20, 0, 0);
@@ -125,7 +125,7 @@ TEST_F(Phantom, AHundredThousandCycles) {
   while (arm()->cycles < begin + 100000) turn();
   EXPECT_EQ(heap.count(), 0);
   EXPECT_GT(reads, 1000u);
-  // A machine that takes the core from us for 3 ms sees the force end, and then return.
+  // If the machine suspends us for 3 ms, the force ends and then returns.
   EXPECT_TRUE(wait_until(
       [&] {
         double x_mm = 0.0;
@@ -133,7 +133,7 @@ TEST_F(Phantom, AHundredThousandCycles) {
         return std::abs(x_mm - 20.0 * hand / (hand + wall)) < 0.01;
       },
       kPatience));
-  EXPECT_EQ(arm()->torque_nmm[2], 0.0);  // torque never becomes force, nor is it sent to three motors
+  EXPECT_EQ(arm()->torque_nmm[2], 0.0);  // torque never becomes force, and is not sent to three motors
 }
 
 TEST_F(Phantom, NeverAsksForMoreThanThePeakNorForNonsense) {
@@ -230,18 +230,18 @@ TEST_F(Phantom, UnpluggedItHasNoForceAndComesBack) {
     arm()->plugged = 1;
   }
   ASSERT_TRUE(wait_until([&] { return heard.count(DeviceEvent::back) >= 3; }, kPatience));
-  // A machine that stops the device's thread for long enough makes it one more.
+  // A machine that stops the device's thread for long enough causes one more loss.
   EXPECT_GE(connection.losses(), 3);
   EXPECT_EQ(static_cast<std::size_t>(connection.losses()), heard.count(DeviceEvent::lost));
 }
 
-TEST_F(Phantom, ADeviceErrorEndsTheForceAndIsTold) {
+TEST_F(Phantom, ADeviceErrorEndsTheForceAndIsReported) {
   Heard heard;
   DeviceConnection connection(*device_, heard.notice(), {10ms, 10ms});
   ASSERT_TRUE(connection.start());
   const Holding hand(*device_, {Vec3(2, 0, 0)});
   ASSERT_TRUE(wait_until([&] { return arm().force_n() > 1.9; }, kPatience));
-  // One bad frame is no reason to begin anew; many are.
+  // One bad frame is no reason to reconnect. Many are.
   arm()->next_error = 0x0304;
   std::this_thread::sleep_for(100ms);
   EXPECT_FALSE(heard.said(DeviceEvent::lost, "0x0304"));
@@ -275,7 +275,7 @@ TEST_F(Phantom, AMissingOrWrongLibraryIsOneClearMessage) {
   EXPECT_EQ(opened.error().code, ErrorCode::not_found);
   EXPECT_NE(opened.error().message.find("install the vendor's OpenHaptics"), std::string::npos);
 
-  opened = make_openhaptics({OSTEON_STAND_IN_DHD, {}})->open();  // another vendor's
+  opened = make_openhaptics({OSTEON_STAND_IN_DHD, {}})->open();  // of another vendor
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
   EXPECT_NE(opened.error().message.find("hdInitDevice"), std::string::npos);
@@ -293,7 +293,7 @@ struct End {
 };
 class PhantomsEnd : public Phantom, public ::testing::WithParamInterface<End> {};
 
-// However the program ends, the scheduler is stopped: some devices need their plug pulled otherwise.
+// The scheduler is stopped however the program ends. Otherwise some devices must be unplugged.
 TEST_P(PhantomsEnd, StopsTheScheduler) {
   const End end = GetParam();
   osteon::test::Process child(osteon::test::program("hold_device"), {"phantom", OSTEON_STAND_IN_HD, end.how});

@@ -20,7 +20,7 @@ Tool burr() {
   return *found;
 }
 
-// Burrs whose tips look at each other along z, the partner's at this place.
+// Burrs whose tips face each other along z. The partner's tip is at this position.
 Pose facing(double tip_z_mm, double x_mm = 0.0) {
   return {{x_mm, 0, tip_z_mm}, Eigen::Quaterniond(Eigen::AngleAxisd(std::acos(-1.0), Vec3::UnitX()))};
 }
@@ -32,7 +32,7 @@ struct Pair {
   PartnerContact contact;
 
   PartnerTool partner(const Pose& pose, double lag_s = 0.0) const { return {7, pose, lag_s, &solid}; }
-  // Held there until low pass and slew have come to their end.
+  // Held there until low pass and slew have settled.
   PartnerForce hold(const Pose& own_pose, const PartnerTool& other, int ticks = 400) {
     PartnerForce force;
     for (int i = 0; i < ticks; ++i) force = contact.step(own, own_pose, std::span(&other, 1), kTick);
@@ -40,7 +40,7 @@ struct Pair {
   }
 };
 
-// Two balls that overlap by d are pushed apart with k d along the line of their centres; samples miss the tip by a
+// Two balls that overlap by d are pushed apart with k d along the line of their centres. Samples miss the tip by a
 // little.
 TEST(PartnerContact, PushesApartByTheOverlap) {
   for (const double overlap_mm : {0.4, 1.0, 1.6}) {
@@ -51,7 +51,7 @@ TEST(PartnerContact, PushesApartByTheOverlap) {
     EXPECT_LT(std::hypot(force.force_n.x(), force.force_n.y()), 0.1 * force.force_n.norm());
     EXPECT_EQ(force.author, 7u);
   }
-  // Beside each other: along the line between the centres too, which is not that of the tips.
+  // Beside each other, the force is also along the line between the centres. That is not the line between the tips.
   Pair pair;
   const Vec3 between = Vec3(3.5, 0, 2.0 * kRadius_mm - 2.0);
   const PartnerForce force = pair.hold({}, pair.partner(facing(-2.0, 3.5)));
@@ -59,12 +59,12 @@ TEST(PartnerContact, PushesApartByTheOverlap) {
   ASSERT_GT(overlap_mm, 0.3);
   EXPECT_NEAR(force.force_n.norm(), force.n_per_mm * overlap_mm, 0.2 * force.n_per_mm);
   EXPECT_GT(-force.force_n.normalized().dot(between.normalized()), 0.97);
-  // The moment about the tip of a force at that place.
+  // The moment about the tip of a force at that point.
   const Vec3 at_mm = Vec3(0, 0, -kRadius_mm) + kRadius_mm * between.normalized();
   EXPECT_LT((force.torque_nmm - at_mm.cross(force.force_n)).norm(), 0.5 * force.force_n.norm());
 }
 
-// What one user feels is what the other feels, the other way round.
+// One user feels the opposite of what the other feels.
 TEST(PartnerContact, IsFeltByBothAlike) {
   Pair one, other;
   const Pose there = facing(-0.8, 1.2);
@@ -78,7 +78,7 @@ TEST(PartnerContact, FeelsNothingThatDoesNotTouch) {
   EXPECT_EQ(pair.hold({}, pair.partner(facing(0.1))).force_n, Vec3(Vec3::Zero()));
   EXPECT_EQ(pair.hold({}, pair.partner(facing(80.0))).force_n, Vec3(Vec3::Zero()));
   EXPECT_GT(pair.hold({}, pair.partner(facing(-1.0))).force_n.norm(), 0.5);
-  // Nobody whose pose is too old, none without a solid; at once.
+  // A partner whose pose is too old, or who has no solid, causes no force at once.
   EXPECT_EQ(pair.hold({}, pair.partner(facing(-1.0), 0.6), 1).force_n, Vec3(Vec3::Zero()));
   PartnerTool unknown = pair.partner(facing(-1.0));
   unknown.solid = nullptr;
@@ -92,7 +92,7 @@ TEST(PartnerContact, IsBoundedAndGrowsSlowly) {
   pair.contact = PartnerContact(params);
   double before_n = 0.0, most_n = 0.0;
   for (int i = 0; i < 2000; ++i) {
-    // A partner that jumps in and out, and a hand that does.
+    // A partner that jumps in and out, and a hand that does so too.
     const PartnerTool partner = pair.partner(facing((i / 130) % 2 ? -4.0 : 5.0));
     const Pose own{{0, 0, (i / 70) % 2 ? 1.5 : 0.0}, Eigen::Quaterniond::Identity()};
     const double now_n = pair.contact.step(pair.own, own, std::span(&partner, 1), kTick).force_n.norm();
@@ -115,13 +115,13 @@ TEST(PartnerContact, IsSofterWhereTheLineIsLonger) {
     EXPECT_LT(force.n_per_mm, before);
     before = force.n_per_mm;
   }
-  // While they touch it does not stiffen.
+  // While the tools touch, the stiffness does not rise.
   Pair pair;
   const double soft = pair.hold({}, pair.partner(facing(-1.0), 0.15)).n_per_mm;
   EXPECT_LE(pair.hold({}, pair.partner(facing(-1.0), 0.0)).n_per_mm, soft);
 }
 
-// Into a partner that stands still and out again, at any speed and aside: the hand gets no more than it put in.
+// Into a partner that stands still and out again, at any speed and sideways. The hand gets no more than it put in.
 TEST(PartnerContact, GivesBackLessThanWasPutIn) {
   for (const double hertz : {0.5, 3.0, 12.0}) {
     Pair pair;
@@ -137,7 +137,7 @@ TEST(PartnerContact, GivesBackLessThanWasPutIn) {
   }
 }
 
-// Two hands without any damping of their own press their tools against each other over a line.
+// Two hands without damping of their own press their tools against each other over a connection.
 struct Meeting {
   double most_late_mm_per_s = 0, force_n[2] = {}, n_per_mm = 0;
 };
@@ -152,7 +152,7 @@ Meeting meet(double delay_s, double told_lag_s) {
     for (int user = 0; user < 2; ++user) {
       sent[user].push_back(z_mm[user]);
       const auto late = static_cast<std::size_t>(delay_s / kTick);
-      // 60 times a second, and nothing between.
+      // States arrive 60 times a second, and nothing in between.
       if (i % 16 == 0 && sent[user].size() > late) known_mm[1 - user] = sent[user][sent[user].size() - 1 - late];
     }
     for (int user = 0; user < 2; ++user) {
@@ -173,13 +173,14 @@ TEST(PartnerContact, ComesToRestOverALongLine) {
   for (const double delay_s : {0.0, 0.05, 0.15}) {
     const Meeting met = meet(delay_s, delay_s + 0.016);
     EXPECT_LT(met.most_late_mm_per_s, 1.0) << delay_s;
-    // Springs in a row: two hands and the tools between, over both pushes.
+    // Springs in series: two hands and the tools between them, over both pushes.
     const double rest_n = 2.0 / (1.0 / met.n_per_mm + 2.0 / 0.2);
     for (const double force_n : met.force_n) EXPECT_NEAR(force_n, rest_n, 0.1 * rest_n) << delay_s;
   }
 }
 
-// That the lag must be known: as stiff as on a short line, the same hands go on shaking each other.
+// Shows that the lag must be known: if it is as stiff as on a short connection, the same hands go on shaking each
+// other.
 TEST(PartnerContact, WouldShakeIfTheLagWereNotCounted) { EXPECT_GT(meet(0.15, 0.0).most_late_mm_per_s, 20.0); }
 
 TEST(PartnerContact, DoesNotAllocate) {
@@ -198,7 +199,7 @@ TEST(PartnerContact, DoesNotAllocate) {
   EXPECT_EQ(heap.count(), 0);
 }
 
-// Every tool has points to be touched by, few enough for a tick.
+// Every tool has points at which it can be touched, few enough for a tick.
 TEST(TouchPoints, AreOnTheToolAndNotTooMany) {
   for (const Tool& tool : builtin_tools()) {
     const TouchPoints touch(tool, 400);

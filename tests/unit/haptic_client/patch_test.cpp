@@ -1,4 +1,4 @@
-// A patch feels like the bone that it was gathered from.
+// A patch feels like the bone from which it was made.
 #include "haptic_client/control/patch_builder.hpp"
 
 #include <gtest/gtest.h>
@@ -42,8 +42,8 @@ TEST(Patch, AgreesWithTheFieldRoundTheTool) {
     ASSERT_TRUE(patch.solid(p, value));
     double unused = 0.0;
     fine += patch.fine.sample(p, unused);
-    // max of trilinears and trilinear of maxima differ by less than the pitch over a crease.
-    // Deep in bone only the sign matters: there values are clipped, in each level by its own band.
+    // The max of trilinears and the trilinear of maxima differ by less than the pitch over a crease.
+    // Deep in bone only the sign matters: values there are clipped, in each level by its own band.
     if (expected > -0.4) {
       EXPECT_NEAR(value, expected, 0.13) << p.transpose();
     } else {
@@ -73,17 +73,17 @@ TEST(Patch, FollowsCutsWithFewNewBricks) {
   ASSERT_TRUE(patch.solid({0, 0, 0.5}, value));
   EXPECT_GT(value, 0.0);
 
-  // Nothing changed: nothing is made.
+  // Nothing changed, so nothing is made.
   const std::size_t second = builder.bricks_made();
   builder.build(field, model, pose, patch);
   EXPECT_EQ(builder.bricks_made(), second);
 }
 
-// Two bodies that share the block: what is solid in either is solid, and one that goes takes its half with it.
+// Two bodies share the block. What is solid in either is solid. A body that goes takes its half with it.
 TEST(Patch, HoldsEveryBody) {
   const Case bone = block_case();
   CutField whole(bone, BodyId{}), left(bone, BodyId{}), right(bone, BodyId{1});
-  // One body has a hole, the other is whole: together they are whole.
+  // One body has a hole and the other is whole. Together they are whole.
   left.apply(hole(4.0));
   const ToolModel model(*find_tool("drill-3.2"), bone.pitch_mm());
   const Pose pose{{0, 0, 4.0}, Eigen::Quaterniond::Identity()};

@@ -1,4 +1,4 @@
-"""deploy/docs/plan.schema.json and osteon-haptic plan check agree on which plans are valid.
+"""Checks that deploy/docs/plan.schema.json and `osteon-haptic plan check` agree on which plans are valid.
 
 plan_schema_test.py OSTEON_HAPTIC: the values are changed at random, with a fixed seed."""
 import copy
@@ -30,7 +30,7 @@ VALID = [
     {"action": "drill", "guide": True, "wear": 2.0, "law": "chi"},
     {"action": "drill", "tool": "pin-1", "to_mm": 20.0, "leave": True, "entry": POINT},
 ]
-# What a value may become. Numbers beyond every limit and on some; values of other types; nothing.
+# Replacement values: numbers beyond every limit and at some limits, values of other types, and nothing.
 OTHERS = [-1.0, 0.0, 1.0, 1e9, "expert", "x", True, False, None, [], [1.0, 2.0], [1.0, 2.0, 3.0], {}]
 FIELDS = sorted({field for step in VALID for field in step} | {"leave", "guide", "unknown"})
 
@@ -68,7 +68,7 @@ class PlanSchema(unittest.TestCase):
             plan = {"steps": [changed(chance.choice(VALID), chance)]}
             taken, said = self.by_program(plan)
             valid += taken
-            # A law that does not suit its tool is for the program alone.
+            # Only the program checks whether a law suits its tool.
             if not taken and '"law"' in said:
                 continue
             self.assertEqual(self.by_schema.is_valid(plan), taken, f"{json.dumps(plan)}: {said}")

@@ -1,4 +1,4 @@
-// The tool that the bone sees: walls, holes, edges, slopes, what stands on the bone, and bone that comes back.
+// The tool's proxy against the bone: walls, holes, edges, slopes, items on the bone, and bone that comes back.
 #include "haptic_client/control/proxy.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr double kStiffness = 50.0;
 
-// A bone from its distance, a tool, and the device that leads it; patches follow as slowly as a busy client's.
+// A bone given by its distance, a tool, and the device that moves it. Patches follow as slowly as a busy client's.
 class Stage {
  public:
   Stage(Case bone, const char* tool, int patch_ticks = 12)
@@ -57,7 +57,7 @@ class Stage {
     builder_ = PatchBuilder();
     rebuild();
   }
-  // The deepest of the tool's own points in the bone's field; negative in bone.
+  // The bone field at the deepest of the tool's own points. Negative in bone.
   [[nodiscard]] double deepest_mm() const {
     double least = 1e9;
     for (const auto* points : {&model_.active, &model_.passive})
@@ -114,7 +114,7 @@ struct WallCase {
 };
 class ThinWall : public ::testing::TestWithParam<WallCase> {};
 
-// However fast the hand, straight on or aslant, sliding or not: the tip stays before the wall.
+// The tip stays before the wall, however fast the hand is, straight or at an angle, sliding or not.
 TEST_P(ThinWall, IsNeverTunnelled) {
   const WallCase& which = GetParam();
   Stage stage(wall(which.thickness_mm, which.pitch_mm), which.tool);
@@ -140,7 +140,8 @@ INSTANTIATE_TEST_SUITE_P(All, ThinWall,
 TEST(SwungShank, StopsAtAWall) {
   Stage stage(wall(0.5, 0.25), "burr-round-5");
   for (const double speed : {50.0, 2000.0}) {
-    // Lying along x over the wall, its tip 6 mm off; then turned about the tip so that the shank dips towards the wall.
+    // It lies along x over the wall, its tip 6 mm away. Then it turns about the tip so that the shank dips towards the
+    // wall.
     const Vec3 tip(7.0, 0, -3.5);
     const Pose level{tip, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
     stage.place(level);
@@ -150,7 +151,7 @@ TEST(SwungShank, StopsAtAWall) {
     const ProxyStep step = stage.lead(dipped, speed, 1500);
     EXPECT_TRUE(step.contact);
     EXPECT_GT(stage.deepest_mm(), -0.02) << speed;
-    // What it may not turn is a torque about y, towards level.
+    // The prevented turn is a torque about y, towards level.
     EXPECT_LT(step.contact_torque_nmm.y(), -100.0);
   }
   EXPECT_EQ(stage.allocations_, 0);
@@ -174,14 +175,14 @@ TEST(SwungShank, IsNeverTakenThroughAThinWall) {
 
 // ---- holes
 
-// A flat end meets the rim of a hole that is narrower, wherever it is led and however it wiggles.
+// A flat end meets the rim of a narrower hole, wherever it is moved and however it wiggles.
 TEST(PegInHole, ANarrowerOneCannotBeEntered) {
   for (const double diameter : {9.0, 7.0}) {
     Stage stage(hole(diameter, 15.0), "end-drill");  // 9.5 mm
     stage.place(straight(0.1, 0, -2));
     stage.lead(straight(0.1, 0, 3), 50);
     EXPECT_LT(stage.proxy_.pose().position_mm.z(), 0.25) << diameter;
-    // Pressed, led round in circles and rocked.
+    // Pressed, moved in circles and rocked.
     double deepest = 0.0;
     for (int i = 0; i < 1500; ++i) {
       const double turn = 0.01 * i, rock = 6.0 * kDegree * std::sin(0.023 * i);
@@ -191,7 +192,7 @@ TEST(PegInHole, ANarrowerOneCannotBeEntered) {
       const Vec3 middle_of_end = stage.proxy_.pose().position_mm;
       deepest = std::max(deepest, middle_of_end.z());
     }
-    // A tilted end dips by its radius times the tilt with the device's, not more.
+    // When the device tilts, a tilted end dips by its radius times the tilt, and not more.
     EXPECT_LT(deepest, 0.25 + 4.75 * std::sin(6.0 * kDegree)) << diameter;
     EXPECT_GT(stage.deepest_mm(), -0.02);
   }
@@ -207,7 +208,7 @@ TEST(PegInHole, AWiderOneIsEnteredWithoutForce) {
   }
   EXPECT_FALSE(contact);
   EXPECT_NEAR(stage.proxy_.pose().position_mm.z(), 12.0, 1e-6);
-  // In it, it goes aside by its play only, and turns by what the play allows.
+  // In the hole it moves sideways by its play only, and turns by what the play allows.
   const double play = 0.25;
   stage.lead(straight(2, 0, 12), 20);
   EXPECT_NEAR(stage.proxy_.pose().position_mm.x(), play, 0.2);
@@ -215,25 +216,25 @@ TEST(PegInHole, AWiderOneIsEnteredWithoutForce) {
   const double tilt = stage.proxy_.pose().direction(Vec3::UnitZ()).x();
   EXPECT_LT(tilt, 2.0 * (play + 0.2) / 11.0);
   EXPECT_GT(stage.last_.contact_torque_nmm.norm(), 500.0);
-  // And out again, however it was pressed.
+  // It also comes out again, however it was pressed.
   stage.lead(straight(0, 0, -2), 30, 300);
   EXPECT_NEAR((stage.proxy_.pose().position_mm - Vec3(0, 0, -2)).norm(), 0.0, 1e-6);
 }
 
-// A ball on the rim of a hole: R − sqrt(R² − r²) deep.
+// A ball on the rim of a hole is R − sqrt(R² − r²) deep.
 TEST(PegInHole, ABallSitsOnTheRim) {
   Stage stage(hole(4.0, 15.0, 0.25), "burr-round-5");
   stage.place(straight(0, 0, -1));
   stage.lead(straight(0, 0, 4), 20);
-  // Its points lie a little within the ball.
+  // Its points lie slightly within the ball.
   const double radius = 2.5 - stage.model_.inset;
   EXPECT_NEAR(stage.proxy_.pose().position_mm.z(), 2.5 - std::sqrt(radius * radius - 2.0 * 2.0), 0.08);
 }
 
 // ---- planes and edges
 
-// Without friction a tool that is pressed on a plane goes along it exactly as it is led, and its way out is the plane's
-// normal.
+// Without friction a tool pressed on a plane moves along it exactly as the device does. It is pushed out along the
+// plane's normal.
 TEST(Slide, AlongAPlaneIsExact) {
   for (const char* name : {"burr-round-5", "drill-3.2"})
     for (const double slope : {0.0, 20.0, 35.0}) {
@@ -260,7 +261,7 @@ TEST(Slide, AlongAPlaneIsExact) {
     }
 }
 
-// On a level face nothing rounds: exactly as it is led.
+// On a level face there is no rounding: the tool moves exactly as the device does.
 TEST(Slide, ALevelFaceGivesNothingAside) {
   Stage stage(half_space(), "end-drill");
   stage.place(straight(0, 0, -1));
@@ -276,8 +277,8 @@ TEST(Slide, ALevelFaceGivesNothingAside) {
   EXPECT_NEAR(z, 0.0, stage.model_.inset + 0.01);
 }
 
-// A flat end over the edge of a block is pushed up on one side: it leans, and the torque is that of the other side with
-// the sign turned.
+// A flat end over the edge of a block is pushed up on one side. It leans, and the torque is that of the other side with
+// the opposite sign.
 TEST(Torque, IsSymmetricOverAnEdge) {
   Vec3 torque[2];
   double lean[2], force_n = 0.0;
@@ -300,14 +301,15 @@ TEST(Torque, IsSymmetricOverAnEdge) {
   std::printf("  torque over an edge %.1f and %.1f N mm, lean %.4f and %.4f\n", torque[0].y(), torque[1].y(), lean[0],
               lean[1]);
   EXPECT_GT(std::abs(torque[0].y()), 20.0);
-  // Its points lie half a millimetre apart and not as in a mirror, so the arm of either side is known to half of that.
+  // Its points lie half a millimetre apart and are not mirrored, so the arm of either side is known to half of that.
   constexpr double kArm_mm = 0.27;
   EXPECT_NEAR(torque[0].y(), -torque[1].y(), 2.0 * kArm_mm * force_n);
   EXPECT_NEAR(torque[0].x(), 0.0, kArm_mm * force_n * 2.0);
   EXPECT_NEAR(lean[0], -lean[1], 2.0 * kArm_mm * force_n / (kStiffness * Proxy::kTurnArm_mm * Proxy::kTurnArm_mm));
 }
 
-// A ball bur held aslant touches a plane at one point: the torque about its tip is that point's arm times the force.
+// A ball bur held at an angle touches a plane at one point. The torque about its tip is that point's arm times the
+// force.
 TEST(Torque, IsTheArmTimesTheForce) {
   Stage stage(half_space(0.25), "burr-round-5");
   const Eigen::Quaterniond aslant(Eigen::AngleAxisd(40 * kDegree, Vec3::UnitY()));
@@ -320,40 +322,41 @@ TEST(Torque, IsTheArmTimesTheForce) {
               expected.y());
   // Its points are 0.37 mm apart, so the arm is known to half of that.
   EXPECT_NEAR((step.contact_torque_nmm - expected).norm(), 0.0, 0.19 * stage.force_n().norm());
-  // It leans the way that it is pushed.
+  // It leans in the direction in which it is pushed.
   EXPECT_GT(step.turn_rad.dot(-step.contact_torque_nmm), 0.0);
 }
 
-// ---- what stands on the bone
+// ---- items on the bone
 
 Tool test_pin() {
   Tool pin = *find_tool("pin-3");  // 4 mm
   return pin;
 }
 
-// A pin that stands in the bone stops a bur that turns as it stops one that stands, at any speed.
+// A pin in the bone stops a turning bur as it stops one that stands, at any speed.
 TEST(Scene, APinStopsTheToolAtAnySpeed) {
   Stage stage(half_space(), "burr-round-5");
-  // Across the way of the ball, from its tip at z = -40 up to beyond the bone.
+  // Across the path of the ball, from the pin's tip at z = -40 up to beyond the bone.
   stage.scene_ = {placed_guide(3, test_pin(), straight(6, 0, 10))};
   for (const double rpm : {0.0, 20000.0})
     for (const double speed : {20.0, 400.0, 10000.0}) {
       stage.place(straight(-2, 0, -5));
       const ProxyStep step = stage.lead(straight(12, 0, -5), speed, 300, rpm);
-      // The ball's middle: pulled at its tip the tool leans.
+      // The ball's middle: the tool is pulled at its tip and leans.
       EXPECT_NEAR(stage.proxy_.pose().point({0, 0, -2.5}).x(), 6.0 - 2.0 - 2.5 + stage.model_.inset, 0.08)
           << rpm << " rpm, " << speed << " mm/s";
       EXPECT_TRUE(step.contact);
       EXPECT_FALSE(step.cutting);
     }
   EXPECT_EQ(stage.allocations_, 0);
-  // Led past beside it, it is not touched.
+  // A tool that moves past beside it does not touch it.
   stage.place(straight(-2, 6, -5));
   stage.lead(straight(12, 6, -5), 100);
   EXPECT_NEAR(stage.proxy_.pose().position_mm.x(), 12.0, 1e-6);
 }
 
-// A sleeve is met from outside; from inside its play rules, which is not felt twice.
+// The tool meets a sleeve from outside. Inside, the guide's play limits it, and the hand must not feel the sleeve
+// twice.
 TEST(Scene, ASleeveIsSolidButForTheToolThatItHolds) {
   Tool sleeve = *find_tool("guide-1");
   Stage stage(half_space(), "drill-3.2");
@@ -361,7 +364,7 @@ TEST(Scene, ASleeveIsSolidButForTheToolThatItHolds) {
   stage.place(straight(-10, 0, -20));
   stage.lead(straight(0, 0, -20), 100);
   EXPECT_NEAR(stage.proxy_.pose().position_mm.x(), -4.0 - 1.6, 0.25);
-  // What is set down where the tool is lets it out.
+  // An item placed where the tool is lets the tool out.
   stage.place(straight(-3.0, 0, -20));
   stage.lead(straight(-10, 0, -20), 100, 600);
   EXPECT_NEAR(stage.proxy_.pose().position_mm.x(), -10.0, 1e-6);
@@ -375,7 +378,7 @@ TEST(Scene, ASleeveIsSolidButForTheToolThatItHolds) {
 class ReturnedBone : public ::testing::Test {
  protected:
   ReturnedBone() : stage_(block_case(16.0), "drill-3.2") {}
-  // The tool in a hole of its own that ends at `deep_mm`; then the bone comes back from `from_mm` on.
+  // The tool is in a hole of its own that ends at `deep_mm`. Then the bone comes back from `from_mm` on.
   void return_from(double deep_mm, double from_mm) {
     stage_.field_.apply(cut(-1, deep_mm, 1));
     stage_.place(straight(0, 0, deep_mm));
@@ -392,7 +395,7 @@ class ReturnedBone : public ::testing::Test {
   Stage stage_;
 };
 
-// Deeper than the band: the pose stays, there is no force and nothing turns, until it is drawn out.
+// Deeper than the band: the pose stays, there is no force and nothing turns, until the tool is drawn out.
 TEST_F(ReturnedBone, HoldsADeepToolWithoutForceUntilItIsDrawnOut) {
   return_from(6.0, 0.0);
   for (const Vec3& to : {Vec3(0, 0, 9), Vec3(3, 0, 6), Vec3(-2, 2, 6)}) {
@@ -417,7 +420,7 @@ TEST_F(ReturnedBone, HoldsADeepToolWithoutForceUntilItIsDrawnOut) {
   EXPECT_TRUE(cut);
 }
 
-// A little of it: the point only blocks until it has left what came back, and no pull holds it.
+// Only a little comes back. The point is only blocked until it has left that bone, and no pull holds it.
 TEST_F(ReturnedBone, IsNotCutUntilTheToolHasLeftIt) {
   return_from(6.0, 5.7);
   ProxyStep step = stage_.lead(straight(0, 0, 8), 20, 100, 1000);
@@ -439,7 +442,7 @@ TEST_F(ReturnedBone, IsNotCutUntilTheToolHasLeftIt) {
 
 // ---- skiving
 
-// On a slope the point slides down until it bites; on a gentle one it bites at once.
+// On a slope the point slides down until it bites. On a gentle slope it bites at once.
 TEST(Skiving, ThePointSlidesDownASlopeUntilItBites) {
   double drift[3];
   int i = 0;
@@ -465,7 +468,7 @@ TEST(Skiving, ThePointSlidesDownASlopeUntilItBites) {
       at_end = tick.report.pose_bone_proxy.position_mm.x();
     });
     EXPECT_TRUE(bench.session().surgeon().results()[0].completed) << slope;
-    EXPECT_LT(sunk_mm, 1.5) << slope;  // the hand's 29 N on K_c of 50 N/mm are 0.58
+    EXPECT_LT(sunk_mm, 1.5) << slope;  // the hand's 29 N at K_c of 50 N/mm are 0.58
     std::printf("  slope %.0f degrees: the tip drifts %.3f mm downhill at most, %.3f mm at the end\n", slope, drifted,
                 at_end);
     drift[i++] = drifted;

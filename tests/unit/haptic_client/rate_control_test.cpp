@@ -1,4 +1,4 @@
-// Rate control: a deflected cap is a velocity.
+// Rate control: the deflection of a cap is a velocity.
 #include "haptic_client/device/rate_control.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ TEST(RateControl, RestsAtRestAndBeginsWithoutAStep) {
   state.push = {0.1009, 0, 0};
   rate.step(state, 1.0);
   EXPECT_NEAR(rate.pose().position_mm.x(), 0.001 * params.fastest_mm_per_s, 1e-9);
-  // Two axes at once are no faster than one.
+  // Two axes at once are not faster than one.
   RateControl both(params);
   state.push = {1, 1, 0};
   both.step(state, 1.0);

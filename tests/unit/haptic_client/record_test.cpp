@@ -1,4 +1,4 @@
-// What a recording holds, that it survives killed writers and full disks, and that Python reads it.
+// Tests what a recording contains, that it survives killed writers and full disks, and that Python reads it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -52,7 +52,7 @@ Pose pose(Random& random) {
   return {vector(random, 100.0), Eigen::Quaterniond(random.between(0.1, 1.0), v.x(), v.y(), v.z()).normalized()};
 }
 
-// Numbers that no two rows share; row i is tick i + 1.
+// Every row has different numbers. Row i is tick i + 1.
 TickRow row(std::uint64_t i) {
   Random random(i);
   TickRow row;
@@ -96,7 +96,7 @@ void write_rows(const std::filesystem::path& file, std::uint64_t count) {
   EXPECT_EQ(recording->rows_written(), count);
 }
 
-// Runs Debian's Python on a script that sees the file as sys.argv[1].
+// Runs Debian's Python on a script. The script gets the file as sys.argv[1].
 osteon::test::RunResult python(const std::string& script, const std::filesystem::path& file) {
   return osteon::test::run(OSTEON_PYTHON, {"-c", script, file});
 }
@@ -139,7 +139,7 @@ TEST(Recording, GivesTheDeviceBackBitForBit) {
   EXPECT_EQ(recorded.name(), "recorded:" + (temp / "a.h5").string());
 }
 
-// Its handle makes sense only with the bone, the tools and the plan that it was recorded with.
+// A handle's motion makes sense only with the bone, the tools and the plan of the recording.
 TEST(Recording, IsOfOneBoneToolAndPlan) {
   const TempDir temp;
   write_rows(temp / "a.h5", 3);
@@ -163,7 +163,7 @@ TEST(Recording, IsOfOneBoneToolAndPlan) {
   EXPECT_THAT(said(info.case_hash, tools, std::string(64, 'q')), HasSubstr("another plan"));
 }
 
-// And with the bone in the state that the recording began on; one that does not say plays on any.
+// It also needs the bone in its state at the recording's start. A recording without that state plays on any bone.
 TEST(Recording, BeganOnBoneInOneState) {
   const TempDir temp;
   const std::string uncut(64, 'a'), cut(64, 'b');
@@ -196,7 +196,7 @@ TEST(Recording, BeganOnBoneInOneState) {
   EXPECT_TRUE(check_played_on(**old, cut));
 }
 
-// Only a session that ended as it should says so; the numbers of one that lost its room are there all the same.
+// Only a session that ended normally says so. A session that lost its room still has its numbers.
 TEST(Recording, SaysWhetherItsRoomWasLost) {
   const TempDir temp;
   for (const bool lost : {false, true}) {
@@ -214,7 +214,7 @@ TEST(Recording, SaysWhetherItsRoomWasLost) {
   }
 }
 
-// A row that was lost is a tick that saw what the one before it saw: later rows keep their time.
+// A lost row is a tick with the same contents as the one before. Later rows keep their time.
 TEST(Recording, LostRowsDoNotShiftTheRest) {
   const TempDir temp;
   {
@@ -238,7 +238,7 @@ TEST(Recording, LostRowsDoNotShiftTheRest) {
   }
 }
 
-// Of a bone that stood, and in recordings of before there were mounts, nobody says where it was.
+// For a bone without a mount, and in recordings older than mounts, the recording has no pose of the bone.
 TEST(Recording, OfABoneThatStoodMovesNone) {
   const TempDir temp;
   {
@@ -263,7 +263,7 @@ TEST(Recording, OfABoneThatStoodMovesNone) {
   }
 }
 
-// A place that is none is damage, as of the handle.
+// An invalid pose of the bone is damage, like an invalid pose of the handle.
 TEST(Recording, RefusesAPlaceOfTheBoneThatIsNone) {
   const TempDir temp;
   write_rows(temp / "a.h5", 3);
@@ -277,7 +277,7 @@ TEST(Recording, RefusesAPlaceOfTheBoneThatIsNone) {
   EXPECT_THAT(session.error().message, testing::HasSubstr("row 1 is no reading of a device"));
 }
 
-// The lines of the README, word for word apart from the file's name.
+// The lines of the README, word for word except for the file's name.
 TEST(Recording, ThreeLinesOfPythonReadIt) {
   const TempDir temp;
   write_rows(temp / "session.h5", 600);
@@ -293,8 +293,8 @@ print(session["data/time"][:], session["drill_force_physical/wrench"][:, :3])
   EXPECT_THAT(read.out, ::testing::HasSubstr("[["));
 }
 
-// Every array says its unit, its frame where it has one, and what it is; all have a row for each time; the groups are
-// those of the volumetric drilling simulator; numbers come out as they went in.
+// Every array has its unit, its frame if it has one, and its meaning. All have a row for each time. The groups are
+// those of the volumetric drilling simulator. Numbers come out as they went in.
 TEST(Recording, IsLaidOutAsItSays) {
   const TempDir temp;
   write_rows(temp / "a.h5", 1300);
@@ -355,7 +355,8 @@ print("%.6f,%.6f,%.6f,%.6f,%.6f" % (f["high_frequency_poses/drill_pose/pose"][i,
     EXPECT_NEAR(got[i], want[i], i < 2 ? 1e-6 : 4e-6) << i;  // poses are doubles, forces floats
 }
 
-// What the loop would have shown on a stronger device is shown by no motor: neither recording nor log says that it was.
+// A device without motors shows nothing of what the loop would have shown on a stronger device. Neither recording nor
+// log says that it did.
 TEST(Recording, ADeviceWithoutMotorsShowsNothing) {
   const TempDir temp;
   struct Device {
@@ -391,7 +392,7 @@ TEST(Recording, ADeviceWithoutMotorsShowsNothing) {
   }
 }
 
-// The bits of a recording mean what the loop sets them for.
+// The bits of a recording have the meaning with which the loop sets them.
 TEST(Recording, NamesItsEvents) {
   const std::vector<std::string> names = event_names();
   const auto named = [&](unsigned bit) { return names.at(static_cast<std::size_t>(std::countr_zero(bit))); };
@@ -415,8 +416,8 @@ TEST(Recording, NamesItsEvents) {
   EXPECT_EQ(names.size(), kLoopEvents);
 }
 
-// A contact is told once, however the hand trembles on it, and the next one again.
-TEST(MetalWatch, TellsEachContactOnce) {
+// A contact is reported once, however the hand trembles on it. The next contact is reported again.
+TEST(MetalWatch, ReportsEachContactOnce) {
   const ToolModel model(*find_tool("drill-3.2"), 0.5);
   MetalWatch watch;
   int told = 0;
@@ -436,7 +437,7 @@ TEST(MetalWatch, TellsEachContactOnce) {
   EXPECT_EQ(told, 2);
 }
 
-// Ticks of a session as the watch is asked of them: those outside only.
+// Ticks of a session as the watch gets them: only those outside the range.
 struct RangeTicks {
   std::string outside(const ToolModel& model, OutOfRange what, int ticks = 1) {
     std::string told;
@@ -453,8 +454,8 @@ struct RangeTicks {
   std::uint64_t seq = 5000;
 };
 
-// Each law is told of once in a session, where it stays outside; all that follows is counted.
-TEST(RangeWatch, TellsOfEachLawOnce) {
+// Each law is reported once in a session, if it stays outside. Everything after that is counted.
+TEST(RangeWatch, ReportsEachLawOnce) {
   const ToolModel drill(*find_tool("drill-3.2"), 0.5), other(*find_tool("drill-3.5"), 0.5);
   const ToolModel saw(*find_tool("saw-oscillating-1"), 0.5);
   RangeTicks ticks;
@@ -475,9 +476,9 @@ TEST(RangeWatch, TellsOfEachLawOnce) {
   EXPECT_EQ(uses[1].ticks, 300u);
 }
 
-// A cone that enters is outside for less than 0.2 s: nothing is said, however many holes follow, but each tick is
-// counted. What is outside two ticks of three is not missed: it gains one tick in three.
-TEST(RangeWatch, TellsOnlyOfWhatLasts) {
+// A cone that enters is outside for less than 0.2 s. Nothing is reported, however many holes follow, but each tick is
+// counted. A law that is outside in two ticks of three is still reported: it gains one tick in three.
+TEST(RangeWatch, ReportsOnlyWhatLasts) {
   const ToolModel drill(*find_tool("drill-3.2"), 0.5);
   RangeTicks holes;
   for (int hole = 0; hole < 30; ++hole) {
@@ -495,8 +496,8 @@ TEST(RangeWatch, TellsOnlyOfWhatLasts) {
   EXPECT_NEAR(told_after, 600, 6);
 }
 
-// A surgeon's drill that enters cortical bone is worth no word; a rig that feeds it more slowly than the law was made
-// for is.
+// A surgeon's drill that enters cortical bone causes no message. A rig that feeds the drill more slowly than the law's
+// range does.
 TEST(RangeWatch, SaysNothingOfAnEnteringDrill) {
   PlanStep hole = straight_down("drill-3.2");
   hole.to_mm = 4.0;
@@ -516,7 +517,7 @@ TEST(RangeWatch, SaysNothingOfAnEnteringDrill) {
   }
 }
 
-// A child that records as fast as it can, saying after each chunk how many rows it has written.
+// A child process that records as fast as it can. After each chunk it prints how many rows it has written.
 class Writer {
  public:
   explicit Writer(const std::filesystem::path& file) {
@@ -540,7 +541,7 @@ class Writer {
     kill();
     close(from_);
   }
-  // The next number of rows that are surely written.
+  // The next number of rows that are certainly written.
   std::uint64_t rows() {
     std::uint64_t rows = 0;
     return read(from_, &rows, sizeof rows) == sizeof rows ? rows : 0;
@@ -560,7 +561,7 @@ class Writer {
   std::uint64_t written_ = 0;
 };
 
-// Killed at any moment, a writer leaves every whole chunk; the next reader needs nothing but the file.
+// A writer killed at any moment leaves every whole chunk. The next reader needs only the file.
 TEST(Recording, AKilledWriterLeavesWhatItWrote) {
   const TempDir temp;
   Random random(7);
@@ -575,7 +576,7 @@ TEST(Recording, AKilledWriterLeavesWhatItWrote) {
     ASSERT_TRUE(session) << session.error().message;
     const std::size_t rows = session->readings.size();
     EXPECT_GE(rows, writer.written());
-    EXPECT_LE(rows, writer.written() + RecordFile::kChunkRows);  // one may be written whose number was not said
+    EXPECT_LE(rows, writer.written() + RecordFile::kChunkRows);  // one more may be written than reported
     EXPECT_EQ(rows % RecordFile::kChunkRows, 0u);
     for (std::size_t i = 0; i < rows; i += 97) expect_same(session->readings[i], row(i).reading);
     EXPECT_EQ(session->field_hash, "");
@@ -604,7 +605,7 @@ TEST(Recording, CanBeReadWhileItGrows) {
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
-// Nothing more can be written at some size of a file, as when the disk is full.
+// Prevents writing beyond some size of a file, as on a full disk.
 class SizeLimit {
  public:
   explicit SizeLimit(rlim_t bytes) {
@@ -650,7 +651,7 @@ TEST(Recording, AFullDiskIsSaidInASentenceAndLeavesWhatWasWritten) {
   }
 }
 
-// It stops before the disk is full, with a file that is closed as it should be: any reader opens it.
+// Recording stops before the disk is full and closes the file properly, so that any reader opens it.
 TEST(Recording, LeavesALittleOfTheDisk) {
   const TempDir temp;
   {
@@ -674,7 +675,7 @@ TEST(Recording, LeavesALittleOfTheDisk) {
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
-// The recorder's thread meets the full disk; who pushes rows never hears of it.
+// The recorder's thread meets the full disk. The thread that pushes rows gets no error.
 TEST(Recorder, EndsTheRecordingAndNothingElse) {
   const TempDir temp;
   Recorder recorder;
@@ -695,7 +696,7 @@ TEST(Recorder, WritesAllThatWasPushed) {
   const TempDir temp;
   Recorder recorder;
   EXPECT_FALSE(recorder.recording());
-  ASSERT_TRUE(recorder.open({}, info_of_a_session()));  // nothing is asked for
+  ASSERT_TRUE(recorder.open({}, info_of_a_session()));  // nothing to record
   EXPECT_FALSE(recorder.recording());
   ASSERT_TRUE(recorder.open(temp / "a.h5", info_of_a_session()));
   for (std::uint64_t i = 0; i < 3333; ++i) recorder.push(row(i));
@@ -714,7 +715,7 @@ TEST(Recording, APlaceThatCannotBeWrittenIsAnError) {
   EXPECT_EQ(made.error().message, "the recording /nowhere/at/all.h5 cannot be made: No such file or directory");
 }
 
-// One sentence each, that names the file and what is wrong with it.
+// Each wrong file causes one sentence with the file's name and the fault.
 class WrongFile : public ::testing::Test {
  protected:
   void expect(ErrorCode code, const std::string& part, std::string name = "a.h5") {
@@ -727,7 +728,7 @@ class WrongFile : public ::testing::Test {
     EXPECT_EQ(message.find('\n'), std::string::npos) << message;
     std::printf("  %s\n", message.c_str());
   }
-  // A good recording after Python has done something to it as `f`.
+  // A good recording after a Python statement has changed it as `f`.
   void spoil(const std::string& how) {
     write_rows(temp_ / "a.h5", 600);
     const auto done =

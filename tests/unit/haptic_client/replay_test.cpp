@@ -1,4 +1,4 @@
-// What a hand has done is done again by its recording: the same bone to the last bit, whatever the tools and devices.
+// A recording repeats what a hand has done: the same bone to the last bit, whatever the tools and devices.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -65,7 +65,7 @@ struct Session {
 };
 
 // A session with the simulated hand, recorded.
-// `mount`: where the bone stands on one, by the number of the tick.
+// `mount`: pose of the bone on a compliant mount, by the number of the tick.
 Session record(const Case& bone, const std::vector<PlanStep>& plan, const SimulatedDeviceParams& device,
                const std::filesystem::path& file, const std::function<Pose(std::uint64_t)>& mount = {}) {
   Bench bench(bone, plan, device);
@@ -119,8 +119,8 @@ TEST(Replay, MakesTheSameCutsAndForces) {
   }
 }
 
-// A bone that swayed on its mount sways again, also where it is played on bone that stands: tools are taken up, felt
-// and cut with where the bone then was.
+// A bone that moved on its mount moves again, even if the recording is played on a bone without a mount. Tools start,
+// feel and cut relative to where the bone then was.
 TEST(Replay, MovesTheBoneAsItMoved) {
   const osteon::test::TempDir temp;
   const Case bone = block_case(16.0);
@@ -140,7 +140,7 @@ TEST(Replay, MovesTheBoneAsItMoved) {
   EXPECT_GT(made.cuts.size(), 300u);
 }
 
-// A recording that was broken off ends the session that it is played in, and nothing is said of the bone.
+// An interrupted recording ends the session that plays it, and no hash of the bone is reported.
 TEST(Replay, EndsWithARecordingThatWasBrokenOff) {
   const osteon::test::TempDir temp;
   const Case bone = block_case();
@@ -160,7 +160,7 @@ TEST(Replay, EndsWithARecordingThatWasBrokenOff) {
       phase = bench.tick().order.phase;
       bench.follow();
     }
-    ASSERT_NE(phase, SurgeonPhase::retract);  // that is gone through without a hand
+    ASSERT_NE(phase, SurgeonPhase::retract);  // the phase passed without a hand
     EXPECT_TRUE(bench.session().done()) << share << ' ' << name(phase);
     const std::vector<StepResult>& results = bench.session().results();
     EXPECT_EQ(results[0].completed, share > 0.5);
@@ -169,7 +169,7 @@ TEST(Replay, EndsWithARecordingThatWasBrokenOff) {
   }
 }
 
-// The hash is of what the hand did: another hand leaves another bone.
+// The hash depends on what the hand did: another hand leaves another bone.
 TEST(Replay, AnotherRecordingMakesAnotherBone) {
   const osteon::test::TempDir temp;
   const Case bone = block_case();

@@ -1,4 +1,4 @@
-// A drill through a bone that came from a CT scan at the default threshold, against the same bone made directly.
+// Drills through a bone from a CT scan at the default threshold, and compares it with the same bone made directly.
 #include <gtest/gtest.h>
 
 #include "server/import/ct_import.hpp"
@@ -10,7 +10,7 @@ namespace {
 
 bool keep_going(double) { return true; }
 
-// The layered block as a scanner sees it, entered along +z at z = 0.
+// The layered block as a scanner shows it, entered along +z at z = 0.
 Case scanned_block() {
   const import::Phantom slab{
       .kind = import::PhantomKind::block, .layers = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}}, .width_mm = 20.0};
@@ -27,7 +27,7 @@ TEST(ScannedBlock, TheFeedRigFeelsTheLawsThrustInEachLayer) {
   step.feed_mm_per_s = 1.0;
   step.beyond_mm = 3.0;
   Bench bench(scanned_block(), {step});
-  // Where all of the point, 0.961 mm high, is in one layer.
+  // Depths at which the whole point, 0.961 mm high, is in one layer.
   const double from[] = {1.2, 6.3, 26.3}, to[] = {4.7, 24.7, 29.7}, law_n[] = {28.9, 3.25, 28.9};
   double sum[3] = {}, after_n = 0.0;
   int count[3] = {};

@@ -1,4 +1,4 @@
-// What comes from a room over two ways, in one order, and what is on its way up.
+// Tests how messages of a room that come over two ways are put in one order, and what is under way to the room.
 #include "haptic_client/net/session_reader.hpp"
 
 #include <gtest/gtest.h>
@@ -22,7 +22,7 @@ TEST(CutsUnderway, GoOnceOverEachLineUntilTheyAreDecided) {
   CutsUnderway underway(8);
   for (std::uint64_t i = 1; i <= 4; ++i) ASSERT_TRUE(underway.push(cut_of(1, i)));
   underway.push(CuttingState{});
-  EXPECT_FALSE(underway.take_cut()) << "the room has not said yet what it has";
+  EXPECT_FALSE(underway.take_cut()) << "the room has not yet sent what it has";
   EXPECT_FALSE(underway.something_to_send());
   underway.go_on(1);
   EXPECT_EQ(underway.take_cut()->author_seq, 2u);
@@ -33,7 +33,7 @@ TEST(CutsUnderway, GoOnceOverEachLineUntilTheyAreDecided) {
   EXPECT_TRUE(underway.take_state());
   EXPECT_FALSE(underway.take_state());
   EXPECT_FALSE(underway.something_to_send());
-  // The line breaks: 3 was decided and its answer lost, 4 was lost itself.
+  // The connection is lost. 3 was decided but its answer was lost, and 4 was lost itself.
   underway.stop();
   ASSERT_TRUE(underway.push(cut_of(1, 5)));
   EXPECT_FALSE(underway.take_cut());
@@ -50,7 +50,7 @@ TEST(CutsUnderway, AreBounded) {
     EXPECT_TRUE(underway.push(cut_of(1, i)));
     EXPECT_TRUE(underway.take_cut());
   }
-  EXPECT_FALSE(underway.push(cut_of(1, 4))) << "sent is not decided";
+  EXPECT_FALSE(underway.push(cut_of(1, 4))) << "a sent cut is not yet decided";
   underway.decided(1);
   EXPECT_TRUE(underway.push(cut_of(1, 4)));
 }
@@ -58,7 +58,7 @@ TEST(CutsUnderway, AreBounded) {
 struct Heard {
   std::vector<std::string> events;
   std::vector<std::uint64_t> decided, partners, seqs;
-  int free = 0;  // times that a stream began with nothing decided about this hand
+  int free = 0;  // times that a stream began without a decision about this hand
   SessionReader reader{
       AuthorId{7},
       builtin_tool_box(),
@@ -117,7 +117,7 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   ASSERT_TRUE(heard.reader.take(entry(1, 10, 2, 1)));
   ASSERT_TRUE(heard.reader.take(entry(2, 11, 7, 6)));  // again, over the stream
   ASSERT_TRUE(heard.reader.take(fast(1, 10, 2, 1)));
-  // A change of the scene comes over the stream alone; what the fast path has after it waits.
+  // A change of the scene comes only over the stream. Later entries from the fast path wait for it.
   ASSERT_TRUE(
       heard.reader.take(wire::IndexedEntry{3, {.room_seq = RoomSeq{12}, .kind = wire::SessionEntryKind::streamed}}));
   ASSERT_TRUE(heard.reader.take(wire::IndexedEntry{4,
@@ -138,8 +138,8 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   EXPECT_EQ(heard.reader.taken(), 4u);
 }
 
-// Where the room has put the cuts that a rejoin confirms; what it does not say stays unknown.
-TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
+// Sequence numbers of the cuts that a rejoin acknowledges. A number that the room does not send stays unknown.
+TEST(SessionReader, SaysTheSequenceNumbersOfDecidedCuts) {
   std::optional<RoomAtJoin> told;
   SessionReader reader(
       AuthorId{7}, builtin_tool_box(), {.complete = [&](const RoomAtJoin& room) { told = room; }}, [](std::uint64_t) {},
@@ -156,7 +156,7 @@ TEST(SessionReader, SaysThePlacesOfTheCutsThatAreDecided) {
   for (const std::uint64_t seq : {0u, 1u, 2u, 6u}) EXPECT_EQ(told->seq_of(seq), std::nullopt) << seq;
   complete.mutable_complete()->clear_decided_room_seqs();
   ASSERT_TRUE(reader.take(complete));
-  EXPECT_EQ(told->seq_of(5), std::nullopt) << "a room of before says nothing";
+  EXPECT_EQ(told->seq_of(5), std::nullopt) << "an older room does not send it";
 }
 
 wire::IndexedEntry word(std::uint64_t index, std::uint64_t seq, bool stopped) {
@@ -174,8 +174,9 @@ v1::SessionResponse streamed_word(const wire::IndexedEntry& entry) {
   return response;
 }
 
-// Each once and in the room's order, whichever way is first; what the stream alone brings keeps its place among them.
-TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
+// Each entry arrives once and in the room's order, whichever way is first. An entry that only the stream brings keeps
+// its position among them.
+TEST(SessionReader, AnInstructorsDecisionKeepsItsSequenceNumber) {
   Heard heard;
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(word(2, 11, true)));  // a cut before it has not come
@@ -195,7 +196,7 @@ TEST(SessionReader, AnInstructorsWordKeepsItsPlace) {
   EXPECT_EQ(heard.reader.seq(), RoomSeq{13});
 }
 
-// What held when the stream began is said before its leaves are complete; where nothing is said, nothing holds any
+// Restrictions that hold at the start of a stream arrive before its leaves are complete. If none arrive, none hold any
 // more.
 TEST(SessionReader, EveryStreamSaysWhatHoldsForTheHand) {
   Heard heard;
@@ -249,9 +250,9 @@ TEST(SessionReader, PassesOnWhereTheBoneStandsOnItsMount) {
   EXPECT_EQ(heard.seqs.size(), 1u);
 }
 
-// A server that was killed may have lost what an earlier one told: of its order, nothing has been heard yet. What was
-// said to be kept is what shows the loss.
-TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
+// A killed server may have lost what it had sent, so nothing of the new stream's order has been received yet. The
+// durable sequence number shows the loss.
+TEST(SessionReader, ItsSequenceNumberIsThatOfThePresentStream) {
   Heard heard;
   heard.reader.begin();
   ASSERT_TRUE(heard.reader.take(entry(1, 10, 2, 1)));
@@ -263,7 +264,7 @@ TEST(SessionReader, ItsPlaceIsThatOfThePresentStream) {
   heard.reader.begin();
   EXPECT_EQ(heard.reader.seq(), RoomSeq{0});
   EXPECT_EQ(heard.reader.kept().value().room_seq, RoomSeq{9});
-  // The scene goes before the leaves, which are not there yet.
+  // The scene comes before the leaves, which are not there yet.
   v1::SessionResponse scene, complete;
   scene.mutable_scene()->set_room_seq(8);
   ASSERT_TRUE(heard.reader.take(scene));
@@ -287,8 +288,8 @@ TEST(SessionReader, BeginsAnewWithEachStream) {
   EXPECT_EQ(heard.events, (std::vector<std::string>{"10 of 2", "13 of 2"}));
 }
 
-// The first outcome of a cut that was sent again: it was told before, or is in the leaves, where an undo may have come
-// since.
+// The first outcome of a cut that was sent again. It was received before, or is in the leaves, where an undo may have
+// followed.
 TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
   Heard heard;
   heard.reader.begin();

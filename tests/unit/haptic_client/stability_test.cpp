@@ -1,5 +1,5 @@
-// A short run of what tests/perf measures over a million ticks: the coupling gives the hand nothing that it did not
-// get, on devices of three axes and of six.
+// A short run of what tests/perf measures over a million ticks. The coupling gives the hand no more energy than it got,
+// on devices with three and with six axes.
 #include "tests/support/stability/stability.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   run.scene = static_cast<StabilityScene>(std::get<0>(GetParam()));
   run.delay_ms = std::get<1>(GetParam());
   run.six_axes = std::get<2>(GetParam());
-  run.ticks = 40'000;  // rig and hand on a strong device and on a weak one
+  run.ticks = 40'000;  // rig and hand, on a strong device and on a weak one
   const StabilityResult r = run_stability(run);
   std::printf(
       "  %s, %d ms: %llu contacts, generated %.4f mJ, worst %.5f, net %.1f, cutting %.1f; steps over %.3f N, still "
@@ -33,8 +33,8 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
                 r.turned_mj, r.torque_most_nmm, r.cut_most_nmm, static_cast<long long>(r.slew_limited));
   EXPECT_LE(r.worst_mj, 0.01);
   EXPECT_LE(r.generated_mj, 1.0);
-  // So by construction: a tick that would be otherwise is made rubbing. What counts is that those are few, so that
-  // means over cutting ticks hold to a hundredth.
+  // True by construction: any other tick becomes a rubbing one. The test checks that those are few, so that means over
+  // cutting ticks hold to a hundredth.
   EXPECT_GE(r.least_cutting_n_mm, 0.0);
   EXPECT_LE(r.pushed_back, r.cutting / 100);
   EXPECT_LE(r.step_over_n, 1e-9);
@@ -48,7 +48,7 @@ TEST_P(Stability, TheCouplingGivesNothingAway) {
   EXPECT_EQ(r.cut_late_nmm, 0.0);
   EXPECT_LE(r.torque_over_nmm, 1e-9);
   EXPECT_EQ(r.allocations, 0);
-  // Else it would prove nothing.
+  // Otherwise the test would prove nothing.
   EXPECT_GT(r.touching, 2'000);
   EXPECT_GT(r.force_most_n, 2.0);
   EXPECT_LT(r.uncovered, r.ticks / 100);

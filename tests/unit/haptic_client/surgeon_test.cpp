@@ -1,4 +1,4 @@
-// What a plan is told apart by, what its steps ask for, and when one of them counts as done.
+// Tests what distinguishes plans, what their steps need, and when a step counts as done.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -27,7 +27,7 @@ PlanStep burr_window() {
   return step;
 }
 
-// A session that ends in the middle of a hole has not done it.
+// A session that ends in the middle of a hole has not completed it.
 TEST(Surgeon, AStepUnderWayIsNotCompleted) {
   Bench bench(block_case(), {drill_down()});
   int cutting = 0;
@@ -42,7 +42,8 @@ TEST(Surgeon, AStepUnderWayIsNotCompleted) {
   EXPECT_FALSE(bench.session().results()[0].gave_up);
 }
 
-// The phase that ran out of time first is kept, though drawing the tool out and putting it down run out of theirs too.
+// The phase that ran out of time first is reported, though drawing the tool out and putting it down run out of time
+// too.
 TEST(Surgeon, SaysInWhichPhaseItGaveUp) {
   PlanStep push = drill_down();
   push.hand = HandKind::expert;
@@ -70,7 +71,7 @@ TEST(Surgeon, SaysInWhichPhaseItGaveUp) {
   }
 }
 
-// The tip of a bur that is tilted by 30 degrees lies above the lowest place of its head.
+// The tip of a bur tilted by 30 degrees lies above the lowest point of its head.
 TEST(Surgeon, SaysHowDeepAStepIsToCome) {
   PlanStep through = drill_down();
   through.to_mm = 0.0;
@@ -81,8 +82,8 @@ TEST(Surgeon, SaysHowDeepAStepIsToCome) {
   EXPECT_NEAR(ready->steps[2].asked_mm(), 2.0 - 2.5 * (1.0 - std::cos(std::numbers::pi / 6.0)), 0.05);
 }
 
-// A window hardly wider than the bur is a place, or a few close together: the hand is given the time to follow there,
-// and what is gone is at least the cap of the bur's sphere as deep as it came.
+// A window hardly wider than the bur is one point, or a few close together. The hand gets time to follow there. At
+// least the cap of the bur's sphere at its depth is removed.
 TEST(Surgeon, BursASmallWindowAsDeepAsAsked) {
   for (const double window_mm : {2.0, 4.0, 5.5, 6.0})
     for (const double deep_mm : {1.0, 2.0}) {
@@ -104,7 +105,7 @@ TEST(Surgeon, BursASmallWindowAsDeepAsAsked) {
     }
 }
 
-// Bone holds a loose hand back: what did not come as deep as asked is not done, and the bur is drawn out all the same.
+// Bone holds a loose hand back. A step that is not as deep as asked is not completed, and the bur is still drawn out.
 TEST(Surgeon, AWindowThatIsTooShallowIsNotCompleted) {
   PlanStep step = burr_window();
   step.hand = HandKind::expert;
@@ -146,7 +147,7 @@ TEST(Plan, HasADigestOfItsOwn) {
   EXPECT_NE(changed([](PlanStep& s) { s.entry.point_mm = Vec3(1.1, -0.2, 0); }), own);
   EXPECT_NE(changed([](PlanStep& s) { s.hand = HandKind::expert; }), own);
   EXPECT_NE(changed([](PlanStep& s) { s.hand_across_n_per_mm = 0.3; }), own);
-  // A tool of the same name that is not the same.
+  // A different tool of the same name.
   EXPECT_NE(digest({step},
                    [](std::string_view name) -> Result<Tool> {
                      Tool tool = *find_tool(name);

@@ -1,5 +1,5 @@
-// What must not depend on how time and space are cut up, and the spindle in bone: it stalls under the hand and turns
-// again.
+// Tests what must not depend on the steps of time and space, and the spindle in bone: it stalls under the hand and
+// turns again.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -36,8 +36,8 @@ TEST(Ticks, NeitherTheirRateNorThePitchIsFelt) {
   }
 }
 
-// A loop that comes late shows no force for some milliseconds, and the hand goes on. When it is over the coupling is
-// what the hand pays for again: drilling goes on as fast as before, and the force is the hand's.
+// A late loop shows no force for some milliseconds, and the hand goes on. Afterwards the coupling is again what the
+// hand pays for. Drilling goes on as fast as before, with the hand's force.
 TEST(Ticks, AStallIsOverWhenItIsOver) {
   Bench bench(block_case(), {straight_down("drill-3.2")});
   int ticks = 0, stalls = 0;
@@ -54,7 +54,7 @@ TEST(Ticks, AStallIsOverWhenItIsOver) {
   const StepResult& result = bench.session().surgeon().results()[0];
   std::printf("  %d stalls: %.2f and %.2f N, %.3f and %.2f mm/s, plunge %.2f mm\n", stalls, result.near_cortex.force_n,
               result.medulla.force_n, result.near_cortex.feed_mm_per_s, result.medulla.feed_mm_per_s, result.plunge_mm);
-  // Of the hand's reference: 27/11 N, 0.89 and 10.7 mm/s, 6.0 mm. A stall costs or gives a little.
+  // The hand's reference: 27/11 N, 0.89 and 10.7 mm/s, 6.0 mm. A stall costs or gives a little.
   EXPECT_NEAR(result.near_cortex.force_n, 27.0, 0.1 * 27.0);
   EXPECT_NEAR(result.near_cortex.feed_mm_per_s, 0.89, 0.15 * 0.89);
   EXPECT_NEAR(result.far_cortex.feed_mm_per_s, 0.89, 0.15 * 0.89);
@@ -62,9 +62,9 @@ TEST(Ticks, AStallIsOverWhenItIsOver) {
   EXPECT_NEAR(result.plunge_mm, 6.0, 0.15 * 6.0);
 }
 
-// A motor of 5 N mm, an eightieth of a drill's, under a hand that pushes for 27: it stands in the bone, nothing
-// advances; drawn back it turns again. A sharp, clean drill's own motor never stalls under a hand; a bur's does, see
-// the tools' effects.
+// A motor of 5 N mm, an eightieth of a drill's, under a hand that pushes with 27 N. It stalls in the bone and nothing
+// advances. When drawn back it turns again. The own motor of a sharp, clean drill never stalls under a hand. A bur's
+// does: see tool_effects_test.cpp.
 TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   const Case bone = block_case();
   ReadyPlan plan = *make_ready({straight_down("drill-3.2")}, bone);
@@ -91,7 +91,7 @@ TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
   EXPECT_GT(stood, 10'000) << pushing << " ticks of pushing, down to " << least_rpm << " rpm, " << torque_nmm
                            << " N mm, " << last_mm << " mm";
   EXPECT_NEAR(pushed_n, 29.0, 3.0);
-  EXPECT_LT(advanced_mm, 0.2);  // all ways of a minute, both ways, added
+  EXPECT_LT(advanced_mm, 0.2);  // all motion of a minute, in both directions, added
   EXPECT_GT(again_rpm, 60.0);
 }
 

@@ -1,5 +1,5 @@
-// What tools do to the hand beyond their law, in the whole loop: clogged flutes, the grab at breakthrough, a saw that
-// binds; and that a tool resists by the law that is chosen for it.
+// Tests what tools do to the hand beyond their force law, in the whole loop: clogged flutes, the grab at breakthrough,
+// a saw that binds. Also that a tool resists by the law that is chosen for it.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ Case slab(double deep_mm, double density_g_cm3, double pitch_mm = 0.5, double wi
                                  surface, [=](const Vec3&) { return density_g_cm3; });
 }
 
-// A machine holds the handle exactly where it is told, over the tool's axis.
+// A machine that holds the handle exactly at its target, over the tool's axis.
 class Rig {
  public:
   Rig(Case bone, const Tool& tool, const LoopParams& params = {}, const char* law = nullptr, double wear = 1.0,
@@ -102,7 +102,7 @@ class Rig {
   std::uint64_t seq_ = 0;
 };
 
-// Mean of what was cut between two depths of the tip.
+// Mean over the cutting ticks between two depths of the tip.
 struct Mean {
   double force_n = 0, torque_nmm = 0;
   int ticks = 0;
@@ -123,7 +123,7 @@ Mean between(const std::vector<LoopReport>& reports, double low_mm, double high_
   return mean;
 }
 
-// A feed of 1 mm/s at 1000 rpm into cortical bone, whatever the law: its own point of comparison.
+// A feed of 1 mm/s at 1000 rpm into cortical bone: each law's own point of comparison.
 TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   const Tool drill = *find_tool("drill-3.2");
   LoopParams params;
@@ -134,7 +134,7 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   } kLaws[] = {{nullptr, 28.9}, {"chi", 28.9}, {"allotta", 53.5}, {"spring-damper", 29.0}, {"multi-point", 28.9}};
   for (const auto& chosen : kLaws) {
     Rig rig(slab(12.0, 1.9), drill, params, chosen.law);
-    // The coupling's stretch settles within some force / K_c / feed, a second.
+    // The coupling's stretch settles within about force / K_c / feed, a second.
     const Mean mean = between(rig.move({0, 0, 9.0}, 9.0), 5.0, 7.0);
     ASSERT_GT(mean.ticks, 500) << (chosen.law ? chosen.law : "default");
     // The spindle droops by some percent under the load.
@@ -142,8 +142,8 @@ TEST(ToolEffects, AToolResistsByTheLawThatIsChosen) {
   }
 }
 
-// Chi's law was made for 0.3 to 2.0 g/cm3 and 0.5 to 3 mm/s: every tick that cuts says what it is outside of, others
-// nothing.
+// Chi's law was made for 0.3 to 2.0 g/cm3 and 0.5 to 3 mm/s. Every cutting tick says which limits it exceeds. Other
+// ticks say nothing.
 TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
   const Tool drill = *find_tool("drill-3.2");
   const struct {
@@ -169,8 +169,8 @@ TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
   }
 }
 
-// A bar 10 mm wide under a blade of 19 mm with 14 teeth: 10 / (19/14) teeth are in it, 0.15 of which bear; each with
-// the thrust of its depth of cut at 1 mm/s, and 4 N along the cut, which the crank feels and the hand along the stroke.
+// A bar 10 mm wide under a blade of 19 mm with 14 teeth: 10 / (19/14) teeth are in it, of which 0.15 bear. Each has the
+// thrust of its depth of cut at 1 mm/s, and 4 N along the cut, which the crank feels and the hand along the stroke.
 TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   const Tool saw = *find_tool("saw-oscillating-2");
   const auto bar = osteon::test::make_bone(
@@ -191,8 +191,7 @@ TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   // Contact points are half a millimetre apart.
   EXPECT_NEAR(mean.force_n, thrust_n, 0.06 * thrust_n);
   EXPECT_NEAR(mean.torque_nmm, bearing * 4.0 * stroke / std::numbers::pi, 0.06 * mean.torque_nmm);
-  // The hand has of it what the motor's port lets through, 0.6 of friction's 0.3, along the stroke and 200 times a
-  // second.
+  // The hand feels what the motor's port lets through: 0.6 of friction's 0.3, along the stroke and 200 times a second.
   double sum_n = 0.0, square = 0.0, aside = 0.0;
   int ticks = 0;
   for (const LoopReport& r : reports) {
@@ -209,7 +208,8 @@ TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   EXPECT_NEAR(aside, 0.0, 1e-6);
 }
 
-// A reamer over a hole of half its radius meets half of its edges, though three quarters of its face: half the thrust.
+// A reamer over a hole of half its radius meets half of its edges, though three quarters of its face. Its thrust is
+// half.
 TEST(ToolEffects, AReamersThrustIsOfTheEdgesInBone) {
   const Tool reamer = *find_tool("reamer-cylinder");
   const auto thrust_n = [&](double hole_mm) {
@@ -225,7 +225,8 @@ TEST(ToolEffects, AReamersThrustIsOfTheEdgesInBone) {
     EXPECT_GT(mean.ticks, 1000);
     return mean.force_n;
   };
-  // By hand: 0.5 mm/s, 300 rpm, 6 teeth: chips of 1/60 mm; all six edges of 6 mm; Chi's growth with density.
+  // Computed by hand: 0.5 mm/s, 300 rpm, 6 teeth give chips of 1/60 mm. All six edges of 6 mm. Chi's growth with
+  // density.
   const double whole_n = (0.5 * 200.0 / 60.0 + 0.01) * 36.0 * std::pow(0.6 / 1.9, 1.1841);
   const double whole = thrust_n(0.0), ring = thrust_n(3.0);
   std::printf("  reamer: %.2f N, by hand %.2f N; over a hole of half its radius %.2f N\n", whole, whole_n, ring);
@@ -233,7 +234,7 @@ TEST(ToolEffects, AReamersThrustIsOfTheEdgesInBone) {
   EXPECT_NEAR(ring / whole, 0.5, 0.04);
 }
 
-// 15 mm of cortical bone are ten diameters of a 1.5 mm drill: torque and thrust rise, and withdrawal clears it.
+// 15 mm of cortical bone are ten diameters of a 1.5 mm drill. Torque and thrust rise, and withdrawal clears the flutes.
 TEST(ToolEffects, ADeepHoleClogsTheDrillUntilItIsDrawnBack) {
   Tool thin = *find_tool("drill-3.2");
   thin.diameter_mm = 1.5;
@@ -242,7 +243,7 @@ TEST(ToolEffects, ADeepHoleClogsTheDrillUntilItIsDrawnBack) {
   const auto first = rig.move({0, 0, 13.0}, 13.0);
   const Mean shallow = between(first, 2.0, 6.0), deep = between(first, 11.5, 12.4);
   ASSERT_GT(deep.ticks, 200);
-  // At 12 mm the flutes are full to 0.8: 1 + 5 (0.8 - 0.5)/0.5 = 4 times the torque of the thrust, which is 1.3 times.
+  // At 12 mm the flutes are full to 0.8: 1 + 5 (0.8 - 0.5)/0.5 = 4 times the torque, and 1.3 times the thrust.
   EXPECT_NEAR(deep.force_n / shallow.force_n, 1.3, 0.06);
   EXPECT_NEAR(deep.torque_nmm / shallow.torque_nmm, 1.3 * 4.0, 0.5);
   rig.move({0, 0, -6.0}, 0.6);
@@ -252,9 +253,10 @@ TEST(ToolEffects, ADeepHoleClogsTheDrillUntilItIsDrawnBack) {
   EXPECT_NEAR(cleared.torque_nmm / shallow.torque_nmm, 1.0, 0.06);
 }
 
-// A barrel bur lies on a bar of cortical bone, shorter than it, and is pressed in with its side, its teeth 3 mm from
-// the axis. Its own motor has 80 N mm, four times a drill's power at twenty times its speed: it carries on at less than
-// 80 / 3 N and stands in the bone at more, where it goes no farther, and turns again when it is drawn back.
+// A barrel bur lies on a shorter bar of cortical bone and is pressed in with its side, its teeth 3 mm from the axis.
+// Its own motor has 80 N mm, four times a drill's power at twenty times its speed.
+// At less than 80 / 3 N it goes on. At more it stalls in the bone and goes no farther. It turns again when it is drawn
+// back.
 TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   const Tool bur = *find_tool("burr-barrel");
   const Pose lying{{4, 0, -3.5}, Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), Vec3::UnitX())};
@@ -272,7 +274,7 @@ TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   EXPECT_GT(torque_nmm, 5.0);
   EXPECT_GE(least_rpm, 20'000.0 - 1.02 * droop * torque_nmm);
 
-  rig.move({0, 0, 9.0}, 0.15);  // faster than its teeth can take
+  rig.move({0, 0, 9.0}, 0.15);  // faster than its teeth can cut
   rig.move(Vec3::Zero(), 0.35);
   double way_mm = 0.0, least_n = 1e9;
   for (const LoopReport& r : rig.move(Vec3::Zero(), 0.5)) {
@@ -290,13 +292,13 @@ TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   EXPECT_NEAR(out.spindle_rpm, 20'000.0, 200.0);
 }
 
-// The motor's port pulls a drill forward while its rim is left, no longer, and not on the way in.
+// The motor's port pulls a drill forward only while its rim is left, and not on the way in.
 TEST(ToolEffects, ADrillGrabsWhenItBreaksThrough) {
   const Tool drill = *find_tool("drill-3.2");
   Rig rig(slab(4.0, 1.9), drill);
   double in_mm = 1e9, out_mm = -1e9, largest = 0.0;
   for (const LoopReport& r : rig.move({0, 0, 7.5}, 7.5)) {
-    // Trembling has no mean and is small beside a pull that lasts.
+    // The vibration has no mean and is small beside a lasting pull.
     const double pull = r.motor_device_n.z();
     if (pull < 2.0) continue;
     in_mm = std::min(in_mm, r.pose_bone_proxy.position_mm.z());
@@ -305,12 +307,12 @@ TEST(ToolEffects, ADrillGrabsWhenItBreaksThrough) {
   }
   EXPECT_GT(largest, 2.0);
   EXPECT_LE(largest, 0.3 * 30.0);  // friction times the normal force
-  // From the point's coming out to the cone's end, 0.96 mm further.
+  // From the point where the tip comes out to the end of the cone, 0.96 mm further.
   EXPECT_GT(in_mm, 3.9);
   EXPECT_LT(out_mm, 5.2);
 }
 
-// A blade pressed on the side of its kerf jams, and goes on when the hand lets it straighten.
+// A blade pressed against the side of its kerf jams. It goes on when the hand lets it straighten.
 TEST(ToolEffects, ASawThatIsPressedAsideBinds) {
   const Tool saw = *find_tool("saw-oscillating-2");
   Rig rig(slab(12.0, 0.6, 0.5, 30.0), saw);
@@ -322,15 +324,16 @@ TEST(ToolEffects, ASawThatIsPressedAsideBinds) {
     return way;
   };
   EXPECT_GT(feed(cutting), 0.5);
-  // 0.9 mm aside at 50 N/mm: 45 N on the wall.
+  // 0.9 mm sideways at 50 N/mm: 45 N on the wall.
   rig.move({0, 0.9, 0}, 0.2);
   EXPECT_LT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.1);
   rig.move({0, -0.9, 0}, 0.2);
   EXPECT_GT(feed(rig.move({0, 0, 0.5}, 0.5)), 0.3);
 }
 
-// One that is turned by a degree about its width or its length, more than its play, is wedged between the walls: pushed
-// on with 25 N it stands, and the hand feels the turn's own spring, K times its arm squared. Straight again it goes on.
+// A blade turned by a degree about its width or its length, more than its play, is wedged between the walls. Pushed on
+// with 25 N it stalls, and the hand feels the turn's own spring, K times its arm squared. When straight again it goes
+// on.
 TEST(ToolEffects, ASawThatIsTurnedInItsKerfStands) {
   const Tool saw = *find_tool("saw-oscillating-2");
   constexpr double kTurn_rad = 0.02;
@@ -356,7 +359,7 @@ TEST(ToolEffects, ASawThatIsTurnedInItsKerfStands) {
   }
 }
 
-// Runs of ticks in which the tool goes on: where each began, how far it went, how long it took.
+// Runs of ticks in which the tool moves on: start, distance and duration of each.
 struct Stretch {
   double from_mm = 0, way_mm = 0;
   int ticks = 0;
@@ -375,18 +378,18 @@ std::vector<Stretch> runs_of(const std::vector<LoopReport>& reports) {
   }
   return runs;
 }
-// The keel broach `deep_mm` in a face: its section there, 40 x 12 mm at the top, 5 degrees of taper over its 40 mm,
-// with corners bevelled by 1.5 mm.
+// Section of the keel broach `deep_mm` in a face. It is 40 x 12 mm at the top, with 5 degrees of taper over its 40 mm
+// and corners bevelled by 1.5 mm.
 double section_mm2(double deep_mm) {
   const double less = 2.0 * (40.0 - deep_mm) * std::tan(5.0 * std::numbers::pi / 180.0);
   return (40.0 - less) * (12.0 - less) - 2.0 * 1.5 * 1.5;
 }
 
-// E = 0.7 (2.8 N s)^2 / (2 · 0.7 kg) of a blow against the resistance of the broach's section: so far each drives it,
-// within some 5 ms, and in between it stays however hard it is pushed; without blows it stays for good.
+// E = 0.7 (2.8 N s)^2 / (2 · 0.7 kg) of a blow against the resistance of the broach's section. Each blow drives it so
+// far, within about 5 ms. In between it stays however hard it is pushed. Without blows it stays for good.
 TEST(ToolEffects, ABroachGoesByBlows) {
   LoopParams params;
-  params.peak_n = 400.0;  // room for the hand's lead over the next blow
+  params.peak_n = 400.0;  // leaves the hand room to lead over the next blow
   const Tool broach = *find_tool("broach-2");
   Rig rig(slab(20.0, 0.6, 0.5, 50.0), broach, params);
   rig.move({0, 0, 6.0}, 3.0);
@@ -395,7 +398,7 @@ TEST(ToolEffects, ABroachGoesByBlows) {
     const double advance_mm = 3920.0 / (130.0 * (0.6 / 1.9) * (0.6 / 1.9) * section_mm2(run.from_mm));
     std::printf("  a blow at %.2f mm: %.3f mm in %d ms, by hand %.3f mm\n", run.from_mm, run.way_mm, run.ticks,
                 advance_mm);
-    // The 38 points on the end's face, 160 mm2, stand for 173: so exact is the area that a blow is spent on.
+    // The 38 points on the end's face, 160 mm2, represent 173 mm2. The area that a blow is spent on is that exact.
     EXPECT_NEAR(run.way_mm, advance_mm, 0.08 * advance_mm);
     EXPECT_GE(run.ticks, 5);
     EXPECT_LE(run.ticks, 7);
@@ -403,16 +406,16 @@ TEST(ToolEffects, ABroachGoesByBlows) {
   }
   EXPECT_EQ(blows, 6);  // 60 a minute
   rig.spindle(0.0);
-  rig.move(Vec3::Zero(), 1.0);  // it runs down, and its points, which are a little within its faces, come to rest
+  rig.move(Vec3::Zero(), 1.0);  // it runs down, and its points, slightly within its faces, come to rest
   double way = 0.0;
   for (const LoopReport& r : rig.move({0, 0, 1.0}, 3.0)) way += r.moved_mm.z();
-  EXPECT_NEAR(way, 0.0, 0.01);  // a hundredth of the hand's way: what settling is left
+  EXPECT_NEAR(way, 0.0, 0.01);  // a hundredth of the hand's way: remaining settling
   rig.spindle(60.0);
   EXPECT_GE(runs_of(rig.move({0, 0, 1.0}, 2.0)).size(), 1u);
 }
 
-// Six times blunt and in 1 g/cm3 a blow does 0.1 mm when 3920 N mm / 0.1 mm = 6 · 130 (1/1.9)^2 A: 181 mm2, 2.5 mm
-// deep. There it is seated: blows go on, the hand pushes, nothing moves.
+// Six times blunt and in 1 g/cm3, a blow drives it 0.1 mm when 3920 N mm / 0.1 mm = 6 · 130 (1/1.9)^2 A: 181 mm2, 2.5
+// mm deep. There it is seated: blows go on and the hand pushes, but nothing moves.
 TEST(ToolEffects, ABroachStopsWhenSeated) {
   Tool broach = *find_tool("broach-2");
   broach.spindle_rpm = 240;
@@ -433,7 +436,7 @@ TEST(ToolEffects, ABroachStopsWhenSeated) {
   EXPECT_GT(last.force_physical_n.norm(), 20.0);
 }
 
-// With the effects off, a tool is as its law says.
+// With the effects off, a tool follows its law alone.
 TEST(ToolEffects, CanBeSwitchedOff) {
   Tool thin = *find_tool("drill-3.2");
   thin.diameter_mm = 1.5;

@@ -1,6 +1,6 @@
-// Torque from the bone to the hand, the whole way: a drill whose shank leans on a wall, led by the handle of a device
-// with six degrees of freedom. What holds its turn back is known in closed form: the wall's push, times its arm from
-// the tip.
+// Torque from the bone to the hand, through all parts. A drill whose shank leans on a wall is moved by the handle of a
+// device with six degrees of freedom. The torque that prevents its turn is known in closed form: the wall's push times
+// its arm from the tip.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -17,7 +17,7 @@ namespace osteon::haptic::test {
 namespace {
 
 constexpr double kReach_mm = 80.0, kRadius_mm = 1.6;  // of drill-3.2 and its shank
-// The points of the shank lie a ring apart from each other along it.
+// Distance of the rings of points along the shank.
 constexpr double kRing_mm = 1.2;
 
 double dense(const Vec3&) { return 1.9; }
@@ -28,13 +28,13 @@ Case wall() {
       {Vec3(-8, -10, -95), Vec3(4, 10, 12)}, 0.5, [](const Vec3& p) { return p.x(); }, dense);
 }
 
-// The handle's rotation with which the tool stands up along the wall, +z out of its tip, its other end leaning towards
+// The handle's rotation in which the tool stands along the wall, with +z out of its tip. Its other end leans towards
 // the wall by this angle. The user looks at the wall: device x, y, z are the bone's y, z, x.
 Eigen::Quaterniond leaning(double angle_rad) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad - 0.5 * std::numbers::pi, Vec3::UnitX()));
 }
 
-// A hand at a device before a bone, with the patches that its thread would build.
+// A hand at a device in front of a bone, with the patches that its thread would build.
 class Before {
  public:
   Before(Case bone, const Vec3& at_mm, const Vec3& toward, HapticDevice& device)
@@ -57,13 +57,13 @@ class Before {
   [[nodiscard]] double force_scale() const { return session_->loop().params().force_scale; }
   [[nodiscard]] double workspace_scale() const { return session_->loop().mapping().scale(); }
   [[nodiscard]] double coupling_n_per_mm() const { return session_->loop().coupling_n_per_mm(); }
-  // How far the hand has the tip past the place where the shank's end touches the wall.
+  // How far the hand's target for the tip is beyond the point where the shank's end touches the wall.
   [[nodiscard]] double beyond_mm() const {
     const Pose& pose = report().pose_bone_device;
     const double lean = std::asin(pose.direction(Vec3::UnitZ()).x());
     return kReach_mm * std::sin(lean) + kRadius_mm * std::cos(lean) - pose.position_mm.x() - report().offset_mm.x();
   }
-  // The wall's push times its arm from the tip: it acts on the rim of the shank's end, at right angles to the wall.
+  // The wall's push times its arm from the tip. It acts on the rim of the shank's end, at right angles to the wall.
   [[nodiscard]] Vec3 arm_times_force() const {
     const Vec3 axis = report().pose_bone_proxy.direction(Vec3::UnitZ());
     const Vec3 to_rim = (axis.x() * axis - Vec3::UnitX()).normalized();
@@ -81,7 +81,7 @@ class Before {
   bool taken_ = false;
 };
 
-// As the stand-in for an omega.7 or sigma.7 has them.
+// Limits of the stand-in for an omega.7 or sigma.7.
 const DeviceLimits kSixAxes{.peak_n = 12,
                             .continuous_n = 4,
                             .stiffness_n_per_mm = 4,
@@ -103,13 +103,14 @@ class Handle final : public HapticDevice {
   DeviceOutput written;
 };
 
-// Of a torque as of a force's work: s over the workspace's scale, 0.6 at which 4 N/mm are K_c of 50 N/mm at s = 4/30.
+// A torque is scaled as the work of a force is: s over the workspace's scale. At 0.6, 4 N/mm are K_c of 50 N/mm at s =
+// 4/30.
 constexpr double kShown = 4.0 / 30.0 / 0.6;
 
-// Leans towards the wall in the air, and is pressed on until its tip would be so far beyond where its end touches.
+// Leans towards the wall in the air. Then presses on until its tip would be `beyond_mm` beyond where its end touches.
 void press(Before& wall, Handle& handle, double lean_rad, double beyond_mm) {
   handle.reading.pose_device_tool = {Vec3::Zero(), leaning(lean_rad)};
-  wall.wait(400);  // all of the force is shown by then
+  wall.wait(400);  // by then all of the force is shown
   const double way_mm = (beyond_mm - wall.beyond_mm()) / wall.workspace_scale();
   constexpr int kTicks = 600;
   for (int i = 1; i <= kTicks; ++i) {
@@ -119,7 +120,7 @@ void press(Before& wall, Handle& handle, double lean_rad, double beyond_mm) {
   wall.wait(600);
 }
 
-// Two springs in a row bear the push at the end of the shank: the tip's, and the turn's on its arm.
+// Two springs in series bear the push at the end of the shank: the tip's, and the turn's on its arm.
 double push_n(const Before& wall) {
   const double arm = kReach_mm / Proxy::kTurnArm_mm;
   return wall.coupling_n_per_mm() * wall.beyond_mm() / (1.0 + arm * arm);
@@ -141,18 +142,19 @@ TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
     EXPECT_NEAR((torque_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n.norm());
     // Points lie within the tool by half a patch pitch and a quantum, a hundredth of a millimetre.
     EXPECT_NEAR(force_n.norm(), push_n(side), push_n(side) * (0.02 + 0.07 / beyond_mm));
-    // On the device scaled as the work of the force is, in its own frame.
+    // Scaled on the device as the force's work is, in the device's own frame.
     EXPECT_NEAR(side.force_scale(), 4.0 / 30.0, 1e-12);
     EXPECT_NEAR(side.workspace_scale(), 0.6, 1e-12);
     const Vec3 in_device_nmm(torque_nmm.y(), torque_nmm.z(), torque_nmm.x());
     EXPECT_NEAR((handle.written.torque_nmm - kShown * in_device_nmm).norm(), 0.0, 1e-9);
-    EXPECT_LT(handle.written.torque_nmm.x(), 0.0);  // it leans about +x, and is turned back
+    EXPECT_LT(handle.written.torque_nmm.x(), 0.0);  // it leans about +x and is turned back
   }
 }
 
-// The hand turns on by 40 mrad and does not move: the end of the shank would go 3.18 mm further into the wall, 80 (sin
-// 0.10 - sin 0.06) less what its rim turns away. Force and torque rise as if it had been pressed there, and go down
-// again as it turns back. On a device of three axes, where turning costs the hand nothing, the force may not rise.
+// The hand turns on by 40 mrad and does not move. The end of the shank would go 3.18 mm further into the wall, 80 (sin
+// 0.10 - sin 0.06) less what its rim turns away.
+// Force and torque rise as if it had been pressed there, and fall as it turns back. On a device of three axes, where
+// turning costs the hand nothing, the force may not rise.
 TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
   constexpr double kFrom_rad = 0.06, kTo_rad = 0.10, kBeyond_mm = 0.5;
   const double to_mm = kBeyond_mm + kReach_mm * (std::sin(kTo_rad) - std::sin(kFrom_rad)) +
@@ -178,7 +180,7 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
       EXPECT_LE(force_n, before_n + 0.05);
       continue;
     }
-    // As push_n(), of what the handle did alone, whatever the loop let go.
+    // As push_n(), from the handle's motion alone, whatever the loop let go.
     const double arm = kReach_mm / Proxy::kTurnArm_mm,
                  expected_n = side.coupling_n_per_mm() * to_mm / (1.0 + arm * arm);
     std::printf(
@@ -227,8 +229,8 @@ TEST(TorqueOnTheHand, IsNoForceWhereItCannotBeShown) {
   EXPECT_GT(six.written.torque_nmm.norm(), 50.0);
 }
 
-// In a hole as wide as itself a drill cannot turn aside: beyond its play the torque rises with the turn's own spring,
-// K times the square of its arm, and ends when the hand turns back.
+// A drill cannot turn sideways in a hole as wide as itself. Beyond its play the torque rises with the turn's own
+// spring, K times the square of its arm. It ends when the hand turns back.
 TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
   constexpr double kDeep_mm = 30.0;
   const Case bone = osteon::test::make_bone(
@@ -240,7 +242,7 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
       dense);
   Handle handle;
   handle.reading.pose_device_tool.rotation = pointing_away();
-  Before hole(bone, {0, 0, kDeep_mm + 10.0}, {0, 0, 1}, handle);  // taken up 10 mm over the ground of the hole
+  Before hole(bone, {0, 0, kDeep_mm + 10.0}, {0, 0, 1}, handle);  // starts 10 mm over the bottom of the hole
   hole.wait(400);
   EXPECT_NEAR(hole.report().pose_bone_proxy.position_mm.z(), kDeep_mm, 0.3);
   EXPECT_EQ(handle.written.torque_nmm.norm(), 0.0);
@@ -262,7 +264,7 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
               per_rad);
   EXPECT_NEAR((nmm[0] - nmm[1]) / (turn[1] - turn[0]), per_rad, 0.02 * per_rad);
   EXPECT_NEAR((nmm[1] - nmm[2]) / (turn[2] - turn[1]), per_rad, 0.02 * per_rad);
-  // Its play of 0.1 mm, and as much again for points inset and a field between samples, at either end of 30 mm.
+  // Its play of 0.1 mm, and as much again for inset points and a field between samples, at either end of 30 mm.
   const double free_rad = turn[0] + nmm[0] / per_rad;
   EXPECT_GT(free_rad, 0.0);
   EXPECT_LT(free_rad, 2.0 * 0.25 / kDeep_mm);
@@ -272,7 +274,7 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
 }
 
 // The same wall through our stand-in for Force Dimension's library: a sigma.7 whose simulated hand holds the handle.
-// Time is the test's: a tick, and the device's cycle with what the tick has written.
+// The test controls time: one tick, and one cycle of the device with what the tick has written.
 class Sigma : public WithArm {
  protected:
   Sigma() {
@@ -282,7 +284,7 @@ class Sigma : public WithArm {
     device_ = make_force_dimension({.library = OSTEON_STAND_IN_DHD, .period = std::chrono::microseconds(0)});
   }
   ~Sigma() override { arm()->until = ~std::uint64_t{0}; }
-  // Where the vendor's handle is level ours points away; its y is our x.
+  // Where the vendor's handle is level, ours points away. Its y is our x.
   static void lean(double angle_rad) {
     const double half = 0.5 * angle_rad + 0.25 * std::numbers::pi;
     arm()->rotation[0] = std::cos(half);
@@ -300,8 +302,8 @@ class Sigma : public WithArm {
     } while (device_->read().sample <= sample_ && std::chrono::steady_clock::now() - began < kPatience);
     sample_ = device_->read().sample;
   }
-  // The hand takes the handle back to where it began; nobody presses, and nothing pushes: these cycles may take less
-  // time than the device holds the force that was last written.
+  // The hand moves the handle back to where it began. Nobody presses and nothing pushes, so these cycles may take less
+  // time than the device holds the last written force.
   bool let_go() {
     device_->write({});
     arm().hand(0.0, 0.0, 0.0);
@@ -310,17 +312,17 @@ class Sigma : public WithArm {
     sample_ = device_->read().sample;
     return there;
   }
-  // The hand moves its wish steadily, and stays there.
+  // The hand moves its target steadily, and stays there.
   void lead(Before& side, double from_mm, double to_mm, int ticks) {
     for (int i = 1; i <= 2 * ticks; ++i) {
       arm().hand(0.0, 0.0, from_mm + (to_mm - from_mm) * std::min(1.0, static_cast<double>(i) / ticks));
       tick(side);
     }
   }
-  // Pressed on the wall, and at rest with nothing let go. False where the machine took the core from us for 3 ms: the
-  // device ends the force then.
+  // Pressed on the wall, and at rest with no stretch let go. False if the machine suspended us for 3 ms: the device
+  // then ends the force.
   bool press(Before& side) {
-    lead(side, 0.0, 0.0, 160);  // all of the force is shown by then
+    lead(side, 0.0, 0.0, 160);  // by then all of the force is shown
     lead(side, 0.0, -14.0, 250);
     const Vec3 before = shown();
     tick(side);

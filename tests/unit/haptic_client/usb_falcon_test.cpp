@@ -1,4 +1,4 @@
-// The Falcon's driver against an emulated device: libusb and everything above it are the real ones.
+// The Falcon's driver against an emulated device. libusb and everything above it are real.
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
@@ -29,7 +29,7 @@ using testing::AssertionResult;
 using testing::AssertionSuccess;
 
 constexpr auto kPatience = 20s;
-constexpr std::size_t kImageBytes = 5000;  // no multiple of a piece
+constexpr std::size_t kImageBytes = 5000;  // not a multiple of a block
 
 class FalconOnUsb : public testing::Test {
  protected:
@@ -42,14 +42,14 @@ class FalconOnUsb : public testing::Test {
     const Result<void> opened = falcon.open();
     return opened ? AssertionSuccess() : AssertionFailure() << opened.error().message;
   }
-  // Until a reading is as wanted; the haptic thread reads again and again.
+  // Reads as the haptic thread does, until a reading fulfils the condition.
   bool reads(HapticDevice& falcon, const std::function<bool(const DeviceReading&)>& wanted) {
     return wait_until([&] { return wanted(falcon.read()); }, kPatience);
   }
   bool becomes_ready(HapticDevice& falcon) {
     return reads(falcon, [](const DeviceReading& r) { return r.usable(); });
   }
-  // Encoders of a place, by rounding its angles.
+  // Encoder counts of a position, from its rounded angles.
   void hold_at(const Eigen::Vector3d& grip_m) {
     const Eigen::Vector3d angles = *falcon_angles(grip_m);
     std::string line = "falcon encoders";
@@ -80,7 +80,7 @@ TEST_F(FalconOnUsb, IsFoundOnlyWhileItIsThere) {
 
 TEST_F(FalconOnUsb, LoadsItsFirmwareHomesAndReadsPlaces) {
   plug();
-  usb_.command("falcon deaf 3");  // greetings may go astray
+  usb_.command("falcon deaf 3");  // greetings may be lost
   hold_at({0.0, 0.0, 0.12});
   const auto falcon = device(image_);
   ASSERT_TRUE(opens(*falcon));
@@ -164,14 +164,14 @@ TEST_F(FalconOnUsb, MotorsDoTheWorkOfTheForceAndStopWithTheHapticThread) {
     shown = told.control == kFalconGreen;
   }
   ASSERT_TRUE(shown);
-  // Work of the torques −motors/10⁴ over a small move, by the inverse kinematics, against the force's.
+  // Compares the work of the torques −motors/10⁴ over a small move, by the inverse kinematics, with the force's work.
   const Vec3 move_m(2e-4, 3e-4, -1e-4);
   const Eigen::Vector3d turned = *falcon_angles(grip_m + move_m) - *falcon_angles(grip_m - move_m);
   double work = 0.0;
   for (int i = 0; i < 3; ++i) work += -1e-4 * told.motors[static_cast<std::size_t>(i)] * turned[i];
   EXPECT_NEAR(work, force_n.dot(2.0 * move_m), 0.01 * force_n.norm() * 2.0 * move_m.norm());
 
-  // Nothing is written any more: the force ends although the device goes on.
+  // Nothing is written any more. The force ends although the device goes on.
   EXPECT_TRUE(wait_until(
       [&] {
         const auto now = usb_.falcon_told();
@@ -186,7 +186,7 @@ struct End {
 };
 class FalconsEnd : public FalconOnUsb, public testing::WithParamInterface<End> {};
 
-// However the program ends, the last that the device hears is a frame without force: it may hold what it heard last.
+// However the program ends, the last frame to the device has no force: the device may hold the last force it received.
 TEST_P(FalconsEnd, StopsTheMotors) {
   plug("loaded");
   hold_at({0.0, 0.0, 0.15});
@@ -224,7 +224,7 @@ TEST_F(FalconOnUsb, AForceBeyondItsLimitKeepsItsDirection) {
         return told.motors != std::array<int, 3>{};
       },
       kPatience));
-  // 8 N along z are the same torque in all three legs, by symmetry; at the middle about 0.18 N m.
+  // 8 N along z are the same torque in all three legs, by symmetry. In the middle it is about 0.18 N m.
   for (int i = 0; i < 3; ++i) EXPECT_NEAR(told.motors[static_cast<std::size_t>(i)], told.motors[0], 20.0);
   const double dz = 1e-5;
   const double slope = ((*falcon_angles({0, 0, 0.15 + dz}))[0] - (*falcon_angles({0, 0, 0.15 - dz}))[0]) / (2.0 * dz);
@@ -261,7 +261,7 @@ TEST_F(FalconOnUsb, AFalseEchoStopsTheLoading) {
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
   EXPECT_NE(opened.error().message.find("byte 992"), std::string::npos)
-      << opened.error().message;  // of its 62-byte piece
+      << opened.error().message;  // of its 62-byte block
   usb_.command("falcon false-echo -1");
   EXPECT_TRUE(opens(*falcon));
 }
@@ -326,12 +326,12 @@ TEST_F(FalconOnUsb, UnpluggedAtAnyMomentAndPluggedInAgain) {
     std::printf("%s: %s\n", when, why.message.c_str());
     EXPECT_NE(why.message.find("unplugged"), std::string::npos) << why.message;
     falcon->close();
-    EXPECT_FALSE(falcon->open());  // it is not there
+    EXPECT_FALSE(falcon->open());  // no device is there
   }
   plug();
   ASSERT_TRUE(opens(*falcon));
   EXPECT_TRUE(becomes_ready(*falcon));
-  // What was wanted before it went is forgotten.
+  // A force from before the device went is forgotten.
   const auto told = usb_.falcon_told();
   EXPECT_EQ(told.with_force, 0u);
 }
@@ -372,7 +372,7 @@ TEST_F(FalconOnUsb, TheHapticThreadNeitherAllocatesNorWaits) {
   EXPECT_EQ(closed.count(), 0);
 }
 
-// Thousands of frames each way while the grip moves; the whole count of 10⁵ is a figure.
+// Thousands of frames each way while the grip moves. The full count of 10⁵ is measured elsewhere.
 TEST_F(FalconOnUsb, ThousandsOfCycles) {
   constexpr std::uint64_t kCycles = 2000;
   plug("loaded");

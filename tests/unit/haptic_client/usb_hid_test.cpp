@@ -1,4 +1,4 @@
-// SpaceMouse and foot pedals on emulated hidraw nodes: hidapi and everything above it are the real ones.
+// SpaceMouse and foot pedals on emulated hidraw nodes. hidapi and everything above it are real.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -46,7 +46,7 @@ TEST_F(HidOnUsb, NothingIsThere) {
   }
 }
 
-// What is said of a device that cannot be opened is what the system says.
+// The message about a device that cannot be opened contains the system's reason.
 TEST_F(HidOnUsb, WhyADeviceCannotBeOpened) {
   const auto said = [](int number) {
     const Error error = hid_open_error("the foot pedal", "/dev/hidraw7", number);
@@ -60,7 +60,7 @@ TEST_F(HidOnUsb, WhyADeviceCannotBeOpened) {
   EXPECT_EQ(said(EBUSY), "another program uses the foot pedal at /dev/hidraw7; end it");
   EXPECT_EQ(said(EIO),
             "the foot pedal at /dev/hidraw7 cannot be opened (Input/output error); unplug it and plug it in again");
-  // One that went between the look and the opening.
+  // The device vanished between search and opening.
   usb_.command("plug switch");
   const std::vector<HidFound> found = list_hid_devices();
   ASSERT_EQ(found.size(), 1u);
@@ -83,7 +83,7 @@ TEST_F(HidOnUsb, EveryKnownSpaceMouseIsFound) {
     EXPECT_EQ(finding.found[0], "SpaceMouse Compact, /dev/hidraw" + std::to_string(round++));
     usb_.command("unplug spacemouse");
   }
-  usb_.command("plug spacemouse 046d c52b");  // a receiver of mice
+  usb_.command("plug spacemouse 046d c52b");  // a receiver for mice
   EXPECT_TRUE(look_for_space_mouse().found.empty());
 }
 
@@ -134,7 +134,7 @@ TEST_F(HidOnUsb, ALostDeflectionEndsByItself) {
         return mouse->read().pose_device_tool.position_mm.x() == before;
       },
       kPatience));
-  EXPECT_LT(mouse->read().pose_device_tool.position_mm.x(), 99.0);  // long before the end of its reach
+  EXPECT_LT(mouse->read().pose_device_tool.position_mm.x(), 99.0);  // long before the end of its travel
 }
 
 TEST_F(HidOnUsb, ACameraFollowsWhicheverCapIsThere) {
@@ -175,20 +175,21 @@ TEST_F(HidOnUsb, AJoysticksAxisTurnsItAsFastAsItIsDown) {
   EXPECT_TRUE(look_for_foot_pedals(false).found.empty());
   const auto pedal = make_foot_pedal({.proportional = true, .axis = {.play = 0.0}});
   ASSERT_EQ(why(pedal->open()), "");
-  usb_.report("joystick", {0, 0, 0x80, 0x00});  // a little down already
+  usb_.report("joystick", {0, 0, 0x80, 0x00});  // already a little down
   ASSERT_TRUE(
       wait_until([&] { return usb_.command("unread joystick") == "0" && !pedal->advice().empty(); }, kPatience));
   EXPECT_EQ(pedal->read().spindle(), 0.0);
   EXPECT_EQ(pedal->advice(), "release the foot pedal once; until then the spindle does not turn");
   usb_.report("joystick", {0, 0, 0, 0});
   ASSERT_TRUE(wait_until([&] { return pedal->advice().empty(); }, kPatience));
-  usb_.report("joystick", {0, 0, 0x00, 0x01});  // 256 of 1023; z comes before x where both are there
+  usb_.report("joystick", {0, 0, 0x00, 0x01});  // 256 of 1023; z comes before x if both exist
   EXPECT_TRUE(reads(*pedal, [](const DeviceReading& r) { return std::abs(r.spindle() - 256.0 / 1023.0) < 1e-9; }));
   usb_.report("joystick", {0, 0xff, 0xff, 0x03});
   EXPECT_TRUE(reads(*pedal, [](const DeviceReading& r) { return r.spindle() == 1.0; }));
 
   const auto other =
-      make_foot_pedal({.proportional = true, .axis_usage = HidUsage{1, 0x35}});  // an axis that it has not
+      // an axis that the device does not have
+      make_foot_pedal({.proportional = true, .axis_usage = HidUsage{1, 0x35}});
   const Result<void> opened = other->open();
   ASSERT_FALSE(opened);
   EXPECT_EQ(opened.error().code, ErrorCode::unsupported);
@@ -263,7 +264,7 @@ TEST_F(HidOnUsb, TheHapticThreadDoesNotAllocate) {
   EXPECT_EQ(heap.count(), 0);
 }
 
-// A burst of reports, none lost: a thousand a second are more than any of these devices sends.
+// No report of a burst is lost. A thousand a second are more than any of these devices sends.
 TEST_F(HidOnUsb, ThousandsOfReports) {
   usb_.command("plug switch");
   const auto pedal = make_foot_pedal();

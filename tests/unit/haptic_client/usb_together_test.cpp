@@ -1,4 +1,4 @@
-// A Falcon for the hand, a SpaceMouse for the rotation and a pedal for the spindle, all emulated, kept by their
+// A Falcon for the hand, a SpaceMouse for the rotation and a pedal for the spindle, all emulated and held by their
 // connections.
 #include <gtest/gtest.h>
 
@@ -75,7 +75,7 @@ TEST_F(Together, EachGivesItsPart) {
   usb_.report("switch", {2, 0});
   EXPECT_TRUE(reads([](const DeviceReading& r) { return r.spindle() == 1.0; }));
   usb_.report("switch", {0, 0});
-  // With a pedal there, a button of the hand's device is no second spindle.
+  // If there is a pedal, a button of the hand's device does not control the spindle.
   usb_.command("falcon buttons 4");
   EXPECT_TRUE(reads([](const DeviceReading& r) { return (r.buttons & kClutchButton) && r.spindle() == 0.0; }));
 }
@@ -100,7 +100,7 @@ TEST_F(Together, WhateverIsUnpluggedComesBackByItself) {
   usb_.command("unplug falcon");
   EXPECT_TRUE(reads([](const DeviceReading& r) { return !r.usable(); }));
   EXPECT_TRUE(was_told("Falcon"));
-  // Forces that are written while it is away go nowhere, nor are they kept for it.
+  // Forces written while the device is away are dropped, and not stored for later.
   device_->write(Vec3(0.0, 0.0, 3.0));
   usb_.command("plug falcon loaded");
   EXPECT_TRUE(reads([](const DeviceReading& r) { return r.usable(); }));

@@ -77,7 +77,7 @@ TEST(Islands, KeptOnesGetNumbersInTheirOrder) {
 }
 
 TEST(Islands, NeighboursAcrossACornerAreOne) {
-  // Every one of the 26 directions from one voxel to a second.
+  // Each of the 26 directions from one voxel to a second.
   for (int d = 0; d < 27; ++d) {
     if (d == 13) continue;
     HuVolume volume = empty_volume();
@@ -97,7 +97,7 @@ TEST(Islands, AGapOfOneVoxelParts) {
 }
 
 TEST(Islands, ABridgeFoundLateJoinsWhatWasApart) {
-  // A U lying on its side: two arms that meet only in the last slice.
+  // A U on its side: two arms that meet only in the last slice.
   HuVolume volume = empty_volume();
   fill(volume, {2, 2, 2}, {3, 3, 12}, 500);
   fill(volume, {12, 2, 2}, {13, 3, 12}, 500);
@@ -130,7 +130,7 @@ TEST(BoneField, OtherIslandsDoNotMoveTheKeptSurface) {
   const auto field = bone_field(volume, number_bones(islands, kept, false, volume.dims), kThreshold_hu, always);
   ASSERT_TRUE(field);
   EXPECT_EQ(field->at(13, 5, 5), 225);
-  // Wherever the interpolated value stands in a cell with a kept voxel it is the same as before.
+  // Wherever the interpolated value matters in a cell with a kept voxel, it is the same as before.
   for (double x = 1.0; x <= 10.0; x += 0.125) {
     const CoordBox at{{static_cast<int>(x * 8), 40, 40}, {static_cast<int>(x * 8), 48, 48}};
     const auto a = resample(volume, at, 0.125, always);
@@ -140,7 +140,7 @@ TEST(BoneField, OtherIslandsDoNotMoveTheKeptSurface) {
   }
 }
 
-// Where the field crosses the threshold between two voxels along x, as part of the way.
+// Where the field crosses the threshold between two voxels along x, as a fraction of the distance.
 double crossing(const HuVolume& field, int column) {
   const double a = field.at(column, 5, 5), b = field.at(column + 1, 5, 5);
   return (a - kThreshold_hu) / (a - b);
@@ -157,8 +157,8 @@ TEST(BoneField, MarrowEndsHalfWayToAirAndHalfWayBetweenVoxelsElsewhere) {
       }
   auto field = bone_field(volume, bones, kThreshold_hu, always);
   ASSERT_TRUE(field);
-  // Linear between 100 and -340, the value half way to air, -450, would lie beyond the second voxel, as far as a
-  // crossing can be.
+  // Linear between 100 and -340, the value half way to air, -450, would lie beyond the second voxel. So the crossing is
+  // as far as possible.
   EXPECT_GT(crossing(*field, 7), 0.9);
   EXPECT_LT(crossing(*field, 7), 1.0);
   for (int row = 0; row < 20; ++row)

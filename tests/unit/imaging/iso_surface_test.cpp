@@ -11,7 +11,7 @@ namespace {
 bool always(double) { return true; }
 constexpr double kPitch_mm = 0.5;
 
-// A field of HU-like size whose value 300 lies at distance zero; `blur_mm` wide, as a scanner blurs an edge.
+// A field with values like HU whose value 300 lies at distance zero. The edge is `blur_mm` wide, as a scanner blurs it.
 template <class Distance>
 DenseVolume<float> edge_field(const CoordBox& box, double blur_mm, Distance distance_mm) {
   DenseVolume<float> field(box, 0.0f);
@@ -25,7 +25,8 @@ DenseVolume<float> edge_field(const CoordBox& box, double blur_mm, Distance dist
 }
 
 // Largest error in voxels over the samples whose true distance is within `within_mm`. Samples near the box's faces are
-// left out: there the nearest point of the true surface lies beyond the box, where the field goes on by its edge.
+// left out. There the nearest point of the true surface lies beyond the box, where the field continues with its edge's
+// value.
 template <class Distance>
 double worst_error(const DenseVolume<float>& field, double within_mm, Distance distance_mm) {
   const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, always);
@@ -46,7 +47,7 @@ double worst_error(const DenseVolume<float>& field, double within_mm, Distance d
 TEST(IsoSurface, TiltedPlaneIsExact) {
   const Vec3 normal = Vec3(1.0, 0.4, -0.7).normalized();
   const auto distance = [&](const Vec3& p) { return normal.dot(p) - 0.23; };
-  // So wide a blur is linear over the whole box, as the interpolation is.
+  // Such a wide blur is linear over the whole box, like the interpolation.
   const auto field = edge_field({{-30, -30, -30}, {30, 30, 30}}, 200.0, distance);
   EXPECT_LT(worst_error(field, 3.9 * kPitch_mm, distance), 0.005);
 }
@@ -56,7 +57,8 @@ TEST(IsoSurface, SphereIsAsNearAsItsFacetsCanBeWhereTheEdgeIsWide) {
   const auto distance = [&](const Vec3& p) { return (p - Vec3(0.11, -0.07, 0.2)).norm() - radius_mm; };
   const auto field = edge_field({{-24, -24, -24}, {24, 24, 24}}, 40.0, distance);
   // r is 16 voxels. A point in the middle of a cell's crossings lies inside by up to the sagitta of the cell's
-  // diagonal, 3/(8 r) = 0.023 voxel, and a facet between such points by that of its own diagonal, 0.016, more.
+  // diagonal, 3/(8 r) = 0.023 voxel. A facet between such points lies inside by the sagitta of its own diagonal, 0.016,
+  // in addition.
   EXPECT_LT(worst_error(field, 3.9 * kPitch_mm, distance), 0.045);
 }
 
@@ -113,7 +115,7 @@ TEST(IsoSurface, SamplesAtTheThresholdAreInside) {
 }
 
 TEST(IsoSurface, SlabsMeetWithoutASeam) {
-  // Longer than two slabs: a plane along x must read the same everywhere.
+  // Longer than two slabs: a plane along x must give the same everywhere.
   const auto distance = [](const Vec3& p) { return 0.6 * p.y() + 0.8 * p.z() - 0.1; };
   const auto field = edge_field({{-5, -24, -24}, {150, 24, 24}}, 200.0, distance);
   EXPECT_LT(worst_error(field, 3.0 * kPitch_mm, distance), 0.005);

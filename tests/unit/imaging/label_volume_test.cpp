@@ -21,8 +21,8 @@ LabelVolume labelled(int edge, const std::function<bool(const Vec3&)>& inside) {
   return volume;
 }
 
-// Root mean square of (S - true distance) in voxels, over samples within two voxels of the surface and `margin` from
-// the box's faces.
+// Root mean square of (S - true distance) in voxels, over samples within two voxels of the surface and at least
+// `margin` from the box's faces.
 double surface_error(const LabelVolume& volume, const SmoothingParams& params,
                      const std::function<double(const Vec3&)>& distance, int margin) {
   const auto field = smooth_labels(volume, params, keep_going);
@@ -47,13 +47,14 @@ constexpr SmoothingParams kNone{.rounds = 0};
 TEST(LabelVolume, ABallComesOutRound) {
   const auto distance = [](const Vec3& p) { return (p - Vec3(20.3, 20.1, 19.8)).norm() - 14.0; };
   const auto ball = labelled(41, [&](const Vec3& p) { return distance(p) < 0.0; });
-  // Halved steps of one voxel, uniformly distributed, have 1/sqrt(12) = 0.29; a third of that is no more seen.
+  // Steps of one voxel, uniformly distributed over half a voxel to both sides, have 1/sqrt(12) = 0.29. A third of that
+  // is no longer visible.
   EXPECT_LT(surface_error(ball, {}, distance, 2), 0.1);
   EXPECT_LT(surface_error(ball, {}, distance, 2), 0.8 * surface_error(ball, kNone, distance, 2));
 }
 
 TEST(LabelVolume, ATiltedPlaneLosesItsSteps) {
-  // Steps of one voxel every five: within the filter's reach.
+  // Steps of one voxel every five voxels: within the filter's reach.
   const Vec3 normal = Vec3(0.2, 0.1, 1.0).normalized();
   const auto distance = [&](const Vec3& p) { return normal.dot(p - Vec3(20.2, 20.3, 20.4)); };
   const auto plane = labelled(41, [&](const Vec3& p) { return distance(p) < 0.0; });
@@ -62,7 +63,7 @@ TEST(LabelVolume, ATiltedPlaneLosesItsSteps) {
 }
 
 TEST(LabelVolume, EveryVoxelStaysOnItsSide) {
-  // A plate of one voxel, a rod of one voxel, a single voxel and a single hole: what plain blurring loses.
+  // A plate of one voxel, a rod of one voxel, a single voxel and a single hole. Plain blurring would lose them.
   const auto thin = labelled(24, [](const Vec3& p) {
     if (p.x() == 4.0) return true;
     if (p.y() == 8.0 && p.z() == 8.0) return true;
@@ -83,7 +84,7 @@ TEST(LabelVolume, ABallKeepsItsVolume) {
   for (const float s : surface->values) volume += std::clamp(0.5 - static_cast<double>(s), 0.0, 1.0);
   double labels = 0;
   for (const std::uint8_t label : ball.labels.values) labels += label;
-  EXPECT_NEAR(volume, labels, 0.015 * labels);  // 0.07 voxel all round; the importer puts the rest back
+  EXPECT_NEAR(volume, labels, 0.015 * labels);  // 0.07 voxel less all round; the importer adds this again
 }
 
 TEST(LabelVolume, ResamplingKeepsALinearField) {
@@ -99,7 +100,7 @@ TEST(LabelVolume, ResamplingKeepsALinearField) {
   for (int x = 1; x <= 10; ++x)
     for (int y = 1; y <= 12; ++y)
       for (int z = 1; z <= 14; ++z) EXPECT_NEAR(out->at({x, y, z}), value(position_mm({x, y, z}, 0.4)), 1e-4);
-  // Beyond the field it goes on as at the edge.
+  // Beyond its edge the field continues with the edge's value.
   const auto beyond = resample(field, spacing, {{-9, 0, 0}, {-9, 0, 0}}, 0.4, keep_going);
   EXPECT_EQ(beyond->values[0], field.at({0, 0, 0}));
 }
@@ -124,7 +125,7 @@ TEST(LabelVolume, StopsWhenAsked) {
   const auto field = smooth_labels(ball, {}, [](double f) { return f < 0.2; });
   ASSERT_FALSE(field);
   EXPECT_EQ(field.error().code, ErrorCode::cancelled);
-  // Also at the very end, where all was done before anybody was asked again.
+  // Also at the very end, when all was done before progress was reported again.
   EXPECT_FALSE(smooth_labels(ball, {}, [](double f) { return f < 0.999; }));
 }
 

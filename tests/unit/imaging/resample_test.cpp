@@ -24,7 +24,7 @@ TEST(Resample, ReproducesALinearFieldOnAnObliqueGrid) {
         volume.values[volume.index(i, j, k)] =
             static_cast<std::int16_t>(std::lround(truth(volume.position_mm(Vec3(i, j, k)))));
 
-  // Around the middle of the volume, at a pitch that fits the grid nowhere.
+  // Around the middle of the volume, at a pitch that does not match the grid.
   const double pitch_mm = 0.37;
   const Vec3 middle = volume.position_mm(Vec3(14.5, 14.5, 9.5));
   const CoordBox box = covering_samples(Box{middle.array() - 3.0, middle.array() + 3.0}, pitch_mm);
@@ -36,7 +36,7 @@ TEST(Resample, ReproducesALinearFieldOnAnObliqueGrid) {
       for (int z = box.min.z; z <= box.max.z; ++z)
         worst = std::max(worst,
                          std::abs(static_cast<double>(out->at({x, y, z})) - truth(position_mm({x, y, z}, pitch_mm))));
-  EXPECT_LT(worst, 0.5 + 1e-3);  // the source is rounded to whole HU; interpolation adds nothing
+  EXPECT_LT(worst, 0.5 + 1e-3);  // the source is rounded to whole HU; interpolation adds no error
 }
 
 TEST(Resample, GoesOnWithTheEdgeBeyondTheScan) {

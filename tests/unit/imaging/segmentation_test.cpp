@@ -1,4 +1,4 @@
-// What cortex encloses is bone; what it does not enclose is none. Each shape is drawn with its answer.
+// What cortex encloses is bone, and what it does not enclose is not. Each shape is drawn with the expected answer.
 #include "common/imaging/segmentation.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ bool always(double) { return true; }
 
 constexpr std::int16_t kCortex = 1500, kFat = -90, kMuscle = 55, kAir = -1000;
 
-// Voxels of `spacing` around the origin, each with the HU that `at` gives for its centre in mm.
+// Voxels of `spacing` around the origin. `at` gives the HU for a voxel's centre in mm.
 HuVolume draw(std::array<int, 3> dims, const Vec3& spacing_mm, const std::function<std::int16_t(const Vec3&)>& at) {
   HuVolume volume;
   volume.dims = dims;
@@ -40,7 +40,7 @@ VoxelMask segment(const HuVolume& volume, const SegmentationParams& params = {},
 
 double radial(const Vec3& p) { return std::hypot(p.x(), p.y()); }
 
-// A shaft along z through the whole scan: cortex from 8 to 12 mm, marrow of fat, muscle around.
+// A shaft along z through the whole scan: cortex from 8 to 12 mm, marrow of fat inside, muscle around.
 std::int16_t shaft(const Vec3& p) { return radial(p) > 12.0 ? kMuscle : radial(p) > 8.0 ? kCortex : kFat; }
 
 TEST(Segmentation, MarrowOfAShaftThatTheScanCutsIsBone) {
@@ -69,7 +69,7 @@ TEST(Segmentation, WhereTheVolumeWasCutOutOfTheScanTheShaftIsOpen) {
 }
 
 TEST(Segmentation, AShaftCutByTheSideOfTheScanIsClosedThere) {
-  // The field of view ends at x = 4 mm, within the marrow: the tube is open on that side but for the scan's end.
+  // The field of view ends at x = 4 mm, within the marrow. The tube is open on that side except for the scan's end.
   const HuVolume volume =
       draw({48, 48, 12}, Vec3(0.8, 0.8, 3.0), [](const Vec3& p) { return shaft(p + Vec3(15.0, 0, 0)); });
   const VoxelMask bone = segment(volume);
@@ -96,7 +96,7 @@ TEST(Segmentation, AWideOpeningDoes) {
 }
 
 TEST(Segmentation, AJointBetweenTwoBonesStaysOpen) {
-  // A ball in a socket, 2 mm of cartilage between them, open at the rim.
+  // A ball in a socket with 2 mm of cartilage between them, open at the rim.
   const HuVolume volume = draw({56, 56, 48}, Vec3::Constant(0.7), [](const Vec3& p) {
     const double r = p.norm();
     if (r < 10.0) return r > 8.0 ? kCortex : kFat;
@@ -110,7 +110,7 @@ TEST(Segmentation, AJointBetweenTwoBonesStaysOpen) {
 }
 
 TEST(Segmentation, ASinusIsNoBone) {
-  // Air within thin walls, a lining of soft tissue on one side.
+  // Air within thin walls, with a lining of soft tissue on one side.
   const HuVolume volume = draw({50, 50, 50}, Vec3::Ones(), [](const Vec3& p) {
     const double r = p.norm();
     return r > 16.0 ? kMuscle : r > 14.0 ? kCortex : r > 12.5 && p.x() < 0 ? kMuscle : kAir;
@@ -128,7 +128,7 @@ TEST(Segmentation, ABrainIsNoMarrowAlsoInAClosedSkull) {
 }
 
 TEST(Segmentation, ABrainThatTheScanCutsIsNoMarrow) {
-  // The vault alone, 57 mm of it: a sphere in it has 28 mm, but the scan does not say that it ends there.
+  // 57 mm of the vault alone. A sphere in it has 28 mm, but the scan does not show that it ends there.
   const HuVolume volume = draw({50, 50, 20}, Vec3::Constant(3.0), [](const Vec3& p) {
     const double r = (p + Vec3(0, 0, 30.0)).norm();
     return r > 64.0 ? kMuscle : r > 58.0 ? kCortex : std::int16_t{35};
@@ -188,7 +188,8 @@ TEST(Segmentation, WithNoiseToo) {
   EXPECT_LT(static_cast<double>(wrong), 0.01 * static_cast<double>(all));
 }
 
-// 7 of every 27 voxels are as bright as cancellous bone, wherever one looks: fewer than half, fewer than a corner has.
+// 7 of every 27 voxels are as bright as cancellous bone, everywhere. That is fewer than half, and fewer than at a
+// corner of bone.
 TEST(Segmentation, AFewBrightVoxelsBetweenTwoBonesAreNoBone) {
   const HuVolume volume = draw({52, 52, 72}, Vec3::Constant(0.5), [](const Vec3& p) {
     if (std::max(std::abs(p.x()), std::abs(p.y())) > 10.0) return kAir;
@@ -214,7 +215,7 @@ TEST(Segmentation, AContrastFilledVesselBesideABoneIsNoBone) {
 }
 
 TEST(Segmentation, ChalkInAVesselsWallDoesNotMakeItBone) {
-  // An aorta of 160 HU with two plaques across from each other.
+  // An aorta of 160 HU with two plaques opposite each other.
   const HuVolume volume = draw({50, 50, 40}, Vec3::Ones(), [](const Vec3& p) {
     const double r = radial(p);
     if (r > 9.0 && r < 11.0 && std::abs(p.y()) < 3.0 && std::abs(p.z()) < 4.0) return std::int16_t{600};

@@ -18,7 +18,7 @@ VoxelMask random_mask(std::array<int, 3> dims, double share, std::uint32_t seed)
   return mask;
 }
 
-// The definition, voxel by voxel.
+// The definition, evaluated voxel by voxel.
 bool is_near(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm, int x, int y, int z) {
   for (int k = 0; k < mask.dims[2]; ++k)
     for (int j = 0; j < mask.dims[1]; ++j)
@@ -65,7 +65,7 @@ TEST(WithinMm, StopsWhenAsked) {
   EXPECT_EQ(near.error().code, ErrorCode::cancelled);
 }
 
-// Components by painting them one voxel at a time.
+// Counts components by painting one voxel at a time.
 std::uint32_t count_by_painting(VoxelMask mask, bool corners) {
   std::uint32_t count = 0;
   std::vector<std::array<int, 3>> waiting;

@@ -1,4 +1,5 @@
-// What is carved is a function of the set of steps: no order changes it, though pieces and debris come off on the way.
+// The result of carving depends only on the set of steps. Their order does not change it, though fragments and debris
+// are separated on the way.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -17,8 +18,8 @@ namespace {
 
 constexpr auto kGoOn = [](double) { return true; };
 
-// Eight tools go across a block of 9 x 9 x 4 mm. Blades saw a net of kerfs, which leaves crumbs. The other tools take
-// some of the crumbs away, or what holds them, sooner or later.
+// Eight tools go across a block of 9 x 9 x 4 mm. Blades saw a net of kerfs, which leaves small fragments. Sooner or
+// later the other tools take some of the fragments away, or what holds them.
 std::vector<CarveStep> crossing_steps(std::size_t count) {
   constexpr std::array kTools = {"saw-oscillating-3", "burr-round-3.2", "saw-oscillating-1", "drill-1-8in",
                                  "saw-reciprocating", "burr-barrel",    "saw-oscillating-2", "drill-3.2"};
@@ -29,7 +30,7 @@ std::vector<CarveStep> crossing_steps(std::size_t count) {
     const bool blade = tool.kind == ToolKind::oscillating_saw || tool.kind == ToolKind::reciprocating_saw;
     const Vec3 at(random.between(-4.5, 4.5), random.between(-4.5, 4.5), 1.0);
     const double deep = blade ? random.between(1.2, 2.6) : random.between(0.1, 0.6);
-    // Some blades go in from the side, under what others have sawn.
+    // Some blades enter from the side, under what others have sawn.
     if (blade && i % 3 == 0) {
       const Vec3 from(-15.0, at.y(), -deep), to(random.between(-4.0, 2.0), at.y(), -deep);
       const Vec3 in = Vec3::UnitX(), across = Vec3::UnitY();
@@ -56,7 +57,7 @@ TEST(CarveOrder, TenOrdersWithDebrisLeaveOneBone) {
     Carving carving(test::plain_block(9.0, 4.0, 0.8), 10.0);
     int of_order = 0, done = 0;
     for (const std::size_t i : test::order_with_repeats(kSteps, 0, random)) {
-      // To ask for the fields on the way changes nothing.
+      // Asking for the fields on the way changes nothing.
       if (order % 2 == 1 && ++done == 30) (void)carving.fields();
       const auto report = carving.run(steps[i], kGoOn);
       ASSERT_TRUE(report);

@@ -1,5 +1,4 @@
-// Carving without a room: volumes against closed forms, closed surfaces, pieces that come apart, scripts that are
-// wrong.
+// Carving without a room: volumes against closed forms, closed surfaces, pieces that come apart, and faulty scripts.
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -46,7 +45,7 @@ TEST(Carving, ABurrsGrooveHasItsVolume) {
   EXPECT_EQ(report->pieces + report->debris, 0);
 }
 
-// Down through bone into a plate of metal: the cuts that would take it are left out, and said.
+// Down through bone into a metal plate: cuts that would take metal are left out, and this is reported.
 TEST(Carving, LeavesMetalWhereItIs) {
   const auto plate = [](const Vec3& p) { return p.z() < -4.0 ? Tissue::metal : Tissue::none; };
   Carving carving(osteon::test::marked_block(12.0, 8.0, 0.5, plate), 0.5),
@@ -83,7 +82,7 @@ TEST(Carving, ACutStartsWhereTheLastOneEnded) {
 
 TEST(Carving, SawingThroughTakesAPieceOff) {
   Carving carving(block(), 1.0);
-  // A blade upright across y, from above through the block at x = 2, in two plunges beside each other.
+  // A blade stands upright across y and goes from above through the block at x = 2, in two plunges beside each other.
   const Vec3 in(0, 0, -1), across(0, 1, 0);
   const double volume = carving.field(0).bone().volume_mm3();
   const auto report = carving.run(
@@ -96,7 +95,7 @@ TEST(Carving, SawingThroughTakesAPieceOff) {
   EXPECT_NEAR(report->removed_mm3, 1.27 * 12.0 * 8.0, 0.03 * 1.27 * 96.0);
   EXPECT_NEAR(report->pieces_mm3, (6.0 - 2.635) * 96.0, 0.03 * 323.0);
   EXPECT_NEAR(carving.field(1).removed_mm3(), volume - report->pieces_mm3, 0.03 * volume);
-  // Both halves are closed, and together they are what the saw left.
+  // Both halves are closed. Together they are what the saw left.
   const auto kept = bone_surface(carving.field(0), keep_going), piece = bone_surface(carving.field(1), keep_going);
   ASSERT_TRUE(kept && piece);
   EXPECT_EQ(open_edges(*kept), 0u);
@@ -135,7 +134,7 @@ TEST(Carving, APieceIsSawnInTwoAgain) {
   EXPECT_EQ(again->pieces, 1);
   ASSERT_EQ(carving.bodies(), 3u);
   const double side = 6.0 - 2.0 - 0.5 * kerf;
-  // The part towards −y is the smaller: from y = −6 to −1.635.
+  // The part towards −y is the smaller one: from y = −6 to −1.635.
   EXPECT_NEAR(again->pieces_mm3, side * (5.0 - 0.5 * kerf) * 8.0, 0.05 * whole / 8.0);
   double solid = 0;
   for (std::size_t body = 0; body < 3; ++body) {
@@ -260,7 +259,7 @@ TEST_F(Scripts, TheProgramsAgree) {
   EXPECT_EQ(report.at("steps").size(), 1u);
   EXPECT_GT(report.at("steps")[0].at("removed_mm3").get<double>(), 50.0);
 
-  // The surface from the saved fields is the one that carving wrote, closed also as read back from the file.
+  // The surface from the saved fields is the one that carving wrote. It is also closed when read back from the file.
   for (const char* name : {"g.stl", "g.ply", "g.obj"}) {
     const auto surface = test::run(program, {"surface", path("case"), "--fields", path("f.vdb"), "--out", path(name)});
     ASSERT_EQ(surface.exit_code, 0) << surface.err;
@@ -313,7 +312,7 @@ TEST_F(Scripts, TheToolBoxIsListedAndWritten) {
   EXPECT_EQ(std::ranges::count(own.out, '\n'), 1);
 }
 
-// How many of the three ways say that the tool meets bone.
+// How many of the three ways of asking say that the tool meets bone.
 std::ptrdiff_t meeting(const std::string& text) {
   std::ptrdiff_t count = 0;
   for (std::size_t at = text.find("meets bone"); at != std::string::npos; at = text.find("meets bone", at + 1)) ++count;
@@ -334,10 +333,11 @@ TEST_F(Scripts, ContactIsAskedInThreeWays) {
     EXPECT_EQ(std::ranges::count(result.out, '\n'), 3) << result.out;
     return meeting(result.out);
   };
-  // The block's top is z = 0, its samples are 0.5 mm apart: a millimetre either way is no matter of the way of asking.
+  // The block's top is z = 0 and its samples are 0.5 mm apart. A millimetre above or below is clear to all ways of
+  // asking.
   EXPECT_EQ(asked("0,0,1"), 0);
   EXPECT_EQ(asked("0,0,-1"), 3);
-  // In a groove of a bur of 5 mm, 3 mm deep, one of 3.2 mm is free a millimetre above its bottom, and not at the wall.
+  // In a groove of a 5 mm bur, 3 mm deep, a 3.2 mm bur is free a millimetre above the bottom, but not at the wall.
   const auto script =
       write("steps: [{tool: burr-round-5, from: [-8, 0, -3], to: [8, 0, -3], axis: [0, 0, -1]}]").string();
   ASSERT_EQ(test::run(program, {"carve", path("case"), script, "--out", path("f.vdb")}).exit_code, 0);

@@ -1,4 +1,5 @@
-// What hospitals hand out: CT series among indexes, reports, pictures and programs; in folders, zips and CD images.
+// Media as hospitals hand them out: CT series among indexes, reports, pictures and programs, in folders, zips and CD
+// images.
 #include <sys/stat.h>
 
 #include <cstdlib>
@@ -15,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// TMPDIR of its own, which must be empty at the end.
+// A TMPDIR of the test's own. It must be empty at the end.
 class Scratch {
  public:
   Scratch() { ::setenv("TMPDIR", folder_.path().c_str(), 1); }
@@ -44,7 +45,7 @@ class CdFolder : public ::testing::Test {
     tag_all(series("SE1"), 0x0018, 0x1210, "H60s");
     tag_all(series("SE0"), 0x0020, 0x0011, "3");
   }
-  // What lies beside the images on a CD.
+  // Other files beside the images on a CD.
   void add_the_rest() {
     const std::string storage = "1.2.840.10008.5.1.4.1.1.";
     write_object(cd_ / "DICOMDIR", "1.2.840.10008.1.3.10", "");
@@ -65,7 +66,7 @@ class CdFolder : public ::testing::Test {
     ASSERT_TRUE(scan) << scan.error().message;
     expect_same(scan->volume, large_);
   }
-  // The large volume, or one sentence.
+  // Expects the large volume, or one sentence.
   void expect_sound(const Result<CtScan>& scan, const std::string& named) const {
     if (scan)
       expect_same(scan->volume, large_);
@@ -165,8 +166,8 @@ TEST_F(CdFolder, ALargerOneOfAKindThatCannotBeImportedIsNotTaken) {
       << report_lines(scan->report);
 }
 
-// It is most likely the one that is meant: the smaller one may be another bone.
-TEST_F(CdFolder, ALargerOneWithAMissingSliceIsToldAndNoOtherTaken) {
+// The larger series is most likely the wanted one: the smaller one may be another bone.
+TEST_F(CdFolder, ALargerOneWithAMissingSliceIsReportedAndNoOtherTaken) {
   fs::remove(series("SE1") / "slice-0010.dcm");
   const auto scan = read_dicom_series(cd_, keep_going);
   ASSERT_FALSE(scan);
@@ -282,7 +283,7 @@ TEST_F(CdFolder, RandomBytesBehindTheMarkAreDamagedFiles) {
   expect_large(read_dicom_series(cd_, keep_going));
 }
 
-// Lengths of 4 GB in a file of 2 KB: neither time nor memory.
+// Lengths of 4 GB in a file of 2 KB must cost neither time nor memory.
 TEST_F(CdFolder, AHugeLengthIsADamagedFile) {
   for (const char* vr : {"OB", "UN", "SQ", "UT", "LO"}) {
     write_object(cd_ / vr, "1.2.840.10008.5.1.4.1.1.2", "CT");
@@ -300,7 +301,7 @@ TEST_F(CdFolder, ATruncatedSliceOfAnyLengthBesideAGoodSeries) {
     fs::copy_file(whole, cd_ / "cut", fs::copy_options::overwrite_existing);
     fs::resize_file(cd_ / "cut", length);
     expect_large(read_dicom_series(cd_, keep_going));
-    // And as the only file of its kind.
+    // Also as the only file of its kind.
     const test::TempDir alone;
     fs::copy(cd_ / "cut", alone / "cut");
     const auto none = read_dicom_series(alone.path(), keep_going);
@@ -379,7 +380,7 @@ TEST_F(CdFolder, StoppedAtAnyMomentLeavesNothing) {
     const Scratch scratch;
     int asked = 0;
     const auto scan = read_dicom_series(folder_ / "cd.zip", [&](double) { return ++asked < stop; });
-    if (scan) continue;  // silence makes further calls, so their number may differ
+    if (scan) continue;  // silencing the library makes further calls, so their number may differ
     EXPECT_EQ(scan.error().code, ErrorCode::cancelled) << scan.error().message;
     ++cancelled;
   }

@@ -11,7 +11,7 @@
 namespace osteon::import {
 namespace {
 
-// Through the phantom's DICOM files and back, at the scan's own pitch unless another is given.
+// Writes the phantom as DICOM files and imports them, at the scan's own pitch unless another is given.
 Result<Case> round_trip(const Phantom& phantom, double spacing_mm, double threshold_hu,
                         std::optional<double> pitch_mm = {}) {
   const test::TempDir folder;
@@ -24,8 +24,8 @@ Result<Case> round_trip(const Phantom& phantom, double spacing_mm, double thresh
   return import_bone(std::move(*read), {.pitch_mm = pitch_mm, .threshold_hu = threshold_hu}, keep_going);
 }
 
-// Largest |S| at points that lie exactly on the phantom's surface, in voxels of the scan; edges are left out by 2 mm,
-// since a scanner rounds them.
+// Largest |S| at points exactly on the phantom's surface, in voxels of the scan. Edges are left out by 2 mm, because a
+// scanner rounds them.
 double surface_error(const Case& bone, const Phantom& phantom, double spacing_mm) {
   double worst = 0.0;
   const double half = 0.5 * phantom.width_mm;
@@ -59,7 +59,7 @@ TEST(CtImport, BlockThroughDicomIsTheBlock) {
   ASSERT_TRUE(bone) << bone.error().message;
   EXPECT_LT(surface_error(*bone, phantom, spacing_mm), 0.15);
   EXPECT_NEAR(bone->volume_mm3(), phantom.volume_mm3(), 0.01 * phantom.volume_mm3());
-  // In the middle of the layers nothing is blurred in.
+  // In the middle of the layers, no neighbouring layer is blurred in.
   EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -2.0}), 1.9, 0.02 * 1.9);
   EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -7.0}), 1.4, 0.02 * 1.4);
   EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -12.0}), 1.9, 0.02 * 1.9);
@@ -68,7 +68,7 @@ TEST(CtImport, BlockThroughDicomIsTheBlock) {
 TEST(CtImport, TubeThroughDicomIsTheTube) {
   const Phantom phantom{.kind = PhantomKind::tube, .layers = {{3.0, 1.9}, {5.0, 0.3}}, .width_mm = 14.0};
   const double spacing_mm = 0.5;
-  // Only the shell lies on the round surface, so its own half height is the right threshold there.
+  // Only the shell lies on the round surface, so half of its own height is the right threshold there.
   const Phantom shell{.kind = PhantomKind::tube, .layers = {{3.0, 1.9}}, .width_mm = 14.0};
   const double threshold_hu = suitable_threshold_hu(shell);
   const auto bone = round_trip(phantom, spacing_mm, threshold_hu);
@@ -77,7 +77,7 @@ TEST(CtImport, TubeThroughDicomIsTheTube) {
     for (const double z : {-4.3, 0.0, 3.1})
       EXPECT_NEAR(bone->surface_mm({8.0 * std::cos(angle), 8.0 * std::sin(angle), z}) / spacing_mm, 0.0, 0.15) << angle;
   EXPECT_NEAR(bone->density_g_cm3({6.5, 0.0, 0.0}), 1.9, 0.02 * 1.9);
-  // The medulla lies below that threshold, between cortex: it is bone, of its own density.
+  // The medulla is below that threshold, but between cortex. It is bone with its own density.
   EXPECT_LT(bone->surface_mm({0.0, 0.0, 0.0}), 0.0);
   EXPECT_NEAR(bone->density_g_cm3({0.0, 0.0, 0.0}), 0.3, 0.02 * 0.3);
 }
@@ -115,8 +115,8 @@ TEST(CtImport, HollowLeavesTheMarrowOut) {
   EXPECT_LT(hollow->volume_mm3(), 1.15 * shell);
 }
 
-// A shaft that is broken right through. A narrow gap is bridged by the marrow space, and the import says so.
-TEST(CtImport, PiecesThatOnlyMarrowJoinsAreTold) {
+// A shaft that is broken right through. The marrow space bridges a narrow gap, and the import reports it.
+TEST(CtImport, PiecesThatOnlyMarrowJoinsAreReported) {
   const auto broken = [](double gap_mm) {
     CtScan scan;
     scan.volume.dims = {60, 60, 60};
@@ -223,7 +223,7 @@ TEST(CtImport, OtherIslandsAreGone) {
   EXPECT_GT(bone->surface_mm({22.0, 10.0, 10.0}), 0.0);
 }
 
-// Three cubes apart: 1000, 512 and 64 mm3.
+// Three separate cubes: 1000, 512 and 64 mm3.
 CtScan three_cubes() {
   CtScan scan;
   scan.volume.dims = {40, 20, 20};
@@ -304,7 +304,7 @@ TEST(CtImport, TooFineAPitchIsRefusedBeforeTheMemoryIsFull) {
 }
 
 TEST(CtImport, StopsAtEveryStage) {
-  // However late the stop comes, nothing but `cancelled` may follow.
+  // However late the stop is asked for, only `cancelled` may follow.
   for (const double until : {0.0, 0.05, 0.2, 0.5, 0.84}) {
     auto scan = scan_phantom(small_block(), 0.25, keep_going);
     ASSERT_TRUE(scan);

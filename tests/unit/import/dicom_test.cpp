@@ -156,12 +156,12 @@ TEST_F(BrokenSeries, MissingSlicesOfAShortSeries) {
 
 TEST_F(BrokenSeries, DoubledSlice) {
   fs::copy(files_[4], series_ / "another.dcm");
-  set_tag(series_ / "another.dcm", 0x0008, 0x0018, "1.2.3.4");  // an instance of its own, so no copy
+  set_tag(series_ / "another.dcm", 0x0008, 0x0018, "1.2.3.4");  // an instance of its own, so not a copy
   expect_refused(series_.string(), "0 mm apart");
 }
 
 TEST_F(BrokenSeries, TiltedGantry) {
-  // Every slice 0.3 mm farther to the back than the one below: shear by atan(0.3).
+  // Every slice is 0.3 mm farther to the back than the one below: shear by atan(0.3).
   for (std::size_t i = 0; i < files_.size(); ++i)
     set_tag(files_[i], 0x0020, 0x0032, "0\\" + std::to_string(0.3 * static_cast<double>(i)) + "\\" + std::to_string(i));
   expect_refused(series_.string(), "16.7 degrees");
@@ -195,11 +195,11 @@ TEST_F(BrokenSeries, NoPixelDataAnywhere) {
 }
 
 TEST_F(BrokenSeries, TruncatedFile) {
-  truncate_file(files_[2], 0.6);  // within its header
+  truncate_file(files_[2], 0.6);  // ends within its header
   expect_refused(series_.string(), "slice-0003.dcm is damaged");
 }
 
-// The library leaves missing pixels zero without a word.
+// The library silently leaves missing pixels zero.
 TEST_F(BrokenSeries, FileThatEndsWithinItsPixels) {
   fs::resize_file(files_[2], fs::file_size(files_[2]) - 2);
   expect_refused(files_[2].string(), "cut off");

@@ -105,7 +105,7 @@ void write_inv3(const fs::path& file, const Inv3& project) {
     ASSERT_EQ(archive_write_data(a, content.data(), content.size()), static_cast<la_ssize_t>(content.size()));
     archive_entry_free(entry);
   };
-  // The matrix first, as an archive may order them.
+  // The matrix comes first, as an archive may order its files.
   if (project.with_matrix) add("tmp/matrix.dat", matrix);
   if (project.with_list) add("tmp/main.plist", list);
   if (!project.with_list && !project.with_matrix) add("tmp/other.txt", "nothing");

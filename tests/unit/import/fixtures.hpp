@@ -1,4 +1,4 @@
-// Small scans and projects that the tests of the importer break in one way each.
+// Small scans and projects. The tests of the importer damage each of them in one way.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -21,11 +21,11 @@ inline bool keep_going(double) { return true; }
 // 4 x 4 x 6 mm of 1.5 g/cm³.
 [[nodiscard]] Phantom small_block();
 
-// A DICOM series of the small block: about 20 slices of 1 mm, sorted by name and position alike.
+// Writes a DICOM series of the small block: about 20 slices of 1 mm. Names and positions have the same order.
 void write_small_series(const std::filesystem::path& folder);
 [[nodiscard]] std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder);
 
-// Sets an attribute of a DICOM file, or takes it out; the file stays valid otherwise.
+// Sets or removes an attribute of a DICOM file. The file otherwise stays valid.
 void set_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element, const std::string& value,
              int vr_if_new = 0);
 void remove_tag(const std::filesystem::path& file, std::uint16_t group, std::uint16_t element);
@@ -43,7 +43,7 @@ struct Inv3 {
 };
 void write_inv3(const std::filesystem::path& file, const Inv3& project);
 
-// A scan whose values are all different along each axis.
+// A scan with different values along each axis.
 [[nodiscard]] imaging::HuVolume numbered_volume(int columns, int rows, int slices);
 void expect_same(const imaging::HuVolume& a, const imaging::HuVolume& b);
 
@@ -51,13 +51,13 @@ void expect_same(const imaging::HuVolume& a, const imaging::HuVolume& b);
 void write_object(const std::filesystem::path& file, const std::string& sop_class, const std::string& modality,
                   const std::string& image_type = {});
 
-// Everything below a folder as one archive: "zip", "iso9660", "pax" or, of a zip with a password, "secret".
+// Packs everything below a folder into one archive: "zip", "iso9660", "pax", or "secret" for a zip with a password.
 void write_archive(const std::filesystem::path& folder, const std::filesystem::path& file, const std::string& format);
 
 // Keeps the first bytes of a file.
 void truncate_file(const std::filesystem::path& file, double part);
 
-// The message is one sentence that names `what` and, after it, says what to do.
+// Expects one sentence that names `what` and then gives a remedy.
 void expect_one_sentence(const Error& error, const std::string& what);
 
 }  // namespace osteon::import

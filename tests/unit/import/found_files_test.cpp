@@ -1,4 +1,4 @@
-// How inputs are searched and unpacked, and how a reader that dies is survived.
+// Tests how inputs are searched and unpacked, and what happens when a reader process dies.
 #include "server/import/found_files.hpp"
 
 #include <archive.h>
@@ -41,7 +41,7 @@ TEST(ContentOf, RawNumbersAreNotDicom) {
   EXPECT_EQ(content_of_text("This is a letter, not a scan.\n"), Content::other);
   EXPECT_EQ(content_of_text(std::string(8192, '\0')), Content::other);
   EXPECT_EQ(content_of_text("PK\3\4 and more"), Content::archive);
-  // Voxels that look like the head of one element, or of two.
+  // Voxels whose bytes look like the head of one element, or of two.
   const std::string one("\10\0\5\0\4\0\0\0abcd", 12);
   EXPECT_EQ(content_of_text(one + std::string(8180, '\1')), Content::other);
   EXPECT_EQ(content_of_text(one + std::string("\10\0\10\0\4\0\0\0abcd", 12) + std::string(8168, '\1')), Content::other);
@@ -211,7 +211,7 @@ TEST(TemporaryFolder, GoesWithItsScope) {
   EXPECT_FALSE(fs::exists(path));
 }
 
-TEST(Isolated, ADeadChildIsToldWithItsFile) {
+TEST(Isolated, ADeadChildIsReportedWithItsFile) {
   std::vector<std::string> heard;
   IsolatedWork work;
   work.run = [](ChildChannel& channel) -> Result<void> {
@@ -242,8 +242,8 @@ TEST(Isolated, AChildThatHangsIsStopped) {
   EXPECT_EQ(end.result.error().code, ErrorCode::cancelled);
 }
 
-// In builds with sanitizers, which reserve far more memory than they use, there is no limit: there it must come to its
-// end.
+// Builds with sanitizers reserve far more memory than they use, so they have no limit. There the child must end
+// normally.
 TEST(Isolated, AChildThatTakesMoreThanItsMemoryDies) {
   IsolatedWork work;
   work.memory_bytes = std::size_t{64} << 20;

@@ -29,7 +29,7 @@ TEST(Inv3, RowsGoToTheFrontAndSlicesToTheHead) {
   EXPECT_LT((at(1, 0, 0) - at(0, 0, 0) - Vec3(0.5, 0, 0)).norm(), 1e-12);    // left
   EXPECT_LT((at(0, 1, 0) - at(0, 0, 0) - Vec3(0, -0.75, 0)).norm(), 1e-12);  // front
   EXPECT_LT((at(0, 0, 1) - at(0, 0, 0) - Vec3(0, 0, 2.0)).norm(), 1e-12);    // head
-  EXPECT_LT(at(0, 4, 0).norm(), 1e-12);                                      // the least corner is the origin
+  EXPECT_LT(at(0, 4, 0).norm(), 1e-12);                                      // the lowest corner is the origin
 }
 
 TEST(Inv3, TheSourceSaysNothingOfThePatient) {
@@ -61,7 +61,7 @@ TEST(Inv3, RefusesWhatIsNoProject) {
 
 TEST(Inv3, RefusesATruncatedArchiveWhereverItEnds) {
   const test::TempDir folder;
-  // Large enough that gzip has more than one block.
+  // Large enough that gzip needs more than one block.
   ASSERT_NO_FATAL_FAILURE(write_inv3(folder / "whole.inv3", {.columns = 200, .rows = 200, .slices = 30}));
   for (const double part : {0.002, 0.1, 0.5, 0.9, 0.99}) {
     const fs::path file = folder / ("cut-" + std::to_string(part) + ".inv3");
@@ -71,7 +71,7 @@ TEST(Inv3, RefusesATruncatedArchiveWhereverItEnds) {
   }
 }
 
-// A tar of one file that claims `size` bytes, as GNU tar writes what has no room in octal digits.
+// A tar of one file that claims `size` bytes. Sizes that do not fit into octal digits are written as GNU tar does.
 std::string tar_entry(const std::string& name, std::uint64_t size) {
   std::string head = name;
   head.resize(512, '\0');

@@ -33,7 +33,7 @@ void write_slice(const fs::path& file, int width, int height, const std::functio
   ASSERT_NE(png_image_write_to_file(&image, file.c_str(), 0, pixels.data(), 0, nullptr), 0) << image.message;
 }
 
-// plane000.png, plane001.png, … plane0010.png: numbered without padding, as the temporal bone is.
+// plane000.png, plane001.png, … plane0010.png: numbered without padding, as in the temporal bone's data.
 void write_stack(const fs::path& folder, int width, int height, int slices,
                  const std::function<Rgba(int, int, int)>& colour) {
   fs::create_directories(folder);
@@ -61,7 +61,7 @@ class Labels : public ::testing::Test {
 };
 
 TEST_F(Labels, SlicesLieByTheirNumbers) {
-  // The colour's column tells the slice; eleven of them, so that order by text would put 10 behind 1.
+  // The column of the colour gives the slice's number. With eleven slices, an order by text would put 10 right after 1.
   write_stack(folder_ / "s", 12, 3, 11, [](int x, int y, int z) { return x == z && y == 1 ? kBone : kEmpty; });
   const auto stack = read_label_stack(folder_ / "s", {}, Vec3(0.1, 0.2, 0.3), keep_going);
   ASSERT_TRUE(stack) << stack.error().message;
@@ -83,13 +83,13 @@ TEST_F(Labels, ABallBecomesABall) {
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(made->bone.pitch_mm(), h);
   const double truth = 4.0 / 3.0 * std::numbers::pi * std::pow(kRadius * h, 3);
-  EXPECT_NEAR(made->labelled_mm3, truth, 0.01 * truth);  // how well voxels count a ball of this size
+  EXPECT_NEAR(made->labelled_mm3, truth, 0.01 * truth);  // error of counting voxels for a ball of this size
   EXPECT_NEAR(made->bone.volume_mm3(), made->labelled_mm3, 0.002 * made->labelled_mm3);
   const Vec3 centre = Vec3(14.2, 15.4, 13.8) * h;
   EXPECT_NEAR(made->bone.density_g_cm3(centre), 1.9, 1e-6);
   EXPECT_EQ(made->bone.tissue({14, 15, 14}), Tissue::cortical);
-  // On the true surface, in all directions, S is within 0.3 voxel of zero, a label's own error,, and the density does
-  // not fade.
+  // On the true surface, in all directions, S is within 0.3 voxel of zero, a label's own error, and the density does
+  // not fall.
   for (int i = 0; i < 200; ++i) {
     const Vec3 way = Vec3(std::cos(2.4 * i) * std::sqrt(1 - std::pow(i / 100.0 - 1, 2)),
                           std::sin(2.4 * i) * std::sqrt(1 - std::pow(i / 100.0 - 1, 2)), i / 100.0 - 1);
@@ -178,7 +178,7 @@ std::uint32_t png_checksum(std::string_view bytes) {
   return ~crc;
 }
 
-// Lets the header of a PNG claim a size that its pixels do not have.
+// Makes the header of a PNG claim a size that its pixels do not have.
 void claim_size(const fs::path& file, std::uint32_t width, std::uint32_t height) {
   std::string header = "IHDR";
   const auto add = [&](std::uint32_t value) {

@@ -34,7 +34,7 @@ TEST(ParseLayers, RefusesNonsenseAndSaysHowToWriteIt) {
 }
 
 TEST(Phantom, DistanceIsThatToTheNearestOfManySurfacePoints) {
-  // The other road: brute force over points scattered on the surface of the tube.
+  // Another way to compute it: brute force over points scattered on the surface of the tube.
   const Phantom tube = long_bone();
   std::mt19937 random(7);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
@@ -60,7 +60,7 @@ TEST(Phantom, LayersOfABlockGoDownFromItsTop) {
   EXPECT_NEAR(block.density_g_cm3({0, 0, -2.5}, 0.4), 1.9, 1e-12);
   EXPECT_NEAR(block.density_g_cm3({0, 0, -15.0}, 0.4), 0.3, 1e-12);
   EXPECT_NEAR(block.density_g_cm3({0, 0, -28.0}, 0.4), 1.9, 1e-12);
-  EXPECT_NEAR(block.density_g_cm3({0, 0, -5.0}, 0.4), 1.1, 1e-12);  // half and half at the interface
+  EXPECT_NEAR(block.density_g_cm3({0, 0, -5.0}, 0.4), 1.1, 1e-12);  // half of each at the interface
 }
 
 TEST(Phantom, LayersOfATubeGoInwards) {
@@ -75,7 +75,7 @@ TEST(PhantomCase, HasTheExactSurface) {
   for (const Phantom& phantom : {plate(), long_bone()}) {
     const auto bone = build_phantom_case(phantom, h, "test", keep_going);
     ASSERT_TRUE(bone) << bone.error().message;
-    // At the samples themselves nothing is interpolated; only the quantum of 2^-10 mm is left.
+    // At the samples themselves nothing is interpolated. Only the quantum of 2^-10 mm remains.
     const CoordBox box = covering_samples(phantom.bounds().grown(2.0), h);
     for (int x = box.min.x; x <= box.max.x; x += 3)
       for (int y = box.min.y; y <= box.max.y; y += 3)
@@ -89,7 +89,7 @@ TEST(PhantomCase, HasTheExactSurface) {
 }
 
 TEST(PhantomCase, KeepsEveryLayersMassAndPlace) {
-  // 5 mm is no whole number of pitches here, and yet the mass over the depth must be that of the layers.
+  // 5 mm is not a whole number of pitches here. Still the mass over the depth must be that of the layers.
   const Phantom phantom = plate();
   const double h = 0.37;
   const auto bone = build_phantom_case(phantom, h, "test", keep_going);

@@ -1,4 +1,4 @@
-// osteon-import as its users meet it: what it prints, what it leaves behind and how it exits.
+// osteon-import as its users see it: what it prints, what files it leaves, and its exit codes.
 #include <sys/stat.h>
 
 #include <csignal>
@@ -27,7 +27,7 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-// Exit code 1, one sentence on standard error and nothing but it, nothing on standard output, no new file.
+// Expects exit code 1, exactly one sentence on standard error, nothing on standard output, and no new file.
 void expect_refused(const std::vector<std::string>& arguments, const std::string& named, const test::TempDir& folder) {
   const auto before = files_of(folder.path());
   const auto result = test::run(kProgram, arguments);
@@ -111,7 +111,7 @@ TEST_F(Program, WrongSeriesAreOneSentence) {
   expect_refused({"ct", path("series"), "--out", path("case")}, "MR images", folder_);
 }
 
-// Two series and a letter on one disc.
+// Two series and a text file on one disc.
 void write_disc(const fs::path& folder) {
   fs::create_directories(folder);
   ASSERT_NO_FATAL_FAILURE(write_small_series(folder / "A"));
@@ -159,7 +159,7 @@ TEST_F(Program, ImportsTheLargestSeriesOfADiscAndSaysSo) {
   EXPECT_LT(first->volume_mm3(), 0.5 * second->volume_mm3());
 }
 
-// Two hollow boxes of cortex with fat in them, 64 and 27 mm3 of fat, apart from each other.
+// Two separate hollow boxes of cortex with fat in them, 64 and 27 mm3 of fat.
 void write_two_boxes(const fs::path& folder) {
   imaging::HuVolume volume;
   volume.dims = {30, 16, 16};
@@ -287,7 +287,7 @@ TEST_F(Program, WrongUsageIsOneSentence) {
   expect_refused({"phantom", "block", "--layers", "5:1", "--pitch", "7", "--out", path("case")}, "--pitch", folder_);
 }
 
-// Who holds it would find out too late.
+// The user of the tool would otherwise learn it too late.
 TEST_F(Program, AToolWithALawThatDoesNotFitIsRefused) {
   const auto write = [&](const std::string& law) {
     std::ofstream(folder_ / "my-drill.yaml")
@@ -354,7 +354,7 @@ TEST_F(Program, InfoOfABrokenCaseIsOneSentence) {
   expect_refused({"info", path("case")}, path("case"), folder_);
 }
 
-// Starts a command, waits for the moment and presses Ctrl-C: 130, and only what was there before is there.
+// Starts a command, waits for the percentage and sends Ctrl-C. Expects exit code 130 and only the files from before.
 void expect_stopped(const std::vector<std::string>& arguments, int percent, const test::TempDir& folder) {
   const auto before = files_of(folder.path());
   test::Process process(kProgram, arguments);
@@ -366,7 +366,7 @@ void expect_stopped(const std::vector<std::string>& arguments, int percent, cons
   EXPECT_EQ(files_of(folder.path()), before);
 }
 
-// While a large archive is unpacked, no folder of it stays behind.
+// If it is stopped while a large archive is unpacked, no folder stays behind.
 TEST_F(Program, CtrlCWhileUnpackingLeavesNothing) {
   const auto volume = numbered_volume(700, 700, 140);
   ASSERT_TRUE(write_dicom_series(volume, folder_ / "disc" / "series", keep_going));

@@ -1,5 +1,5 @@
-// Small scans of all kinds at thresholds on and between whole numbers: every import ends, within a bounded number of
-// steps, with one clear sentence or a closed surface, and stops wherever it is asked to.
+// Small scans of all kinds at thresholds on and between whole numbers. Every import ends within a bounded number of
+// steps, with one clear sentence or a closed surface. It stops wherever it is asked to.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -16,7 +16,8 @@ namespace osteon::import {
 namespace {
 
 constexpr int kScans = 2000;
-// Questions of one import: each stands for a slice of a stage, or a hundredth of a second of the distance's threads.
+// Most progress calls of one import. Each stands for a slice of a stage, or a hundredth of a second of the distance's
+// threads.
 constexpr int kMostQuestions = 20'000;
 
 struct Drawn {
@@ -25,8 +26,8 @@ struct Drawn {
   std::string what;
 };
 
-// Noise of three values round the threshold, one value, all bone, no bone, checkerboards, two blocks with a bridge of
-// one voxel.
+// Noise of three values round the threshold, a single value, all bone, no bone, checkerboards, and two blocks with a
+// bridge of one voxel.
 Drawn draw(std::uint32_t seed) {
   std::mt19937 random(seed);
   const auto integer = [&](int low, int high) { return std::uniform_int_distribution<int>(low, high)(random); };
@@ -91,7 +92,7 @@ TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
     const auto made =
         import_ct({d.volume, "test"},
                   {.threshold_hu = d.threshold_hu, .keep_all = seed % 5 == 0, .hollow = seed % 7 == 0}, count);
-    ASSERT_LT(questions, kMostQuestions) << "it does not end";
+    ASSERT_LT(questions, kMostQuestions) << "the import does not end";
     const bool any = std::ranges::any_of(d.volume.values, [&](std::int16_t hu) { return hu >= d.threshold_hu; });
     if (!any) {
       ASSERT_FALSE(made);
@@ -117,7 +118,8 @@ TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
   EXPECT_GT(refused, kScans / 20);
 }
 
-// The scan that never ended: air with a cube of 226 plus noise of three values, 700 apart, at the default threshold.
+// The scan for which the import once never ended: air with a cube of 226 plus noise of three values, 700 apart, at the
+// default threshold.
 TEST(RandomSeries, TheCubeOnTheThresholdEnds) {
   std::mt19937 random(1);
   CtScan scan;
@@ -146,11 +148,12 @@ TEST(RandomSeries, StopsAtEveryQuestionOfEveryStage) {
     EXPECT_TRUE(std::ranges::is_sorted(fractions)) << "progress goes back";
     if (!whole) continue;
     ++imported;
-    // The distance's threads ask while they work, as often as that takes: stop by the fraction, not by the count.
+    // The distance's threads report progress while they work, as often as the work takes. So the stop depends on the
+    // fraction and not on the count.
     for (const double until : fractions) {
       bool stopped = false;
       const auto made = import_ct({d.volume, "test"}, {.threshold_hu = d.threshold_hu}, [&](double done) {
-        EXPECT_FALSE(stopped && done > until + 0.02) << "it went on after it was stopped";
+        EXPECT_FALSE(stopped && done > until + 0.02) << "the import went on after it was stopped";
         stopped = stopped || done >= until;
         return !stopped;
       });

@@ -1,4 +1,4 @@
-// Real scans: the skull of Debian's invesalius-examples and what lies in the shared data folder, where they are there.
+// Real scans, where available: the skull of Debian's invesalius-examples, and the scans in the shared data folder.
 #include <map>
 
 #include <fstream>
@@ -27,12 +27,12 @@ TEST(Skull, LiesInThePatientFrame) {
   const auto bone = import_bone(std::move(*scan), {.pitch_mm = {}, .title = "Skull"}, keep_going);
   ASSERT_TRUE(bone) << bone.error().message;
 
-  // InVesalius' own mesh of everything above 226 HU holds 657.7 cm³ (surface_0.plist), the headrest and loose pieces
-  // included; the largest island is most of it.
+  // InVesalius' own mesh of everything above 226 HU encloses 657.7 cm³ (surface_0.plist), with headrest and loose
+  // pieces. The largest island is most of it.
   EXPECT_LT(bone->volume_mm3(), 657.7e3);
   EXPECT_GT(bone->volume_mm3(), 0.88 * 657.7e3);
 
-  // Enamel is the densest thing in a head, and teeth are low and in front: -z and -y of the middle.
+  // Enamel is the densest material in a head. Teeth are low and in front: -z and -y of the middle.
   const Vec3 middle = bone->bounds().centre_mm();
   Vec3 sum = Vec3::Zero();
   int enamel = 0;
@@ -51,7 +51,7 @@ TEST(Skull, LiesInThePatientFrame) {
   EXPECT_LT(teeth.y(), middle.y() - 40.0);
   EXPECT_NEAR(teeth.x(), middle.x(), 15.0);
 
-  // A line from above meets the vault, then the cavity of the brain.
+  // A line from above meets the vault, and then the brain's cavity.
   double vault_z = 1e9;
   for (double z = bone->bounds().max_mm.z(); z > middle.z(); z -= 0.25)
     if (bone->surface_mm({middle.x(), middle.y(), z}) < 0.0) {
@@ -79,7 +79,8 @@ TEST(Skull, ImportsToOneHash) {
   }
 }
 
-// The script that README shows, with what it says: both steps take something from the skull, as osteon-import makes it.
+// The script in README, with the results that README gives: both steps remove bone from the skull, as osteon-import
+// makes it.
 TEST(Skull, TheReadmesCarveScriptRemovesBone) {
   const auto file = test::find_skull();
   ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
@@ -138,14 +139,14 @@ TEST_F(SharedScans, TibiaWithoutDicomPreamble) {
   const imaging::HuVolume grid = scan->volume;
   const auto bone = import_bone(std::move(*scan), {}, keep_going);
   ASSERT_TRUE(bone);
-  // One of the two tibiae, whose places README gives; a closed tube with a canal of 20 to 80 HU.
+  // One of the two tibiae at the positions that README gives. It is a closed tube with a canal of 20 to 80 HU.
   const Vec3 middle = grid.voxel(bone->bounds().centre_mm());
   const bool first = middle.x() > 85 && middle.x() < 127 && middle.y() > 290 && middle.y() < 337;
   const bool second = middle.x() > 342 && middle.x() < 388 && middle.y() > 297 && middle.y() < 342;
   EXPECT_TRUE(first || second) << middle.transpose();
 }
 
-// Of a tibia's outline nothing is void: in each slice of the shaft every sample that bone surrounds is bone.
+// Within a tibia's outline there are no voids: in each slice of the shaft every sample that bone surrounds is bone.
 TEST_F(SharedScans, ATibiaHasItsMarrow) {
   auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
   ASSERT_TRUE(scan);
@@ -212,7 +213,7 @@ Result<CtScan> read_pair(const fs::path& file) {
 TEST_F(SharedScans, EveryTransferSyntaxGivesTheReferencesValuesOrIsRefused) {
   const auto reference = read_pair(data_ / "dicom-tricky" / "transfer-syntaxes" / "CTImage.dcm");
   ASSERT_TRUE(reference) << reference.error().message;
-  // README: stored -2000..2402 with intercept -1024.
+  // README: stored values -2000..2402 with intercept -1024.
   const auto [least, most] = std::ranges::minmax(reference->volume.values);
   EXPECT_EQ(least, -3024);
   EXPECT_EQ(most, 1378);
@@ -230,7 +231,7 @@ TEST_F(SharedScans, EveryTransferSyntaxGivesTheReferencesValuesOrIsRefused) {
     // Largest differences by README: lossy JPEG-LS 1, lossy JPEG 2000 5, 12-bit JPEG 36, 8-bit JPEG by its slope.
     const int allowed = ends("4.81") ? 1 : ends("4.91") ? 5 : ends("4.51") ? 36 : ends("4.50") ? 400 : 0;
     int worst = 0;
-    // Below -1024 is outside of the scanned circle, which the lossy ones clip.
+    // Values below -1024 are outside of the scanned circle. Lossy encodings clip them.
     for (std::size_t i = 0; i < scan->volume.values.size(); ++i)
       if (reference->volume.values[i] >= -1024)
         worst = std::max(worst, std::abs(scan->volume.values[i] - reference->volume.values[i]));
@@ -240,7 +241,7 @@ TEST_F(SharedScans, EveryTransferSyntaxGivesTheReferencesValuesOrIsRefused) {
   EXPECT_GE(compared, 12);
 }
 
-// The library decodes what is there and leaves the rest as it likes.
+// The library decodes what is there and leaves the rest undefined.
 TEST_F(SharedScans, ACutOffSliceOfAnyTransferSyntaxIsRefused) {
   for (const auto& entry : fs::directory_iterator(data_ / "dicom-tricky" / "transfer-syntaxes")) {
     const test::TempDir folder;
@@ -276,7 +277,7 @@ TEST_F(SharedScans, RawSlicesAreNoDicom) {
   expect_refused(data_ / "headsq-raw", "holds no DICOM files: 94 files that are not DICOM");
 }
 
-// Two hospitals on one disc: neither hides the other.
+// Two hospitals' series on one disc: neither hides the other.
 TEST_F(SharedScans, TwoRealSeriesInSubfolders) {
   const test::TempDir folder;
   fs::create_directory_symlink(data_ / "nowhere", folder / "link");

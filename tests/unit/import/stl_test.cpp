@@ -1,4 +1,5 @@
-// A case from a triangle mesh: closed forms of a sphere and a box, both ways of turning, and meshes that are no bone.
+// A case from a triangle mesh: closed forms of a sphere and a box, both orientations of triangles, and meshes that are
+// not bones.
 #include <cmath>
 #include <fstream>
 #include <numbers>
@@ -17,7 +18,8 @@ namespace fs = std::filesystem;
 constexpr double kPi = std::numbers::pi;
 const Vec3 kCentre(3.3, -17.1, 40.7);
 
-// Of a radius whose triangles enclose the ball's volume to second order; corners on meridians and parallels.
+// A ball with corners on meridians and parallels. The radius is chosen so that the triangles enclose the ball's volume
+// to second order.
 TriangleMesh ball(double radius_mm, int parallels = 90) {
   TriangleMesh mesh;
   const int meridians = 2 * parallels;
@@ -56,8 +58,8 @@ TEST(MeshCase, ABallHasItsDistancesVolumeAndDensity) {
   const auto bone = made(ball(r), pitch);
   ASSERT_TRUE(bone) << bone.error().message;
   EXPECT_NEAR(bone->volume_mm3(), 4.0 / 3.0 * kPi * r * r * r, 0.003 * 7238.0);
-  // The middles of the quads lie up to 2 r (1 - cos(pi / 180)) = 0.0037 mm within the ball; between samples a distance
-  // that bends by 1 / r is off by h² / 4r. Cells at the end of the band, 2 mm away, have clipped corners.
+  // The middles of the quads lie up to 2 r (1 - cos(pi / 180)) = 0.0037 mm within the ball. Between samples, a distance
+  // that bends by 1 / r is wrong by h² / 4r. Cells at the end of the band, 2 mm away, have clipped corners.
   for (double at = -1.1; at < 1.1; at += 0.13)
     for (const Vec3& way :
          {Vec3(1, 0, 0), Vec3(0.6, 0, 0.8), Vec3(-1, 2, 3).normalized(), Vec3(1, -1, -1).normalized()})

@@ -1,4 +1,4 @@
-// Where a joystick's descriptor says that its axis is.
+// Finds a joystick's axis by its descriptor.
 #include "common/input/hid_report.hpp"
 
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-// Two buttons and six bits of nothing, x of 8 bits signed, then report 2 with z of 10 bits from 0 and a throttle of 16.
+// Two buttons and six bits of padding, x of 8 bits signed, then report 2 with z of 10 bits from 0 and a throttle of 16.
 const Bytes kDescriptor{0x05, 0x01, 0x09, 0x04, 0xa1, 0x01, 0x85, 0x01, 0x05, 0x09, 0x19, 0x01, 0x29, 0x02, 0x15,
                         0x00, 0x25, 0x01, 0x75, 0x01, 0x95, 0x02, 0x81, 0x02, 0x95, 0x06, 0x81, 0x03, 0x05, 0x01,
                         0x09, 0x30, 0x15, 0x81, 0x25, 0x7f, 0x75, 0x08, 0x95, 0x01, 0x81, 0x02, 0x85, 0x02, 0x09,
@@ -45,7 +45,7 @@ TEST(HidReport, FieldsLieWhereTheDescriptorSays) {
 }
 
 TEST(HidReport, AnUnsignedByteRangeIsNotMinusOne) {
-  // 25 ff says −1 where 255 is meant, as many devices have it.
+  // 25 ff means −1 where 255 is intended, as in many devices.
   const Bytes descriptor{0x05, 0x01, 0x09, 0x30, 0x15, 0x00, 0x25, 0xff, 0x75, 0x08, 0x95, 0x01, 0x81, 0x02};
   const std::vector<HidField> fields = hid_input_fields(descriptor);
   ASSERT_EQ(fields.size(), 1u);

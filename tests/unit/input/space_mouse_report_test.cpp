@@ -22,7 +22,7 @@ TEST(SpaceMouseReport, TheCapsAxesInTheDeviceFrame) {
   EXPECT_EQ(state.push, Vec3(0, 0, 1));
   ASSERT_TRUE(take_report(state, kDown));
   EXPECT_EQ(state.push, Vec3(0, -1, 0));
-  // The map keeps right hands right: x × y = z before and after.
+  // The map keeps frames right-handed: x × y = z before and after.
   EXPECT_EQ(Vec3(1, 0, 0).cross(Vec3(0, 0, 1)), Vec3(0, -1, 0));
 }
 
@@ -36,7 +36,7 @@ TEST(SpaceMouseReport, RotationInItsOwnReportOrBehindTheTranslation) {
   EXPECT_EQ(apart.push, together.push);
   EXPECT_EQ(apart.twist, together.twist);
   EXPECT_EQ(together.twist, Vec3(0, -1, 0.5));
-  // Longer still, as wireless ones pad it.
+  // Even longer, as wireless devices pad it.
   ASSERT_TRUE(take_report(together, Report{1, 0, 0, 0, 0, 0, 0, 0x5e, 1, 0, 0, 0, 0, 9, 9, 9}));
   EXPECT_EQ(together.twist, Vec3(1, 0, 0));
 }

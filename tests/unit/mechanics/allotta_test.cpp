@@ -13,7 +13,7 @@ namespace {
 const GramsPerCm3 kCortical{1.9};
 
 double at_1000_rpm(double diameter_mm) { return allotta_thrust({.diameter_mm = diameter_mm}, 0.06, kCortical).value(); }
-// The torque that goes with a thrust on two lips.
+// The torque of a thrust on two lips.
 double torque(double diameter_mm, double feed_mm_per_rev, GramsPerCm3 density = kCortical) {
   const Newtons thrust = allotta_thrust({.diameter_mm = diameter_mm}, feed_mm_per_rev, density);
   return drilling_torque({.diameter_mm = diameter_mm}, thrust).value();
@@ -30,7 +30,7 @@ TEST(Allotta, GivesThePointsOfComparison) {
   }
 }
 
-// (7.1) and (7.2) say one thing of energy: the torque's work in a turn is K_s for each mm3 of the turn's hole.
+// (7.1) and (7.2) agree in energy: the torque's work in a turn is K_s for each mm3 of the turn's hole.
 TEST(Allotta, TorqueSpendsTheEnergyOfTheVolume) {
   for (const double diameter : {2.5, 3.2, 7.94})
     for (const double feed : {0.02, 0.06, 0.3})
@@ -51,7 +51,7 @@ TEST(Allotta, ScalesWithFeedDiameterDensityAndWear) {
   EXPECT_NEAR(allotta_thrust({.wear = 2.0}, 0.06, kCortical).value(), 2.0 * at, 1e-9);
 }
 
-// The two drilling laws disagree, by the factor that is known of them.
+// The two drilling laws disagree by their known factor.
 TEST(Allotta, AsksForNearlyTwiceChisThrust) {
   const double chi = resistance_n(drilling_law({}, RevolutionsPerMinute{1000}, kCortical, 1.0), 1.0);
   EXPECT_NEAR(at_1000_rpm(3.2) / chi, 1.85, 0.01);

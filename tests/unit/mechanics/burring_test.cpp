@@ -31,7 +31,8 @@ TEST(Agus, DepthUndoesForceAndIsMicrons) {
   EXPECT_EQ(agus_depth_mm({}, Newtons{-1.0}), 0.0);
 }
 
-// At the pole every direction occurs as often as its opposite; far from it all are one, and friction is mu F.
+// At the pole every direction occurs as often as its opposite. Far from it all directions are one, and friction is mu
+// F.
 TEST(Agus, FrictionVanishesAtThePoleAndIsCoulombsFarFromIt) {
   const AgusParams params;
   const Newtons normal{3.0};
@@ -57,7 +58,7 @@ TEST(Agus, FrictionNearThePoleHasItsClosedForm) {
               0.05 * 0.9 * 0.1 * 1.18);
 }
 
-// The sum over the disc near the pole and the series far from it meet.
+// The sum over the disc near the pole and the series far from it must meet.
 TEST(Agus, FrictionIsOneCurve) {
   const AgusParams params;
   const double contact = std::sqrt(agus_depth_mm(params, Newtons{3.0}) * params.radius_mm);

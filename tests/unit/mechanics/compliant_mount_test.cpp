@@ -29,7 +29,7 @@ TwoUsersRun over_line(double one_ms, double other_ms, long ticks = 120'000) {
 }
 double allowed_mj(const TwoUsersRun& run) { return 2.0 * run.client.allowance_mj + 1e-6; }
 
-// Of what the other makes; some tenths of a percent are that arms turn with the bone.
+// Share of the other's force. The remaining few tenths of a percent come from arms that turn with the bone.
 TEST(MountServer, LetsEachUserFeelTheOtherAsTheClosedFormSays) {
   for (const auto& [one_ms, other_ms] : {std::pair{0.0, 0.0}, {50.0, 50.0}, {150.0, 150.0}, {0.0, 150.0}}) {
     const auto result = test::push_each_other(over_line(one_ms, other_ms));
@@ -53,7 +53,7 @@ TEST(MountServer, GivesNoMoreThanWasPutInAndItsAllowance) {
       }
 }
 
-// That those hands are hard to serve: with an account that is always full the same lines feed them joules.
+// Shows that these hands are hard to serve: with an account that is always full, the same connections give them joules.
 TEST(MountServer, WouldMakeEnergyWithoutTheController) {
   TwoUsersRun run = over_line(50.0, 50.0, 60'000);
   run.hand_stiffness = 3.0;
@@ -64,8 +64,8 @@ TEST(MountServer, WouldMakeEnergyWithoutTheController) {
   EXPECT_GT(result.most_created_mj, 1000.0);
 }
 
-// Loads without any reason, which no hand would make, and bones that jump.
-TEST(MountFollower, PaysForWhatItGivesWhateverIsTold) {
+// Random loads that no hand would make, and bones that jump.
+TEST(MountFollower, PaysForWhatItGivesWhateverIsSent) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> even(-1.0, 1.0);
   const auto any = [&] { return Vec3(even(random), even(random), even(random)); };
@@ -96,7 +96,7 @@ TEST(MountFollower, PaysForWhatItGivesWhateverIsTold) {
   EXPECT_GT(held_back, 1000);
 }
 
-// Once the hand lets go, or is paid for, the bone goes where it is told, exactly.
+// Once the hand lets go, or is paid for, the bone goes exactly to the pose that the server sends.
 TEST(MountFollower, ForgetsNothingThatItHeldBack) {
   MountFollowerParams params;
   MountFollower bone(params);
@@ -113,7 +113,7 @@ TEST(MountFollower, ForgetsNothingThatItHeldBack) {
       bone.step(held, kTick);
     }
   };
-  // Against the load by as much as the allowance pays for; beside it, all the way.
+  // Against the load it goes as far as the allowance pays for. Sideways it goes all the way.
   run(load, 0.0);
   EXPECT_NEAR(bone.shift().place_mm.x(), -params.allowance_mj / 20.0, 1e-9);
   EXPECT_NEAR(bone.shift().place_mm.y(), 1.0, 1e-6);
@@ -126,8 +126,8 @@ TEST(MountFollower, ForgetsNothingThatItHeldBack) {
   EXPECT_FALSE(bone.held_back());
 }
 
-// The ledger of a hand at it looks a tick ahead and reckons with no more: where what it may give comes to its end, and
-// where a hand that held it lets go at once.
+// The ledger of a hand looks one tick ahead and counts on no more. Tests the moment when its budget is used up, and a
+// hand that lets go at once after it held the bone.
 TEST(MountFollower, SetsOutAndStopsNoFasterThanABoneDoes) {
   const MountFollowerParams params;
   const Load loads[] = {{{20.0, 0, 0}, Vec3::Zero()}, {Vec3::Zero(), {0, 800.0, 0}}, {{20.0, 0, 0}, {0, 800.0, 0}}};
@@ -207,7 +207,7 @@ TEST(MountFollower, CountsGrantsOfTheNewSessionOnly) {
   EXPECT_EQ(bone.granted_mj(), 10.0);
 }
 
-// A grant that nobody here wants goes to the others, all of it and once.
+// A grant that nobody here needs goes to the others, all of it and only once.
 TEST(MountFollower, HandsOnWhatItDoesNotNeed) {
   MountFollowerParams params;
   MountFollower bone(params);
@@ -266,13 +266,13 @@ TEST(MountServer, AddsThePushesOfAll) {
   EXPECT_NEAR(bone.seen(1).shift.place_mm.x(), 6.0 / 5.0, 1e-6);
   EXPECT_EQ(bone.seen(1).push_seq, 239u);
   EXPECT_EQ(bone.seen(7).seen_seq, 0u);
-  // Who leaves or falls silent does not push any more.
+  // A user who leaves or falls silent does not push any more.
   bone.leave(1);
   for (int i = 0; i < 600; ++i) bone.step(kServerTick);
   EXPECT_LT(bone.seen(2).shift.place_mm.norm(), 1e-3);
 }
 
-// Grants are what was given, shared out, and nothing is granted twice, nor from before a session.
+// Grants are shares of what was given. Nothing is granted twice, or from before a session.
 TEST(MountServer, GrantsWhatOthersGaveAndNoMore) {
   MountServer bone{MountServerParams{}};
   for (const std::uint64_t author : {1, 2, 3}) bone.join(author);
@@ -288,7 +288,7 @@ TEST(MountServer, GrantsWhatOthersGaveAndNoMore) {
   bone.join(1);
   EXPECT_TRUE(bone.receive(1, pushed(1, Vec3::Zero(), 900.0)));
   EXPECT_DOUBLE_EQ(bone.seen(2).energy_mj, 7.0);
-  // More than an arm can do was not put in.
+  // Work beyond what an arm can do does not count as put in.
   EXPECT_TRUE(bone.receive(1, pushed(2, Vec3::Zero(), 1e12)));
   EXPECT_LT(bone.seen(2).energy_mj, 1e5);
 }
@@ -310,7 +310,7 @@ TEST(MountServer, TellsTheSlowestLag) {
   EXPECT_NEAR(bone.seen(1).lag_s, 36 * kServerTick, 1e-6);
 }
 
-// The figure haptic_mount goes on for a million ticks.
+// The program haptic_mount in tests/perf runs this for a million ticks.
 TEST(MountServer, StaysStableOverALongLine) {
   TwoUsersRun run = over_line(150.0, 150.0, 200'000);
   run.seed = 3;

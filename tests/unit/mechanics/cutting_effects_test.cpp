@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDt = 1e-3;
 
-// wear = blunt - (blunt - 1) exp(-W / W0) with the work W of the torque, whatever the ticks it is done in.
+// wear = blunt - (blunt - 1) exp(-W / W0) with the work W of the torque, whatever the ticks in which it is done.
 TEST(Bluntness, GrowsByTheWorkOfCutting) {
   for (const double dt : {5e-4, 1e-3, 1e-2}) {
     Bluntness edge;
@@ -34,10 +34,11 @@ TEST(Bluntness, NeverPassesBluntAndIdlingCostsNothing) {
   idle.step({}, 0.0, 1000.0, 1.0);
   worn.step({}, 100.0, 1000.0, 1.0);
   EXPECT_EQ(idle.wear(), 1.2);
-  EXPECT_EQ(worn.wear(), 3.0);  // given as worse than blunt: it does not sharpen
+  EXPECT_EQ(worn.wear(), 3.0);  // given as worse than blunt: it does not become sharper
 }
 
-// Full after ten diameters of cortical bone, empty again after one and a half of withdrawal; felt from the half on.
+// The flutes are full after ten diameters of cortical bone, and empty again after one and a half of withdrawal. The
+// effect is felt from half full on.
 TEST(FluteClogging, FillsByDepthAndClearsByWithdrawal) {
   const CloggingParams params;
   FluteClogging flutes;
@@ -61,7 +62,7 @@ TEST(FluteClogging, FillsByDepthAndClearsByWithdrawal) {
   EXPECT_NEAR(flutes.level(), 0.1, 1e-9);
 }
 
-// Pecking, five diameters and back each time, is never felt; one go of the same depth is.
+// Pecking, five diameters and back each time, is never felt. A single pass to the same depth is.
 TEST(FluteClogging, PeckingKeepsTheFlutesOpen) {
   FluteClogging pecked, straight;
   for (int peck = 0; peck < 4; ++peck) {
@@ -75,7 +76,7 @@ TEST(FluteClogging, PeckingKeepsTheFlutesOpen) {
   EXPECT_EQ(straight.level(), 1.0);
 }
 
-// A bicortical hole, 5 mm of cortex, 20 of medulla, 5 of cortex, is drilled in one go without anything felt of it.
+// A bicortical hole of 5 mm cortex, 20 mm medulla and 5 mm cortex is drilled in a single pass without any effect.
 TEST(FluteClogging, ABicorticalHoleIsNoDepth) {
   FluteClogging flutes;
   const struct { double thickness, density; } kLayers[] = {{5.0, 1.9}, {20.0, 0.3}, {5.0, 1.9}};
@@ -85,7 +86,7 @@ TEST(FluteClogging, ABicorticalHoleIsNoDepth) {
   EXPECT_EQ(flutes.thrust_factor({}), 1.0);
 }
 
-// The share of the point in bone while it comes out: from 1 to 0.
+// The share of the point in bone while the point comes out: from 1 to 0.
 std::vector<double> coming_out(int steps) {
   std::vector<double> shares;
   for (int i = 0; i <= steps; ++i) shares.push_back(1.0 - static_cast<double>(i) / steps);
@@ -99,7 +100,7 @@ TEST(BreakthroughGrab, PullsWhileTheRimIsThere) {
     grab.step(params, share, true, 30.0 * share, false);
     if (share < 0.9 && share > 0.02) {
       EXPECT_TRUE(grab.grabbing());
-      // 0.15 of the last thrust of the whole point, at 0.9 of it, on the parabola.
+      // 0.15 of the last thrust of the whole point, on the parabola at a share of 0.9.
       EXPECT_NEAR(grab.pull_n(params), 0.15 * 27.0 * 4.0 * share * (1.0 - share), 1e-9);
       EXPECT_NEAR(grab.torque_factor(params), 1.0 + 4.0 * share * (1.0 - share), 1e-9);
     }
@@ -132,7 +133,7 @@ TEST(BreakthroughGrab, IsOverWhenTheDrillIsDrawnBackAndBoundedByTheThrust) {
   EXPECT_GT(grab.pull_n({}), 0.0);
   grab.step({}, 0.5, false, 0.0, true);
   EXPECT_EQ(grab.pull_n({}), 0.0);
-  // Not cutting, as with the spindle off: it is never armed.
+  // Without cutting, as with the spindle off, it is never armed.
   BreakthroughGrab idle;
   idle.step({}, 1.0, false, 0.0, false);
   idle.step({}, 0.5, true, 10.0, false);
@@ -154,7 +155,7 @@ TEST(SawBinding, DragsJamsAndComesFreeWithHysteresis) {
   EXPECT_FALSE(blade.jammed());
 }
 
-// A broach whose hand follows every blow: what it may go, it goes.
+// A broach whose hand follows every blow as far as the blow allows.
 struct FollowedBroach {
   BroachDrive drive;
   double way_mm = 0, last_mm = 0;
@@ -164,7 +165,7 @@ struct FollowedBroach {
   }
 };
 
-// Blows a second, each of its advance, on bone that stays the same: way = blows · E / R.
+// A given number of blows a second, each with its advance, on bone that stays the same: way = blows · E / R.
 TEST(BroachDrive, AdvancesByItsBlows) {
   const double area = 400.0, density = 0.3;
   const double advance = 3920.0 / (130.0 * (0.3 / 1.9) * (0.3 / 1.9) * area);
@@ -188,8 +189,8 @@ TEST(BroachDrive, StandsBetweenBlowsAndSpreadsEachOverTheContact) {
   EXPECT_LE(moving, 6);
 }
 
-// A taper: resistance grows with depth, R = k x, so each blow does less, and none below 0.1 mm: at x = E/(0.1 k) it is
-// seated, give or take the last advance.
+// A taper: resistance grows with depth, R = k x. Each blow does less, and none goes below 0.1 mm. At x = E/(0.1 k) it
+// is seated, to within the last advance.
 TEST(BroachDrive, StopsWhenSeated) {
   const double density = 0.5, strength = 130.0 * (0.5 / 1.9) * (0.5 / 1.9);
   const double area_per_mm = 100.0, seat_mm = 3920.0 / (0.1 * strength * area_per_mm);
@@ -201,7 +202,7 @@ TEST(BroachDrive, StopsWhenSeated) {
   const double seated_mm = broach.way_mm;
   for (int i = 0; i < 5000; ++i) broach.step(120.0, area_per_mm * broach.way_mm, density, 20.0);
   EXPECT_EQ(broach.way_mm, seated_mm);
-  // Where there is room again it goes on.
+  // When there is room again, it goes on.
   for (int i = 0; i < 1000; ++i) broach.step(120.0, 50.0, density, 20.0);
   EXPECT_GT(broach.way_mm, seated_mm);
 }
@@ -218,7 +219,8 @@ TEST(BroachDrive, BouncesWhenHeldLooselyAndRestsWhenNotHeld) {
   EXPECT_EQ(resting.drive.blows(), 0);
 }
 
-// A hand that follows by half a millimetre a blow: so far it goes, and no blow's rest is kept for later.
+// A hand that follows by half a millimetre a blow. The broach goes only so far, and the rest of a blow is not saved for
+// later.
 TEST(BroachDrive, GoesNoFurtherThanTheHandFollows) {
   BroachDrive drive;
   double way = 0.0, gone = 0.0, in_blow = 0.0;
@@ -234,8 +236,8 @@ TEST(BroachDrive, GoesNoFurtherThanTheHandFollows) {
   EXPECT_NEAR(way, 3 * 0.5, 1e-9);
 }
 
-// A hand that follows slowly has what it followed of a blow while that lasted, some 5 ms, and nothing more until the
-// next.
+// A hand that follows slowly gets what it followed while a blow lasted, about 5 ms, and nothing more until the next
+// blow.
 TEST(BroachDrive, ABlowIsOverWhenItsContactIs) {
   BroachDrive drive;
   double way = 0.0, gone = 0.0;
@@ -251,7 +253,7 @@ TEST(BroachDrive, ABlowIsOverWhenItsContactIs) {
   EXPECT_NEAR(way, 1e-3 * moving, 1e-12);
 }
 
-// The drive of a blunt broach does half the way at a blow.
+// A blow drives a blunt broach half as far.
 TEST(BroachDrive, GoesHalfAsFarWhenTwiceBlunt) {
   const auto way_mm = [](double wear) {
     CuttingEffects effects(*find_tool("broach-2"), wear);
@@ -269,7 +271,8 @@ TEST(BroachDrive, GoesHalfAsFarWhenTwiceBlunt) {
   EXPECT_NEAR(way_mm(2.0), 0.5 * way_mm(1.0), 1e-6);
 }
 
-// Handpieces of one power: most torque times speed is one number, and so is the droop under a share of the most torque.
+// Handpieces of equal power: largest torque times speed is constant, and so is the droop at a share of the largest
+// torque.
 TEST(Motor, KeepsItsPowerAtEverySpeed) {
   const SpindleParams drill = motor_of(*find_tool("drill-3.2")), burr = motor_of(*find_tool("burr-round-5"));
   EXPECT_EQ(drill.full_rpm, 1000.0);
@@ -287,7 +290,8 @@ TEST(Motor, KeepsItsPowerAtEverySpeed) {
   EXPECT_NEAR(reamer.most_nmm * reamer.full_rpm, 4.0 * drill.most_nmm * drill.full_rpm, 1e-6);
 }
 
-// The law's torque stalls the spindle under more thrust than it can turn against, and it turns again when that is less.
+// The law's torque stalls the spindle at a thrust that it cannot turn against. The spindle turns again when the thrust
+// falls.
 TEST(Motor, StallsByTheLawsTorqueAndRecovers) {
   const Tool tool = *find_tool("drill-5-16in");
   const ForceLaw& law = *find_force_law("allotta");
@@ -301,7 +305,7 @@ TEST(Motor, StallsByTheLawsTorqueAndRecovers) {
   };
   run(0.0, 1.0);
   EXPECT_NEAR(spindle.rpm, tool.spindle_rpm, 1e-6);
-  // M = T D / (4 sin(beta/2)): the thrust whose torque is the motor's most.
+  // M = T D / (4 sin(beta/2)): the thrust whose torque is the motor's largest.
   const double most_thrust = motor.most_nmm * 4.0 * std::sin(59.0 * std::numbers::pi / 180.0) / tool.diameter_mm;
   run(0.9 * most_thrust, 1.0);
   EXPECT_GT(spindle.rpm, 0.5 * tool.spindle_rpm);
@@ -349,7 +353,7 @@ TEST(CuttingEffects, ADeepHoleClogsADrillButNoBurr) {
   EXPECT_NEAR(resistance_n(cortical_law(drilling, drill), 1.0), 1.5 * clean_n, 1e-9);
   EXPECT_NEAR(drilling.torque_nmm(10.0), 60.0, 1e-9);
   EXPECT_EQ(burring.torque_nmm(10.0), 10.0);
-  // Withdrawal clears it.
+  // Withdrawal clears the flutes.
   for (int i = 0; i < 100; ++i) drilling.step({.spindle_rpm = 1000, .advance_mm = -0.1}, kDt);
   EXPECT_EQ(drilling.torque_nmm(10.0), 10.0);
 }
@@ -366,7 +370,7 @@ TEST(CuttingEffects, AJammedSawStandsAndABroachWaitsForItsBlow) {
   const LawInputs soft{.spindle_rpm = 60, .density_g_cm3 = 0.3, .engaged = 1.0};
   const FeedLaw blows = default_law(broach).feed_law(law_tool(broach), soft);
   ASSERT_GT(blows.max_feed_mm_per_s, 0.0);
-  EXPECT_EQ(broaching.felt(blows).max_feed_mm_per_s, 0.0);  // nobody has struck yet
+  EXPECT_EQ(broaching.felt(blows).max_feed_mm_per_s, 0.0);  // no blow yet
   EffectMoment held{.spindle_rpm = 60,
                     .engaged = 1.0,
                     .engaged_area_mm2 = law_tool(broach).leading_area_mm2,
@@ -375,7 +379,7 @@ TEST(CuttingEffects, AJammedSawStandsAndABroachWaitsForItsBlow) {
   double way = 0.0;
   for (int i = 0; i < 10'000; ++i) {
     broaching.step(held, kDt);
-    // Solved as the proxy does: held firmly, it goes as far as the blow drives it.
+    // Solved as the proxy does: a firmly held broach goes as far as the blow drives it.
     held.advance_mm = solve_feed(broaching.felt(blows), 50.0, 0.4, kDt).feed_mm_per_s * kDt;
     way += held.advance_mm;
   }

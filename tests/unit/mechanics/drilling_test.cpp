@@ -12,7 +12,7 @@ double feed(double rpm, double force, double density) {
   return feed_at_mm_per_s(drilling_law({}, RevolutionsPerMinute{rpm}, GramsPerCm3{density}, 1.0), force);
 }
 
-// Points of comparison at 1000 rpm and 1 mm/s, published to one decimal.
+// Points of comparison at 1000 rpm and 1 mm/s, published to one decimal place.
 TEST(Drilling, GivesThePublishedThrusts) {
   const struct { double density, newtons; } kPoints[] = {{0.3, 3.2}, {0.5, 5.9}, {1.0, 13.5}, {1.8, 27.1}, {2.0, 30.7}};
   for (const auto& point : kPoints) EXPECT_NEAR(thrust(1000, 1, point.density), point.newtons, 0.06) << point.density;

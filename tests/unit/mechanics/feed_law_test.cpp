@@ -53,7 +53,7 @@ TEST(FeedLaw, NeverOvertakesTheDevice) {
   EXPECT_EQ(solve_feed(kCortical, kStiffness, -0.1, kDt).feed_mm_per_s, 0.0);
 }
 
-// A law that begins at an offset: v = (K e - offset) / (c + K dt).
+// A law with an offset: v = (K e - offset) / (c + K dt).
 TEST(FeedLaw, AnOffsetHasItsClosedForm) {
   const FeedLaw law{.offset_n = 5.0, .scale_n = 24.0, .exponent = 1.0, .max_feed_mm_per_s = 1e6, .threshold_n = 0.0};
   for (const double extension : {0.11, 0.2, 1.0}) {
@@ -85,7 +85,7 @@ TEST(FeedLaw, RootsAndSquaresHaveTheirClosedForms) {
   }
 }
 
-// Whatever the law: the balance holds within the bracket, else the cap or the device's own way limits.
+// For every law the balance holds within the bracket. Otherwise the cap or the device's own way limits the feed.
 TEST(FeedLaw, EveryOffsetAndPowerIsBracketed) {
   for (const double exponent : {0.163, 0.5189, 1.0, 1.5, 3.0})
     for (const double offset : {0.0, 0.3, 12.0})
@@ -102,7 +102,7 @@ TEST(FeedLaw, EveryOffsetAndPowerIsBracketed) {
               if (stiffness * extension <= offset) {
                 ASSERT_EQ(v, 0.0);
               } else {
-                // Never more than the coupling has; and where no cap limits, a little more feed would ask for too much.
+                // Never more than the coupling's force. If no cap limits, a little more feed would need too much.
                 const auto left = [&](double feed) {
                   return stiffness * (extension - feed * kDt) - resistance_n(law, feed);
                 };
@@ -124,7 +124,7 @@ TEST(FeedLaw, InvertsItself) {
     for (const double v : {0.01, 1.0, 30.0}) EXPECT_NEAR(feed_at_mm_per_s(law, resistance_n(law, v)), v, 1e-9 * v);
     EXPECT_EQ(feed_at_mm_per_s(law, 2.0), 0.0);
     EXPECT_EQ(feed_at_mm_per_s(law, -1.0), 0.0);
-    EXPECT_EQ(resistance_n(law, 0.0), 0.0);  // nothing resists what stands still
+    EXPECT_EQ(resistance_n(law, 0.0), 0.0);  // nothing resists a tool at rest
   }
 }
 

@@ -10,7 +10,7 @@
 namespace osteon {
 namespace {
 
-// (7.15) with alpha = exp(-dt/tau): a step is followed as 1 - exp(-t/tau), whatever the tick.
+// (7.15) with alpha = exp(-dt/tau): a step is followed as 1 - exp(-t/tau), whatever the tick is.
 TEST(ForceFilter, FollowsAStepIndependentlyOfTheTick) {
   for (const double dt : {5e-4, 1e-3, 2e-3}) {
     ForceFilter<double> filter(0.0);

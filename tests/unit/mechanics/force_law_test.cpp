@@ -25,7 +25,7 @@ const ForceLaw& law(std::string_view name) {
 
 LawTool tool_of(std::string_view name) { return law_tool(*find_tool(name)); }
 
-// A tool of the kind that a law is for, at its usual speed, wholly in bone of the middle of its range.
+// A tool of the law's kind, at its usual speed, wholly in bone of the middle of the law's range.
 struct Moment {
   std::string_view tool;
   double rpm, density;
@@ -50,7 +50,7 @@ TEST(ForceLaws, EveryOneSaysWhatItIs) {
     EXPECT_NE(l.feed_law, nullptr);
     EXPECT_NE(l.torque_nmm, nullptr);
   }
-  // Every row of the page of laws.
+  // Every row of the page of force laws.
   for (const char* name :
        {"allotta", "chi", "agus", "milling", "spring-damper", "multi-point", "saw", "reamer", "broach"})
     EXPECT_TRUE(names.contains(name)) << name;
@@ -58,7 +58,7 @@ TEST(ForceLaws, EveryOneSaysWhatItIs) {
   EXPECT_EQ(find_force_law("hooke"), nullptr);
 }
 
-// "7.7-7.8", "7.12, 7.14": what follows 7. of all of them.
+// Numbers after "7." in a text such as "7.7-7.8" or "7.12, 7.14".
 std::set<int> numbers_of(const ForceLaw& l) {
   std::set<int> found;
   std::istringstream parts{std::string(l.number)};
@@ -71,9 +71,9 @@ std::set<int> numbers_of(const ForceLaw& l) {
   return found;
 }
 
-// Every numbered equation of chapter 7 but 7.15, which is a filter, computed by hand: what the law that claims it must
-// give. The whole point of a 3.2 mm drill at 1000 rpm in cortical bone; a 5 mm burr at 20 000 rpm with 10 mm2 at 2 mm
-// from its axis.
+// Computes by hand every numbered equation of chapter 7 except 7.15, which is a filter. The law that claims an equation
+// must give its value. Inputs: the whole point of a 3.2 mm drill at 1000 rpm in cortical bone; a 5 mm burr at 20 000
+// rpm with 10 mm2 at 2 mm from its axis.
 TEST(ForceLaws, ComputeEveryNumberedEquation) {
   const LawTool drill = tool_of("drill-3.2"), burr = tool_of("burr-round-5");
   const LawInputs drilled{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0, .directed_density = 0.4};
@@ -84,8 +84,8 @@ TEST(ForceLaws, ComputeEveryNumberedEquation) {
                          .edge_length_mm = 40.0,
                          .mean_arm_mm = 2.0};
   LawInputs at_pole = burred;
-  // (7.4): 3 N press a sphere of 2.5 mm in by h; Hertz's disc has a^2 = h R. There friction's directions differ: 3 pi d
-  // / (8 a).
+  // (7.4): 3 N press a sphere of 2.5 mm in by h. Hertz's disc has a^2 = h R. There the directions of friction differ: 3
+  // pi d / (8 a).
   const double h_mm = 2.5 * std::pow(3.0 / (25'000.0 * 2.5 * 2.5), 2.0 / 3.0), a_mm = std::sqrt(h_mm * 2.5);
   at_pole.mean_arm_mm = 0.2 * a_mm;
   const double omega = 20'000 * 2.0 * std::numbers::pi / 60.0, half_point = std::sin(59.0 * std::numbers::pi / 180.0);
@@ -137,7 +137,7 @@ TEST(ForceLaws, ComputeEveryNumberedEquation) {
       {10,
        [&](auto& l) {
          return Given{thrust(l, drill, drilled, 1e-9), 5.0, 1e-6};
-       }},  // the spring, even bone or not
+       }},  // the spring's force, in any bone
       {11,
        [&](auto& l) {
          return Given{thrust(l, drill, drilled, 3.0) - thrust(l, drill, drilled, 1.0), 24.0 * 2.0, 1e-9};
@@ -182,14 +182,14 @@ TEST(ForceLaws, GiveThePointsOfComparison) {
     EXPECT_NEAR(thrust, point.newtons, 0.06) << point.diameter;
     EXPECT_NEAR(law("allotta").torque_nmm(law_tool(tool), in, thrust), point.newton_mm, 0.6 * point.last_digit);
   }
-  // Fitted to the cortical point of Chi: 28.9 N.
+  // Fitted to Chi's cortical point: 28.9 N.
   const LawInputs cortical{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0};
   for (const char* name : {"chi", "spring-damper", "multi-point"})
     EXPECT_NEAR(resistance_n(law(name).feed_law(drill, cortical), 1.0), 28.9, 0.01 * 28.9) << name;
   EXPECT_NEAR(law("chi").torque_nmm(drill, cortical, 28.9), 27.0, 0.1);
 }
 
-// How thrust grows: x 2 of the speed, the feed, the density; and what stays out.
+// How thrust grows when speed, feed or density doubles, and which inputs have no effect.
 TEST(ForceLaws, ScaleAsTheirEquationsSay) {
   const struct {
     const char* law;
@@ -258,7 +258,7 @@ TEST(ForceLaws, ResistanceRisesWithFeedDensityEngagementAndWear) {
   }
 }
 
-// A blunt tool, wear 2, needs twice the force for the same feed. A broach goes half as far at a blow instead.
+// A blunt tool, wear 2, needs twice the force for the same feed. A broach instead goes half as far at a blow.
 TEST(ForceLaws, ABluntToolNeedsTwiceTheForce) {
   for (const ForceLaw& l : force_laws()) {
     LawInputs blunt = inputs(usual(l));
@@ -281,7 +281,7 @@ TEST(ForceLaws, ATurningToolThatStandsDoesNotCut) {
   }
 }
 
-// Nothing that a volume can hold makes a law say what is no number.
+// For any content of a volume, a law gives a finite number.
 TEST(ForceLaws, AreFiniteAtTheEdges) {
   for (const ForceLaw& l : force_laws())
     for (const double density : {0.0, 1e-6, 3.0})
@@ -297,7 +297,7 @@ TEST(ForceLaws, AreFiniteAtTheEdges) {
         }
 }
 
-// A burr wholly in bone of one density: the sum over small faces of its leading half, by the points' road, is the
+// A burr is wholly in bone of one density. The sum over small faces of its leading half, computed from points, is the
 // closed form at the harmonic mean distance. For a sphere fed across its axis the faces' sum of area / distance is pi
 // R.
 TEST(ForceLaws, MillingFromPointsIsMillingOfTheFace) {
@@ -305,7 +305,7 @@ TEST(ForceLaws, MillingFromPointsIsMillingOfTheFace) {
   const MillingParams params{.diameter_mm = 2.0 * radius, .pole_radius = 0.0};
   double sum = 0.0;
   const int n = 400;
-  for (int i = 0; i < n; ++i) {  // strips across the axis: width 2 sqrt(R^2 - z^2) = 2 r, all at places of the disc
+  for (int i = 0; i < n; ++i) {  // strips across the axis: width 2 sqrt(R^2 - z^2) = 2 r, at all positions on the disc
     const double z = radius * (-1.0 + 2.0 * (i + 0.5) / n), r = std::sqrt(radius * radius - z * z);
     sum += milling_resistance(params, 2.0 * r * 2.0 * radius / n, r, density);
   }
@@ -323,8 +323,9 @@ TEST(ForceLaws, MultiPointTakesItsSumFromThePoints) {
   EXPECT_NEAR(resistance_n(law("multi-point").feed_law(tool_of("drill-3.2"), in), 2.0), 17.7 * 0.4 * 2.0, 1e-9);
 }
 
-// Published: human cortical bone was drilled with 0 to 50 N; Hobkirk and Rusiniak's operators pressed with means
-// of 4.22 to 18.93 N and peaks of 5.98 to 24.32 N. At these a 3.2 mm drill must advance, and no faster than drills do.
+// Published: human cortical bone was drilled with 0 to 50 N. Hobkirk and Rusiniak's operators pressed with means of
+// 4.22 to 18.93 N and peaks of 5.98 to 24.32 N. At these forces a 3.2 mm drill must advance, and no faster than drills
+// do.
 TEST(ForceLaws, DrillAtThePublishedThrusts) {
   for (const char* name : {"chi", "multi-point", "spring-damper"}) {
     const LawInputs in{.spindle_rpm = 1000, .density_g_cm3 = 1.9, .engaged = 1.0};
@@ -356,8 +357,8 @@ TEST(ForceLaws, EveryToolThatCutsHasALawThatFits) {
   EXPECT_EQ(default_law(*find_tool("screw-1")).name, "multi-point");
 }
 
-// A tool used as it comes, in the middle of the law's densities, is not outside what its law was made for: nobody who
-// chose nothing is to be warned.
+// A tool with its default settings, in the middle of the law's densities, is within the law's range. A user who has
+// chosen nothing must get no warning.
 TEST(ForceLaws, ADefaultIsWithinItsRangeAtTheToolsOwnSpeed) {
   const unsigned pressed = static_cast<unsigned>(OutOfRange::feed) | static_cast<unsigned>(OutOfRange::depth_of_cut);
   for (const Tool& tool : builtin_tools()) {
@@ -366,14 +367,14 @@ TEST(ForceLaws, ADefaultIsWithinItsRangeAtTheToolsOwnSpeed) {
     const Span& range = l.limits.density_g_cm3;
     const double density = range.highest > 0.0 ? 0.5 * (range.lowest + range.highest) : 1.0;
     const LawInputs in{.spindle_rpm = tool.spindle_rpm, .density_g_cm3 = density, .engaged = 1.0};
-    unsigned outside = out_of_range(l, law_tool(tool), in, 1.0) & ~pressed;  // how hard it is pressed is the hand's
-    // Its teeth make 1200 mm/s, and slower ones than 1700 were not measured: that is said.
+    unsigned outside = out_of_range(l, law_tool(tool), in, 1.0) & ~pressed;  // the hand decides how hard it presses
+    // Its teeth reach 1200 mm/s. Teeth slower than 1700 mm/s were not measured, and the law says so.
     if (tool.name == "saw-reciprocating") outside ^= static_cast<unsigned>(OutOfRange::tooth_speed);
     EXPECT_EQ(outside, 0u) << tool.name << ", " << l.name << ": " << out_of_range_words(outside);
   }
 }
 
-// What a law can be chosen for is what its range names.
+// A law can be chosen for the tools that its range names.
 TEST(ForceLaws, FitTheToolsThatTheirRangeNames) {
   using enum ToolKind;
   const std::map<std::string_view, std::set<ToolKind>> kinds = {
@@ -398,7 +399,7 @@ TEST(ForceLaws, FitTheToolsThatTheirRangeNames) {
       << drilled.error().message;
 }
 
-// Burs' teeth stand out for five usual feeds: 0.1 mm a turn, 33 mm/s at 20 000 rpm. A drill's heel is a third of its
+// Burs' teeth protrude by five usual feeds: 0.1 mm a turn, 33 mm/s at 20 000 rpm. A drill's heel is a third of its
 // diameter.
 TEST(ForceLaws, TeethAndHeelsLimitTheFeed) {
   const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0};
@@ -435,14 +436,14 @@ TEST(ForceLaws, ALawIsChosenByTheToolOrInstead) {
   EXPECT_FALSE(choose_law(*find_tool("broach-1"), "chi"));
 }
 
-// Builtin tools were never loaded by a user: all of them name a law that fits, or none.
+// Every builtin tool names a law that fits, or none. No user has loaded or checked them.
 TEST(ForceLaws, FitEveryBuiltinTool) {
   for (const Tool& tool : builtin_tools()) EXPECT_TRUE(choose_law(tool).has_value()) << tool.name;
 }
 
-// Across the feed: (7.8) K_r of what cuts, without the edges' ploughing; (7.5) mu of the contact's force but at the
-// pole; of a saw's teeth the force along the cut, which depth does not change and torque is made of. All round a drill
-// or reamer it cancels.
+// Forces across the feed. (7.8): K_r of what cuts, without the edges' ploughing. (7.5): mu of the contact's force,
+// except at the pole. For a saw's teeth: the force along the cut, which makes the torque and does not depend on depth.
+// All round a drill or reamer they cancel.
 TEST(ForceLaws, ActAcrossTheFeedAsTheirEquationsSay) {
   const LawTool burr = tool_of("burr-round-5"), blade = tool_of("saw-oscillating-1");
   const LawInputs milled{.spindle_rpm = 20'000, .density_g_cm3 = 1.9, .engaged = 1.0, .edge_length_mm = 40.0};
@@ -455,7 +456,7 @@ TEST(ForceLaws, ActAcrossTheFeedAsTheirEquationsSay) {
   EXPECT_EQ(law("milling").across_n(burr, milled, 0.3), 0.0);
   EXPECT_NEAR(law("agus").across_n(burr, milled, 6.0), 0.3 * 6.0, 1e-3);
   LawInputs pole = milled;
-  pole.mean_arm_mm = 1e-4;  // microns from the pole friction has no direction, and no arm
+  pole.mean_arm_mm = 1e-4;  // microns from the pole, friction has no direction and no arm
   EXPECT_LT(law("agus").across_n(burr, pole, 6.0), 0.01);
   EXPECT_LT(law("agus").torque_nmm(burr, pole, 6.0), 1e-5);
   const LawInputs sawn{.spindle_rpm = 12'000, .density_g_cm3 = 1.9, .teeth_engaged = 10.0};
@@ -490,7 +491,7 @@ TEST(ForceLaws, SayWhenTheyAreUsedOutsideTheirRange) {
   thick.diameter_mm = 12.0;
   const LawInputs cortical{.spindle_rpm = 1000, .density_g_cm3 = 1.9};
   EXPECT_EQ(out_of_range(law("allotta"), thick, cortical, 1.0), static_cast<unsigned>(OutOfRange::diameter));
-  // A saw: 0.15 · 10 um · 2 stroke · strokes / pitch is the fastest feed that was measured.
+  // A saw: 0.15 · 10 um · 2 stroke · strokes / pitch is the fastest measured feed.
   const LawTool saw = tool_of("saw-oscillating-1");
   const double fastest = 0.15 * 0.010 * 2.0 * saw.stroke_mm * 200.0 / saw.tooth_pitch_mm;
   const LawInputs stroke{.spindle_rpm = 12'000, .density_g_cm3 = 1.9, .engaged = 1.0};
@@ -500,7 +501,7 @@ TEST(ForceLaws, SayWhenTheyAreUsedOutsideTheirRange) {
   EXPECT_EQ(out_of_range(law("saw"), saw, slow, fastest / 4.0), static_cast<unsigned>(OutOfRange::tooth_speed));
 }
 
-// A screw advances by its thread's pitch in a turn, whatever the law.
+// A screw advances by its thread's pitch per turn, whatever the law.
 TEST(ForceLaws, AScrewsThreadLimitsItsFeed) {
   const Tool screw = *find_tool("screw-1");
   const LawInputs in{.spindle_rpm = 120, .density_g_cm3 = 1.0, .engaged = 1.0};

@@ -10,7 +10,7 @@ namespace {
 const RevolutionsPerMinute kSpeed{20000.0};
 
 constexpr double kEdge_mm = 20.0;
-// What one face of 2 mm² at the equator of a 5 mm burr resists with, moved at `v` mm/s.
+// Resistance of one face of 2 mm² at the equator of a 5 mm burr, moved at `v` mm/s.
 double force(double v, MillingParams params = {}, RevolutionsPerMinute speed = kSpeed, double edge_mm = kEdge_mm) {
   return resistance_n(milling_law(params, speed, milling_resistance(params, 2.0, 2.5, 1.9), edge_mm, GramsPerCm3{1.9}),
                       v);
@@ -37,7 +37,7 @@ TEST(Milling, AStandingBurrDoesNotCut) {
   EXPECT_EQ(milling_law({}, RevolutionsPerMinute{0.0}, 1.0, kEdge_mm, GramsPerCm3{1.9}).max_feed_mm_per_s, 0.0);
 }
 
-// A turn advances by no more than the teeth stand out: 0.1 mm at 20 000 rpm is 33 mm/s.
+// A turn advances by no more than the teeth protrude: 0.1 mm at 20 000 rpm is 33 mm/s.
 TEST(Milling, TeethLimitTheFeed) {
   const FeedLaw law = milling_law({.heel_mm_per_rev = 0.1}, kSpeed, 1.0, kEdge_mm, GramsPerCm3{1.9});
   EXPECT_NEAR(law.max_feed_mm_per_s, 100.0 / 3.0, 1e-9);
@@ -52,7 +52,8 @@ TEST(Milling, InverseUndoesForward) {
   EXPECT_EQ(feed_at_mm_per_s(law, 0.19), 0.0);  // the edges only plough
 }
 
-// As printed, with the feed below the fraction, the force would be K_t times the swept area at any feed: here it grows.
+// In the printed form, with the feed below the fraction, the force would be K_t times the swept area at any feed. Here
+// it grows with the feed.
 TEST(Milling, DependsOnTheFeedAsThePrintedFormDoesNot) {
   EXPECT_NEAR(force(20.0, {}, kSpeed, 0.0), 2.0 * force(10.0, {}, kSpeed, 0.0), 1e-9);
   EXPECT_NEAR(force(10.0, {.wear = 2.0}), 2.0 * force(10.0), 1e-9);

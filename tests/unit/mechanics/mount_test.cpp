@@ -49,7 +49,7 @@ TEST(Mount, ConvergesToTheCriticallyDampedResponse) {
   }
 }
 
-// Without a damper too, for light and stiff mounts, and against the stops: never more than was put in.
+// Also without a damper, for light and stiff mounts, and against the stops: never more energy than was put in.
 TEST(Mount, NeverHasMoreEnergyThanWasPutIn) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> even(-1.0, 1.0);
@@ -99,7 +99,7 @@ TEST(Mount, TurnsTheBoneAboutItsCentre) {
   const Pose pose = pose_world_bone(params, shift);
   const Vec3 centre_bone_mm = params.pose_world_rest.inverse().point(params.centre_mm);
   EXPECT_LT((pose.point(centre_bone_mm) - params.centre_mm - shift.place_mm).norm(), 1e-12);
-  // A point beside the centre along x goes round by the angle.
+  // A point beside the centre along x turns by the angle.
   const Vec3 beside = params.pose_world_rest.inverse().point(params.centre_mm + Vec3(8, 0, 0));
   EXPECT_LT(
       (pose.point(beside) - params.centre_mm - shift.place_mm - 8.0 * Vec3(std::cos(0.2), std::sin(0.2), 0)).norm(),

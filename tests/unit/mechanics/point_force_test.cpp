@@ -14,7 +14,7 @@ TEST(SpringDamper, FitsTheDrillAtOneMillimetreASecond) {
   EXPECT_NEAR(spring_damper_thrust_n({}, 1.0, 1.9), kChiCortical, 0.01 * kChiCortical);
 }
 
-// t_s at rest's edge and t_r more for each millimetre a second, both with the wear and with (rho/1.9)^1.1841.
+// t_s at the edge of rest, and t_r more for each millimetre a second, both times the wear and (rho/1.9)^1.1841.
 TEST(SpringDamper, IsASpringAndADamper) {
   EXPECT_NEAR(spring_damper_thrust_n({}, 1e-9, 1.9), 5.0, 1e-6);
   EXPECT_NEAR(spring_damper_thrust_n({}, 3.0, 1.9), 5.0 + 72.0, 1e-9);
@@ -23,7 +23,7 @@ TEST(SpringDamper, IsASpringAndADamper) {
   EXPECT_EQ(spring_damper_thrust_n({}, 0.0, 1.9), 0.0);
 }
 
-// A drill's point: the sides of the cone cancel, along the axis K1 D v sin(beta/2) is left, fitted to Chi.
+// At a drill's point the sides of the cone cancel. Along the axis K1 D v sin(beta/2) is left, fitted to Chi.
 TEST(MultiPoint, AConeFitsTheDrill) {
   const double directed = 1.9 * std::sin(59.0 * std::numbers::pi / 180.0);
   EXPECT_NEAR(multi_point_feed_mm_per_s({}, kChiCortical, directed), 1.0, 0.01);

@@ -18,7 +18,7 @@ double thrust(const ReamingParams& reamer, double feed, double edge_mm, GramsPer
   return resistance_n(reaming_law(reamer, speed, edge_mm, density), feed);
 }
 
-// Another road: the milling law of the whole face, ring by ring, whose radial part is the reamer's thrust.
+// Another way to compute it: the milling law of the whole face, ring by ring, whose radial part is the reamer's thrust.
 TEST(Reaming, IsMillingAlongTheAxis) {
   const double radius = 25.0, teeth = 40.0, feed = 0.7;
   const ReamingParams reamer{.teeth = teeth, .edge_n_per_mm = 0.0};
@@ -57,7 +57,7 @@ TEST(Reaming, FasterTurningAndMoreTeethNeedLessEdgesAndWearMore) {
   EXPECT_NEAR(thrust({.edge_n_per_mm = 0.0, .wear = 2.0}, 0.5, 600.0, kSubchondral), 2.0 * at, 1e-9);
 }
 
-// All the tangential force at one distance: M = (K_t t + k_e) L r.
+// All the tangential force acts at one distance: M = (K_t t + k_e) L r.
 TEST(Reaming, TorqueIsTheTangentialForceAtItsArm) {
   const ReamingParams reamer{.teeth = 40};
   const double edge = 1000.0, t = 60.0 * 0.5 / (250.0 * 40.0);
@@ -93,7 +93,7 @@ TEST(Broaching, BlowsAMinuteAreItsFeed) {
   const GramsPerCm3 density{0.3};
   const FeedLaw law = broaching_law({}, RevolutionsPerMinute{90}, 400.0, density);
   EXPECT_NEAR(law.max_feed_mm_per_s, 1.5 * blow_advance_mm({}, 400.0, density), 1e-9);
-  // Held with 5 N every blow counts.
+  // When held with 5 N, every blow counts.
   EXPECT_NEAR(resistance_n(law, law.max_feed_mm_per_s), 5.0, 1e-9);
   EXPECT_EQ(blow_advance_mm({}, 0.0, density), 5.0);  // nothing in the way
 }

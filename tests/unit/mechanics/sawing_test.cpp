@@ -11,7 +11,7 @@ namespace {
 const GramsPerCm3 kCortical{1.9};
 const RevolutionsPerMinute kStrokes{12'000};
 
-// Published of single teeth in cortical bone: resultants of 8 to 11 N from 2.5 to 10 micrometres.
+// Published for single teeth in cortical bone: resultants of 8 to 11 N from 2.5 to 10 micrometres.
 TEST(Sawing, ResultantLiesInThePublishedBand) {
   for (double depth = 2.5; depth <= 10.0; depth += 0.5) {
     const double resultant =
@@ -28,14 +28,14 @@ TEST(Sawing, ThrustRisesByThirtyPercent) {
   EXPECT_NEAR(tooth_thrust({}, 6.0, kCortical).value(), 0.5 * (low + high), 1e-12);
 }
 
-// Published: at one depth of cut the speed of the blade has no effect. Twice the strokes at twice the feed.
+// Published: at one depth of cut the speed of the blade has no effect. Here: twice the strokes at twice the feed.
 TEST(Sawing, SpeedHasNoEffectAtTheSameDepth) {
   const FeedLaw slow = sawing_law({}, kStrokes, kCortical, 10);
   const FeedLaw fast = sawing_law({}, RevolutionsPerMinute{24'000}, kCortical, 10);
   EXPECT_NEAR(resistance_n(slow, 1.0), resistance_n(fast, 2.0), 1e-9);
 }
 
-// What the bearing teeth take is what the kerf grows by: feed · pitch · teeth = share · teeth · depth · speed.
+// The bearing teeth take what the kerf grows by: feed · pitch · teeth = share · teeth · depth · speed.
 TEST(Sawing, DepthOfCutConservesVolume) {
   const SawingParams saw;
   const double feed = 1.3, teeth = 11.0, kerf_width = 1.0;

@@ -1,4 +1,4 @@
-// The spindle under load: closed forms of a motor with a straight line of speed over torque, an end to its torque, and
+// The spindle under load: closed forms of a motor with a straight line of speed over torque, a largest torque, and
 // inertia.
 #include "common/mechanics/spindle.hpp"
 
@@ -29,7 +29,7 @@ TEST(Spindle, RunsUpAndDownInItsTime) {
   EXPECT_FALSE(spindle.stalled);
 }
 
-// A load that the motor carries: exponentially to speed less droop times torque.
+// A load that the motor can carry: the speed goes exponentially to its value less droop times torque.
 TEST(Spindle, DroopsUnderLoad) {
   for (const double dt : {5e-4, 1e-3, 2e-3}) {
     Spindle spindle;
@@ -43,7 +43,7 @@ TEST(Spindle, DroopsUnderLoad) {
   }
 }
 
-// More than it has: the excess slows the rotor at a constant rate, inertia being response / droop.
+// A load beyond its torque: the excess slows the rotor at a constant rate, with inertia response / droop.
 TEST(Spindle, StallsAndTurnsAgain) {
   Spindle spindle;
   run(spindle, 1000, 0, 0.4);
@@ -55,7 +55,7 @@ TEST(Spindle, StallsAndTurnsAgain) {
   run(spindle, 1000, 500.0, 1.0);
   EXPECT_EQ(spindle.rpm, 0.0);
   EXPECT_TRUE(spindle.stalled);
-  // It stands for as long as it is held, and comes back as fast as its torque lets it once the load is less.
+  // It stands as long as it is held. When the load falls, it comes back as fast as its torque allows.
   run(spindle, 1000, 401.0, 1.0);
   EXPECT_TRUE(spindle.stalled);
   run(spindle, 1000, 300.0, 0.5);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kDt = 1e-3;
 
-// Against a wall that takes exactly the push, nothing moves and the spring stays slack.
+// Against a wall that takes exactly the push, nothing moves and the spring is not stretched.
 TEST(Hand, PushesWithItsPush) {
   Hand hand(expert_hand(), Vec3::Zero());
   HandCommand push{HandMode::push, Vec3::Zero(), Vec3::UnitX()};
@@ -22,7 +22,7 @@ TEST(Hand, PushesWithItsPush) {
   EXPECT_NEAR(force, 29.0, 0.05);
 }
 
-// Frozen hand whose load vanishes: plunge = F/K (1 + overshoot), the reaction time being long for its spring.
+// A frozen hand whose load vanishes: plunge = F/K (1 + overshoot), as the reaction time is long for its spring.
 TEST(Hand, PlungesByPushOverStiffness) {
   for (const HandParams& params : {expert_hand(), novice_hand()}) {
     Hand hand(params, Vec3::Zero());
@@ -37,12 +37,12 @@ TEST(Hand, PlungesByPushOverStiffness) {
     }
     EXPECT_NEAR(furthest - start, params.push_n / params.stiffness_n_per_mm,
                 0.08 * params.push_n / params.stiffness_n_per_mm);
-    // And comes back to where it was frozen.
+    // It comes back to where it was frozen.
     EXPECT_NEAR(hand.position_mm().x(), start, 0.1);
   }
 }
 
-// A step of the rest place is followed as the damped oscillator's closed form says: critically damped here.
+// A step of the rest position is followed as in the damped oscillator's closed form: here critically damped.
 TEST(Hand, CarriesAsACriticallyDampedOscillator) {
   HandParams params = expert_hand();
   const double mass = 1e-3 * params.mass_kg, omega = std::sqrt(params.stiffness_n_per_mm / mass);
@@ -68,7 +68,7 @@ TEST(Hand, ScalingForcesKeepsMotion) {
   EXPECT_GT(full.position_mm().x(), 0.5);
 }
 
-TEST(Hand, ARigGoesExactlyWhereItIsTold) {
+TEST(Hand, ARigGoesExactlyToItsTarget) {
   Hand hand(expert_hand(), Vec3::Zero());
   hand.step({HandMode::rig, {1, 2, 3}, Vec3::UnitX()}, {-1000, 0, 0}, kDt);
   EXPECT_EQ(hand.position_mm(), Vec3(1, 2, 3));

@@ -1,4 +1,4 @@
-// The measures of sound against signals whose level, frequency and brightness are known in closed form.
+// Compares the measures of sound with signals whose level, frequency and brightness are known in closed form.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -54,7 +54,7 @@ TEST(Spectrum, PowerSumsToTheMeanSquare) {
   std::normal_distribution<float> normal(0.0F, 0.1F);
   std::vector<float> noise(480000);
   for (float& x : noise) x = normal(random);
-  // Ten seconds of noise: the mean square is known to sqrt(2 / 480000) = 0.2 %, the windows weigh it unevenly.
+  // Ten seconds of noise: the mean square is known to sqrt(2 / 480000) = 0.2 %, and the windows weigh it unevenly.
   EXPECT_NEAR(band_db(power_spectrum(noise, kRate_hz), 0, 24001), rms_db(noise), 0.05);
   // White noise is flat: half of the band has half of the power, and its middle is the centroid.
   const Spectrum flat = power_spectrum(noise, kRate_hz);
@@ -72,7 +72,7 @@ TEST(Spectrum, StrongestPeaksAreTheTonesLoudestFirst) {
   const auto tones = sum(sum(sine(1234.5, 0.05, 96000), sine(3700.2, 0.2, 96000)), sine(9001.7, 0.1, 96000));
   const std::vector<Peak> peaks = strongest_peaks(power_spectrum(tones, kRate_hz), 3, 100);
   ASSERT_EQ(peaks.size(), 3U);
-  // The parabola on a Hann lobe is right to a few hundredths of a bin of 11.7 Hz.
+  // The parabola on a Hann lobe is accurate to a few hundredths of a bin of 11.7 Hz.
   EXPECT_NEAR(peaks[0].hz, 3700.2, 0.6);
   EXPECT_NEAR(peaks[1].hz, 9001.7, 0.6);
   EXPECT_NEAR(peaks[2].hz, 1234.5, 0.6);

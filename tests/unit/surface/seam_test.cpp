@@ -1,4 +1,4 @@
-// Blocks of different levels side by side: the surface stays closed, by the bits of its vertices.
+// Blocks of different levels side by side: the surface stays closed, exact to the bits of its vertices.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,7 +35,7 @@ struct Drawn {
         for (int z = (b.min.z - 1) >> 4; z <= b.max.z >> 4; ++z) all.push_back({{}, 0, {x, y, z}});
     return all;
   }
-  // Over the wire and back.
+  // Encoded and decoded again.
   std::vector<Mesh> meshes(bool seams = true) const {
     std::vector<Mesh> all;
     BlockSamples samples;
@@ -51,7 +51,7 @@ struct Drawn {
 };
 
 struct Check {
-  int open = 0;     // edges that are not matched by as many in the other direction
+  int open = 0;     // edges without as many edges in the other direction
   int pinched = 0;  // edges with more than two triangles
   int shrunk = 0;   // triangles lost by welding
   int euler = 0;
@@ -175,8 +175,8 @@ TEST(Seams, FarBlocksAreCoarseAndTheSurfaceStaysClosed) {
   EXPECT_EQ(check(drawn.meshes()).open, 0);
 }
 
-// The loops for whole blocks beside the road for any box of samples: the same bits, at every level, below and above
-// zero.
+// Compares the loops for whole blocks with the code for any box of samples: the same bits, on every level, below and
+// above zero.
 TEST(BlockSource, GathersWhatTheFieldGathers) {
   Drawn drawn = ball(7.0);
   for (int i = 0; i < 6; ++i) {

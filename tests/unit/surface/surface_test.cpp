@@ -51,7 +51,7 @@ struct Welded {
   double area = 0.0, volume = 0.0;
 };
 
-// Joins vertices only where their bits are equal: what makes the surface closed must be exact.
+// Joins vertices only if their bits are equal, because the surface must be closed exactly.
 Welded weld(const std::map<BlockKey, BlockPayload>& blocks, double pitch) {
   Welded all;
   for (const auto& [key, payload] : blocks) {
@@ -88,7 +88,7 @@ TEST(MarchingCubes, ASphereAcrossBlocksIsOneClosedSurface) {
   const int edges = static_cast<int>(mesh.edges.size()) / 2;
   EXPECT_EQ(static_cast<int>(mesh.points.size()) - edges + mesh.triangles, 2);  // Euler characteristic of a sphere
   EXPECT_NEAR(mesh.area, 4.0 * kPi * 25.0, 0.01 * 4.0 * kPi * 25.0);
-  // Positive: triangles are counter-clockwise seen from outside.
+  // Positive if triangles are counter-clockwise as seen from outside.
   EXPECT_NEAR(mesh.volume, 4.0 / 3.0 * kPi * 125.0, 0.01 * 4.0 / 3.0 * kPi * 125.0);
 }
 
@@ -108,7 +108,7 @@ vtkIdType flying_edges_triangles(const std::vector<float>& values, int n) {
   vtkNew<vtkImageData> image;
   image->SetDimensions(n, n, n);
   image->AllocateScalars(VTK_FLOAT, 1);
-  // VTK's x is fastest; which axis is called x does not change the count.
+  // VTK's x is fastest. Which axis is called x does not change the count.
   std::ranges::copy(values, static_cast<float*>(image->GetScalarPointer()));
   vtkNew<vtkFlyingEdges3D> contour;
   contour->SetInputData(image);
@@ -145,7 +145,7 @@ TEST(MarchingCubes, NoiseToo) {
   std::vector<float> gathered(static_cast<std::size_t>(kBlockApron * kBlockApron * kBlockApron));
   for (float& v : gathered) v = noise(random);
   const Mesh mesh = *decode_block({}, encode_block(gathered, gathered, 0, 1.0), 1.0);
-  // Every crossed edge has its vertex, however wild the field is.
+  // Every crossed edge has its vertex, however irregular the field is.
   std::size_t crossings = 0;
   const std::vector<float> f = inner_samples(gathered);
   const auto at = [&](int x, int y, int z) {
@@ -185,7 +185,7 @@ TEST(BlockCodec, LeavesOutCoveredCells) {
   };
   EXPECT_EQ(triangles(0), 512u);                                 // 16 · 16 cells, two triangles each
   EXPECT_EQ(triangles(CoveredGroups{1} << 1), 512u - 2u * 16u);  // the group with cells z = 4 to 7 at x = y = 0
-  EXPECT_EQ(triangles(CoveredGroups{1} << 0), 512u);             // nothing crosses z = 0 to 3
+  EXPECT_EQ(triangles(CoveredGroups{1} << 0), 512u);             // no triangle crosses z = 0 to 3
   EXPECT_EQ(triangles(~CoveredGroups{0}), 0u);
 }
 
@@ -247,14 +247,14 @@ TEST(SurfaceBlocks, FineAndCoarseTogetherDrawEveryFaceOnce) {
       surface.field.apply(test::straight_cut(*find_tool("drill-3.2"), {1, 1, 1}, {1, 1, -14}, {0, 0, -1}));
   (void)surface.blocks.touch(report.level, report.changed_leaves);
   const Welded after = weld(surface.all(), 0.5);
-  // The hole's wall is won and its two mouths are lost. A fine block drawn twice or not at all would be off by its
-  // 2 mm by 2 mm of face; the rims, rounded by the pitch, by less than half of that.
+  // The hole's wall is added and its two mouths are removed. A fine block drawn twice or not at all would cause an
+  // error of its 2 mm by 2 mm of face. The rims, rounded by the pitch, cause less than half of that.
   const double wall = 2.0 * kPi * 1.6 * 10.0, mouths = 2.0 * kPi * 1.6 * 1.6;
   EXPECT_NEAR(after.area - before.area, wall - mouths, 2.0);
 }
 
-// A rod of metal and a cap of enamel in a block: each vertex has the tissue of what is below it, on the imported
-// surface and on faces that cuts have left. Blocks that meet neither have the bytes that they had.
+// A rod of metal and a cap of enamel in a block. Each vertex has the tissue below it, on the imported surface and on
+// faces of cuts. Blocks without metal and enamel keep their bytes.
 TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
   const auto tissue = [](const Vec3& p) {
     if (std::hypot(p.x() - 3.0, p.y()) < 1.0) return Tissue::metal;
@@ -262,7 +262,7 @@ TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
   };
   DrawnSurface plain{CutField(test::plain_block(20.0, 10.0, 0.5), {})};
   DrawnSurface marked{CutField(test::marked_block(20.0, 10.0, 0.5, tissue), {})};
-  // Past the rod, beside which it lays metal bare, and into the enamel: cuts of two levels, and far off in coarse
+  // Cuts on two levels: past the rod, where the groove lays metal bare, and into the enamel. Far away also in coarse
   // blocks.
   Cut groove = test::straight_cut(*find_tool("burr-round-5"), {3, -8, -1}, {3, -2.4, -1}, {0, 0, -1});
   const Cut across = test::straight_cut(*find_tool("drill-3.2"), {-8, 0, 1}, {-8, 0, -6}, {0, 0, -1});
@@ -298,7 +298,7 @@ TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
       metal += mesh->tissue[v] == Tissue::metal;
       enamel += mesh->tissue[v] == Tissue::enamel;
       cut_enamel += mesh->tissue[v] == Tissue::enamel && mesh->cut_face[v] != 0;
-      // Where it is the same in a whole sample round it, nothing else may be shown.
+      // Where the tissue is the same in a whole sample round it, no other tissue may be shown.
       const double reach_mm = std::max(0.5, pitch_mm);
       bool alike = true;
       for (int i = 0; i < 27; ++i)
@@ -307,7 +307,7 @@ TEST(SurfaceBlocks, MetalAndEnamelAreMarked) {
       ASSERT_EQ(mesh->tissue[v], tissue(p)) << key.level << ": " << p.transpose();
       bone += mesh->tissue[v] == Tissue::none;
     }
-    // Two bits that say nothing are no block's.
+    // No block has a pair of bits without a meaning.
     BlockPayload broken = payload;
     broken.bytes.back() |= 3;
     EXPECT_FALSE(decode_block(key, broken, pitch_mm));

@@ -1,5 +1,4 @@
-// The whole numbers that a cut sweeps, against the tools as they really are. The bodies are evaluated here by plain
-// formulas of their own.
+// Compares the integer bodies that a cut sweeps with the real tools. Plain formulas of this test evaluate the bodies.
 #include "common/tools/cut_body.hpp"
 
 #include <gtest/gtest.h>
@@ -16,7 +15,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// Whether a point is in the body: exact, with doubles.
+// True if a point is in the body: exact, in doubles.
 bool in_body(const CutBody& body, const Vec3& p) {
   switch (body.kind) {
     case CutKind::ball: {
@@ -65,7 +64,7 @@ TEST_P(EveryCutter, BodyIsTheCutSolidToTwoQuanta) {
   int inside = 0, near = 0;
   for (int i = 0; i < 60000; ++i) {
     Vec3 p = box.min_mm + Vec3(share(random), share(random), share(random)).cwiseProduct(box.size_mm());
-    // Half of the places within a few quanta of the surface, where the two can differ.
+    // Half of the positions are within a few quanta of the surface, where the two can differ.
     if (i % 2 == 0) p += (std::copysign(3.0 * kQuantum_mm, share(random) - 0.5) - solid(p)) * gradient(solid, p);
     const double distance = solid(p);
     if (std::abs(distance) <= 2.0 * kQuantum_mm) continue;
@@ -77,7 +76,7 @@ TEST_P(EveryCutter, BodyIsTheCutSolidToTwoQuanta) {
   EXPECT_GT(near, 1000);
 }
 
-// Apart from the end of the body, which lies in what was cut before, it is the tool's own cutting part.
+// The body is the tool's own cutting part, except for the body's end, which lies in what was cut before.
 TEST_P(EveryCutter, BodyIsTheToolWhereItHasNoStroke) {
   const Tool& tool = GetParam();
   if (tool.kind == ToolKind::oscillating_saw || tool.kind == ToolKind::reciprocating_saw) return;
@@ -131,7 +130,7 @@ TEST_P(EveryCutter, BodyKeepsTheRulesOfItsKind) {
     const ProfileCorner a = body.profile[i], b = body.profile[(i + 1) % body.profile.size()],
                         c = body.profile[(i + 2) % body.profile.size()];
     EXPECT_GE(a.r, 0);
-    // Turns to the left at every corner: convex and counter-clockwise.
+    // It turns to the left at every corner: convex and counter-clockwise.
     EXPECT_GT(static_cast<std::int64_t>(b.r - a.r) * (c.z - b.z) - static_cast<std::int64_t>(b.z - a.z) * (c.r - b.r),
               0);
   }
@@ -167,7 +166,7 @@ TEST(CutBody, AnOscillatingSawsBodyIsTheUnionOfItsStroke) {
     std::mt19937 random(8);
     std::uniform_real_distribution<double> share(-1.0, 1.0);
     const double reach = body.highest[0] * kQuantum_mm;
-    // Chords in place of the arc, rounding, and the step between two angles at the corner.
+    // Chords instead of the arc, rounding, and the step between two angles at the corner.
     const double tolerance = 0.010 + 2.0 * kQuantum_mm;
     int inside = 0;
     for (int i = 0; i < 20000; ++i) {
@@ -203,7 +202,7 @@ TEST(CutBody, AKerfIsThePlateAndTheSetOfTheTeeth) {
     for (double y = 0.0; in_body(body, {0, y, -1}); y += 1e-4) high = y;
     for (double y = 0.0; in_body(body, {0, y, -1}); y -= 1e-4) low = y;
     EXPECT_NEAR(high - low, saw.thickness_mm + saw.set_mm, kQuantum_mm + 2e-4) << saw.name;
-    // The plate runs free in it.
+    // The plate moves freely in it.
     EXPECT_LT(saw.thickness_mm, high - low);
   }
 }
@@ -211,13 +210,13 @@ TEST(CutBody, AKerfIsThePlateAndTheSetOfTheTeeth) {
 TEST(CutBody, ADrillCutsWithItsLipsAndALand) {
   const Tool drill = *find_tool("drill-3.2");
   const CutBody body = drill.cut_body();
-  // (D/2) / tan(59°), which force-laws call the ramp of the entry: 0.961 mm.
+  // (D/2) / tan(59°) = 0.961 mm. force-laws calls it the ramp of the entry.
   EXPECT_NEAR(-body.profile[3].z * kQuantum_mm, 0.961, 0.001);
   EXPECT_EQ(body.profile, (std::vector<ProfileCorner>{{0, 0}, {0, -2622}, {1638, -2622}, {1638, -984}}));
 }
 
 TEST(CutBody, ArcsAreWithinTheirChordsShareOfACell) {
-  // 0.15 of a cell is what a surface may be off; chords take less than two thirds of it at the finest pitch.
+  // A surface may be wrong by 0.15 of a cell. Chords take less than two thirds of it at the finest pitch.
   constexpr double kShare_mm = 0.1 * 0.125;
   const Tool barrel = *find_tool("burr-barrel"), contoured = *find_tool("burr-contoured");
   const Implicit barrel_part = cutting_part(barrel), contoured_part = cutting_part(contoured);
@@ -230,7 +229,7 @@ TEST(CutBody, ArcsAreWithinTheirChordsShareOfACell) {
                  angle = contoured.taper_rad + (0.5 * kPi - contoured.taper_rad) * i / 1000.0;
     ASSERT_NEAR(contoured_part({end * std::cos(angle), 0, end * std::sin(angle) - end}), 0.0, kShare_mm);
   }
-  // The taper goes on from the rounded end to the full diameter.
+  // The taper continues from the rounded end to the full diameter.
   EXPECT_NEAR(contoured_part({0.5 * contoured.diameter_mm, 0, -contoured.cutting_length_mm}), 0.0, 1e-9);
 }
 

@@ -1,4 +1,4 @@
-// Guides against closed forms: play, tilt, what is left free, and a shaky hand.
+// Guides against closed forms: play, tilt, remaining freedom, and a shaky hand.
 #include "common/tools/guide.hpp"
 
 #include <gtest/gtest.h>
@@ -52,7 +52,7 @@ Tool saw() {
   return tool;
 }
 
-// Somewhere in the patient, so that no frame is mistaken for another.
+// A general pose in the patient, so that no frame is mistaken for another.
 const Pose kPlace{{12.0, -40.0, 7.0}, Eigen::Quaterniond(Eigen::AngleAxisd(1.1, Vec3(0.3, -0.5, 0.8).normalized()))};
 
 Eigen::Quaterniond small_turn(double x, double y, double z) {
@@ -61,7 +61,7 @@ Eigen::Quaterniond small_turn(double x, double y, double z) {
                         : Eigen::Quaterniond::Identity();
 }
 
-// Seen from the guide: how far the axis is from the bore's middle at a depth below the mouth.
+// In the guide's frame: how far the axis is from the bore's middle at a depth below the mouth.
 Eigen::Vector2d off_axis(const GuideBore& bore, const Pose& tool, double depth_mm) {
   const Pose seen = kPlace.inverse() * tool;
   const Vec3 axis = seen.direction(Vec3::UnitZ());
@@ -94,8 +94,8 @@ TEST(GuideShape, OfTheThreeGuides) {
   EXPECT_EQ(opening_count(guide_shape(drill())), 0u);
 }
 
-// The 4-in-1 block's cuts: anterior and posterior parallel, chamfers at 45 degrees between them and the distal cut, and
-// every slot ends on the bone's side of the block.
+// The cuts of the 4-in-1 block: anterior and posterior cuts are parallel. The chamfers are at 45 degrees between them
+// and the distal cut. Every slot ends on the bone's side of the block.
 TEST(GuideShape, TheFourCutsMeetAsPlanned) {
   const Tool guide = block(ToolKind::four_in_one_block);
   const GuideShape shape = guide_shape(guide);
@@ -109,7 +109,7 @@ TEST(GuideShape, TheFourCutsMeetAsPlanned) {
   EXPECT_NEAR(shape.slots[0].normal.dot(shape.slots[1].normal), 1.0, 1e-12);
   EXPECT_NEAR(std::abs(shape.slots[2].normal.dot(shape.slots[0].normal)), std::sqrt(0.5), 1e-12);
   EXPECT_NEAR(shape.slots[2].normal.dot(shape.slots[3].normal), 0.0, 1e-12);
-  // Each chamfer goes outwards and stays on its side of the block.
+  // Each chamfer points outwards and stays on its side of the block.
   EXPECT_GT(shape.slots[2].entry_mm.y(), 0.0);
   EXPECT_GT(shape.slots[2].direction.y(), 0.0);
   EXPECT_LT(shape.slots[3].entry_mm.y(), 0.0);
@@ -129,8 +129,8 @@ TEST(Guide, TakesOnlyWhatFits) {
   EXPECT_FALSE(fits(cutting, slot, wide));
 }
 
-// However the hand shakes: inside the sleeve the axis stays within the play c, and a tip l beyond a sleeve of length L
-// within c (1 + 2 l / L).
+// However the hand shakes, the axis inside the sleeve stays within the play c. A tip l beyond a sleeve of length L
+// stays within c (1 + 2 l / L).
 TEST(Guide, AShakyDrillStaysWithinTheSleevesPlay) {
   const Tool guide = sleeve(), tool = drill();
   const GuideShape shape = guide_shape(guide);
@@ -152,14 +152,14 @@ TEST(Guide, AShakyDrillStaysWithinTheSleevesPlay) {
     ASSERT_NEAR(guided->play_mm, c * (1.0 + 2.0 * beyond / length), 1e-12);
     largest_tip = std::max(largest_tip, tip);
     largest_correction = std::max(largest_correction, guided->correction_mm);
-    // The way along the sleeve is the hand's own.
+    // The position along the sleeve is the hand's own.
     ASSERT_NEAR((kPlace.inverse() * pose).position_mm.z(), (kPlace.inverse() * wanted).position_mm.z(), 1e-9);
-    // Once more changes nothing.
+    // Applying it once more changes nothing.
     const auto again = constrain(shape, 0, kPlace, tool, pose);
     ASSERT_TRUE(again);
     ASSERT_LT(difference(again->pose_bone_tool, pose), 1e-7);
   }
-  // 50 mm beyond, c (1 + 100 / 30) = 0.65 mm is nearly reached: the bound is not slack.
+  // 50 mm beyond, c (1 + 100 / 30) = 0.65 mm is nearly reached, so the bound is tight.
   EXPECT_GT(largest_tip, 0.55);
   EXPECT_GT(largest_correction, 3.0);
 }
@@ -170,7 +170,7 @@ TEST(Guide, LeavesWhatIsAllowedAsItIs) {
   const double c = 0.15, length = 30.0;
   ShakyHand hand(2);
   for (int i = 0; i < 5000; ++i) {
-    // An axis through two points within the play, turned about itself at will.
+    // An axis through two points within the play, with a random turn about itself.
     const double a = 6.3 * hand.one(), b = 6.3 * hand.one(), depth = hand.between(0.5, 80.0),
                  end = std::min(depth, length);
     const Vec3 in(0.99 * c * std::cos(a), 0.99 * c * std::sin(a), -length),
@@ -178,7 +178,7 @@ TEST(Guide, LeavesWhatIsAllowedAsItIs) {
     Pose wanted = pose_along(in + (out - in) * (depth / end), out - in);
     wanted.rotation = wanted.rotation * Eigen::AngleAxisd(3.0 * hand.one(), Vec3::UnitZ());
     const Pose there = kPlace * wanted;
-    if ((out - in).head<2>().norm() > 0.9 * (out - in).z()) continue;  // steeper than what goes in
+    if ((out - in).head<2>().norm() > 0.9 * (out - in).z()) continue;  // steeper than can enter
     const auto guided = constrain(shape, 0, kPlace, tool, there);
     ASSERT_TRUE(guided);
     ASSERT_EQ(guided->correction_mm, 0.0);
@@ -187,7 +187,7 @@ TEST(Guide, LeavesWhatIsAllowedAsItIs) {
   }
 }
 
-// No allowed axis is nearer: against random allowed ones, by the measure that the header names.
+// No allowed axis is nearer. Compared with random allowed ones, by the measure in the header.
 TEST(Guide, FindsTheNearestAxis) {
   const Tool tool = drill();
   const GuideShape shape = guide_shape(sleeve());
@@ -207,7 +207,7 @@ TEST(Guide, FindsTheNearestAxis) {
     ASSERT_TRUE(guided);
     const double best = measure(guided->pose_bone_tool, wanted);
     for (int j = 0; j < 300; ++j) {
-      // Random ones in the play, half of them beside the answer.
+      // Random axes in the play, half of them close to the answer.
       const bool beside = j % 2;
       const auto place = [&](double z) {
         Eigen::Vector2d v = beside ? Eigen::Vector2d(off_axis(shape.bores[0], guided->pose_bone_tool, z) +
@@ -223,7 +223,7 @@ TEST(Guide, FindsTheNearestAxis) {
   }
 }
 
-// A hand that goes in, works and comes out again in small steps, trembling: the guided tool never jumps.
+// A trembling hand goes in, works and comes out again in small steps. The guided tool never jumps.
 TEST(Guide, NothingJumps) {
   struct Scene {
     GuideShape shape;
@@ -255,7 +255,7 @@ TEST(Guide, NothingJumps) {
           held.reset();
         inside += guided.has_value();
       }
-      // As far as the hand itself moved in this step, and what a line that is held at its other end adds.
+      // As far as the hand itself moved in this step, plus the lever of a line that is held at its other end.
       const double step = difference(wanted, wanted_before);
       if (i > 0) worst = std::max(worst, (now.position_mm - before.position_mm).norm() - 8.0 * step);
       before = now;
@@ -267,7 +267,7 @@ TEST(Guide, NothingJumps) {
   }
 }
 
-// A blade keeps to the slot's plane within the play at every corner of what is in the slot, and is free in the plane.
+// A blade stays in the slot's plane within the play, at every corner of its part in the slot. It is free in the plane.
 TEST(Guide, ABladeStaysInItsSlotsPlane) {
   const Tool guide = block(ToolKind::four_in_one_block), tool = saw();
   const GuideShape shape = guide_shape(guide);
@@ -292,7 +292,7 @@ TEST(Guide, ABladeStaysInItsSlotsPlane) {
         for (const double side : {-1.0, 1.0}) {
           const double x =
               seen.position_mm.x() + axis.x() * (z - seen.position_mm.z()) / axis.z() + side * 0.5 * tool.width_mm;
-          // The blade's plane there.
+          // The blade's plane at that point.
           const double y =
               seen.position_mm.y() -
               (normal.x() * (x - seen.position_mm.x()) + normal.z() * (z - seen.position_mm.z())) / normal.y();
@@ -304,12 +304,12 @@ TEST(Guide, ABladeStaysInItsSlotsPlane) {
       ASSERT_LT(difference(again->pose_bone_tool, guided->pose_bone_tool), 1e-5);
     }
     EXPECT_GT(largest, 0.9 * c);
-    // Along the flat and in yaw the blade is the hand's, within the slot's width.
+    // Along the flat and in yaw the hand moves the blade freely, within the slot's width.
     const Pose free = pose_bone_slot * Pose{{5.0, 0.1, 20.0}, small_turn(0, 0.05, 0)};
     const auto guided = constrain(shape, opening, kPlace, tool, free);
     EXPECT_EQ(guided->correction_mm, 0.0);
     EXPECT_EQ(difference(guided->pose_bone_tool, free), 0.0);
-    // Turned over it fits as well.
+    // Turned over, it fits as well.
     const Pose over = free * Pose{Vec3::Zero(), Eigen::Quaterniond(0, 0, 0, 1)};
     EXPECT_EQ(difference(constrain(shape, opening, kPlace, tool, over)->pose_bone_tool, over), 0.0);
   }

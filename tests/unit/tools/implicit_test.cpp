@@ -12,7 +12,7 @@
 namespace osteon {
 namespace {
 
-// The distance to a box written as six half-spaces is the one that is known in closed form.
+// The distance to a box made of six half-spaces equals its closed form.
 TEST(Implicit, AConvexSolidFromHalfSpacesIsAsExactAsABox) {
   const Box box{Vec3(-1, -2, -3), Vec3(2, 1, 0.5)};
   std::vector<HalfSpace> faces;
@@ -35,7 +35,7 @@ TEST(Implicit, AConvexSolidFromHalfSpacesIsAsExactAsABox) {
   }
 }
 
-// A turned rectangle is a cylinder, an outline off the axis a tube.
+// A revolved rectangle is a cylinder, and a revolved outline off the axis is a tube.
 TEST(Implicit, ATurnedOutlineIsTheSolidThatItGoesRound) {
   const Implicit solid = turned({{0, -4}, {2, -4}, {2, 1}, {0, 1}}), plain = cylinder(2, -4, 1);
   const Implicit ring = turned({{1, -4}, {2, -4}, {2, 1}, {1, 1}}), tube = subtract(plain, cylinder(1, -9, 9));
@@ -44,7 +44,7 @@ TEST(Implicit, ATurnedOutlineIsTheSolidThatItGoesRound) {
   for (int i = 0; i < 5000; ++i) {
     const Vec3 p(place(random), place(random), place(random));
     ASSERT_NEAR(solid(p), plain(p), 1e-12);
-    // Exact, so never nearer than the bound that a difference gives, and of one sign with it.
+    // It is exact, so it is never below the bound that a difference gives, and has the same sign.
     ASSERT_GE(ring(p), tube(p) - 1e-12);
     ASSERT_EQ(ring(p) < 0.0, tube(p) < 0.0);
   }
@@ -72,13 +72,13 @@ TEST_P(EveryTool, DistanceChangesAtMostAsFastAsThePointMoves) {
   std::normal_distribution<double> step(0.0, 1.0);
   for (int i = 0; i < 20000; ++i) {
     const Vec3 a = box.min_mm + Vec3(share(random), share(random), share(random)).cwiseProduct(box.size_mm());
-    // From a hundredth of a millimetre to several.
+    // From a hundredth of a millimetre to several millimetres.
     const Vec3 b = a + std::pow(10.0, 3.0 * share(random) - 2.0) * Vec3(step(random), step(random), step(random));
     ASSERT_LE(std::abs(solid(a) - solid(b)), (a - b).norm() * (1.0 + 1e-12) + 1e-12);
   }
 }
 
-// Central differences of another step than the library's, wherever the distance has a gradient at all.
+// Central differences with another step than the library's, wherever the distance has a gradient.
 TEST_P(EveryTool, NormalIsTheDistancesSteepestWay) {
   const Tool& tool = GetParam();
   const Implicit solid = tool_solid(tool);
@@ -118,7 +118,8 @@ TEST_P(EveryTool, BoxesHoldTheToolTightly) {
     }
   }
   EXPECT_GT(inside, 20);
-  // Tight: the tool touches every side, so just outside of it the distance is small somewhere and just inside zero.
+  // The box is tight: the tool touches every side. Just outside of a side the distance is small somewhere, and just
+  // inside it is zero.
   for (int k = 0; k < 3; ++k)
     for (const bool top : {false, true}) {
       double nearest = 1e9;
@@ -130,7 +131,7 @@ TEST_P(EveryTool, BoxesHoldTheToolTightly) {
           p[k] = at;
           nearest = std::min(nearest, solid(p));
         }
-      // The places looked at are up to half a step of the box's sides beside the one that touches.
+      // The sampled positions are up to half a step of the box's sides beside the one that touches.
       const double step = std::hypot(local.size_mm()[(k + 1) % 3], local.size_mm()[(k + 2) % 3]) / 200.0;
       EXPECT_LE(nearest, step + 1e-9) << "side " << k << " " << top;
     }

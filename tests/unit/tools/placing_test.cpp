@@ -1,4 +1,4 @@
-// Where the bone puts an item, on bones that are known in closed form.
+// Where an item is placed, on bones that are known in closed form.
 #include "common/tools/placing.hpp"
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@ namespace {
 BoneQuery ball(double radius_mm) {
   return [radius_mm](const Vec3& p) { return p.norm() - radius_mm; };
 }
-// Bone above z = 0 with a hemisphere of this radius reamed into it: +z goes in.
+// Bone above z = 0 with a hemisphere of this radius reamed into it. +z points into the bone.
 BoneQuery reamed(double radius_mm) {
   return [radius_mm](const Vec3& p) { return std::max(-p.z(), radius_mm - p.norm()); };
 }
@@ -44,7 +44,7 @@ TEST(Placing, OntoABallItStandsOnTheRadius) {
   EXPECT_NEAR(pose.position_mm.norm(), 20.0, 1e-3);
   EXPECT_LT(between(pose.position_mm, near), 0.01);
   EXPECT_LT(between(pose.direction(Vec3::UnitZ()), -near), 0.01) << "into the bone";
-  // Its x lies in the plane of its z and the way across.
+  // Its x lies in the plane of its z and the given direction across.
   EXPECT_NEAR(pose.direction(Vec3::UnitY()).dot(Vec3::UnitX()), 0.0, 1e-9);
   EXPECT_GT(pose.direction(Vec3::UnitX()).dot(Vec3::UnitX()), 0.0);
 
@@ -68,13 +68,13 @@ TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
   EXPECT_LT(between(turned->item.pose_bone_item.direction(Vec3::UnitX()), Vec3::UnitY()), 1e-9)
       << "a turn and a quarter";
 
-  // All the way: its head's underside lies one length above the tip.
+  // Driven home: the underside of its head is one length above the tip.
   const auto home = placed(ByThread{80.0 / pitch}, &screw, screw, reamed(0.0));
   ASSERT_TRUE(home) << home.error().message;
   EXPECT_NEAR(home->item.pose_bone_item.position_mm.z(), length, 0.01);
   EXPECT_NEAR(home->item.turns - 2.0, length / pitch, 0.01 / pitch);
   EXPECT_TRUE(set_by_rules({}, &screw, {home->item, screw.tool}, reamed(0.0)))
-      << "its way is its pitch times its turns";
+      << "it moves by its pitch times its turns";
 
   const auto out = placed(ByThread{-0.5}, &screw, screw, reamed(0.0));
   ASSERT_TRUE(out);
@@ -86,7 +86,7 @@ TEST(Placing, ACupIsDrivenIntoACavityOfItsSize) {
   const double radius = 0.5 * cup.tool.diameter_mm;
   const auto home = placed(DriveHome{60.0}, &cup, cup, reamed(radius));
   ASSERT_TRUE(home) << home.error().message;
-  // Its pole, the origin, comes to the cavity's.
+  // Its pole, the origin, reaches the cavity's pole.
   EXPECT_NEAR(home->item.pose_bone_item.position_mm.z(), radius, 0.1);
   EXPECT_GT(home->contact_fraction, 0.9);
   const auto short_way = placed(DriveHome{5.0}, &cup, cup, reamed(radius));

@@ -43,7 +43,7 @@ TEST(SamplePoints, AreAsManyAsAskedOnThePartThatCuts) {
       if (!tool.cuts()) {
         EXPECT_EQ(active, 0) << tool.name;
       }
-      // Not many more than asked, else count would mean nothing.
+      // Not many more than asked for. Otherwise the count would be meaningless.
       if (wanted == 300) {
         EXPECT_LE(tool.cuts() ? active : static_cast<std::ptrdiff_t>(points.size()), 450) << tool.name;
       }
@@ -88,7 +88,7 @@ TEST(SamplePoints, StandForTheWholeCuttingFace) {
   double forward = 0.0;
   for (const SamplePoint& point : sample_points(burr, 200))
     forward += point.active ? point.area_mm2 * std::max(0.0, -point.inward.z()) : 0.0;
-  // Seen along the axis a sphere is a disc.
+  // Along the axis a sphere appears as a disc.
   EXPECT_NEAR(forward, kPi * 2.5 * 2.5, 0.02 * kPi * 2.5 * 2.5);
 
   // A hemisphere of 50 mm.
@@ -117,7 +117,7 @@ TEST(SpreadPoints, AreasAddUpToTheSurfaceOfSphereCylinderAndBox) {
   for (const auto& c : cases) {
     const auto points = spread_points(c.solid, surface_of(c.solid, 0.4), everywhere, {.count = 200});
     EXPECT_NEAR(area_of(points), c.area_mm2, 0.01 * c.area_mm2);
-    // By divergence: the areas times the normals of a closed surface add up to nothing, times the place to the volume.
+    // By divergence: over a closed surface, areas times normals sum to zero, and times positions to the volume.
     Vec3 net = Vec3::Zero();
     for (const SamplePoint& point : points) net += point.area_mm2 * point.inward;
     EXPECT_LT(net.norm(), 0.04 * c.area_mm2);
@@ -135,8 +135,8 @@ TEST(SpreadPoints, AreNowhereTooNearAndLeaveNoBarePatch) {
       for (std::size_t j = 0; j < i; ++j)
         closest = std::min(closest, (points[i].position_mm - points[j].position_mm).norm());
     EXPECT_GT(closest, 0.6 * packed) << count;
-    // Of a random throw the closest two would be 0.05 of it apart at the same count. Bare patches: over places of a
-    // golden spiral, which know nothing of the points.
+    // Random points of the same count would have a closest pair at 0.05 of it. Bare patches are measured over the
+    // positions of a golden spiral, which do not depend on the points.
     double barest = 0.0;
     for (int i = 0; i < 5000; ++i) {
       const double z = 1.0 - (2.0 * i + 1.0) / 5000.0, angle = i * kPi * (3.0 - std::sqrt(5.0)),
@@ -147,7 +147,7 @@ TEST(SpreadPoints, AreNowhereTooNearAndLeaveNoBarePatch) {
       barest = std::max(barest, nearest);
     }
     EXPECT_LT(barest, 1.05 * packed) << count;
-    // Each stands for its own patch.
+    // Each point stands for its own patch.
     for (const SamplePoint& point : points) {
       EXPECT_GT(point.area_mm2, 0.2 * area_of(points) / static_cast<double>(points.size()));
       EXPECT_LT(point.area_mm2, 2.5 * area_of(points) / static_cast<double>(points.size()));

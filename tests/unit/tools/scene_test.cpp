@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-// A slab below z = 0: +z goes into it.
+// A slab below z = 0. +z points into it.
 double slab(const Vec3& p) { return -p.z(); }
 
 // The slab with a hemisphere of this radius reamed into it, its centre on the surface.
@@ -85,7 +85,7 @@ TEST(PlaceOnBone, FindsTheNearestPointAndItsNormal) {
   EXPECT_GT(given->direction(Vec3::UnitZ()).dot(Vec3(0.3, 0, 1).normalized()), 1.0 - 1e-12);
 }
 
-// Two pins through the block's holes fix it; one does not, nor do two through the same hole or beside it.
+// Two pins through the block's holes fix it. One pin does not, nor do two through the same hole or beside it.
 TEST(Pins, TwoFixAGuide) {
   const Tool block = *find_tool("guide-2"), pin = *find_tool("pin-1");
   const Pose place{{10, 5, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Vec3::UnitZ()))};
@@ -135,7 +135,7 @@ TEST(Pins, MoveAlongTheirAxisOnly) {
   EXPECT_FALSE(set_by_rules({}, &before, wanted, slab).has_value());
 }
 
-// One pitch in a turn, both ways, until the head is on the bone: thread length below the surface.
+// One pitch per turn, in both directions, until the head is on the bone: thread length below the surface.
 TEST(Screw, FollowsItsThreadAndStopsAtItsHead) {
   const Tool screw = *find_tool("screw-1");
   const Pose start{{3, 4, 2.0}, Eigen::Quaterniond::Identity()};
@@ -143,7 +143,7 @@ TEST(Screw, FollowsItsThreadAndStopsAtItsHead) {
   EXPECT_NEAR(in.turns, 8.25, 1e-12);
   EXPECT_FALSE(in.seated);
   EXPECT_NEAR(in.pose_bone_item.position_mm.z(), 2.0 + 8.25 * screw.thread_pitch_mm, 1e-9);
-  // A quarter turn past eight.
+  // A quarter turn after eight turns.
   EXPECT_NEAR(in.pose_bone_item.direction(Vec3::UnitX()).dot(Vec3::UnitY()), 1.0, 1e-9);
   const Driven out = turn_screw(screw, in.pose_bone_item, -8.25, slab);
   EXPECT_LT((out.pose_bone_item.position_mm - start.position_mm).norm(), 1e-9);
@@ -155,7 +155,8 @@ TEST(Screw, FollowsItsThreadAndStopsAtItsHead) {
   EXPECT_NEAR(home.turns, (screw.cutting_length_mm - 2.0) / screw.thread_pitch_mm, 1e-6);
   EXPECT_NEAR(turn_screw(screw, home.pose_bone_item, 1.0, slab).turns, 0.0, 1e-6);
   EXPECT_FALSE(turn_screw(screw, home.pose_bone_item, -1.0, slab).seated);
-  // Tilted, one side of the head meets the bone first: by radius times the slope's sine along the axis over its cosine.
+  // When tilted, one side of the head meets the bone first: by radius times the slope's sine along the axis over its
+  // cosine.
   const double tilt = 0.2;
   const Pose leaning{{0, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(tilt, Vec3::UnitX()))};
   const Driven leant = turn_screw(screw, leaning, 1000.0, slab);
@@ -185,8 +186,8 @@ TEST(TrialCup, FillsItsOwnHemisphere) {
   EXPECT_LE(seating.fit.largest_overlap_mm, 0.02 + 1e-6);
 }
 
-// In one of 52 it lies on its pole, 1 mm deeper than centred: the gap at polar angle t is 26 − √(25² + 1 + 50 cos t),
-// within 0.2 mm for the share 1 − cos t of the hemisphere where it is that.
+// In a hemisphere of 52 it lies on its pole, 1 mm deeper than centred. The gap at polar angle t is 26 − √(25² + 1 + 50
+// cos t). The gap is within 0.2 mm for the share 1 − cos t of the hemisphere.
 TEST(TrialCup, IsLooseInALargerOne) {
   const Seating seating = driven(50, 52);
   std::printf("  50 in 52: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",
@@ -200,8 +201,8 @@ TEST(TrialCup, IsLooseInALargerOne) {
   EXPECT_NEAR(seating.fit.contact_fraction, share, 0.04);
 }
 
-// In one of 48 it hangs on the rim: a sphere of 25 mm meets the mouth of radius 24 at √(25² − 24²) = 7 mm below its
-// middle, so its pole is at 18 mm, 6 mm above the cavity's, and its rim stands 7 mm above the bone.
+// In a hemisphere of 48 it hangs on the rim. A sphere of 25 mm meets the mouth of radius 24 at √(25² − 24²) = 7 mm
+// below its middle. So its pole is at 18 mm, 6 mm above the cavity's, and its rim stands 7 mm above the bone.
 TEST(TrialCup, StandsProudInASmallerOne) {
   const Seating seating = driven(50, 48);
   std::printf("  50 in 48: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",

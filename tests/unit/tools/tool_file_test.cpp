@@ -12,7 +12,7 @@
 namespace osteon {
 namespace {
 
-// A tool file with one line changed, removed ("" as the new line) or added (no such field yet).
+// A tool file with one line changed, removed (new line "") or added (if the field does not exist yet).
 std::string with(const std::string& text, const std::string& field, const std::string& line) {
   std::string changed;
   std::istringstream lines(text);
@@ -168,7 +168,7 @@ TEST(ToolFile, EveryBadInputIsNamedWithFileFieldAndRemedy) {
   }
 }
 
-// A tool may name the law by which it resists. Without one its hash is what it was before there was a choice.
+// A tool may name the force law by which it resists. Without a law its hash is as before this choice existed.
 TEST(ToolFile, ALawIsPartOfTheDefinitionWhereItIsNamed) {
   const Tool plain = *find_tool("burr-round-5");
   EXPECT_TRUE(plain.law.empty());

@@ -16,7 +16,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 
 TEST(ToolSurface, KeepsSharpEdgesAndRoundFaces) {
-  // Sharp edges: the volume and area of a box are right whatever the cells are.
+  // Sharp edges: the volume and area of a box are right, whatever the cells are.
   const Implicit box = cuboid({Vec3(-1, -2, -3), Vec3(4, 3.3, 5)});
   const TriangleMesh mesh = surface_of(box, 0.7);
   EXPECT_EQ(open_edges(mesh), 0u);
@@ -48,8 +48,8 @@ TEST_P(ToolSurfaces, IsClosedTurnsOutwardsAndLiesOnTheTool) {
   // A sharp point may be cut off within its cell; elsewhere vertices lie on the tool.
   EXPECT_LT(off, cell);
   EXPECT_LT(sum / static_cast<double>(mesh.positions_mm.size()), 0.01 * cell);
-  // The volume by counting random places, within three and a half standard deviations. Chords take from a cylinder of
-  // diameter d the share (2/3) (cell / d)²; the cell is half of the thinnest there is, or less.
+  // The volume by counting random positions, within three and a half standard deviations. Chords take the share (2/3)
+  // (cell / d)² from a cylinder of diameter d. The cell is half of the thinnest part, or less.
   const Box box = solid.bounds;
   std::mt19937 random(9);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -61,7 +61,7 @@ TEST_P(ToolSurfaces, IsClosedTurnsOutwardsAndLiesOnTheTool) {
   const double deviation = std::sqrt(p * (1.0 - p) / kPlaces) * whole;
   const double thin = 0.5 * cell / thinnest_cell_mm(tool);
   EXPECT_NEAR(enclosed_mm3(mesh), p * whole, 3.5 * deviation + (0.005 + 0.667 * thin * thin) * p * whole);
-  // Nothing of the tool is lost, and nothing sticks out.
+  // No part of the tool is lost, and nothing protrudes.
   const Box drawn = bounds(mesh);
   // A point ends where it is narrower than a cell's diagonal.
   const double slope = tool.point_angle_rad > 0.0 ? std::tan(0.5 * tool.point_angle_rad) : 1.0;

@@ -11,7 +11,7 @@
 namespace osteon {
 namespace {
 
-// A box finds what comes with Osteon and what was added; two of a name it does not choose from.
+// A tool box finds Osteon's own tools and added ones. It does not choose between two tools of the same name.
 TEST(ToolBox, FindsToolsByName) {
   const auto box = builtin_tool_box();
   EXPECT_EQ(box->find("drill-3.2")->hash(), find_tool("drill-3.2")->hash());
@@ -27,7 +27,7 @@ TEST(ToolBox, FindsToolsByName) {
   EXPECT_EQ(box->find("my-drill").error().code, ErrorCode::invalid_input);
 }
 
-// Table B.1 of the dissertation: its eight groups.
+// Table B.1 of the dissertation with its eight groups.
 TEST(Tools, AllOfAppendixBAreThereInTheirGroups) {
   const std::vector<std::vector<std::string>> groups{
       {"drill-1-8in", "drill-5-16in", "end-drill"},
@@ -46,7 +46,7 @@ TEST(Tools, AllOfAppendixBAreThereInTheirGroups) {
     for (const std::string& name : groups[i]) {
       const auto tool = find_tool(name);
       ASSERT_TRUE(tool) << name;
-      // Guides do not cut; pins and screws make their own holes.
+      // Guides do not cut. Pins and screws make their own holes.
       EXPECT_EQ(tool->cuts(), i != 5) << name;
       names.insert(name);
     }

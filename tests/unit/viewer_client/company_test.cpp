@@ -1,4 +1,4 @@
-// The render loop among people: what it shows of them, and what it asks the room for.
+// The render loop with other people in the room: what it shows of them, and what it asks the room for.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -19,7 +19,7 @@ using testing::HasSubstr;
 
 constexpr AuthorId kAda{3}, kBerg{4}, kSelf{8};
 
-// A room as a server would keep it, as far as a window asks.
+// A room as on a server, as far as a viewer asks for it.
 class SmallRoom final : public SupervisionClient {
  public:
   std::vector<PersonSeen> people_here;
@@ -76,7 +76,7 @@ class Company : public test::Picture {
     berg.look = ViewFrustum{Vec3(0, -200, 100), Vec3(1, 2, 3), 0.001, 0.5};
     room_.people_here = {ada, berg};
   }
-  // Obeys some lines; what ended it.
+  // Carries out some lines. Returns what ended it.
   Result<void> obey(const std::string& lines, const std::string& hand = {}) {
     ViewerOptions options;
     options.bounds = {Vec3(-20, -20, -20), Vec3(20, 20, 20)};
@@ -119,7 +119,7 @@ TEST_F(Company, AScriptDrawsAndWipes) {
   EXPECT_EQ(status_["drawn"], 3);
   EXPECT_EQ(why(obey("wipe 2\nwait drawn 2\nwipe all\nwait drawn 0")), "ok");
   EXPECT_TRUE(room_.drawn.empty());
-  // What the room would refuse is told before it is asked.
+  // What the room would reject is reported before the room is asked.
   EXPECT_THAT(why(obey("label 0 0 0 " + std::string(300, 'x'))), HasSubstr("words"));
   room_.closed = true;
   EXPECT_EQ(why(obey("point 0 0 0")), "the room refuses this");
@@ -153,7 +153,7 @@ TEST_F(Company, TheCameraGoesWhereAnotherLooks) {
 
 TEST_F(Company, TheCameraFollowsEveryLookUntilItIsLetGo) {
   const Vec3 later(300, 0, 0);
-  // The room hears of a new look while the viewer waits for a drawing, which comes with it.
+  // The room receives a new view while the viewer waits for an annotation. The annotation comes with it.
   on_turn_ = [&](int turn) {
     if (turn != 30) return;
     room_.people_here[1].look->eye_mm = later;
@@ -167,7 +167,7 @@ TEST_F(Company, TheCameraFollowsEveryLookUntilItIsLetGo) {
   EXPECT_EQ(status_["camera"]["eye_mm"], (std::vector<double>{0, -200, 100}));
 }
 
-TEST_F(Company, TheHandBeforeTheWindowIsToldWhatWasDecided) {
+TEST_F(Company, TheHandBeforeTheWindowSeesWhatWasDecided) {
   room_.people_here[0].supervision.stopped = true;
   EXPECT_EQ(why(obey("", "Ada")), "ok");
   EXPECT_THAT(status_["said"], ElementsAre("Dr. Berg has stopped your hand"));

@@ -1,4 +1,4 @@
-// What the console makes of a line, at a desk that keeps what it was asked.
+// Tests how the console carries out a line, with a supervision client that records what it was asked.
 #include "viewer_client/app/console.hpp"
 
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ class FakeDesk final : public SupervisionClient {
   }
 
   mutable std::vector<PersonSeen> people_;
-  mutable std::optional<PersonSeen> late_;  // who is in the list of people once it was waited for
+  mutable std::optional<PersonSeen> late_;  // who is in the list of people after a wait for it
   std::vector<Annotation> drawn_;
   std::vector<WordsSeen> words_;
   std::vector<std::pair<AuthorId, Restrictions>> asked_;
@@ -148,7 +148,7 @@ TEST_F(ConsoleTest, SaysWhatIsKnownWhereItKnowsNothing) {
   EXPECT_FALSE(console.over());
 }
 
-// A name is the hand's rather than the viewer's of the same person, and never a guess.
+// A name means the person's hand rather than their viewer, and the console never guesses.
 TEST_F(ConsoleTest, FindsWhoIsMeant) {
   EXPECT_EQ(say("freeze Ben"), "ok at 11");
   EXPECT_EQ(desk.asked_.back().first, AuthorId{2});
@@ -162,7 +162,7 @@ TEST_F(ConsoleTest, FindsWhoIsMeant) {
   EXPECT_EQ(desk.asked_.size(), 3u);
 }
 
-// All that holds for a hand is said each time, so that one decision does not undo another.
+// All restrictions of a hand are sent each time, so that one decision does not undo another.
 TEST_F(ConsoleTest, DecisionsAddUp) {
   EXPECT_EQ(say("limit force Ben 2.5").find("ok"), 0u);
   EXPECT_EQ(say("limit zone Ben 1 -2 3 10").find("ok"), 0u);
@@ -189,13 +189,14 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
     EXPECT_EQ(say(line).find("ok"), 0u) << line;
   EXPECT_EQ(desk.asked_.back().second, Restrictions{});
   EXPECT_EQ(say("limit force Ben 0").find("ok"), 0u);
-  EXPECT_EQ(desk.asked_.back().second.force_limit, 1) << "nothing at all is not the same as no limit";
+  EXPECT_EQ(desk.asked_.back().second.force_limit, 1) << "a limit of zero differs from no limit";
   EXPECT_EQ(say("limit force Ben 1000").find("error"), 0u);
   EXPECT_EQ(say("limit tools Ben saw"), "error the room knows no tool \"saw\"");
   EXPECT_EQ(say("guide Ben along Ada share 2").find("error"), 0u);
 }
 
-// Who has a hand here takes the tool into that one; not into one that is away, nor another's of the same name.
+// A person with a hand in the room takes the tool into that hand. It must not be a hand that is away, or another
+// person's hand with the same name.
 TEST_F(ConsoleTest, ATakenToolIsInTheHandOfWhoTypes) {
   desk.people_.push_back({.author = {7}, .name = "Ada", .role = Role::instructor, .hand = true});
   desk.people_.push_back({.author = {8}, .name = "Ada", .role = Role::trainee, .here = true, .hand = true});
@@ -214,7 +215,7 @@ TEST_F(ConsoleTest, AllAreDecidedAboutAtOnceUnlessMoreHoldsForOne) {
   EXPECT_EQ(say("limit force Ben 3"), "ok at 13");
   desk.asked_.clear();
   EXPECT_EQ(say("freeze all"), "ok at 17");
-  ASSERT_EQ(desk.asked_.size(), 4u) << "each hand but the instructor's";
+  ASSERT_EQ(desk.asked_.size(), 4u) << "each hand except the instructor's";
   EXPECT_EQ(desk.asked_[0], (std::pair(AuthorId{2}, Restrictions{.stopped = true, .force_limit = 300})));
 }
 
@@ -266,7 +267,7 @@ TEST_F(ConsoleTest, SpeaksToOneOrToAll) {
   EXPECT_EQ(desk.words_.back().words, "a little slower");
   EXPECT_EQ(say("say all stop please"), "ok at 12 to all");
   EXPECT_EQ(desk.words_.back().words, "stop please");
-  EXPECT_EQ(say("say well done"), "ok at 13 to all") << "nobody is called well";
+  EXPECT_EQ(say("say well done"), "ok at 13 to all") << "nobody has the name well";
   EXPECT_EQ(desk.words_.back().words, "well done");
   EXPECT_EQ(say("say hello"), "ok at 14 to all");
   EXPECT_EQ(say("say #77 hello").find("error"), 0u);
@@ -274,7 +275,7 @@ TEST_F(ConsoleTest, SpeaksToOneOrToAll) {
   EXPECT_EQ(say("said").find("ok at 11 #1 \"Ada\" to #2 \"Ben\" \"a little slower\"; at 12"), 0u);
 }
 
-TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
+TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveAcknowledged) {
   EXPECT_EQ(say("view Ben").find("error nobody knows"), 0u);
   desk.people_[2].look = ViewFrustum{.eye_mm = {1, 2, 3}, .target_mm = {4, 5, -6}};
   EXPECT_EQ(say("view Ben"), "ok eye 1.000 2.000 3.000 target 4.000 5.000 -6.000") << "by the viewer of the same name";
@@ -289,7 +290,7 @@ TEST_F(ConsoleTest, SaysWhereSomebodyLooksAndWhetherTheyHaveHeard) {
   EXPECT_EQ(say("wait acknowledged Ben"), "ok at 12");
 }
 
-// The answer comes before the list of people has the demonstrator: what is said next may name it all the same.
+// The answer comes before the demonstrator is in the list of people. The next command may still name it.
 TEST_F(ConsoleTest, Demonstrates) {
   EXPECT_EQ(say("demonstrate"), "ok demonstrator #9 cuts 12");
   EXPECT_EQ(say("demonstrate \"the other room\" of Ben from 3 to 77 speed 0.5"), "ok demonstrator #9 cuts 12");
@@ -298,7 +299,7 @@ TEST_F(ConsoleTest, Demonstrates) {
   EXPECT_EQ(desk.shown_.from, RoomSeq{3});
   EXPECT_EQ(desk.shown_.to, RoomSeq{77});
   EXPECT_DOUBLE_EQ(desk.shown_.speed, 0.5);
-  EXPECT_EQ(say("demonstrate of #1234"), "ok demonstrator #9 cuts 12") << "who is known in the other room alone";
+  EXPECT_EQ(say("demonstrate of #1234"), "ok demonstrator #9 cuts 12") << "a person known only in the other room";
   EXPECT_EQ(desk.shown_.of, AuthorId{1234});
   EXPECT_EQ(say("demonstrate speed 0").find("error"), 0u);
   EXPECT_EQ(say("guide Ben along #9 share 1"), "ok at 11");

@@ -1,4 +1,4 @@
-// A console at the credentials of a server from before consoles were a kind of client.
+// A console at a server from before consoles were a kind of client.
 #include "viewer_client/net/people_client.hpp"
 
 #include <gmock/gmock.h>

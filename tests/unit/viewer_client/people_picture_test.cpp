@@ -1,4 +1,4 @@
-// What people draw and say, asked of the pixels; and the mouse, by events as an X server sends them.
+// Checks in the pixels what people draw and say. Checks the mouse with events as an X server sends them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 #include "picture.hpp"
 #include "synthetic.hpp"
 #include "viewer_client/scene/stroke.hpp"
-// Last: it defines words that others use as names.
+// Last, because it defines macros with words that others use as names.
 #include <X11/Xlib.h>
 #include <X11/keysym.h>
 
@@ -47,7 +47,7 @@ class PeoplePicture : public test::Picture {
     window_->show_annotations(all);
     return drawn_now();
   }
-  // Where a point of the bone is seen from the front: columns and rows.
+  // Where a point of the bone appears from the front: column and row.
   static std::pair<int, int> seen(const Vec3& p) {
     const double px_per_mm = focal_px(from_front(kFrom_mm)) / (kFrom_mm + p.y());
     const auto x = std::lround(0.5 * kWidth + px_per_mm * p.x()), y = std::lround(0.5 * kHeight - px_per_mm * p.z());
@@ -62,7 +62,7 @@ class PeoplePicture : public test::Picture {
         std::ranges::count_if(image.rgb, [](const auto& c) { return greenish(Vec3(c[0], c[1], c[2])); }));
   }
 
-  // Of a line that is not drawn yet.
+  // Pixels of a line that is not finished.
   static int yellow_pixels(const Image& image) {
     const auto yellow = [](const auto& c) { return c[0] > 120 && c[1] > 2 * c[2] && c[0] > c[1]; };
     return static_cast<int>(std::ranges::count_if(image.rgb, yellow));
@@ -71,7 +71,7 @@ class PeoplePicture : public test::Picture {
   Image bare_;
 };
 
-// On the sphere's front, at these angles to the right and up.
+// A point on the sphere's front, at these angles to the right and up.
 Vec3 on_front(double right_rad, double up_rad) {
   return kRadius_mm *
          Vec3(std::sin(right_rad) * std::cos(up_rad), -std::cos(right_rad) * std::cos(up_rad), std::sin(up_rad));
@@ -82,7 +82,7 @@ TEST_F(PeoplePicture, ALineIsSeenInItsColourAlongItsPointsAndVanishes) {
   for (int i = -10; i <= 10; ++i) points.push_back(on_front(0.06 * i, 0.0));
   const Image image = with({mark(1, AnnotationKind::line, points)});
   for (const int i : {-9, -4, 0, 5, 9}) EXPECT_TRUE(greenish(at(image, on_front(0.06 * i, 0.0)))) << i;
-  // Above and below it the bone is as before.
+  // Above and below it the bone looks as before.
   for (const double off : {0.3, -0.3}) EXPECT_EQ(at(image, on_front(0.0, off)), at(bare_, on_front(0.0, off)));
   EXPECT_EQ(differing_pixels(with({}), bare_), 0);
 }
@@ -147,7 +147,7 @@ TEST_F(PeoplePicture, TwoLabelsAtOnePlaceDoNotCoverEachOther) {
                    same = mark(3, AnnotationKind::label, {point}, "first");
   const int one = green_pixels(with({first})), two = green_pixels(with({first, same}));
   const int other = green_pixels(with({first, mark(3, AnnotationKind::label, {on_front(0.0, -0.6)}, "first")}));
-  EXPECT_GT(two, 1.3 * one) << "the second frame is seen too";
+  EXPECT_GT(two, 1.3 * one) << "the second frame is visible too";
   EXPECT_GT(two, 0.8 * other - 60);
 }
 
@@ -199,14 +199,14 @@ TEST_F(PeoplePicture, TheSurfaceUnderAPixelIsTheBonesNotTheTools) {
     const auto [x, y] = seen(point);
     const auto at = window_->surface_at(x, y);
     ASSERT_TRUE(at);
-    // A pixel is 0.2 mm here; facets lie up to 0.1 mm inside the sphere, more where one looks along the surface.
+    // A pixel is 0.2 mm here. Facets lie up to 0.1 mm inside the sphere, more where the view is along the surface.
     EXPECT_LT((*at - point).norm(), 0.6) << at->transpose();
     EXPECT_NEAR(at->norm(), kRadius_mm, 0.1);
   }
   EXPECT_FALSE(window_->surface_at(3, 3));
 }
 
-// The keyboard and the mouse of somebody before the window.
+// Keyboard and mouse of a person at the viewer.
 class Drawing : public PeoplePicture {
  protected:
   void SetUp() override {
@@ -254,7 +254,7 @@ class Drawing : public PeoplePicture {
     event.xbutton.same_screen = True;
     send(event, type == ButtonPress ? ButtonPressMask : ButtonReleaseMask);
   }
-  // VTK asks the server where the pointer is, so it must really be there.
+  // VTK asks the server for the pointer's position, so the pointer must really be there.
   void move(const Vec3& over) {
     const auto [x, y] = seen(over);
     XWarpPointer(display_, 0, shown_, 0, 0, 0, 0, x, y);
@@ -270,7 +270,7 @@ class Drawing : public PeoplePicture {
 TEST_F(Drawing, APressesPThenClicksWhereToPoint) {
   press_key(XK_p);
   EXPECT_TRUE(window_->events().redraw);
-  EXPECT_GT(differing_pixels(drawn_now(), bare_), 50) << "it says what to do";
+  EXPECT_GT(differing_pixels(drawn_now(), bare_), 50) << "a hint is shown";
   button(ButtonPress, Vec3(40, 0, 0));  // beside the bone
   button(ButtonRelease, Vec3(40, 0, 0));
   EXPECT_FALSE(window_->events().pointed);
@@ -281,7 +281,7 @@ TEST_F(Drawing, APressesPThenClicksWhereToPoint) {
   ASSERT_TRUE(events.pointed);
   EXPECT_LT((*events.pointed - point).norm(), 0.6);
   EXPECT_EQ(differing_pixels(drawn_now(), bare_), 0) << "and the camera has not moved";
-  // Once: the next click turns the bone again.
+  // It works only once: the next click turns the bone again.
   button(ButtonPress, point);
   button(ButtonRelease, point);
   EXPECT_FALSE(window_->events().pointed);
@@ -292,7 +292,7 @@ TEST_F(Drawing, ALineFollowsTheMouseOverTheSurface) {
   button(ButtonPress, on_front(-0.5, 0.0));
   for (int i = -49; i <= 50; ++i) move(on_front(0.01 * i, 0.0));
   EXPECT_TRUE(moved_);
-  EXPECT_GT(yellow_pixels(drawn_now()), yellow_pixels(bare_) + 100) << "it is seen while it is drawn";
+  EXPECT_GT(yellow_pixels(drawn_now()), yellow_pixels(bare_) + 100) << "the line is visible while it is drawn";
   button(ButtonRelease, on_front(0.5, 0.0));
   const std::vector<Vec3> line = window_->events().drawn;
   ASSERT_GE(line.size(), 3u) << "it bends";

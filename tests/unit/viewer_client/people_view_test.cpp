@@ -33,7 +33,7 @@ PeopleSeen all_three() {
   return {{person(kAda, "Ada"), person(kBerg, "Dr. Berg", Role::instructor), person(kCy, "Cy")}, {}, {}};
 }
 
-// Ada under what was decided about her.
+// Ada with the restrictions that were decided about her.
 PeopleSeen about_ada(const Restrictions& supervision) {
   PeopleSeen seen = all_three();
   seen.people[0].supervision = supervision;
@@ -46,7 +46,7 @@ PeopleSeen said(std::uint64_t place, AuthorId from, AuthorId to, const std::stri
   return seen;
 }
 
-TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
+TEST(PeopleView, TheHandSeesWhatWasDecidedAboutIt) {
   PeopleView view("Ada");
   view.take(all_three(), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), IsEmpty());
@@ -62,14 +62,14 @@ TEST(PeopleView, TheHandIsToldWhatWasDecidedAboutIt) {
   EXPECT_EQ(view.holding(), "");
 }
 
-TEST(PeopleView, OthersAreToldOfWhom) {
+TEST(PeopleView, OthersSeeWhomItConcerns) {
   PeopleView view("Cy");
   view.take(all_three(), kSelf, kNow);
   Restrictions stopped;
   stopped.stopped = true;
   view.take(about_ada(stopped), kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre("Dr. Berg has stopped Ada's hand"));
-  EXPECT_EQ(view.holding(), "") << "it is not Cy's hand";
+  EXPECT_EQ(view.holding(), "") << "this is not Cy's hand";
 }
 
 TEST(PeopleView, EveryKindOfDecisionHasItsSentence) {
@@ -123,16 +123,16 @@ TEST(PeopleView, TheRoomSaysWhoDecided) {
   change.people[0].decided_by = kBerg;
   view.take(change, kSelf, kNow);
   EXPECT_THAT(view.notices(kNow), ElementsAre(testing::_, "Dr. Berg has set your hand free"));
-  EXPECT_EQ(view.holding(), "") << "nothing holds that anybody has decided";
+  EXPECT_EQ(view.holding(), "") << "no decision holds";
 }
 
-TEST(PeopleView, WhatAlreadyHoldsIsToldToWhoComesLater) {
+TEST(PeopleView, WhoComesLaterSeesWhatAlreadyHolds) {
   PeopleView view("Ada");
   PeopleSeen change = all_three();
   change.people[0].supervision.stopped = true;
   view.take(change, kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), 1u);
-  // After a connection was lost everything is told once more: nothing of it is new.
+  // After a lost connection everything is sent once more. Nothing of it is new.
   view.take(change, kSelf, kNow + 60s);
   EXPECT_THAT(view.notices(kNow + 60s), IsEmpty());
   EXPECT_EQ(view.holding(), "Your hand is stopped");
@@ -150,7 +150,7 @@ TEST(PeopleView, WordsSayWhoSpeaksToWhom) {
               ElementsAre("Dr. Berg: good morning", "Dr. Berg to you: slower", "Dr. Berg to you: turn the bone",
                           "Cy to Dr. Berg: may I?", "#77: hello"));
   view.take(said(5, AuthorId{77}, {}, "hello"), kSelf, kNow);
-  EXPECT_EQ(view.notices(kNow).front(), "Dr. Berg: good morning") << "what is told again is not new";
+  EXPECT_EQ(view.notices(kNow).front(), "Dr. Berg: good morning") << "a message sent again is not new";
   view.take(said(6, kCy, {}, "one more"), kSelf, kNow);
   EXPECT_EQ(view.notices(kNow).size(), PeopleView::kMostNotices);
   EXPECT_EQ(view.notices(kNow).back(), "Cy: one more");
@@ -185,7 +185,7 @@ TEST(PeopleView, PeopleAreFoundByNameOrNumber) {
   }
   EXPECT_EQ(view.names().at(AuthorId{10}), "#10");
   EXPECT_EQ(view.name_of(kCy), "Cy");
-  // Who came back under the same name is the newer one.
+  // A person who came back under the same name is the newer one.
   change.people[0].here = false;
   change.people[3].here = true;
   view.take(change, kSelf, kNow);
@@ -229,7 +229,7 @@ TEST(PeopleView, DrawingsAreThoseOfTheRoom) {
 
 TEST(Wrapped, BreaksAtBlanksAndCutsOff) {
   EXPECT_EQ(wrapped("one two three", 7, 9), "one two\nthree");
-  EXPECT_EQ(wrapped("  a \n b\t c ", 80, 9), "a b c") << "what is said is one line";
+  EXPECT_EQ(wrapped("  a \n b\t c ", 80, 9), "a b c") << "words are shown as one line";
   EXPECT_EQ(wrapped("abcdefghij", 4, 9), "abcd\nefgh\nij");
   EXPECT_EQ(wrapped("x abcdefghij", 4, 9), "x\nabcd\nefgh\nij");
   EXPECT_EQ(wrapped("äöü äöü", 3, 9), "äöü\näöü") << "characters, not bytes";
@@ -255,7 +255,7 @@ TEST(CameraView, LooksAsSomebodyElse) {
   EXPECT_EQ(looking_as(look, own).eye_mm, own.eye_mm);
 }
 
-// Who follows sees the picture as the other does, also where they have rolled it.
+// A person who follows sees the same picture as the other, also where the other has rolled it.
 TEST(CameraView, RollsAsSomebodyElseDoes) {
   CameraView theirs;
   theirs.eye_mm = Vec3(10, -200, 0);
@@ -266,12 +266,12 @@ TEST(CameraView, RollsAsSomebodyElseDoes) {
   EXPECT_LT((*look.up - Vec3(1, 0, 1).normalized()).norm(), 1e-9) << "across the line of sight, of length 1";
   EXPECT_LT((looking_as(look, CameraView()).up - *look.up).norm(), 1e-9);
   theirs.up = Vec3(0, 1, 0);
-  EXPECT_FALSE(look_of(theirs, 800, 600).up) << "along the line of sight nothing is up";
+  EXPECT_FALSE(look_of(theirs, 800, 600).up) << "there is no up direction along the line of sight";
   theirs.eye_mm = theirs.target_mm;
   EXPECT_FALSE(look_of(theirs, 800, 600).up);
 }
 
-// A turn of the picture is told as any other move of the camera is.
+// A roll of the picture is sent like any other move of the camera.
 TEST(CameraView, LooksThatRollAreNotNearEachOther) {
   ViewFrustum look{Vec3(0, -200, 0), Vec3::Zero(), 0.001, 0.4, Vec3(0, 0, 1)}, other = look;
   EXPECT_TRUE(nearly_equal(look, other));

@@ -1,4 +1,4 @@
-// A window on a screen of its own, for tests that ask pixels.
+// A window on a screen of its own, for tests that read pixels.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace osteon::test {
 
 inline constexpr int kWidth = 320, kHeight = 240;
 
-// From the front at this distance, z upwards.
+// View from the front at this distance, with z upwards.
 inline CameraView from_front(double distance_mm) {
   CameraView view;
   view.target_mm = Vec3::Zero();
@@ -52,7 +52,7 @@ class Picture : public testing::Test {
     window_->draw();
     return window_->image();
   }
-  // Mean colour of a square of 9 pixels round a place.
+  // Mean colour of a square of 9 pixels round a position.
   static Vec3 colour(const Image& image, int x, int y) {
     Vec3 sum = Vec3::Zero();
     for (int dy = -1; dy <= 1; ++dy) {

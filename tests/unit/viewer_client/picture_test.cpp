@@ -1,4 +1,4 @@
-// Pictures are looked at: what is drawn is asked of the pixels.
+// Checks in the pixels what is drawn.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -46,7 +46,7 @@ TEST_F(Picture, ASphereCoversItsOutline) {
   for (const auto& [x, y] : {std::pair{2, 2}, {kWidth - 3, 2}, {2, kHeight - 3}, {kWidth - 3, kHeight - 3}}) {
     EXPECT_EQ(image.at(x, y), empty.at(x, y));
   }
-  // Bone is bright against the background, and warm: red over blue.
+  // Bone is bright against the background, and of a warm colour: red over blue.
   const Vec3 middle = colour(image, kWidth / 2, kHeight / 2);
   EXPECT_GT(middle.sum(), colour(empty, kWidth / 2, kHeight / 2).sum() + 200.0);
   EXPECT_GT(middle.x(), middle.z() + 10.0);
@@ -74,8 +74,8 @@ TEST_F(Picture, CutFacesAreRedder) {
   EXPECT_GT(cut.x() / cut.y(), 1.25 * imported.x() / imported.y());
 }
 
-// A block of bone with a rod of metal and a cap of enamel, a groove through all of the bone between: over the wire and
-// drawn.
+// A block of bone with a rod of metal and a cap of enamel, and a groove through all of the bone between them. It is
+// encoded, decoded and drawn.
 TEST_F(Picture, MetalAndEnamelHaveColoursOfTheirOwn) {
   const auto tissue = [](const Vec3& p) {
     if (std::hypot(p.x() - 8.0, p.z() + 6.0) < 3.0) return Tissue::metal;
@@ -123,7 +123,7 @@ TEST_F(Picture, MetalAndEnamelHaveColoursOfTheirOwn) {
 }
 
 TEST_F(Picture, DoesNotDependOnTheOrderOfArrival) {
-  // Two spheres of different colour in one place: the depth test cannot decide between them.
+  // Two spheres of different colour at one position: the depth test cannot decide between them.
   window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
   window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
   const Image forwards = drawn();
@@ -143,12 +143,12 @@ TEST_F(Picture, TheToolStandsAtTheProxyAndTheGhostAtTheHand) {
   state.pose_bone_device = state.pose_bone_tool;
   window_->show_tools(std::span(&state, 1));
   const Image tool = drawn();
-  // Between tip and shank the ball's middle, a radius above the tip.
+  // Between tip and shank, at the ball's middle: a radius above the tip.
   const int up_px = static_cast<int>(focal_px(from_front(100.0)) * 2.5 / 100.0);
   EXPECT_NE(tool.at(kWidth / 2, kHeight / 2 - up_px), empty.at(kWidth / 2, kHeight / 2 - up_px));
   EXPECT_EQ(tool.at(kWidth / 2, kHeight / 2 + 2 * up_px), empty.at(kWidth / 2, kHeight / 2 + 2 * up_px));
 
-  // The hand 10 mm to the right: something translucent there, the tool unchanged.
+  // The hand is 10 mm to the right: something translucent appears there, and the tool is unchanged.
   state.pose_bone_device.position_mm += Vec3(10, 0, 0);
   window_->show_tools(std::span(&state, 1));
   const Image ghost = drawn();
@@ -187,8 +187,8 @@ TEST_F(Picture, IsSavedAsPng) {
   EXPECT_FALSE(window_->save_png("/nowhere/at/all.png"));
 }
 
-// The render loop between a network thread's render_queue and the window.
-TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
+// Tests the render loop between a network thread's render queue and the window.
+TEST_F(Picture, TheLoopShowsWhatTheRenderQueueBrings) {
   const test::TempDir folder;
   ViewerOptions options;
   options.bounds = {Vec3(-20, -20, -20), Vec3(20, 20, 20)};
@@ -212,7 +212,7 @@ TEST_F(Picture, TheLoopShowsWhatTheInboxBrings) {
     }
     return false;
   };
-  // Until the whole surface is there, nothing of it is drawn.
+  // Nothing of the surface is drawn until the whole surface is there.
   render_queue.begin_stream();
   deliver(3, 15.0, false);
   EXPECT_FALSE(turns(8));

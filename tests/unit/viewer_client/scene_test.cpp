@@ -45,7 +45,7 @@ TEST(SurfaceScene, HashNamesContentNotOrderVersionOrEmptyBlocks) {
   b.replace(block(key(4), 2, "nothing", {}));
   b.replace(block(key(0), 5, "left", small_sphere(0)));
   EXPECT_EQ(a.hash(), b.hash());
-  // The same two meshes in each other's place are another surface.
+  // Exchanging the same two meshes makes another surface.
   SurfaceScene swapped;
   swapped.replace(block(key(0), 1, "right", small_sphere(9)));
   swapped.replace(block(key(9), 1, "left", small_sphere(0)));
@@ -61,7 +61,7 @@ TEST(SurfaceScene, AChangeTouchesOnlyItsRegion) {
   scene.replace(block(key(-1), 2, "cut", small_sphere(-1)));
   EXPECT_EQ(scene.take_dirty(), std::vector{region_of(key(-1))});
   EXPECT_NE(region_of(key(-1)), region_of(key(0)));
-  // A fine block has a region of its own although it lies in the same place.
+  // A fine block has a region of its own although it is at the same position.
   scene.replace(block(key(-1, 0, 0, 2), 1, "fine", small_sphere(-1)));
   EXPECT_EQ(scene.take_dirty(), std::vector{region_of(key(-1, 0, 0, 2))});
 }
@@ -97,7 +97,7 @@ TEST(SurfaceScene, RegionMeshKeepsEveryTriangleOfItsBlocks) {
   ASSERT_EQ(mesh.triangles.size(), 2 * kSmallTriangles);
   ASSERT_EQ(mesh.cut_face.size(), mesh.positions_mm.size());
   ASSERT_EQ(mesh.normals.size(), mesh.positions_mm.size());
-  // No triangle reaches from one sphere to the other, and the marks went with their sphere.
+  // No triangle reaches from one sphere to the other, and the marks stayed with their sphere.
   for (const auto& [a, b, c] : mesh.triangles) {
     const bool first = mesh.positions_mm[a][0] < 15.0f;
     EXPECT_EQ(first, mesh.positions_mm[b][0] < 15.0f);
@@ -113,7 +113,7 @@ TEST(SurfaceScene, ASnapshotAfterAnInterruptionReplacesEverything) {
   scene.replace(block(key(9), 41, "vanishes", small_sphere(9)));
   scene.end_snapshot();
 
-  // A server started anew counts versions from one and knows nothing of block 9.
+  // A restarted server counts versions from one and knows nothing of block 9.
   for (SurfaceScene* each : {&scene, &late}) {
     each->begin_snapshot();
     each->replace(block(key(0), 1, "new", small_sphere(5)));
@@ -123,7 +123,7 @@ TEST(SurfaceScene, ASnapshotAfterAnInterruptionReplacesEverything) {
   EXPECT_EQ(scene.blocks(), 1u);
   const auto dirty = scene.take_dirty();
   EXPECT_TRUE(std::ranges::count(dirty, region_of(key(9))));
-  // And from here on versions count again.
+  // From here on versions count again.
   EXPECT_FALSE(scene.replace(block(key(0), 1, "late copy", small_sphere(7))));
 }
 
@@ -157,7 +157,7 @@ TEST(CameraView, OverviewHoldsTheWholeBone) {
   const Box bone{Vec3(-70, -90, 10), Vec3(80, 100, 190)};
   const CameraView view = overview(bone);
   const Vec3 sight = (view.target_mm - view.eye_mm).normalized();
-  // The inscribed ellipsoid's extremes, the bone's likely reach, lie within the view's cone.
+  // The extremes of the inscribed ellipsoid, the bone's likely extent, lie within the view's cone.
   for (int axis = 0; axis < 3; ++axis) {
     for (const double side : {-1.0, 1.0}) {
       Vec3 p = 0.5 * (bone.min_mm + bone.max_mm);
@@ -177,12 +177,12 @@ TEST(CameraView, BesideToolSeesTheTipFromBehindTheTool) {
     EXPECT_NEAR((view.target_mm - pose.position_mm).norm(), 0.0, 1e-12);
     const double angle = std::acos((view.eye_mm - pose.position_mm).normalized().dot(-axis.normalized()));
     EXPECT_GT(angle, 0.3);  // the shank does not hide the tip
-    EXPECT_LT(angle, 1.0);  // the bone does not either
+    EXPECT_LT(angle, 1.0);  // neither does the bone
     EXPECT_GT(view.up.cross((view.target_mm - view.eye_mm).normalized()).norm(), 0.9);
   }
 }
 
-// A point as it is seen: right, up and towards the eye from where the camera looks.
+// A point in the camera's frame: right, up and towards the eye from where the camera looks.
 Vec3 seen(const CameraView& view, const Vec3& point) {
   const Vec3 back = (view.eye_mm - view.target_mm).normalized();
   const Vec3 up = (view.up - view.up.dot(back) * back).normalized();
@@ -195,7 +195,7 @@ TEST(CameraView, TheBoneFollowsTheCap) {
   const Vec3 point(12.0, 40.0, -3.0), twist = Vec3(0.3, -0.8, 0.5).normalized();
   const double distance_mm = (before.eye_mm - before.target_mm).norm();
 
-  // A twist turns what one sees about the middle of the picture, right-handed about the cap's own axis.
+  // A twist of the cap turns the picture about its middle, right-handed about the cap's own axis.
   const CameraView turned = held_by_cap(before, Vec3::Zero(), twist, 0.25);
   const double angle =
       Eigen::Quaterniond::FromTwoVectors(seen(before, point).cross(twist), seen(turned, point).cross(twist))
@@ -207,7 +207,7 @@ TEST(CameraView, TheBoneFollowsTheCap) {
   const CameraView further = held_by_cap(before, Vec3::Zero(), twist, 0.5);
   EXPECT_LT((seen(further, point) - Eigen::AngleAxisd(2.0 * angle, twist) * seen(before, point)).norm(), 1e-9);
 
-  // A push aside shifts it that way; one to the user brings it nearer.
+  // Pushing the cap sideways shifts the picture that way. Pulling it to the user brings the picture nearer.
   const Vec3 shifted = seen(held_by_cap(before, Vec3(1.0, -0.5, 0.0), Vec3::Zero(), 0.1), point) - seen(before, point);
   EXPECT_GT(shifted.x(), 1.0);
   EXPECT_NEAR(shifted.y(), -0.5 * shifted.x(), 1e-9);
@@ -252,7 +252,7 @@ TEST_P(ToolMeshes, LiesOnTheToolAndFillsItsBox) {
   EXPECT_LT(inside_mm, 0.005);
   EXPECT_EQ(cutting > 0, tool.cuts());
   EXPECT_LT(cutting, mesh.positions_mm.size());
-  // A narrow point may end in its last cell, a millimetre at most.
+  // A narrow point may end in its last cell, at most a millimetre away.
   const Box box = local_bounds(tool);
   for (int k = 0; k < 3; ++k) {
     EXPECT_NEAR(drawn.min_mm[k], box.min_mm[k], 0.01 * box.size_mm()[k]);
@@ -262,8 +262,8 @@ TEST_P(ToolMeshes, LiesOnTheToolAndFillsItsBox) {
   EXPECT_NEAR(drawn.min_mm.z(), -tool.reach_mm(), 1e-3);
 }
 
-// Gauss: the flux of the position through a closed surface is three times its volume, which is positive only if all
-// triangles turn outwards.
+// Gauss: the flux of the position through a closed surface is three times its volume. It is positive only if all
+// triangles face outwards.
 TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
   const Tool& tool = GetParam();
   const ToolMesh mesh = tool_mesh(tool);
@@ -286,7 +286,7 @@ TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
   const double radius = 0.5 * tool.diameter_mm, shank = 0.5 * tool.shank_diameter_mm;
   const double shank_mm3 = std::numbers::pi * shank * shank * tool.shank_length_mm;
   if (fluted(tool)) {
-    // Flutes take away less than half of the solid.
+    // Flutes remove less than half of the solid.
     const double head_mm3 =
         tool.kind == ToolKind::drill
             ? std::numbers::pi * radius * radius *
@@ -296,8 +296,8 @@ TEST_P(ToolMeshes, IsClosedAndTurnsOutwards) {
     EXPECT_LT(volume_mm3, 1.02 * (shank_mm3 + head_mm3));
     return;
   }
-  // Every other tool by counting random places, within three and a half standard deviations and chords of three per
-  // cent.
+  // The volume of every other tool by counting random positions, within three and a half standard deviations and chords
+  // of three per cent.
   const Implicit solid = tool_solid(tool);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> share(0.0, 1.0);

@@ -1,5 +1,5 @@
-// Blocks of all levels drawn side by side, looked at for cracks: through one shows the bright background or, in a loud
-// colour, the inside of the far wall.
+// Draws blocks of all levels side by side and looks for cracks. Through a crack the bright background is visible, or
+// the inside of the far wall in a strong colour.
 #include <gtest/gtest.h>
 #include <vtkActor.h>
 #include <vtkCamera.h>
@@ -38,11 +38,11 @@ constexpr int kEdge_px = 900;
 constexpr double kDistance = 5.0;  // of the eye, in radii
 constexpr double kViewAngle_deg = 24.0;
 constexpr int kEroded_px = 2;
-// Beside a seam a sliver of less than a hundredth of a square millimetre may lie the wrong way round; in all pictures
-// together that is a pixel here and there. Cracks show by tens.
+// Beside a seam a sliver of less than a hundredth of a square millimetre may face the wrong way. In all pictures
+// together that is only a few pixels. Cracks show by tens of pixels.
 constexpr int kSlivers_px = 6;
 
-// A ball with a groove of each level; all three cross at its north pole.
+// A ball with a groove on each level. All three cross at its north pole.
 struct GroovedBall {
   double radius_mm;
   CutField field{test::make_bone(
@@ -65,7 +65,7 @@ struct GroovedBall {
   }
   void focus(const Focus& focus) { (void)blocks.focus({&focus, 1}, field.bone().bounds_samples(), kPitch_mm); }
 
-  // Over the wire and back. Without seams every block is made as if it were alone.
+  // The surface, encoded and decoded again. Without seams every block is made as if it were alone.
   vtkSmartPointer<vtkPolyData> surface(bool seams) const {
     std::vector<BlockKey> keys = blocks.fine_blocks();
     for (const BlockKey& key : blocks.coarse_blocks()) keys.push_back(key);
@@ -130,8 +130,8 @@ class Silhouette : public testing::Test {
     screen_.reset();
   }
 
-  // What is wrong within the outline of a ball that is smaller by the grooves' depth. From distance d it is a circle of
-  // angle asin(r / d).
+  // Faults within the outline of a ball that is smaller by the grooves' depth. From distance d it is a circle of angle
+  // asin(r / d).
   Leaks look(const Vec3& from, double radius_mm) {
     vtkCamera* camera = renderer_->GetActiveCamera();
     const Vec3 eye = kDistance * radius_mm * from.normalized();
@@ -187,7 +187,7 @@ TEST_F(Silhouette, HasNoCracksWhereLevelsMeet) {
   EXPECT_EQ(grooves.inside, 0);
   EXPECT_EQ(small.levels(), (std::set<int>{0, 1, 2}));
 
-  // Far blocks coarser: five levels side by side, the coarse ones beyond the grooves.
+  // Far blocks are coarser: five levels side by side, the coarse ones beyond the grooves.
   GroovedBall large(kLarge_mm);
   for (const Focus& focus : {Focus{{0, 0, kLarge_mm}, 10, 20}, Focus{{0, 0, kLarge_mm}, 12, 16}}) {
     large.focus(focus);
@@ -198,7 +198,7 @@ TEST_F(Silhouette, HasNoCracksWhereLevelsMeet) {
   }
 }
 
-// What this test looks at shows cracks where there are some.
+// Shows that this test finds cracks where there are some.
 TEST_F(Silhouette, ShowsTheCracksThatSeamsClose) {
   const Leaks cut = look_from_all_sides(GroovedBall(kSmall_mm), false);
   GroovedBall large(kLarge_mm);

@@ -15,7 +15,7 @@ TEST(Stroke, AStraightLineIsItsEnds) {
   const auto line = stroke.line(1024);
   ASSERT_EQ(line.size(), 2u);
   EXPECT_EQ(line.front(), Vec3::Zero());
-  EXPECT_NEAR(line.back().x(), 40.0, 1e-9) << "where the hand let go, however near to the point before";
+  EXPECT_NEAR(line.back().x(), 40.0, 1e-9) << "the point of release, however near to the point before";
 }
 
 TEST(Stroke, PointsAreAMillimetreApartAndKeepTheirCorners) {
@@ -40,7 +40,8 @@ TEST(Stroke, ACircleIsPassedWithinTheToleranceAndOnlyAsFinelyAsAllowed) {
   EXPECT_GE(coarse.size(), 5u);
   EXPECT_GT(fine.size(), coarse.size());
   EXPECT_LT(fine.size(), 126u) << "2 pi r points a millimetre apart";
-  // A chord whose middle is s inside the circle spans an angle of 2 acos(1 - s / r): of 0.05 mm and the millimetre.
+  // A chord whose middle is s inside the circle spans an angle of 2 acos(1 - s / r). Here s is 0.05 mm plus the
+  // millimetre's share.
   for (std::size_t i = 1; i < fine.size(); ++i)
     EXPECT_GT(0.5 * (fine[i - 1] + fine[i]).norm(), radius_mm - 0.05 - 1.0 / (8.0 * radius_mm)) << i;
   EXPECT_EQ(fine.front(), coarse.front());

@@ -36,7 +36,7 @@ inline Mesh sphere_mesh(const Vec3& centre_mm, double radius_mm, std::uint8_t cu
   return mesh;
 }
 
-// A block's hash is the server's business: here any text gives one.
+// The server computes a block's hash. Here any text gives one.
 inline Digest digest_of(std::string_view text) {
   Hasher hasher;
   hasher.text(text);

@@ -16,7 +16,7 @@ CaseInfo info_of(double pitch_mm) {
   return {.title = "Test bone", .source = "closed form", .pitch_mm = pitch_mm, .calibration = {}, .threshold_hu = 0.0};
 }
 
-// A ball with a denser shell, and how its parts are filled.
+// A ball with a denser shell, and the way in which its parts are filled.
 struct Ball {
   double radius_mm = 20.0, pitch_mm = 0.5;
   Vec3 centre_mm{1.7, -0.9, 0.3};
@@ -28,7 +28,7 @@ struct Ball {
     const Vec3 half = Vec3::Constant(radius_mm + 5.0 * pitch_mm);
     return covering_samples({centre_mm - half, centre_mm + half}, pitch_mm);
   }
-  // Parts that are all one are named so.
+  // Marks parts of one value as such.
   PartKind fill(const CoordBox& part, PartSamples& to) {
     const Vec3 low = position_mm(part.min, pitch_mm), high = position_mm(part.max, pitch_mm);
     const double middle = distance_mm(0.5 * (low + high)),
@@ -69,7 +69,7 @@ TEST(CaseFromParts, IsTheCaseFromTheWholeVolume) {
   EXPECT_EQ(parts->bounds_samples(), whole->bounds_samples());
   // Not every sample of the box was asked for.
   EXPECT_LT(ball.samples_asked, static_cast<std::int64_t>(surface.values.size()));
-  // And what was left out is there.
+  // The samples that were left out have their values.
   EXPECT_NEAR(parts->density_g_cm3(ball.centre_mm), 0.4, 1e-6);
   EXPECT_EQ(parts->tissue({3, -2, 1}), Tissue::trabecular);
   EXPECT_EQ(parts->density_g_cm3({60.0, 0.0, 0.0}), 0.0);

@@ -24,7 +24,7 @@ CoordBox whole(int level) {
   return {{-24 << level, -24 << level, -24 << level}, {24 << level, 24 << level, 24 << level}};
 }
 
-// How far the surface that a query shows lies from the ball's, in pitches: root mean square and largest, along rays.
+// Distance between the surface that a query shows and the ball's, in pitches: root mean square and largest, along rays.
 struct Error {
   double rms = 0.0, largest = 0.0;
 };
@@ -35,7 +35,7 @@ Error surface_error(const std::function<bool(const Vec3&)>& inside, double pitch
   constexpr int kRays = 2000;
   for (int i = 0; i < kRays; ++i) {
     const Vec3 direction = Vec3{normal(random), normal(random), normal(random)}.normalized();
-    // From outside to the first contact, by small steps: what a tool's point does.
+    // From outside to the first contact in small steps, as a tool's point moves.
     double r = kRadius_mm + 2.0 * pitch;
     while (!inside(kCentre + r * direction) && r > kRadius_mm - 2.0 * pitch) r -= 0.01 * pitch;
     const double e = std::abs(r - kRadius_mm) / pitch;
@@ -56,13 +56,13 @@ TEST(CellCollision, EachRuleIsAsAccurateAsItCanBe) {
   const Error by_distance = surface_error([&](const Vec3& p) { return distance.inside(p); }, kPitch_mm);
   std::printf("error in pitches, rms / largest: nearest %.3f / %.3f, trilinear %.3f / %.3f, distance %.4f / %.4f\n",
               nearest.rms, nearest.largest, trilinear.rms, trilinear.largest, by_distance.rms, by_distance.largest);
-  // A sample stands for a cube: half its diagonal is the most that it can be wrong by, and a quarter of an edge the rms
-  // of what is evenly spread over half an edge to both sides, at least for faces along the lattice.
+  // A sample stands for a cube. It can be wrong by half the cube's diagonal at most. The rms is at least a quarter of
+  // an edge, for values evenly spread over half an edge to both sides and for faces along the lattice.
   EXPECT_LE(nearest.largest, 0.5 * std::sqrt(3.0) + 0.02);
   EXPECT_GT(nearest.largest, 0.4);
   EXPECT_LT(trilinear.rms, nearest.rms);
   EXPECT_LE(trilinear.largest, 0.5 * std::sqrt(3.0) + 0.02);
-  // Trilinear distance misses a sphere by its curvature only: 3 pitch² / (8 radius), and the quantum of S.
+  // Trilinear distance differs from a sphere only by its curvature, 3 pitch² / (8 radius), and by the quantum of S.
   EXPECT_LE(by_distance.largest, 3.0 * kPitch_mm / (8.0 * kRadius_mm) + kQuantum_mm / kPitch_mm + 0.011);
 }
 
@@ -88,7 +88,7 @@ TEST(CellCollision, SeesWhatWasCut) {
   for (const Coord leaf : report.changed_leaves) cells.update(field, {leaf, leaf + Coord{7, 7, 7}});
   EXPECT_FALSE(cells.inside(at, MixedCell::trilinear));
   EXPECT_FALSE(cells.inside(at, MixedCell::nearest));
-  // Brought up to date it is what it would be anew.
+  // An update gives the same cells as making them anew.
   const BoneCells anew(field, 1, whole(1));
   std::mt19937 random(2);
   std::uniform_real_distribution<double> any(-10.0, 10.0);

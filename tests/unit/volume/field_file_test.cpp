@@ -17,7 +17,7 @@ namespace {
 using test::plain_block;
 using test::straight_cut;
 
-// Two bodies cut at all levels, with leaves that are all gone.
+// Two bodies with cuts on all levels, and with leaves that are completely removed.
 struct Cut2 {
   Case bone = plain_block(16.0, 8.0, 0.5);
   CutField parent{bone, {}}, piece{bone, {7}};
@@ -50,7 +50,7 @@ TEST(FieldFile, BringsBackTheSameBone) {
   for (const FieldLeaf& leaf : loaded->leaves)
     if (leaf.body == BodyId{}) again.restore(leaf);
   EXPECT_EQ(again.hash(), scene.parent.hash());
-  // Over an older one, and nothing else is left in the folder.
+  // Overwrites an older file. Nothing else is left in the folder.
   ASSERT_TRUE(save_fields(temp / "fields.vdb", scene.saved()));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), std::filesystem::directory_iterator()), 1);
 }
@@ -95,7 +95,7 @@ TEST(FieldFile, IsAnOrdinaryVdbFileForOthers) {
   const auto grid = openvdb::gridPtrCast<openvdb::FloatGrid>(file.readGrid("cuts.body0.level2"));
   ASSERT_TRUE(grid);
   EXPECT_DOUBLE_EQ(grid->voxelSize().x(), 0.125);
-  // At its place in millimetres stands the distance.
+  // The distance is at its position in millimetres.
   for (const FieldLeaf& leaf : scene.parent.leaves())
     if (leaf.level == 2) {
       const openvdb::Coord at(leaf.origin.x + 1, leaf.origin.y + 2, leaf.origin.z + 3);
@@ -103,7 +103,7 @@ TEST(FieldFile, IsAnOrdinaryVdbFileForOthers) {
     }
 }
 
-// Loads, and says what was wrong.
+// Loads and returns the error.
 Error refused(const std::filesystem::path& file, const Case* bone = nullptr) {
   const auto loaded = bone ? load_fields(file, *bone) : load_fields(file);
   EXPECT_FALSE(loaded);
@@ -136,7 +136,7 @@ TEST(FieldFile, RefusesOthersInOneSentence) {
   EXPECT_NE(refused(temp / "fields.vdb").message.find("cuts.body7"), std::string::npos);
 }
 
-// What another program could write, sealed as if it were ours.
+// Writes what another program could write, with a seal as if it were ours.
 void write_sealed(const std::filesystem::path& file, const openvdb::GridPtrVec& grids, const openvdb::MetaMap& meta) {
   openvdb::io::File(file.string()).write(grids, meta);
   std::ifstream in(file, std::ios::binary);
@@ -174,12 +174,12 @@ TEST(FieldFile, RefusesValuesBetweenTheQuanta) {
   openvdb::MetaMap none;
   write_sealed(temp / "nameless.vdb", *grids, none);
   EXPECT_EQ(refused(temp / "nameless.vdb").code, ErrorCode::invalid_input);
-  // And a case's own file is none of fields.
+  // A case's own file is not a file of fields.
   ASSERT_TRUE(scene.bone.save(temp / "case"));
   EXPECT_EQ(refused(temp / "case" / "bone.vdb").code, ErrorCode::invalid_input);
 }
 
-// Bytes changed anywhere, or cut off anywhere: an error.
+// Bytes changed or cut off anywhere cause an error.
 TEST(FieldFile, RefusesEveryDamage) {
   const test::TempDir temp;
   const Cut2 scene;

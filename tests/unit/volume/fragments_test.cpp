@@ -20,7 +20,7 @@ double box_distance(const Box& box, const Vec3& p) {
   return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
 }
 
-// Leaves that remove a solid given by its exact distance, as cuts of that level would.
+// Leaves that remove a solid given by its exact distance, as cuts of that level would do.
 std::vector<FieldLeaf> leaves_of(const Case& bone, int level, const Box& around,
                                  const std::function<double(const Vec3&)>& distance_mm) {
   std::vector<FieldLeaf> leaves;
@@ -84,7 +84,7 @@ struct Room {
   }
 };
 
-// A body of the piece's own: the parent's field before the piece is taken, and all but the piece gone.
+// The fragment's own body: the parent's field before the fragment is taken, with everything but the fragment removed.
 CutField body_of(const Fragment& piece, const CutField& parent_before) {
   CutField body(parent_before.bone(), {1});
   for (FieldLeaf leaf : parent_before.leaves()) {
@@ -104,10 +104,10 @@ CutField copy_of(const CutField& field) {
   return copy;
 }
 
-// Between two planes across a block.
+// The part of a block between two planes.
 Box slab_of(double x0, double x1, double y0 = -12.0, double y1 = 12.0) { return {{x0, y0, -12.0}, {x1, y1, 2.0}}; }
 
-// Of what is solid in a box, from samples of the finest level.
+// Solid volume in a box, from samples of the finest level.
 double solid_mm3(const CutField& field, const Box& box) {
   const double pitch = level_pitch_mm(field.bone().pitch_mm(), 2);
   const CoordBox samples = covering_samples(box, pitch);
@@ -140,12 +140,13 @@ TEST(Fragments, ASawnBlockIsTwoPiecesWithTheirVolumes) {
   EXPECT_NEAR(parent_mm3, left, 0.005 * left);
   EXPECT_NEAR(piece_mm3, right, 0.005 * right);
   EXPECT_NEAR(parent_mm3 + piece_mm3 + kerf, whole, 0.005 * whole);
-  // The piece by itself is one body without pieces.
+  // The fragment by itself is one body without fragments.
   EXPECT_TRUE(FragmentFinder(piece).take_fragments(piece).empty());
 }
 
-// What was removed is kerf and piece, although the masks of the piece are of two levels. A sample on an edge of the
-// block counts half where a quarter of it is bone: that much may be too much along the edges of what is gone.
+// Kerf and fragment count as removed, although the fragment's masks are of two levels. A sample on an edge of the block
+// counts half where a quarter of it is bone. So along the edges of the removed part the volume may be too large by that
+// much.
 TEST(Fragments, WhatAPieceTakesAlongCountsAsRemoved) {
   for (const double x0 : {1.06, 4.0, 5.3}) {
     SCOPED_TRACE(x0);
@@ -161,7 +162,7 @@ TEST(Fragments, WhatAPieceTakesAlongCountsAsRemoved) {
   }
 }
 
-// Most leaves of a piece's masks are of one value and take a hundredth of the memory.
+// Most leaves of a fragment's masks have a single value and take a hundredth of the memory.
 TEST(Fragments, MasksKeepWhatIsGoneThroughoutAsOneValue) {
   Room room(plain_block(20.0, 10.0, 0.5));
   room.remove_box(2, slab_of(1.06, 2.1));
@@ -173,7 +174,7 @@ TEST(Fragments, MasksKeepWhatIsGoneThroughoutAsOneValue) {
       const bool equal = std::ranges::all_of(leaf.values, [&](std::int16_t v) { return v == leaf.values.front(); });
       EXPECT_EQ(leaf.is_constant(), equal);
     }
-  // Listed in full they do the same to a field, to its hash and to a history.
+  // Masks listed in full have the same effect on a field, its hash and a history.
   CutField compact = body_of(pieces[0], before), full = copy_of(compact);
   Fragment listed = pieces[0];
   for (FieldLeaf& leaf : listed.left) leaf.expand();
@@ -187,7 +188,7 @@ TEST(Fragments, MasksKeepWhatIsGoneThroughoutAsOneValue) {
   EXPECT_EQ(field_hash(std::move(leaves), 0.5), compact.hash());
 }
 
-// No point is solid in both, and none that was solid is lost or gained: at samples of every level, and anywhere.
+// No point is solid in both bodies, and no solid point is lost or gained: at samples of every level, and anywhere.
 void expect_partition(const CutField& before, const CutField& parent, const CutField& piece, const Box& box,
                       int allowed = 0) {
   for (int level = 0; level < kLevels; ++level) {
@@ -226,7 +227,7 @@ TEST(Fragments, ParentAndPieceArePartsOfWhatWasAndShareNothing) {
   for (const int level : {0, 1, 2}) {
     SCOPED_TRACE("kerf at level " + std::to_string(level));
     Room room(plain_block(16.0, 8.0, 0.5));
-    // An oblique kerf, 1 mm at the finest level, wider where the voxels are.
+    // An oblique kerf: 1 mm at the finest level, wider at coarser voxels.
     const double width = level == 2 ? 1.0 : level == 1 ? 1.3 : 2.2;
     const Vec3 normal = Vec3{1.0, 0.35, 0.2}.normalized();
     room.remove(leaves_of(room.field.bone(), level, {{-10, -10, -10}, {10, 10, 2}}, [&](const Vec3& p) {
@@ -244,7 +245,7 @@ TEST(Fragments, ParentAndPieceArePartsOfWhatWasAndShareNothing) {
 
 TEST(Fragments, AThinBridgeHoldsAndTheLastOfSeveralGivesWay) {
   Room room(plain_block(20.0, 10.0, 0.5));
-  // All sawn but two bridges of 0.5 mm.
+  // Sawn through except for two bridges of 0.5 mm.
   room.remove_box(2, slab_of(1.0, 2.0, -12.0, -4.0));
   room.remove_box(2, slab_of(1.0, 2.0, -3.5, 5.0));
   room.remove_box(2, slab_of(1.0, 2.0, 5.5, 12.0));
@@ -253,7 +254,7 @@ TEST(Fragments, AThinBridgeHoldsAndTheLastOfSeveralGivesWay) {
   EXPECT_TRUE(room.pieces().empty());
   room.remove_box(2, slab_of(1.0, 2.0, 4.8, 5.7));
   EXPECT_EQ(room.pieces().size(), 1u);
-  // Found until it is taken; and with a bridge back it is none.
+  // It is found until it is taken. If a bridge comes back, it is not a fragment.
   EXPECT_EQ(room.pieces().size(), 1u);
   room.rebuild({&first, 1}, true);
   EXPECT_TRUE(room.pieces().empty());
@@ -297,7 +298,7 @@ TEST(Fragments, BonesThatWereApartStayAndEachCanLosePieces) {
       {{-12, -7, -7}, {7, 7, 7}}, 0.5, [&](const Vec3& p) { return std::min(large(p), small(p)); },
       [](const Vec3&) { return 1.9; }));
   EXPECT_TRUE(room.pieces().empty());
-  // A cut at one changes cells that both have: still two bones.
+  // A cut at one ball changes cells that both have. There are still two bones.
   room.remove_box(2, {{0.2, -2, -2}, {2.4, 2, 2}});
   EXPECT_TRUE(room.pieces().empty());
   room.remove_box(2, {{3.4, -4, -4}, {4.6, 4, 4}});
@@ -307,7 +308,7 @@ TEST(Fragments, BonesThatWereApartStayAndEachCanLosePieces) {
   EXPECT_GT(pieces[0].bounds.min_mm.x(), 2.0);
 }
 
-// However it came about, the pieces follow from the field.
+// The fragments depend only on the field, however it was made.
 TEST(Fragments, KeptUpToDateIsWhatIsFoundAnew) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> across(-7.0, 7.0), depth(-8.0, 0.5);

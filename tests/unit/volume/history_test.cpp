@@ -12,14 +12,14 @@ namespace {
 using test::plain_block;
 using test::straight_cut;
 
-// A cut or a mask, as a room has them.
+// A cut or a mask, as in a room.
 struct Change {
   RoomSeq place;
   Cut cut;
   std::vector<FieldLeaf> mask;
 };
 
-// Drills and burrs at random places of a block, at all levels, and masks of random values on random leaves.
+// Drills and burrs at random positions of a block, on all levels, and masks of random values on random leaves.
 std::vector<Change> random_changes(std::mt19937& random, int count) {
   std::uniform_real_distribution<double> across(-6.0, 6.0), depth(-6.0, 0.0), tilt(-0.4, 0.4);
   std::vector<Change> changes;
@@ -84,7 +84,7 @@ TEST(CutHistory, UndoLeavesWhatOnlyTheOthersWouldHaveCut) {
     }
     history.undo(field, places);
     EXPECT_EQ(field.hash(), others.hash()) << "round " << round;
-    // What is gone is gone: no leaf is left that no remaining event made.
+    // No leaf is left that no remaining event has made.
     for (const RoomSeq place : places) EXPECT_TRUE(history.undone(place));
     std::ranges::shuffle(places, random);
     history.redo(field, places);
@@ -124,7 +124,7 @@ TEST(CutHistory, ACutHiddenByAnotherComesBackWhenThatIsUndone) {
   EXPECT_EQ(field.hash(), small.hash());
 }
 
-// A piece's history: what both bodies had before is taken back in each of them by itself.
+// A fragment's history: cuts that both bodies had before are undone in each of them separately.
 TEST(CutHistory, AForkGoesItsOwnWay) {
   const Case bone = plain_block(20.0, 8.0, 0.5);
   const Tool burr = *find_tool("burr-round-5");
@@ -167,7 +167,7 @@ TEST(CutHistory, CostsWhatWasTouchedAndNamesTheLeavesThatChanged) {
   CutHistory history;
   const Tool drill = *find_tool("drill-3.2");
   std::uint64_t place = 0;
-  // A row of holes that do not touch each other, each of three cuts.
+  // A row of holes that do not touch each other. Each has three cuts.
   for (int hole = 0; hole < 4; ++hole)
     for (int step = 0; step < 3; ++step) {
       const Vec3 at{-15.0 + 10.0 * hole, 0.0, -2.0 * step};
@@ -177,7 +177,7 @@ TEST(CutHistory, CostsWhatWasTouchedAndNamesTheLeavesThatChanged) {
   const std::vector<FieldLeaf> before = field.leaves();
   const RoomSeq last_of_second{6};
   const auto changed = history.undo(field, {&last_of_second, 1});
-  // Its own leaves, and no cut of another hole.
+  // Only its own leaves change, and no cut of another hole.
   EXPECT_LE(history.last_cost().cuts, 2u);
   EXPECT_GT(history.last_cost().leaves, 0u);
   EXPECT_LE(history.last_cost().leaf_cuts, 2 * history.last_cost().leaves);
@@ -188,7 +188,7 @@ TEST(CutHistory, CostsWhatWasTouchedAndNamesTheLeavesThatChanged) {
     field.read(now);
     EXPECT_EQ(now.values != leaf.values, std::ranges::binary_search(changed[0].origins, leaf.origin));
   }
-  // Again, or of what is not there: nothing.
+  // Undoing it again, or undoing an unknown cut, changes nothing.
   EXPECT_TRUE(history.undo(field, {&last_of_second, 1}).empty());
   const RoomSeq unknown{99};
   EXPECT_TRUE(history.undo(field, {&unknown, 1}).empty());

@@ -1,4 +1,4 @@
-// What a cut removes, against closed forms, at random places and orientations on the lattice.
+// Compares what a cut removes with closed forms, at random positions and orientations on the lattice.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -35,8 +35,8 @@ template <class Make>
 void expect_true(Make make) {
   const Worst coarse = worst_of(make, 0.25), fine = worst_of(make, 0.125);
   EXPECT_LE(fine.volume_percent, 0.5);
-  // Distances are exact on the samples and linear between them, so halving the pitch should leave a quarter of the
-  // error. A hundredth of a per cent is the rounding of distances to quanta.
+  // Distances are exact on the samples and linear between them, so half the pitch should leave a quarter of the error.
+  // A hundredth of a per cent is the rounding of distances to quanta.
   EXPECT_LE(fine.mean_percent, 0.5 * coarse.mean_percent + 0.01);
   // A surface of curvature 1/r is a chord between samples: p²/8r, with p ≤ r a part of the pitch far below this bound.
   EXPECT_LE(coarse.deviation_pitches, 0.15);

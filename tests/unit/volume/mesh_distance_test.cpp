@@ -14,7 +14,7 @@
 namespace osteon {
 namespace {
 
-// An octahedron whose triangles are divided and pushed out to the sphere.
+// An octahedron whose triangles are divided and moved out to the sphere.
 TriangleMesh sphere_mesh(double radius, const Vec3& centre, int divisions) {
   std::vector<Vec3> points{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   std::vector<std::array<std::uint32_t, 3>> triangles{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
@@ -49,7 +49,7 @@ TEST(MeshDistance, OfASphereIsTheDistanceToIt) {
   const auto sampled = sampled_distance(mesh, pitch);
   ASSERT_TRUE(sampled) << sampled.error().message;
   const SampledDistance& d = **sampled;
-  // The triangles lie within the sphere, each by no more than its plane does.
+  // The triangles lie within the sphere, each at most as deep as its plane.
   double chord = 0.0;
   for (const auto& t : mesh.triangles) {
     const Vec3 corner = position(mesh, t[0]) - centre;
@@ -70,7 +70,7 @@ TEST(MeshDistance, OfASphereIsTheDistanceToIt) {
         worst = std::max(worst, std::abs(stored - std::clamp(exact, -kMeshBand_mm, kMeshBand_mm)));
       }
   EXPECT_EQ(i, d.values.size());
-  // The triangle taken for the nearest may be one beside it.
+  // The triangle that is found as the nearest may be a neighbour of it.
   EXPECT_LT(worst, chord + 0.5 * kQuantum_mm + 0.06 * pitch) << "chord " << chord;
   EXPECT_GE(d.box.max.x * pitch, centre.x() + radius + kMeshBand_mm - pitch);
 }
@@ -99,7 +99,7 @@ TEST(MeshDistance, RefusesWhatIsNoSolidOrTooLarge) {
   refused(sphere_mesh(100.0, {0, 0, 0}, 1), 0.1, "million");
   refused(sphere_mesh(0.01, {0, 0, 0}, 1), 0.5, "less than one sample");
   refused(sphere_mesh(4.0, {0, 0, 0}, 1), 0.0, "pitch");
-  refused(sphere_mesh(200.0, {1e10, 0, 0}, 1), 1.0, "mm from the origin");  // its samples have no numbers of 32 bits
+  refused(sphere_mesh(200.0, {1e10, 0, 0}, 1), 1.0, "mm from the origin");  // its samples have no 32-bit indices
   TriangleMesh broken = sphere_mesh(4.0, {0, 0, 0}, 1);
   broken.positions_mm[0][1] = std::nanf("");
   refused(broken, 0.5, "not numbers");
@@ -108,7 +108,7 @@ TEST(MeshDistance, RefusesWhatIsNoSolidOrTooLarge) {
   refused(broken, 0.5, "corners");
 }
 
-// A ball from an STL file cuts what a ball cuts.
+// A ball from an STL file cuts like a ball.
 TEST(MeshDistance, AToolFromAnStlFileCutsItsShape) {
   const test::TempDir temp;
   const double radius = 2.5;

@@ -54,7 +54,7 @@ TEST(Metal, IsFoundInTheCase) {
   EXPECT_TRUE(test::plain_block(24.0, 12.0, kPitch_mm).hard_leaves().empty());
 }
 
-// Of each sample of a level, what the nearest sample of level 0 is that is bone.
+// For each sample of a level, the tissue of the nearest level-0 sample that is bone.
 TEST(Metal, IsKnownOnEveryLevel) {
   const Case bone = plate_block();
   for (int level = -2; level <= 2; ++level) {
@@ -68,7 +68,7 @@ TEST(Metal, IsKnownOnEveryLevel) {
     for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
       for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
         for (std::int32_t z = box.min.z; z <= box.max.z; ++z, ++i) {
-          // Half-way between samples either may be the nearest.
+          // Half-way between two samples either may be the nearest.
           const Vec3 p = position_mm({x, y, z}, pitch_mm);
           const Tissue above = plate(p + Vec3::Constant(0.5 * kPitch_mm)),
                        below = plate(p - Vec3::Constant(0.5 * kPitch_mm));
@@ -82,14 +82,14 @@ TEST(Metal, IsKnownOnEveryLevel) {
   }
 }
 
-// The tip may be as deep in the plate as the case's samples are apart, whatever the level of the cut.
+// The tip may enter the plate by the distance of the case's samples, whatever the level of the cut.
 TEST(Metal, IsMetDeeperThanAVoxel) {
   const CutField field(plate_block(), BodyId{});
   for (const char* name : {"burr-round-5", "drill-3.2"})
     for (int level = 0; level <= 2; ++level)
       for (const double deep_mm : {-1.0, 0.0, 0.4, 0.6, 2.0}) {
         const Tool tool = *find_tool(name);
-        // A drill's point is a cone: it is as deep at its axis as the distance to its flanks.
+        // A drill's point is a cone: at its axis it is as deep as the distance to its flanks.
         const double cone = tool.kind == ToolKind::drill ? std::sin(0.5 * 118.0 / 180.0 * std::numbers::pi) : 1.0;
         Cut cut = test::straight_cut(tool, {0, 0, 1}, {0, 0, -5.0 - deep_mm / cone}, kDown);
         cut.level = level;
@@ -99,8 +99,8 @@ TEST(Metal, IsMetDeeperThanAVoxel) {
                      test::straight_cut(*find_tool("burr-round-5"), {0, 0, 1}, {0, 0, -7}, kDown)));
 }
 
-// Both ends of the way are clear of the rod, and the middle is not: moved across, and turned about the far end of the
-// tool.
+// Both ends of the path are clear of the rod, but the middle is not. The tool moves across it, or turns about its far
+// end.
 TEST(Metal, IsMetAnywhereOnTheWay) {
   const CutField field(test::marked_block(24.0, 12.0, kPitch_mm, rod), BodyId{});
   const Tool burr = *find_tool("burr-round-5");
@@ -121,7 +121,7 @@ TEST(Metal, IsMetAnywhereOnTheWay) {
   EXPECT_TRUE(meets(field, turn));
 }
 
-// Cuts that graze it by less than a voxel each do not add up.
+// Cuts that each touch it by less than a voxel do not add up.
 TEST(Metal, IsNotShavedAwayVoxelByVoxel) {
   CutField field(plate_block(), BodyId{});
   int taken = 0;
@@ -135,13 +135,13 @@ TEST(Metal, IsNotShavedAwayVoxelByVoxel) {
   EXPECT_LT(field.solid_mm({0, 0, -6}), 0.0);
 }
 
-// What is no longer there cannot be taken away, and what is left of it in another body can.
+// Metal that is gone cannot be taken away. What is left of it in another body can.
 TEST(Metal, CountsWhereItIsStillThere) {
   const Case bone = plate_block();
   CutField gone(bone, BodyId{0});
   const CutField whole(bone, BodyId{1});
   const Cut cut = test::straight_cut(*find_tool("burr-round-5"), {0, 0, -4}, {0, 0, -8}, kDown);
-  // As where a piece with the plate in it was taken away.
+  // As if a piece with the plate in it had been removed.
   for (double x = -14; x <= 14; x += 2)
     for (double y = -14; y <= 14; y += 2)
       gone.apply(test::straight_cut(*find_tool("burr-round-5"), {x, y, -4}, {x, y, -9}, kDown));

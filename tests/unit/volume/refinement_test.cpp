@@ -34,7 +34,7 @@ TEST(Refinement, BothMethodsGiveTheSameBone) {
     }
     EXPECT_EQ(whole.hash(), local.hash());
     EXPECT_EQ(whole.sub_volumes().size(), resampled);
-    // The same f at every sample, where something was resampled and where not.
+    // The same f at every sample, whether it was resampled or not.
     const CoordBox box{{-40 << level, -37 << level, -22 << level}, {38 << level, 41 << level, 5 << level}};
     const Coord d = box.dims();
     std::vector<float> a(static_cast<std::size_t>(d.x) * static_cast<std::size_t>(d.y) * static_cast<std::size_t>(d.z)),

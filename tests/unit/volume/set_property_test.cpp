@@ -1,4 +1,4 @@
-// A bone is a function of the set of its cuts: no order and no repetition changes its name.
+// A bone is a function of the set of its cuts: order and repetition do not change its hash.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -41,7 +41,7 @@ TEST(SetProperty, EveryOrderWithRepeatsGivesOneName) {
 }
 
 TEST(SetProperty, EveryCutMatters) {
-  // Else the test above could pass with cuts that do nothing.
+  // Otherwise the test above could pass with cuts that do nothing.
   constexpr std::size_t kCuts = 40;
   const Case bone = ball_of_bone();
   Random random(6);

@@ -1,4 +1,4 @@
-// What a set of cuts leaves of a bone: the same in every order, though debris and pieces come off on the way.
+// What a set of cuts leaves of a bone is the same in every order, though debris and fragments are separated on the way.
 #include "common/volume/settled.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ Cut swept(const Tool& tool, const Pose& from, const Pose& to, int level) {
   return cut;
 }
 
-// A cut of a blade straight down at x or y = `at`, to the depth `deep`; it reaches beyond the block on both sides.
+// A blade's cut straight down at x or y = `at`, to the depth `deep`. It reaches beyond the block on both sides.
 Cut kerf(const Vec3& across, const Vec3& at, double deep) {
   return swept(*find_tool("saw-oscillating-1"), pose_across(at + Vec3(0, 0, 1), kDown, across),
                pose_across(at - Vec3(0, 0, deep), kDown, across), 2);
@@ -40,8 +40,8 @@ Cut kerf(const Vec3& across, const Vec3& at, double deep) {
 Cut kerf_at_x(double x, double deep) { return kerf(Vec3::UnitY(), {x, 0, 0}, deep); }
 Cut kerf_at_y(double y, double deep) { return kerf(Vec3::UnitX(), {0, y, 0}, deep); }
 
-// Eight tools go across a block of 9 x 9 x 4 mm. Blades saw a net of kerfs, which leaves crumbs. The other tools take
-// some of the crumbs away, or what holds them, sooner or later.
+// Eight tools go across a block of 9 x 9 x 4 mm. Blades saw a net of kerfs, which leaves small fragments. Sooner or
+// later the other tools take some of the fragments away, or what holds them.
 std::vector<Cut> crossing_cuts(std::size_t count, const std::array<int, 3>& levels) {
   constexpr std::array kTools = {"saw-oscillating-3", "burr-round-3.2", "saw-oscillating-1", "drill-1-8in",
                                  "saw-reciprocating", "burr-barrel",    "saw-oscillating-2", "drill-3.2"};
@@ -53,7 +53,7 @@ std::vector<Cut> crossing_cuts(std::size_t count, const std::array<int, 3>& leve
     const double x = random.between(-4.5, 4.5), y = random.between(-4.5, 4.5), turn = random.between(0.0, 3.1);
     const double deep = blade ? random.between(1.2, 2.6) : random.between(0.1, 0.6);
     const int level = levels[i % levels.size()];
-    // Some blades go in from the side, under what others have sawn.
+    // Some blades enter from the side, under what others have sawn.
     if (blade && i % 3 == 0) {
       const auto at = [&](double tip) { return pose_across({tip, y, -deep}, Vec3::UnitX(), Vec3::UnitY()); };
       cuts.push_back(swept(tool, at(-15.0), at(0.5 * x), level));
@@ -72,7 +72,7 @@ std::string name_of(const Settled& settled, double pitch_mm) {
   return to_hex(field_hash(std::move(leaves), pitch_mm));
 }
 
-// A bone as a room keeps it: what comes apart goes at once, as it is at that moment.
+// A bone as in a room: a separated part leaves at once, in its state at that moment.
 struct Cutting {
   CutField field;
   FragmentFinder finder;
@@ -96,7 +96,7 @@ struct Cutting {
       history.add_mask({seq}, std::move(fragment.taken));
     }
   }
-  // The bone with nothing but its cuts, settled.
+  // The bone with only its cuts, settled.
   [[nodiscard]] Settled settled() {
     history.undo(field, taken);
     return settle(std::move(field));
@@ -125,13 +125,13 @@ TEST(Settled, AHundredOrdersOfFortyCutsWithDebrisLeaveOneBone) {
   RecordProperty("debris", debris);
   RecordProperty("pieces", pieces);
   RecordProperty("bones_as_they_fell", static_cast<int>(fallen.size()));
-  EXPECT_GE(debris, 2 * kOrders) << "else debris is not what is tried here";
+  EXPECT_GE(debris, 2 * kOrders) << "otherwise this does not test debris";
   EXPECT_LT(orders_without, kOrders / 10);
-  EXPECT_GT(fallen.size(), 1u) << "else settling would have nothing to do";
+  EXPECT_GT(fallen.size(), 1u) << "otherwise there is nothing to settle";
   EXPECT_EQ(settled.size(), 1u);
 }
 
-// The other road to what is solid: distances of every sample to every tool, and a flood over one dense lattice.
+// Another way to find what is solid: distances of every sample to every tool, and a flood fill over one dense lattice.
 TEST(Settled, HoldsWhatDistancesAndAFloodSay) {
   const Case bone = plain_block(9.0, 4.0, 0.8);
   const double pitch = level_pitch_mm(bone.pitch_mm(), 2);
@@ -182,7 +182,8 @@ TEST(Settled, HoldsWhatDistancesAndAFloodSay) {
   for (const Cut& cut : cuts) whole.apply(cut);
   const Settled settled = settle(std::move(whole));
   EXPECT_EQ(settled.bodies.size() + static_cast<std::size_t>(settled.debris), sizes.size());
-  // Each part is in one body, or, if small, in none. By samples a volume is known to the part's surface only.
+  // Each part is in one body, or in none if it is small. Samples give a volume only to the accuracy of the part's
+  // surface.
   std::vector<std::set<int>> in_bodies(sizes.size());
   std::size_t differing = 0;
   for (std::size_t b = 0; b < settled.bodies.size(); ++b) {
@@ -213,12 +214,13 @@ TEST(Settled, HoldsWhatDistancesAndAFloodSay) {
   EXPECT_GT(gone, 1);
 }
 
-// A column of 0.73 x 2.73 mm, 1 mm high, sawn out of a corner is a piece of 2 mm3; a kerf across it makes two halves of
-// 0.53 mm3 of it, which are debris. Sawn in this order the piece comes off first; the other way round only debris does.
+// A column of 0.73 x 2.73 mm, 1 mm high, is sawn out of a corner: a fragment of 2 mm3. A kerf across it makes two
+// halves of 0.53 mm3, which are debris. In this order the fragment is separated first. In the other order only debris
+// is.
 TEST(Settled, APieceThatIsCutUpIsDebrisInEveryOrder) {
   const Case bone = plain_block(12.0, 6.0, 0.5);
   const double half = 0.5 * 1.27, column_x = 6.0 - 0.73, column_y = 6.0 - 2.73, deep = 1.0;
-  // Under the column and no farther, from the side: 8 mm wide, a kerf of 1.1 mm.
+  // From the side, under the column and no farther: 8 mm wide, with a kerf of 1.1 mm.
   const Tool blade = *find_tool("saw-reciprocating");
   const auto under = [&](double tip) {
     return pose_across({tip, column_y - half + 4.0, -deep - 0.55}, -Vec3::UnitX(), Vec3::UnitY());

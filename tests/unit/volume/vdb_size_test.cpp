@@ -1,4 +1,4 @@
-// What a .vdb file declares is known before OpenVDB believes it.
+// The size that a .vdb file declares is checked before OpenVDB uses it.
 #include "common/volume/vdb_size.hpp"
 
 #include <gtest/gtest.h>
@@ -78,10 +78,10 @@ TEST_F(VdbSizeTest, RefusesAFileThatEndsTooEarly) {
   }
 }
 
-// Each of these took OpenVDB 6 to 18 GB of memory, or half a minute.
+// Each of these files made OpenVDB use 6 to 18 GB of memory, or half a minute.
 TEST_F(VdbSizeTest, RefusesWhatMakesOpenVdbAllocate) {
   constexpr std::size_t kFirstGrid = 100,
-                        kMetadata = 128;  // where the first grid is; how many entries of metadata it has
+                        kMetadata = 128;  // position of the first grid; number of metadata entries
   for (const Changes& changes :
        {Changes{{kFirstGrid + 2, 16}}, Changes{{kMetadata + 1, 253}}, Changes{{kMetadata + 7, 127}}}) {
     const auto out = measured(changed(changes));
@@ -91,7 +91,7 @@ TEST_F(VdbSizeTest, RefusesWhatMakesOpenVdbAllocate) {
   }
 }
 
-// A sound file of a few kilobytes: a constant of the whole neighbourhood. Listing its leaves took 1.6 GB.
+// A valid file of a few kilobytes: a constant in the whole neighbourhood. Listing its leaves took 1.6 GB.
 TEST_F(VdbSizeTest, CountsTheLeavesOfLargeConstants) {
   start_openvdb();
   for (const openvdb::Index level : {2u, 3u}) {

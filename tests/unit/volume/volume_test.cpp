@@ -17,7 +17,7 @@ constexpr double kPi = std::numbers::pi;
 
 TEST(Case, MeasuresTheVolumeOfABlock) {
   const Case bone = plain_block(12.0, 10.0, 0.5);
-  // Edges are rounded off by the pitch, so a little is missing.
+  // Edges are rounded by the pitch, so a little volume is missing.
   EXPECT_NEAR(bone.volume_mm3(), 12.0 * 12.0 * 10.0, 0.01 * 1440.0);
 }
 
@@ -30,7 +30,7 @@ TEST(Case, KnowsDistanceDensityAndClearance) {
   EXPECT_EQ(bone.tissue({0, 0, -4}), Tissue::cortical);
   EXPECT_EQ(bone.tissue({0, 0, -16}), Tissue::trabecular);
   EXPECT_EQ(bone.tissue({0, 0, 2}), Tissue::none);
-  // Never more than the true distance, and of use far away.
+  // Never more than the true distance, and still useful far away.
   for (double height = 0.0; height < 60.0; height += 0.7)
     EXPECT_LE(bone.clearance_mm({0.3, 0.2, height}), height + 1e-6);
   EXPECT_GT(bone.clearance_mm({0.0, 0.0, 50.0}), 20.0);
@@ -78,7 +78,7 @@ TEST(Case, RefusesWhatIsNotACaseInOneSentenceNamingIt) {
   for (const char* name : {"version", "tampered", "broken", "cut-off"}) ASSERT_TRUE(bone.save(temp / name));
   replace_in(temp / "version" / "case.json", "\"schema_version\": 1", "\"schema_version\": 99");
   EXPECT_NE(message("version").find("99"), std::string::npos);
-  // Undefined as an int: the sanitizers see it.
+  // Undefined behaviour as an int: the sanitizers would detect it.
   replace_in(temp / "version" / "case.json", "\"schema_version\": 99", "\"schema_version\": 1e17");
   EXPECT_NE(message("version").find("schema_version is 1e+17"), std::string::npos);
   replace_in(temp / "tampered" / "case.json", "\"pitch_mm\": 0.5", "\"pitch_mm\": 0.6");
@@ -99,7 +99,7 @@ TEST(Case, DoesNotOverwriteAndLeavesNothingBehind) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), std::filesystem::directory_iterator()), 1);
 }
 
-// Cuts level 2, so pitch 4h gives cuts at h.
+// Cuts on level 2, so a pitch of 4h gives cuts at h.
 double drilled_mm3(double cut_pitch) {
   const Tool drill = *find_tool("drill-3.2");
   CutField field(plain_block(12.0, 8.0, 4.0 * cut_pitch), {});
@@ -121,7 +121,7 @@ double burred_mm3(double cut_pitch) {
 }
 
 TEST(CutField, ASphereCutsItsCapAndTheErrorShrinksWithThePitch) {
-  // Of a sphere of radius R all but the cap of height R − 1.5 above the face is in bone.
+  // Of a sphere of radius R, all but the cap of height R − 1.5 above the face is in bone.
   const double r = 2.5, cap = r - 1.5;
   const double exact = 4.0 / 3.0 * kPi * r * r * r - kPi * cap * cap * (3.0 * r - cap) / 3.0;
   EXPECT_NEAR(burred_mm3(0.125), exact, 0.005 * exact);
@@ -197,8 +197,8 @@ TEST(CutField, UncutBoneKeepsItsDepthBesideACut) {
   EXPECT_NEAR(solid.back(), before, 1e-3);
 }
 
-// A large cut is shared out to threads and finds out at once what matters in each leaf; leaf by leaf it is neither. The
-// field and what is said of it must be the same, also where leaves became all removed.
+// A large cut is distributed to threads and finds at once what matters in each leaf. A cut leaf by leaf does neither.
+// The field and its report must be the same, also in leaves that became completely removed.
 TEST(CutField, ALargeCutIsThatOfItsLeavesOneByOne) {
   const Case bone = plain_block(40.0, 20.0, 0.5);
   const Tool mill = *find_tool("burr-round-5");
@@ -220,7 +220,7 @@ TEST(CutField, ALargeCutIsThatOfItsLeavesOneByOne) {
   EXPECT_EQ(whole.changed_leaves, changed);
   EXPECT_EQ(at_once.memory_bytes(), one_by_one.memory_bytes());
   EXPECT_GT(at_once.memory_bytes(), 4u * kLeafVoxels * changed.size() / 2);
-  // Again it changes nothing.
+  // Applying it again changes nothing.
   EXPECT_EQ(at_once.apply(cut).modified, 0);
   EXPECT_EQ(at_once.hash(), one_by_one.hash());
 }

@@ -1,5 +1,5 @@
-// One hand leads another's: the pull begins and ends anywhere without a jump, brings the hands together however late
-// states come, and gives no energy that the leading hand's motion has not paid.
+// One hand guides another's. The pull begins and ends anywhere without a jump. It brings the hands together however
+// late states arrive. It gives no energy that the guiding hand's motion has not paid.
 #include "haptic_client/control/guidance_spring.hpp"
 
 #include <gtest/gtest.h>
@@ -21,7 +21,7 @@ using osteon::test::Random;
 
 constexpr double kT = 1e-3, kSlew_n = 0.5, kBudget_mj = 0.01;
 
-// States of a leading hand as a bad line brings them: now and then, late, some lost, some out of order.
+// States of a guiding hand over a bad connection: irregular, late, some lost, some out of order.
 class BadLine {
  public:
   BadLine(int delay_ms, double jitter_ms, double loss, double hz)
@@ -48,7 +48,7 @@ class BadLine {
   std::deque<std::pair<double, GuideSeen>> on_the_way_;
 };
 
-// A led hand in the air; device and bone frames are alike.
+// A guided hand in the air. Device and bone frames are alike.
 struct Led {
   explicit Led(double holds_n_per_mm) : hand(params(holds_n_per_mm), Vec3::Zero()) {}
   static HandParams params(double holds_n_per_mm) {
@@ -56,7 +56,7 @@ struct Led {
     params.stiffness_n_per_mm = params.lateral_n_per_mm = holds_n_per_mm;
     return params;
   }
-  // One tick; what the pull does to the hand.
+  // Runs one tick. Returns the force of the pull on the hand.
   Vec3 tick(const GuideSeen& seen, double share = 1.0) {
     hand.step({.mode = HandMode::carry, .target_mm = rest_mm}, force_n, kT);
     const Vec3 moved_mm = hand.position_mm() - handle_mm;
@@ -68,7 +68,7 @@ struct Led {
     smoothed_mm = pull.smoothed_mm();
     force_n =
         pull.step({.handle_mm = handle_mm, .guide_mm = smoothed_mm, .share = share, .room_n = 60.0, .slew_n = kSlew_n});
-    // The far end goes no faster than the other's hand and what it makes up; no more than this can it put in.
+    // The far end moves no faster than the other hand plus what it catches up. It can put in no more energy than this.
     paid_mj += std::max(force_n.norm(), before_n.norm()) * far_mm_per_s * kT;
     over_mj = std::max(over_mj, given_mj - paid_mj);
     const double square = before_n.squaredNorm();
@@ -86,9 +86,9 @@ struct Led {
 
 class GuideOverLine : public ::testing::TestWithParam<int> {};
 
-// It begins 25 mm off, follows a circle, rests, is silent, and comes back 40 mm elsewhere.
+// It begins 25 mm away, follows a circle, rests, is silent, and comes back 40 mm elsewhere.
 TEST_P(GuideOverLine, BringsTheHandAlongWithoutAJump) {
-  Led led(0.02);  // a hand that lets itself be led
+  Led led(0.02);  // a hand that does not resist
   BadLine line(GetParam(), 20.0, 0.3, 60.0);
   double far_mm = 0.0, rested_mm = 1e9;
   const auto place = [](int i) {
@@ -101,13 +101,13 @@ TEST_P(GuideOverLine, BringsTheHandAlongWithoutAJump) {
     if (i > 3500 && i < 8000) far_mm = std::max(far_mm, (led.handle_mm - place(i)).norm());
     if (i > 10'000) rested_mm = std::min(rested_mm, (led.handle_mm - place(i)).norm());
   }
-  // On its way it is as far behind as the states are late, and some tens of milliseconds, at 10 mm/s.
+  // At 10 mm/s it lags by the delay of the states and some tens of milliseconds.
   std::printf(
       "  %d ms late: %.2f mm behind, %.3f mm off at rest, %.2f N at most, step %.3f N, over %.4f mJ, worst %.5f mJ\n",
       GetParam(), far_mm, rested_mm, led.most_n, led.step_n, led.over_mj, led.pull.energy().worst_mj);
   EXPECT_LT(far_mm, 10.0 * (1e-3 * GetParam() + 0.2) + 0.2);
   EXPECT_LT(rested_mm, 0.2);
-  // Silence: within a quarter of a second it begins to fade, and within another it is gone.
+  // In silence the pull begins to fade within a quarter of a second, and is gone within another.
   GuideSeen last = line.tick(place(11'000));
   for (int i = 0; i < 520; ++i) led.tick(last);
   EXPECT_EQ(led.force_n.norm(), 0.0);
@@ -127,7 +127,7 @@ TEST_P(GuideOverLine, BringsTheHandAlongWithoutAJump) {
 
 INSTANTIATE_TEST_SUITE_P(Delays, GuideOverLine, ::testing::Values(0, 50, 150));
 
-// A hand that holds back feels no more than the bound, and is not worn down.
+// A hand that resists feels no more than the bound, and the pull does not build up.
 TEST(GuidanceSpring, AHandThatHoldsBackFeelsABoundedPull) {
   Led led(5.5);
   GuideSeen seen{true, 1, {80, 0, 0}};
@@ -138,7 +138,7 @@ TEST(GuidanceSpring, AHandThatHoldsBackFeelsABoundedPull) {
   EXPECT_NEAR(led.force_n.norm(), 30.0, 0.5);
   EXPECT_LE(led.most_n, 30.0 + 1e-9);
   EXPECT_NEAR(led.handle_mm.x(), 30.0 / 5.5, 0.3);
-  // Half the share, half of it; and no share, none.
+  // Half the share gives half the pull, and no share gives none.
   for (int i = 0; i < 1000; ++i) {
     if (i % 16 == 0) ++seen.state_seq;
     led.tick(seen, 0.5);
@@ -152,7 +152,7 @@ TEST(GuidanceSpring, AHandThatHoldsBackFeelsABoundedPull) {
   EXPECT_LE(led.step_n, kSlew_n + 1e-9);
 }
 
-// A rig that throws the handle about near a guide that stands: what the spring gives back is what it got.
+// A rig throws the handle about near a guide that stands still. The spring must give back no more than it got.
 TEST(GuidanceSpring, AHandleThatIsThrownAboutGetsNothingForNothing) {
   Random random(5);
   GuidanceSpring pull;
@@ -177,8 +177,9 @@ TEST(GuidanceSpring, AHandleThatIsThrownAboutGetsNothingForNothing) {
   EXPECT_LE(pull.energy().worst_mj, kBudget_mj);
 }
 
-// The same where contact comes and goes at once beside the pull, which makes up for that (slew.hpp) in whatever
-// direction. The handle stays so near that the far end stands where the guide does: work that the hand gets is all the
+// The same with contact that comes and goes at once beside the pull. The pull compensates that (slew.hpp) in any
+// direction.
+// The handle stays so near that the far end stands where the guide does. All work that the hand gets is then the
 // spring's, whose store was empty.
 TEST(GuidanceSpring, MakesUpForContactOutOfWhatTheHandHasPaid) {
   Random random(9);
@@ -210,14 +211,14 @@ TEST(GuidanceSpring, MakesUpForContactOutOfWhatTheHandHasPaid) {
   }
   ASSERT_GT(far_mm, 1.0);
   ASSERT_LT(far_mm, 5.0);
-  EXPECT_GT(aside_n, 2.0) << "it makes up for contact";
+  EXPECT_GT(aside_n, 2.0) << "it compensates for contact";
   EXPECT_LE(most_mj, kBudget_mj);
   std::printf("  %.2f mm away, %.5f mJ given at most, %.2f mJ in the end; %.2f N aside\n", far_mm, most_mj, given_mj,
               aside_n);
 }
 
-// A device that is gone, a clutch, a loop that comes late: no force at once, and the pull begins anew from where the
-// handle is.
+// A lost device, a clutch, or a late loop: the force is zero at once, and the pull begins anew from the handle's
+// position.
 TEST(GuidanceSpring, BeginsAnewAfterASafetyZero) {
   Led led(0.02);
   GuideSeen seen{true, 1, {30, 0, 0}};
@@ -245,8 +246,8 @@ TEST(GuidanceSpring, BeginsAnewAfterASafetyZero) {
   EXPECT_LE(led.step_n, kSlew_n + 1e-9);
 }
 
-// In the loop: a hand that works in the bone is led aside while it is stopped, and let go again; with the contact
-// together no step is above the limit, and no force above the device's or the instructor's.
+// In the loop: a hand that works in the bone is guided aside while it is stopped, and is released again. With the
+// contact, no step exceeds the slew limit, and no force exceeds the device's or the instructor's limit.
 class LedAtTheBone : public ::testing::TestWithParam<std::tuple<int, bool>> {};
 TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
   const auto [delay_ms, weak] = GetParam();
@@ -291,7 +292,7 @@ TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
   EXPECT_EQ(crossed.allocations, 0);
 }
 
-// A hand is led into bone that holds it; a limit is set on what it feels. Both forces come down, neither first.
+// A hand is guided into bone that holds it, and a force limit is set. Both forces come down together.
 TEST(LimitOfForce, LetsNeitherContactNorPullGoAtOnce) {
   OverseenHand hand({});
   Restrictions led;
@@ -324,8 +325,8 @@ TEST(LimitOfForce, LetsNeitherContactNorPullGoAtOnce) {
   EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
 }
 
-// Another's bur beside the own one pushes it aside, within the same limit together with all else; who leads the hand,
-// or has its tool, by whatever program and with whatever hand, is where it is and pushes nothing.
+// Another person's bur beside the own one pushes it aside, within the same limit for all forces together. A partner who
+// guides the hand or has taken its tool pushes nothing, whatever program and tool they use.
 TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
   for (const bool weak : {false, true}) {
     OverseenHand hand({.weak = weak});
@@ -335,14 +336,14 @@ TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
     double most_n = 0.0;
     for (int i = 0; i < 9000; ++i) {
       hand.command.target_mm = Vec3(4.0 * std::sin(1.5e-3 * i), 0, std::min(1.5, -3.0 + 6e-3 * i));
-      // Some two millimetres within it, to and fro; it jumps there as states do.
+      // About two millimetres within it, to and fro. It jumps there, as states do.
       const Vec3 beside_mm(3.5 + 2.0 * std::sin(0.7e-3 * (i - i % 16)), 0, hand.command.target_mm.z());
       hand.partners = {{2, {beside_mm, Eigen::Quaterniond::Identity()}, 0.03, &solid}};
       Restrictions led;
       led.guide = AuthorId{2};
       led.guide_share = 300;
       if (i == 6000) hand.decide(led);
-      if (i == 7500) hand.decide({.taken_by = AuthorId{77}});  // a console: of the person whose hand is 2
+      if (i == 7500) hand.decide({.taken_by = AuthorId{77}});  // a console of the person whose hand is 2
       const LoopReport now = hand.tick();
       most_n = std::max(most_n, now.partner_device_n.norm());
       if (i > 6001) {

@@ -1,4 +1,4 @@
-// What a log says of a decision about the hand, and of who made it.
+// Tests what a log says of a decision about the hand, and of who made it.
 #include <gtest/gtest.h>
 
 #include "haptic_client/control/supervision_guard.hpp"
@@ -6,7 +6,7 @@
 namespace osteon::haptic {
 namespace {
 
-TEST(OversightWords, SayAllThatHolds) {
+TEST(RestrictionWords, SayAllThatHolds) {
   EXPECT_EQ(in_words({}), "");
   EXPECT_EQ(in_words({.stopped = true, .words = "look here"}), "stopped");
   EXPECT_EQ(in_words({.stopped = true,
@@ -21,11 +21,11 @@ TEST(OversightWords, SayAllThatHolds) {
             "with 2 tools only");
 }
 
-TEST(OversightWords, SayWhoDecided) {
+TEST(RestrictionWords, SayWhoDecided) {
   EXPECT_EQ(called({AuthorId{7}, "Dr. Weber"}), "Dr. Weber");
   EXPECT_EQ(called({AuthorId{7}, ""}), "#7");
-  EXPECT_EQ(called({}), "") << "of a server that does not say it";
-  EXPECT_EQ(called({AuthorId{7}, "Ada\x1b[2J\n"}), "Ada?[2J?") << "nobody's name moves the cursor";
+  EXPECT_EQ(called({}), "") << "from a server that does not send it";
+  EXPECT_EQ(called({AuthorId{7}, "Ada\x1b[2J\n"}), "Ada?[2J?") << "a name must not move the cursor";
   EXPECT_EQ(called({AuthorId{7}, "Jörg"}), "Jörg");
 }
 

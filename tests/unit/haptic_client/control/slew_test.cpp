@@ -1,4 +1,4 @@
-// What of a force is growth, and what a part of it is to be so that the whole grows slowly.
+// Tests which part of a force is growth, and how a part must change so that the whole grows slowly.
 #include "haptic_client/control/slew.hpp"
 
 #include <gtest/gtest.h>
@@ -16,17 +16,18 @@ TEST(Slew, LesseningIsNoGrowth) {
   EXPECT_EQ(growth(Vec3(1, 0, 0), now).norm(), 0.0);
   EXPECT_EQ(growth(Vec3(6, 0, 0), now), Vec3(2, 0, 0));
   EXPECT_EQ(growth(Vec3(3, 1, 0), now), Vec3(0, 1, 0));
-  EXPECT_EQ(growth(Vec3(-1, 0, 0), now), Vec3(-1, 0, 0));  // it comes down to nothing at once, and grows from there
+  EXPECT_EQ(growth(Vec3(-1, 0, 0), now), Vec3(-1, 0, 0));  // it falls to zero at once, and grows from there
   EXPECT_EQ(growth(Vec3(1, 2, 3), Vec3::Zero()), Vec3(1, 2, 3));
 }
 
-// A hand is led by 2 N against bone that holds it with as much; the bone gives way to a half, or to nothing.
+// A hand is guided by 2 N against bone that holds it with the same force. The bone then holds it with half of that, or
+// not at all.
 TEST(Slew, APullIsLessenedAsWhatHeldItBack) {
   const Vec3 pull(2, 0, 0);
   EXPECT_EQ(held_to(0.25, pull, -pull, Vec3::Zero()), pull);
   EXPECT_EQ(held_to(0.25, pull, -0.5 * pull, Vec3::Zero()), Vec3(1.25, 0, 0));
   EXPECT_EQ(held_to(0.25, pull, Vec3::Zero(), Vec3::Zero()), Vec3(0.25, 0, 0));
-  EXPECT_EQ(held_to(0.0, pull, Vec3::Zero(), Vec3(3, 0, 0)), pull);  // what is less than before is shown whole
+  EXPECT_EQ(held_to(0.0, pull, Vec3::Zero(), Vec3(3, 0, 0)), pull);  // a force below the one before is shown in full
 }
 
 TEST(Slew, TheWholeNeverGrowsFasterNorLargerThanItMay) {
@@ -40,7 +41,7 @@ TEST(Slew, TheWholeNeverGrowsFasterNorLargerThanItMay) {
     ASSERT_LE(whole.norm(), std::max(before.norm(), (rest + pull).norm()) + 1e-12);
     most_n = std::max(most_n, growth(rest + pull, before).norm());
   }
-  EXPECT_GT(most_n, 3.0) << "where the pull stays as it is";
+  EXPECT_GT(most_n, 3.0) << "if the pull does not change";
 }
 
 }  // namespace

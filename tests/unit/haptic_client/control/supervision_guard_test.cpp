@@ -1,4 +1,4 @@
-// A hand whose instructor stops it, takes its tool, limits it and takes back what it cut, while it presses on bone.
+// An instructor stops a hand, takes its tool, limits it and undoes its cuts while it presses on bone.
 #include "haptic_client/control/supervision_guard.hpp"
 
 #include <gtest/gtest.h>
@@ -22,27 +22,26 @@ ZoneLimit ball(const Vec3& centre_mm, double radius_mm) {
           static_cast<std::int32_t>(radius_mm / kQuantum_mm)};
 }
 
-TEST(SupervisionGuard, ADatagramsWordHoldsUntilANewerRow) {
+TEST(SupervisionGuard, ADatagramsFlagHoldsUntilANewerLogEntry) {
   SupervisionGuard guard;
   EXPECT_TRUE(guard.may_cut(0, Vec3::Zero()));
   guard.set(StopFlag{7, true});
   EXPECT_TRUE(guard.stopped());
   HapticRestrictions row;
-  row.lease_epoch = 6;  // of before
+  row.lease_epoch = 6;  // from before
   guard.set(row);
   EXPECT_TRUE(guard.stopped());
   row.lease_epoch = 7;
   row.stopped = true;
   guard.set(row);
   EXPECT_TRUE(guard.stopped());
-  // A rejection raises the epoch while the hand is stopped; where the way of datagrams then ends, the flag stays as it
-  // was.
+  // A rejection raises the epoch while the hand is stopped. If the fast path then ends, the stop flag stays as it was.
   guard.set(StopFlag{9, true});
   row.lease_epoch = 10;
   row.stopped = false;
   guard.set(row);
   EXPECT_FALSE(guard.stopped());
-  // What a flag gives back before its row has come is not believed.
+  // A flag that allows something before its log entry has arrived is ignored.
   row.stopped = true;
   row.lease_epoch = 11;
   guard.set(row);
@@ -79,7 +78,7 @@ TEST(SupervisionGuard, ForceComesDownToItsLimitAndUpAgainNoFasterThanItMay) {
   EXPECT_EQ(ticks, 110);
 }
 
-// What the loop keeps to is what the room judges by.
+// The loop must obey the same limits by which the room judges cuts.
 TEST(SupervisionGuard, KeepsToWhatTheRoomWouldRefuse) {
   const std::vector<ToolModel> tools{ToolModel(*find_tool("burr-round-5"), 0.5),
                                      ToolModel(*find_tool("drill-3.2"), 0.5)};
@@ -102,14 +101,14 @@ TEST(SupervisionGuard, KeepsToWhatTheRoomWouldRefuse) {
   EXPECT_TRUE(guard.may_cut(1, {1, 2, 3}));
 }
 
-// How the hand of these tests is pressed: a bur to and fro on the bone, or a drill straight in.
+// How the hand of these tests presses: a bur to and fro on the bone, or a drill straight in.
 class Pressed {
  public:
   explicit Pressed(const OverseenRun& run) : hand(run), drills_(std::string_view(run.tool) == "drill-3.2") {
     hand.pedal = true;
     hand.run(400);  // the spindle comes up in the air
   }
-  // So many milliseconds of work; true when anything was cut.
+  // Works for `ticks` milliseconds. True if anything was cut.
   bool work(int ticks) {
     const std::int64_t before = hand.crossed().cutting;
     for (int i = 0; i < ticks; ++i, ++t_) {
@@ -126,7 +125,7 @@ class Pressed {
     }
     return hand.crossed().cutting > before;
   }
-  // Out of the bone and of what has come back in it: it goes down slowly enough to leave no overhang.
+  // Moves out of the bone and of bone that came back. It goes down slowly enough to leave no overhang.
   void lift() {
     hand.command.mode = HandMode::carry;
     const Vec3 from_mm = hand.handle_mm();
@@ -162,8 +161,8 @@ class Overseen : public ::testing::TestWithParam<std::tuple<const char*, int, bo
   OverseenRun run_;
 };
 
-// From the tick on in which the hand hears of it nothing is cut, and the bone stays as hard as it was; what went up
-// meanwhile is refused and comes back. Given back, it cuts on.
+// From the tick in which the hand gets the decision, nothing is cut and the bone stays as hard as it was. Cuts sent
+// before are rejected and the bone comes back. When the hand is released, it cuts on.
 TEST_P(Overseen, StopsInTheBoneAndGoesOn) {
   Pressed pressed(run_);
   OverseenHand& hand = pressed.hand;
@@ -176,11 +175,11 @@ TEST_P(Overseen, StopsInTheBoneAndGoesOn) {
     pressed.work(run_.delay_ms);  // on its way
     const std::size_t cuts = hand.cuts().size();
     EXPECT_FALSE(pressed.work(1200)) << round;
-    EXPECT_LE(hand.cuts().size(), cuts + 2) << "what was open is closed, and no more";
+    EXPECT_LE(hand.cuts().size(), cuts + 2) << "only open cuts are closed";
     EXPECT_EQ(hand.last().spindle_rpm, 0.0);
     EXPECT_TRUE(hand.last().events & kForbidden);
     EXPECT_EQ(hand.replica().unconfirmed(), 0u);
-    // Where none of what it had cut was taken back it feels the bone that it stopped in.
+    // If none of its cuts was undone, it feels the bone in which it stopped.
     if (run_.delay_ms == 0) {
       EXPECT_GT(pressed.force_n, 0.3 * (run_.weak ? 0.11 : 1.0)) << "bone stays hard";
     }
@@ -228,7 +227,7 @@ TEST_P(Overseen, FeelsAndCutsWithNoMoreThanItsLimit) {
   limited.force_limit = static_cast<int>(50.0 * free_n);  // half of that
   hand.decide(limited);
   const double s = hand.loop().params().force_scale, limit_n = limited.force_limit_n();
-  // Down to it within what the slew limit takes; the law's own force goes with it.
+  // The force falls to the limit as fast as the slew limit allows. The force law's own force falls with it.
   pressed.work(run_.delay_ms + static_cast<int>(60.0 * s / 0.5) + 2);
   double shown_n = 0.0;
   for (int i = 0; i < 1000; ++i) {
@@ -254,9 +253,9 @@ INSTANTIATE_TEST_SUITE_P(Tools, Overseen,
                                            Case("burr-round-5", 150, false), Case("drill-3.2", 0, true),
                                            Case("drill-3.2", 50, false), Case("drill-3.2", 150, true)));
 
-// The bone yields on its mount under this hand and another user, who pushes it as suddenly as a push can be told, while
-// the hand is stopped, led, loses its tool and gets it back, and what it cut comes back round it, all with the tool on
-// the bone.
+// The bone yields on its mount under this hand and under another user, who pushes as suddenly as a load can be sent.
+// Meanwhile the hand is stopped, guided, loses its tool and gets it back, and its cuts come back round it, all with the
+// tool on the bone.
 class OnAMount : public ::testing::TestWithParam<std::tuple<const char*, int, bool>> {};
 
 TEST_P(OnAMount, IsOverruledAsGentlyAsOnBoneThatStands) {
@@ -311,8 +310,7 @@ INSTANTIATE_TEST_SUITE_P(Tools, OnAMount,
                                            Case("burr-round-5", 150, true), Case("drill-3.2", 0, false),
                                            Case("drill-3.2", 50, true), Case("drill-3.2", 150, false)));
 
-// What is found to be within the limit is so because the loop keeps to it: one that lets force grow ten times as fast
-// is seen.
+// Shows that the limit is kept by the loop: the test detects a loop that lets force grow ten times as fast.
 TEST(OverseenHand, SeesAStepThatIsTooLarge) {
   double most = 0.0;
   for (const char* tool : {"burr-round-5", "drill-3.2"}) {
@@ -333,8 +331,7 @@ TEST(OverseenHand, SeesAStepThatIsTooLarge) {
   EXPECT_GT(most, 1.5);
 }
 
-// A bur that is led to and fro across the edge of where it may cut: no path leaves that, and beyond it the bone is
-// whole.
+// A bur is moved to and fro across the edge of its zone. No path leaves the zone, and beyond it the bone is whole.
 TEST(Zone, NothingIsCutBeyondItsEdge) {
   OverseenHand hand({});
   Restrictions zoned;
@@ -358,7 +355,7 @@ TEST(Zone, NothingIsCutBeyondItsEdge) {
   ASSERT_GT(hand.cuts().size(), 50u);
   for (const Cut& cut : hand.cuts()) EXPECT_EQ(breach(zoned, cut), Rejection::none);
   EXPECT_GT(hand.replica().predicted().solid_mm({0, 0, 0.2}), 0.0);
-  EXPECT_LT(hand.replica().predicted().solid_mm({7.5, 0, 0.2}), 0.0);  // a radius and a bit beyond
+  EXPECT_LT(hand.replica().predicted().solid_mm({7.5, 0, 0.2}), 0.0);  // a little more than a radius beyond
   EXPECT_LE(hand.crossed().step_over_slew, 1.0 + 1e-6);
   EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
 }
