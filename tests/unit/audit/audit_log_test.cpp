@@ -209,7 +209,7 @@ TEST_F(AuditLogs, VerifyAfterOldRecordsWereRemoved) {
   EXPECT_TRUE(verify().sound()) << *verify().fault;
 }
 
-TEST_F(AuditLogs, ForgetAPersonAndStayAsTheyAre) {
+TEST_F(AuditLogs, EraseAPersonAndStayAsTheyAre) {
   AuditLog log = open();
   const AuditIdentity claimed{std::string(kClaimed) + "anna", "0A1B", "", "ipv4:10.0.0.9"};
   const std::vector<AuditEvent> some{event("a"), event("b", claimed), event("c", {.person = "ben"})};

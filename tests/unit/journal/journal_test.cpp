@@ -372,7 +372,7 @@ void forget(Journal& journal, int people, const std::function<std::size_t(std::s
   EXPECT_TRUE(verify_journal(journal).value().sound());
 }
 
-TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
+TEST_F(JournalTest, ErasesPeopleSoThatNoByteOfThemIsLeft) {
   Journal journal = create();
   forget(journal, 400, [&](std::string_view name) {
     std::size_t found = 0;
@@ -384,7 +384,7 @@ TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
 
 // When the tree of a large table moves entries from page to page, it leaves copies behind, a few in thousands of
 // entries.
-TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
+TEST(JournalPeople, AreErasedWhereverTheTreeHasPutThem) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     std::mt19937_64 random(seed);
     MemoryDisk disk(seed);
@@ -407,7 +407,7 @@ TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
   }
 }
 
-TEST(JournalOnDisk, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
+TEST(JournalOnDisk, ErasesPeopleSoThatNoByteOfThemIsLeft) {
   const test::TempDir folder;
   Journal journal = std::move(Journal::create(folder / "journal", "bone").value());
   forget(journal, 120, [&](std::string_view name) {

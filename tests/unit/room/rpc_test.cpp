@@ -31,7 +31,7 @@ class RoomRpc : public ServedRoom {
   std::optional<wire::JoinedRoom> watcher_;
 };
 
-// Twelve cuts in two log entries, none of which separates debris.
+// Twelve cuts in two rows of six, none of which separates debris.
 std::vector<Cut> dimples(AuthorId author, double y_mm) {
   std::vector<Cut> cuts;
   for (int i = 0; i < 12; ++i) {
