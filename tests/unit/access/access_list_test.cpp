@@ -68,7 +68,7 @@ TEST_F(AccessFileTest, IsReadAgainWhenItChanges) {
   EXPECT_EQ(access_.refresh().value(), true);
   EXPECT_TRUE(refuses_ben());
   EXPECT_EQ(access_.refresh().value(), false);
-  // Of the same length and perhaps the same time.
+  // The new text has the same length and perhaps the same time.
   write("revoke user bon\n");
   EXPECT_EQ(access_.refresh().value(), true);
   EXPECT_FALSE(refuses_ben());
@@ -80,7 +80,7 @@ TEST_F(AccessFileTest, LetsNobodyInAgainByAMistake) {
   write("rvoke user ann\n");
   ASSERT_FALSE(access_.refresh().has_value());
   EXPECT_TRUE(refuses_ben());
-  EXPECT_EQ(access_.refresh().value(), false) << "a mistake is said once";
+  EXPECT_EQ(access_.refresh().value(), false) << "a mistake is reported once";
   std::filesystem::remove(file_);
   EXPECT_FALSE(access_.refresh().has_value());
   EXPECT_TRUE(refuses_ben());

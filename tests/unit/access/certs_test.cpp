@@ -1,5 +1,5 @@
-// deploy/certs beside a server that runs as a user of its own: whatever it renews or revokes, the server can still
-// read.
+// deploy/certs beside a server that runs as a user of its own: the server can still read everything that it renews or
+// revokes.
 #include <grp.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -36,12 +36,12 @@ Rights rights_of(const fs::path& file) {
   return {about.st_uid, about.st_gid, about.st_mode};
 }
 
-// True in the child, which is then another user.
+// Returns true in the child process, which then runs as another user.
 bool becomes(uid_t user, gid_t group) {
   return ::setgroups(0, nullptr) == 0 && ::setgid(group) == 0 && ::setuid(user) == 0;
 }
 
-// Whether another user gets to files of tests at all: the root of a chroot may be its owner's alone.
+// Whether another user can reach the test's files at all: the root of a chroot may be accessible only to its owner.
 bool others_get_there(uid_t user, gid_t group) {
   const pid_t child = ::fork();
   if (child == 0)
@@ -50,14 +50,14 @@ bool others_get_there(uid_t user, gid_t group) {
   return ::waitpid(child, &status, 0) == child && WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-// Where this test may be anybody, somebody else; otherwise itself.
+// Another user if this test may change its user, otherwise the same.
 constexpr uid_t kOther = 64123;
 constexpr gid_t kOthersGroup = 64124;
 const bool kMayBeOthers = ::geteuid() == 0 && others_get_there(kOther, kOthersGroup);
 const uid_t kServer = kMayBeOthers ? kOther : ::geteuid();
 const gid_t kServersGroup = kMayBeOthers ? kOthersGroup : ::getegid();
 
-// How many entries the list has as the server's user reads it; -1: it cannot.
+// The number of entries in the list as the server's user reads it, -1 if it cannot.
 int entries_for_the_server(const fs::path& file) {
   if (::geteuid() == 0 && !kMayBeOthers)
     std::printf("no other user gets to files of tests here: root reads %s itself\n", file.c_str());
@@ -74,7 +74,7 @@ int entries_for_the_server(const fs::path& file) {
 
 class Certs : public ::testing::Test {
  protected:
-  // As the head of deploy/systemd/osteon-server.service says: the server reads as one of a group.
+  // As the head of deploy/systemd/osteon-server.service says: the server reads through its group.
   Certs() {
     fs::permissions(people_.folder(), fs::perms(0711));
     fs::permissions(people_.server().parent_path(), fs::perms(0711));
@@ -96,7 +96,7 @@ TEST_F(Certs, WhomTheyRevokeTheServerReadsOf) {
   people_.certs({"revoke", "ben"});
   EXPECT_EQ(rights_of(list), before);
   EXPECT_EQ(entries_for_the_server(list), 1);
-  // Also after a line whose end its writer forgot, and where there is no list yet.
+  // Also after a last line without a line end, and when there is no list yet.
   std::ofstream(list, std::ios::app) << "revoke user eve";
   (void)people_.person("dan");
   people_.certs({"revoke", "dan"});
@@ -117,10 +117,10 @@ TEST_F(Certs, WhatTheyRenewStaysReadable) {
   EXPECT_NE(fs::last_write_time(people_.server() / "server.pem"), renewed);
   for (const auto& [name, rights] : before) EXPECT_EQ(rights_of(people_.server() / name), rights) << name;
   EXPECT_EQ(std::distance(fs::directory_iterator(people_.server()), fs::directory_iterator{}), 9)
-      << "nothing is left beside";
+      << "no other file is left in the folder";
 }
 
-// For programs that ask such a list; those of Osteon do not.
+// For programs that check such a list. Osteon's programs do not.
 TEST(CertsMade, NameTheListThatIsPublished) {
   test::People people;
   const auto shown = [&](const std::string& what, const std::vector<std::string>& how) {
@@ -139,7 +139,7 @@ TEST(CertsMade, NameTheListThatIsPublished) {
   EXPECT_NE(shown("crl", {"-inform", "DER", "-text"}).find("Serial Number:"), std::string::npos);
 }
 
-// Of its own accord it opens nothing to others.
+// The tool itself makes nothing accessible to others.
 TEST(CertsMade, AreForTheirOwnerAlone) {
   const test::People people;
   for (const char* file : {"server.key", "access.txt"})

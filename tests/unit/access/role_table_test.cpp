@@ -31,7 +31,7 @@ Names compiled_calls() {
   return names;
 }
 
-// What each role may call beyond the one before it, as the roles are described to people.
+// The calls that each role may make beyond the role before it. They follow the description of the roles for people.
 Names allowed(Role role) {
   const std::string room = "/osteon.v1.RoomService/", watch = "/osteon.v1.WatchService/",
                     people = "/osteon.v1.PeopleService/", rooms = "/osteon.v1.RoomsService/",
@@ -84,7 +84,7 @@ TEST(RoleTable, RefusesWhatItDoesNotKnow) {
       EXPECT_FALSE(may_call(role, call)) << to_string(role) << " " << call;
 }
 
-TEST(RoleTable, CarriesNothingOfAHandForThoseWhoHoldNone) {
+TEST(RoleTable, CarriesNothingOfAToolForThoseWhoHoldNone) {
   for (int kind = 0; kind < kDatagrams; ++kind)
     for (const Role role : kAll)
       EXPECT_EQ(may_carry(role, static_cast<DatagramContent>(kind)),
@@ -92,7 +92,7 @@ TEST(RoleTable, CarriesNothingOfAHandForThoseWhoHoldNone) {
           << to_string(role) << " " << kind;
 }
 
-TEST(RoleTable, TellsOfOthersToTheInstructorAlone) {
+TEST(RoleTable, ShowsOthersToTheInstructorAlone) {
   for (const Role role : kAll) {
     const bool in_room = role != Role::none && role != Role::operator_;
     EXPECT_EQ(may_receive(role, StreamContent::surface), in_room);

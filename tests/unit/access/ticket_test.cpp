@@ -136,7 +136,7 @@ TEST(Ticket, IsRefusedWithAnotherKeysSignature) {
   ASSERT_FALSE(forged);
   EXPECT_EQ(forged.error().code, ErrorCode::invalid_input);
   EXPECT_THAT(forged.error().message, HasSubstr("signature"));
-  // One ticket's signature under another's contents.
+  // The signature of one ticket on the contents of another.
   const std::string mine = sign_ticket(a_ticket(), key()),
                     better = sign_ticket(make_ticket("r", "u", Role::instructor, kNoon).value(), forger);
   const std::string mixed = better.substr(0, better.rfind('.')) + mine.substr(mine.rfind('.'));

@@ -1,5 +1,5 @@
-// Whoever changes an audit log is found out, and the line is named; whoever is erased is gone from it, and it still
-// verifies.
+// A change of an audit log is detected, and the changed line is named. An erased person is gone from the log, and the
+// log still verifies.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ class AuditLogs : public ::testing::Test {
     EXPECT_TRUE(log.has_value()) << (log ? "" : log.error().message);
     return std::move(*log);
   }
-  // One record after the other. Returns the lines.
+  // Appends the records one after the other. Returns the lines.
   std::vector<std::string> fill(int records) {
     AuditLog log = open();
     for (int i = 0; i < records; ++i) {
@@ -124,7 +124,7 @@ TEST_F(AuditLogs, NameTheLineThatIsMissingRepeatedMovedOrPutIn) {
   lines.insert(lines.begin() + 3, whole[2]);
   EXPECT_THAT(fault_of(lines), StartsWith("line 4: it is repeated or out of order"));
   lines = whole;
-  // A record of another log of the same server has a good signature.
+  // A record of another log of the same server has a valid signature.
   ASSERT_TRUE(disk_.remove(kLog));
   const std::vector<std::string> others = fill(6);
   lines[3] = others[3];
@@ -140,7 +140,7 @@ TEST_F(AuditLogs, NameTheLineThatAnotherKeySigned) {
   record.object = "somewhere else";
   lines[2] = encode(record, forger);
   EXPECT_THAT(fault_of(lines), StartsWith("line 3: it is signed by an unknown key, " + to_hex(forger.public_key())));
-  // All of it, from an entry on.
+  // All entries from one on are signed by the other key.
   Digest previous = hash_of_line(lines[1]);
   for (std::size_t i = 2; i < lines.size(); ++i) {
     record = *decode_record(lines[i]);
@@ -149,7 +149,7 @@ TEST_F(AuditLogs, NameTheLineThatAnotherKeySigned) {
     previous = hash_of_line(lines[i]);
   }
   EXPECT_THAT(fault_of(lines), StartsWith("line 3: it is signed by an unknown key"));
-  // Under the name of the server's own.
+  // The record names the key of the server.
   std::string& last = lines.back();
   last.replace(last.find(to_hex(forger.public_key())), 64, to_hex(keys_->key().public_key()));
   lines[2] = last;
@@ -160,14 +160,14 @@ TEST_F(AuditLogs, AreFoundToBeShorterByTheHashOfARecordAlone) {
   auto lines = fill(4);
   const Digest last = verify().last_hash, earlier = hash_of_line(lines[1]);
   EXPECT_TRUE(verify(last).sound());
-  EXPECT_TRUE(verify(earlier).sound()) << "more came since";
+  EXPECT_TRUE(verify(earlier).sound()) << "more records were added since";
   lines.pop_back();
   disk_.put(kLog, text_of(lines));
-  EXPECT_TRUE(verify().sound()) << "nothing in the log says that more was there";
+  EXPECT_TRUE(verify().sound()) << "nothing in the log shows that there were more records";
   EXPECT_THAT(verify(last).fault.value_or(""), HasSubstr("records are missing after line 3"));
 }
 
-// The process that wrote them still knows how many there were.
+// The process that wrote the records still knows how many there were.
 TEST_F(AuditLogs, ThatAreCutWhileTheServerRunsHaveAGap) {
   AuditLog log = open();
   const std::vector<AuditEvent> some{event("a"), event("b"), event("c")};
@@ -192,16 +192,16 @@ TEST_F(AuditLogs, VerifyAfterOldRecordsWereRemoved) {
   EXPECT_TRUE(verify().sound()) << *verify().fault;
   EXPECT_EQ(verify().first, 3u);
   EXPECT_EQ(entries().back().record.action, kRetention);
-  EXPECT_THAT(*disk_.read(kPeople, 0, 1 << 20), Not(HasSubstr("ben"))) << "whom no record names any more";
+  EXPECT_THAT(*disk_.read(kPeople, 0, 1 << 20), Not(HasSubstr("ben"))) << "no record names ben any more";
   EXPECT_THAT(*disk_.read(kPeople, 0, 1 << 20), HasSubstr("anna"));
   EXPECT_EQ(log.remove_before(now - std::chrono::days(28)).value(), 0u);
-  // Of what is left nobody removes more than the record says.
+  // Nobody can remove more of the rest than the record says.
   auto lines = lines_of(text());
   const std::string kept = text();
   lines.erase(lines.begin());
   EXPECT_THAT(fault_of(lines), StartsWith("line 1: all records before number 4 are missing"));
   disk_.put(kLog, kept);
-  // All of them go, and the chain goes on.
+  // All records are removed, and the chain goes on.
   AuditLog again = open();
   EXPECT_EQ(again.remove_before(now + 1h).value(), 3u);
   EXPECT_EQ(verify().records, 1u);
@@ -209,7 +209,7 @@ TEST_F(AuditLogs, VerifyAfterOldRecordsWereRemoved) {
   EXPECT_TRUE(verify().sound()) << *verify().fault;
 }
 
-TEST_F(AuditLogs, ForgetAPersonAndStayAsTheyAre) {
+TEST_F(AuditLogs, EraseAPersonAndStayAsTheyAre) {
   AuditLog log = open();
   const AuditIdentity claimed{std::string(kClaimed) + "anna", "0A1B", "", "ipv4:10.0.0.9"};
   const std::vector<AuditEvent> some{event("a"), event("b", claimed), event("c", {.person = "ben"})};
@@ -222,7 +222,7 @@ TEST_F(AuditLogs, ForgetAPersonAndStayAsTheyAre) {
   const auto all = entries();
   EXPECT_TRUE(all[0].is_erased && all[1].is_erased);
   EXPECT_EQ(all[2].who.person, "ben");
-  // Whoever comes again is somebody new.
+  // A person who comes again is a new person.
   ASSERT_TRUE(log.append(some));
   EXPECT_NE(entries()[3].record.identity, all[0].record.identity);
   EXPECT_EQ(entries()[5].record.identity, all[2].record.identity);
@@ -270,7 +270,7 @@ TEST_F(AuditLogs, TakeNoNameForALine) {
   EXPECT_THAT(syslog_message((*written)[9].record, clean(some[9].who), {}), HasSubstr("person=\"\\\\\\\"\\]\""));
 }
 
-// At every write and sync of an append: the disk is full once, and what was tried again is there once.
+// At every write and sync of an append: the disk is full once, and the record that is tried again is in the log once.
 TEST_F(AuditLogs, AreWholeAfterAFullDisk) {
   for (const int error : {ENOSPC, EIO})
     for (std::uint64_t n = 1; n <= 12; ++n) {
@@ -291,7 +291,8 @@ TEST_F(AuditLogs, AreWholeAfterAFullDisk) {
     }
 }
 
-// A power failure may spoil the sector in which the last records stand. Then the log says so; it is never just shorter.
+// A power failure may spoil the sector of the last records. Then the log is reported as damaged; it is never only
+// shorter.
 TEST_F(AuditLogs, KeepWhatWasAcknowledgedWhenThePowerFailsOrSayThatItIsDamaged) {
   int whole = 0;
   for (std::uint64_t n = 1; n <= 40; ++n) {

@@ -1,4 +1,5 @@
-// Whoever records waits for no disk, a flood of refusals fills none, and what is lost is counted in the log.
+// Whoever records waits for no disk, a flood of refusals does not fill the disk, and lost records are counted in the
+// log.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
@@ -24,11 +25,11 @@ using testing::HasSubstr;
 
 constexpr std::chrono::seconds kPatience{20};
 
-// The computer's disk, full as long as somebody says so.
+// The computer's disk, full as long as the test sets it.
 class FullDisk final : public Disk {
  public:
   std::atomic<bool> full{false};
-  std::atomic<int> tried{0};  // while it was full
+  std::atomic<int> tried{0};  // The number of writes while it was full.
 
   Result<std::unique_ptr<DiskFile>> create(const std::filesystem::path& file) override { return real_.create(file); }
   Result<std::unique_ptr<DiskFile>> open(const std::filesystem::path& file) override {
@@ -111,7 +112,7 @@ TEST_F(Trails, WaitInMemoryForAFullDiskAndCountWhatIsLost) {
   disk_.full = true;
   trail->record(done("first"));
   ASSERT_TRUE(test::wait_until([&] { return trail->counts().failing && disk_.tried > 2; }, kPatience));
-  // The first is in the batch that is tried again and again.
+  // The first record is in the batch that is tried again and again.
   for (int i = 0; i < 500; ++i) trail->record(done("room-" + std::to_string(i)));
   EXPECT_GE(trail->counts().lost, 100u);
   const std::uint64_t lost = trail->counts().lost;
@@ -124,7 +125,7 @@ TEST_F(Trails, WaitInMemoryForAFullDiskAndCountWhatIsLost) {
   EXPECT_EQ(entries("CreateRoom").size(), 501 - lost);
 }
 
-TEST_F(Trails, DoNotLetRefusalsTakeThePlaceOfWhatWasDone) {
+TEST_F(Trails, DoNotLetRefusalsDisplaceWhatWasDone) {
   auto trail = open({.most_waiting = 20});
   disk_.full = true;
   trail->record(done("first"));
@@ -156,7 +157,7 @@ TEST_F(Trails, CountEqualRefusals) {
   EXPECT_EQ(all[1].record.detail, "role, 9999 times more");
 }
 
-TEST_F(Trails, BoundDifferentRefusalsOfAPersonAndOfStrangers) {
+TEST_F(Trails, BoundDifferentRefusalsOfAPersonAndOfTheUnauthenticated) {
   auto trail = open();
   for (int i = 0; i < 1000; ++i) {
     trail->record(refusal("eve", "room-" + std::to_string(i)));
@@ -197,7 +198,7 @@ TEST_F(Trails, SayTheSameToTheSystemsLog) {
   for (const char* part :
        {"person=\"eve\"", "certificate=\"0A\"", "action=\"DeleteRoom\"", "object=\"ward\"", "result=\"refused\""})
     EXPECT_THAT(heard[1], HasSubstr(part));
-  // Its hash is that by which the end of the log is known.
+  // Its hash identifies the end of the log.
   const std::size_t hash = heard[1].find("hash=\"") + 6;
   const auto report = verify_audit(
       disk_, file(), [](const PublicKey&) { return true; }, *digest_from_hex(heard[1].substr(hash, 64)));

@@ -1,5 +1,5 @@
-// A server that other people reach says in its audit log who did what, and who was refused: by certificate, ticket and
-// address. The program's own commands find it there.
+// The audit log of a server that other people can reach: who did what, and who was refused, by certificate, ticket and
+// address. The program's own commands read it.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -81,7 +81,7 @@ class Audited : public ::testing::Test {
     for (std::string line; std::getline(lines, line);) entries.push_back(json::parse(line));
     return entries;
   }
-  // The entry of that action and result, once it is written.
+  // The record of this action and result, once it is written.
   json find(const std::string& action, const std::string& result, const std::string& person) {
     json found;
     EXPECT_TRUE(test::wait_until(
@@ -122,20 +122,20 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   expect_is(deleted, olga_);
   EXPECT_EQ(deleted.value("object", ""), "ward");
 
-  // A role that may not, several times.
+  // A role that may not make the call tries it several times.
   const Someone ivy = come("ivy", Role::instructor, "hall");
   for (int i = 0; i < 5; ++i) EXPECT_FALSE(as(ivy).close("hall"));
   const json refused = find("CloseRoom", "refused", "ivy");
   expect_is(refused, ivy);
   EXPECT_EQ(refused.value("object", ""), "hall");
   EXPECT_EQ(refused.value("detail", ""), "role");
-  // A role that may, of a room that is another person's: the handler knows that.
+  // A role that may make the call, but the room belongs to another person: the handler checks that.
   EXPECT_FALSE(as(ivy).remove("hall", false));
   const json denied = find("DeleteRoom", "refused", "ivy");
   expect_is(denied, ivy);
   EXPECT_EQ(denied.value("detail", ""), "permission denied");
 
-  // What a handler refuses: there is no such room.
+  // A refusal by a handler: there is no such room.
   EXPECT_FALSE(as(olga_).remove("nowhere", false));
   EXPECT_EQ(find("DeleteRoom", "failed", "olga").value("detail", ""), "not found");
 
@@ -146,7 +146,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   EXPECT_EQ(joined.value("object", ""), "hall");
   EXPECT_EQ(joined.value("detail", ""), "CLIENT_KIND_VIEWER author 1");
 
-  // In a handshake nobody shows a ticket, and who is on the revocation list is who they say they are.
+  // No ticket is shown in a handshake. A person on the revocation list is recorded by the name in the certificate.
   const Someone mallory = come("mallory", Role::trainee, "hall");
   people_.certs({"revoke", "mallory"});
   json revoked;
@@ -163,7 +163,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
   EXPECT_EQ(revoked.value("certificate", ""), mallory.serial);
   EXPECT_THAT(revoked.value("address", ""), HasSubstr("ipv4:127.0.0.1"));
 
-  // Without a certificate there is an address alone.
+  // Without a certificate, only the address is known.
   EXPECT_FALSE(RoomAdminClient::reach(address_, 1s, {}, {}));
   EXPECT_THAT(find("handshake", "refused", "").value("address", ""), HasSubstr("ipv4:127.0.0.1"));
 
@@ -179,7 +179,7 @@ TEST_F(Audited, SaysWhoMadeDeletedJoinedAndWasRefused) {
     EXPECT_EQ(std::filesystem::status(rooms() / file).permissions(), std::filesystem::perms(0600)) << file;
 }
 
-TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
+TEST_F(Audited, RecordsWhatCommandsDoToJournalsAndErases) {
   ASSERT_TRUE(as(olga_).create("hall", ""));
   const Someone anna = come("anna", Role::trainee, "hall");
   ASSERT_TRUE(wire::join_room(address_, wire::ClientKind::viewer, "anna", 5s, {}, "hall", anna.credentials));
@@ -209,7 +209,7 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   EXPECT_THAT(content(rooms() / "audit.people"), Not(HasSubstr("olga")));
   verify_is_sound();
 
-  // With a key elsewhere it has to be named; else the command says that nothing was recorded.
+  // If the key is elsewhere, it has to be named. Otherwise the command reports that nothing was recorded.
   std::filesystem::rename(rooms() / "signing.key", dir_ / "signing.key");
   const std::size_t records = shown().size();
   const test::RunResult unseen = run(program("osteon-server"), {"export", journal, dir_ / "again.jsonl"});
@@ -219,7 +219,7 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   command({"export", journal, dir_ / "third.jsonl", "--signing-key", dir_ / "signing.key"});
   EXPECT_EQ(shown().size(), records + 1);
 
-  // A line that is taken out is named.
+  // A removed line is named.
   std::string text = content(log());
   const std::size_t end = text.find('\n') + 1;
   text.erase(end, text.find('\n', end) + 1 - end);
@@ -229,7 +229,7 @@ TEST_F(Audited, TakesDownWhatCommandsDoToJournalsAndForgets) {
   EXPECT_THAT(found.err, HasSubstr("line 2: 1 records are missing before it"));
 }
 
-// What only some may do is recorded, but for what is in the room's own journal or says nothing of anybody.
+// Calls that only some roles may make are recorded, except those that are in the room's own journal or concern nobody.
 TEST(AuditedCalls, AreAllThatOnlyInstructorsOrOperatorsMayMake) {
   const std::set<std::string_view> without{"Annotate", "ListRooms", "ListCases"};
   for (const CallRow& entry : call_rows()) {

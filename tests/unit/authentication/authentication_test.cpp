@@ -1,5 +1,5 @@
-// The doors of a server in this process, on TLS and the loopback device: every call by every role, and those who come
-// with the wrong thing in their hands.
+// The authentication of a server in this process, on TLS and the loopback device: every call by every role, and clients
+// with wrong credentials.
 #include <gmock/gmock.h>
 #include <google/protobuf/dynamic_message.h>
 #include <grpcpp/generic/generic_stub.h>
@@ -62,7 +62,7 @@ class Authentication : public ::testing::Test {
     server_ = std::move(*started);
   }
   static constexpr std::size_t kMostConnections = 24;
-  // Where clients come.
+  // The address that clients connect to.
   virtual const std::string& address() { return server_->address(); }
   void expect_every_role_to_make_the_calls_that_are_for_it();
   Result<wire::JoinedRoom> join(const wire::ClientCredentials& credentials,
@@ -73,7 +73,7 @@ class Authentication : public ::testing::Test {
     const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 500ms, {}, room, credentials);
     return joined ? std::string() : joined.error().message;
   }
-  // A channel with this credentials, as no client of ours would use it.
+  // A channel with these credentials, as none of our clients would use it.
   std::shared_ptr<grpc::Channel> channel(const wire::ClientCredentials& credentials) {
     return grpc::CreateChannel(address(), wire::channel_credentials(credentials, address()).value());
   }
@@ -83,7 +83,7 @@ class Authentication : public ::testing::Test {
   std::unique_ptr<RoomServer> server_;
 };
 
-// Somebody who connects and says nothing.
+// A client that connects and sends nothing.
 class RawConnection {
  public:
   explicit RawConnection(const std::string& address) : socket_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
@@ -103,10 +103,10 @@ class RawConnection {
 
 struct Called {
   grpc::Status status;
-  bool answered = false;  // a message came
+  bool answered = false;  // a message was received
 };
 
-// Any call: one request, then what comes first, a message or the end.
+// Any call: one request, then the first answer, a message or the end.
 Called call(const std::shared_ptr<grpc::Channel>& channel, const std::string& method, const ByteBuffer& request,
             const std::map<std::string, std::string>& metadata) {
   grpc::GenericStub stub(channel);
@@ -154,7 +154,7 @@ std::vector<Method> methods() {
   return all;
 }
 
-// A request of that kind, with nothing in it but its author.
+// A request of this type, empty except for its author.
 ByteBuffer request_of(const Method& method, std::uint64_t author) {
   google::protobuf::DynamicMessageFactory factory;
   const std::unique_ptr<google::protobuf::Message> message(factory.GetPrototype(method.request)->New());
@@ -168,7 +168,7 @@ ByteBuffer request_of(const Method& method, std::uint64_t author) {
 bool has_author(const Method& method) { return method.request->FindFieldByName("author") != nullptr; }
 
 void Authentication::expect_every_role_to_make_the_calls_that_are_for_it() {
-  // By the rules as people are told them: what a role may do beyond looking.
+  // The rules as the roles are described to people: what a role may do beyond watching.
   const std::set<std::string> hands{"Session",      "AddTool",         "Undo", "Redo", "Mark",
                                     "SetSceneItem", "RemoveSceneItem", "Say"},
       instructors{"RemoveBody", "SaveFields", "Supervise", "Annotate", "Demonstrate", "EndDemonstration"},
@@ -207,7 +207,7 @@ void Authentication::expect_every_role_to_make_the_calls_that_are_for_it() {
 
 TEST_F(Authentication, LetEveryRoleMakeTheCallsThatAreForIt) { expect_every_role_to_make_the_calls_that_are_for_it(); }
 
-// With the proxy of deploy/haproxy.cfg, which ends TLS and says of each call whose it is.
+// With the proxy of deploy/haproxy.cfg, which ends TLS and adds the person's name to each call.
 class AuthenticationBehindAProxy : public Authentication {
  protected:
   void SetUp() override {
@@ -254,7 +254,7 @@ TEST_F(AuthenticationBehindAProxy, BelieveNoHeaderThatAClientSends) {
   EXPECT_EQ(server_->connection_health().authorizer.admitted, 0u);
 }
 
-TEST_F(AuthenticationBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) {
+TEST_F(AuthenticationBehindAProxy, RefuseWhoWasRevokedAndOtherAuthorities) {
   EXPECT_EQ(refusal(people_.credentials("anna", Role::trainee, "ward")), "");
   test::People elsewhere;
   EXPECT_FALSE(test::RawHttp2(address(), elsewhere.person("anna")).read(5s).has_value());
@@ -263,15 +263,16 @@ TEST_F(AuthenticationBehindAProxy, AreShutToWhoWasRevokedAndToOtherAuthorities) 
   ASSERT_TRUE(before.read(5s).has_value());
   people_.certs({"revoke", "anna"});
   ASSERT_TRUE(proxy_->is_told_of(1));
-  EXPECT_FALSE(test::RawHttp2(address(), people_.person("anna")).read(5s).has_value()) << "a new connection";
+  EXPECT_FALSE(test::RawHttp2(address(), people_.person("anna")).read(5s).has_value())
+      << "a new connection was accepted";
   (void)before.call(1, "/osteon.v1.RoomService/GetStatus");
-  EXPECT_TRUE(before.closed_within(test::kPatience)) << "the connection that was open";
+  EXPECT_TRUE(before.closed_within(test::kPatience)) << "the open connection was not closed";
   EXPECT_EQ(refusal(people_.credentials("ben", Role::trainee, "ward")), "");
-  EXPECT_THAT(proxy_->log(), HasSubstr("certificate fault 23")) << "openssl verify's number of a revoked certificate";
+  EXPECT_THAT(proxy_->log(), HasSubstr("certificate fault 23")) << "openssl verify's number for a revoked certificate";
 }
 
 TEST_F(AuthenticationBehindAProxy, KeepInsidersFromTheServer) {
-  // The headers end a gRPC 1.51 that is asked with an AuthMetadataProcessor, or by itself (CVE-2023-1428).
+  // These headers end a gRPC 1.51 process, with an AuthMetadataProcessor or by itself (CVE-2023-1428).
   const test::RawHttp2::Headers strange[] = {
       {{"grpclb_client_stats", "x"}}, {{"lb-token", "x"}}, {{"te", "x"}}, {{":scheme", "x"}}};
   for (const test::RawHttp2::Headers& headers : strange) {
@@ -302,7 +303,7 @@ TEST_F(Authentication, LetNobodyCallAsSomebodyElse) {
     ++tried;
     const Called called = call(line, method.name, request_of(method, ben->author.value), metadata);
     EXPECT_FALSE(called.answered) << method.name;
-    // What is wrong with an empty request may be said first.
+    // The fault of the empty request may be reported first.
     EXPECT_THAT(called.status.error_code(), testing::AnyOf(StatusCode::PERMISSION_DENIED, StatusCode::INVALID_ARGUMENT))
         << method.name << " " << called.status.error_message();
     if (called.status.error_code() == StatusCode::PERMISSION_DENIED) {
@@ -315,21 +316,22 @@ TEST_F(Authentication, LetNobodyCallAsSomebodyElse) {
 TEST_F(Authentication, NeedACertificateOfTheirOwnAuthority) {
   const wire::ClientCredentials anna = people_.credentials("anna", Role::trainee, "ward");
   EXPECT_EQ(refusal(anna), "");
-  EXPECT_THAT(refusal({}), HasSubstr("asks for a certificate")) << "plain text";
+  EXPECT_THAT(refusal({}), HasSubstr("asks for a certificate")) << "the client uses plain text";
   test::People strangers;
-  EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "") << "of another authority";
-  // The server's authority, and a certificate that another has signed.
+  EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "")
+      << "the certificate is of another authority";
+  // The authority is the server's, but another authority signed the certificate.
   std::filesystem::copy_file(people_.person("anna") / "ca.pem", strangers.person("anna") / "ca.pem",
                              std::filesystem::copy_options::overwrite_existing);
   EXPECT_NE(refusal({.certificates = strangers.person("anna"), .ticket = anna.ticket}), "")
-      << "signed by another authority";
-  // None at all.
+      << "another authority signed it";
+  // No certificate at all.
   const auto bare = grpc::CreateChannel(
       address(),
       grpc::SslCredentials(
           {.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""}));
   EXPECT_EQ(call(bare, "/osteon.v1.RoomsService/ListRooms", {}, {}).status.error_code(), StatusCode::UNAVAILABLE);
-  // Nor does a client take another authority's server for the right one.
+  // A client does not accept the server of another authority either.
   std::filesystem::copy_file(strangers.server() / "ca.pem", people_.person("ben") / "ca.pem",
                              std::filesystem::copy_options::overwrite_existing);
   EXPECT_NE(refusal({.certificates = people_.person("ben"), .ticket = people_.ticket("ben", "ward", Role::trainee)}),
@@ -354,7 +356,7 @@ TEST_F(Authentication, SayInOneSentenceWhatIsWrongWithATicket) {
                   new_ticket_key()))),
               HasSubstr("signature"));
   EXPECT_THAT(with(people_.folder() / "none"), HasSubstr("no ticket came"));
-  // An observer comes to look, not to cut.
+  // An observer may watch, but not cut.
   const auto hand = join(people_.credentials("eve", Role::observer, "ward"), wire::ClientKind::haptic);
   ASSERT_FALSE(hand);
   EXPECT_EQ(hand.error().code, ErrorCode::denied);
@@ -363,7 +365,7 @@ TEST_F(Authentication, SayInOneSentenceWhatIsWrongWithATicket) {
 }
 
 TEST_F(Authentication, TakeATicketOnceOnly) {
-  // Twice with one call: two readers might take different ones.
+  // The call has two tickets: two readers could use different ones.
   const wire::ClientCredentials anna = people_.credentials("anna", Role::trainee, "ward");
   grpc::ClientContext context;
   context.AddMetadata("osteon-ticket", wire::ticket_text(anna));
@@ -374,8 +376,8 @@ TEST_F(Authentication, TakeATicketOnceOnly) {
   EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
 }
 
-TEST_F(Authentication, TakeNewCertificatesWithoutAStartAnew) {
-  // A surgeon's certificate of an authority that comes to be trusted while the server runs.
+TEST_F(Authentication, TakeNewCertificatesWithoutARestart) {
+  // The certificate of a surgeon whose authority becomes trusted while the server runs.
   test::People others;
   const std::filesystem::path guest = others.person("guest");
   std::filesystem::copy_file(people_.server() / "ca.pem", guest / "ca.pem",
@@ -387,7 +389,7 @@ TEST_F(Authentication, TakeNewCertificatesWithoutAStartAnew) {
   std::ofstream(dir_ / "both.pem") << both;
   std::filesystem::rename(dir_ / "both.pem", people_.server() / "ca.pem");
   EXPECT_TRUE(test::wait_until([&] { return refusal(credentials).empty(); }, test::kPatience));
-  // And a new key of the server's own.
+  // The server gets a new key too.
   people_.certs({"server", "127.0.0.1"});
   const std::string fresh = content(people_.server() / "server.pem");
   EXPECT_TRUE(test::wait_until(
@@ -409,11 +411,11 @@ TEST_F(Authentication, TakeNewCertificatesWithoutAStartAnew) {
 }
 
 TEST_F(Authentication, KeepRoomsApart) {
-  // Without a room's name a call is to the ticket's.
+  // A call without the name of a room is for the room of the ticket.
   const auto in_theatre = join(people_.credentials("anna", Role::trainee, "theatre"), wire::ClientKind::viewer, "");
   ASSERT_TRUE(in_theatre.has_value()) << in_theatre.error().message;
   EXPECT_EQ(in_theatre->name, "theatre");
-  // An instructor of one room sees, checks and branches that one.
+  // An instructor of one room can list, verify and branch only that room.
   auto rooms = RoomAdminClient::reach(address(), 5s, {}, people_.credentials("ina", Role::instructor, "ward"));
   ASSERT_TRUE(rooms.has_value());
   const auto list = rooms->list();
@@ -426,7 +428,7 @@ TEST_F(Authentication, KeepRoomsApart) {
   EXPECT_EQ(other.error().code, ErrorCode::denied) << other.error().message;
   EXPECT_FALSE(rooms->branch("theatre", "copy", RoomSeq{0}));
   EXPECT_FALSE(rooms->create("third", ""));
-  // Nor does she show in it what was cut in another.
+  // Nor can she replay in it what was cut in another room.
   const auto ina = join(people_.credentials("ina", Role::instructor, "ward"), wire::ClientKind::viewer, "");
   ASSERT_TRUE(ina.has_value()) << ina.error().message;
   v1::DemonstrateRequest shown;
@@ -444,7 +446,7 @@ TEST_F(Authentication, KeepRoomsApart) {
   EXPECT_TRUE(all->remove("third", false));
 }
 
-// Which room a call is about says its message; the metadata, by which it was let in, may name another.
+// The message of a call names its room. The metadata that admitted the call may name another.
 TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   const auto asked = [&](const wire::ClientCredentials& credentials, const std::string& in, const std::string& about) {
     grpc::ClientContext context;
@@ -456,7 +458,7 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
     return v1::RoomsService::NewStub(channel(credentials))->DeleteRoom(&context, request, &response);
   };
   const auto is_there = [&](const std::string& name) { return server_->rooms().find(name).has_value(); };
-  // More in one room than elsewhere.
+  // A higher role in one room than elsewhere.
   ASSERT_TRUE(server_->rooms().create("annex", nullptr));
   people_.append_access("role bob operator annex");
   people_.append_access("role otto observer ward");
@@ -466,7 +468,7 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   EXPECT_TRUE(is_there("ward"));
   EXPECT_TRUE(asked(bob, "annex", "annex").ok());
   EXPECT_FALSE(is_there("annex"));
-  // Less in one room than elsewhere.
+  // A lower role in one room than elsewhere.
   const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
   for (const char* in : {"", "ward", "theatre"})
     EXPECT_EQ(asked(otto, in, "ward").error_code(), StatusCode::PERMISSION_DENIED) << in;
@@ -480,7 +482,7 @@ TEST_F(Authentication, JudgeCallsAboutRoomsByTheRoomsThatTheyName) {
   ASSERT_EQ(all->size(), 1u);
   EXPECT_EQ(all->front().name, "theatre");
   EXPECT_TRUE(rooms->close("theatre"));
-  // And no name is not the name of the only one.
+  // An empty name does not stand for the only room.
   EXPECT_EQ(asked(otto, "theatre", "").error_code(), StatusCode::INVALID_ARGUMENT);
 }
 
@@ -507,7 +509,7 @@ TEST_F(Authentication, AreAskedOnceForADeletion) {
   const AuthorizerCounts before = server_->connection_health().authorizer;
   EXPECT_EQ(bob->remove("ward", false).error().code, ErrorCode::denied);
   EXPECT_EQ(server_->connection_health().authorizer.refused, before.refused + 1);
-  EXPECT_TRUE(bob->remove("annex", false)) << "where the role is another";
+  EXPECT_TRUE(bob->remove("annex", false)) << "the role is another one in that room";
   EXPECT_EQ(server_->connection_health().authorizer.refused, before.refused + 1);
 }
 
@@ -527,8 +529,8 @@ TEST_F(Authentication, ShowNothingOfARoomInWhichOneIsNoInstructor) {
   EXPECT_THAT(status.error_message(), HasSubstr("a trainee may not call Demonstrate"));
 }
 
-// Datagrams go to where the connections come in, however that was written.
-TEST(DoorsSomewhere, HaveTheFastPathWhereverTheServerListens) {
+// The datagrams use the address of the connections, however it was written.
+TEST(AuthenticationAddress, HasTheFastPathWhereverTheServerListens) {
   test::People people;
   people.certs({"server", "127.0.0.1", "::1", "localhost"});
   const test::TempDir dir;
@@ -540,11 +542,11 @@ TEST(DoorsSomewhere, HaveTheFastPathWhereverTheServerListens) {
     ASSERT_TRUE(rooms->create("ward", nullptr));
     const auto server = RoomServer::start(std::move(rooms), host + ":0", {.certificates = people.server()});
     if (!server) {
-      EXPECT_EQ(host.front(), '[') << "a machine may lack IPv6: " << server.error().message;
+      EXPECT_EQ(host.front(), '[') << "the machine may have no IPv6: " << server.error().message;
       continue;
     }
     EXPECT_NE((*server)->link_port(), 0) << host;
-    // By the names that are in the certificate.
+    // By the names in the certificate.
     const std::string name = host == "localhost" ? host : host.front() == '[' ? "[::1]" : "127.0.0.1";
     const std::string at = name + (*server)->address().substr((*server)->address().rfind(':'));
     test::Surgeon surgeon(at, dir / "cache", "", "ward", people.credentials("sue", Role::trainee, "ward"));
@@ -555,7 +557,7 @@ TEST(DoorsSomewhere, HaveTheFastPathWhereverTheServerListens) {
 }
 
 // A firewall lets one known port through.
-TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
+TEST(AuthenticationAddress, HasTheFastPathAtTheRequestedPort) {
   test::People people;
   const test::TempDir dir;
   const Case bone = test::test_block();
@@ -567,7 +569,7 @@ TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
         std::move(rooms), "127.0.0.1:0",
         {.certificates = with_certificates ? people.server() : std::filesystem::path(), .udp_listen = udp_listen});
   };
-  // The system chose this one for another socket, and it is free again.
+  // The system chose this port for another socket, and it is free again.
   const std::uint16_t port = UdpPort::open({}).value()->local().port;
   const std::string at = "127.0.0.1:" + std::to_string(port);
   const auto server = start(at);
@@ -576,7 +578,7 @@ TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
   test::Surgeon surgeon((*server)->address(), dir / "cache", "", "ward",
                         people.credentials("sue", Role::trainee, "ward"));
   EXPECT_TRUE(test::wait_until([&] { return surgeon.session().fast_path().alive; }, test::kPatience));
-  // A second server finds it taken, before it prepares anything too.
+  // A second server finds the port in use, before it prepares anything.
   const auto second = start(at);
   ASSERT_FALSE(second.has_value());
   EXPECT_THAT(second.error().message, HasSubstr("--udp-listen " + at));
@@ -586,8 +588,8 @@ TEST(DoorsSomewhere, HaveTheFastPathAtThePortThatIsAskedFor) {
   EXPECT_THAT(start("0.0.0.0:0", false).error().message, HasSubstr("--certificates DIR"));
 }
 
-// A surgeon of the ward at work, and somebody beside who is in trouble.
-class DoorsAtWork : public Authentication {
+// A surgeon of the ward at work, and somebody else who loses their access.
+class AuthenticationAtWork : public Authentication {
  protected:
   void SetUp() override {
     Authentication::SetUp();
@@ -595,7 +597,7 @@ class DoorsAtWork : public Authentication {
                                                people_.credentials("sue", Role::trainee, "ward"));
     ASSERT_TRUE(test::wait_until([&] { return surgeon_->complete(); }, test::kPatience));
   }
-  // Cuts on, and expects it to arrive; her session is the one that she began with.
+  // She cuts, and expects the cut to arrive in the session that she began with.
   void expect_undisturbed() {
     const std::uint64_t before = surgeon_->own();
     Cut cut = test::strokes(surgeon_->author(), static_cast<int>(before) + 1, 7).back();
@@ -630,7 +632,7 @@ class DoorsAtWork : public Authentication {
   std::unique_ptr<test::Surgeon> surgeon_;
 };
 
-TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
+TEST_F(AuthenticationAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
   auto ben = join(people_.credentials("ben", Role::observer, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
   Watcher watcher(*ben);
@@ -644,12 +646,12 @@ TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoIsRevoked) {
   expect_undisturbed();
 }
 
-// Who does not read hears no reason, and is gone all the same: also what is on its way to nobody.
-TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
+// A client that does not read receives no reason, but its streams end too, with everything that waits to be sent.
+TEST_F(AuthenticationAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
   auto ben = join(people_.credentials("ben", Role::observer, "ward"));
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
   const std::size_t others = server_->connection_health().authorizer.streams;
-  std::filesystem::resize_file(dir_ / "case" / "bone.vdb", 32 << 20);  // more than any line holds by itself
+  std::filesystem::resize_file(dir_ / "case" / "bone.vdb", 32 << 20);  // Larger than what any connection buffers.
   grpc::ClientContext context;
   v1::GetCaseRequest request;
   request.set_case_hash(wire::to_wire(test::test_block().hash()));
@@ -657,16 +659,16 @@ TEST_F(DoorsAtWork, EndTheStreamsOfSomebodyWhoDoesNotRead) {
   ASSERT_TRUE(
       test::wait_until([&] { return server_->connection_health().authorizer.streams == others + 1; }, test::kPatience));
   EXPECT_FALSE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 2s))
-      << "by itself it goes on";
+      << "the stream would go on by itself";
   people_.certs({"revoke", "ben"});
   EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == others; }, 10s));
   context.TryCancel();
   expect_undisturbed();
 }
 
-// A newer program of the same person, and the older one coming again behind it: whoever is in the queue, the newer one
-// stays.
-TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
+// A newer program of the same person, and the older one that reconnects after it. In any order in the queue, the newer
+// one stays.
+TEST_F(Authentication, KeepTheNewestProgramAlsoInAQueue) {
   const wire::ClientCredentials credentials = people_.credentials("ben", Role::observer, "ward");
   const auto older = join(credentials);
   ASSERT_TRUE(older.has_value()) << older.error().message;
@@ -681,7 +683,7 @@ TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
     const std::uint64_t before = admitted();
     auto answer = std::async(std::launch::async, std::move(ask));
     EXPECT_TRUE(test::wait_until([&] { return admitted() > before; }, test::kPatience));
-    std::this_thread::sleep_for(200ms);  // from the authorizer into the queue
+    std::this_thread::sleep_for(200ms);  // Long enough to move from the authorizer into the queue.
     return answer;
   };
   auto newer = queue([&] { return join(credentials); });
@@ -695,18 +697,18 @@ TEST_F(Authentication, GiveThePlaceToTheNewestAlsoInAQueue) {
   EXPECT_TRUE(wire::join_again(*newest, wire::ClientKind::viewer, {}));
 }
 
-TEST_F(DoorsAtWork, EndTheSessionOfSomebodyWhoseRoleIsTakenAway) {
+TEST_F(AuthenticationAtWork, EndTheSessionOfSomebodyWhoseRoleIsTakenAway) {
   test::Surgeon ben(address(), dir_ / "cache", "", "ward", people_.credentials("ben", Role::collaborator, "ward"));
   ASSERT_TRUE(test::wait_until([&] { return ben.complete(); }, test::kPatience));
   people_.append_access("role ben observer ward");
   ASSERT_TRUE(test::wait_until([&] { return !ben.lost().empty(); }, 10s));
   EXPECT_THAT(ben.lost(), HasSubstr("an observer may not call Session"));
-  EXPECT_EQ(ben.interruptions(), 0) << "it does not come again by itself";
-  EXPECT_TRUE(join(people_.credentials("ben", Role::collaborator, "ward"))) << "but may watch";
+  EXPECT_EQ(ben.interruptions(), 0) << "the session does not reconnect by itself";
+  EXPECT_TRUE(join(people_.credentials("ben", Role::collaborator, "ward"))) << "the person may still watch";
   expect_undisturbed();
 }
 
-TEST_F(DoorsAtWork, EndTheStreamsOfATicketThatExpires) {
+TEST_F(AuthenticationAtWork, EndTheStreamsOfATicketThatExpires) {
   auto ben = join({.certificates = people_.person("ben"), .ticket = people_.ticket("ben", "ward", Role::observer, 3s)});
   ASSERT_TRUE(ben.has_value()) << ben.error().message;
   Watcher watcher(*ben);
@@ -715,7 +717,7 @@ TEST_F(DoorsAtWork, EndTheStreamsOfATicketThatExpires) {
   expect_undisturbed();
 }
 
-TEST_F(DoorsAtWork, GiveTheNewerSessionOfAPersonThePlace) {
+TEST_F(AuthenticationAtWork, EndTheOlderSessionOfAPerson) {
   const wire::ClientCredentials credentials = people_.credentials("ben", Role::observer, "ward");
   const auto first = join(credentials);
   Watcher older(*first);
@@ -730,8 +732,8 @@ TEST_F(DoorsAtWork, GiveTheNewerSessionOfAPersonThePlace) {
   expect_undisturbed();
 }
 
-// A person's console has a place of its own beside their window.
-TEST_F(DoorsAtWork, GiveAConsoleAPlaceBesideTheWindow) {
+// A person may have a console beside their viewer.
+TEST_F(AuthenticationAtWork, AllowAConsoleBesideTheViewer) {
   const wire::ClientCredentials credentials = people_.credentials("ina", Role::instructor, "ward");
   const auto window = join(credentials);
   ASSERT_TRUE(window.has_value());
@@ -749,11 +751,11 @@ TEST_F(DoorsAtWork, GiveAConsoleAPlaceBesideTheWindow) {
   EXPECT_FALSE(seen.over(1ms));
   EXPECT_TRUE(wire::join_again(*window, wire::ClientKind::viewer, {}));
   EXPECT_EQ(wire::join_again(*window, wire::ClientKind::console, {}).error().code, ErrorCode::denied)
-      << "a place is of one kind";
+      << "a number is for one kind of program";
   expect_undisturbed();
 }
 
-TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
+TEST_F(AuthenticationAtWork, StandWhatIsTooLargeOrNoMessage) {
   const wire::ClientCredentials credentials = people_.credentials("ben", Role::trainee, "ward");
   const auto line = channel(credentials);
   const std::map<std::string, std::string> metadata{{"osteon-room-bin", "ward"},
@@ -767,7 +769,7 @@ TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
         << method;
     const Called malformed = call(line, method, ByteBuffer(&no_message, 1), metadata);
     EXPECT_FALSE(malformed.answered) << method;
-    // gRPC itself says of a single request that it cannot read that there was none.
+    // If gRPC cannot read a single request, it reports that there was none.
     EXPECT_THAT(malformed.status.error_code(), testing::AnyOf(StatusCode::INVALID_ARGUMENT, StatusCode::UNIMPLEMENTED))
         << method << malformed.status.error_message();
   }
@@ -778,7 +780,7 @@ TEST_F(DoorsAtWork, StandWhatIsTooLargeOrNoMessage) {
   expect_undisturbed();
 }
 
-TEST_F(DoorsAtWork, RefuseFurtherConnectionsAndLetThemInAgain) {
+TEST_F(AuthenticationAtWork, RefuseFurtherConnectionsAndAdmitThemAgain) {
   const ListenerCounts before = server_->connection_health().connections;
   std::vector<std::unique_ptr<RawConnection>> strangers;
   for (std::size_t i = 0; i < 2 * kMostConnections; ++i)
@@ -789,7 +791,7 @@ TEST_F(DoorsAtWork, RefuseFurtherConnectionsAndLetThemInAgain) {
   strangers.clear();
   EXPECT_TRUE(
       test::wait_until([&] { return server_->connection_health().connections.open <= before.open; }, test::kPatience))
-      << "connections that are gone are counted";
+      << "closed connections are still counted";
   EXPECT_TRUE(test::wait_until([&] { return refusal(people_.credentials("ben", Role::observer, "ward")).empty(); },
                                test::kPatience));
 }

@@ -41,7 +41,7 @@ class AuthorizerTest : public ::testing::Test {
     return sign_ticket(make_ticket(room, user, role, UnixTime{std::chrono::seconds(now_)} + good_for).value(),
                        people_->key());
   }
-  // The refusal's sentence, with the word it is counted under; empty: let in.
+  // The sentence of the refusal, with the word that it is counted under. Empty if the call is admitted.
   std::string refused(const std::string& user, const std::string& with, const std::string& room,
                       const std::string& method, bool is_known) {
     const auto caller =
@@ -76,7 +76,7 @@ class AuthorizerTest : public ::testing::Test {
 };
 test::People* AuthorizerTest::people_ = nullptr;
 
-TEST_F(AuthorizerTest, ReadsWhoACertificateIsOf) {
+TEST_F(AuthorizerTest, ReadsWhoseACertificateIs) {
   const Result<PersonCertificate> anna = read_person_certificate(certificate("anna"));
   ASSERT_TRUE(anna.has_value()) << anna.error().message;
   EXPECT_EQ(anna->user, "anna");
@@ -84,14 +84,14 @@ TEST_F(AuthorizerTest, ReadsWhoACertificateIsOf) {
   const std::int64_t days = (anna->ends.time_since_epoch().count() - now_) / 86400;
   EXPECT_GE(days, 363);
   EXPECT_LE(days, 366);
-  // The server's own names nobody.
+  // The server's own certificate names no person.
   EXPECT_THAT(read_person_certificate(content(people_->server() / "server.pem")).error().message,
               HasSubstr("osteon://person/"));
   for (const std::string& text : {std::string(), std::string("nonsense"), certificate("anna").substr(0, 300)})
     EXPECT_FALSE(read_person_certificate(text));
 }
 
-TEST_F(AuthorizerTest, LetsInWhoHasBoth) {
+TEST_F(AuthorizerTest, AdmitsWhoHasBoth) {
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", ticket("anna", "*", Role::collaborator), "other", kUndo, true), "");
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "", kUndo, true), "");
@@ -134,18 +134,18 @@ TEST_F(AuthorizerTest, GoesByTheClock) {
               HasSubstr("certificate: the certificate has expired"));
 }
 
-TEST_F(AuthorizerTest, TakesNoTicketThatIsGoodForTooLong) {
+TEST_F(AuthorizerTest, TakesNoTicketThatIsValidForTooLong) {
   const std::string day = ticket("anna", "ward", Role::trainee, 24h), more = ticket("anna", "ward", Role::trainee, 26h);
-  EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "") << "unless somebody says otherwise";
+  EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "") << "the option allows it";
   authorizer_->set_most_ticket_life(24h);
   EXPECT_EQ(refused("anna", day, "ward", kUndo, true), "");
   EXPECT_EQ(refused("anna", more, "ward", kUndo, false),
             "ticket: the ticket is valid for 26 more hours, but this server accepts at most 24; ask for a "
             "shorter one");
-  // A ticket does not say since when it is good: what is left counts.
+  // A ticket does not contain the start of its validity, so the remaining time counts.
   now_ += 2 * 3600;
   EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "");
-  // The clock of whoever signs may be a little ahead.
+  // The clock of the signer may be a little ahead.
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee, 24h + 59s), "ward", kUndo, true), "");
   EXPECT_THAT(refused("anna", ticket("anna", "ward", Role::trainee, 24h + 61s), "ward", kUndo, false),
               HasSubstr("25 more hours"));
@@ -172,7 +172,7 @@ TEST_F(AuthorizerTest, ReadsTheKeysOfTicketsWhileItRuns) {
       authorizer_->enter(anna, "ward", AuthorId{}, kWatch, [&](const Refusal& why) { ended = why, ++calls; });
   ASSERT_TRUE(stream.has_value());
   people_->certs({"rotate-tickets"});
-  EXPECT_THROW(people_->certs({"rotate-tickets"}), std::runtime_error) << "one rotation at a time";
+  EXPECT_THROW(people_->certs({"rotate-tickets"}), std::runtime_error) << "only one rotation at a time";
   authorizer_->look();
   const std::string fresh = ticket("anna", "ward", Role::trainee);
   EXPECT_EQ(refused("anna", old, "ward", kUndo, true), "");
@@ -182,15 +182,15 @@ TEST_F(AuthorizerTest, ReadsTheKeysOfTicketsWhileItRuns) {
   authorizer_->look();
   EXPECT_THAT(refused("anna", old, "ward", kUndo, false), HasSubstr("signature"));
   EXPECT_EQ(refused("anna", fresh, "ward", kUndo, true), "");
-  ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s)) << "what is open by a ticket of the old key ends too";
+  ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s)) << "open streams with a ticket of the old key end too";
   EXPECT_THAT(ended->sentence, HasSubstr("the key that signed the ticket was replaced"));
-  EXPECT_THROW(people_->certs({"rotate-tickets", "--finish"}), std::runtime_error) << "there is none to finish";
+  EXPECT_THROW(people_->certs({"rotate-tickets", "--finish"}), std::runtime_error) << "there is no rotation to finish";
 }
 
 TEST_F(AuthorizerTest, GoesOnWithTheKeysOfTicketsThatItHasWhereNewOnesAreWrong) {
   const std::filesystem::path file = people_->server() / "tickets.pub";
   const std::string good = ticket("anna", "ward", Role::trainee), keys = content(file);
-  testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+  testing::internal::CaptureStdout();  // A program that has not opened its log writes it here.
   for (const std::string& wrong : {std::string("nonsense\n"), keys + "nonsense\n", std::string()}) {
     std::ofstream(file) << wrong;
     authorizer_->look();
@@ -233,7 +233,7 @@ TEST_F(AuthorizerTest, WarnsOfSecretKeysThatOthersMayRead) {
   const fs::path key = people_->server() / "server.key", proxy = people_->server() / "proxy.pem";
   const auto said = [&](fs::perms of_key) {
     fs::permissions(key, of_key);
-    testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+    testing::internal::CaptureStdout();  // A program that has not opened its log writes it here.
     EXPECT_TRUE(Authorizer::open(people_->server(), refusals_));
     return testing::internal::GetCapturedStdout();
   };
@@ -242,7 +242,7 @@ TEST_F(AuthorizerTest, WarnsOfSecretKeysThatOthersMayRead) {
     const std::string log = said(fs::perms(mode));
     EXPECT_THAT(log, HasSubstr("READABLE SECRET KEY")) << std::oct << mode;
     EXPECT_THAT(log, HasSubstr("chmod 600 " + key.string())) << std::oct << mode;
-    EXPECT_THAT(log, testing::Not(HasSubstr(proxy.string()))) << "that one is private";
+    EXPECT_THAT(log, testing::Not(HasSubstr(proxy.string()))) << "that file is private";
   }
   fs::permissions(proxy, fs::perms(0644));
   EXPECT_THAT(said(fs::perms(0600)), HasSubstr("chmod 600 " + proxy.string()));
@@ -288,18 +288,19 @@ TEST_F(AuthorizerTest, ANewerSessionTakesThePlaceOfAnOlderOne) {
   EXPECT_EQ(bystander, "");
   EXPECT_FALSE(authorizer_->check_author(anna, "ward", AuthorId{1}));
   EXPECT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{4}));
-  EXPECT_FALSE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1})) << "or they would push out each other for ever";
+  EXPECT_FALSE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1}))
+      << "otherwise the two would end each other for ever";
   EXPECT_EQ(authorizer_->counts().displaced, 1u);
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{4});
   EXPECT_EQ(authorizer_->counts().displaced, 1u);
 }
 
-TEST_F(AuthorizerTest, WhoComesAgainTooLateTakesNoPlace) {
+TEST_F(AuthorizerTest, WhoReconnectsTooLateIsRefused) {
   const Caller anna = let_in("anna", Role::trainee);
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}));
   EXPECT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}, Authorizer::Coming::again));
   ASSERT_TRUE(authorizer_->check_resume(anna, "ward", 1, AuthorId{1}));
-  // A newer program comes between the question and the answer.
+  // A newer program joins between the check and the result.
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{2}));
   std::string ended;
   const auto newer =
@@ -319,25 +320,26 @@ TEST_F(AuthorizerTest, StopsWhoCallsMoreOftenThanAnybodyDoesByHand) {
   int let_in = 0;
   for (; let_in < 100'000 && said.empty(); ++let_in) said = refused("anna", annas, "ward", kSay, true);
   EXPECT_THAT(said, HasSubstr("rate: that is called too often"));
-  EXPECT_GT(let_in, 20) << "a script may say much at once";
-  EXPECT_EQ(refused("anna", annas, "ward", kWatch, true), "") << "another call";
-  EXPECT_EQ(refused("ben", bens, "ward", kSay, true), "") << "another person";
+  EXPECT_GT(let_in, 20) << "a script may send many messages at once";
+  EXPECT_EQ(refused("anna", annas, "ward", kWatch, true), "") << "the call is another one";
+  EXPECT_EQ(refused("ben", bens, "ward", kSay, true), "") << "the person is another one";
   EXPECT_GE(refusals_.counts().at("rate"), 1u);
-  // In a while again.
+  // After a while the calls are admitted again.
   EXPECT_TRUE(test::wait_until([&] { return refused("anna", annas, "ward", kSay, true).empty(); }, 10s));
 }
 
-// As behind a proxy, where they come in over a connection that stays.
-TEST_F(AuthorizerTest, TellsWhoBeganTooManyCallsToWaitAMinute) {
+// As behind a proxy, whose connection to the server stays open.
+TEST_F(AuthorizerTest, AsksWhoBeganTooManyCallsToWaitAMinute) {
   authorizer_->note_flood(shown(certificate("anna")));
   EXPECT_EQ(refused("anna", ticket("anna", "ward", Role::trainee), "ward", kWatch, true),
             "flood: too many calls came from you; wait a minute");
-  EXPECT_EQ(refused("ben", ticket("ben", "ward", Role::trainee), "ward", kWatch, true), "") << "another person";
+  EXPECT_EQ(refused("ben", ticket("ben", "ward", Role::trainee), "ward", kWatch, true), "")
+      << "the person is another one";
 }
 
-// A client may begin thousands of calls and close the connection before the first of them is looked at.
+// A client may begin thousands of calls, and close the connection before the first of them is checked.
 TEST_F(AuthorizerTest, NotesTheFloodOfAConnectionThatIsGoneOnce) {
-  static Connections none;  // outlives the authorizer, whose thread looks at it
+  static Connections none;  // It outlives the authorizer, whose thread checks it.
   authorizer_->set_connections(none);
   for (int call = 0; call < 1000; ++call) authorizer_->note_flood(shown(certificate("anna")));
   EXPECT_EQ(refusals_.counts().at("flood"), 1u);
@@ -345,9 +347,8 @@ TEST_F(AuthorizerTest, NotesTheFloodOfAConnectionThatIsGoneOnce) {
             "flood: too many calls came from you; wait a minute");
 }
 
-// Between the question whose an identity is and the beginning of its stream there is no moment in which it is lost
-// unseen.
-TEST_F(AuthorizerTest, LooksAgainWhoItIsWhenAStreamBegins) {
+// An identity that is lost between the check of its owner and the beginning of its stream must not go unnoticed.
+TEST_F(AuthorizerTest, ChecksTheIdentityAgainWhenAStreamBegins) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{1}) && authorizer_->joined(ben, "ward", 1, AuthorId{2}));
   ASSERT_TRUE(authorizer_->check_author(anna, "ward", AuthorId{1}));
@@ -359,9 +360,9 @@ TEST_F(AuthorizerTest, LooksAgainWhoItIsWhenAStreamBegins) {
   EXPECT_THAT(enter(anna, AuthorId{2}), HasSubstr("author 2 is not yours"));
   ASSERT_TRUE(authorizer_->joined(anna, "ward", 1, AuthorId{3}));
   EXPECT_THAT(enter(anna, AuthorId{1}), HasSubstr("author 1 is not yours in this room, or no more"))
-      << "a newer session took its place";
+      << "a newer session replaced it";
   EXPECT_EQ(enter(anna, AuthorId{3}), "");
-  EXPECT_EQ(enter(anna, {}), "") << "as nobody";
+  EXPECT_EQ(enter(anna, {}), "") << "it has no author number";
   people_->append_access("role anna observer");
   authorizer_->look();
   EXPECT_THAT(enter(anna, AuthorId{3}), HasSubstr("your role has changed to observer"));
@@ -375,7 +376,7 @@ TEST_F(AuthorizerTest, LooksAgainWhoItIsWhenAStreamBegins) {
 TEST_F(AuthorizerTest, ARoomThatIsMadeAnewLeavesItsNewPeopleAlone) {
   const Caller anna = let_in("anna", Role::trainee), ben = let_in("ben", Role::trainee);
   (void)authorizer_->joined(anna, "ward", 1, AuthorId{1});
-  // Deleted and made again behind the authorizer's back: its authors are counted anew.
+  // The room was deleted and made again without the authorizer's knowledge. Its authors are counted anew.
   (void)authorizer_->joined(ben, "ward", 1, AuthorId{1});
   std::string ended;
   const auto bens =
@@ -410,7 +411,7 @@ TEST_F(AuthorizerTest, EndsStreamsOfWhoMayHaveThemNoMore) {
   gone->reset();
   EXPECT_EQ(authorizer_->counts().streams, 2u);
   EXPECT_EQ((*first)->role(), Role::trainee);
-  // Nobody asks: the authorizer looks by itself.
+  // No call triggers this: the authorizer checks by itself.
   people_->append_access("role anna observer");
   ASSERT_TRUE(test::wait_until([&] { return calls == 1; }, 5s));
   EXPECT_THAT(ended[0]->sentence, HasSubstr("your role has changed to observer"));
@@ -443,15 +444,15 @@ TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
     for (const auto end = now + length; now < end; now += every) count += rates.take(user, kJoin, now) ? 1 : 0;
     return count;
   };
-  // Whoever tries a thousand times a second for an hour is let through as often as the rate and one rest say.
+  // Whoever tries a thousand times a second for an hour is admitted as often as the rate and one full reserve allow.
   const int in_an_hour = through("eve", 1ms, 3600s);
   EXPECT_GT(in_an_hour, 3600);
   EXPECT_LT(in_an_hour, 5 * 3600);
-  // As somebody may who has a bad line for a minute.
+  // As somebody may with a bad connection for a minute.
   EXPECT_EQ(through("anna", 500ms, 60s), 120);
   for (int i = 0; i < 1000; ++i)
-    EXPECT_TRUE(rates.take("anna", "/osteon.v1.WatchService/LookFrom", now)) << "what costs nothing is not counted";
-  // Time that goes back gives nothing.
+    EXPECT_TRUE(rates.take("anna", "/osteon.v1.WatchService/LookFrom", now)) << "cheap calls are not counted";
+  // A clock that goes back gives nothing.
   for (int i = 0; i < 1000; ++i) (void)rates.take("eve", kJoin, now);
   EXPECT_FALSE(rates.take("eve", kJoin, now - 10s));
   EXPECT_FALSE(rates.take("eve", kJoin, now));
@@ -471,7 +472,7 @@ TEST(CallRates, AreThoseOfCallsThatThereAre) {
   int limited = 0;
   for (const CallRow& entry : call_rows()) limited += find_call_rate(entry.method) != nullptr ? 1 : 0;
   EXPECT_EQ(limited, 21);
-  // All that makes an entry of the journal.
+  // Every call that makes an entry of the journal.
   for (const char* method :
        {"Join", "Mark", "Undo", "Redo", "AddTool", "RemoveBody", "SetSceneItem", "RemoveSceneItem"})
     EXPECT_NE(find_call_rate(std::string("/osteon.v1.RoomService/") + method), nullptr) << method;

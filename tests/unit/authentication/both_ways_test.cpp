@@ -1,5 +1,5 @@
-// The same people, wrong certificates and attacks, straight at the server and through the proxy of deploy/haproxy.cfg:
-// what becomes of them is the same.
+// The same people, wrong certificates and attacks, directly at the server and through the proxy of deploy/haproxy.cfg.
+// Both ways have the same results.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -51,7 +51,7 @@ class BothWays : public ::testing::TestWithParam<Way> {
   }
   void TearDown() override {
     if (!server_) return;
-    // Anna comes in as before, whatever was tried.
+    // Anna can still join, whatever was tried.
     const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "anna", 5s, {}, "ward", anna_);
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     EXPECT_TRUE(!proxy_ || proxy_->running());
@@ -69,33 +69,33 @@ class BothWays : public ::testing::TestWithParam<Way> {
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
     if (is_proxied()) proxy_.emplace(people_.server(), doors.proxy_socket, changes);
-    testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+    testing::internal::CaptureStdout();  // A program that has not opened its log writes it here.
     capturing_ = true;
   }
-  // Where clients come.
+  // The address that clients connect to.
   const std::string& address() { return proxy_ ? proxy_->address() : server_->address(); }
-  // What the server and the proxy have said since they began; once.
+  // What the server and the proxy have logged since their start. May be called once.
   std::string log() {
     capturing_ = false;
     const std::string said = testing::internal::GetCapturedStdout() + (proxy_ ? proxy_->log() : "");
-    std::cout << said;  // what failed meanwhile stands in it too
+    std::cout << said;  // The log also contains the failures so far.
     return said;
   }
-  // The headers by which the server admits a person's call.
+  // The headers with which the server admits a person's call.
   RawHttp2::Headers admission(const std::string& user) {
     const std::string room_in_base64 = "d2FyZA";  // ward
     std::string ticket = content(people_.ticket(user, "ward", Role::trainee));
     ticket.pop_back();
     return {{"osteon-ticket", ticket}, {"osteon-room-bin", room_in_base64}};
   }
-  // Whether a frame of that kind comes before the end of the connection.
+  // Whether a frame of this kind is received before the connection ends.
   static bool comes(RawHttp2& line, std::uint8_t kind) {
     while (const auto frame = line.read(5s))
       if (frame->type == kind) return true;
     return false;
   }
-  // Whether somebody with that certificate and a ticket in their name is told anything about the room.
-  bool is_told(const std::filesystem::path& person, const std::string& user) {
+  // Whether somebody with this certificate and a ticket in their name is sent anything about the room.
+  bool is_informed(const std::filesystem::path& person, const std::string& user) {
     RawHttp2 line(address(), person);
     return line.call(1, kGetStatus, admission(user)) && line.send_empty_message(1) && comes(line, kDataFrame);
   }
@@ -104,14 +104,14 @@ class BothWays : public ::testing::TestWithParam<Way> {
     return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0},
                            [](std::uint64_t sum, const auto& one) { return sum + one.second; });
   }
-  // Lines in which the proxy notes a call, or a handshake that failed, with its address.
+  // Number of lines in which the proxy logs a call, or a failed handshake, with its address.
   std::size_t noted_by_proxy() {
     if (!proxy_) return 0;
     const std::string said = proxy_->log();
     static const std::regex line("127\\.0\\.0\\.1:[0-9]+ ");
     return static_cast<std::size_t>(std::distance(std::sregex_iterator(said.begin(), said.end(), line), {}));
   }
-  // Whether a line of a log says that it was that person, and from where: of the server after the name, of the proxy
+  // Whether a line of a log names that person and the address: the server writes the address after the name, the proxy
   // before it.
   static bool is_named(const std::string& said, const std::string& user) {
     const std::regex server("refused who=\"?" + user + "\\b.* from=\"?(ipv4:)?127\\.0\\.0\\.1\\b"),
@@ -121,7 +121,7 @@ class BothWays : public ::testing::TestWithParam<Way> {
       if (std::regex_search(line, server) || std::regex_search(line, proxy)) return true;
     return false;
   }
-  // A stream that is open, of somebody who has joined.
+  // An open stream of somebody who has joined.
   std::unique_ptr<RawHttp2> stream_of(const std::string& user) {
     const wire::ClientCredentials credentials = people_.credentials(user, Role::trainee, "ward");
     const auto joined = wire::join_room(address(), wire::ClientKind::viewer, user, 5s, {}, "ward", credentials);
@@ -147,29 +147,29 @@ TEST_P(BothWays, RefuseEveryWrongCertificateAndNoteItsAddress) {
   const auto wrong = test::wrong_certificates(people_, dir_ / "wrong");
   ASSERT_GE(wrong.size(), 13u);
   serve();
-  EXPECT_TRUE(is_told(people_.person("anna"), "anna")) << "the right certificate";
+  EXPECT_TRUE(is_informed(people_.person("anna"), "anna")) << "the right certificate was refused";
   const std::uint64_t admitted = server_->connection_health().authorizer.admitted;
   for (const test::WrongCertificate& one : wrong) {
     SCOPED_TRACE(one.kind);
     const std::uint64_t noted = refusals() + noted_by_proxy();
-    EXPECT_FALSE(is_told(one.folder, one.user));
+    EXPECT_FALSE(is_informed(one.folder, one.user));
     EXPECT_TRUE(test::wait_until([&] { return refusals() + noted_by_proxy() > noted; }, kPatience))
-        << "nobody notes it";
+        << "no log has a line about it";
   }
   EXPECT_EQ(server_->connection_health().authorizer.admitted, admitted);
-  EXPECT_TRUE(is_told(people_.person("anna"), "anna"));
+  EXPECT_TRUE(is_informed(people_.person("anna"), "anna"));
   EXPECT_THAT(log(), HasSubstr("127.0.0.1"));
 }
 
-// Where each round trip takes 150 ms, a handshake takes half a second.
-TEST_P(BothWays, LetPeopleInOverALongLine) {
+// If each round trip takes 150 ms, a handshake takes half a second.
+TEST_P(BothWays, AdmitPeopleOverASlowConnection) {
   serve();
   const test::ImpairProcess line({"--tcp", address(), "--delay-ms", "75"});
   const auto joined = wire::join_room(line.tcp(), wire::ClientKind::viewer, "anna", 5s, {}, "ward", anna_);
   EXPECT_TRUE(joined.has_value()) << joined.error().message;
 }
 
-// A client that prefers a weaker cipher gets the one that is preferred here.
+// A client that prefers a weaker cipher gets the cipher that the server prefers.
 TEST_P(BothWays, ChooseTheCipherThemselves) {
   serve();
   const auto chosen = [&](const std::string& offered) {
@@ -190,17 +190,17 @@ TEST_P(BothWays, CloseWhatIsOpenOfWhoIsRevoked) {
   serve();
   const auto mallorys = stream_of("mallory"), annas = stream_of("anna");
   RawHttp2 of_no_call(address(), people_.person("mallory"));
-  ASSERT_TRUE(of_no_call.read(5s).has_value());  // the settings: the handshake is over
+  ASSERT_TRUE(of_no_call.read(5s).has_value());  // The settings were received: the handshake is complete.
   people_.certs({"revoke", "mallory"});
   EXPECT_TRUE(mallorys->closed_within(kPatience));
   EXPECT_TRUE(of_no_call.closed_within(kPatience));
   EXPECT_TRUE(!proxy_ || proxy_->is_told_of(1));
-  EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s)) << "comes again";
+  EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s)) << "a new connection was accepted";
   EXPECT_FALSE(annas->closed_within(1s)) << "the stream of somebody else was closed";
 }
 
-// gRPC 1.51 ends the process where an AuthMetadataProcessor is handed such a header.
-TEST_P(BothWays, LiveOnWhenAnybodySendsAHeaderThatOnceEndedTheServer) {
+// gRPC 1.51 ends the process when an AuthMetadataProcessor receives such a header.
+TEST_P(BothWays, SurviveAHeaderThatOnceEndedTheServer) {
   people_.certs({"revoke", "mallory"});
   serve();
   const RawHttp2::Headers killing{{"grpclb_client_stats", "x"}};
@@ -210,8 +210,8 @@ TEST_P(BothWays, LiveOnWhenAnybodySendsAHeaderThatOnceEndedTheServer) {
   };
   for (const char* path : {kGetStatus, "/osteon.v1.CuttingService/Session", "/osteon.v1.RoomService/Nothing"}) {
     EXPECT_TRUE(call(people_.person("ben"), path)) << "is answered, with a refusal";
-    EXPECT_FALSE(call(people_.person("mallory"), path)) << "revoked";
-    EXPECT_FALSE(call({}, path)) << "without a certificate";
+    EXPECT_FALSE(call(people_.person("mallory"), path)) << "the certificate is revoked";
+    EXPECT_FALSE(call({}, path)) << "there is no certificate";
   }
   EXPECT_EQ(server_->connection_health().authorizer.admitted, 0u);
   const std::string said = log();
@@ -220,7 +220,7 @@ TEST_P(BothWays, LiveOnWhenAnybodySendsAHeaderThatOnceEndedTheServer) {
 }
 
 // CVE-2023-44487: calls that are begun and reset, without waiting.
-TEST_P(BothWays, LiveOnWhenAnybodyResetsCallsRapidly) {
+TEST_P(BothWays, SurviveRapidResetsOfCalls) {
   people_.certs({"revoke", "mallory"});
   serve();
   for (const std::filesystem::path& person :
@@ -229,7 +229,7 @@ TEST_P(BothWays, LiveOnWhenAnybodyResetsCallsRapidly) {
     RawHttp2 line(address(), person);
     for (std::uint32_t stream = 1; stream < 40'001; stream += 2)
       if (!line.call(stream, kGetStatus) || !line.reset(stream)) break;
-    EXPECT_TRUE(line.closed_within(kPatience)) << "may go on for ever";
+    EXPECT_TRUE(line.closed_within(kPatience)) << "the attack could go on for ever";
   }
   EXPECT_LT(server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused, 8'000u);
   const std::string said = log();
@@ -237,8 +237,8 @@ TEST_P(BothWays, LiveOnWhenAnybodyResetsCallsRapidly) {
   EXPECT_TRUE(is_named(said, "mallory"));
 }
 
-// A cable that was pulled: the server learns of it by itself. With the times of the shipped configuration it takes less
-// than 30 s, see below.
+// A pulled cable: the server detects it by itself. With the times of the shipped configuration it takes less than 30 s,
+// see below.
 TEST_P(BothWays, EndTheStreamsOfAMachineThatAnswersNothing) {
   serve({.keepalive = 500ms}, {{"clitcpka-idle 10s", "clitcpka-idle 1s"},
                                {"clitcpka-intvl 5s", "clitcpka-intvl 1s"},
@@ -250,11 +250,11 @@ TEST_P(BothWays, EndTheStreamsOfAMachineThatAnswersNothing) {
   EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().authorizer.streams == 0; }, kPatience));
 }
 
-// Seconds that the configuration gives to a word of it.
+// The number of seconds that the configuration sets for this word.
 int seconds(const std::string& configuration, const std::string& word, const std::string& unit = "s") {
   std::smatch found;
   if (!std::regex_search(configuration, found, std::regex("\n[^#\n]*\\b" + word + " ([0-9]+)" + unit + "\\b"))) {
-    ADD_FAILURE() << "haproxy.cfg does not say " << word;
+    ADD_FAILURE() << "haproxy.cfg does not contain " << word;
     return 0;
   }
   return std::stoi(found[1]);
@@ -266,13 +266,13 @@ TEST(ShippedTimes, EndADeadClientWithin30Seconds) {
   EXPECT_LE(seconds(proxy, "clitcpka-idle") + seconds(proxy, "clitcpka-intvl") * seconds(proxy, "clitcpka-cnt", ""),
             kMost);
   EXPECT_NE(proxy.find("\n  option clitcpka\n"), std::string::npos);
-  EXPECT_LE(seconds(proxy, "tcp-ut"), kMost) << "while something was sent to it";
-  EXPECT_LE(seconds(proxy, "timeout client"), kMost) << "that takes nothing of what waits for it";
+  EXPECT_LE(seconds(proxy, "tcp-ut"), kMost) << "something was sent to the client";
+  EXPECT_LE(seconds(proxy, "timeout client"), kMost) << "the client takes nothing of what waits for it";
   EXPECT_LE(2 * std::chrono::duration_cast<std::chrono::seconds>(ConnectionOptions{}.keepalive).count(), kMost)
-      << "asked after that time, and given as long to answer";
+      << "the client is asked after that time, and has as long to answer";
 }
 
-// Asked of systemd's own checker, with a program that is there in the place of the script.
+// systemd's own checker checks the unit, with an existing program in place of the script.
 TEST(ShippedUnits, OfTheProxyAreAsSystemdWantsThem) {
   const std::string configuration = content(OSTEON_DEPLOY "/haproxy.cfg");
   EXPECT_THAT(configuration, HasSubstr("OSTEON_ADMIN_SOCKET /run/osteon-proxy/admin.sock\n"));
@@ -286,12 +286,12 @@ TEST(ShippedUnits, OfTheProxyAreAsSystemdWantsThem) {
                                                        std::regex("/usr/local/bin/[a-z-]+"), "/usr/bin/true");
   for (const char* name : {"osteon-proxy.service", "osteon-proxy-revoked.service"}) {
     const std::string unit = content(folder / name);
-    // The server's user alone can open its socket, and the proxy's.
+    // Only the server's user can open its socket, and the proxy's.
     EXPECT_THAT(unit, HasSubstr("\nDynamicUser=yes\nUser=osteon-server\n")) << name;
     EXPECT_THAT(unit, HasSubstr("\nInaccessiblePaths=-/var/lib/osteon -/var/lib/private\n")) << name;
     const test::RunResult verified = test::run("systemd-analyze", {"verify", folder / name}, 60s);
     EXPECT_EQ(verified.exit_code, 0) << verified.err;
-    EXPECT_EQ(verified.err, "") << "it warns of what it does not know, and is content all the same";
+    EXPECT_EQ(verified.err, "") << "the checker only warns of unknown settings";
     const test::RunResult exposed =
         test::run("systemd-analyze", {"security", "--offline=true", "--threshold=20", folder / name}, 60s);
     EXPECT_EQ(exposed.exit_code, 0) << exposed.out << exposed.err;

@@ -1,4 +1,4 @@
-// What somebody has started ends with their right to it: demonstrations and uploads. And what goes on over the age of a
+// Demonstrations and uploads end with the right of the person who started them. Sessions go on beyond the age of their
 // connection.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
@@ -58,7 +58,7 @@ class GoingOn : public ::testing::Test {
     EXPECT_TRUE(test::wait_until([&] { return one->complete(); }, test::kPatience));
     return one;
   }
-  // Its next strokes, which arrive.
+  // Makes its next strokes, and waits until they are decided.
   void cut(test::Surgeon& by, int count) {
     const std::uint64_t before = by.own();
     std::vector<Cut> cuts = test::strokes(by.author(), static_cast<int>(before) + count, 7);
@@ -80,12 +80,12 @@ class GoingOn : public ::testing::Test {
 TEST_F(GoingOn, ADemonstrationEndsWithTheRightOfWhoStartedIt) {
   start();
   const auto sue = surgeon("sue");
-  for (int i = 0; i < 10; ++i) cut(*sue, 1);  // each in a tick of its own
+  for (int i = 0; i < 10; ++i) cut(*sue, 1);  // Each in a tick of its own.
   const auto show = [&](const wire::JoinedRoom& by) {
     v1::DemonstrateRequest request;
     request.set_author(by.author.value);
     request.set_of_author(sue->author().value);
-    request.set_speed(0.001);  // far longer than this test
+    request.set_speed(0.001);  // It takes far longer than this test.
     v1::DemonstrateResponse response;
     grpc::ClientContext context;
     const grpc::Status status = v1::PeopleService::NewStub(by.channel)->Demonstrate(&context, request, &response);
@@ -114,14 +114,14 @@ TEST_F(GoingOn, ADemonstrationEndsWithTheRightOfWhoStartedIt) {
   const grpc::Status revoked = end(ida, of_ira);
   EXPECT_EQ(revoked.error_code(), StatusCode::NOT_FOUND);
   EXPECT_THAT(revoked.error_message(), HasSubstr("revoked"));
-  // Nobody else's: it goes on until it is ended.
+  // The demonstrations of others go on until they are ended.
   EXPECT_EQ(sessions(), 2u);
   EXPECT_TRUE(end(ida, of_ida).ok());
   cut(*sue, 1);
 }
 
-// A newer window of the same person takes the place of the older one, and leaves what that one has started.
-TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
+// A newer viewer of the same person replaces the older one. What the older one has started goes on.
+TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterReconnects) {
   start();
   const auto sue = surgeon("sue");
   for (int i = 0; i < 10; ++i) cut(*sue, 1);
@@ -145,10 +145,10 @@ TEST_F(GoingOn, ADemonstrationGoesOnWhenItsStarterComesAnew) {
   EXPECT_TRUE(status.ok()) << status.error_message();
 }
 
-// An upload as some client makes it, piece by piece.
+// An upload as a client makes it, chunk by chunk.
 struct Sending {
   Sending(const std::string& address, const wire::ClientCredentials& credentials) {
-    context.set_deadline(std::chrono::system_clock::now() + 2 * test::kPatience);  // where nobody ends it
+    context.set_deadline(std::chrono::system_clock::now() + 2 * test::kPatience);  // In case nobody ends it.
     context.AddMetadata("osteon-ticket", wire::ticket_text(credentials));
     const auto channel = grpc::CreateChannel(address, wire::channel_credentials(credentials, address).value());
     writer = v1::CaseService::NewStub(channel)->UploadCase(&context, &response);
@@ -158,7 +158,7 @@ struct Sending {
     piece.set_data(std::string(1000, 'x'));
     return writer->Write(piece);
   }
-  // Goes on until nobody takes it any more.
+  // Goes on until the server takes no more.
   grpc::Status send_until_the_end() {
     EXPECT_TRUE(test::wait_until([&] { return !send(); }, test::kPatience));
     return writer->Finish();
@@ -188,8 +188,8 @@ TEST_F(Uploads, EndWithTheRightOfWhoSendsThem) {
   EXPECT_TRUE(nothing_is_left());
 }
 
-TEST_F(Uploads, EndAlsoWhileTheyAreLookedThrough) {
-  // A program that takes long to look a case through.
+TEST_F(Uploads, EndAlsoDuringTheirValidation) {
+  // A validation that takes long.
   const fs::path checker = dir_ / "checker";
   std::ofstream(checker) << "#!/bin/sh\nexec sleep 60\n";
   fs::permissions(checker, fs::perms::owner_all);
@@ -213,7 +213,7 @@ TEST_F(Uploads, EndAlsoWhileTheyAreLookedThrough) {
   EXPECT_TRUE(nothing_is_left());
 }
 
-TEST_F(Uploads, EndWhereNothingComesOrTheyTakeTooLong) {
+TEST_F(Uploads, EndIfNothingIsReceivedOrTheyTakeTooLong) {
   start({}, {.idle = 300ms, .sending = 1500ms});
   const wire::ClientCredentials otto = people_.credentials("otto", Role::operator_, "*");
   Sending silent(server_->address(), otto);
@@ -233,10 +233,10 @@ TEST_F(GoingOn, ASessionDoesNotNoticeTheAgeOfItsConnection) {
   const auto sue = surgeon("sue");
   cut(*sue, 5);
   const std::uint64_t before = server_->connection_health().connections.accepted;
-  // Calls go over newer connections, each with a handshake of its own.
+  // The calls use newer connections, each with a handshake of its own.
   EXPECT_TRUE(test::wait_until(
       [&] {
-        std::this_thread::sleep_for(20ms);  // who asks without a pause is cut off
+        std::this_thread::sleep_for(20ms);  // A client that asks without a pause is cut off.
         EXPECT_GT(test::status_of(sue->session().room()).room_seq(), 0u);
         return server_->connection_health().connections.accepted >= before + 3;
       },
@@ -246,7 +246,7 @@ TEST_F(GoingOn, ASessionDoesNotNoticeTheAgeOfItsConnection) {
   EXPECT_EQ(sue->lost(), "");
 }
 
-TEST_F(GoingOn, ASessionComesAgainAfterTheLongestThatThereIs) {
+TEST_F(GoingOn, ASessionReconnectsAfterTheLongestPossibleAge) {
   start({.connection_age = 400ms, .longest_session = 400ms});
   const auto sue = surgeon("sue");
   for (int i = 0; sue->interruptions() < 2 && i < 1000 && !HasFatalFailure(); ++i) cut(*sue, 1);
@@ -256,7 +256,8 @@ TEST_F(GoingOn, ASessionComesAgainAfterTheLongestThatThereIs) {
   EXPECT_EQ(wire::to_wire(sue->hash()), test::status_of(sue->session().room()).field_hash());
 }
 
-// Whose authority is trusted no more is shut out when their connection is old, for all calls that begin later.
+// If the authority of a person is no longer trusted, all calls are refused that begin after their connection has
+// reached its age.
 TEST_F(GoingOn, WhoseAuthorityIsTrustedNoMoreIsOutWithTheAgeOfTheConnection) {
   test::People others;
   const fs::path guest = others.person("guest");

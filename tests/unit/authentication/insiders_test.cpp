@@ -1,5 +1,5 @@
-// People who have, or once had, a certificate of the authority, and say by HTTP/2 what no client of ours would: the
-// server lives on, others notice nothing, and the log says who and from where.
+// People who have or had a certificate of the authority, and send over HTTP/2 what none of our clients would. The
+// server goes on, others notice nothing, and the log contains the person and the address.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -43,15 +43,15 @@ class Insiders : public ::testing::Test {
     auto started = RoomServer::start(std::move(rooms), "127.0.0.1:0",
                                      {.certificates = people_.server(),
                                       .flood = {.at_once = kCalls, .per_second = 1.0},
-                                      .keepalive = 1h});  // which would close connections too
+                                      .keepalive = 1h});  // A keepalive would close connections too.
     ASSERT_TRUE(started.has_value()) << started.error().message;
     server_ = std::move(*started);
     anna_ = people_.credentials("anna", Role::trainee, "ward");
     (void)people_.person("mallory");
-    testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+    testing::internal::CaptureStdout();  // A program that has not opened its log writes it here.
     capturing_ = true;
   }
-  // Somebody else still comes in as before.
+  // Somebody else can still join as before.
   void TearDown() override {
     if (!server_) return;
     const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "anna", 5s, {}, "ward", anna_);
@@ -62,12 +62,12 @@ class Insiders : public ::testing::Test {
   const std::string& address() { return server_->address(); }
   std::string log() {
     capturing_ = false;
-    // What failed meanwhile stands in it too.
+    // The log also contains the failures so far.
     std::string said = testing::internal::GetCapturedStdout();
     std::cout << said;
     return said;
   }
-  // What the first stream is answered; false: the connection ends without it.
+  // Whether the first stream is answered. False if the connection ends before.
   static bool is_answered(RawHttp2& line) {
     while (const auto frame = line.read(5s))
       if (frame->type == kHeadersFrame) return true;
@@ -86,7 +86,7 @@ class Insiders : public ::testing::Test {
   bool capturing_ = false;
 };
 
-// gRPC 1.51 ends the process where an AuthMetadataProcessor is handed the first of these.
+// gRPC 1.51 ends the process when an AuthMetadataProcessor receives the first of these.
 TEST_F(Insiders, AreRefusedForHeadersThatNoClientHas) {
   const RawHttp2::Headers strange[] = {{{"grpclb_client_stats", "x"}},
                                        {{"lb-token", "x"}},
@@ -102,7 +102,7 @@ TEST_F(Insiders, AreRefusedForHeadersThatNoClientHas) {
       ASSERT_TRUE(line.call(1, path, headers) && line.send_empty_message(1));
       EXPECT_TRUE(is_answered(line)) << path << " " << headers.front().first;
     }
-  // Nobody has come in without a ticket; without a strange header that alone is why.
+  // Nobody was admitted without a ticket. Without a strange header, that is the only reason.
   EXPECT_EQ(server_->connection_health().authorizer.admitted, 0u);
   RawHttp2 line(address(), people_.person("mallory"));
   ASSERT_TRUE(line.call(1, kSession));
@@ -127,11 +127,11 @@ TEST_F(Insiders, WhoAreRevokedFailInTheHandshake) {
   for (int i = 0; i < 5; ++i) {
     RawHttp2 line(address(), people_.person("mallory"));
     (void)line.call(1, kGetStatus, {{"grpclb_client_stats", "x"}});
-    // Not even the settings with which an HTTP/2 server begins.
+    // The client does not even receive the settings with which an HTTP/2 server begins.
     EXPECT_FALSE(line.read(5s).has_value());
     EXPECT_TRUE(line.closed_within(kPatience));
   }
-  EXPECT_EQ(server_->connection_health().authorizer.refused, refused) << "calls came through";
+  EXPECT_EQ(server_->connection_health().authorizer.refused, refused) << "a call passed the handshake";
   EXPECT_GE(counted("revoked"), 5u);
   const std::string said = log();
   EXPECT_THAT(said, HasSubstr("mallory, certificate "));
@@ -144,7 +144,7 @@ TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
   ASSERT_TRUE(of_a_call.call(1, kSession));
   ASSERT_TRUE(is_answered(of_a_call));
   RawHttp2 of_no_call(address(), people_.person("mallory"));
-  ASSERT_TRUE(of_no_call.read(5s).has_value());  // the server's settings: the handshake is over
+  ASSERT_TRUE(of_no_call.read(5s).has_value());  // The server's settings were received: the handshake is complete.
   const wire::ClientCredentials anna = anna_;
   RawHttp2 annas(address(), people_.person("anna"));
   ASSERT_TRUE(annas.call(1, kSession));
@@ -155,12 +155,12 @@ TEST_F(Insiders, WhoAreRevokedLoseTheConnectionsThatTheyHave) {
   RawHttp2 newcomer(address(), people_.person("anna"));
   ASSERT_TRUE(newcomer.read(5s).has_value());
   EXPECT_TRUE(of_no_call.closed_within(kPatience));
-  EXPECT_TRUE(newcomer.call(1, kSession) && is_answered(newcomer)) << "who came after the revocation";
+  EXPECT_TRUE(newcomer.call(1, kSession) && is_answered(newcomer)) << "a person who connected after the revocation";
   EXPECT_FALSE(annas.closed_within(1s)) << "the connection of somebody else was closed";
   EXPECT_TRUE(test::wait_until([&] { return server_->connection_health().connections.open == 2; }, kPatience));
 }
 
-// Whoever is just coming in has made no call yet, and loses nothing by the revocation of somebody else.
+// Somebody who has just connected has made no call yet. The revocation of somebody else must not close that connection.
 TEST_F(Insiders, LoseNoConnectionThatIsNewWhenSomebodyElseIsRevoked) {
   RawHttp2 mallorys(address(), people_.person("mallory"));
   ASSERT_TRUE(mallorys.call(1, kSession));
@@ -173,7 +173,7 @@ TEST_F(Insiders, LoseNoConnectionThatIsNewWhenSomebodyElseIsRevoked) {
   EXPECT_TRUE(is_answered(annas));
 }
 
-// Whoever is about to make a first call notices nothing of the role of somebody else.
+// Somebody who is about to make a first call does not notice a change of somebody else's role.
 TEST_F(Insiders, LoseNoConnectionByAChangedRole) {
   RawHttp2 line(address(), people_.person("anna"));
   ASSERT_TRUE(line.read(5s).has_value());
@@ -183,7 +183,7 @@ TEST_F(Insiders, LoseNoConnectionByAChangedRole) {
   EXPECT_TRUE(is_answered(line));
 }
 
-// A revocation list as other authorities write it holds as the server's own list does.
+// A revocation list that another authority wrote is obeyed as the server's own list is.
 TEST_F(Insiders, AreRevokedByAListOfTheAuthorityAlone) {
   const std::filesystem::path list = people_.server() / "access.txt";
   people_.certs({"revoke", "mallory"});
@@ -200,13 +200,14 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
     if (!line.call(stream, kSession) || !line.reset(stream)) break;
   EXPECT_TRUE(line.closed_within(kPatience));
   EXPECT_GE(counted("flood"), 1u);
-  // What gRPC had read when the connection was closed may still begin, and nothing that waited in the receive queue.
+  // Calls that gRPC had read before the connection was closed may still begin, but none that waited in the receive
+  // queue.
   const std::uint64_t begun =
       server_->connection_health().authorizer.admitted + server_->connection_health().authorizer.refused;
   EXPECT_LT(begun, 2'000u);
-  // Once for the connection, and for calls that other threads begin at that moment.
+  // Once for the connection, and for the calls that other threads begin at that moment.
   EXPECT_LE(counted("flood"), 16u) << "of " << begun;
-  // They do not come again at once, whatever connection they take.
+  // The person cannot connect again at once, over any connection.
   EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value());
   EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value());
   const std::string said = log();
@@ -214,7 +215,7 @@ TEST_F(Insiders, WhoResetCallsRapidlyAreCutOffAndWait) {
   EXPECT_THAT(said, HasSubstr("more calls than a person may begin"));
 }
 
-// More connections are no more calls: all of a person share one limit, and all are closed.
+// More connections do not allow more calls: all of a person share one limit, and all are closed.
 TEST_F(Insiders, ShareOneLimitOverAllTheirConnections) {
   RawHttp2 first(address(), people_.person("mallory")), second(address(), people_.person("mallory"));
   ASSERT_TRUE(first.read(5s).has_value());
@@ -229,8 +230,8 @@ TEST_F(Insiders, ShareOneLimitOverAllTheirConnections) {
   EXPECT_GE(counted("flood"), 1u);
 }
 
-// Handshakes that fail are noted with the address, whatever is wrong.
-TEST_F(Insiders, AndStrangersAreNotedWithTheirAddress) {
+// Failed handshakes are logged with the address, whatever the reason.
+TEST_F(Insiders, AndTheUnauthenticatedAreNotedWithTheirAddress) {
   test::People elsewhere;
   EXPECT_FALSE(RawHttp2(address(), elsewhere.person("anna")).read(5s).has_value());
   EXPECT_FALSE(RawHttp2(address()).read(5s).has_value());

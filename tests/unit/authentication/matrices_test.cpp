@@ -1,5 +1,5 @@
-// What each role sends and is told in a server with certificates: by datagram, and by each stream. The expectations are
-// written out here, kind by kind, as people are told the roles.
+// What each role may send and is sent by a server with certificates: by datagram, and by each stream. The expectations
+// are listed here for each kind, as the roles are described to people.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ using testing::HasSubstr;
 
 using Seen = std::set<std::string>;
 
-// One stream down, read until it ends.
+// A stream from the server, read until it ends.
 template <class Message>
 class Reader {
  public:
@@ -50,7 +50,7 @@ class Reader {
     }
     return end_;
   }
-  // What it ends with by itself.
+  // Waits until it ends by itself.
   grpc::Status wait() {
     thread_.join();
     return end_;
@@ -63,7 +63,7 @@ class Reader {
   std::thread thread_;
 };
 
-// Somebody with a ticket, and everything that they are told: as stream and content.
+// A person with a ticket, and everything that they are sent: stream and content.
 class Member {
  public:
   explicit Member(wire::JoinedRoom joined) : room(std::move(joined)) {}
@@ -100,7 +100,7 @@ class Member {
         [this](const v1::WatchPeopleResponse& said) { note_people(said); });
   }
 
-  // The session's stream; nothing of it goes by datagram, but for what `link` is given.
+  // Opens the stream of the session. Nothing of it goes by datagram, except what `link` receives.
   void open(std::function<void(const v1::LinkOffer&)> link = {}) {
     session_context_ = std::make_unique<grpc::ClientContext>();
     session_ = v1::CuttingService::NewStub(room.channel)->Session(session_context_.get());
@@ -182,7 +182,7 @@ class Member {
   std::thread session_thread_;
 };
 
-// The client's end of a session's datagrams, which also looks into each that comes.
+// The client's end of a session's datagrams, which also records the content of each datagram received.
 class Line {
  public:
   Line(const v1::LinkOffer& offer, const std::string& address)
@@ -194,7 +194,7 @@ class Line {
         link_(keys),
         opener_(keys.session, keys.down) {}
 
-  // Sends and hears until it holds.
+  // Sends and receives until `holds` is true.
   bool drive(const std::function<bool()>& holds, std::chrono::milliseconds patience = test::kPatience) {
     const auto until = std::chrono::steady_clock::now() + patience;
     DatagramBuffer buffer, plain;
@@ -290,7 +290,7 @@ class Matrices : public ::testing::Test {
   void say(AuthorId to, const std::string& words) {
     happen([&](Room& room) { return room.say(ina_, to, words); });
   }
-  // Something of every kind, also about `reader`, and at last "the end" to all.
+  // Makes something of every kind happen, also about `reader`, and at last sends "the end" to all.
   void let_everything_happen(AuthorId reader, bool hand) {
     sue_cuts();
     sue_moves();
@@ -320,7 +320,7 @@ class Matrices : public ::testing::Test {
 
 constexpr Role kHands[] = {Role::trainee, Role::collaborator, Role::instructor};
 
-TEST_F(Matrices, EveryStreamTellsEveryRoleWhatIsForIt) {
+TEST_F(Matrices, EveryStreamSendsEveryRoleWhatIsForIt) {
   const Seen of_watchers{"mesh surface",  "cutting tool_states", "cutting scene",
                          "people people", "people scene",        "people own_words"};
   const Seen of_hands{"people own_supervision", "session field",           "session scene",
@@ -341,8 +341,8 @@ TEST_F(Matrices, EveryStreamTellsEveryRoleWhatIsForIt) {
     if (hand) expected.insert(of_hands.begin(), of_hands.end());
     if (role == Role::instructor) expected.insert(of_instructors.begin(), of_instructors.end());
     for (const std::string& what : expected)
-      EXPECT_TRUE(test::wait_until([&] { return sue_moves(), reader.saw(what); }, 10s)) << "is not told: " << what;
-    // Whatever else there was to be told has had its turn, since the streams keep the order.
+      EXPECT_TRUE(test::wait_until([&] { return sue_moves(), reader.saw(what); }, 10s)) << "is not sent: " << what;
+    // The streams keep the order, so everything else that was to be sent has been sent before.
     ASSERT_TRUE(test::wait_until([&] { return reader.saw("the end"); }, test::kPatience));
     Seen seen = reader.seen();
     for (const char* what : {"session complete", "own cut", "the end"}) seen.erase(what);
@@ -351,14 +351,14 @@ TEST_F(Matrices, EveryStreamTellsEveryRoleWhatIsForIt) {
   }
 }
 
-TEST_F(Matrices, NoStreamTellsAnOperatorOfARoom) {
+TEST_F(Matrices, NoStreamSendsAnOperatorAnythingOfARoom) {
   const wire::ClientCredentials credentials = people_.credentials("otto", Role::operator_, "ward");
   const auto joined = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", credentials);
   ASSERT_FALSE(joined);
   EXPECT_THAT(joined.error().message, HasSubstr("an operator may not call"));
 }
 
-TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
+TEST_F(Matrices, DatagramsBringEveryHapticClientAllThatIsForIt) {
   for (const Role role : kHands) {
     SCOPED_TRACE(to_string(role));
     const std::string name = "hand-" + std::string(to_string(role));
@@ -371,7 +371,7 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
     line.me = hand.room.author.value;
     ASSERT_TRUE(line.drive([&] { return hand.saw("session complete") && line.seen.contains("bone_seen"); }));
 
-    // Up: nothing is said over the stream.
+    // To the server: nothing is sent over the stream.
     CuttingState state;
     state.pose_bone_tool.position_mm = {3, 0, 5};
     EXPECT_TRUE(line.drive([&] {
@@ -390,19 +390,21 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
       return line.seen.contains("bone_push");
     })) << "bone_push";
 
-    // Down.
+    // From the server.
     sue_cuts();
     decide_about(hand.room.author);
     for (const char* what : {"acknowledgements", "own entry", "committed_cuts", "partners", "supervision", "bone_seen"})
-      EXPECT_TRUE(line.drive([&] { return sue_moves(), line.seen.contains(what); }, 10s)) << "does not come: " << what;
+      EXPECT_TRUE(line.drive([&] { return sue_moves(), line.seen.contains(what); }, 10s))
+          << "is not received: " << what;
 
-    // And none of it any more from the moment on when the role is another, though the hand sends on and reads on.
+    // From the change of the role on, none of it is received any more, although the haptic client goes on sending and
+    // receiving.
     people_.append_access("role " + name + " observer ward");
     ASSERT_TRUE(line.drive([&] { return hand.session_end().has_value(); }));
     EXPECT_EQ(hand.session_end()->error_code(), StatusCode::PERMISSION_DENIED);
     EXPECT_THAT(hand.session_end()->error_message(), HasSubstr("an observer may not call Session"));
     const auto nothing = [&] { return false; };
-    (void)line.drive(nothing, 100ms);  // what was on its way
+    (void)line.drive(nothing, 100ms);  // Receives what was under way.
     const std::size_t before = line.datagrams;
     const RoomSeq place = host().room_seq();
     Cut late = test::strokes(hand.room.author, 2, 11).back();
@@ -411,7 +413,7 @@ TEST_F(Matrices, DatagramsBringEveryHandAllThatIsForIt) {
     sue_cuts();
     (void)line.drive(nothing, 500ms);
     EXPECT_EQ(line.datagrams, before);
-    EXPECT_EQ(host().room_seq().value, place.value + 1) << "Sue's cut alone";
+    EXPECT_EQ(host().room_seq().value, place.value + 1) << "only Sue's cut";
   }
 }
 
@@ -424,7 +426,7 @@ TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
     ASSERT_FALSE(as_hand);
     EXPECT_EQ(as_hand.error().code, ErrorCode::denied);
     EXPECT_THAT(as_hand.error().message, HasSubstr(role == Role::observer ? "holds no tool" : "may not call Join"));
-    // Nor does a session of a watcher, or of another's hand, get as far as the keys.
+    // A session of an observer, or of another person's haptic client, does not receive the keys either.
     std::uint64_t author = sue_->author().value;
     if (role == Role::observer) author = join(credentials, wire::ClientKind::viewer).author.value;
     grpc::ClientContext context;
@@ -440,7 +442,7 @@ TEST_F(Matrices, DatagramsBringNothingToWhoHoldsNoTool) {
     const grpc::Status end = session->Finish();
     EXPECT_EQ(end.error_code(), StatusCode::PERMISSION_DENIED);
     EXPECT_THAT(end.error_message(), HasSubstr("may not call Session"));
-    // With keys of one's own making: counted, and not answered.
+    // With keys of its own making: counted, and not answered.
     const std::uint64_t unauthenticated = server_->link_health().unauthenticated;
     Line line(make_session_keys(0x01020304, system_random()), server_->link_port(), address());
     CuttingState state;

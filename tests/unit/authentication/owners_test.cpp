@@ -1,4 +1,4 @@
-// Rooms and backups are counted for who made them, and who made them may delete them: also after a restart.
+// Rooms and backups count for the person who made them. That person may delete them, also after a restart.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -53,7 +53,7 @@ class Owners : public ::testing::Test {
     for (const RoomLine& room : listed.value()) names.insert(room.name);
     return names;
   }
-  // Of something that failed.
+  // The message of a failure.
   template <class T>
   static std::string refusal(const Result<T>& done, ErrorCode code) {
     EXPECT_FALSE(done.has_value());
@@ -76,14 +76,14 @@ TEST_F(Owners, HaveNoMoreRoomsThanOnePersonMay) {
   EXPECT_THAT(third, HasSubstr("--most-rooms-per-person"));
   EXPECT_THAT(refusal(ina.replay("ward", "film", RoomSeq{}, RoomSeq{}, 1), ErrorCode::exhausted), HasSubstr("2 rooms"));
   EXPECT_FALSE(fs::exists(folder() / "third.journal"));
-  // Nobody else notices.
+  // Nobody else is affected.
   EXPECT_TRUE(as("ian", Role::instructor, "ward").branch("ward", "ians", RoomSeq{}));
   for (const char* name : {"one", "two", "three"})
-    EXPECT_TRUE(as("otto", Role::operator_, "*").create(name, "")) << "an operator may have any number";
+    EXPECT_TRUE(as("otto", Role::operator_, "*").create(name, "")) << "an operator may have any number of rooms";
   serve();
   EXPECT_THAT(refusal(as("ina", Role::instructor, "ward").branch("ward", "third", RoomSeq{}), ErrorCode::exhausted),
               HasSubstr("you have made 2 rooms (first, second)"))
-      << "after a restart, too";
+      << "also after a restart";
 }
 
 TEST_F(Owners, OfPlaybacksAreCountedToo) {
@@ -106,19 +106,20 @@ TEST_F(Owners, DeleteTheirRoomsAndNobodyElseBelowAnOperatorDoes) {
                 HasSubstr("the ticket is for room ward"));
     EXPECT_THAT(refusal(as("ina", Role::trainee, "first").remove("first", false), ErrorCode::denied),
                 HasSubstr("a trainee may not call"));
-    // Nobody made this one as far as it says, as none of before owners were noted.
+    // This room has no owner, as rooms have none that were made before owners were stored.
     EXPECT_THAT(refusal(as("ina", Role::instructor, "*").remove("ward", true), ErrorCode::denied),
                 HasSubstr("ward is not yours"));
   }
-  // A branch is not in the ticket of whoever made it, and theirs all the same.
+  // The branch is not in the ticket of the person who made it, but it is their room.
   EXPECT_EQ(names(as("ina", Role::instructor, "ward")), (std::set<std::string>{"ward", "first", "second"}));
   EXPECT_EQ(names(as("ian", Role::instructor, "ward")), (std::set<std::string>{"ward"}));
   EXPECT_TRUE(as("ina", Role::instructor, "ward").remove("first", false));
   EXPECT_FALSE(fs::exists(folder() / "first.journal"));
   EXPECT_FALSE(fs::exists(folder() / "first.journal-owner"));
-  EXPECT_TRUE(as("ina", Role::instructor, "ward").branch("ward", "third", RoomSeq{})) << "there is room for one again";
+  EXPECT_TRUE(as("ina", Role::instructor, "ward").branch("ward", "third", RoomSeq{}))
+      << "there is space for one room again";
   EXPECT_TRUE(as("otto", Role::operator_, "*").remove("third", false));
-  // Whom the list of access calls less in that room, is less there.
+  // A role that the access list lowers for that room is lower there.
   people_.append_access("role ina observer second");
   server_->rooms().authorizer->look();
   EXPECT_FALSE(as("ina", Role::instructor, "ward").remove("second", false));
@@ -136,7 +137,7 @@ TEST_F(Owners, HaveNoMoreBackupsThanOnePersonMayAndDeleteTheirs) {
     EXPECT_THAT(second, HasSubstr("you have made 1 backups (w1)"));
     EXPECT_THAT(second, HasSubstr("--most-backups-per-person"));
   }
-  EXPECT_TRUE(as("olga", Role::operator_, "ward").back_up("ward", "olgas.backup")) << "another person";
+  EXPECT_TRUE(as("olga", Role::operator_, "ward").back_up("ward", "olgas.backup")) << "another person made that backup";
   EXPECT_THAT(refusal(as("olga", Role::operator_, "ward").remove("w1.backup", false), ErrorCode::denied),
               HasSubstr("the ticket is for room ward"));
   EXPECT_TRUE(as("otto", Role::operator_, "ward").remove("w1.backup", false));
@@ -144,7 +145,8 @@ TEST_F(Owners, HaveNoMoreBackupsThanOnePersonMayAndDeleteTheirs) {
   EXPECT_FALSE(fs::exists(folder() / "w1.backup-owner"));
   EXPECT_THAT(refusal(as("otto", Role::operator_, "*").remove("w1.backup", false), ErrorCode::not_found),
               HasSubstr("there is no backup w1.backup"));
-  EXPECT_TRUE(as("otto", Role::operator_, "*").remove("olgas.backup", false)) << "an operator of every room";
+  EXPECT_TRUE(as("otto", Role::operator_, "*").remove("olgas.backup", false))
+      << "an operator of every room may delete it";
   EXPECT_TRUE(server_->rooms().find("ward"));
 }
 
@@ -155,8 +157,8 @@ TEST_F(Owners, AreThoseOfTheRoomAndNotOfItsName) {
   struct stat about {};
   ASSERT_EQ(::stat((folder() / "annex.journal-owner").c_str(), &about), 0);
   EXPECT_EQ(about.st_mode & 0777u, 0600u);
-  // A room that is deleted without the server leaves nothing of it, and what is left all the same counts for no later
-  // one.
+  // A room that is deleted without the server leaves no owner. If a file of the owner is left nevertheless, it does not
+  // count for a later room.
   ASSERT_TRUE(rooms.close("annex"));
   ASSERT_TRUE(delete_room(folder() / "annex.journal", false));
   EXPECT_FALSE(fs::exists(folder() / "annex.journal-owner"));
@@ -165,7 +167,7 @@ TEST_F(Owners, AreThoseOfTheRoomAndNotOfItsName) {
   EXPECT_EQ(rooms.owner("annex"), "");
 }
 
-TEST_F(Owners, AreForgottenWithTime) {
+TEST_F(Owners, AreErasedWithTime) {
   ASSERT_TRUE(note_owner(folder() / "ward.journal", "ina"));
   ASSERT_TRUE(note_owner(folder() / "w.backup", "otto"));
   const fs::path older = folder() / "ward.journal-owner";
@@ -173,7 +175,7 @@ TEST_F(Owners, AreForgottenWithTime) {
   EXPECT_EQ(forget_owners(folder(), std::chrono::days(365)), 1u);
   EXPECT_EQ(owner_of(folder() / "ward.journal"), "");
   EXPECT_EQ(owner_of(folder() / "w.backup"), "otto");
-  // A server does so by itself.
+  // The server does so by itself.
   fs::last_write_time(folder() / "w.backup-owner", fs::file_time_type::clock::now() - std::chrono::days(366));
   server_.reset();
   const Rooms rooms({.cases = {{test::test_block(), dir_ / "case"}}, .folder = folder(), .retention_days = 365});

@@ -1,4 +1,4 @@
-// What the proxy allows at most: limits of deploy/haproxy.cfg at work, and the numbers that its page promises.
+// The limits of the proxy: those of deploy/haproxy.cfg in use, and the numbers that the documentation promises.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ using testing::HasSubstr;
 
 constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
 
-// TCP connections over which nothing is said.
+// TCP connections over which nothing is sent.
 class Connected {
  public:
   Connected(const std::string& address, int count) {
@@ -56,7 +56,7 @@ class Connected {
   }
   Connected(const Connected&) = delete;
   Connected& operator=(const Connected&) = delete;
-  // How many the other side has closed.
+  // The number of connections that the other side has closed.
   long closed() {
     (void)::poll(sockets_.data(), sockets_.size(), 0);
     return std::ranges::count_if(sockets_, [](const pollfd& one) { return one.revents != 0; });
@@ -68,7 +68,7 @@ class Connected {
 
 class ProxyLimits : public ::testing::Test {
  protected:
-  // The server itself bounds nothing.
+  // The server itself limits nothing.
   void serve(const test::Proxy::Changes& changes = {}) {
     const Case bone = test::test_block();
     ASSERT_TRUE(bone.save(dir_ / "case"));
@@ -86,16 +86,17 @@ class ProxyLimits : public ::testing::Test {
     if (const std::string missing = test::Proxy::missing(); !missing.empty()) GTEST_SKIP() << missing;
   }
   const std::string& address() { return proxy_->address(); }
-  // Begins so many calls and resets each at once. The connection ends, and for a while there is no other.
+  // Begins `calls` calls and resets each at once. The connection ends, and for a while the person gets no other.
   void expect_pause_after(std::uint32_t calls) {
     RawHttp2 line(address(), people_.person("mallory"));
     for (std::uint32_t i = 0; i < calls; ++i)
       if (!line.call(2 * i + 1, kGetStatus) || !line.reset(2 * i + 1)) break;
     EXPECT_TRUE(line.closed_within(kPatience));
-    EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value()) << "comes again at once";
-    EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value()) << "somebody else";
+    EXPECT_FALSE(RawHttp2(address(), people_.person("mallory")).read(5s).has_value())
+        << "the person can connect again at once";
+    EXPECT_TRUE(RawHttp2(address(), people_.person("anna")).read(5s).has_value()) << "another person cannot connect";
   }
-  // Lines of the proxy's log about a call of mallory's.
+  // The lines of the proxy's log about mallory's calls.
   long noted() {
     const std::string said = proxy_->log();
     static const std::regex line("\"mallory\" [0-9A-F]+ ");
@@ -131,13 +132,13 @@ TEST_F(ProxyLimits, BoundCallsOfOneCertificateAtATime) {
     for (std::uint32_t i = 0; i < calls; ++i) EXPECT_TRUE(lines.back()->call(2 * i + 1, kGetStatus));
   };
   for (std::uint32_t i = 0; i < kConnections; ++i) begin(kOfOne);
-  EXPECT_EQ(noted(), 0) << "a call ended:\n" << proxy_->log();
+  EXPECT_EQ(noted(), 0) << "a call was ended:\n" << proxy_->log();
   begin(1);
   EXPECT_TRUE(lines.back()->closed_within(kPatience));
   EXPECT_TRUE(test::wait_until([&] { return noted() == 1; }, kPatience)) << proxy_->log();
 }
 
-// CVE-2023-44487, where the server itself bounds nothing.
+// CVE-2023-44487, with a server that limits nothing itself.
 TEST_F(ProxyLimits, BoundCallsOfOneCertificateInASecond) {
   serve();
   expect_pause_after(20'000);
@@ -150,8 +151,8 @@ TEST_F(ProxyLimits, BoundCallsOfOneCertificateInTenSeconds) {
   expect_pause_after(60);
 }
 
-// The server would refuse the call for what the proxy leaves out.
-TEST_F(ProxyLimits, LetHeadersAloneThroughThatCallsNeed) {
+// The server would refuse the call because of the headers that the proxy leaves out.
+TEST_F(ProxyLimits, PassOnOnlyTheHeadersThatCallsNeed) {
   serve();
   std::string ticket = content(people_.ticket("anna", "ward", Role::trainee));
   ticket.pop_back();
@@ -164,7 +165,7 @@ TEST_F(ProxyLimits, LetHeadersAloneThroughThatCallsNeed) {
   EXPECT_TRUE(is_answered);
 }
 
-// A promise of the page that the configuration does not keep is found here.
+// Finds promises of the documentation that the configuration does not keep.
 TEST(ShippedLimits, AreThoseOfThePage) {
   const std::string configuration = content(OSTEON_DEPLOY "/haproxy.cfg"),
                     page = content(OSTEON_DEPLOY "/docs/security.md");

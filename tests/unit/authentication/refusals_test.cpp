@@ -1,5 +1,5 @@
-// What a server with certificates refuses: each is told so, counted, and logged once however often it is tried; and a
-// surgeon at work beside it notices nothing.
+// What a server with certificates refuses. Every refusal is reported to the client, counted, and logged once however
+// often it is tried. A surgeon at work beside it notices nothing.
 #include <gmock/gmock.h>
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ using grpc::StatusCode;
 using test::content;
 using testing::HasSubstr;
 
-constexpr int kTimes = 3;  // that each is tried
+constexpr int kTimes = 3;  // how often each is tried
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 int count_of(const std::string& text, const std::string& what) {
@@ -59,10 +59,10 @@ class Refused : public ::testing::Test {
                                            people_.credentials("sue", Role::trainee, "ward"));
     ASSERT_TRUE(test::wait_until([&] { return sue_->complete(); }, test::kPatience));
     for (const auto& [reason, count] : server_->rooms().refusals.counts())
-      ADD_FAILURE() << "refused before anything was: " << reason;
-    testing::internal::CaptureStdout();  // where a program that has not opened its log writes it
+      ADD_FAILURE() << "a call was refused before the test began: " << reason;
+    testing::internal::CaptureStdout();  // A program that has not opened its log writes it here.
   }
-  // She cuts on, in the session that she began with.
+  // The surgeon goes on cutting, in the session that she began with.
   void TearDown() override {
     const std::uint64_t before = sue_->own();
     Cut cut = test::strokes(sue_->author(), static_cast<int>(before) + 1, 7).back();
@@ -82,7 +82,7 @@ class Refused : public ::testing::Test {
     const auto found = counts.find(reason);
     return found == counts.end() ? 0 : found->second;
   }
-  // Lines of the log since the test began.
+  // The lines of the log since the test began.
   static std::vector<std::string> logged(const std::string& what) {
     std::istringstream lines(testing::internal::GetCapturedStdout());
     std::vector<std::string> found;
@@ -90,8 +90,8 @@ class Refused : public ::testing::Test {
       if (line.find(what) != std::string::npos) found.push_back(line);
     return found;
   }
-  // Connects, says that, and listens until it is hung up on: what is answered. A handshake may be answered by an alert
-  // of TLS.
+  // Connects, sends `says`, and receives until the connection is closed. Returns the answer. The answer to a handshake
+  // may be an alert of TLS.
   std::string knock(const std::string& says) {
     const int socket = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_in at{};
@@ -124,17 +124,17 @@ TEST_F(Refused, ATicketIsItsOwnersAlone) {
   const auto watch = v1::PeopleService::NewStub(first->channel)->WatchPeople(&watching, request);
   v1::WatchPeopleResponse said;
   ASSERT_TRUE(watch->Read(&said));
-  // Used again by another person: by the certificate it is not theirs.
+  // Another person uses the ticket again. The certificate shows that it is not theirs.
   for (int i = 0; i < kTimes; ++i)
     EXPECT_THAT(refusal({.certificates = people_.person("ben"), .ticket = anna.ticket}),
                 HasSubstr("the ticket is for anna and the certificate for ben"));
   EXPECT_EQ(counted("person"), static_cast<std::uint64_t>(kTimes));
-  // By another connection of the same person: the older one ends.
+  // The same person uses it over another connection: the older session ends.
   const auto second = wire::join_room(address(), wire::ClientKind::viewer, "whatever", 5s, {}, "ward", anna);
   ASSERT_TRUE(second.has_value()) << second.error().message;
   while (watch->Read(&said)) continue;
   EXPECT_THAT(watch->Finish().error_message(), HasSubstr("a newer session of anna took the place of this one"));
-  // Twice with one call: two readers might take different ones.
+  // The call has two tickets: two readers could use different ones.
   const auto channel = grpc::CreateChannel(address(), wire::channel_credentials(anna, address()).value());
   for (int i = 0; i < kTimes; ++i) {
     grpc::ClientContext context;
@@ -147,18 +147,19 @@ TEST_F(Refused, ATicketIsItsOwnersAlone) {
   }
   EXPECT_EQ(counted("request"), static_cast<std::uint64_t>(kTimes));
   const std::vector<std::string> lines = logged("refused who=");
-  EXPECT_EQ(lines.size(), 3u) << "of Ben, of the stream that ended, of the call: " << testing::PrintToString(lines);
+  EXPECT_EQ(lines.size(), 3u)
+      << "one of Ben, one of the ended stream, one of the call: " << testing::PrintToString(lines);
 }
 
-TEST_F(Refused, StrangersAreCountedAndLoggedOnce) {
-  // A client in this process has taken gRPC's log over since the server started.
+TEST_F(Refused, TheUnauthenticatedAreCountedAndLoggedOnce) {
+  // A client in this process has redirected gRPC's log since the server started.
   RefusalCounts beside;
   Connections nobodys;
   const HandshakeWatch again(beside, nobodys);
   const auto no_certificate = grpc::SslCredentials(
       {.pem_root_certs = content(people_.server() / "ca.pem"), .pem_private_key = "", .pem_cert_chain = ""});
   for (int i = 0; i < kTimes; ++i) {
-    // Plain text: one alert of TLS is all that may come, never a frame of HTTP/2.
+    // Plain text: the answer may be one alert of TLS, but never a frame of HTTP/2.
     const std::uint64_t before = counted("tls");
     EXPECT_LE(knock(std::string("PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\4\0\0\0\0\0", 33)).size(), 7u);
     EXPECT_TRUE(test::wait_until([&] { return counted("tls") == before + 1; }, test::kPatience));
@@ -173,7 +174,7 @@ TEST_F(Refused, StrangersAreCountedAndLoggedOnce) {
     EXPECT_TRUE(test::wait_until([&] { return counted("tls") >= before + 2; }, test::kPatience));
   }
   const std::vector<std::string> lines = logged("reason=tls");
-  EXPECT_EQ(lines.size(), 4u) << "plain text, and no certificate, of either count: " << testing::PrintToString(lines);
+  EXPECT_EQ(lines.size(), 4u) << "plain text and no certificate, from both counters: " << testing::PrintToString(lines);
 }
 
 TEST_F(Refused, JoinsAreLoggedOnceForEachKind) {
@@ -220,7 +221,7 @@ TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
           << what << " " << counted("request");
     }
   };
-  // A pose that is no number: of an item, of a camera, of a tool in its session.
+  // A pose that is not a number: of an item, of a camera, of a tool in its session.
   expect_refused("item", [&](grpc::ClientContext& context) {
     v1::SetSceneItemRequest request;
     request.set_author(author);
@@ -277,7 +278,7 @@ TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
     request.mutable_cut()->clear_path();
     return in_session(context, request);
   });
-  // Tools that are huge, no numbers, or no tools.
+  // Tools that are too large, have values that are not numbers, or are no tools.
   const std::string yaml = wire::to_wire(test::tool_named("burr-round-5")).yaml();
   const auto diameter = [&](const std::string& value) {
     const std::size_t at = yaml.find("diameter_mm: ");
@@ -294,7 +295,7 @@ TEST_F(Refused, WhatMakesNoSenseIsRefusedWithAStatus) {
       v1::AddToolResponse response;
       return room->AddTool(&context, request, &response);
     });
-  // Each was counted; from one address all of them are one line.
+  // Each refusal was counted. All refusals from one address are one line.
   const std::vector<std::string> lines = logged("refused who=");
   EXPECT_EQ(lines.size(), 1u) << testing::PrintToString(lines);
 }

@@ -1,5 +1,5 @@
-// A journal that something has damaged, anywhere: each byte of each of its files flipped, each of them cut at every
-// length. What is then read is exactly what was acknowledged, or it is said that it is not.
+// A journal that was damaged anywhere: each byte of each of its files flipped, each file cut at every length. A reader
+// then gets exactly what was acknowledged, or an error.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -19,17 +19,17 @@ constexpr const char* kFile = "/room/journal";
 constexpr std::uint64_t kLogBytes = 3000;
 
 struct Outcomes {
-  int whole = 0;    // as if nothing had been
-  int closed = 0;   // opened to be read, and said so
+  int whole = 0;    // as if there were no damage
+  int closed = 0;   // opened only for reading, with the reason
   int refused = 0;  // not opened
-  int behind = 0;   // shorter, found out by the client that knew more
-  int found = 0;    // by verify_journal
+  int behind = 0;   // shorter, detected by a client that had more acknowledged
+  int found = 0;    // detected by verify_journal
 };
 
 class DamageTest : public ::testing::TestWithParam<bool> {
  protected:
-  // Small pages keep it small. `closed`: with a footer and without a log; else all but the first entries are in the
-  // log.
+  // Small pages keep the journal small. `closed`: with a footer and without a log. Otherwise all but the first entries
+  // are in the log.
   void SetUp() override {
     Journal journal =
         std::move(Journal::create(kFile, "bone", {.disk = &disk_, .log_bytes = kLogBytes, .page_bytes = 512}).value());
@@ -56,7 +56,7 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     EXPECT_GT(outcomes_.closed, 0);
     EXPECT_GT(outcomes_.refused, 0);
     EXPECT_GT(outcomes_.found, 0);
-    EXPECT_EQ(outcomes_.behind, 0) << "its log has all that anybody was told of, twice";
+    EXPECT_EQ(outcomes_.behind, 0) << "the two logs have all acknowledged entries twice";
   }
 
   void look(const std::string& what) {
@@ -64,7 +64,7 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     const MemoryDisk::Image damaged = disk_.image();
     const auto report = verify_journal(kFile, &disk_);
     if (!report || !report->sound()) ++outcomes_.found;
-    ASSERT_EQ(disk_.image(), damaged) << "verifying changes nothing";
+    ASSERT_EQ(disk_.image(), damaged) << "verifying must change nothing";
 
     auto opened = Journal::open(kFile, {.disk = &disk_, .log_bytes = kLogBytes});
     if (!opened) {
@@ -73,7 +73,7 @@ class DamageTest : public ::testing::TestWithParam<bool> {
       ASSERT_FALSE(report && report->sound());
       return;
     }
-    // Rows may be missing at the end, never differ.
+    // Entries may be missing at the end, but never differ.
     const std::vector<JournalEntry> entries = entries_of(*opened);
     ASSERT_LE(entries.size(), entries_.size());
     ASSERT_TRUE(equal(entries, {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(entries.size())}));

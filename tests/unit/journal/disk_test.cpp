@@ -1,4 +1,4 @@
-// The disk in memory: what it may forget, and what it must not. And that the computer's own keeps the same promises.
+// The disk in memory: which data it may lose, and which it must not. The computer's own disk keeps the same promises.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,19 +31,19 @@ TEST(MemoryDisk, KeepsWhatWasSyncedAndMayForgetTheRest) {
     MemoryDisk disk(seed, 512);
     write(disk, "/a/kept", old, true);
     ASSERT_TRUE(disk.sync_folder("/a"));
-    write(disk, "/a/unnamed", old, true);  // its name is not synced
+    write(disk, "/a/unnamed", old, true);  // Its name is not synced.
     ASSERT_TRUE(disk.rename("/a/unnamed", "/a/renamed"));
     {
       auto file = disk.create("/a/tail");
       ASSERT_TRUE(file && (*file)->write(old) && (*file)->sync() && disk.sync_folder("/b"));
       ASSERT_TRUE((*file)->write(std::string(3000, 'n')));
-      EXPECT_EQ(disk.read("/a/tail", 3000, 9000).value(), std::string(3000, 'n')) << "at once to be read";
+      EXPECT_EQ(disk.read("/a/tail", 3000, 9000).value(), std::string(3000, 'n')) << "it can be read at once";
     }
     disk.power_returns();
     ASSERT_EQ(disk.read("/a/kept", 0, 9000).value(), old);
     const bool unnamed = disk.size("/a/unnamed").value().has_value(),
                renamed = disk.size("/a/renamed").value().has_value();
-    ASSERT_FALSE(unnamed && renamed) << "a rename happens or not";
+    ASSERT_FALSE(unnamed && renamed) << "a rename happens or does not";
     ++outcomes[unnamed ? "not renamed" : renamed ? "renamed" : "not there"];
     if (!disk.size("/a/tail").value()) {
       ++outcomes["no tail"];
@@ -51,7 +51,7 @@ TEST(MemoryDisk, KeepsWhatWasSyncedAndMayForgetTheRest) {
     }
     const std::string tail = disk.read("/a/tail", 0, 9000).value();
     ASSERT_GE(tail.size(), 3000u);
-    // Whole sectors before the one that both writes share are safe.
+    // The whole sectors before the sector that both writes share are safe.
     ASSERT_EQ(tail.substr(0, 2560), old.substr(0, 2560));
     if (tail.size() == 3000) ++outcomes["tail not longer"];
     if (tail == old + std::string(3000, 'n')) ++outcomes["tail whole"];
@@ -63,7 +63,8 @@ TEST(MemoryDisk, KeepsWhatWasSyncedAndMayForgetTheRest) {
     EXPECT_GT(outcomes[outcome], 0) << outcome;
 }
 
-// As Linux does: after it, a page looks written and is not, or is as it was; a later sync does not write it.
+// As on Linux: after a failed sync a page looks written and is not, or is as it was before. A later sync does not write
+// it.
 TEST(MemoryDisk, DoesNotWriteLaterWhatASyncFailedToWrite) {
   int looked_written = 0, forgotten = 0;
   for (std::uint64_t seed = 1; seed <= 100; ++seed) {
@@ -73,7 +74,7 @@ TEST(MemoryDisk, DoesNotWriteLaterWhatASyncFailedToWrite) {
     ASSERT_TRUE((*file)->write(std::string(512, 'n')));
     disk.fail_sync_at(1, EIO);
     ASSERT_FALSE((*file)->sync());
-    ASSERT_TRUE((*file)->sync()) << "the next says that all is well";
+    ASSERT_TRUE((*file)->sync()) << "the next sync reports success";
     file->reset();
     const bool seen = disk.read("/a/file", 512, 512).value() == std::string(512, 'n');
     disk.power_returns();
@@ -122,7 +123,7 @@ TEST(MemoryDisk, IsTheSameForTheSameSeed) {
   EXPECT_NE(run(7), run(8));
 }
 
-// One list of promises, both disks.
+// One list of promises for both disks.
 void keep_promises(Disk& disk, const std::filesystem::path& folder) {
   EXPECT_EQ(disk.size(folder / "none").value(), std::nullopt);
   EXPECT_EQ(disk.read(folder / "none", 0, 1).error().code, ErrorCode::not_found);
@@ -130,7 +131,7 @@ void keep_promises(Disk& disk, const std::filesystem::path& folder) {
   {
     auto file = DurableFile::begin(disk, folder / "file");
     ASSERT_TRUE(file && file->write("ab") && file->write("c"));
-    EXPECT_EQ(disk.size(folder / "file").value(), std::nullopt) << "not there before it is whole";
+    EXPECT_EQ(disk.size(folder / "file").value(), std::nullopt) << "the file must not be visible before it is whole";
     const auto written = file->finish();
     ASSERT_TRUE(written);
     EXPECT_EQ(written->size, 3u);
@@ -163,7 +164,7 @@ void keep_promises(Disk& disk, const std::filesystem::path& folder) {
   ASSERT_TRUE(disk.rename(folder / "file", folder / "renamed"));
   EXPECT_TRUE(disk.identity(folder / "renamed").value()->same_file(*identity));
   EXPECT_EQ(disk.lock(folder / "renamed", LockKind::shared).error().code, ErrorCode::exists)
-      << "the file is locked, not its name";
+      << "the lock is on the file, not on its name";
   held->reset();
   const auto one = disk.lock(folder / "renamed", LockKind::shared),
              two = disk.lock(folder / "renamed", LockKind::shared);
@@ -187,7 +188,7 @@ TEST(Disks, KeepTheSamePromises) {
   keep_promises(system_disk(), folder.path());
 }
 
-// As whoever deletes a journal does, while others try to open it.
+// As somebody does who deletes a journal while others try to open it.
 TEST(Disks, ALockWhoseFileIsRemovedByItsHolderIsStillHeldByOneAlone) {
   const test::TempDir folder;
   const std::filesystem::path file = folder.path() / "lock";
@@ -199,9 +200,9 @@ TEST(Disks, ALockWhoseFileIsRemovedByItsHolderIsStillHeldByOneAlone) {
       if (!lock) continue;
       most = std::max<int>(most, ++holders);
       ++held;
-      std::this_thread::yield();  // who else has one now?
+      std::this_thread::yield();  // Gives others a chance to lock it too.
       --holders;
-      ASSERT_TRUE(system_disk().remove(file));  // from here on the name is anybody's
+      ASSERT_TRUE(system_disk().remove(file));  // From here on anybody may use the name.
     }
   };
   std::vector<std::thread> threads;

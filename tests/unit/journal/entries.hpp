@@ -1,4 +1,4 @@
-// Rows for the tests of journals.
+// Log entries for the tests of journals.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 
 namespace osteon {
 
-// Places 1 to `count`.
+// Entries with the sequence numbers 1 to `count`.
 inline std::vector<JournalEntry> some_entries(std::uint64_t seed, std::size_t count, std::size_t most_bytes = 300) {
   std::mt19937_64 random(seed);
   std::vector<JournalEntry> entries;
@@ -39,13 +39,13 @@ inline std::vector<JournalEntry> entries_of(Journal& journal, std::uint64_t from
   return entries;
 }
 
-// Rows from index `from` up to `to`, in one batch.
+// Appends the entries from index `from` up to `to`, in one batch.
 inline void append(Journal& journal, const std::vector<JournalEntry>& entries, std::size_t from, std::size_t to) {
   const Result<void> done = journal.append(std::span(entries).subspan(from, to - from));
   ASSERT_TRUE(done) << done.error().message;
 }
 
-// The file of a checkpoint, found by its place.
+// The file of a checkpoint, found by its sequence number.
 inline std::filesystem::path checkpoint_path(const test::MemoryDisk& disk, const JournalHead& at) {
   for (const auto& [name, bytes] : disk.image())
     if (name.find("-" + std::to_string(at.seq.value) + "-") != std::string::npos && name.ends_with(".checkpoint"))

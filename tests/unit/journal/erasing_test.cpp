@@ -1,4 +1,4 @@
-// Rows of which something was erased: the chain and its signatures still hold, and nobody else can replace an entry.
+// Entries of which something was erased: the chain and its signatures still hold, and nobody else can replace an entry.
 #include <gmock/gmock.h>
 #include <sqlite3.h>
 
@@ -63,8 +63,8 @@ TEST_F(ErasingTest, TheChainAndItsSignaturesHold) {
   EXPECT_EQ(entries_of(again)[3].bytes, entries_[3].bytes);
 }
 
-// Neither in pages that a row was on before, as what stands in its place is longer, nor in the log's files behind their
-// end.
+// No byte is left in pages that a table row was on before, although the replacement is longer, nor in the files of the
+// log behind their end.
 TEST_F(ErasingTest, NoByteOfWhatWasErasedIsLeft) {
   const std::string word = "Wilhelmina";
   std::vector<JournalEntry> rows = some_entries(2, 2000, 60);
@@ -88,7 +88,7 @@ TEST_F(ErasingTest, NoByteOfWhatWasErasedIsLeft) {
     return bytes;
   };
   EXPECT_EQ(journal->erase_entries(longer).value(), 666u);
-  EXPECT_EQ(found(), 0u) << "while it is open";
+  EXPECT_EQ(found(), 0u) << "while the journal is open";
   ASSERT_TRUE(journal->close());
   EXPECT_EQ(found(), 0u);
 }
@@ -108,8 +108,8 @@ TEST_F(ErasingTest, WithoutTheKeyNothingIsErased) {
   EXPECT_TRUE(equal(entries_of(*journal), entries_));
 }
 
-// Whoever can write the file puts something in place of an entry, and says itself that it was erased.
-TEST_F(ErasingTest, AServerTakesNoRowsThatSomebodyElseReplaced) {
+// Somebody who can write the file replaces an entry, and marks it as erased.
+TEST_F(ErasingTest, AServerTakesNoEntriesThatSomebodyElseReplaced) {
   make(keys_);
   {
     auto file = JournalFile::open(file_, system_disk(), {});
@@ -125,8 +125,8 @@ TEST_F(ErasingTest, AServerTakesNoRowsThatSomebodyElseReplaced) {
   EXPECT_THAT(journal.closed_because()->message, HasSubstr("replaced entries"));
 }
 
-// Also not within what the server has erased itself.
-TEST_F(ErasingTest, WhatStandsInPlaceOfARowIsSealed) {
+// Also not in an entry that the server itself has erased from.
+TEST_F(ErasingTest, TheReplacementOfAnEntryIsSealed) {
   make(keys_);
   {
     Journal journal = open(keys_);

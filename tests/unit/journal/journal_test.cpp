@@ -37,7 +37,7 @@ class JournalTest : public ::testing::Test {
 };
 
 // Computed with Python's hashlib from the definition in chain.hpp.
-TEST(JournalChain, IsTheOneThatIsWrittenDown) {
+TEST(JournalChain, IsAsDocumented) {
   const JournalHead none = first_head("bone");
   EXPECT_EQ(to_hex(none.chain), "76315a6e8df2e7e5be7c5e2d969b2e8d752c0a1f91f230eaa9f407b8f851caba");
   const JournalHead one = next_head(none, {RoomSeq{1}, 5, "first"});
@@ -61,7 +61,7 @@ TEST_F(JournalTest, GivesBackWhatItWasGivenAfterItsProcessWasKilledAndAfterItWas
     append(journal, entries, 20, 40);
     ASSERT_TRUE(journal.close());
   }
-  EXPECT_THAT(disk_.image(), SizeIs(1)) << "closed, it is one file";
+  EXPECT_THAT(disk_.image(), SizeIs(1)) << "a closed journal is one file";
   Journal journal = reopen();
   EXPECT_EQ(journal.head(), plain_head("bone", entries));
   EXPECT_TRUE(equal(entries_of(journal), entries));
@@ -82,7 +82,7 @@ TEST_F(JournalTest, IsMadeOnceAndOpenedOnlyWhereItIs) {
 
   EXPECT_THAT(again.error().message, HasSubstr("there is /room/journal already; give the new journal another name"));
 
-  // A log that belonged to another journal of that name would be read as the new one's.
+  // The log of another journal of that name would be read as the new journal's log.
   ASSERT_TRUE(disk_.remove(kFile));
   const auto haunted = Journal::create(kFile, "bone", options());
   ASSERT_FALSE(haunted);
@@ -90,7 +90,7 @@ TEST_F(JournalTest, IsMadeOnceAndOpenedOnlyWhereItIs) {
   EXPECT_THAT(haunted.error().message, HasSubstr("/room/journal-log belonged to an earlier journal"));
 }
 
-TEST_F(JournalTest, TakesNoRowAboveTheLimitAndGoesOn) {
+TEST_F(JournalTest, TakesNoEntryAboveTheLimitAndGoesOn) {
   JournalOptions small = options();
   small.most_entry_bytes = 100;
   Journal journal = std::move(Journal::create(kFile, "bone", small).value());
@@ -105,7 +105,7 @@ TEST_F(JournalTest, TakesNoRowAboveTheLimitAndGoesOn) {
   EXPECT_TRUE(journal.append({entries.data(), 1}));
 }
 
-TEST_F(JournalTest, AbortsOnAPlaceThatDoesNotGoOn) {
+TEST_F(JournalTest, AbortsOnASequenceNumberThatIsNotTheNext) {
   Journal journal = create();
   const JournalEntry skipping{RoomSeq{2}, 0, ""};
   EXPECT_DEATH(static_cast<void>(journal.append({&skipping, 1})), "broken promise");
@@ -153,7 +153,7 @@ TEST_F(JournalTest, KeepsTheNewestTwoCheckpoints) {
     EXPECT_EQ(journal.begin_checkpoint(heads.back(), "").error().code, ErrorCode::exists);
     EXPECT_EQ(journal.begin_checkpoint({RoomSeq{2}, heads.back().chain}, "").error().code, ErrorCode::invalid_input);
     EXPECT_EQ(journal.begin_checkpoint({RoomSeq{5}, heads.back().chain}, "").error().code, ErrorCode::invalid_input);
-    // One that is given up.
+    // This one is given up.
     append(journal, {{RoomSeq{5}, 0, "x"}}, 0, 1);
     auto dropped = journal.begin_checkpoint(journal.head(), "");
     ASSERT_TRUE(dropped && dropped->write("half"));
@@ -176,7 +176,7 @@ TEST_F(JournalTest, KeepsTheNewestTwoCheckpoints) {
   EXPECT_THAT(spoiled.error().message, HasSubstr("is not what was written"));
 }
 
-// The file of an earlier day, and a checkpoint that knows more: the log with what was between them is lost.
+// An older database with a newer checkpoint: the log with the entries between them is lost.
 TEST_F(JournalTest, OpensForReadingOnlyWhereACheckpointKnowsMore) {
   const std::vector<JournalEntry> entries = some_entries(4, 9);
   MemoryDisk::Image earlier;
@@ -257,7 +257,8 @@ TEST_F(JournalTest, TakesNothingAfterAFailedWriteNotEvenWhenOpenedAnew) {
   EXPECT_GE(journal.head().seq, RoomSeq{2});
 }
 
-// Linux shows pages as written whose write has failed; a page that is read again then is as it was, or empty.
+// Linux shows pages as written although their write has failed. When such a page is read again, it is as before, or
+// empty.
 TEST(JournalAfterAFailedWrite, BlamesItselfAndNoClientForWhatItsFileShows) {
   const std::vector<JournalEntry> entries = some_entries(8, 60);
   int failed = 0, shown_otherwise = 0;
@@ -279,7 +280,7 @@ TEST(JournalAfterAFailedWrite, BlamesItselfAndNoClientForWhatItsFileShows) {
     }
   }
   EXPECT_GT(failed, 20);
-  EXPECT_GT(shown_otherwise, 0) << "no file showed anything else: this has tried nothing";
+  EXPECT_GT(shown_otherwise, 0) << "no file showed anything else, so nothing was tested";
 }
 
 TEST_F(JournalTest, SaysThatTheDiskIsFull) {
@@ -300,11 +301,11 @@ TEST_F(JournalTest, KeepsItsLogShort) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     append(journal, entries, i, i + 1);
     for (const char* name : {"/room/journal-log", "/room/journal-mirror"}) {
-      EXPECT_GE(disk_.size(name).value().value(), 4096u + (64 << 10)) << "made as long as it gets";
-      EXPECT_LT(disk_.size(name).value().value(), 4096u + (64 << 10) + 500) << "and one append";
+      EXPECT_GE(disk_.size(name).value().value(), 4096u + (64 << 10)) << "the log is created at its largest size";
+      EXPECT_LT(disk_.size(name).value().value(), 4096u + (64 << 10) + 500) << "the limit and one append";
     }
   }
-  EXPECT_GT(disk_.size(kFile).value().value(), std::uint64_t{64} << 10) << "what was written before is in the database";
+  EXPECT_GT(disk_.size(kFile).value().value(), std::uint64_t{64} << 10) << "earlier entries are in the database";
 }
 
 TEST_F(JournalTest, CutsItsLogWhenItIsTidied) {
@@ -328,7 +329,7 @@ TEST_F(JournalTest, CutsItsLogWhenItIsTidied) {
   EXPECT_TRUE(equal(entries_of(journal), entries));
 }
 
-// Of a journal whose entries SQLite has in memory.
+// SQLite has the entries of this journal in memory.
 TEST_F(JournalTest, AVerifyOfOneInUseReadsTheDisk) {
   const std::vector<JournalEntry> entries = some_entries(11, 30);
   {
@@ -348,7 +349,7 @@ TEST_F(JournalTest, AVerifyOfOneInUseReadsTheDisk) {
   EXPECT_FALSE(report->sound());
 }
 
-// A name in the middle of many: some moved from page to page as the table grew, one was given another name.
+// Erases a name among many. Some names moved from page to page as the table grew, and one was renamed.
 void forget(Journal& journal, int people, const std::function<std::size_t(std::string_view)>& found) {
   const std::string name = "Wilhelmina Grubenmann";
   for (int i = 0; i < people; ++i) {
@@ -371,7 +372,7 @@ void forget(Journal& journal, int people, const std::function<std::size_t(std::s
   EXPECT_TRUE(verify_journal(journal).value().sound());
 }
 
-TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
+TEST_F(JournalTest, ErasesPeopleSoThatNoByteOfThemIsLeft) {
   Journal journal = create();
   forget(journal, 400, [&](std::string_view name) {
     std::size_t found = 0;
@@ -381,9 +382,9 @@ TEST_F(JournalTest, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
   });
 }
 
-// Where the tree of a large table moves entries from page to page it leaves copies behind, a few in thousands of
+// When the tree of a large table moves entries from page to page, it leaves copies behind, a few in thousands of
 // entries.
-TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
+TEST(JournalPeople, AreErasedWhereverTheTreeHasPutThem) {
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
     std::mt19937_64 random(seed);
     MemoryDisk disk(seed);
@@ -406,7 +407,7 @@ TEST(JournalPeople, AreForgottenWhereverTheTreeHasPutThem) {
   }
 }
 
-TEST(JournalOnDisk, ForgetsPeopleSoThatNoByteOfThemIsLeft) {
+TEST(JournalOnDisk, ErasesPeopleSoThatNoByteOfThemIsLeft) {
   const test::TempDir folder;
   Journal journal = std::move(Journal::create(folder / "journal", "bone").value());
   forget(journal, 120, [&](std::string_view name) {
@@ -477,11 +478,11 @@ TEST(JournalOnDisk, IsNotTakenFromAnyFile) {
     EXPECT_EQ(opened.error().code, ErrorCode::invalid_input) << opened.error().message;
     EXPECT_THAT(opened.error().message, HasSubstr((folder / "file").string() + " " + why));
     EXPECT_EQ(verify_journal(folder / "file").error().message, opened.error().message);
-    EXPECT_THAT(names_in(folder.path()), ElementsAre("file")) << "nothing is made beside it";
+    EXPECT_THAT(names_in(folder.path()), ElementsAre("file")) << "no file is created beside it";
   }
 }
 
-// While the other program has it open for itself.
+// While the other program has it locked.
 TEST(JournalOnDisk, IsNotTakenFromAnotherProgramsDatabase) {
   const test::TempDir folder;
   sqlite3* other = nullptr;
@@ -496,7 +497,7 @@ TEST(JournalOnDisk, IsNotTakenFromAnotherProgramsDatabase) {
   EXPECT_EQ(sqlite3_close(other), SQLITE_OK);
 }
 
-// Beside the name of a journal that is there, what belongs to it is not what is in the way.
+// Files that belong to an existing journal of this name are not named as the obstacle.
 TEST(JournalOnDisk, NamesTheJournalThatIsInTheWay) {
   const test::TempDir folder;
   for (int i = 0; i < 16; ++i) {
@@ -521,7 +522,7 @@ TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
     return journal ? ErrorCode::cancelled : journal.error().code;
   };
 
-  EXPECT_EQ(code(Journal::open(sub)), ErrorCode::invalid_input) << "and so nobody makes a new one there";
+  EXPECT_EQ(code(Journal::open(sub)), ErrorCode::invalid_input) << "so nobody creates a new journal there";
   EXPECT_THAT(why(Journal::open(sub)), AllOf(HasSubstr(sub.string()), HasSubstr("name a file, not a folder")));
   EXPECT_FALSE(std::filesystem::exists(folder / "sub.lock"));
   EXPECT_EQ(why(Journal::create(folder / "none" / "journal", "bone")),
@@ -531,7 +532,7 @@ TEST(JournalOnDisk, SaysWhatItMayNotDoAndWhatToDoAboutIt) {
   const test::WithoutPrivileges anybody;
   std::filesystem::permissions(file, perms::none);
   EXPECT_THAT(why(Journal::open(file)), AllOf(HasSubstr(file.string()), HasSubstr("see to the permissions")));
-  EXPECT_NE(code(Journal::open(file)), ErrorCode::not_found) << "and so nobody makes a new one there";
+  EXPECT_NE(code(Journal::open(file)), ErrorCode::not_found) << "so nobody creates a new journal there";
   EXPECT_FALSE(std::filesystem::exists(folder / "journal.lock"));
   std::filesystem::permissions(file, perms::owner_read);
   EXPECT_THAT(why(Journal::open(file)),

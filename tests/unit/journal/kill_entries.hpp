@@ -1,4 +1,4 @@
-// The entries of a program that is killed, each known from its place.
+// The entries of a program that is killed. The sequence number determines each of them.
 #pragma once
 #include <string>
 #include <utility>

@@ -1,4 +1,4 @@
-// A real process that appends to a journal on the real disk, killed at any moment.
+// A real process that appends to a journal on the real disk, and is killed at any moment.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ using namespace std::chrono_literals;
 constexpr int kKills = 100, kDamages = 80;
 constexpr int kKillsPerJournal = 20;
 
-// The place in the last whole line of what it printed.
+// The sequence number in the last whole line that it printed.
 std::uint64_t last_place(const std::string& out) {
   const std::size_t end = out.rfind('\n');
   if (end == std::string::npos) return 0;
@@ -31,7 +31,7 @@ std::uint64_t last_place(const std::string& out) {
   return std::stoull(out.substr(begin == std::string::npos ? 0 : begin + 1));
 }
 
-TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
+TEST(JournalKill, LosesNoAcknowledgedEntryAndLetsTheNextOneIn) {
   std::mt19937_64 random(1);
   std::uint64_t acknowledged = 0, kept = 0;
   for (int round = 0; round < kKills / kKillsPerJournal; ++round) {
@@ -40,7 +40,7 @@ TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
     std::uint64_t before = 0;
     for (int kill = 0; kill < kKillsPerJournal; ++kill) {
       test::Process writer(test::program("journal_kill_writer"), {file.string(), std::to_string(random())});
-      // Anywhere: while it is made or opened, or later in the work.
+      // At any time: while the journal is created or opened, or later.
       const auto lines = kill % 4 == 0 ? 0 : random() % 12;
       for (std::uint64_t i = 0; i < lines; ++i) ASSERT_TRUE(writer.read_line(60s)) << writer.err();
       std::this_thread::sleep_for(std::chrono::microseconds(random() % 8000));
@@ -63,7 +63,7 @@ TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
         return true;
       }));
       ASSERT_GE(entries.size(), told);
-      ASSERT_LE(entries.size(), told + 4) << "more than the batch that was under way";
+      ASSERT_LE(entries.size(), told + 4) << "more entries than the batch under way";
       for (std::size_t i = 0; i < entries.size(); ++i) {
         const JournalEntry expected = kill_entry(i + 1);
         ASSERT_EQ(entries[i].seq, expected.seq);
@@ -81,7 +81,7 @@ TEST(JournalKill, LosesNoAcknowledgedRowAndLetsTheNextOneIn) {
   EXPECT_GT(acknowledged, 5u * kKills);
 }
 
-// What a breaker does to one file, chosen by `random`. Gives what it was.
+// Damages one file in a way chosen by `random`. Returns a description.
 std::string damage(const std::filesystem::path& file, std::mt19937_64& random) {
   std::string bytes;
   {
@@ -114,7 +114,7 @@ std::string damage(const std::filesystem::path& file, std::mt19937_64& random) {
   return done;
 }
 
-// The oracle is what the killed process had printed.
+// The output of the killed process says what must be in the journal.
 TEST(JournalKill, DamageAfterItIsHarmlessOrNamed) {
   std::mt19937_64 random(2);
   int whole = 0, named = 0, refused = 0;
@@ -151,7 +151,7 @@ TEST(JournalKill, DamageAfterItIsHarmlessOrNamed) {
   EXPECT_GT(named + refused, kDamages / 20);
 }
 
-// Both at once: the holder of a journal is alive, then killed.
+// In one test: the holder of a journal is first alive, then killed.
 TEST(JournalKill, TheLockEndsWithItsHolder) {
   const test::TempDir folder;
   const std::filesystem::path file = folder / "journal";

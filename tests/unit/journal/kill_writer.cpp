@@ -1,5 +1,5 @@
-// Appends entries to a journal until it is killed, and prints the place of each as soon as it is acknowledged:
-// journal_kill_writer FILE SEED. Each entry is made from its place alone, so that whoever killed it knows what to find.
+// Appends entries to a journal until it is killed: journal_kill_writer FILE SEED. Prints the sequence number of each
+// entry as soon as it is acknowledged. The sequence number determines the entry, so that the test knows what to find.
 #include <unistd.h>
 
 #include <cstdio>
@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   const std::filesystem::path file = argv[1];
   std::uint64_t random = std::strtoull(argv[2], nullptr, 10);
   JournalOptions options;
-  options.log_bytes = 200 << 10;  // so that it is carried into the file every now and then
+  options.log_bytes = 200 << 10;  // Small, so that the log is often moved into the database.
   auto journal = std::filesystem::exists(file) ? Journal::open(file, options) : Journal::create(file, "bone", options);
   if (!journal || journal->closed_because() != nullptr) {
     std::fprintf(stderr, "%s\n",

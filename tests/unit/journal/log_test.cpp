@@ -1,4 +1,4 @@
-// The newest entries of a journal: what a breaker does to their files, and to the journal while it is open.
+// The newest entries of a journal: damage to their files, and to the journal while it is open.
 #include <gmock/gmock.h>
 
 #include <fstream>
@@ -30,7 +30,7 @@ constexpr const char *kFile = "/room/journal", *kLog = "/room/journal-log", *kMi
 class LogTest : public ::testing::Test {
  protected:
   JournalOptions options() { return {.disk = &disk_, .log_bytes = 32 << 10}; }
-  // A journal whose process was killed: some entries in the database, the others in its log.
+  // A journal whose process was killed: some entries are in the database, the others in its log.
   void make_killed() {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
     append(journal, entries_, 0, 40);
@@ -38,7 +38,7 @@ class LogTest : public ::testing::Test {
     before_ = disk_.image();
     for (std::size_t i = 40; i < entries_.size(); i += 2) append(journal, entries_, i, i + 2);
   }
-  // Opens it and expects all entries. Gives what was repaired.
+  // Opens it and expects all entries. Returns what was repaired.
   std::vector<std::string> expect_whole() {
     const auto report = verify_journal(kFile, &disk_);
     EXPECT_TRUE(report && report->sound()) << (report ? report->faults.front() : report.error().message);
@@ -48,15 +48,15 @@ class LogTest : public ::testing::Test {
     EXPECT_EQ(report->notes, journal.notes());
     return journal.notes();
   }
-  // Opens it and expects that it takes no entries. Gives why.
+  // Opens it and expects that it takes no entries. Returns the reason.
   std::string expect_closed(std::size_t entries) {
     const auto report = verify_journal(kFile, &disk_);
     EXPECT_TRUE(report && !report->sound());
     EXPECT_EQ(backup_journal(kFile, "/backup/journal", &disk_).error().code, ErrorCode::invalid_input);
     Journal journal = std::move(Journal::open(kFile, options()).value());
-    EXPECT_NE(journal.closed_because(), nullptr) << "it takes entries";
+    EXPECT_NE(journal.closed_because(), nullptr) << "the journal takes entries";
     if (journal.closed_because() == nullptr) return {};
-    EXPECT_FALSE(journal.next_server_epoch()) << "an epoch could come twice";
+    EXPECT_FALSE(journal.next_server_epoch()) << "an epoch could be given twice";
     EXPECT_TRUE(
         equal(entries_of(journal), {entries_.begin(), entries_.begin() + static_cast<std::ptrdiff_t>(entries)}));
     return journal.closed_because()->message;
@@ -75,7 +75,7 @@ class LogTest : public ::testing::Test {
   MemoryDisk::Image before_;
 };
 
-TEST_F(LogTest, HasTheNewestRowsTwiceAndNothingElseHasThem) {
+TEST_F(LogTest, HasTheNewestEntriesTwiceAndNothingElseHasThem) {
   make_killed();
   for (const auto& [name, bytes] : disk_.image()) {
     const bool has = bytes.find(entries_[59].bytes) != std::string::npos;
@@ -111,7 +111,7 @@ TEST_F(LogTest, DamageToOneOfItsFilesIsReadFromTheOther) {
   }
 }
 
-TEST_F(LogTest, DamageToBothIsNamedWithTheRowsThatAreMissing) {
+TEST_F(LogTest, DamageToBothIsNamedWithTheEntriesThatAreMissing) {
   make_killed();
   for (const char* file : {kLog, kMirror}) flip(file, 50);
   EXPECT_THAT(expect_closed(50),
@@ -134,7 +134,7 @@ TEST_F(LogTest, ItsLossIsNamed) {
   for (const char* file : {kLog, kMirror}) disk_.cut(file, 0);
   EXPECT_THAT(expect_closed(40), HasSubstr("is damaged"));
   EXPECT_THAT(verify_journal(kFile, &disk_)->faults, Contains(HasSubstr("after event 40 cannot be told")));
-  // Behind the first sector, and where an entry ends: what is left looks like a log with fewer entries.
+  // Cut behind the first sector and at the end of an entry, the rest looks like a log with fewer entries.
   for (const std::size_t entry : {40, 50}) {
     disk_.load(killed);
     for (const char* file : {kLog, kMirror})
@@ -157,7 +157,7 @@ TEST_F(LogTest, IsNotReadWhereItIsLongerThanAnyLog) {
   EXPECT_THAT(report->notes, ElementsAre(HasSubstr("journal-log is longer than any log; its entries were read from")));
 }
 
-// Their first sector said neither how long they are nor who signs.
+// In version 3, the first sector contained neither the length of the files nor the signer.
 TEST_F(LogTest, ReadsTheFilesOfVersion3) {
   make_killed();
   constexpr std::size_t kEnd = 104, kChecksum = 16;
@@ -189,7 +189,7 @@ TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
               HasSubstr("goes to event 20, but its log vouches for event 60: 40 entries are missing"));
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
   EXPECT_EQ(Journal::open(kFile, options())->head().seq, RoomSeq{20})
-      << "an older copy of all files: only witnesses know more";
+      << "this is an older copy of all files, which only witnesses can detect";
 }
 
 TEST_F(LogTest, AnOlderLogBesideANewerDatabaseIsNamed) {
@@ -236,8 +236,8 @@ TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
     }
 }
 
-// An entry is as large as it may be, and has in it what looks like the entry of a log.
-TEST_F(LogTest, TakesARowThatIsLargerThanItself) {
+// The entry has the largest allowed size, and contains bytes that look like an entry of a log.
+TEST_F(LogTest, TakesAnEntryThatIsLargerThanItself) {
   {
     Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
     append(journal, entries_, 0, 59);
@@ -246,7 +246,7 @@ TEST_F(LogTest, TakesARowThatIsLargerThanItself) {
     EXPECT_EQ(journal.head(), plain_head("bone", entries_));
   }
   EXPECT_THAT(expect_whole(), IsEmpty());
-  EXPECT_LT(disk_.size(kLog).value().value(), 200u << 10) << "the entry went into the database";
+  EXPECT_LT(disk_.size(kLog).value().value(), 200u << 10) << "the entry was moved into the database";
 }
 
 std::map<std::string, std::string> contents_of(const fs::path& folder) {
@@ -259,7 +259,7 @@ std::map<std::string, std::string> contents_of(const fs::path& folder) {
   return all;
 }
 
-// Whatever was beside the journal may be removed: the file itself is locked.
+// Any file beside the journal may be removed: the journal file itself is locked.
 TEST(JournalSecondOpener, IsRefusedAndChangesNoByte) {
   const test::TempDir folder;
   const fs::path file = folder / "journal";

@@ -1,4 +1,4 @@
-// Checking, backing up, recovering and migrating journals as files.
+// Verifying, backing up, salvaging and migrating journals as files.
 #include "server/journal/maintenance.hpp"
 
 #include <gmock/gmock.h>
@@ -22,9 +22,9 @@ using ::testing::SizeIs;
 
 constexpr const char *kFile = "/room/journal", *kTo = "/backup/journal";
 
-class UpkeepTest : public ::testing::Test {
+class JournalMaintenanceTest : public ::testing::Test {
  protected:
-  // With something of everything.
+  // A journal with every kind of content.
   void make(bool closed) {
     Journal journal = std::move(Journal::create(kFile, "bone", {.disk = &disk_}).value());
     for (std::size_t i = 0; i < entries_.size(); i += 5) append(journal, entries_, i, i + 5);
@@ -58,7 +58,7 @@ class UpkeepTest : public ::testing::Test {
   std::vector<JournalEntry> entries_ = some_entries(10, 40);
 };
 
-TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
+TEST_F(JournalMaintenanceTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
   for (const bool closed : {true, false}) {
     disk_.load({});
     make(closed);
@@ -74,7 +74,7 @@ TEST_F(UpkeepTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
   }
 }
 
-TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
+TEST_F(JournalMaintenanceTest, TheFirstBadEntryIsNamed) {
   make(true);
   const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find(entries_[17].bytes);
@@ -91,20 +91,20 @@ TEST_F(UpkeepTest, TheFirstBadRowIsNamed) {
   const auto recovered = salvage_journal(kFile, kTo, &disk_);
   ASSERT_TRUE(recovered) << recovered.error().message;
   EXPECT_EQ(recovered->head.seq, RoomSeq{17});
-  EXPECT_EQ(recovered->lost(), 23u) << "of the 40 that the footer vouches for";
+  EXPECT_EQ(recovered->lost(), 23u) << "of the 40 entries that the footer confirms";
   for (const auto& [name, content] : before) EXPECT_EQ(disk_.image().at(name), content) << name;
   Journal journal = open(kTo);
   EXPECT_EQ(journal.closed_because(), nullptr);
   EXPECT_TRUE(equal(entries_of(journal), {entries_.begin(), entries_.begin() + 17}));
   EXPECT_THAT(journal.people().value(), ElementsAre(Person{"p1", "Anna", 20000}));
   const auto checkpoints = journal.checkpoints().value();
-  ASSERT_THAT(checkpoints, SizeIs(1)) << "the one behind the damage is not of this history";
+  ASSERT_THAT(checkpoints, SizeIs(1)) << "the checkpoint behind the damage is not of this history";
   EXPECT_EQ(journal.read_checkpoint(checkpoints[0]).value(), "room at 10");
-  EXPECT_GT(journal.next_server_epoch().value(), 1000u) << "far from what the lost part may have given";
+  EXPECT_GT(journal.next_server_epoch().value(), 1000u) << "far from the numbers that the lost part may have used";
   append(journal, entries_, 17, 20);
 }
 
-TEST_F(UpkeepTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
+TEST_F(JournalMaintenanceTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
   make(true);
   const std::string newest = checkpoint_path(disk_, {RoomSeq{25}, {}});
   disk_.flip_bit(newest, 0);
@@ -122,7 +122,7 @@ TEST_F(UpkeepTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
   EXPECT_TRUE(equal(entries_of(journal), entries_));
 }
 
-TEST_F(UpkeepTest, ABackupIsTheJournalAgain) {
+TEST_F(JournalMaintenanceTest, ABackupIsTheJournalAgain) {
   for (const bool closed : {true, false}) {
     disk_.load({});
     make(closed);
@@ -131,7 +131,7 @@ TEST_F(UpkeepTest, ABackupIsTheJournalAgain) {
     ASSERT_TRUE(done) << done.error().message;
     const MemoryDisk::Image after = disk_.image();
     for (const auto& [name, content] : before) EXPECT_EQ(after.at(name), content) << name;
-    EXPECT_THAT(after, SizeIs(before.size() + 3)) << "the copy, its two checkpoints, nothing else";
+    EXPECT_THAT(after, SizeIs(before.size() + 3)) << "only the copy and its two checkpoints are new";
     Journal copy = open(kTo);
     expect_copied(copy);
     EXPECT_EQ(copy.next_server_epoch().value(), 2u);
@@ -140,7 +140,7 @@ TEST_F(UpkeepTest, ABackupIsTheJournalAgain) {
   }
 }
 
-TEST_F(UpkeepTest, ABackupInSlicesLetsRowsBeAppendedBetween) {
+TEST_F(JournalMaintenanceTest, ABackupInSlicesLetsEntriesBeAppendedBetween) {
   make(false);
   Journal journal = open(kFile);
   auto copy = JournalCopy::begin(journal, kTo);
@@ -154,13 +154,13 @@ TEST_F(UpkeepTest, ABackupInSlicesLetsRowsBeAppendedBetween) {
     append(journal, all, next, next + 1);
     ++next;
   }
-  EXPECT_EQ(steps, 7u) << "40 entries by 7, two checkpoints";
+  EXPECT_EQ(steps, 7u) << "40 entries in slices of 7, then two checkpoints";
   EXPECT_EQ(journal.head(), plain_head("bone", {all.begin(), all.begin() + 47}));
   Journal backup = open(kTo);
   expect_copied(backup);
 }
 
-TEST_F(UpkeepTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
+TEST_F(JournalMaintenanceTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
   make(false);
   {
     Journal journal = open(kFile);
@@ -174,12 +174,12 @@ TEST_F(UpkeepTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
     const bool done = backup_journal(kFile, kTo, &disk_).has_value();
     EXPECT_EQ(done, !disk_.has_failed());
     disk_.power_returns();
-    if (disk_.size(kTo).value()) {  // the last step but the sync may have stayed
+    if (disk_.size(kTo).value()) {  // everything but the sync of the last step may be done
       Journal copy = open(kTo);
       expect_copied(copy);
     } else {
       const Result<void> again = backup_journal(kFile, kTo, &disk_);
-      // Checkpoints that got their names first are in the way, and that is said.
+      // Checkpoints that already had their names prevent a new copy, and the error says so.
       EXPECT_TRUE(again || again.error().code == ErrorCode::exists) << again.error().message;
     }
     Journal source = open(kFile);
@@ -192,7 +192,7 @@ TEST_F(UpkeepTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
   }
 }
 
-TEST_F(UpkeepTest, WhatClientsKnowCountsAsLost) {
+TEST_F(JournalMaintenanceTest, WhatClientsKnowCountsAsLost) {
   make(true);
   const auto recovered = salvage_journal(kFile, kTo, &disk_, {{RoomSeq{39}, {}}, {RoomSeq{44}, {}}});
   ASSERT_TRUE(recovered);
@@ -203,7 +203,7 @@ TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   const test::TempDir folder;
   const std::filesystem::path old = folder / "old", now = folder / "new";
   std::vector<JournalEntry> entries = some_entries(11, 30);
-  for (JournalEntry& entry : entries) entry.at_ns = 0;  // it kept no times
+  for (JournalEntry& entry : entries) entry.at_ns = 0;  // Version 1 stored no times.
   ASSERT_NO_FATAL_FAILURE(make_old_journal(old, 1, entries, RowsIn::file));
 
   const auto opened = Journal::open(old);
@@ -217,19 +217,20 @@ TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
 
   const Result<void> migrated = migrate_journal(old, now);
   ASSERT_TRUE(migrated) << migrated.error().message;
-  EXPECT_EQ(verify_journal(old)->version, 1) << "the old one is left";
+  EXPECT_EQ(verify_journal(old)->version, 1) << "the old journal is unchanged";
   EXPECT_EQ(verify_journal(now)->version, 4);
   Journal journal = std::move(Journal::open(now).value());
   EXPECT_EQ(journal.closed_because(), nullptr);
   EXPECT_TRUE(equal(entries_of(journal), entries));
-  EXPECT_TRUE(journal.check_witness(plain_head("bone", entries))) << "what clients were told still holds";
+  EXPECT_TRUE(journal.check_witness(plain_head("bone", entries)))
+      << "what clients have acknowledged is still confirmed";
   const JournalEntry next{RoomSeq{31}, 12345, "next"};
   EXPECT_TRUE(journal.append({&next, 1}));
   ASSERT_TRUE(journal.close());
   EXPECT_EQ(migrate_journal(now, folder / "newer").error().code, ErrorCode::exists);
 }
 
-// What another program has changed in a journal.
+// Changes a journal as another program would.
 void change(const std::filesystem::path& file, const char* sql) {
   sqlite3* database = nullptr;
   ASSERT_EQ(sqlite3_open(file.c_str(), &database), SQLITE_OK);

@@ -1,4 +1,4 @@
-// Journals as the programs of earlier versions made them: their tables, in their words.
+// Journals as programs of earlier versions made them, with the tables of those versions.
 #pragma once
 #include <filesystem>
 #include <vector>
@@ -9,7 +9,7 @@ namespace osteon {
 
 enum class RowsIn { file, sqlites_log };
 
-// Of the genesis "bone". Version 1 kept no times. `where`: what the program left when it was closed, or killed.
+// A journal of the genesis "bone". Version 1 stored no times. `where`: whether the program was closed or killed.
 void make_old_journal(const std::filesystem::path& file, int version, const std::vector<JournalEntry>& entries,
                       RowsIn where);
 

@@ -1,4 +1,4 @@
-// Who vouches for a journal: its server's key, somebody else's, or nobody.
+// Who signed a journal: the key of its server, another key, or nobody.
 #include "server/journal/signing.hpp"
 
 #include <gmock/gmock.h>
@@ -74,7 +74,8 @@ TEST(SigningKeyFile, IsMadeOnceForItsOwnerAlone) {
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(mode_of(file), 0600u);
   EXPECT_EQ((*load_or_make_signing_keys(file))->key().public_key(), (*made)->key().public_key());
-  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1) << "a draft is left";
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 1)
+      << "a temporary file is left";
 
   fs::permissions(file, fs::perms::group_read, fs::perm_options::add);
   const auto open_to_others = load_or_make_signing_keys(file);
@@ -128,7 +129,7 @@ TEST(SigningKeyFile, KeepsTheLineOfItsKeys) {
   EXPECT_EQ(keys_of_line(first, (*third)->successions()).size(), 3u);
 }
 
-// What people did is nobody else's, whatever the umask.
+// What people did is private, whatever the umask.
 TEST(JournalFiles, AreForTheirOwnerAlone) {
   const test::TempDir folder;
   const auto before = ::umask(0);
@@ -149,7 +150,7 @@ TEST(JournalFiles, AreForTheirOwnerAlone) {
   EXPECT_EQ(files, 8) << "journal, log, mirror, write-ahead log, checkpoint, key, backup and its checkpoint";
 }
 
-// Whoever makes a key of their own before or after another's has only one of the two signatures.
+// Somebody who puts a key of their own before or after another key has only one of the two signatures.
 TEST(Succession, NeedsBothItsKeys) {
   const SigningKey ours = SigningKey::make(), theirs = SigningKey::make();
   for (const bool before : {false, true}) {
@@ -180,7 +181,7 @@ class SignedJournal : public ::testing::Test {
     EXPECT_TRUE(report && report->sound()) << (report ? report->faults.front() : report.error().message);
     return vouched_by(key, *report);
   }
-  // As text: "1-30" for each range.
+  // As text, with "1-30" for each range.
   static std::vector<std::string> text_of(const std::vector<SignedRange>& ranges) {
     std::vector<std::string> texts;
     for (const SignedRange& one : ranges)
@@ -225,16 +226,16 @@ TEST_F(SignedJournal, IsVouchedForToItsEndHoweverItsServerEnded) {
 TEST_F(SignedJournal, IsVouchedForByNobodyWithoutAKey) {
   write(nullptr, 0, 20, true);
   EXPECT_THAT(text_of(vouched(key_).by_nobody), ElementsAre("1-20"));
-  // A server with a key vouches for what it adds, not for what it found.
+  // A server with a key signs what it adds, not what it found.
   write(keys_, 20, 30, false);
   const Vouched found = vouched(key_);
   EXPECT_THAT(text_of(found.ranges), ElementsAre("21-30"));
   EXPECT_THAT(text_of(found.by_nobody), ElementsAre("1-20"));
-  EXPECT_THAT(open(keys_).notes(), IsEmpty()) << "the second time it knows them";
+  EXPECT_THAT(open(keys_).notes(), IsEmpty()) << "the second time the entries are known";
 }
 
-// The chain of hashes has no key: a script can go on with it.
-TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
+// The hash chain has no key, so a script can extend it.
+TEST_F(SignedJournal, NamesEntriesThatAScriptAppended) {
   write(keys_, 0, 20, true);
   write(nullptr, 20, 50, true);
   const Vouched found = vouched(key_);
@@ -245,14 +246,14 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
     ASSERT_NE(journal.closed_because(), nullptr) << "it takes entries behind invented ones";
     EXPECT_THAT(journal.closed_because()->message, HasSubstr("signed the entries up to 20, but not entries 21 to 50"));
   }
-  // Without the key nobody makes the server take them.
+  // Without the key nobody can make the server take them.
   ASSERT_TRUE(salvage_journal(file_, folder_ / "by a script"));
   EXPECT_NE(std::move(Journal::open(folder_ / "by a script", {.keys = keys_}).value()).closed_because(), nullptr);
   EXPECT_THAT(vouched(key_, folder_ / "by a script").other_seals, Contains("the register \"recovered\""));
-  // Only the signed entries.
+  // Only the signed entries are salvaged.
   ASSERT_TRUE(salvage_journal(file_, folder_ / "signed", nullptr, {}, RoomSeq{20}, keys_));
   EXPECT_TRUE(vouched(key_, folder_ / "signed").all());
-  // All entries, on purpose: they still are not vouched for.
+  // All entries are salvaged, on purpose. They are still not signed.
   ASSERT_TRUE(salvage_journal(file_, folder_ / "all", nullptr, {}, {}, keys_));
   file_ = folder_ / "all";
   write(keys_, 50, 60, true);
@@ -262,7 +263,7 @@ TEST_F(SignedJournal, NamesRowsThatAScriptAppended) {
   EXPECT_THAT(recovered.other_seals, IsEmpty());
 }
 
-// Whoever cuts it back to an earlier signature has no footer for that place.
+// If somebody cuts the journal back to an earlier signature, no footer matches that sequence number.
 TEST_F(SignedJournal, NamesAFooterThatAScriptWrote) {
   write(keys_, 0, 20, true);
   write(keys_, 20, 30, true);
@@ -295,7 +296,7 @@ TEST_F(SignedJournal, NamesAPersonWhoWasExchanged) {
   EXPECT_THAT(vouched(key_).other_seals, ElementsAre("the name of person 1"));
 }
 
-// A signature of the attacker's own key, for entries that there are not.
+// The signature is of the attacker's own key, for entries that do not exist.
 TEST_F(SignedJournal, IsRecoveredWithoutSignaturesThatDoNotFit) {
   write(keys_, 0, 20, true);
   const SigningKey theirs = SigningKey::make();
@@ -316,7 +317,7 @@ TEST_F(SignedJournal, IsRecoveredWithoutSignaturesThatDoNotFit) {
   EXPECT_TRUE(vouched(key_, folder_ / "recovered").all());
 }
 
-TEST_F(SignedJournal, NamesRowsThatAnotherKeySigned) {
+TEST_F(SignedJournal, NamesEntriesThatAnotherKeySigned) {
   write(keys_, 0, 20, true);
   const auto others = new_keys();
   write(others, 20, 50, true);
@@ -369,8 +370,8 @@ TEST_F(SignedJournal, KeepsItsSignaturesInACopyThatItsServerMakes) {
   EXPECT_THAT(text_of(found.ranges), ElementsAre("1-30"));
 }
 
-// A branch would turn entries of nobody into entries of the server.
-TEST_F(SignedJournal, SignsNoBranchOfRowsThatItFound) {
+// A branch would turn unsigned entries into entries of the server.
+TEST_F(SignedJournal, SignsNoBranchOfEntriesThatItFound) {
   write(nullptr, 0, 20, true);
   Journal journal = open(keys_);
   append(journal, entries_, 20, 30);
@@ -391,12 +392,12 @@ TEST_F(SignedJournal, SignsABranchThatItsServerMakes) {
   EXPECT_THAT(text_of(vouched(key_, folder_ / "branch").ranges), ElementsAre("1-10"));
 }
 
-TEST_F(SignedJournal, TakesTheSignatureOfEarlierRowsForNoOther) {
+TEST_F(SignedJournal, TakesTheSignatureOfEarlierEntriesForNoOther) {
   write(keys_, 0, 20, true);
   const fs::path first = std::exchange(file_, folder_ / "other");
   entries_ = some_entries(18, 60);
   write(keys_, 0, 20, true);
-  // The other journal's entries with the first one's signatures.
+  // The entries of the other journal with the signatures of the first.
   run_sql("ATTACH '" + first.string() +
           "' AS first; DELETE FROM signatures; INSERT INTO signatures SELECT * FROM first.signatures");
   const auto report = verify_journal(file_);
@@ -429,13 +430,14 @@ TEST_F(SignedJournal, VouchesForItsRegistersAndCheckpoints) {
   {
     Journal journal = open(keys_);
     EXPECT_FALSE(journal.is_vouched_for("room name").value());
-    EXPECT_FALSE(journal.is_vouched_for(journal.checkpoints()->front())) << "whose bone the server would serve";
+    EXPECT_FALSE(journal.is_vouched_for(journal.checkpoints()->front()))
+        << "the server would use the bone of this checkpoint";
   }
   EXPECT_FALSE(open(new_keys()).is_vouched_for("room name").value());
   EXPECT_THAT(vouched(key_).other_seals, ElementsAre("the checkpoint at event 20", "the register \"room name\""));
 }
 
-// Of another genesis, a register's signature is none.
+// The signature of a register is not valid for another genesis.
 TEST_F(SignedJournal, TakesNoRegisterOfAnotherJournal) {
   write(keys_, 0, 5, false);
   { ASSERT_TRUE(open(keys_).set_register("room name", "hip")); }

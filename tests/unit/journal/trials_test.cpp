@@ -1,4 +1,4 @@
-// The journal on disks that lose their power and that fail, by the thousand.
+// Thousands of trials of the journal on disks that lose power and that fail.
 #include <gtest/gtest.h>
 
 #include <cerrno>
@@ -26,15 +26,15 @@ TEST(JournalTrials, LosesNothingAcknowledgedWhenThePowerFails) {
   const Tally tally = power_loss_trials(1, 2000);
   show("power loss", tally);
   expect_nothing_lost(tally);
-  EXPECT_EQ(tally.closed, 0u) << "lost power alone is no reason to refuse entries";
-  // The trials are hard: the disk fails in them, and often with a batch under way.
+  EXPECT_EQ(tally.closed, 0u) << "a power failure alone is no reason to refuse entries";
+  // The trials are hard: the disk fails in most of them, and often while a batch is under way.
   EXPECT_GT(tally.failed, tally.trials * 9 / 10);
   EXPECT_GT(tally.acknowledged, 10 * tally.trials);
   EXPECT_GT(tally.kept_unasked, 100u);
 }
 
-// The same trials must find it when entries are reported that were not waited for.
-TEST(JournalTrials, FindsRowsLostWhenNobodyWaitsForTheDisk) {
+// The same trials must find the loss when entries are acknowledged before the disk has them.
+TEST(JournalTrials, FindsEntriesLostWhenNobodyWaitsForTheDisk) {
   const Tally tally = power_loss_trials(1, 100, false);
   show("power loss, synchronous=OFF", tally);
   EXPECT_GT(tally.bad_trials, 90u);
@@ -57,7 +57,7 @@ TEST(JournalTrials, LosesNothingAcknowledgedWhenTheDiskIsFullAtAnyWrite) {
   EXPECT_GT(tally.closed, 300u);
 }
 
-// What looks written after a failed sync is not: the next process must write it anew before it builds on it.
+// Data that looks written after a failed sync is not. The next process must write it again before it appends.
 TEST(JournalTrials, LosesNothingAcknowledgedWhereAFailedSyncWasForgotten) {
   const Tally tally = forgotten_sync_trials(1, 1000);
   show("forgotten sync", tally);
@@ -82,7 +82,7 @@ TEST(JournalTrials, DamageToAnyOneFileIsHarmlessOrNamed) {
   EXPECT_GT(tally.refused, tally.trials / 20);
 }
 
-// The same trials must find it when one log is all that there is.
+// The same trials must find the loss when there is only one log.
 TEST(JournalTrials, DamageToTheOnlyLogIsSilent) {
   const DamageTally tally = damage_trials(1, 300, DamagedFiles::only_log_left);
   show("damage, without a mirror", tally);

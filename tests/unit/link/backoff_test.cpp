@@ -24,12 +24,13 @@ TEST(Backoff, StaysUnderALimitThatDoublesUpToItsBound) {
       longest[i] = std::max(longest[i], wait);
     }
   }
-  // Of 1000 even draws the longest is within 2 % of the limit but for one chance in 10^8.
+  // Of 1000 uniform draws the longest is within 2 % of the limit, except with a probability of 10^-8.
   for (std::size_t i = 0; i < std::size(limits); ++i) EXPECT_GE(longest[i], 0.98 * limits[i]) << i;
 }
 
 TEST(Backoff, SpreadsClientsEvenly) {
-  // Kolmogorov's distance of 4000 first waits from an even spread; beyond 1.95 / sqrt(n) with a chance of 0.1 %.
+  // Kolmogorov's distance of 4000 first waits from a uniform distribution. It exceeds 1.95 / sqrt(n) with a probability
+  // of 0.1 %.
   std::vector<double> waits;
   for (std::uint64_t seed = 0; seed < 4000; ++seed)
     waits.push_back((Backoff(seed).next() - Time(100ms)) / 1.0ms / 100.0);

@@ -1,5 +1,5 @@
-// Two ends of a session made of SendWindow, ReceiveWindow and SendRate over any DatagramPort, as simple as can be:
-// plain bytes, nothing sealed. For carrying_test and for what send_window_test measures.
+// The two ends of a session, made of SendWindow, ReceiveWindow and SendRate over any DatagramPort. They are as simple
+// as possible: plain bytes, not sealed. For carrying_test and for the measurements of send_window_test.
 #pragma once
 #include <cstring>
 #include <functional>
@@ -16,19 +16,19 @@ namespace osteon::test {
 struct PeerParams {
   SendWindowLimits window;
   SendRateParams rate;
-  int repeats = 0;                    // 0: as SendRate says
-  std::size_t budget = 0;             // most bytes of a datagram, 0: as SendRate says
-  std::size_t fixed_bytes = 29 + 60;  // what a real packet holds beside items: seal, acknowledgement, times, a pose
+  int repeats = 0;                    // 0: as SendRate chooses
+  std::size_t budget = 0;             // most bytes of a datagram, 0: as SendRate chooses
+  std::size_t fixed_bytes = 29 + 60;  // bytes of a real packet beside its items: seal, acknowledgement, times, a pose
   std::uint64_t most_ahead = 1024;
 };
 
-// What a bound must hold for.
+// The largest values, for the bounds that a test checks.
 struct PeerExtremes {
   std::size_t waiting_bytes = 0, waiting_items = 0, held = 0, datagram = 0;
   std::uint64_t datagrams = 0, bytes = 0;  // with 28 B of header each
 };
 
-// Takes what Peer puts into a packet out of it again.
+// Reads from a packet what Peer has written.
 struct PacketReader {
   std::span<const std::uint8_t> bytes;
   template <class T>
@@ -61,8 +61,8 @@ class Peer {
         in_(1, params.most_ahead),
         take_(std::move(take)) {}
 
-  // At most 254 bytes, as the first of which its length goes, and a head of at least 5 for a mark and the number.
-  // `follows`: its head is saved after the item before. False when the window is full.
+  // An item of at most 254 bytes, since its first byte is its length. The head has at least 5 bytes for a mark and the
+  // number. `follows`: its head is saved after the item before. Returns false if the window is full.
   bool say(const std::string& bytes, std::string head, bool follows) {
     OSTEON_CHECK(bytes.size() < kHead && head.size() >= 5);
     return window_.push({static_cast<char>(bytes.size()) + bytes, std::move(head), follows ? window_.next() - 1 : 0})
@@ -104,7 +104,7 @@ class Peer {
     unsaid_ = unsaid_ || in_.acknowledged() != said_ || in_.beyond(in_.acknowledged()) != said_beyond_;
   }
 
-  // Sends what is due now.
+  // Sends what is due.
   void step(Time now) {
     extremes_.waiting_bytes = std::max(extremes_.waiting_bytes, window_.bytes_unacknowledged());
     extremes_.waiting_items = std::max(extremes_.waiting_items, window_.items_unacknowledged());
@@ -120,12 +120,12 @@ class Peer {
     put<std::uint64_t>(out, newest_);
     put<std::uint64_t>(out, received_);
     put<std::uint64_t>(out, in_.beyond(in_.acknowledged()));
-    // The time that was held back here is no part of the way.
+    // The time for which the echo was held back here is not part of the round trip.
     put<std::int64_t>(out, newest_ == 0 ? 0 : (echo_ + (now - echo_came_)).count());
     put<std::int64_t>(out, now.count());
     out.resize(params_.fixed_bytes);
     const auto picked = window_.pick(now, budget - params_.fixed_bytes, repeats);
-    // A head is counted as long as it was said to be; what is written of it is its number.
+    // A head counts with its declared length. Only its number is written.
     for (const std::uint64_t number : picked.numbers) {
       if (window_.needs_head(number, picked)) {
         put<std::uint8_t>(out, kHead);
@@ -167,7 +167,7 @@ class Peer {
   std::function<void(std::string)> take_;
   std::uint64_t counter_ = 0, newest_ = 0, received_ = 0;
   Time echo_{}, echo_came_{}, fastest_{};
-  bool unsaid_ = false;  // something has come and is not yet acknowledged
+  bool unsaid_ = false;  // received, not yet acknowledged
   std::uint64_t said_ = 0, said_beyond_ = 0;
   PeerExtremes extremes_;
 };

@@ -1,4 +1,4 @@
-// Two authors and a server on a hostile network: what the windows and the rate promise together.
+// Two authors and a server on a hostile network: the promises of the windows and the rate together.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -20,17 +20,18 @@ using Time = VirtualTime::Time;
 
 struct Outcome {
   bool each_once_in_order =
-      true;               // the server has each author's cuts 1, 2, 3, ... and every author the server's entries
+      // the server has the cuts 1, 2, 3, ... of each author, and every author has the server's entries
+      true;
   bool complete = false;  // and all of them, within the quiet time
   std::size_t cuts = 0, refused = 0;
   Time quiet_until_complete{};
-  std::vector<double> felt_ms;  // from a cut until the other author has it
+  std::vector<double> felt_ms;  // from a cut until the other author has received it
   PeerExtremes worst;
   double worst_kbit_per_s = 0;
   NetworkCounts network;
 };
 
-// Authors cut every 8 ms for 2 s, with pauses; the server puts what it takes in one order and tells it to both.
+// Authors cut every 8 ms for 2 s, with pauses. The server orders the cuts that it takes and sends them to both.
 template <class Receive>
 Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partition) {
   VirtualTime time;
@@ -44,11 +45,11 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
     int author;
     std::uint64_t number;
   };
-  std::vector<Row> entries;                   // the server's order
-  std::array<std::uint64_t, 2> last_entry{};  // in both down windows, of each author
+  std::vector<Row> entries;                   // in the order of the server
+  std::array<std::uint64_t, 2> last_entry{};  // newest entry of each author, in both down windows
   std::array<std::vector<Time>, 2> made;      // by number - 1
-  std::array<std::uint64_t, 2> taken{};       // cuts that the server has of each
-  std::array<std::size_t, 2> known{};         // entries that each author has
+  std::array<std::uint64_t, 2> taken{};       // number of cuts that the server has of each author
+  std::array<std::size_t, 2> known{};         // number of entries that each author has
   std::array<bool, 2> pausing{};
 
   const std::array<std::unique_ptr<SimPort>, 2> server_ports{network.open(node(1, 1)), network.open(node(1, 2))};
@@ -65,8 +66,8 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
           std::string text = std::to_string(a) + " " + std::to_string(number);
           text.resize(12, ' ');
           for (const auto& server : servers) {
-            // An entry is joined to the author's last one where that is the entry before; a real packet joins it over
-            // others too.
+            // An entry is joined to the author's last entry only if that is the entry before. A real packet joins
+            // entries also across others.
             const bool follows = last_entry[a] != 0 && last_entry[a] + 1 == entries.size();
             if (!server->say(text, std::string(40, 'h'), follows)) outcome.each_once_in_order = false;
           }
@@ -124,7 +125,7 @@ Outcome carry(std::uint64_t seed, const PathQuality& quality, bool with_partitio
       outcome.worst.datagram = std::max(outcome.worst.datagram, seen.datagram);
       if (side == &authors) {
         const double s = std::chrono::duration<double>(time.now()).count();
-        // Beside the rate, the burst that it allows once.
+        // The burst is allowed once in addition to the rate.
         const double kbit = (static_cast<double>(seen.bytes) - 2256.0) * 8.0 / 1000.0;
         outcome.worst_kbit_per_s = std::max(outcome.worst_kbit_per_s, kbit / s);
       }
@@ -184,7 +185,7 @@ TEST(Carrying, EveryCutArrivesOnceAndInOrderWhateverTheNetworkDoes) {
   EXPECT_LE(worst.held, 1024u);
   EXPECT_LE(worst.datagram, kMostDatagramBytes);
   EXPECT_LE(worst_kbit, 300.0);
-  // Two ways of at most 110 ms and 30 held back, and what has to be repeated; not a round trip more.
+  // Two ways of at most 110 ms, twice 30 ms held back, and the repeats, but no further round trip.
   EXPECT_LT(share(0.99), 2 * 110.0 + 2 * 30.0 + 10 * 8.0);
   EXPECT_LT(longest, 2s);
 }
@@ -198,7 +199,7 @@ TEST(Carrying, AGoodNetworkNeedsLittle) {
   EXPECT_LE(*std::ranges::max_element(outcome.felt_ms), 2.0 + 2 * 8.0 + 2.0);
 }
 
-// Items longer than the rate gives a packet as a rule.
+// Items longer than the rate usually allows for a packet.
 TEST(Carrying, LongItemsGoThroughASmallRate) {
   VirtualTime time;
   SimNetwork network(time, 1);
@@ -226,7 +227,7 @@ TEST(Carrying, LongItemsGoThroughASmallRate) {
   EXPECT_EQ(taken, said);
 }
 
-// A window that passes on what came before.
+// A faulty window that passes on items repeatedly.
 struct WithoutDedup {
   explicit WithoutDedup(std::uint64_t first, std::uint64_t most_ahead) : window(first, most_ahead) {}
   bool offer(std::uint64_t number, std::string item) {
@@ -249,7 +250,7 @@ struct WithoutDedup {
   std::vector<std::string> again;
 };
 
-// A window that passes items on as they come, each once.
+// A faulty window that passes on each item once, but as it arrives.
 struct WithoutOrder {
   explicit WithoutOrder(std::uint64_t first, std::uint64_t) : next(first) {}
   bool offer(std::uint64_t number, std::string item) {

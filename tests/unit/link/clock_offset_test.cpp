@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 using Time = std::chrono::nanoseconds;
 
-// A datagram that leaves at `sent`, takes `there` and `back`, and is kept for `kept`, of a peer whose clock is ahead.
+// A datagram that leaves at `sent`, takes `there` and `back`, and is held for `kept` by a peer whose clock is ahead.
 ClockSample exchange(Time sent, Time there, Time kept, Time back, Time ahead) {
   return {sent, sent + there + ahead, sent + there + kept + ahead, sent + there + kept + back};
 }
@@ -36,8 +36,8 @@ TEST(ClockOffset, ErrsByHalfTheDifferenceOfTheWays) {
   EXPECT_EQ(clock.at(2s)->offset, 3s + 40ms);
 }
 
-// Queues that grow and empty, different on both ways: the truth is always within the error that is stated, which is
-// half of the least round trip of the samples kept.
+// Queues that grow and empty differently on both ways. The true offset is always within the stated error, which is half
+// of the shortest round trip of the kept samples.
 TEST(ClockOffset, StaysWithinItsStatedErrorOnAnyNetwork) {
   Time worst{0};
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
@@ -67,7 +67,7 @@ TEST(ClockOffset, StaysWithinItsStatedErrorOnAnyNetwork) {
       worst = std::max(worst, Time(off * 1000 / reading->error.count()));
     }
   }
-  // The bound is met, not merely kept: some ways are as unequal as they can be.
+  // The bound is tight: some ways are as unequal as possible.
   EXPECT_GT(worst, 900ns);
 }
 
@@ -75,7 +75,7 @@ TEST(ClockOffset, ForgetsWhatIsOldOrPushedOut) {
   ClockOffset clock;
   EXPECT_FALSE(clock.at(0s));
   ASSERT_TRUE(clock.add(exchange(0s, 1ms, 0s, 1ms, 1s)));
-  ASSERT_TRUE(clock.at(30s + 2ms)) << "it came back at 2 ms";
+  ASSERT_TRUE(clock.at(30s + 2ms)) << "the sample came back at 2 ms";
   EXPECT_EQ(clock.at(30s + 2ms)->round_trip, 2ms);
   EXPECT_FALSE(clock.at(30s + 2ms + 1ns));
   for (int i = 0; i < 15; ++i) ASSERT_TRUE(clock.add(exchange(1s, 5ms, 0s, 5ms, 1s)));
@@ -87,8 +87,8 @@ TEST(ClockOffset, ForgetsWhatIsOldOrPushedOut) {
 TEST(ClockOffset, RefusesWhatNoClocksCanShow) {
   ClockOffset clock;
   EXPECT_FALSE(clock.add({1s, 5s, 4s, 2s}));  // the peer sent before it received
-  EXPECT_FALSE(clock.add({1s, 5s, 7s, 2s}));  // and kept it for longer than it was away
-  EXPECT_FALSE(clock.add({2s, 5s, 5s, 1s}));  // it came back before it went
+  EXPECT_FALSE(clock.add({1s, 5s, 7s, 2s}));  // the peer held it for longer than the round trip
+  EXPECT_FALSE(clock.add({2s, 5s, 5s, 1s}));  // it came back before it was sent
   const Time most(std::numeric_limits<std::int64_t>::max()), least(std::numeric_limits<std::int64_t>::min());
   for (const Time peer : {most, least}) EXPECT_FALSE(clock.add({1s, peer, peer, 2s}));
   EXPECT_FALSE(clock.add({least, 0s, 0s, most}));

@@ -21,7 +21,7 @@ FillRandom seeded(std::uint64_t seed) {
   };
 }
 
-// A watch of a peer that has proven kHome.
+// A watch whose peer has proven kHome.
 PathWatch at_home(const PathRules& rules = {}) {
   PathWatch watch(seeded(1), rules);
   watch.received(kHome, true, 100, 0ms);
@@ -50,17 +50,17 @@ TEST(PathWatch, MovesWhenTheNewAddressEchoes) {
   const auto challenge = watch.challenge_due(kChallengeBytes, 10ms);
   ASSERT_TRUE(challenge);
   EXPECT_EQ(challenge->to, kAway);
-  EXPECT_EQ(watch.address(), kHome) << "data goes on to the old address";
+  EXPECT_EQ(watch.address(), kHome) << "data still goes to the old address";
   PathToken wrong = challenge->token;
   wrong[15] ^= 1;
   EXPECT_FALSE(watch.echoed(kAway, wrong, 20ms));
-  EXPECT_FALSE(watch.echoed(kHome, challenge->token, 20ms)) << "an echo from elsewhere proves nothing";
+  EXPECT_FALSE(watch.echoed(kHome, challenge->token, 20ms)) << "an echo from another address proves nothing";
   EXPECT_FALSE(watch.echoed(kFar, challenge->token, 20ms));
   EXPECT_EQ(watch.address(), kHome);
   EXPECT_TRUE(watch.echoed(kAway, challenge->token, 20ms));
   EXPECT_EQ(watch.address(), kAway);
   EXPECT_EQ(watch.moves(), 2u);
-  EXPECT_FALSE(watch.echoed(kAway, challenge->token, 21ms)) << "once";
+  EXPECT_FALSE(watch.echoed(kAway, challenge->token, 21ms)) << "a token is valid once";
 }
 
 TEST(PathWatch, IsNotMovedByWhatIsNotNewer) {
@@ -83,13 +83,13 @@ TEST(PathWatch, ChallengesThriceAndForgets) {
     }
   EXPECT_EQ(sent, (std::vector<Time>{0ms, 200ms, 400ms}));
   EXPECT_FALSE(watch.echoed(kAway, token, 5s));
-  // It may begin anew, with another token.
+  // A new challenge may begin, with another token.
   watch.received(kAway, true, 100, 6s);
   const auto again = watch.challenge_due(kChallengeBytes, 6s);
   ASSERT_TRUE(again);
   EXPECT_NE(again->token, token);
   EXPECT_FALSE(watch.echoed(kAway, token, 6s));
-  EXPECT_TRUE(watch.echoed(kAway, again->token, 6s + 900ms)) << "an echo of a slow way counts";
+  EXPECT_TRUE(watch.echoed(kAway, again->token, 6s + 900ms)) << "an echo over a slow path counts";
 }
 
 TEST(PathWatch, HasOneCandidateTheNewest) {
@@ -100,18 +100,18 @@ TEST(PathWatch, HasOneCandidateTheNewest) {
   const auto far = watch.challenge_due(kChallengeBytes, 11ms);
   ASSERT_TRUE(away && far);
   EXPECT_EQ(far->to, kFar);
-  watch.received(kAway, false, 100, 12ms);  // late on its way: changes nothing
+  watch.received(kAway, false, 100, 12ms);  // it arrives late and changes nothing
   EXPECT_FALSE(watch.echoed(kAway, away->token, 13ms));
   EXPECT_TRUE(watch.echoed(kFar, far->token, 13ms));
 }
 
-TEST(PathWatch, DropsTheCandidateWhenThePeerIsHeardWhereItWas) {
+TEST(PathWatch, DropsTheCandidateWhenThePeerSendsFromItsOldAddress) {
   PathWatch watch = at_home();
   watch.received(kAway, true, 100, 10ms);
   const auto challenge = watch.challenge_due(kChallengeBytes, 10ms);
   ASSERT_TRUE(challenge);
-  watch.received(kHome, false, 100, 11ms);  // sent before it moved
-  watch.received(kHome, true, 100, 12ms);   // sent after: it has come back
+  watch.received(kHome, false, 100, 11ms);  // sent before the move
+  watch.received(kHome, true, 100, 12ms);   // sent after the move: the peer has come back
   EXPECT_FALSE(watch.echoed(kAway, challenge->token, 13ms));
   EXPECT_EQ(watch.address(), kHome);
 }
@@ -126,8 +126,8 @@ TEST(PathWatch, WaitsWithAChallengeUntilEnoughHasCome) {
   EXPECT_TRUE(watch.challenge_due(48, 300ms));
 }
 
-// Any order of events: it is only ever at an address that echoed the last token sent there, nobody unproven is sent
-// more than three times what came from him, and at most one address is challenged at a time.
+// For any order of events: the peer's address is always one that echoed the last token sent there. An unproven address
+// is sent at most three times the bytes that came from it. At most one address is challenged at a time.
 TEST(PathWatch, KeepsItsRulesUnderAnyOrderOfEvents) {
   std::uint64_t moves = 0, challenges = 0;
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
@@ -135,9 +135,9 @@ TEST(PathWatch, KeepsItsRulesUnderAnyOrderOfEvents) {
     std::mt19937_64 random(seed);
     PathWatch watch(seeded(seed));
     const Endpoint all[] = {kHome, kAway, kFar, {0, 4, 4000}};
-    std::map<Endpoint, std::size_t> received, sent;  // bytes, since the peer was last heard elsewhere
-    std::map<Endpoint, PathToken> tokens;            // the last one sent there
-    std::optional<Endpoint> newest_from;             // of what was heard
+    std::map<Endpoint, std::size_t> received, sent;  // bytes since the last datagram of the peer from another address
+    std::map<Endpoint, PathToken> tokens;            // the last token sent to each
+    std::optional<Endpoint> newest_from;             // source of the newest datagram
     Time now{0};
     Endpoint from = kHome;
     for (int i = 0; i < 2000; ++i) {

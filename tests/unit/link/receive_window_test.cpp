@@ -20,7 +20,7 @@ TEST(ReceiveWindow, GivesEachItemOnceInOrder) {
   EXPECT_TRUE(window.offer(2, "b"));
   EXPECT_FALSE(window.take()) << "1 is missing";
   EXPECT_TRUE(window.offer(1, "a"));
-  EXPECT_FALSE(window.offer(2, "other")) << "the first wins";
+  EXPECT_FALSE(window.offer(2, "other")) << "the first item with this number is kept";
   EXPECT_EQ(window.acknowledged(), 0u) << "nothing was taken yet";
   EXPECT_EQ(window.take(), "a");
   EXPECT_EQ(window.take(), "b");
@@ -40,12 +40,12 @@ TEST(ReceiveWindow, DropsWhatIsTooFarAhead) {
   EXPECT_EQ(window.counts().beyond, 2u);
   EXPECT_TRUE(window.offer(10, 10));
   EXPECT_EQ(window.take(), 10);
-  EXPECT_TRUE(window.offer(14, 14)) << "one further now";
+  EXPECT_TRUE(window.offer(14, 14)) << "the window has moved by one";
   EXPECT_EQ(window.held(), 2u);
 }
 
-// Against the set of what was offered, asked one by one.
-TEST(ReceiveWindow, SaysWhatHasComeBeyondTheMissing) {
+// Compared with the set of the offered numbers, one by one.
+TEST(ReceiveWindow, ReportsWhatWasReceivedBeyondTheMissing) {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     test::Random random(seed);
     ReceiveWindow<int> window;
@@ -65,8 +65,8 @@ TEST(ReceiveWindow, SaysWhatHasComeBeyondTheMissing) {
   }
 }
 
-// Any order and repetition of packets of neighbouring items gives 1, 2, 3, ... and nothing twice, and never holds more
-// than the bound; packets go on coming until all have arrived.
+// Any order and repetition of packets with neighbouring items gives 1, 2, 3, ... and nothing twice. The window never
+// holds more than the bound. Packets arrive until all items have.
 TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
   std::uint64_t offers = 0;
   for (std::uint64_t seed = 1; seed <= 2000; ++seed) {
@@ -79,7 +79,7 @@ TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
       const std::uint64_t from = first + random.index(count), length = 1 + random.index(8);
       for (std::uint64_t n = from; n < std::min(from + length, first + count); ++n, ++offers) window.offer(n, n * 7);
       ASSERT_LE(window.held(), most_ahead);
-      if (random.unit() < 0.5) continue;  // taken later
+      if (random.unit() < 0.5) continue;  // these are taken later
       while (const auto item = window.take()) taken.push_back(*item);
       ASSERT_EQ(window.acknowledged(), first - 1 + taken.size());
     }
@@ -90,7 +90,7 @@ TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
   std::printf("%llu items offered\n", static_cast<unsigned long long>(offers));
 }
 
-// Items that came some other way do not come out, nor hold up those behind them.
+// Items that were received over the other transport are not given out, and do not delay the items behind them.
 TEST(ReceiveWindow, WhatIsSkippedIsPassedOver) {
   ReceiveWindow<int> window(1, 8);
   EXPECT_TRUE(window.offer(2, 2));

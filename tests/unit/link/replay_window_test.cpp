@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint64_t kLast = std::numeric_limits<std::uint64_t>::max();
 
-// What a window must say, by everything that was ever marked.
+// The correct answer of a window, from everything that was ever marked.
 struct Oracle {
   std::set<std::uint64_t> marked;
   [[nodiscard]] bool is_newest(std::uint64_t counter) const { return marked.empty() || counter > *marked.rbegin(); }
@@ -22,7 +22,7 @@ struct Oracle {
   }
 };
 
-// Asks and marks; the number of fresh ones.
+// Compares the window with the oracle while marking. Returns the number of fresh counters.
 int agree(const std::vector<std::uint64_t>& counters) {
   ReplayWindow window;
   Oracle oracle;
@@ -46,7 +46,7 @@ TEST(ReplayWindow, TakesEachCounterOnceInAnyOrder) {
     std::mt19937_64 random(seed);
     std::vector<std::uint64_t> counters;
     for (std::uint64_t i = 0; i < 2 * ReplayWindow::kSpan; ++i) counters.push_back(i);
-    // Shuffled in stretches shorter than the window, and each sent twice: every one is taken, once.
+    // Shuffled within stretches shorter than the window, and each sent twice: every counter is taken exactly once.
     for (std::size_t at = 0; at < counters.size(); at += 1024)
       std::shuffle(counters.begin() + static_cast<long>(at), counters.begin() + static_cast<long>(at + 1024), random);
     std::vector<std::uint64_t> twice;
@@ -62,7 +62,7 @@ TEST(ReplayWindow, AgreesWithASetOfAllThatWasSeen) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937_64 random(seed);
-    // A front that goes on in small steps, and now and then in jumps of about a window, its ring, or far more.
+    // The front moves in small steps, and sometimes by about a window, its ring, or far more.
     std::uint64_t front = seed % 3 == 0 ? 0 : seed % 3 == 1 ? random() >> 1 : kLast - 40000;
     std::vector<std::uint64_t> counters;
     for (int i = 0; i < 3000; ++i) {
@@ -71,7 +71,7 @@ TEST(ReplayWindow, AgreesWithASetOfAllThatWasSeen) {
       const bool far = random() % 100 == 0;
       const std::uint64_t jump = jumps[far ? 4 + random() % 3 : random() % 4];
       front += std::min(jump, kLast - front);
-      // What the ring held before must not be taken for what is at the window's far end now.
+      // The earlier contents of the ring must not be taken for those at the window's far end.
       for (std::uint64_t back = 1980; far && back < 2060; back += 3)
         counters.insert(counters.end(), {front, front - std::min(back, front)});
       const std::uint64_t back = random() % 20 == 0 ? 1900 + random() % 300 : random() % 100;

@@ -60,8 +60,8 @@ Bytes some_plain(std::size_t size, std::uint64_t seed) {
   return plain;
 }
 
-// RFC 8439, section 2.8.2: the library's primitive is the one of the standard.
-TEST(Sealed, StandsOnThePrimitiveOfTheStandard) {
+// RFC 8439, section 2.8.2: the primitive of the library is that of the standard.
+TEST(Sealed, UsesThePrimitiveOfTheStandard) {
   const std::string text =
       "Ladies and Gentlemen of the class of '99: If I could offer you only one tip for the future, sunscreen would be "
       "it.";
@@ -119,9 +119,9 @@ TEST(Sealed, OpensWhatWasSealedAndNothingThatWasChanged) {
       ASSERT_FALSE(open(opener, longer, 0s));
     }
     const auto came = open(opener, sealed, 0s);
-    ASSERT_TRUE(came) << "attempts on it must not use it up";
+    ASSERT_TRUE(came) << "failed attempts must not use up its counter";
     EXPECT_EQ(came->plain, plain);
-    EXPECT_FALSE(open(opener, sealed, 0s)) << "twice";
+    EXPECT_FALSE(open(opener, sealed, 0s)) << "it must open only once";
     EXPECT_EQ(opener.counts().opened, 1u);
     EXPECT_EQ(opener.counts().replayed, 1u);
   }
@@ -161,7 +161,7 @@ TEST(Sealed, ChangesItsKeyByTimeAndByNumber) {
   std::set<std::uint64_t> counters;
   for (int second = 0; second < 1000; second += 10) {
     EXPECT_EQ(by_time.generation(), static_cast<std::uint64_t>(std::max(0, second - 10) / 120));
-    EXPECT_TRUE(counters.insert(by_time.counter()).second) << "counters go on from key to key";
+    EXPECT_TRUE(counters.insert(by_time.counter()).second) << "the counters continue from key to key";
     seal(by_time, {}, std::chrono::seconds(second));
   }
   Sealer by_number(kSession, a_key(), {.rekey_packets = 100});
@@ -172,11 +172,11 @@ TEST(Sealed, ChangesItsKeyByTimeAndByNumber) {
   Sealer silent(kSession, a_key());
   seal(silent, {}, 0s);
   seal(silent, {}, 24h);
-  EXPECT_EQ(silent.generation(), 1u) << "a silent sender does not run ahead of its peer";
+  EXPECT_EQ(silent.generation(), 1u) << "a silent sender does not get ahead of its peer";
 }
 
-// Datagrams under two keys arrive in any order, with others lost and repeated: all of them are opened, once, through
-// more generations than a byte can number.
+// Datagrams under two keys arrive in any order, and some are lost or repeated. All that arrive are opened exactly once,
+// over more generations than a byte can number.
 TEST(Sealed, OpensBothGenerationsInFlight) {
   std::mt19937_64 random(5);
   Sealer sealer(kSession, a_key());
@@ -195,7 +195,7 @@ TEST(Sealed, OpensBothGenerationsInFlight) {
     if (random() % 10 < 3) {
       ++lost;
     } else {
-      // Up to 9 s on its way: shorter than the previous key is kept.
+      // At most 9 s under way: less time than the previous key is held.
       flying.push_back({now + std::chrono::milliseconds(random() % 9000), bytes, counter});
       if (random() % 10 == 0) flying.push_back({now + std::chrono::milliseconds(random() % 9000), bytes, counter});
     }
@@ -220,11 +220,11 @@ TEST(Sealed, OpensBothGenerationsInFlight) {
             return left.size();
           }(),
       sent)
-      << "each is opened once, lost or still on its way";
+      << "each is opened once, lost or still under way";
   EXPECT_EQ(opener.counts().forged, 0u);
   EXPECT_GT(sealer.generation(), 256u);
   EXPECT_EQ(opener.generation(), sealer.generation());
-  EXPECT_GT(older, sealer.generation()) << "the keys did overlap";
+  EXPECT_GT(older, sealer.generation()) << "no datagram arrived under an older key";
 }
 
 TEST(Sealed, ForgetsThePreviousKeyTenSecondsAfterTheNextIsSeen) {
@@ -253,13 +253,13 @@ TEST(Sealed, UnderstandsAPeerWhoseKeysWereLostOnTheWayUpToALimit) {
     Opener opener(kSession, a_key());
     ASSERT_EQ(open(opener, sealed, 0s).has_value(), generation <= Opener::kMostAhead) << generation;
     if (generation > 0 && generation <= Opener::kMostAhead) {
-      EXPECT_TRUE(open(opener, before, 0s)) << "the key before it is known then, though never seen";
+      EXPECT_TRUE(open(opener, before, 0s)) << "the key before it is then known, though it was never seen";
     }
     before = sealed;
   }
 }
 
-// Whoever writes a later generation into a datagram moves no key.
+// A forged later generation in a datagram changes no key.
 TEST(Sealed, IsNotMovedToAnotherKeyByForgers) {
   Sealer sealer(kSession, a_key());
   Opener opener(kSession, a_key());

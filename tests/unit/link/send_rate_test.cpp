@@ -17,20 +17,20 @@ constexpr auto kNothing = SendRate::Time::max();
 
 TEST(SendRate, GoesEvery8MsWithSomethingToSayAnd4TimesASecondWithout) {
   SendRate rate;
-  EXPECT_EQ(rate.next(3s, kNothing), 3s) << "the first packet goes at once";
+  EXPECT_EQ(rate.next(3s, kNothing), 3s) << "the first packet is sent at once";
   rate.sent(3s, 100);
   EXPECT_EQ(rate.next(3s, 3s), 3s + 8ms);
   EXPECT_EQ(rate.next(3s + 5ms, 3s), 3s + 8ms);
-  EXPECT_EQ(rate.next(4s, 3s), 4s) << "long due";
-  EXPECT_EQ(rate.next(3s, 3s + 100ms), 3s + 100ms) << "as soon as there is something";
+  EXPECT_EQ(rate.next(4s, 3s), 4s) << "it is long due";
+  EXPECT_EQ(rate.next(3s, 3s + 100ms), 3s + 100ms) << "as soon as there is something to send";
   EXPECT_EQ(rate.next(3s, kNothing), 3s + 250ms);
   EXPECT_EQ(rate.next(3s, 10s), 3s + 250ms);
   EXPECT_EQ(rate.budget(3s + 7ms), 0u);
   EXPECT_GT(rate.budget(3s + 8ms), 0u);
 }
 
-// As long as bytes are there: once they are short, new packets come no sooner than others.
-TEST(SendRate, WhatIsNewGoesSooner) {
+// As long as the rate allows it: once bytes are short, packets with new items are sent no sooner than others.
+TEST(SendRate, NewItemsAreSentSooner) {
   SendRate rate;
   rate.sent(3s, 100);
   EXPECT_EQ(rate.next(3s, 3s, 0, true), 3s + 4ms);
@@ -45,7 +45,7 @@ TEST(SendRate, WhatIsNewGoesSooner) {
   EXPECT_GT(rate.next(now, now, 0, true), now + 7ms) << "280 bytes at 300 kbit/s";
 }
 
-// Always everything that is allowed, at times of any kind: over every stretch at most the rate and one burst.
+// Sends everything that is allowed, at times of any kind. In every interval it is at most the rate and one burst.
 TEST(SendRate, KeepsTheBytesASecond) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     test::Random random(seed);
@@ -81,7 +81,7 @@ TEST(SendRate, WaitsForWhatALongItemNeeds) {
     ASSERT_GE(rate.budget(now), 900u);
     rate.sent(now, rate.budget(now));
   }
-  EXPECT_LE(rate.next(30s, 30s, 1 << 20), 31s) << "never waits for more than a packet holds";
+  EXPECT_LE(rate.next(30s, 30s, 1 << 20), 31s) << "it never waits for more than a packet holds";
 }
 
 TEST(SendRate, WaitsForAPacketWorthSending) {
@@ -100,7 +100,7 @@ TEST(SendRate, WaitsForAPacketWorthSending) {
   EXPECT_NEAR(packets, (30.0 * 10'000 + static_cast<double>(params.burst_bytes)) / 280.0, 2.0);
 }
 
-// The fewest k with loss^k R/T at most 0.0002, from the estimate of the loss, which strays by about sqrt(p (1 - p) /
+// The smallest k with loss^k R/T at most 0.0002. The loss is an estimate with a deviation of about sqrt(p (1 - p) /
 // 128).
 TEST(SendRate, RepeatsAsOftenAsTheLossAsksFor) {
   for (const double loss : {0.02, 0.1, 0.2, 0.3, 0.4, 0.7}) {

@@ -26,12 +26,12 @@ TEST(SendWindow, NumbersItemsAndForgetsThemWhenAcknowledged) {
   EXPECT_EQ(window.push(item(10)), 7u);
   EXPECT_EQ(window.push(item(20)), 8u);
   EXPECT_EQ(window.bytes_unacknowledged(), 30u);
-  EXPECT_FALSE(window.acknowledge(7)) << "was never sent";
+  EXPECT_FALSE(window.acknowledge(7)) << "item 7 was never sent";
   (void)window.pick(0s, 1000, 5);
   EXPECT_FALSE(window.acknowledge(6));
   EXPECT_FALSE(window.acknowledge(9));
   EXPECT_TRUE(window.acknowledge(7));
-  EXPECT_FALSE(window.acknowledge(7)) << "again";
+  EXPECT_FALSE(window.acknowledge(7)) << "item 7 is acknowledged already";
   EXPECT_EQ(window.oldest(), 8u);
   EXPECT_EQ(window.bytes_unacknowledged(), 20u);
   EXPECT_TRUE(window.acknowledge(8));
@@ -48,7 +48,7 @@ TEST(SendWindow, RefusesWhatGoesBeyondItsLimits) {
   for (int i = 0; i < 3; ++i) EXPECT_TRUE(items.push(item(1)));
   EXPECT_FALSE(items.push(item(1)));
   SendWindow large({100, 10});
-  EXPECT_TRUE(large.push(item(500))) << "an empty window takes any item, or it would never be sent";
+  EXPECT_TRUE(large.push(item(500))) << "an empty window takes any item, otherwise the item could never be sent";
 }
 
 TEST(SendWindow, RepeatsEachItemInTheNextPacketsAndThenWaits) {
@@ -61,15 +61,15 @@ TEST(SendWindow, RepeatsEachItemInTheNextPacketsAndThenWaits) {
   }
   EXPECT_EQ(sent, (std::map<std::uint64_t, int>{{1, 5}, {2, 5}, {3, 5}}));
   EXPECT_EQ(window.counts().repeated, 12u);
-  // The first was last sent at 32 ms: due a retransmission time later, and not before.
+  // The first item was last sent at 32 ms. It is due one retransmission time later, and not before.
   const auto due = 32ms + window.retransmission_time();
   EXPECT_GT(window.retransmission_time(), 200ms);
   EXPECT_EQ(window.next_due(160ms, 5), due);
-  // Its acknowledgement, though, is overdue a retransmission time after the first time.
+  // Its acknowledgement is overdue one retransmission time after it was first sent.
   EXPECT_TRUE(window.pick(window.retransmission_time() - 1ns, 1000, 5).numbers.empty());
   EXPECT_EQ(window.pick(window.retransmission_time(), 1000, 5).numbers, Numbers{1});
   EXPECT_EQ(window.pick(window.retransmission_time() + 8ms, 1000, 5).numbers, Numbers{1})
-      << "in every packet from then on";
+      << "the item is in every packet from then on";
   EXPECT_EQ(window.pick(1s, 1000, 5).numbers, (Numbers{1, 2, 3}));
 }
 
@@ -91,24 +91,25 @@ TEST(SendWindow, PutsTheOverdueFirstThenTheNewInOrderThenTheLeastOftenSent) {
   EXPECT_EQ(window.pick(0s, 60, 5).numbers, (Numbers{1, 2, 3, 4, 5, 6}));
   window.push(item(10));
   window.push(item(10));
-  // Room for four: both new ones, and of the others the last.
+  // There is room for four: both new items, and the last two of the others.
   EXPECT_EQ(window.pick(8ms, 40, 5).numbers, (Numbers{5, 6, 7, 8}));
   window.push(item(10));
-  // Overdue now: the oldest goes first.
+  // Items are overdue: the oldest is sent first.
   EXPECT_EQ(window.pick(1s, 20, 5).numbers, (Numbers{1, 9}));
   window.push(item(10));
   window.push(item(30));
   window.push(item(1));
   EXPECT_EQ(window.pick(1s + 8ms, 25, 5).numbers, (Numbers{1, 10}))
-      << "12 must not go before 11, for which there is no room";
+      << "12 must not be sent before 11, for which there is no room";
 }
 
-// Bytes counted by hand: a head is paid where the item before is not in the packet, and once saved when it joins later.
+// Bytes counted by hand. An item needs a head if the item before it is not in the packet. The head is saved again if
+// that item joins later.
 TEST(SendWindow, CountsAHeadOnlyWhereARunBegins) {
   SendWindow window;
   window.push(item(10, 40));
   window.push(item(10, 40, 1));
-  window.push(item(10, 40));  // a new run
+  window.push(item(10, 40));  // It begins a new run.
   window.push(item(10, 40, 3));
   const auto all = window.pick(0s, 1000, 5);
   EXPECT_EQ(all.bytes, 4u * 10 + 2u * 40);
@@ -116,7 +117,8 @@ TEST(SendWindow, CountsAHeadOnlyWhereARunBegins) {
   EXPECT_FALSE(window.needs_head(2, all));
   EXPECT_TRUE(window.needs_head(3, all));
   EXPECT_FALSE(window.needs_head(4, all));
-  // Least often sent: all alike, so from the end; 4 with its head is 50, 3 joins for 10 more, 2 costs 50 again.
+  // All were sent equally often, so they are picked from the end: 4 with its head needs 50 bytes, 3 joins for 10 more,
+  // 2 would need 50 again.
   const auto two = window.pick(8ms, 109, 5);
   EXPECT_EQ(two.numbers, (Numbers{3, 4}));
   EXPECT_EQ(two.bytes, 60u);
@@ -129,10 +131,10 @@ TEST(SendWindow, DoesNotRepeatWhatHasArrivedAheadOfItsTurn) {
   EXPECT_FALSE(window.acknowledge(0, 1)) << "nothing was sent";
   (void)window.pick(0s, 1000, 5);
   window.push(item(10));
-  // 1 arrived, 2 is missing, 3 and 5 arrived; the bits for 7, never sent, and beyond mean nothing.
+  // 1 arrived, 2 is missing, 3 and 5 arrived. The bits for 7, which was never sent, and beyond are ignored.
   EXPECT_TRUE(window.acknowledge(1, 0b11110101));
-  EXPECT_FALSE(window.acknowledge(1, 0b101)) << "no news";
-  EXPECT_FALSE(window.acknowledge(0, 0b10)) << "an older packet, overtaken: that 3 arrived is known";
+  EXPECT_FALSE(window.acknowledge(1, 0b101)) << "the acknowledgement has no news";
+  EXPECT_FALSE(window.acknowledge(0, 0b10)) << "an older packet was overtaken: it is known that 3 arrived";
   EXPECT_EQ(window.pick(8ms, 1000, 5).numbers, (Numbers{2, 4, 6, 7}));
   EXPECT_EQ(window.items_unacknowledged(), 6u);
   EXPECT_EQ(window.pick(2s, 1000, 5).numbers, (Numbers{2, 4, 6, 7}));
@@ -140,22 +142,22 @@ TEST(SendWindow, DoesNotRepeatWhatHasArrivedAheadOfItsTurn) {
   EXPECT_FALSE(window.next_due(3s, 5));
 }
 
-TEST(SendWindow, SendsAllAgainToAnEndThatBeganAnew) {
+TEST(SendWindow, SendsAllAgainToARestartedEndpoint) {
   SendWindow window;
   for (int i = 0; i < 6; ++i) window.push(item(10));
   (void)window.pick(0s, 1000, 5);
   window.acknowledge(2, 0b110);
-  EXPECT_FALSE(window.restart(1)) << "has lost what it had acknowledged";
-  EXPECT_FALSE(window.restart(7)) << "was never pushed";
+  EXPECT_FALSE(window.restart(1)) << "the peer has lost what it had acknowledged";
+  EXPECT_FALSE(window.restart(7)) << "item 7 was never pushed";
   EXPECT_TRUE(window.restart(3));
-  EXPECT_FALSE(window.acknowledge(4)) << "was not sent since";
+  EXPECT_FALSE(window.acknowledge(4)) << "item 4 was not sent since";
   EXPECT_EQ(window.pick(8ms, 20, 1).numbers, (Numbers{4, 5}));
   EXPECT_EQ(window.pick(8ms, 1000, 1).numbers, (Numbers{6}));
   EXPECT_TRUE(window.restart(6));
   EXPECT_TRUE(window.empty());
 }
 
-// With what least_room() asks for, pick() takes what is overdue and at least one item that was never sent.
+// With the room that least_room() reports, pick() takes the overdue items and at least one that was never sent.
 TEST(SendWindow, SaysHowMuchRoomItNeeds) {
   SendWindow window({1 << 20, 100, 6});
   EXPECT_EQ(window.least_room(0s), 0u);
@@ -166,12 +168,12 @@ TEST(SendWindow, SaysHowMuchRoomItNeeds) {
   EXPECT_EQ(window.least_room(0s), 0u);
   window.push(item(300));
   EXPECT_EQ(window.least_room(1ms), 300u);
-  EXPECT_EQ(window.least_room(1s), 846u) << "1 is overdue";
+  EXPECT_EQ(window.least_room(1s), 846u) << "item 1 is overdue";
   EXPECT_EQ(window.pick(1s, 846, 5).numbers, (Numbers{1, 2}));
 }
 
-// Whatever happens: the budget holds, what was never sent goes without a gap, nothing acknowledged is sent again, and
-// the bytes are those of the items and of one head for each that misses its predecessor.
+// In any case: the budget holds, new items are sent without a gap, and no acknowledged item is sent again. The bytes
+// are those of the items, and of one head for each item that misses its predecessor.
 TEST(SendWindow, KeepsItsPromisesUnderAnythingThatIsAskedOfIt) {
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
     test::Random random(seed);
@@ -263,7 +265,7 @@ Carried carry(std::chrono::nanoseconds one_way, double kbit_per_s, int repeats, 
     }
     bytes += static_cast<double>(sender.extremes().bytes);
   }
-  EXPECT_EQ(static_cast<double>(delays_ms.size()), said) << "everything said has arrived";
+  EXPECT_EQ(static_cast<double>(delays_ms.size()), said) << "all pushed items arrived";
   std::ranges::sort(delays_ms);
   const auto share = [&](double of) {
     return delays_ms.at(static_cast<std::size_t>(of * static_cast<double>(delays_ms.size() - 1)));
@@ -272,8 +274,8 @@ Carried carry(std::chrono::nanoseconds one_way, double kbit_per_s, int repeats, 
           bytes * 8.0 / 1000.0 / (14.0 * static_cast<double>(seeds))};
 }
 
-// What k and the budget do to the delay until an item is passed on, in order. The columns are what SendRate's choice
-// rests on.
+// The effect of k and the budget on the delay until an item is passed on in order. SendRate's choice is based on these
+// columns.
 TEST(SendWindow, Table) {
   for (const auto one_way : {40ms, 100ms}) {
     std::map<int, Carried> wide;
@@ -293,16 +295,16 @@ TEST(SendWindow, Table) {
       }
     }
     const double way_ms = std::chrono::duration<double, std::milli>(one_way).count();
-    // p^k R/T: 6 % of items wait a round trip at k = 5 of 100 ms, so the 99th percentile does; 0.01 % at k = 10, so it
-    // does not.
+    // The wait of a round trip has the probability p^k R/T. At k = 5 and 100 ms these are 6 % of the items, so the 99th
+    // percentile waits. At k = 10 they are 0.01 %, so it does not.
     if (one_way == 100ms) {
       EXPECT_GT(wide[5].p99_ms, 2.0 * way_ms);
     }
     EXPECT_GT(wide[3].p99_ms, 2.0 * way_ms);
-    // Four packets in an entry are lost once in 123 times: then the fifth brings it, 32 ms later.
+    // Four packets in succession are lost once in 123 times. Then the fifth brings the item, 32 ms later.
     EXPECT_LT(wide[10].p99_ms, way_ms + 10.0 + 5.0 * 8.0);
-    EXPECT_LT(wide[0].p99_ms, way_ms + 10.0 + 5.0 * 8.0) << "as SendRate chooses";
-    // With two thirds of the bytes packets go every 11 ms.
+    EXPECT_LT(wide[0].p99_ms, way_ms + 10.0 + 5.0 * 8.0) << "with the k that SendRate chooses";
+    // With two thirds of the bytes, packets are sent every 11 ms.
     EXPECT_LT(short_of_bytes.p99_ms, way_ms + 10.0 + 6.0 * 11.0);
   }
 }

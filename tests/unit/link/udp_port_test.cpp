@@ -29,7 +29,7 @@ struct Came {
   Endpoint from;
   Bytes bytes;
 };
-// Waits for what is on its way.
+// Waits for a datagram that is under way.
 std::optional<Came> next(UdpPort& port) {
   DatagramBuffer into;
   std::optional<Came> came;
@@ -43,7 +43,7 @@ std::optional<Came> next(UdpPort& port) {
   return came;
 }
 
-// A socket of this process by the port that it is bound to.
+// The socket of this process that is bound to this port.
 int socket_bound_to(std::uint16_t port) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     const int number = std::stoi(entry.path().filename());
@@ -77,7 +77,7 @@ TEST(UdpPort, CarriesDatagramsBothWaysAndSaysWhoseTheyAre) {
   EXPECT_EQ(server->counts().received, 4u);
   EXPECT_EQ(server->counts().sent, 4u);
   DatagramBuffer into;
-  EXPECT_FALSE(server->receive(into)) << "nothing is left";
+  EXPECT_FALSE(server->receive(into)) << "there is no further datagram";
 }
 
 TEST(UdpPort, ServesManyPeersFromOneSocket) {
@@ -114,24 +114,24 @@ TEST(UdpPort, DropsWhatIsLongerThanADatagramMayBe) {
   EXPECT_EQ(server->counts().received, 1u);
 }
 
-// A program that is not there is reported by ICMP. Systems differ in whom they tell: here the kernel is asked to tell
-// us.
+// ICMP reports a port without a program. Systems differ in which sockets receive that report, so the test asks the
+// kernel for it.
 TEST(UdpPort, OutlivesAPeerThatRefuses) {
   const auto port = a_port(), other = a_port();
   const int on = 1;
   ASSERT_EQ(setsockopt(socket_bound_to(port->local().port), IPPROTO_IP, IP_RECVERR, &on, sizeof(on)), 0);
-  const Endpoint nobody = a_port()->local();  // closed again at once
+  const Endpoint nobody = a_port()->local();  // It is closed again at once.
   DatagramBuffer into;
   for (int i = 0; i < 5; ++i) {
     port->send(nobody, Bytes{1});
     EXPECT_FALSE(port->receive(into));
   }
-  EXPECT_GT(port->counts().receive_failed + port->counts().send_failed, 0u) << "the refusal was told";
+  EXPECT_GT(port->counts().receive_failed + port->counts().send_failed, 0u) << "the refusal was reported";
   other->send(port->local(), Bytes{2});
   const auto came = next(*port);
   ASSERT_TRUE(came);
   port->send(nobody, Bytes{1});
-  port->wait(1s);  // what is told then is no datagram either
+  port->wait(1s);  // A report is no datagram either.
   port->send(other->local(), Bytes{3});
   port->send(other->local(), Bytes{3});
   EXPECT_TRUE(next(*other));
@@ -141,13 +141,13 @@ TEST(UdpPort, WaitsForADatagramOrACall) {
   const auto server = a_port(), client = a_port();
   DatagramBuffer into;
   EXPECT_FALSE(server->wait(0s));
-  // Each of these waits would last for a day if nothing ended it.
+  // Each of these waits would last a day if nothing ended it.
   for (int i = 0; i < 3; ++i) {
     client->send(server->local(), Bytes{1});
     EXPECT_TRUE(server->wait(24h));
     while (!server->receive(into)) server->wait(24h);
   }
-  client->send(server->local(), Bytes{1});  // two at once, one taken: the other is still there to end any wait
+  client->send(server->local(), Bytes{1});  // Two are sent and one is taken. The other can end any wait.
   client->send(server->local(), Bytes{2});
   EXPECT_TRUE(server->wait(24h));
   while (!server->receive(into)) server->wait(24h);
@@ -161,13 +161,13 @@ TEST(UdpPort, WaitsForADatagramOrACall) {
   });
   while (!called) server->wait(24h);
   caller.join();
-  server->wake();  // before the wait
+  server->wake();  // Called before the wait.
   EXPECT_TRUE(server->wait(24h));
   for (int i = 0; i < 1000; ++i) server->wake();
   EXPECT_TRUE(server->wait(24h));
   int more = 0;
   while (server->wait(0s)) ++more;
-  EXPECT_LE(more, 1) << "a thousand calls end one wait; at most one more was ended by a datagram taken since";
+  EXPECT_LE(more, 1) << "a thousand calls end one wait, and a datagram taken since may have ended one more";
   EXPECT_FALSE(server->receive(into));
 }
 
@@ -187,12 +187,12 @@ TEST(UdpPort, RefusesAddressesThatAreNotHere) {
   const auto name = UdpPort::open({.address = "not an address"});
   ASSERT_FALSE(name);
   EXPECT_EQ(name.error().code, ErrorCode::invalid_input);
-  const auto elsewhere = UdpPort::open({.address = "192.0.2.1"});  // RFC 5737: nobody's
+  const auto elsewhere = UdpPort::open({.address = "192.0.2.1"});  // RFC 5737: nobody has this address.
   ASSERT_FALSE(elsewhere);
   EXPECT_EQ(elsewhere.error().code, ErrorCode::unavailable);
 }
 
-TEST(UdpPort, IsHeardOnAnyAddress) {
+TEST(UdpPort, ReceivesOnAnyAddress) {
   const auto server = a_port("0.0.0.0"), client = a_port();
   Endpoint to = client->local();
   to.port = server->local().port;
@@ -202,9 +202,9 @@ TEST(UdpPort, IsHeardOnAnyAddress) {
   EXPECT_EQ(came->from, client->local());
 }
 
-// Where the machine has IPv6, a port of both families says of a peer of IPv4 what a port of IPv4 says; where it has
-// not, opening says so.
-TEST(UdpPort, HearsBothFamilies) {
+// If the machine has IPv6, a port of both families shows the address of an IPv4 peer as an IPv4 port does. If not,
+// opening fails with a message.
+TEST(UdpPort, ReceivesFromBothFamilies) {
   const auto both = UdpPort::open({.address = "::"});
   if (!both) {
     EXPECT_EQ(both.error().code, ErrorCode::unavailable);
@@ -219,7 +219,7 @@ TEST(UdpPort, HearsBothFamilies) {
   EXPECT_EQ(came->from, v4->local());
   (*both)->send(came->from, Bytes{5});
   EXPECT_TRUE(next(*v4));
-  // IPv4 has no way to an address of IPv6: lost, and counted.
+  // IPv4 cannot reach an address of IPv6: the datagram is lost, and counted.
   v4->send({0, 1, to.port}, Bytes{6});
   EXPECT_EQ(v4->counts().send_failed, 1u);
   if (const auto v6 = UdpPort::open({.address = "::1"})) {
@@ -238,7 +238,7 @@ TEST(FindEndpoint, KnowsNumbersAndThisMachine) {
   const auto v6 = find_endpoint("::1", 5000);
   ASSERT_TRUE(v6);
   EXPECT_EQ(*v6, (Endpoint{0, 1, 5000}));
-  const std::string no_name(70, 'a');  // RFC 1035: a label has at most 63 bytes, so that nobody is asked for it
+  const std::string no_name(70, 'a');  // RFC 1035: a label has at most 63 bytes, so no name server is asked
   const auto none = find_endpoint(no_name, 5000);
   ASSERT_FALSE(none);
   EXPECT_EQ(none.error().code, ErrorCode::not_found);

@@ -12,7 +12,7 @@ inline Case test_block() { return plain_block(24.0, 12.0, kBlockPitch_mm); }
 
 inline Tool tool_named(std::string_view name) { return find_tool(name).value(); }
 
-// Short strokes at random places of the block's upper face, numbered from 1.
+// Short strokes at random points of the block's upper face, numbered from 1.
 inline std::vector<Cut> strokes(AuthorId author, int count, unsigned seed) {
   std::mt19937 random(seed);
   const auto between = [&](double low, double high) {

@@ -1,5 +1,5 @@
-// A recording that is cut again in a live room: seen at rest while it is stopped, over when the server is to stop, and
-// in nobody's way while its journal is read.
+// A demonstration in a live room. Viewers see its tool at rest while it is stopped. It ends when the server shall stop.
+// Nobody waits while its journal is read.
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-// Every state of a tool that viewers are told, of any author.
+// Keeps every tool state that viewers are sent, of any author.
 class SeenTools final : public StateSubscriber {
  public:
   void offer(const ShownNow& now) override {
@@ -58,7 +58,7 @@ class SeenTools final : public StateSubscriber {
   std::map<std::uint64_t, std::vector<v1::CuttingState>> states_;
 };
 
-// A hand at the bone on its mount.
+// A haptic client at the bone on its compliant mount.
 class MountedHand final : public SessionSubscriber {
  public:
   explicit MountedHand(AuthorId author) : author_(author) {}
@@ -86,7 +86,8 @@ class MountedHand final : public SessionSubscriber {
   MountPose seen_;
 };
 
-// A server with the rooms "ward", open, and "shown" and "other", closed, each with a recording of 240 cuts in 2.4 s.
+// A server with three rooms: "ward" is open, "shown" and "other" are closed. The closed ones each have a recording of
+// 240 cuts in 2.4 s.
 class DemonstrationTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -97,7 +98,7 @@ class DemonstrationTest : public ::testing::Test {
       kept.cut(300);
       ASSERT_TRUE(kept.store->close());
     }
-    // A program that takes long to look a case through, and says when it begins.
+    // An upload validation that takes long, and that creates a file when it begins.
     std::ofstream(dir_ / "checker") << "#!/bin/sh\n: > '" << (dir_ / "checks").string() << "'\nexec sleep 60\n";
     fs::permissions(dir_ / "checker", fs::perms::owner_all);
     auto store = CaseRepository::open(dir_ / "cases", dir_ / "checker", {});
@@ -139,7 +140,7 @@ class DemonstrationTest : public ::testing::Test {
   SeenTools seen_;
 };
 
-// Its cuts are so close together that its tool is not seen at rest between two.
+// The cuts are so close together that the tool is never seen at rest between two of them.
 TEST_F(DemonstrationTest, IsSeenAtRestWhileItIsStoppedOrWithoutItsTool) {
   const Result<Shown> shown = show(0.06);
   ASSERT_TRUE(shown) << shown.error().message;
@@ -147,7 +148,7 @@ TEST_F(DemonstrationTest, IsSeenAtRestWhileItIsStoppedOrWithoutItsTool) {
   for (const Restrictions& word : {Restrictions{.stopped = true}, Restrictions{.taken_by = instructor_}}) {
     ASSERT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience));
     decide(who, word);
-    ASSERT_TRUE(wait_until([&] { return seen_.at_rest(who); }, kPatience)) << "everybody goes on hearing it";
+    ASSERT_TRUE(wait_until([&] { return seen_.at_rest(who); }, kPatience)) << "everybody still receives its states";
     // As long as three cuts take.
     const std::uint64_t cuts = committed();
     const auto then = seen_.of(who);
@@ -156,10 +157,10 @@ TEST_F(DemonstrationTest, IsSeenAtRestWhileItIsStoppedOrWithoutItsTool) {
     EXPECT_EQ(seen_.of(who).size(), then.size());
     EXPECT_EQ(committed(), cuts);
     decide(who, {});
-    ASSERT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience)) << "it goes on";
+    ASSERT_TRUE(wait_until([&] { return seen_.at_work(who); }, kPatience)) << "the demonstration goes on";
     EXPECT_TRUE(wait_until([&] { return committed() > cuts; }, kPatience));
   }
-  // Whoever takes only newer states than those that they have takes these.
+  // Readers that take only newer states take these.
   const auto all = seen_.of(who);
   for (std::size_t i = 1; i < all.size(); ++i) EXPECT_GT(all[i].state_seq(), all[i - 1].state_seq());
 }
@@ -183,14 +184,14 @@ TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
     std::this_thread::sleep_for(time);
     return ++waits > 100;
   });
-  EXPECT_EQ(waits, 0) << "nobody was there who would have had to leave";
+  EXPECT_EQ(waits, 0) << "nobody was in the room who had to leave";
   EXPECT_EQ(room_->runtime().health().sessions, 0u);
   const auto newest = [&] { return room_->runtime().room_seq(); };
   EXPECT_TRUE(wait_until([&] { return seen_.at_rest(shown->demonstrator); }, kPatience));
   const RoomSeq then = newest();
   std::this_thread::sleep_for(500ms);
   EXPECT_EQ(newest(), then);
-  // Nor does another begin, whose journal would be read first.
+  // No other demonstration begins either. Its journal would have to be read first.
   for (const std::string room : {"", "nowhere"}) {
     const Result<Shown> late = show(1.0, room);
     ASSERT_FALSE(late);
@@ -198,8 +199,8 @@ TEST_F(DemonstrationTest, EndsWhenTheServerIsToStop) {
   }
 }
 
-// What one hand puts into the bone is for the others who are pushed by it, and a demonstrator's tool is where it was on
-// the bone.
+// The energy that one person's push puts into the bone is for the others whom the bone pushes. A demonstration takes
+// none of it. Its tool is where it was relative to the bone.
 TEST_F(DemonstrationTest, NeitherMovesTheBoneOnItsMountNorTakesOfItsEnergy) {
   const auto open = [&] {
     auto hand = std::make_shared<MountedHand>(room_->runtime().join(MemberKind::surgeon).value());
@@ -222,11 +223,11 @@ TEST_F(DemonstrationTest, NeitherMovesTheBoneOnItsMountNorTakesOfItsEnergy) {
   room_->runtime().leave(*other);
 }
 
-// Calls that everybody makes who comes.
+// The calls that every client makes when it connects.
 class CallsOfOthers {
  public:
   explicit CallsOfOthers(const wire::JoinedRoom& room) : room_(room) {}
-  // Empty: all were answered.
+  // Empty if all calls were answered.
   std::string fail() const {
     v1::ListRoomsResponse rooms;
     v1::ListCasesResponse cases;
@@ -259,7 +260,7 @@ class CallsOfOthers {
 
 TEST_F(DemonstrationTest, NobodyWaitsUntilItsJournalIsRead) {
   const wire::JoinedRoom viewer = join(server_->address(), wire::ClientKind::viewer, "ward");
-  // Somebody opens a large room: until that is done no other closed room's journal can be read.
+  // Somebody opens a large room. Until it is open, the journal of no other closed room can be read.
   std::promise<void> opening, done;
   std::thread operator_of_rooms([&] {
     const auto opened = server_->rooms().resume("other", [&, told = false](double) mutable {
@@ -283,11 +284,11 @@ TEST_F(DemonstrationTest, NobodyWaitsUntilItsJournalIsRead) {
   const CallsOfOthers others(viewer);
   std::string failed;
   for (int i = 0; i < 30 && failed.empty(); ++i) {
-    std::this_thread::sleep_for(10ms);  // the call above takes a moment until it is there
+    std::this_thread::sleep_for(10ms);  // The call above needs a moment to arrive.
     failed = others.fail();
   }
   EXPECT_EQ(failed, "");
-  EXPECT_EQ(response.demonstrator(), 0u) << "it was not waited for at all";
+  EXPECT_EQ(response.demonstrator(), 0u) << "the demonstration did not wait for it";
   done.set_value();
   operator_of_rooms.join();
   of_instructor.join();

@@ -1,5 +1,5 @@
-// What a room decides as entries: replayed, through their bytes, they make the same room again, from the beginning or
-// from any place on.
+// The log entries of a room. After a round trip through bytes, a replay of them makes the same room again, from the
+// beginning or from any sequence number.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -24,7 +24,8 @@ Fragment half(const Case& bone, bool upper) {
   return fragment;
 }
 
-// Two hands that cut, undo, redo, saw the bone apart, take pieces away, set items, mark, and err, in a seeded mixture.
+// Two authors in a seeded mixture: they cut, undo, redo, saw the bone apart, remove pieces, set items, mark, and make
+// mistakes.
 class BusyRoom {
  public:
   explicit BusyRoom(unsigned seed) : room(test_block()), random_(seed) {
@@ -100,14 +101,14 @@ Room begun_like(const Room& room) {
   return std::move(*made);
 }
 
-// As a journal keeps it.
+// The entry as a journal stores it.
 LogEntry through_bytes(const LogEntry& entry) {
   Result<LogEntry> read = entry_from_bytes(entry.seq, entry.at, to_bytes(entry));
   EXPECT_TRUE(read) << read.error().message;
   return std::move(*read);
 }
 
-// The whole room, also what shows only later: what an undo of everything leaves, and a redo after that.
+// Compares the whole room, also what shows only later: the room after an undo of everything, and after a redo of that.
 void expect_same(Room& one, Room& other) {
   ASSERT_EQ(one.room_hash(), other.room_hash());
   ASSERT_EQ(one.bodies(), other.bodies());
@@ -140,12 +141,12 @@ TEST_P(LogEntries, ReplayedMakeTheSameRoom) {
     ASSERT_EQ(replayed.room_hash(), busy.room.room_hash()) << "event " << i << ", entry " << entries;
     ASSERT_EQ(replayed.room_seq(), busy.room.room_seq());
   }
-  EXPECT_EQ(entries, busy.room.room_seq().value) << "every place of the order is an entry";
-  EXPECT_TRUE(replayed.take_entries().empty()) << "what was decided elsewhere is not decided again";
+  EXPECT_EQ(entries, busy.room.room_seq().value) << "every sequence number has a log entry";
+  EXPECT_TRUE(replayed.take_entries().empty()) << "a replayed decision makes no new entry";
   expect_same(busy.room, replayed);
 }
 
-// Fields of any place and the entries before it, which are not evaluated again, then the entries after it.
+// The field of a checkpoint and the entries before it, which are not evaluated again. Then the entries after it.
 TEST_P(LogEntries, GoOnFromACheckpoint) {
   BusyRoom busy(GetParam());
   std::vector<LogEntry> before, after;
@@ -167,7 +168,7 @@ TEST_P(LogEntries, GoOnFromACheckpoint) {
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LogEntries, ::testing::Range(1u, 9u));
 
-TEST(RoomReplay, TakesOnlyTheRowThatComesNext) {
+TEST(RoomReplay, TakesOnlyTheNextLogEntry) {
   BusyRoom busy(3);
   for (int i = 0; i < 20; ++i) busy.act();
   const std::vector<LogEntry> entries = busy.room.take_entries();
@@ -175,18 +176,18 @@ TEST(RoomReplay, TakesOnlyTheRowThatComesNext) {
   for (std::size_t i = 0; i < entries.size(); ++i) {
     const Digest before = replayed.room_hash();
     if (i + 1 < entries.size()) {
-      EXPECT_FALSE(replayed.replay(entries[i + 1])) << "a gap";
+      EXPECT_FALSE(replayed.replay(entries[i + 1])) << "an entry is missing";
     }
     if (i > 0) {
-      EXPECT_FALSE(replayed.replay(entries[i - 1])) << "again";
+      EXPECT_FALSE(replayed.replay(entries[i - 1])) << "the entry was replayed already";
     }
     EXPECT_EQ(replayed.room_hash(), before);
     ASSERT_TRUE(replayed.replay(entries[i]));
   }
 }
 
-// A journal may have been damaged or forged where its chain still holds: no entry may name what is not there.
-TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
+// A journal may be damaged or forged although its chain holds. No entry may name something that does not exist.
+TEST(RoomReplay, RefusesALogEntryThatNamesWhatIsNotThere) {
   Room room(test_block());
   const AuthorId hand = room.join(MemberKind::surgeon);
   const auto cuts = strokes(hand, 3, 4);
@@ -256,8 +257,8 @@ TEST(RoomReplay, RefusesARowThatNamesWhatIsNotThere) {
   EXPECT_TRUE(room.replay({RoomSeq{3}, 1s, hand, CutEntry{cuts[1]}}));
 }
 
-// Not only where the sum of two times would overflow.
-TEST(RoomReplay, RefusesATimeBeforeTheLastRowsOrBeyondAnyRooms) {
+// Also where the sum of the two times would not overflow.
+TEST(RoomReplay, RefusesATimeBeforeTheLastLogEntryOrBeyondAnyRooms) {
   Room room(test_block());
   const AuthorId hand = room.join(MemberKind::surgeon);
   ASSERT_TRUE(room.replay({RoomSeq{2}, 2s, hand, MarkEntry{"here"}}));
@@ -268,7 +269,7 @@ TEST(RoomReplay, RefusesATimeBeforeTheLastRowsOrBeyondAnyRooms) {
     EXPECT_EQ(room.room_hash(), before);
     EXPECT_EQ(room.time(), 2s);
   }
-  EXPECT_TRUE(room.replay({RoomSeq{3}, 2s, hand, MarkEntry{"there"}})) << "two entries of one moment";
+  EXPECT_TRUE(room.replay({RoomSeq{3}, 2s, hand, MarkEntry{"there"}})) << "two entries may have the same time";
 }
 
 TEST(RoomReplay, RefusesARedoThatNamesOneEventTwice) {
@@ -310,7 +311,7 @@ TEST(RoomReplay, TakesNoMoreItemsThanTheRoomGives) {
   item.set_at = item.id;
   EXPECT_FALSE(room.replay({RoomSeq{item.id}, 1s, {}, ItemEntry{item.id, item}}));
   --item.id;
-  EXPECT_TRUE(room.replay({RoomSeq{kMostItems + 1}, 1s, {}, ItemEntry{item.id, item}})) << "one that is there moves";
+  EXPECT_TRUE(room.replay({RoomSeq{kMostItems + 1}, 1s, {}, ItemEntry{item.id, item}})) << "an existing item may move";
 }
 
 TEST(RoomLease, FallsWithARejectionForItsAuthorAlone) {
@@ -322,12 +323,12 @@ TEST(RoomLease, FallsWithARejectionForItsAuthorAlone) {
   EXPECT_EQ(fell.rejection, Rejection::level);
   EXPECT_GT(fell.lease_epoch, 1u);
   EXPECT_EQ(room.lease_epoch(one), fell.lease_epoch);
-  // What was on its way was made on top of what fell; that it falls too does not void what comes after it.
+  // The cut under way was made on top of the rejected one, so it is rejected too. That does not void the cuts after it.
   EXPECT_EQ(room.submit(cuts[1])->rejection, Rejection::lease);
   EXPECT_EQ(room.submit(cuts[2])->rejection, Rejection::lease);
   cuts[3].lease_epoch = fell.lease_epoch;
   EXPECT_TRUE(room.submit(cuts[3])->committed());
-  EXPECT_TRUE(room.submit(of_other[0])->committed()) << "another's work stands on other bone";
+  EXPECT_TRUE(room.submit(of_other[0])->committed()) << "the other author's cuts are on other bone";
 }
 
 TEST(RoomLease, TakesNoMoreToolTimeThanHasPassed) {
@@ -346,7 +347,7 @@ TEST(RoomLease, TakesNoMoreToolTimeThanHasPassed) {
   EXPECT_EQ(room.counts().rejected, 1u);
 }
 
-// 1 mm of way a cut; what the kernel would look at is bounded by the box of the tool and its way.
+// Each cut moves 1 mm. The box around the tool and its path bounds what the kernel examines.
 TEST(RoomLimits, BoundWhatIsSweptOverTime) {
   const auto taken_in_a_entry = [](double voxels_per_s) {
     Room room(test_block(), {.swept_voxels_per_s = voxels_per_s});
@@ -364,7 +365,7 @@ TEST(RoomLimits, BoundWhatIsSweptOverTime) {
     Cut cut = test::straight_cut(burr, {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, 101);
     cut.author = hand;
     cut.lease_epoch = room.lease_epoch(hand);
-    EXPECT_TRUE(room.submit(cut)->committed()) << "time gives it back";
+    EXPECT_TRUE(room.submit(cut)->committed()) << "the limit recovers with time";
     return taken;
   };
   const std::size_t few = taken_in_a_entry(1e5), more = taken_in_a_entry(2e5);
@@ -373,9 +374,9 @@ TEST(RoomLimits, BoundWhatIsSweptOverTime) {
   EXPECT_NEAR(static_cast<double>(more), 2.0 * static_cast<double>(few), 2.0);
 }
 
-// Each of the samples stands for a 64th of the bur, and eight of them are forgiven: 1.1 J.
-// A block of 1.9 g/cm3 has an ultimate stress of 130 N/mm2: a bur of 5 mm, wholly in it, needs at least 130 N/mm2 *
-// pi/6 * 125 mm3 = 8.5 J, and half of that where half of it is in air.
+// Each sample stands for a 64th of the bur. Eight samples are allowed without energy: 1.1 J. A block of 1.9 g/cm3 has
+// an ultimate stress of 130 N/mm2. A bur of 5 mm that is wholly in it needs at least 130 N/mm2 * pi/6 * 125 mm3 = 8.5
+// J, and half of that if half of it is in air.
 TEST(RoomLimits, BoundTheEnergyOfACutByTheMotor) {
   const auto rejection_of = [](const std::string& tool, const Vec3& at, double power_w, double blow_j,
                                std::uint32_t path_us) {
@@ -388,16 +389,17 @@ TEST(RoomLimits, BoundTheEnergyOfACutByTheMotor) {
   const Vec3 deep{0, 0, -8};
   EXPECT_EQ(rejection_of("burr-round-5", deep, 1e-9, 9.5, 8000), Rejection::none);
   EXPECT_EQ(rejection_of("burr-round-5", deep, 1e-9, 6.0, 8000), Rejection::power);
-  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, -2.5}, 1e-9, 5.0, 8000), Rejection::none) << "half of it is in air";
+  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, -2.5}, 1e-9, 5.0, 8000), Rejection::none)
+      << "half of the bur is in air";
   EXPECT_EQ(rejection_of("burr-round-5", {0, 0, -2.5}, 1e-9, 2.0, 8000), Rejection::power);
-  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, 6}, 1e-9, 0.0, 8000), Rejection::none) << "in air";
+  EXPECT_EQ(rejection_of("burr-round-5", {0, 0, 6}, 1e-9, 0.0, 8000), Rejection::none) << "the bur is in air";
   // 8.5 J in 20 ms are 425 W.
   EXPECT_EQ(rejection_of("burr-round-5", deep, 500.0, 0.0, 20'000), Rejection::none);
   EXPECT_EQ(rejection_of("burr-round-5", deep, 350.0, 0.0, 20'000), Rejection::power);
-  EXPECT_EQ(rejection_of("burr-round-5", deep, 0.0, 0.0, 0), Rejection::none) << "without the bound";
+  EXPECT_EQ(rejection_of("burr-round-5", deep, 0.0, 0.0, 0), Rejection::none) << "there is no bound";
 }
 
-// What is gone already takes no energy.
+// Bone that is removed already takes no energy.
 TEST(RoomLimits, ATurnInItsOwnHoleTakesNoEnergy) {
   Room room(test_block(), {.power_w = 1e-9, .blow_j = 9.5});
   const AuthorId hand = room.join(MemberKind::surgeon);
@@ -430,13 +432,14 @@ TEST(RoomMark, IsFoundAgainAndUndoneTo) {
   ASSERT_TRUE(undone);
   EXPECT_EQ(undone->seqs.size(), 3u);
   EXPECT_EQ(room.field_hash(), then);
-  EXPECT_EQ(room.undo_to(hand, room.marks()[0].first).error().code, ErrorCode::unavailable) << "nothing stands since";
+  EXPECT_EQ(room.undo_to(hand, room.marks()[0].first).error().code, ErrorCode::unavailable)
+      << "nothing has happened since that could be undone";
   EXPECT_FALSE(room.undo_to(hand, RoomSeq{99}));
-  EXPECT_FALSE(room.mark(hand, "")) << "a mark without a name";
+  EXPECT_FALSE(room.mark(hand, "")) << "a mark needs a name";
   EXPECT_FALSE(room.mark(AuthorId{}, "nobody's"));
 }
 
-TEST(JournalRows, AreRefusedWhereTheyAreNone) {
+TEST(JournalEntries, AreRefusedWhereTheyAreNone) {
   EXPECT_FALSE(entry_from_bytes(RoomSeq{1}, 0s, "\xff\xff"));
   EXPECT_EQ(entry_from_bytes(RoomSeq{1}, 0s, "").error().code, ErrorCode::unsupported);
   EXPECT_FALSE(genesis_from_bytes("\xff\xff"));

@@ -1,4 +1,5 @@
-// The room's events beside cuts. The other road to every bone: a fresh room that only ever had what is left.
+// The room's events other than cuts. Each bone is compared with that of a new room that only ever had the remaining
+// cuts.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -26,14 +27,14 @@ RoomSeq commit(Room& room, const Cut& cut) {
   return outcome->room_seq;
 }
 
-// A room's bone after these cuts alone.
+// The bone of a room after only these cuts.
 Digest bone_after(const std::vector<Cut>& cuts) {
   CutField field(test_block(), BodyId{0});
   for (const Cut& cut : cuts) field.apply(cut);
   return field.hash();
 }
 
-// One side of x = 0.
+// One side of the plane x = 0.
 Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
   Fragment fragment = part(
       bone, [&](int x) { return (x >= 0) == upper; }, volume_mm3);
@@ -59,10 +60,10 @@ TEST(RoomUndo, LeavesTheBoneOfTheOtherCuts) {
   const RoomSeq second[] = {seqs[1]};
   const auto undone = room.undo(surgeon, second);
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->room_seq.value, 7u) << "after a surgeon who came and five cuts";
+  EXPECT_EQ(undone->room_seq.value, 7u) << "a surgeon has joined and made five cuts";
   EXPECT_EQ(undone->seqs, std::vector<RoomSeq>{seqs[1]});
   EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2], cuts[3], cuts[4]}));
-  EXPECT_FALSE(room.undo(surgeon, second)) << "it is undone already";
+  EXPECT_FALSE(room.undo(surgeon, second)) << "it was undone already";
   ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
   EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[2]}));
 
@@ -104,7 +105,7 @@ TEST(RoomUndo, EndsTheLeasesUnderWhichOthersCut) {
   commit(room, cuts[2]);
 }
 
-TEST(RoomUndo, RefusesWhatCannotBeTakenBackWithoutAPlaceInTheOrder) {
+TEST(RoomUndo, RefusesWhatCannotBeUndoneWithoutASequenceNumber) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const RoomSeq cut = commit(room, strokes(surgeon, 1, 35)[0]);
@@ -116,12 +117,12 @@ TEST(RoomUndo, RefusesWhatCannotBeTakenBackWithoutAPlaceInTheOrder) {
   }
   EXPECT_FALSE(room.undo(surgeon, {}));
   EXPECT_FALSE(room.undo_last(surgeon, 0, {}));
-  EXPECT_FALSE(room.undo_last(AuthorId{9}, 1, {})) << "a stranger";
+  EXPECT_FALSE(room.undo_last(AuthorId{9}, 1, {})) << "author 9 has not joined";
   EXPECT_FALSE(room.redo_last(AuthorId{9}, 1));
   EXPECT_EQ(room.room_seq(), undo);
 }
 
-// Two roads to one surface: blocks made anew where an event made them stale, or all at the end.
+// Compares two ways to the surface: remaking the blocks that each event makes stale, and making all at the end.
 TEST(RoomUndo, NamesEveryBlockThatItMakesStale) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
@@ -165,7 +166,7 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_EQ(split->bodies, (std::vector<BodyId>{BodyId{0}, BodyId{1}}));
   ASSERT_NE(room.find_field(BodyId{1}), nullptr);
 
-  // Each point of the bone is in one of the two.
+  // Each point of the bone is in one of the two bodies.
   const Vec3 up{6, 0, -6}, down{-6, 0, -6};
   EXPECT_GT(room.field().solid_mm(up), 0.0);
   EXPECT_LT(room.field().solid_mm(down), 0.0);
@@ -173,16 +174,16 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_GT(room.find_field(BodyId{1})->solid_mm(down), 0.0);
   const double parted_mm3 =
       room.field().removed_mm3() + room.find_field(BodyId{1})->removed_mm3() - room.bone().volume_mm3();
-  EXPECT_NEAR(parted_mm3, before_mm3, 0.02 * room.bone().volume_mm3()) << "no bone is lost by parting";
+  EXPECT_NEAR(parted_mm3, before_mm3, 0.02 * room.bone().volume_mm3()) << "the split loses no bone";
 
-  // A burr across the parting line takes bone of both.
+  // A cut across the plane of the split takes bone of both bodies.
   Cut across = test::straight_cut(tool_named("burr-round-5"), {-4, 0, -1}, {4, 0, -1}, {0, 0, -1}, 3);
   across.author = surgeon;
   commit(room, across);
   EXPECT_GT(room.find_field(BodyId{1})->solid_mm({3, 0, -0.5}), 0.0);
   EXPECT_GT(room.field().solid_mm({-3, 0, -0.5}), 0.0);
 
-  // The first cut is older than the split: that falls too, and what was cut since stays in the bone.
+  // The undone cut is older than the split, so the split is undone too. The cuts after it stay in the bone.
   const RoomSeq oldest[] = {saw};
   const auto undone = room.undo(surgeon, oldest);
   ASSERT_TRUE(undone) << undone.error().message;
@@ -190,7 +191,7 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_EQ(room.bodies(), std::vector<BodyId>{BodyId{0}});
   EXPECT_EQ(room.field_hash(), bone_after({cuts[1], across}));
 
-  // And both come again.
+  // The redo brings back both.
   ASSERT_TRUE(room.redo_last(surgeon, 1));
   EXPECT_EQ(room.bodies().size(), 2u);
   CutField whole(room.bone(), BodyId{0}), piece(room.bone(), BodyId{1});
@@ -202,7 +203,7 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_EQ(room.find_field(BodyId{1})->hash(), piece.hash());
 }
 
-// A piece made beforehand, from a copy that lacks the last cuts, is the one that the room would have made.
+// A body made in advance, from a copy that lacks the last cuts, equals the one that the room would have made.
 TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
   Room slow(test_block()), fast(test_block());
   const AuthorId surgeon = slow.join(MemberKind::surgeon);
@@ -226,7 +227,7 @@ TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
   ASSERT_TRUE(slow.split(BodyId{0}, {half(slow.bone(), true)}, slow.bone_epoch()));
   EXPECT_EQ(fast.find_field(BodyId{1})->hash(), slow.find_field(BodyId{1})->hash());
   EXPECT_EQ(fast.field_hash(), slow.field_hash());
-  // Its history goes its own way.
+  // Both bodies have histories of their own.
   for (Room* room : {&slow, &fast}) {
     const RoomSeq second[] = {RoomSeq{2}, RoomSeq{7}};
     ASSERT_TRUE(room->undo(surgeon, second));
@@ -261,7 +262,7 @@ TEST(RoomSplit, IsRefusedWhereBoneHasComeBackMeanwhile) {
 TEST(RoomSplit, APieceIsTakenAwayAndComesBack) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
-  EXPECT_FALSE(room.remove_body(surgeon, BodyId{0})) << "the last one stays";
+  EXPECT_FALSE(room.remove_body(surgeon, BodyId{0})) << "the last body cannot be removed";
   ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
   const Digest parted = room.field_hash();
   const auto removed = room.remove_body(surgeon, BodyId{1});
@@ -289,7 +290,7 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   double apart_mm3 = -2.0 * room.bone().volume_mm3();
   for (const BodyId body : room.bodies()) apart_mm3 += room.find_field(body)->removed_mm3();
 
-  // Else the bone of the first piece would be in the second as well.
+  // Otherwise the second body would also contain the bone of the first.
   const RoomSeq named[] = {first->room_seq};
   const auto undone = room.undo(surgeon, named);
   ASSERT_TRUE(undone) << undone.error().message;
@@ -300,7 +301,7 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
 
   ASSERT_TRUE(room.redo_last(surgeon, 1));
   EXPECT_EQ(room.field_hash(), parted);
-  // The later one alone falls alone.
+  // An undo of the later split leaves the earlier one.
   const RoomSeq later[] = {second->room_seq};
   const auto one = room.undo(surgeon, later);
   ASSERT_TRUE(one) << one.error().message;
@@ -343,7 +344,7 @@ TEST(RoomSplit, ABodyThatIsAwayMissesNoCut) {
 
   const RoomSeq back[] = {away->room_seq};
   ASSERT_TRUE(room.undo(surgeon, back));
-  EXPECT_GT(room.field().solid_mm({-3, 0, -0.5}), 0.0) << "it was cut while nobody saw it";
+  EXPECT_GT(room.field().solid_mm({-3, 0, -0.5}), 0.0) << "the cut also took bone of the removed body";
   const RoomSeq whole[] = {split->room_seq};
   ASSERT_TRUE(room.undo(surgeon, whole));
   EXPECT_EQ(room.field_hash(), bone_after({cuts[0], cuts[1], across}));
@@ -366,7 +367,7 @@ TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {
   moved.pose_bone_item.position_mm.x() = 3;
   ASSERT_TRUE(room.set_item(surgeon, moved));
   EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 3);
-  EXPECT_FALSE(room.items()[0].seated) << "without pins, whatever it says of itself";
+  EXPECT_FALSE(room.items()[0].seated) << "the item has no pins, so its own claim does not count";
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_EQ(room.items()[0].pose_bone_item.position_mm.x(), 1);
   EXPECT_EQ(room.lease_epoch(surgeon), 1u) << "no bone came back";
@@ -376,7 +377,7 @@ TEST(RoomScene, KeepsWhatWasSetAndTakesItBack) {
   const auto second = room.set_item(surgeon, guide);
   EXPECT_EQ(second->item, 2u);
   ASSERT_TRUE(room.remove_item(surgeon, 1));
-  EXPECT_FALSE(room.remove_item(surgeon, 1)) << "it stands no more";
+  EXPECT_FALSE(room.remove_item(surgeon, 1)) << "it was removed already";
   ASSERT_EQ(room.items().size(), 1u);
   EXPECT_EQ(room.items()[0].id, 2u);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
@@ -405,20 +406,20 @@ TEST(RoomScene, PinsFixAGuideUntilOneIsDrawn) {
     ASSERT_TRUE(set) << set.error().message;
     pins.push_back(set->item);
   }
-  EXPECT_TRUE(room.items()[0].seated) << "by the pins that came after it";
+  EXPECT_TRUE(room.items()[0].seated) << "the pins came after the guide and fix it";
   SceneItem moved = room.items()[0];
   moved.pose_bone_item.position_mm.x() += 2.0;
   const RoomSeq before = room.room_seq();
   const auto refused = room.set_item(surgeon, moved);
   ASSERT_FALSE(refused);
   EXPECT_NE(refused.error().message.find("pin"), std::string::npos) << refused.error().message;
-  EXPECT_FALSE(room.remove_item(surgeon, id)) << "nor is it taken off";
-  EXPECT_EQ(room.room_seq(), before) << "what is refused has no place in the order";
+  EXPECT_FALSE(room.remove_item(surgeon, id)) << "a fixed guide cannot be removed either";
+  EXPECT_EQ(room.room_seq(), before) << "a refused event gets no sequence number";
   ASSERT_TRUE(room.remove_item(surgeon, pins[0]));
   EXPECT_FALSE(room.items()[0].seated);
   ASSERT_TRUE(room.set_item(surgeon, moved));
   ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
-  EXPECT_TRUE(room.items()[0].seated) << "with the pin that is back";
+  EXPECT_TRUE(room.items()[0].seated) << "the pin is back";
 }
 
 TEST(RoomScene, AScrewGoesByItsThread) {
@@ -431,14 +432,14 @@ TEST(RoomScene, AScrewGoesByItsThread) {
   screw.id = room.set_item(surgeon, screw)->item;
   SceneItem deeper = screw;
   deeper.turns = 3;
-  EXPECT_FALSE(room.set_item(surgeon, deeper)) << "turned on the spot";
+  EXPECT_FALSE(room.set_item(surgeon, deeper)) << "it was turned without moving along its axis";
   deeper.pose_bone_item.position_mm.z() -= 3 * tool.thread_pitch_mm;
   EXPECT_TRUE(room.set_item(surgeon, deeper));
   deeper.pose_bone_item.position_mm.x() += 1.0;
-  EXPECT_FALSE(room.set_item(surgeon, deeper)) << "out of its hole";
+  EXPECT_FALSE(room.set_item(surgeon, deeper)) << "it was moved out of its hole";
 }
 
-// A cup of 50 mm on the flat of the block touches it at its pole only.
+// A cup of 50 mm touches the flat face of the block only at its pole.
 TEST(RoomScene, ATrialImplantIsSeatedWhereItFits) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
@@ -465,7 +466,7 @@ TEST(RoomScene, RefusesItemsThatCannotStandHere) {
   EXPECT_TRUE(refused([](SceneItem& i) { i.id = 4; }));
   EXPECT_TRUE(refused([](SceneItem& i) { i.pose_bone_item.position_mm.x() = 900; }));
   EXPECT_FALSE(room.set_item(AuthorId{9}, item));
-  EXPECT_EQ(room.room_seq().value, 1u) << "nobody but a surgeon who came";
+  EXPECT_EQ(room.room_seq().value, 1u) << "only the join of the surgeon";
 }
 
 TEST(RoomScene, AnItemGoesWithItsBody) {
@@ -499,15 +500,15 @@ TEST(RoomTools, AToolIsAddedOnceAndCutsFromThenOn) {
   cut.lease_epoch = room.lease_epoch(surgeon);
   commit(room, cut);
 
-  EXPECT_EQ(room.add_tool(surgeon, burr)->room_seq, RoomSeq{}) << "known, so no event";
+  EXPECT_EQ(room.add_tool(surgeon, burr)->room_seq, RoomSeq{}) << "the tool is known, so there is no event";
   EXPECT_EQ(room.add_tool(surgeon, tool_named("drill-3.2"))->room_seq, RoomSeq{});
   burr.diameter_mm = burr.cutting_length_mm = 4.4;
-  EXPECT_EQ(room.add_tool(surgeon, burr).error().code, ErrorCode::exists) << "another tool of that name";
+  EXPECT_EQ(room.add_tool(surgeon, burr).error().code, ErrorCode::exists) << "another tool has that name";
   EXPECT_FALSE(room.add_tool(AuthorId{9}, burr));
   EXPECT_EQ(room.room_seq().value, 4u);
 }
 
-// A prediction that an undo overtakes falls, and the replica is the room's when all is heard.
+// An undo that arrives first drops the prediction. The replica equals the room once everything is received.
 TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   Room room(test_block());
   const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon);
@@ -516,7 +517,7 @@ TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   for (int i = 0; i < 2; ++i) replica.add_own(cuts[static_cast<std::size_t>(i)]);
   for (int i = 0; i < 2; ++i)
     replica.commit(commit(room, cuts[static_cast<std::size_t>(i)]), cuts[static_cast<std::size_t>(i)], true);
-  replica.add_own(cuts[2]);  // on its way when the other hand undoes
+  replica.add_own(cuts[2]);  // This cut is under way when the other author undoes.
   const auto undo = room.undo_last(b, 1, {});
   ASSERT_TRUE(undo);
   replica.add_own(cuts[3]);
@@ -524,7 +525,7 @@ TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   EXPECT_EQ(room.submit(cuts[3])->rejection, Rejection::lease);
   hear(replica, *undo);
   EXPECT_EQ(replica.unconfirmed(), 0u);
-  EXPECT_FALSE(replica.reject(RoomSeq{6}, 3)) << "it has fallen already";
+  EXPECT_FALSE(replica.reject(RoomSeq{6}, 3)) << "it was dropped already";
   EXPECT_FALSE(replica.reject(RoomSeq{7}, 4));
   replica.settle();
   EXPECT_EQ(replica.hash(), room.field_hash());
@@ -532,8 +533,8 @@ TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   EXPECT_EQ(replica.room_seq(), room.room_seq());
 }
 
-// A split that others caused while own cuts are pending: they reach the piece as well.
-TEST(RoomReplica, PredictsInPiecesThatItHearsOfLate) {
+// Another author splits the bone while own cuts are pending. The pending cuts reach the new body as well.
+TEST(RoomReplica, PredictsInPiecesThatItReceivesLate) {
   Room room(test_block());
   const AuthorId a = room.join(MemberKind::surgeon);
   const auto cuts = strokes(a, 12, 41);
@@ -551,7 +552,8 @@ TEST(RoomReplica, PredictsInPiecesThatItHearsOfLate) {
   EXPECT_EQ(predicted, room.field_hash()) << "the prediction was right";
 }
 
-// Any mixture of events by two hands: who was there from the start and who joins on the way have the room's bone.
+// Any mixture of events by two authors. Replicas that joined at the start and replicas that joined later equal the
+// room's bone.
 TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     SCOPED_TRACE(seed);
@@ -598,11 +600,11 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
       }
     }
     for (const Replica& holder : holders) EXPECT_EQ(holder.hash(), room.field_hash());
-    // With every undo redone or not, what stands is what the remaining cuts leave where nothing was parted.
+    // Whether or not every undo is redone, the bone is what the remaining cuts leave where nothing was split.
     while (room.undo_last(hands[0], 50, {})) {
     }
     if (room.bodies() == std::vector<BodyId>{BodyId{0}} && room.field_hash() != Room(test_block()).field_hash())
-      ADD_FAILURE() << "an undone room is not the imported bone";
+      ADD_FAILURE() << "the bone after an undo of everything is not the imported bone";
   }
 }
 
@@ -613,9 +615,9 @@ std::vector<FieldLeaf> leaves_of(const Room& room) {
   return leaves;
 }
 
-// Whatever was missed while the line was down, a client that comes back has the room's bone, with its own undecided
-// cuts on top, and nothing changes under the tool where nothing has.
-TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
+// A client that reconnects has the room's bone with its own undecided cuts on top, whatever it missed. Under the tool
+// nothing changes unless the bone did.
+TEST(RoomReplica, IsRenewedAfterTheConnectionWasDown) {
   for (unsigned seed = 1; seed <= 24; ++seed) {
     SCOPED_TRACE(seed);
     std::mt19937 random(seed);
@@ -629,7 +631,7 @@ TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
       replica.commit(commit(room, cuts[next]), cuts[next], true);
       ++next;
     }
-    // The line is down: own cuts go on, some of them reach the room, and others work.
+    // The connection is down. Own cuts go on, some of them reach the room, and others work.
     const std::size_t reached = random() % 5;
     for (std::size_t i = 0; i < 6; ++i) replica.add_own(cuts[next + i]);
     for (std::size_t i = 0; i < reached; ++i) commit(room, cuts[next + i]);
@@ -644,10 +646,10 @@ TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
     const std::vector<FieldLeaf> now = leaves_of(room);
     replica.renew(room.room_seq(), room.bodies(), now, room.decided(own));
     replica.lease(room.lease_epoch(own));
-    // What was decided since comes in the same turn, or in a later one.
+    // The decisions since then arrive in the same turn or in a later one.
     const bool same_turn = random() % 2;
     if (!same_turn) replica.settle();
-    // What was not decided falls with an undo, and is there without one.
+    // An undo drops the undecided cuts. Without an undo they stay.
     const std::size_t pending = undoes ? 0 : 6 - reached;
     EXPECT_EQ(replica.unconfirmed(), pending);
     if (pending == 0 && !same_turn) {
@@ -658,7 +660,7 @@ TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
     replica.settle();
     EXPECT_EQ(replica.hash(), room.field_hash());
     EXPECT_EQ(replica.room_seq(), room.room_seq());
-    // Once more, when nothing has happened meanwhile.
+    // Once more, with no events in between.
     (void)replica.take_changes();
     replica.renew(room.room_seq(), room.bodies(), leaves_of(room), room.decided(own));
     replica.settle();
@@ -667,8 +669,8 @@ TEST(RoomReplica, IsRenewedAfterTheLineWasDown) {
   }
 }
 
-// As where a client gives up: what it says of the bone then is the room's word and nothing else.
-TEST(RoomReplica, IsTheRoomsOnceWhatIsUnconfirmedIsDropped) {
+// As when a client gives up: its replica is then only what the room has decided.
+TEST(RoomReplica, EqualsTheRoomOnceWhatIsUnacknowledgedIsDropped) {
   Room room(test_block());
   const AuthorId own = room.join(MemberKind::surgeon);
   const auto cuts = strokes(own, 12, 43);
@@ -713,7 +715,8 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   EXPECT_EQ(resumed->field_hash(), room.field_hash());
   EXPECT_EQ(resumed->room_seq(), room.room_seq());
   const AuthorId again = resumed->join(MemberKind::surgeon);
-  EXPECT_EQ(resumed->undo_last(again, 1, {}).error().code, ErrorCode::unavailable) << "what came before stays";
+  EXPECT_EQ(resumed->undo_last(again, 1, {}).error().code, ErrorCode::unavailable)
+      << "events from before cannot be undone";
   for (int i = 3; i < 6; ++i) {
     Cut cut = cuts[static_cast<std::size_t>(i)];
     commit(room, cut);
@@ -724,10 +727,10 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   EXPECT_EQ(resumed->field_hash(), room.field_hash());
   ASSERT_TRUE(room.undo_last(surgeon, 2, {}));
   ASSERT_TRUE(resumed->undo_last(again, 2, {}));
-  EXPECT_EQ(resumed->field_hash(), room.field_hash()) << "undo rebuilds on top of what was loaded";
+  EXPECT_EQ(resumed->field_hash(), room.field_hash()) << "an undo rebuilds from the loaded field";
   EXPECT_EQ(resumed->items(), saved.items);
   pin.id = 0;
-  EXPECT_EQ(resumed->set_item(again, pin)->item, 8u) << "numbers are not given twice";
+  EXPECT_EQ(resumed->set_item(again, pin)->item, 8u) << "item numbers are not used twice";
   EXPECT_NE(resumed->tools()->find(tool.hash()), nullptr);
   ASSERT_TRUE(resumed->remove_item(again, 7));
   ASSERT_TRUE(resumed->undo_last(again, 1, {}));
@@ -739,7 +742,7 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::unsupported);
   other = saved;
   other.tools.clear();
-  EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::invalid_input) << "a pin of no tool";
+  EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::invalid_input) << "the pin names no known tool";
   other = saved;
   other.tools[0].name = "pin-1";
   EXPECT_EQ(Room::resume(test_block(), other).error().code, ErrorCode::exists);

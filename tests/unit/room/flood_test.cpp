@@ -1,5 +1,5 @@
-// Cuts that come in datagrams wait for the room as those of the stream do, and as few: a client that waits for nothing
-// fills no memory.
+// Cuts from datagrams wait for the room as those from the stream do, with the same limit. A client that does not wait
+// for the room cannot fill the server's memory.
 #include <gtest/gtest.h>
 
 #include <future>
@@ -18,15 +18,15 @@ namespace {
 using namespace std::chrono_literals;
 using namespace test;
 
-constexpr std::size_t kWindow = 1024;      // cuts that a haptic client sends and has not heard of, at most
-constexpr std::size_t kOfTheStream = 256;  // that are read from a stream before any is decided
+constexpr std::size_t kWindow = 1024;      // largest number of unacknowledged cuts of a haptic client
+constexpr std::size_t kOfTheStream = 256;  // largest number of undecided cuts read from a stream
 
 SealKey key_in(const std::string& bytes) {
   return key_of({reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()}).value();
 }
 
-// A room that decides when it is told to, as slowly as one on a bad disk; and one session, with no other rule than the
-// wire's.
+// A room that decides only when the test says so, as slowly as one on a bad disk. It has one session, with no rules
+// other than those of the wire.
 class FloodTest : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -45,7 +45,7 @@ class FloodTest : public ::testing::Test {
   void TearDown() override {
     context_.TryCancel();
     if (reader_.joinable()) reader_.join();
-    tick();  // what waits holds the room
+    tick();  // The room holds the cuts that wait.
     (*server_->rooms().find(""))->runtime().stop();
     server_.reset();
   }
@@ -53,7 +53,7 @@ class FloodTest : public ::testing::Test {
   void tick() { (*server_->rooms().find(""))->runtime().tick(now_ += 8ms); }
   std::size_t queued() { return server_->health().queued_cuts; }
 
-  // Says `cuts` in datagrams, as fast as they go, and goes on with the path until it holds.
+  // Sends `cuts` in datagrams as fast as possible, and runs the datagram path until `holds` is true.
   bool send(std::span<const Cut> cuts, const std::function<bool()>& holds) {
     const auto begin = std::chrono::steady_clock::now();
     DatagramBuffer buffer;
@@ -88,7 +88,7 @@ class FloodTest : public ::testing::Test {
     while (stream_->Read(&said) && !said.has_complete()) {
       if (said.has_link()) {
         const v1::LinkOffer& offer = said.link();
-        wire::LinkOptions hasty;  // it sends what it has, whatever the room says
+        wire::LinkOptions hasty;  // It sends what it has, whatever the room acknowledges.
         hasty.rate.interval = hasty.rate.fresh_interval = 100us;
         hasty.rate.bytes_per_s = 1e9;
         hasty.rate.burst_bytes = 1 << 20;
@@ -136,11 +136,11 @@ TEST_F(FloodTest, AWindowOfCutsWaitsForASlowRoom) {
   ASSERT_FALSE(is_over()) << end().error_message();
   tick();
   EXPECT_TRUE(send({}, [&] { return link().acknowledged() == kWindow; }))
-      << "each has its answer: " << link().acknowledged();
+      << "each cut was acknowledged: " << link().acknowledged();
   EXPECT_FALSE(is_over());
 }
 
-TEST_F(FloodTest, WhoDoesNotWaitForTheRoomIsToldSoAndEnded) {
+TEST_F(FloodTest, AClientThatDoesNotWaitForTheRoomIsSentTheReasonAndEnded) {
   const std::vector<Cut> cuts = strokes(author(), 4 * static_cast<int>(kWindow), 1);
   std::size_t most = 0;
   EXPECT_TRUE(send(cuts,
@@ -149,13 +149,13 @@ TEST_F(FloodTest, WhoDoesNotWaitForTheRoomIsToldSoAndEnded) {
                      return is_over();
                    }))
       << most << " cuts wait";
-  EXPECT_GE(most, kWindow) << "which nobody is refused";
+  EXPECT_GE(most, kWindow) << "so many may wait without a refusal";
   EXPECT_LE(most, kWindow + kOfTheStream);
   if (!is_over()) return;
   const grpc::Status why = end();
   EXPECT_EQ(why.error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED) << why.error_message();
   EXPECT_NE(why.error_message().find("cuts of this session wait"), std::string::npos) << why.error_message();
-  tick();  // what was queued is decided
+  tick();  // The queued cuts are decided.
   EXPECT_EQ(queued(), 0u);
 }
 

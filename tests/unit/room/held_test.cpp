@@ -1,5 +1,5 @@
-// What holds for a person: wherever their hand comes back, in all that they do beside cutting, and told to whoever is
-// there.
+// The restrictions of a person. They hold when the person joins again, for everything beside cutting, and everybody in
+// the room is sent them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -28,7 +28,7 @@ using test::tool_named;
 constexpr std::uint32_t kAda = 1, kBen = 2, kCy = 3;
 const Digest kSecret{{7}};
 
-// An instructor's console, a trainee with a hand and a viewer, a collaborator with a hand.
+// An instructor's console, a trainee with a haptic client and a viewer, and a collaborator with a haptic client.
 struct Held {
   Held() : room(test_block()) {
     ada = room.join(MemberKind::watcher, kAda, kSecret, Role::instructor);
@@ -68,15 +68,15 @@ TEST(CarriedOver, AHandThatJoinsAnewIsHeldAsItWas) {
   all.decide(all.ben, word);
   const RoomSeq before = all.room.room_seq();
   const AuthorId again = all.again(kBen, Role::trainee);
-  EXPECT_EQ(all.room.room_seq().value, before.value + 2) << "the join, and what holds";
+  EXPECT_EQ(all.room.room_seq().value, before.value + 2) << "one entry for the join, one for the restrictions";
   EXPECT_EQ(all.room.people().supervised(again).supervision, word);
-  EXPECT_EQ(all.room.people().supervised(again).by, all.ada) << "it is hers all the same";
+  EXPECT_EQ(all.room.people().supervised(again).by, all.ada) << "the instructor's decision still holds";
   EXPECT_EQ(all.cut(again).rejection, Rejection::frozen);
-  // Another role is no way out; nor is a third start.
+  // Neither another role nor a third start lifts the restrictions.
   const AuthorId third = all.again(kBen, Role::collaborator);
   EXPECT_EQ(all.cut(third).rejection, Rejection::frozen);
   all.decide(third, {});
-  EXPECT_TRUE(all.cut(all.again(kBen, Role::trainee)).committed()) << "what counts is the newest hand";
+  EXPECT_TRUE(all.cut(all.again(kBen, Role::trainee)).committed()) << "the newest join of the person decides";
 }
 
 TEST(CarriedOver, OnlyToTheSamePersonsHand) {
@@ -85,27 +85,27 @@ TEST(CarriedOver, OnlyToTheSamePersonsHand) {
   const RoomSeq before = all.room.room_seq();
   (void)all.room.join(MemberKind::watcher, kBen, kSecret, Role::trainee);
   EXPECT_TRUE(all.cut(all.again(kCy, Role::collaborator)).committed());
-  EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed()) << "nobody knows who that is";
-  // A hand of the server itself, which shows something, is nobody's that comes back.
+  EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed()) << "a person without a name is unknown";
+  // An author of the server itself, which shows something, is not a person who comes back.
   EXPECT_EQ(all.room.people().supervised(all.room.join(MemberKind::surgeon, kBen, {}, Role::collaborator)).seq,
             RoomSeq{});
   EXPECT_EQ(all.room.room_seq().value, before.value + 6) << "four joins, two cuts and nothing else";
-  // Nor do those whom nobody knows hold each other.
+  // Unknown persons do not restrict each other either.
   all.decide(all.again(0, Role::trainee), {.stopped = true});
   EXPECT_TRUE(all.cut(all.again(0, Role::trainee)).committed());
 }
 
-// The program was started again while the word was on its way.
-TEST(CarriedOver, AWordAboutAnOlderHandHoldsForTheNewestToo) {
+// The haptic client was restarted while the decision was under way.
+TEST(CarriedOver, ADecisionAboutAnOlderJoinHoldsForTheNewestToo) {
   Held all;
   const AuthorId again = all.again(kBen, Role::trainee);
   all.decide(all.ben, {.stopped = true});
   EXPECT_EQ(all.cut(again).rejection, Rejection::frozen);
-  // But not where something else was decided about the newer.
+  // But not if something else was decided about the newer join.
   all.decide(again, {.force_limit = 100});
   all.decide(all.ben, {});
   EXPECT_EQ(all.room.people().supervised(again).supervision, (Restrictions{.force_limit = 100}));
-  // Without roles anybody may be called the same: only who is named is meant.
+  // Without roles, several people may have one name. Then only the author that was named is meant.
   Room plain(test_block());
   const AuthorId one = plain.join(MemberKind::surgeon, kBen, kSecret),
                  other = plain.join(MemberKind::surgeon, kBen, kSecret);
@@ -113,7 +113,7 @@ TEST(CarriedOver, AWordAboutAnOlderHandHoldsForTheNewestToo) {
   EXPECT_TRUE(plain.people().supervised(other).supervision.may_cut());
 }
 
-TEST(CarriedOver, ItsRowsReplay) {
+TEST(CarriedOver, ItsLogEntriesReplay) {
   Held all;
   all.decide(all.ben, {.stopped = true, .zone = ZoneLimit{{1, 2, 3}, 4}});
   (void)all.again(kBen, Role::trainee);
@@ -127,7 +127,7 @@ TEST(CarriedOver, ItsRowsReplay) {
   EXPECT_EQ(replayed.room_hash(), all.room.room_hash());
 }
 
-// A journal of a server that did not carry anything over: its entries decide.
+// The journal of a server that did not carry restrictions over: its entries decide.
 TEST(CarriedOver, NothingInAReplay) {
   Held all;
   all.decide(all.ben, {.stopped = true});
@@ -148,7 +148,7 @@ SceneItem guide() {
   return item;
 }
 
-// All but cutting: from the hand, and from the person's viewer.
+// Everything but cutting is refused, from the haptic client and from the person's viewer.
 TEST(Held, TakesNothingBackAndPlacesNothing) {
   for (const bool taken : {false, true}) {
     Held all;
@@ -172,17 +172,17 @@ TEST(Held, TakesNothingBackAndPlacesNothing) {
     }
     EXPECT_EQ(all.room.room_seq(), seq);
     EXPECT_EQ(all.room.field_hash(), bone);
-    EXPECT_TRUE(all.room.say(all.ben, {}, "why?")) << "to speak is no work on the bone";
+    EXPECT_TRUE(all.room.say(all.ben, {}, "why?")) << "speaking is no work on the bone";
     all.decide(all.ben, {});
     EXPECT_TRUE(all.room.redo_last(all.ben, 1));
     EXPECT_TRUE(all.room.remove_item(all.ben, placed->item));
   }
 }
 
-// It took back what the instructor has then forbidden; and it does again what somebody else took back.
+// The redo would repeat what the instructor has forbidden since. It may be the person's own undo or somebody else's.
 TEST(Held, DoesNothingAgainThatItMayNotCut) {
   Held all;
-  ASSERT_TRUE(all.cut(all.ben).committed());  // the burr's
+  ASSERT_TRUE(all.cut(all.ben).committed());  // The burr's cut.
   const RoomSeq drilled = all.cut(all.ben).room_seq;
   ASSERT_TRUE(all.room.undo_last(all.ben, 1, {}));
   const Digest bone = all.room.field_hash();
@@ -191,7 +191,7 @@ TEST(Held, DoesNothingAgainThatItMayNotCut) {
   ASSERT_EQ(all.refused(denied), ErrorCode::denied);
   EXPECT_NE(denied.error().message.find("event " + std::to_string(drilled.value)), std::string::npos)
       << denied.error().message;
-  EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "nor does a friend, for it";
+  EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "a friend cannot redo it for them either";
   EXPECT_EQ(all.room.field_hash(), bone);
   all.decide(all.ben, {.tools = {tool_named("drill-3.2").hash()}});
   EXPECT_TRUE(all.room.redo_last(all.ben, 1));
@@ -199,17 +199,18 @@ TEST(Held, DoesNothingAgainThatItMayNotCut) {
   ASSERT_TRUE(all.room.undo_last(all.cy, 1, {}));
   const auto at = all.cuts.at(all.ben)[1].path.front().position;
   all.decide(all.cy, {.zone = ZoneLimit{at, 1}});
-  EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied) << "another's cut, out of its zone";
+  EXPECT_EQ(all.refused(all.room.redo_last(all.cy, 1)), ErrorCode::denied)
+      << "another author's cut is outside the person's zone";
   all.decide(all.cy, {.zone = ZoneLimit{at, 1 << 20}});
   EXPECT_TRUE(all.room.redo_last(all.cy, 1));
 
-  // Who supervises them does again what they like.
+  // Whoever supervises them may redo anything.
   ASSERT_TRUE(all.room.undo_last(all.ada, 2, {}));
   all.decide(all.ben, {.stopped = true});
   EXPECT_TRUE(all.room.redo_last(all.ada, 1));
 }
 
-// Such a cut is in no body's history.
+// Such a cut is in the history of no body.
 TEST(Held, ACutThatMetNoBoneIsJudgedToo) {
   Held all;
   for (Cut& cut : all.cuts.at(all.ben))
@@ -221,7 +222,8 @@ TEST(Held, ACutThatMetNoBoneIsJudgedToo) {
   EXPECT_EQ(all.refused(all.room.redo_last(all.ben, 1)), ErrorCode::denied);
 }
 
-// No hand has a command for it: they take back at their viewer what their hand did, also before it came again.
+// A haptic client has no command for an undo. A person undoes at their viewer what their haptic client did, also before
+// it was restarted.
 TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
   Held all;
   const RoomSeq own = all.cut(all.ben).room_seq, others = all.cut(all.cy).room_seq;
@@ -231,17 +233,17 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
   for (const AuthorId by : {all.viewer, again}) {
     const auto undone = all.room.undo_last(by, 1, {});
     ASSERT_TRUE(undone) << undone.error().message;
-    EXPECT_EQ(undone->seqs, std::vector{own}) << "the newest of all is another's";
-    ASSERT_TRUE(all.room.redo_last(all.viewer, 1)) << "whoever of them took it back";
+    EXPECT_EQ(undone->seqs, std::vector{own}) << "the newest cut of all is another person's";
+    ASSERT_TRUE(all.room.redo_last(all.viewer, 1)) << "any program of the person may redo it";
     ASSERT_TRUE(all.room.undo(by, named));
     ASSERT_TRUE(all.room.redo_last(all.ben, 1));
   }
   ASSERT_TRUE(all.cut(again).committed());
   const auto older = all.room.undo_last(all.cy, 1, all.ben);
   ASSERT_TRUE(older) << older.error().message;
-  EXPECT_EQ(older->seqs, std::vector{own}) << "of that author alone";
-  EXPECT_EQ(all.refused(all.room.redo_last(all.viewer, 1)), ErrorCode::denied) << "another's undo";
-  // Whom nobody knows has only their own number.
+  EXPECT_EQ(older->seqs, std::vector{own}) << "the undo is of that author only";
+  EXPECT_EQ(all.refused(all.room.redo_last(all.viewer, 1)), ErrorCode::denied) << "another person made that undo";
+  // An author without a name may undo only what has its own number.
   const AuthorId nobody = all.again(0, Role::trainee),
                  stranger = all.room.join(MemberKind::watcher, 0, kSecret, Role::trainee);
   const RoomSeq cut[] = {all.cut(nobody).room_seq};
@@ -249,7 +251,7 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
   EXPECT_TRUE(all.room.undo(nobody, cut));
 }
 
-// Keeps the places that a session is told.
+// Keeps the sequence numbers that a session is sent.
 class Placed final : public SessionSubscriber {
  public:
   explicit Placed(AuthorId author) : author_(author) {}
@@ -292,7 +294,7 @@ struct HeldRuntime {
   std::shared_ptr<Placed> session(AuthorId author) {
     auto subscriber = std::make_shared<Placed>(author);
     EXPECT_TRUE(runtime.open_session(subscriber, kSecret));
-    subscribers.push_back(subscriber);  // the runtime's until it goes
+    subscribers.push_back(subscriber);  // The runtime uses it until it leaves.
     return subscriber;
   }
   RoomRuntime& runtime;
@@ -312,18 +314,18 @@ void expect_held(HeldRuntime& lesson) {
   const AuthorId again = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
   EXPECT_EQ(lesson.session(again)->held, word);
   EXPECT_EQ(lesson.session(lesson.join(MemberKind::surgeon, "Dora", Role::trainee))->held, std::nullopt);
-  // Who is there misses no place of the order.
+  // The session receives every sequence number.
   ASSERT_FALSE(session->seqs.empty());
   EXPECT_EQ(session->seqs.back(), lesson.runtime.room_seq().value);
   for (std::size_t i = 1; i < session->seqs.size(); ++i) EXPECT_EQ(session->seqs[i], session->seqs[i - 1] + 1);
-  // And the board of people shows it.
+  // The presence shows the restrictions.
   PresenceCursor cursor;
   v1::WatchPeopleResponse news;
   ASSERT_TRUE(news.ParseFromString(*lesson.runtime.people().news(cursor, ada, {})));
   const auto person = std::ranges::find(news.people(), again.value, &v1::Person::author);
   ASSERT_NE(person, news.people().end());
   EXPECT_TRUE(person->supervision().stopped());
-  // A word that was on its way while its hand was started again.
+  // A decision that was under way while the haptic client was restarted.
   const AuthorId third = lesson.join(MemberKind::surgeon, "Ben", Role::trainee);
   const auto own = lesson.session(third);
   lesson.supervise(ada, again, {});
@@ -332,14 +334,14 @@ void expect_held(HeldRuntime& lesson) {
   EXPECT_EQ(session->seqs.back(), lesson.runtime.room_seq().value);
 }
 
-TEST(CarriedOver, IsToldByAHostThatKeepsNothing) {
+TEST(CarriedOver, IsSentByARuntimeWithoutAJournal) {
   RoomRuntime runtime(Room(test_block()), kDriven, {});
   HeldRuntime lesson(runtime);
   expect_held(lesson);
   runtime.stop();
 }
 
-TEST(CarriedOver, IsToldByAHostWithAJournal) {
+TEST(CarriedOver, IsSentByARuntimeWithAJournal) {
   const test::TempDir folder;
   PersistedRoom kept = RoomStore::open(folder / "room.journal", test_block(), RoomStore::Options{}).value();
   RoomRuntime runtime(std::move(kept.room), kDriven, {}, Detail::automatic, kept.store.get());

@@ -1,5 +1,5 @@
-// The runtime's threads with subscribers in place of streams: free of gRPC, so that the thread sanitizer can look at
-// them.
+// The threads of the room runtime, with subscribers in place of streams. There is no gRPC in it, so that the thread
+// sanitizer can check it.
 #include "server/net/room_runtime.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::strokes;
 
-// Keeps a replica from what a session's stream would carry.
+// Maintains a replica from what the stream of a session would carry.
 class FakeSession final : public SessionSubscriber {
  public:
   FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}, tools_) {}
@@ -62,7 +62,7 @@ class FakeSession final : public SessionSubscriber {
       if (response.has_change()) take(response.change());
       if (response.has_scene()) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
       if (!response.has_committed()) continue;
-      EXPECT_GT(response.committed().room_seq(), seq_.value) << "every entry once and in order";
+      EXPECT_GT(response.committed().room_seq(), seq_.value) << "every entry arrives once and in order";
       replica_.commit(RoomSeq{response.committed().room_seq()}, wire::from_wire(response.committed().cut()).value(),
                       false);
       seq_ = RoomSeq{response.committed().room_seq()};
@@ -114,9 +114,10 @@ class FakeMesh final : public MeshSubscriber {
   std::map<BlockKey, std::string> hashes_;
 };
 
-TEST(RoomRuntime, EverySinkEndsWithTheRoomsBoneAndSurface) {
+TEST(RoomRuntime, EverySubscriberEndsWithTheRoomsBoneAndSurface) {
   const Case bone = test::test_block();
-  // Every event is a cut: random strokes now and then leave a crumb, which would be an event too.
+  // Every event shall be a cut. Random strokes can separate debris, which would be an event too, so the detection is
+  // off.
   RoomRuntime runtime(Room(bone), {.tick = 1ms, .mesh = 3ms, .pieces = 0ns}, {});
   std::vector<std::shared_ptr<FakeSession>> sessions;
   for (int i = 0; i < 3; ++i) {
@@ -129,7 +130,7 @@ TEST(RoomRuntime, EverySinkEndsWithTheRoomsBoneAndSurface) {
   FakeMesh early;
   runtime.watch_mesh(early);
 
-  // Two hands cut at once while others come and go.
+  // Two authors cut at the same time while others join and leave.
   constexpr int kCuts = 60;
   std::vector<std::thread> hands;
   for (unsigned who = 0; who < 2; ++who)
@@ -158,7 +159,7 @@ TEST(RoomRuntime, EverySinkEndsWithTheRoomsBoneAndSurface) {
   EXPECT_EQ(early.hashes(), after.hashes());
   const BoneStatus status = runtime.bone_status();
   EXPECT_EQ(status.counts.committed, 2u * kCuts);
-  EXPECT_EQ(status.room_seq.value, 2u * kCuts + 3 + 5) << "each who came has a place too";
+  EXPECT_EQ(status.room_seq.value, 2u * kCuts + 3 + 5) << "each join has a sequence number too";
   for (unsigned who = 0; who < 2; ++who) EXPECT_EQ(sessions[who]->decided_cuts(), kCuts);
   for (const auto& list : {sessions, late})
     for (const auto& session : list) {
@@ -176,8 +177,8 @@ TEST(RoomRuntime, EverySinkEndsWithTheRoomsBoneAndSurface) {
   runtime.leave(after);
 }
 
-// Leaves are copied while the room goes on cutting, so some are newer than others. What is said of a place of the order
-// must be true of it all the same.
+// The leaves are copied while the room goes on cutting, so some are newer than others. What a session is sent about a
+// sequence number must still be true of it.
 TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
   const Case bone = test::test_block();
   RoomRuntime runtime(Room(bone), {.tick = 200us, .mesh = 50ms, .pieces = 0ns}, {});
@@ -185,7 +186,7 @@ TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
   ASSERT_TRUE(runtime.open_session(hand));
   constexpr std::uint64_t kCuts = 60;
   std::vector<Cut> cuts = strokes(hand->author(), static_cast<int>(kCuts), 21);
-  for (Cut& cut : cuts) cut.level = 1;  // cheaper, and several batches of leaves all the same
+  for (Cut& cut : cuts) cut.level = 1;  // Cheaper to compute, and still several batches of leaves.
   std::thread cutting([&] {
     for (const Cut& cut : cuts) {
       runtime.queue_cut(hand, cut, RoomRuntime::Clock::now());

@@ -24,7 +24,7 @@ TEST(JobThread, RunsJobsInTheirOrderOnAThreadOfItsOwn) {
   EXPECT_NE(where, std::this_thread::get_id());
 }
 
-// Somebody waits for what it answers.
+// Somebody waits for the result of this job.
 TEST(JobThread, RunsWhatComesAfterItsEndWithinTheCall) {
   JobThread jobs;
   jobs.start();

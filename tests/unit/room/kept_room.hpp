@@ -1,4 +1,4 @@
-// A room that is kept in a journal, cut by one hand: for the tests of its maintenance.
+// A persisted room that one author cuts, for the tests of its maintenance.
 #pragma once
 #include <gtest/gtest.h>
 
@@ -16,7 +16,7 @@
 namespace osteon::test {
 
 struct KeptCuts {
-  // A new one, or, where there is a journal, that one gone on with.
+  // Opens the journal if there is one, and otherwise creates it.
   KeptCuts(const std::filesystem::path& file, Disk* disk, const std::string& name, unsigned seed = 1)
       : options{.name = name,
                 .limits = {},
@@ -37,7 +37,7 @@ struct KeptCuts {
     store = std::move(kept->store);
   }
 
-  // So many strokes, each with a mark after it; every fifth is taken back.
+  // Makes `count` strokes with a mark after each. Every fifth stroke is undone.
   void cut(int count) {
     for (int i = 0; i < count; ++i) {
       room->set_time(room->time() + std::chrono::milliseconds(8));
@@ -67,7 +67,7 @@ struct KeptCuts {
   std::vector<Cut> cuts;
 };
 
-// Rows that nobody has judged, of `bytes` each: what only a chain has to do with.
+// Log entries of `bytes` each that no room has checked. Only the chain examines them.
 inline std::vector<LogEntry> plain_entries(RoomSeq after, std::size_t count, std::size_t bytes = 20) {
   std::vector<LogEntry> entries;
   for (std::size_t i = 1; i <= count; ++i) {
@@ -79,7 +79,7 @@ inline std::vector<LogEntry> plain_entries(RoomSeq after, std::size_t count, std
   return entries;
 }
 
-// The room of these entries, through nothing but a replay.
+// The room that a replay of these entries makes.
 inline Room replay_of(const std::vector<LogEntry>& entries) {
   Room room(test_block());
   for (const LogEntry& entry : entries) {

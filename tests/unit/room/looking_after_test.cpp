@@ -1,4 +1,4 @@
-// What an operator asks a server: places to listen, certificates, refusals, health, figures, a drain.
+// What an operator asks a server about: addresses, certificates, refusals, health, metrics, a drain.
 #include <grpcpp/health_check_service_interface.h>
 #include <gtest/gtest.h>
 #include <openssl/evp.h>
@@ -56,10 +56,10 @@ TEST(RefusalCounts, CountsByReasonInBoundedMemory) {
   EXPECT_EQ(refusals.counts().at("ticket"), 3u);
   std::uint64_t all = 0;
   for (const auto& [reason, count] : refusals.counts()) all += count;
-  EXPECT_EQ(all, 1004u) << "none is forgotten";
+  EXPECT_EQ(all, 1004u) << "every refusal is counted";
 }
 
-// A self-signed certificate that ends so many seconds from now.
+// Writes a self-signed certificate that expires in `seconds`.
 void write_certificate(const std::filesystem::path& file, long seconds) {
   EVP_PKEY* key = EVP_EC_gen("P-256");
   X509* certificate = X509_new();
@@ -80,15 +80,15 @@ TEST(Certificate, SaysHowManyDaysAreLeft) {
     write_certificate(dir / "server.pem", static_cast<long>(days * 86400));
     const Result<double> left = certificate_days_left(dir / "server.pem");
     ASSERT_TRUE(left.has_value()) << left.error().message;
-    EXPECT_NEAR(*left, days, 0.01) << "a quarter of an hour for a slow machine";
+    EXPECT_NEAR(*left, days, 0.01) << "a quarter of an hour of tolerance for a slow machine";
   }
   EXPECT_EQ(certificate_days_left(dir / "nowhere.pem").error().code, ErrorCode::not_found);
   std::ofstream(dir / "text.pem") << "no certificate";
   EXPECT_EQ(certificate_days_left(dir / "text.pem").error().code, ErrorCode::invalid_input);
 }
 
-// What grpc.health.v1 would answer.
-class Told final : public grpc::HealthCheckServiceInterface {
+// Keeps what grpc.health.v1 would answer.
+class ReportedHealth final : public grpc::HealthCheckServiceInterface {
  public:
   void SetServingStatus(const std::string& name, bool serving) override { serving_[name] = serving; }
   void SetServingStatus(bool) override {}
@@ -101,20 +101,20 @@ class Told final : public grpc::HealthCheckServiceInterface {
   std::map<std::string, bool> serving_;
 };
 
-TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
+TEST(HealthWatch, ARoomServesUntilItIsClosedOrItsJournalFails) {
   TempDir dir;
   MemoryDisk disk{1};
   const std::filesystem::path file = "/rooms/femur.journal";
   KeptCuts kept(file, &disk, "femur");
   kept.keep();
-  disk.fail_sync_at(1, EIO, MemoryDisk::Lasting::from_then_on);  // the next thing that the room keeps
+  disk.fail_sync_at(1, EIO, MemoryDisk::Lasting::from_then_on);  // The next sync of the journal fails.
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   ASSERT_TRUE(rooms.create("tibia", nullptr));
-  Told told;
+  ReportedHealth told;
   {
     HealthWatch watch(rooms, told);
-    // Its own thread looks too; whatever it said last is so.
+    // The thread of the health watch checks too. Its last report is true at any time.
     const auto says = [&](const std::string& name, bool serving) {
       watch.look();
       return told.of(name) == serving;
@@ -132,7 +132,7 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrKeepsNothingAnyMore) {
   }
 }
 
-// A hand's stream, which hears why it ends.
+// The stream of a haptic client, which keeps the reason of its end.
 class Hand final : public SessionSubscriber {
  public:
   explicit Hand(AuthorId author) : author_(author) {}
@@ -159,7 +159,7 @@ class Hand final : public SessionSubscriber {
   std::string ended_;
 };
 
-// Of a journal that takes no entry nothing is known to be safe that is decided now, however it came to that.
+// If a journal takes no entry, no new decision is durable, whatever the cause.
 TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   TempDir dir;
   MemoryDisk disk{1};
@@ -174,13 +174,13 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   ASSERT_NE(at, std::string::npos);
   disk.flip_bit(file, 8 * at + 1);
   kept.open(file);
-  ASSERT_EQ(kept.store->head().seq.value, head.seq.value - 1) << "the rest can be looked at";
+  ASSERT_EQ(kept.store->head().seq.value, head.seq.value - 1) << "the other entries can be read";
   Rooms rooms(RoomsOptions{.cases = {{test_block(), dir / "case"}}});
   ASSERT_TRUE(rooms.add("femur", std::move(*kept.room), std::move(kept.store), {}, [](double) {}));
   RoomRuntime& host = (*rooms.find("femur"))->runtime();
   EXPECT_TRUE(host.stopped());
   EXPECT_FALSE(host.health().serving);
-  Told told;
+  ReportedHealth told;
   HealthWatch watch(rooms, told);
   watch.look();
   EXPECT_EQ(told.of("femur"), false);
@@ -196,7 +196,7 @@ TEST(HealthWatch, ARoomWhoseJournalIsDamagedIsOpenToNobody) {
   const auto again = rooms.resume("femur");
   ASSERT_FALSE(again);
   EXPECT_NE(again.error().message.find(file.string()), std::string::npos) << again.error().message;
-  // Who was in it before is told too, also where the session is opened before the first tick.
+  // An earlier session of the room is sent it too, also if it is opened before the first tick.
   const auto hand = std::make_shared<Hand>(kept.hand);
   (void)host.open_session(hand);
   EXPECT_TRUE(wait_until([&] { return hand->ended().starts_with("the room takes no more cuts"); }, kPatience))
@@ -216,7 +216,7 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   ASSERT_TRUE(host.open_session(hand));
   EXPECT_TRUE(host.health().serving);
   disk.fail_sync_at(1, EIO, MemoryDisk::Lasting::from_then_on);
-  ASSERT_FALSE(host.join(MemberKind::watcher, "Ada")) << "her name is kept before her place";
+  ASSERT_FALSE(host.join(MemberKind::watcher, "Ada")) << "her name is written before her join";
   EXPECT_TRUE(host.stopped());
   EXPECT_FALSE(host.health().serving);
   EXPECT_FALSE(rooms.list()[0].open);
@@ -225,8 +225,8 @@ TEST(HealthWatch, ARoomStopsWhenItsJournalIsClosedBesideACommit) {
   host.leave(*hand);
 }
 
-// As the server's maintenance asks it, every few seconds.
-TEST(Upkeep, AnIdleRoomsLogGoesIntoTheDatabase) {
+// As the server's maintenance asks for it, every few seconds.
+TEST(Maintenance, AnIdleRoomsLogGoesIntoTheDatabase) {
   TempDir dir;
   const std::filesystem::path file = dir / "femur.journal";
   KeptCuts kept(file, nullptr, "femur");
@@ -249,13 +249,13 @@ TEST_F(DrainTest, EveryHandLeavesWithWhatItSentDecidedAndNobodyComesIn) {
   std::vector<Cut> cuts = strokes(hand->author(), 400, 1);
   send(*hand, {cuts.begin(), cuts.begin() + 20});
   ASSERT_TRUE(wait_until([&] { return hand->own() == 20; }, kPatience));
-  send(*hand, {cuts.begin() + 20, cuts.end()});  // at work
+  send(*hand, {cuts.begin() + 20, cuts.end()});  // These are under way.
   int waits = 0;
   server_->drain(1h, [&](std::chrono::milliseconds time) {
     std::this_thread::sleep_for(time);
     return ++waits > 1000;
   });
-  EXPECT_LE(waits, 1000) << "the hand did not go by itself";
+  EXPECT_LE(waits, 1000) << "the haptic client did not leave by itself";
   EXPECT_EQ(server_->health().sessions, 0u);
   EXPECT_TRUE(wait_until([&] { return hand->interruptions() == 1; }, kPatience));
   const auto acknowledged = hand->acknowledged();

@@ -1,4 +1,4 @@
-// Members of a room as tests hold them: haptic clients with their replicas, and viewers without a window.
+// Members of a room for tests: haptic clients with their replicas, and viewers without a window.
 #pragma once
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ inline v1::GetStatusResponse status_of(const wire::JoinedRoom& room) {
   return response;
 }
 
-// A haptic client that keeps a replica, as osteon-haptic does.
+// A haptic client with a replica, as osteon-haptic has one.
 class Surgeon {
  public:
   Surgeon(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path = {},
@@ -67,7 +67,8 @@ class Surgeon {
                             for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own) {
                               const RoomSeq seq = room.seq_of(own).value_or(RoomSeq{});
                               if (!seq) continue;
-                              EXPECT_EQ(acknowledged_.emplace(own, seq).first->second, seq) << "another before";
+                              EXPECT_EQ(acknowledged_.emplace(own, seq).first->second, seq)
+                                  << "the cut had another sequence number before";
                             }
                           });
                         },
@@ -109,11 +110,11 @@ class Surgeon {
   bool complete() { return read(complete_); }
   RoomSeq seq() { return read(seq_); }
   std::uint64_t own() { return read(own_); }
-  // Called for every cut that comes, with a lock held.
+  // Called for every committed cut that is received, with a lock held.
   void on_cut(std::function<void(const Cut&)> heard) {
     on([&] { heard_ = std::move(heard); });
   }
-  // Of own cuts: their places in the order, as the room said them.
+  // The sequence numbers that the room gave the own cuts.
   std::map<std::uint64_t, RoomSeq> acknowledged() { return read(acknowledged_); }
   bool stands() { return read(complete_) && !read(interrupted_); }
   int interruptions() { return read(interruptions_); }
@@ -154,7 +155,7 @@ class Surgeon {
   std::string rejected_, lost_;
 };
 
-// Whether the room has come to rest, with all pieces found that came off, and every one of them is there.
+// Whether the room has come to rest, with all fragments found, and every replica is at its sequence number.
 inline bool settled(RoomRuntime& room, const std::vector<Surgeon*>& holders) {
   const RoomSeq before = room.room_seq();
   room.find_pieces();
@@ -162,7 +163,7 @@ inline bool settled(RoomRuntime& room, const std::vector<Surgeon*>& holders) {
          std::ranges::all_of(holders, [&](Surgeon* holder) { return holder->complete() && holder->seq() == before; });
 }
 
-// What a viewer holds of the surface.
+// The surface as a viewer has it.
 class MeshReader {
  public:
   explicit MeshReader(const std::string& address, const std::string& room = {})
@@ -175,7 +176,7 @@ class MeshReader {
     context_.TryCancel();
     status_ = stream_->Finish();
   }
-  // Reads until the surface contains this place of the order.
+  // Reads until the surface contains this sequence number.
   bool read_to(RoomSeq seq) {
     v1::WatchMeshResponse message;
     while ((!complete_ || seq_ < seq) && stream_->Read(&message)) {

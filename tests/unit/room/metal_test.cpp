@@ -1,4 +1,4 @@
-// A room on a bone with metal in it: no cut takes any of it away.
+// A room on a bone that contains metal: no cut removes any metal.
 #include <gtest/gtest.h>
 
 #include "server/room/room.hpp"
@@ -7,7 +7,7 @@
 namespace osteon {
 namespace {
 
-// A plate from 5 mm below the upper face on.
+// The block with a plate that begins 5 mm below the upper face.
 Case plate_block() {
   return test::marked_block(24.0, 12.0, test::kBlockPitch_mm,
                             [](const Vec3& p) { return p.z() <= -5.0 ? Tissue::metal : Tissue::none; });
@@ -27,24 +27,25 @@ struct MetalRoom {
 
 TEST(RoomMetal, RejectsWhatWouldTakeMetalAway) {
   MetalRoom all;
-  EXPECT_TRUE(all.cut({0, 0, 1}, {0, 0, -4}).committed()) << "the bone above it";
+  EXPECT_TRUE(all.cut({0, 0, 1}, {0, 0, -4}).committed()) << "the cut is in the bone above the plate";
   const Digest before = all.room.field_hash();
   const std::uint64_t lease = all.room.lease_epoch(all.hand);
   (void)all.room.take_stale_blocks();
 
   const Outcome into = all.cut({0, 0, -4}, {0, 0, -6});
   EXPECT_EQ(into.rejection, Rejection::metal) << sentence(into.rejection);
-  EXPECT_EQ(all.cut({-5, 0, -6}, {5, 0, -6}).rejection, Rejection::metal) << "sideways";
-  EXPECT_EQ(all.cut({3, 3, -7}, {3, 3, -7}, "drill-3.2").rejection, Rejection::metal) << "standing in it";
+  EXPECT_EQ(all.cut({-5, 0, -6}, {5, 0, -6}).rejection, Rejection::metal) << "the cut goes sideways through the plate";
+  EXPECT_EQ(all.cut({3, 3, -7}, {3, 3, -7}, "drill-3.2").rejection, Rejection::metal)
+      << "the drill stands in the plate";
   EXPECT_EQ(all.room.field_hash(), before);
   EXPECT_EQ(all.room.stale_blocks(), 0u);
   EXPECT_EQ(all.room.counts().rejected, 3u);
-  EXPECT_GT(all.room.lease_epoch(all.hand), lease) << "what was cut on the sight of it is void";
-  EXPECT_TRUE(all.cut({0, 0, -4}, {4, 0, -4.5}).committed()) << "beside it";
+  EXPECT_GT(all.room.lease_epoch(all.hand), lease) << "cuts predicted before the rejection are void";
+  EXPECT_TRUE(all.cut({0, 0, -4}, {4, 0, -4.5}).committed()) << "the cut is beside the plate";
 }
 
-// The entries make the same room again, the rejections among them.
-TEST(RoomMetal, ReplaysFromItsRows) {
+// A replay of the entries makes the same room again, with the rejections.
+TEST(RoomMetal, ReplaysFromItsLogEntries) {
   MetalRoom all;
   (void)all.cut({0, 0, 1}, {0, 0, -4});
   (void)all.cut({0, 0, -4}, {0, 0, -7});
@@ -61,7 +62,7 @@ TEST(RoomMetal, ReplaysFromItsRows) {
   EXPECT_EQ(again.room_hash(), all.room.room_hash());
 }
 
-// Every reason has a sentence of its own.
+// Every rejection has a sentence of its own.
 TEST(Rejections, EachHasASentence) {
   for (int i = 0; i < kRejections; ++i)
     for (int k = 0; k < i; ++k)

@@ -1,4 +1,4 @@
-// The bone on its mount in a room: whoever has a session is told where it is, and moves it for all.
+// The bone on its compliant mount in a room. Every session is sent its position, and can move it for all.
 #include <gtest/gtest.h>
 
 #include <memory>
@@ -12,10 +12,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Keeps the places that a session is told.
-class HeardBone final : public SessionSubscriber {
+// Keeps the positions that a session is sent.
+class ReceivedMotion final : public SessionSubscriber {
  public:
-  explicit HeardBone(AuthorId author) : author_(author) {}
+  explicit ReceivedMotion(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
@@ -33,7 +33,7 @@ class HeardBone final : public SessionSubscriber {
   const AuthorId author_;
 };
 
-// A driven runtime with two hands.
+// A driven runtime with two haptic clients.
 struct Pair {
   explicit Pair(bool mount)
       : runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns, .mount = mount}, {}) {
@@ -46,15 +46,15 @@ struct Pair {
     tick();
     return author;
   }
-  std::shared_ptr<HeardBone> open(AuthorId author) {
-    auto session = std::make_shared<HeardBone>(author);
+  std::shared_ptr<ReceivedMotion> open(AuthorId author) {
+    auto session = std::make_shared<ReceivedMotion>(author);
     EXPECT_TRUE(runtime.open_session(session));
     return session;
   }
   void tick(int times = 1) {
     for (int i = 0; i < times; ++i) runtime.tick(now += 8ms);
   }
-  void push(const std::shared_ptr<HeardBone>& session, const Load& load, double energy_mj = 0.0) {
+  void push(const std::shared_ptr<ReceivedMotion>& session, const Load& load, double energy_mj = 0.0) {
     runtime.push_bone(session->author(),
                       {++pushes, load, energy_mj, session->seen_.empty() ? 0 : session->seen_.back().seen_seq});
   }
@@ -62,15 +62,15 @@ struct Pair {
   std::chrono::nanoseconds now{};
   std::uint64_t pushes = 0;
   RoomRuntime runtime;
-  std::shared_ptr<HeardBone> sessions[2];
+  std::shared_ptr<ReceivedMotion> sessions[2];
 };
 
 TEST(MountInARoom, APushMovesTheBoneOfAll) {
   Pair room(true);
   room.tick(20);
   for (const auto& session : room.sessions) {
-    ASSERT_FALSE(session->seen_.empty()) << "it is told that there is a mount";
-    EXPECT_LE(session->seen_.size(), 5u) << "seldom, as the bone rests";
+    ASSERT_FALSE(session->seen_.empty()) << "the session is sent that there is a mount";
+    EXPECT_LE(session->seen_.size(), 5u) << "updates are rare while the bone rests";
     EXPECT_EQ(session->seen_.back().shift.place_mm, Vec3(Vec3::Zero()));
   }
   const Load load{{10.0, 0, 0}, Vec3::Zero()};
@@ -84,8 +84,8 @@ TEST(MountInARoom, APushMovesTheBoneOfAll) {
     EXPECT_NEAR(session->seen_.back().shift.place_mm.x(), expected_mm, 1e-3 * expected_mm);
   EXPECT_EQ(room.sessions[0]->seen_.back().push_seq, room.pushes);
   EXPECT_EQ(room.sessions[1]->seen_.back().push_seq, 0u);
-  EXPECT_GE(room.sessions[1]->seen_.size() - before, 249u) << "at every tick while it moves";
-  // A push that is not renewed dies away.
+  EXPECT_GE(room.sessions[1]->seen_.size() - before, 249u) << "there is an update at every tick while it moves";
+  // A push that is not renewed decays.
   room.tick(400);
   EXPECT_LT(room.sessions[1]->seen_.back().shift.place_mm.norm(), 0.01 * expected_mm);
 }
@@ -108,7 +108,7 @@ TEST(MountInARoom, WhoLeavesPushesNoMore) {
   }
   EXPECT_GT(room.sessions[1]->seen_.back().shift.place_mm.y(), 3.0);
   room.runtime.leave(*room.sessions[0]);
-  // Of whoever has no session a push is nothing; and it is told nothing more.
+  // An author without a session has no effect and is sent nothing more.
   const std::size_t told = room.sessions[0]->seen_.size();
   for (int i = 0; i < 200; ++i) {
     room.push(room.sessions[0], {{0, 20.0, 0}, Vec3::Zero()});
@@ -116,14 +116,14 @@ TEST(MountInARoom, WhoLeavesPushesNoMore) {
   }
   EXPECT_EQ(room.sessions[0]->seen_.size(), told);
   EXPECT_LT(room.sessions[1]->seen_.back().shift.place_mm.norm(), 0.1);
-  // In another session its numbers begin anew.
+  // The numbers begin again in another session.
   room.sessions[0] = room.open(room.sessions[0]->author());
   room.tick(10);
   ASSERT_FALSE(room.sessions[0]->seen_.empty());
   EXPECT_EQ(room.sessions[0]->seen_.front().seen_seq, 1u);
 }
 
-// The bone's motion is nothing that a room keeps: entries, field and hash are as without.
+// The motion of the bone is not stored. Entries, field and hash are the same as without it.
 TEST(MountInARoom, IsNoEvent) {
   Pair room(true), other(false);
   for (int i = 0; i < 100; ++i) {
@@ -134,7 +134,7 @@ TEST(MountInARoom, IsNoEvent) {
   }
   EXPECT_EQ(room.runtime.room_seq(), other.runtime.room_seq());
   EXPECT_EQ(room.runtime.bone_status().field_hash, other.runtime.bone_status().field_hash);
-  EXPECT_TRUE(other.sessions[0]->seen_.empty()) << "where there is no mount, nothing is told of one";
+  EXPECT_TRUE(other.sessions[0]->seen_.empty()) << "without a mount no motion is sent";
   EXPECT_TRUE(other.sessions[1]->seen_.empty());
 }
 

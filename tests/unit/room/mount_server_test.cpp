@@ -1,5 +1,4 @@
-// Pushes and places between a served room and real sessions: in datagrams, over the stream, and when a session begins
-// anew.
+// Pushes and positions between a served room and real sessions: in datagrams, over the stream, and after a reconnect.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -16,7 +15,7 @@ namespace {
 using namespace std::chrono_literals;
 using test::wait_until;
 
-// A session that pushes and is told of the bone.
+// A session that pushes and receives the motion of the bone.
 class Pusher {
  public:
   Pusher(const std::string& address, const std::filesystem::path& cache, const std::string& fast_path) {
@@ -39,7 +38,7 @@ class Pusher {
   }
   ~Pusher() { session_->close(); }
 
-  // Pushes until it holds.
+  // Pushes until `holds` is true.
   bool push_until(double force_n, const std::function<bool()>& holds) {
     return wait_until(
         [&] {
@@ -91,7 +90,7 @@ class ServedMount : public ::testing::Test {
   std::unique_ptr<RoomServer> server_;
 };
 
-// 10 N at 5 N/mm, by whichever way.
+// 10 N at 5 N/mm, over either transport.
 TEST_F(ServedMount, OnesPushIsSeenByTheOtherByDatagramAndByStream) {
   serve(true);
   for (const char* way : {"", "off"}) {
@@ -101,7 +100,7 @@ TEST_F(ServedMount, OnesPushIsSeenByTheOtherByDatagramAndByStream) {
     ASSERT_TRUE(wait_until([&] { return one.session().fast_path().alive == datagrams; }, test::kPatience));
     EXPECT_TRUE(one.push_until(10.0, [&] { return other.x_mm() > 1.9; })) << way;
     EXPECT_NEAR(other.x_mm(), 2.0, 0.15);
-    EXPECT_TRUE(one.push_until(10.0, [&] { return one.newest().push_seq > 0; })) << "its own are answered";
+    EXPECT_TRUE(one.push_until(10.0, [&] { return one.newest().push_seq > 0; })) << "its own pushes are acknowledged";
     EXPECT_EQ(other.newest().push_seq, 0u);
     EXPECT_EQ(one.session().fast_path().alive, datagrams);
   }
@@ -115,17 +114,17 @@ TEST_F(ServedMount, NumbersBeginAnewWithTheNextSession) {
   EXPECT_TRUE(one.push_until(10.0, [&] { return one.newest().seen_seq > 100 && one.x_mm() > 1.9; }));
   EXPECT_EQ(line.command("reset"), "ok");
   ASSERT_TRUE(wait_until([&] { return one.interruptions() > 0 && one.first() > 0; }, test::kPatience));
-  EXPECT_LT(one.first(), 100u) << "they begin anew, after the interruption was told";
+  EXPECT_LT(one.first(), 100u) << "the numbers begin again after the interruption was reported";
   const std::uint64_t pushed = one.newest().push_seq;
   EXPECT_TRUE(one.push_until(10.0, [&] { return one.newest().push_seq > pushed && one.x_mm() > 1.9; }))
-      << "and it pushes on";
+      << "and its pushes work again";
 }
 
-TEST_F(ServedMount, NobodyIsToldWhereThereIsNone) {
+TEST_F(ServedMount, NothingIsSentWhereThereIsNone) {
   serve(false);
   Pusher one(server_->address(), dir_ / "cache", ""), streamed(server_->address(), dir_ / "cache", "off");
   int looks = 0;
-  EXPECT_TRUE(one.push_until(10.0, [&] { return ++looks > 40; })) << "a push there does no harm";
+  EXPECT_TRUE(one.push_until(10.0, [&] { return ++looks > 40; })) << "a push without a mount does no harm";
   EXPECT_TRUE(streamed.push_until(10.0, [&] { return ++looks > 80; }));
   EXPECT_EQ(one.told() + streamed.told(), 0);
   EXPECT_EQ(one.interruptions() + streamed.interruptions(), 0);

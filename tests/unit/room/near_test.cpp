@@ -1,5 +1,5 @@
-// A large bone is drawn in full only where somebody looks: what viewers hold follows their looks, and stays one closed
-// surface.
+// A large bone is drawn in full detail only where somebody looks. What viewers hold follows their view frusta and stays
+// one closed surface.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -26,7 +26,7 @@ Case ball() {
       [](const Vec3& p) { return p.norm() - kRadius_mm; }, [](const Vec3&) { return 1.9; });
 }
 
-// Close enough for full detail, in a picture of `wide_mm` from its middle to its corner.
+// A view close enough for full detail, with `wide_mm` from the middle of the picture to its corner.
 ViewFrustum close_to(const Vec3& target_mm, double wide_mm) {
   return {target_mm + Vec3(0, -40, 0), target_mm, 0.3 * kPitch_mm / 40, std::atan(wide_mm / 40)};
 }
@@ -67,7 +67,7 @@ class Reader final : public MeshSubscriber {
     for (const auto& [key, payload] : blocks_) levels.insert(key.level);
     return levels;
   }
-  // The finest level of those blocks that come nearest to the place.
+  // The finest level of the blocks that are nearest to the point.
   int level_at(const Vec3& place_mm) const {
     const std::lock_guard lock(mutex_);
     double nearest = 1e9;
@@ -90,7 +90,7 @@ class Reader final : public MeshSubscriber {
     return bodies;
   }
   std::size_t triangles() const { return whole().triangles.size(); }
-  // Edges that are not matched by one in the other direction.
+  // The number of edges without a matching edge in the other direction.
   int open_edges() const {
     std::map<std::pair<std::uint32_t, std::uint32_t>, int> edges;
     for (const auto& t : whole().triangles)
@@ -118,7 +118,7 @@ class Reader final : public MeshSubscriber {
 
 RuntimeRates fast() { return {.tick = 1ms, .mesh = 3ms, .looks = 5ms}; }
 
-TEST(NearDetail, FollowsTheLooksOfAllViewers) {
+TEST(NearDetail, FollowsTheViewsOfAllViewers) {
   RoomRuntime runtime(Room(ball()), fast(), {}, Detail::near);
   RoomRuntime in_full(Room(ball()), fast(), {}, Detail::full);
   Reader full(in_full.join(MemberKind::watcher).value());
@@ -126,7 +126,7 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   EXPECT_EQ(full.levels(), std::set<int>{0});
   EXPECT_EQ(full.open_edges(), 0);
 
-  // Nobody has looked yet: the one who joins is sent the coarse bone at once and then what it looks at.
+  // Nobody has looked yet. The first viewer is sent the coarse bone at once and then what it looks at.
   const Vec3 north(0, 0, kRadius_mm), east(kRadius_mm, 0, 0), south(0, 0, -kRadius_mm);
   Reader one(runtime.join(MemberKind::watcher).value());
   runtime.watch_mesh(one, close_to(north, 8));
@@ -137,13 +137,14 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   EXPECT_EQ(one.hash(), runtime.surface_hash());
   EXPECT_LT(one.triangles(), 2 * full.triangles() / 3);
 
-  // Its look moves, and another one joins elsewhere: each has what it needs, both hold the same.
+  // Its view moves, and another viewer joins elsewhere. Each has the detail that it needs, and both hold the same
+  // surface.
   runtime.look(one.author(), close_to(east, 8));
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(east) == 0 && one.level_at(north) < 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
   Reader two(runtime.join(MemberKind::watcher).value());
   runtime.watch_mesh(two, close_to(south, 8));
-  EXPECT_EQ(two.hash(), runtime.surface_hash()) << "as it is at the moment";
+  EXPECT_EQ(two.hash(), runtime.surface_hash()) << "the surface of this moment";
   EXPECT_EQ(two.first_levels(), one.levels());
   ASSERT_TRUE(test::wait_until([&] { return two.level_at(south) == 0; }, 20s));
   EXPECT_EQ(two.level_at(east), 0);
@@ -151,7 +152,7 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   EXPECT_EQ(one.hash(), two.hash());
   EXPECT_EQ(one.hash(), runtime.surface_hash());
 
-  // A tool is seen in full wherever it works.
+  // The bone at a tool is drawn in full wherever the tool works.
   CuttingState state;
   state.author = runtime.join(MemberKind::surgeon).value();
   state.pose_bone_tool = pose_along(north, {0, 0, -1});
@@ -159,7 +160,7 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
 
-  // One that never says where it looks is sent all, to the bytes of a room that draws everything in full.
+  // A viewer that never sends its view receives everything, with the same bytes as from a room that draws all in full.
   Reader all(runtime.join(MemberKind::watcher).value());
   runtime.watch_mesh(all);
   ASSERT_TRUE(test::wait_until([&] { return all.hash() == full.hash(); }, 20s));
@@ -173,7 +174,7 @@ TEST(NearDetail, FollowsTheLooksOfAllViewers) {
   in_full.leave(full);
 }
 
-// The ball between two planes across x.
+// The part of the ball between two planes across x.
 Fragment cap(const Case& bone, double from_mm, double to_mm) {
   return test::part(bone, [=](int x) { return kPitch_mm * x >= from_mm && kPitch_mm * x < to_mm; });
 }
@@ -187,7 +188,7 @@ TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
   rates.pieces = 0ms;
   RoomRuntime runtime(std::move(room), rates, {}, Detail::near);
   Reader one(runtime.join(MemberKind::watcher).value());
-  runtime.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // so that both pieces are far
+  runtime.watch_mesh(one, close_to({0, 0, kRadius_mm}, 8));  // From here both fragments are far away.
   ASSERT_TRUE(test::wait_until([&] { return one.level_at({0, 0, kRadius_mm}) == 0; }, 20s));
   const auto remove = [&](BodyId body) {
     runtime.queue_event([=](Room& r) { return r.remove_body(surgeon, body); },
@@ -197,7 +198,7 @@ TEST(NearDetail, ABodyTakesAllItsBlocksAndNoOthers) {
   ASSERT_EQ(one.bodies(), (Bodies{BodyId{0}, BodyId{1}, BodyId{2}}));
   remove(BodyId{1});
   EXPECT_TRUE(test::wait_until([&] { return one.bodies() == Bodies{BodyId{0}, BodyId{2}}; }, 20s));
-  EXPECT_EQ(one.open_edges(), 0) << "the body beside it lost nothing";
+  EXPECT_EQ(one.open_edges(), 0) << "the body beside it lost no block";
   remove(BodyId{0});
   EXPECT_TRUE(test::wait_until([&] { return one.bodies() == Bodies{BodyId{2}}; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);

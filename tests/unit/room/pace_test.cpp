@@ -1,4 +1,4 @@
-// How often a stream is told, and that a room's tick waits for none.
+// The rate at which a stream is sent states. The tick of a room waits for no stream.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -31,7 +31,7 @@ TEST(Pace, KeepsItsRateHoweverUnevenlyItIsAsked) {
     last = now;
   }
   EXPECT_NEAR(times, 3000, 2);
-  EXPECT_GE(shortest, kApart - 12ms) << "no closer than by what one asking came late";
+  EXPECT_GE(shortest, kApart - 12ms) << "the distance is shorter only by the lateness of one request";
 }
 
 TEST(Pace, AfterAPauseIsDueAtOnceAndOnlyOnce) {
@@ -42,7 +42,7 @@ TEST(Pace, AfterAPauseIsDueAtOnceAndOnlyOnce) {
   const auto later = kStart + 10s;
   EXPECT_TRUE(pace.due(later));
   pace.done(later);
-  EXPECT_FALSE(pace.due(later + kApart - 1ns)) << "what was not used is not made up for";
+  EXPECT_FALSE(pace.due(later + kApart - 1ns)) << "missed sends are not made up for";
 }
 
 TEST(Pace, ManyThatBeginTogetherTakeTurns) {
@@ -55,14 +55,14 @@ TEST(Pace, ManyThatBeginTogetherTakeTurns) {
       if (pace.due(now)) pace.done(now), ++due;
     told.push_back(due);
   }
-  EXPECT_EQ(told.front(), 40) << "the first news reach everyone at once";
+  EXPECT_EQ(told.front(), 40) << "all are sent the first state at once";
   for (std::size_t i = 1; i < told.size(); ++i) EXPECT_LE(told[i], 10);
 }
 
-// A stream that is told slowly, as many are together.
-class SlowSink final : public StateSubscriber {
+// A stream that receives slowly, as if many shared the server.
+class SlowSubscriber final : public StateSubscriber {
  public:
-  explicit SlowSink(std::chrono::nanoseconds apart = {}) : apart_(apart) {}
+  explicit SlowSubscriber(std::chrono::nanoseconds apart = {}) : apart_(apart) {}
   void offer(const ShownNow& now) override {
     std::unique_lock lock(mutex_);
     inside_ = true;
@@ -111,45 +111,45 @@ CuttingState state(std::uint64_t seq) {
 
 TEST(StatePublisher, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
   StatePublisher board;
-  SlowSink slow, prompt, seldom(20ms);
-  for (SlowSink* subscriber : {&slow, &prompt, &seldom}) board.watch(*subscriber);
+  SlowSubscriber slow, prompt, seldom(20ms);
+  for (SlowSubscriber* subscriber : {&slow, &prompt, &seldom}) board.watch(*subscriber);
   slow.open(false);
   board.offer(state(1));
   board.publish(RoomSeq{1});
   ASSERT_TRUE(test::wait_until([&] { return slow.inside(); }, 20s));
-  // The teller stands in the slow one; a room that waited for it would stand here.
+  // The publisher's thread blocks in the slow subscriber. A room that waited for it would block here.
   for (std::uint64_t seq = 2; seq <= 500; ++seq) {
     board.offer(state(seq));
     board.publish(RoomSeq{seq});
   }
   EXPECT_TRUE(slow.inside());
   slow.open(true);
-  // Ticks without news bring what is owed.
+  // Ticks without news send what is still due.
   ASSERT_TRUE(test::wait_until(
       [&] {
         board.publish(RoomSeq{500});
         return slow.room_seq() == 500 && prompt.room_seq() == 500 && seldom.room_seq() == 500;
       },
       20s));
-  EXPECT_EQ(slow.messages(), 2) << "the one that it stood in, and the newest";
-  for (SlowSink* subscriber : {&slow, &prompt, &seldom}) board.leave(*subscriber);
+  EXPECT_EQ(slow.messages(), 2) << "the state in which it blocked, and the newest";
+  for (SlowSubscriber* subscriber : {&slow, &prompt, &seldom}) board.leave(*subscriber);
 }
 
-TEST(StatePublisher, WhoComesLateIsShownTheNewestAtOnceAndStoppingTellsTheLast) {
+TEST(StatePublisher, ALateSubscriberIsSentTheNewestAtOnceAndStoppingSendsTheLast) {
   StatePublisher board;
   board.show({}, {BodyId{0}, BodyId{3}});
-  SlowSink early, late;
+  SlowSubscriber early, late;
   board.watch(early);
   board.publish(RoomSeq{7});
   ASSERT_TRUE(test::wait_until([&] { return early.messages() == 1; }, 20s));
   board.watch(late);
   EXPECT_EQ(late.messages(), 1);
   EXPECT_EQ(late.room_seq(), 7u);
-  board.publish(RoomSeq{8});  // nothing has changed: no message
+  board.publish(RoomSeq{8});  // Nothing has changed, so there is no message.
   board.offer(state(1));
   board.publish(RoomSeq{9});
   board.stop();
-  for (SlowSink* subscriber : {&early, &late}) {
+  for (SlowSubscriber* subscriber : {&early, &late}) {
     EXPECT_EQ(subscriber->room_seq(), 9u);
     EXPECT_EQ(subscriber->messages(), 2);
   }

@@ -1,4 +1,4 @@
-// Pieces for the room's tests, as a finder would report them.
+// Fragments for the room's tests, as the fragment detector would report them.
 #pragma once
 #include <algorithm>
 #include <functional>
@@ -7,7 +7,7 @@
 
 namespace osteon::test {
 
-// The part of the bone whose samples have such an x, as a saw would part it: by masks that take whole samples.
+// The part of the bone whose samples satisfy `has` for their x, as a saw would separate it: by masks of whole samples.
 inline Fragment part(const Case& bone, const std::function<bool(int)>& has, double volume_mm3 = 1000.0) {
   const double h = bone.pitch_mm();
   const auto band = static_cast<std::int16_t>(4 * h * 1024);

@@ -1,5 +1,5 @@
-// What a runtime tells of its people: to whom a word goes, what holds for a hand that comes, how far it has heard, and
-// what readers are told who may not hear everything.
+// What a runtime sends about its people: who receives a message, which restrictions hold for a client that joins, how
+// far it has acknowledged, and what readers receive who may not read everything.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -21,10 +21,10 @@ namespace {
 
 using namespace std::chrono_literals;
 
-// Keeps what a session is told.
-class HeardSession final : public SessionSubscriber {
+// Keeps what a session is sent.
+class ReceivedSession final : public SessionSubscriber {
  public:
-  explicit HeardSession(AuthorId author) : author_(author) {}
+  explicit ReceivedSession(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts before, Bytes complete) override {
     for (const Bytes& part : before) take(part, before_);
@@ -90,14 +90,14 @@ class HeardSession final : public SessionSubscriber {
   std::vector<CuttingState> partners_;
 };
 
-// A driven runtime: what is asked of it is decided at once.
+// A driven runtime: every request is decided at once.
 struct Lesson {
   Lesson() : runtime(Room(test::test_block()), {.tick = 0ns, .mesh = 1s, .pieces = 0ns}, {}) {
     instructor = join("Ada", Role::instructor);
     trainee = join("Ben", Role::trainee);
     other = join("Cy", Role::trainee);
     for (const AuthorId author : {trainee, other}) {
-      sessions[author] = std::make_shared<HeardSession>(author);
+      sessions[author] = std::make_shared<ReceivedSession>(author);
       EXPECT_TRUE(runtime.open_session(sessions[author]));
     }
   }
@@ -131,10 +131,10 @@ struct Lesson {
   std::chrono::nanoseconds now{};
   RoomRuntime runtime;
   AuthorId instructor, trainee, other;
-  std::map<AuthorId, std::shared_ptr<HeardSession>> sessions;
+  std::map<AuthorId, std::shared_ptr<ReceivedSession>> sessions;
 };
 
-// What somebody may take back goes by the role of the join, so that who comes back with another has to join anew.
+// The role of the join decides what somebody may undo. Who returns with another role has to join again.
 TEST(PeopleHost, AnAuthorOfAnotherRoleDoesNotComeBack) {
   Lesson lesson;
   const Digest secret{{7}};
@@ -143,13 +143,13 @@ TEST(PeopleHost, AnAuthorOfAnotherRoleDoesNotComeBack) {
                       [&](const Result<AuthorId>& given) { author = given.value(); });
   lesson.tick();
   EXPECT_TRUE(lesson.runtime.resume(author, secret, {}, Role::instructor));
-  EXPECT_TRUE(lesson.runtime.resume(author, secret, {}));  // over plain text nobody has a role
+  EXPECT_TRUE(lesson.runtime.resume(author, secret, {}));  // Over plain text nobody has a role.
   const Result<void> demoted = lesson.runtime.resume(author, secret, {}, Role::trainee);
   ASSERT_FALSE(demoted);
   EXPECT_EQ(demoted.error().code, ErrorCode::denied);
 }
 
-TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
+TEST(PeopleHost, ADecisionGoesToItsAuthorAndLeavesNoGapForOthers) {
   Lesson lesson;
   const auto frozen = lesson.supervise(lesson.trainee, {.stopped = true, .words = "stop"});
   ASSERT_TRUE(frozen);
@@ -166,7 +166,7 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   EXPECT_EQ(fast.kind, wire::SessionEntryKind::supervised);
   EXPECT_TRUE(fast.supervision.stopped);
   EXPECT_EQ(fast.lease_epoch, lesson.runtime.lease_epoch(lesson.trainee));
-  EXPECT_EQ(fast.by, (Decider{lesson.instructor, "Ada"})) << "as the stream says it";
+  EXPECT_EQ(fast.by, (Decider{lesson.instructor, "Ada"})) << "the same as in the stream";
   ASSERT_TRUE(others.back().has_noted());
   EXPECT_EQ(others.back().noted().room_seq(), frozen->room_seq.value);
 
@@ -179,18 +179,18 @@ TEST(PeopleHost, AWordGoesToItsHandAndLeavesNoGapForOthers) {
   for (const auto& [author, session] : lesson.sessions) {
     const auto entries = session->entries();
     EXPECT_EQ(entries[entries.size() - 2].said().words(), "all");
-    EXPECT_TRUE(entries.back().has_noted()) << "a drawing";
+    EXPECT_TRUE(entries.back().has_noted()) << "the entry is an annotation";
     const auto seqs = session->seqs();
     for (std::size_t i = 1; i < seqs.size(); ++i) EXPECT_EQ(seqs[i].value, seqs[i - 1].value + 1) << "no gap";
   }
 }
 
-TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
+TEST(PeopleHost, WhoJoinsIsSentFirstWhatHolds) {
   Lesson lesson;
   const AuthorId away = lesson.join("Di", Role::trainee);
   ASSERT_TRUE(lesson.supervise(away, {.taken_by = lesson.instructor}));
   const auto comes = [&] {
-    const auto session = std::make_shared<HeardSession>(away);
+    const auto session = std::make_shared<ReceivedSession>(away);
     EXPECT_TRUE(lesson.runtime.open_session(session));
     return session;
   };
@@ -202,11 +202,11 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   EXPECT_EQ(told->supervised().lease_epoch(), first->complete_.complete().lease_epoch());
   EXPECT_EQ(told->supervised().decided_by(), lesson.instructor.value);
   EXPECT_EQ(told->supervised().decided_by_name(), "Ada");
-  ASSERT_TRUE(first->held_) << "and its link, for the flag";
+  ASSERT_TRUE(first->held_) << "its link is sent them too, for the flag";
   EXPECT_FALSE(first->held_->supervision.may_cut());
   lesson.runtime.leave(*first);
 
-  // Freed while it was away: it must not go on believing otherwise.
+  // The restrictions were lifted while it was away. It must not go on obeying them.
   ASSERT_TRUE(lesson.supervise(away, {}));
   const auto second = comes();
   ASSERT_TRUE(second->held_);
@@ -214,10 +214,10 @@ TEST(PeopleHost, WhoComesIsToldFirstWhatHolds) {
   EXPECT_EQ(std::ranges::count_if(lesson.sessions[lesson.trainee]->before_,
                                   [](const auto& entry) { return entry.has_supervised(); }),
             0)
-      << "of whom nobody has decided anything";
+      << "nothing was decided about this author";
 }
 
-TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
+TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsAcknowledged) {
   Lesson lesson;
   PresenceCursor cursor;
   const v1::WatchPeopleResponse first = lesson.news(cursor, lesson.instructor);
@@ -228,7 +228,7 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   EXPECT_EQ(ben->role(), v1::ROLE_TRAINEE);
   EXPECT_TRUE(ben->here() && ben->hand());
   EXPECT_FALSE(ben->has_supervision());
-  EXPECT_FALSE(Lesson::person(first, lesson.instructor)->here()) << "joined, and no stream is open";
+  EXPECT_FALSE(Lesson::person(first, lesson.instructor)->here()) << "it has joined, but no stream is open";
 
   const RoomSeq seq = lesson.supervise(lesson.trainee, {.stopped = true})->room_seq;
   v1::WatchPeopleResponse next = lesson.news(cursor, lesson.instructor);
@@ -238,13 +238,13 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   EXPECT_EQ(next.people(0).decided_by(), lesson.instructor.value);
   EXPECT_LT(next.people(0).acknowledged_room_seq(), seq.value);
   EXPECT_TRUE(next.people(0).supervision().stopped());
-  EXPECT_EQ(lesson.runtime.people().news(cursor, lesson.instructor, {}), nullptr) << "all is told";
+  EXPECT_EQ(lesson.runtime.people().news(cursor, lesson.instructor, {}), nullptr) << "everything was sent";
 
   lesson.runtime.people().acknowledged(lesson.trainee, seq);
   lesson.runtime.people().acknowledged(lesson.trainee, RoomSeq{1});
   next = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(next.people_size(), 1);
-  EXPECT_EQ(next.people(0).acknowledged_room_seq(), seq.value) << "what was heard later was said earlier";
+  EXPECT_EQ(next.people(0).acknowledged_room_seq(), seq.value) << "the acknowledgement for later entries came earlier";
 
   lesson.runtime.leave(*lesson.sessions[lesson.trainee]);
   next = lesson.news(cursor, lesson.instructor);
@@ -253,7 +253,7 @@ TEST(PeopleHost, WhatIsDecidedIsPendingUntilItIsHeard) {
   EXPECT_TRUE(next.people(0).hand());
 }
 
-TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
+TEST(PeopleHost, AReaderIsSentWhatConcernsThem) {
   Lesson lesson;
   ASSERT_TRUE(lesson.supervise(lesson.trainee, {.stopped = true}));
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, lesson.other, "secret"); }));
@@ -265,10 +265,11 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
     return lesson.news(cursor, reader, rights);
   };
   EXPECT_FALSE(Lesson::person(told(lesson.other, trainees), lesson.trainee)->has_supervision());
-  EXPECT_TRUE(Lesson::person(told(lesson.trainee, trainees), lesson.trainee)->has_supervision()) << "their own";
+  EXPECT_TRUE(Lesson::person(told(lesson.trainee, trainees), lesson.trainee)->has_supervision())
+      << "their own restrictions";
   EXPECT_TRUE(Lesson::person(told(lesson.instructor, {}), lesson.trainee)->has_supervision());
   EXPECT_EQ(told(lesson.trainee, trainees).words_size(), 1);
-  // A window beside a hand is of the same person, whoever else may look.
+  // A viewer beside a haptic client belongs to the same person, whoever else may watch.
   const auto window = [&](const std::string& name) {
     AuthorId author;
     lesson.runtime.join(MemberKind::watcher, name, {}, Role::trainee,
@@ -279,7 +280,8 @@ TEST(PeopleHost, AReaderIsToldWhatConcernsThem) {
   const auto bens = window("Ben"), nobodys = window("");
   EXPECT_TRUE(Lesson::person(told(bens, trainees), lesson.trainee)->has_supervision());
   EXPECT_FALSE(Lesson::person(told(nobodys, trainees), lesson.trainee)->has_supervision());
-  EXPECT_EQ(told(window("Cy"), trainees).words_size(), 3) << "what is said to the hand is said to its window";
+  EXPECT_EQ(told(window("Cy"), trainees).words_size(), 3)
+      << "a message to the haptic client is also sent to the person's viewer";
   EXPECT_EQ(told(bens, trainees).words_size(), 1);
   EXPECT_EQ(told(lesson.other, trainees).words_size(), 3);
   EXPECT_EQ(told(lesson.instructor, {}).words_size(), 3);
@@ -295,13 +297,13 @@ TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
   ASSERT_TRUE(draw(1));
   ASSERT_TRUE(draw(7));
   v1::WatchPeopleResponse news = lesson.news(cursor, lesson.instructor);
-  ASSERT_EQ(news.annotations_size(), 1) << "the newest pointer alone";
+  ASSERT_EQ(news.annotations_size(), 1) << "only the newest pointer";
   EXPECT_EQ(news.annotations(0).points(0), 7);
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.wipe_off(lesson.instructor, 1); }));
   news = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(news.wiped_size(), 1);
   EXPECT_EQ(news.wiped(0), 1u);
-  // Drawn and wiped off between two looks: nobody need know.
+  // Drawn and wiped off between two reads: no reader needs it.
   ASSERT_TRUE(draw(9));
   ASSERT_TRUE(lesson.ask([&](Room& room) { return room.wipe_off(lesson.instructor, 2); }));
   news = lesson.news(cursor, lesson.instructor);
@@ -311,10 +313,10 @@ TEST(PeopleHost, DrawingsComeAndGoAndWordsAreBounded) {
     ASSERT_TRUE(lesson.ask([&](Room& room) { return room.say(lesson.instructor, {}, std::to_string(i)); }));
   news = lesson.news(cursor, lesson.instructor);
   ASSERT_EQ(news.words_size(), static_cast<int>(Presence::kMostWords));
-  EXPECT_EQ(news.words(news.words_size() - 1).words(), "99") << "the newest";
+  EXPECT_EQ(news.words(news.words_size() - 1).words(), "99") << "the newest message";
 }
 
-// However many have come and gone, a reader is told of a bounded number.
+// However many have joined and left, a reader is sent a bounded number.
 TEST(Presence, ThoseWhoWereHereLongestAgoAreLeftOut) {
   Room room(test::test_block());
   for (int i = 0; i < 600; ++i) (void)room.join(MemberKind::surgeon);
@@ -328,9 +330,9 @@ TEST(Presence, ThoseWhoWereHereLongestAgoAreLeftOut) {
   EXPECT_EQ(count().people_size(), static_cast<int>(Presence::kMostAbsent));
   EXPECT_EQ(count().people(0).author(), 600 - Presence::kMostAbsent + 1);
   board.came(AuthorId{3});
-  EXPECT_EQ(count().people(0).author(), 3u) << "who is here is told in any case";
+  EXPECT_EQ(count().people(0).author(), 3u) << "a present person is always listed";
   board.went(AuthorId{3});
-  EXPECT_EQ(count().people(0).author(), 3u) << "and was here last";
+  EXPECT_EQ(count().people(0).author(), 3u) << "it was the last to be present";
 }
 
 CuttingState state(std::uint64_t author, std::uint64_t seq) {
@@ -340,7 +342,7 @@ CuttingState state(std::uint64_t author, std::uint64_t seq) {
   return one;
 }
 
-TEST(PartnerSendQueue, TellsTheNewestThirtyTimesASecond) {
+TEST(PartnerSendQueue, SendsTheNewestThirtyTimesASecond) {
   PartnerSendQueue send_queue;
   const PartnerSendQueue::Clock::time_point start{};
   int told = 0;
@@ -351,17 +353,17 @@ TEST(PartnerSendQueue, TellsTheNewestThirtyTimesASecond) {
     if (const auto one = send_queue.take(start + std::chrono::milliseconds(ms))) {
       ++told;
       newest = one->state_seq;
-      EXPECT_EQ(newest, ms + 1) << "never an older one";
+      EXPECT_EQ(newest, ms + 1) << "an older state is never sent";
     }
   }
   EXPECT_GE(told, 28);
   EXPECT_LE(told, 31);
-  // The last one is still owed, and comes.
+  // The last one is still due, and is sent.
   EXPECT_NE(newest, 1000u);
   EXPECT_EQ(send_queue.take(start + 2s)->state_seq, 1000u);
   EXPECT_FALSE(send_queue.waits());
   send_queue.offer({state(1, 1000)}, true);
-  EXPECT_FALSE(send_queue.waits()) << "the same again";
+  EXPECT_FALSE(send_queue.waits()) << "the state is unchanged";
 }
 
 TEST(PartnerSendQueue, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
@@ -382,7 +384,7 @@ TEST(PartnerSendQueue, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
   EXPECT_EQ(told, PartnerSendQueue::kMost);
 }
 
-// Who somebody was, what was decided about them and what they drew is there again when the room is.
+// Somebody's name, the decisions about them and their annotations are there again when the room is reopened.
 TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   const test::TempDir folder;
   const auto open = [&] {
@@ -426,9 +428,9 @@ TEST(PeopleHost, NamesAndDecisionsOutliveTheProcess) {
   runtime.stop();
 }
 
-TEST(PeopleHost, HandsAreToldOfOthersTools) {
+TEST(PeopleHost, HapticClientsAreSentOthersTools) {
   RoomRuntime runtime(Room(test::test_block()), {.tick = 2ms, .mesh = 50ms, .pieces = 0ns}, {});
-  const auto one = std::make_shared<HeardSession>(runtime.join(MemberKind::surgeon).value());
+  const auto one = std::make_shared<ReceivedSession>(runtime.join(MemberKind::surgeon).value());
   ASSERT_TRUE(runtime.open_session(one));
   runtime.offer_state(state(77, 5));
   const auto told = [&] {

@@ -1,5 +1,5 @@
-// What people decide about each other in a room, draw and say: who may, what it does to cuts, and that its entries make
-// the same room again.
+// What people decide about each other in a room, draw and say: who may do it, how it affects cuts, and that its log
+// entries make the same room again.
 #include "server/room/people.hpp"
 
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ using test::strokes;
 using test::test_block;
 using test::tool_named;
 
-// An instructor, a collaborator, two trainees, each with a hand, and an observer.
+// An instructor, a collaborator and two trainees, each with a haptic client, and an observer.
 struct Class {
   Class() : room(test_block()) {
     instructor = room.join(MemberKind::surgeon, 1, {}, Role::instructor);
@@ -29,7 +29,7 @@ struct Class {
     for (const AuthorId author : {instructor, collaborator, trainee, other})
       cuts[author] = strokes(author, 100, static_cast<unsigned>(author.value));
   }
-  // The author's next stroke, under the present lease.
+  // The author's next stroke, under the current lease.
   Outcome cut(AuthorId author) { return cut(author, room.lease_epoch(author)); }
   Outcome cut(AuthorId author, std::uint64_t epoch) {
     Cut next = cuts.at(author).at(room.decided(author));
@@ -57,12 +57,12 @@ TEST(Supervise, AFrozenHandCutsNothingUntilItIsFreed) {
   EXPECT_EQ(frozen->kind, EventKind::supervise);
   EXPECT_GT(all.room.lease_epoch(all.trainee), before);
   EXPECT_EQ(frozen->lease_epoch, all.room.lease_epoch(all.trainee));
-  EXPECT_EQ(all.room.lease_epoch(all.other), others) << "nobody else's lease";
+  EXPECT_EQ(all.room.lease_epoch(all.other), others) << "the leases of others stay";
   EXPECT_EQ(all.room.people().supervised(all.trainee).seq, frozen->room_seq);
   EXPECT_EQ(all.room.people().supervised(all.trainee).supervision.words, "look here");
   EXPECT_EQ(all.room.people().supervised(all.trainee).by, all.instructor);
 
-  EXPECT_EQ(all.cut(all.trainee, before).rejection, Rejection::lease) << "what was under way falls as such";
+  EXPECT_EQ(all.cut(all.trainee, before).rejection, Rejection::lease) << "a cut under way is rejected for its lease";
   EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::frozen);
   EXPECT_EQ(all.room.field_hash(), bone);
   EXPECT_TRUE(all.cut(all.other).committed());
@@ -70,7 +70,8 @@ TEST(Supervise, AFrozenHandCutsNothingUntilItIsFreed) {
   const std::uint64_t while_frozen = all.room.lease_epoch(all.trainee);
   ASSERT_TRUE(all.room.supervise(all.instructor, all.trainee, {}));
   EXPECT_GT(all.room.lease_epoch(all.trainee), while_frozen);
-  EXPECT_EQ(all.cut(all.trainee, while_frozen).rejection, Rejection::lease) << "what was queued while it was frozen";
+  EXPECT_EQ(all.cut(all.trainee, while_frozen).rejection, Rejection::lease)
+      << "so is a cut that was queued during the stop";
   EXPECT_TRUE(all.cut(all.trainee).committed());
 }
 
@@ -83,14 +84,14 @@ TEST(Supervise, ATakenToolIsNobodysUntilItIsGivenBack) {
   EXPECT_TRUE(all.cut(all.trainee).committed());
 }
 
-// A limit is no stop: the lease stays, so that what keeps to it and is under way is taken.
+// A restriction of tools is no stop. The lease stays, so that cuts under way that obey the restriction are taken.
 TEST(Supervise, AToolThatIsNotAmongThoseLeftIsRejected) {
   Class all;
   const std::uint64_t lease = all.room.lease_epoch(all.trainee);
   ASSERT_TRUE(all.room.supervise(all.instructor, all.trainee, {.tools = {tool_named("burr-round-5").hash()}}));
   EXPECT_EQ(all.room.lease_epoch(all.trainee), lease);
   EXPECT_TRUE(all.cut(all.trainee, lease).committed()) << "the first stroke is the burr's";
-  EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::forbidden_tool) << "and the second the drill's";
+  EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::forbidden_tool) << "the second stroke is the drill's";
   EXPECT_TRUE(all.cut(all.trainee).committed());
 }
 
@@ -103,7 +104,7 @@ TEST(Supervise, ACutThatLeavesItsZoneIsRejected) {
   way = std::sqrt(way);
   ASSERT_TRUE(
       all.room.supervise(all.instructor, all.trainee, {.zone = ZoneLimit{from, static_cast<std::int32_t>(way) - 1}}));
-  EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::zone) << "its end is outside";
+  EXPECT_EQ(all.cut(all.trainee).rejection, Rejection::zone) << "the end of the cut is outside";
   const auto second = all.cuts.at(all.trainee)[1].path;
   ASSERT_TRUE(all.room.supervise(all.instructor, all.trainee, {.zone = ZoneLimit{second.front().position, 1 << 20}}));
   EXPECT_TRUE(all.cut(all.trainee).committed());
@@ -119,13 +120,13 @@ TEST(Supervise, OnlyAnInstructorDoesAndOnlyAboutAHand) {
   const auto bad = [&](Restrictions supervision) {
     return all.refused(all.room.supervise(all.instructor, all.trainee, supervision));
   };
-  EXPECT_EQ(bad({.taken_by = AuthorId{99}}), ErrorCode::invalid_input) << "who has not joined";
-  EXPECT_EQ(bad({.guide = all.trainee}), ErrorCode::invalid_input) << "along itself";
-  EXPECT_EQ(bad({.tools = {Digest{{1}}}}), ErrorCode::invalid_input) << "a tool that nobody knows";
+  EXPECT_EQ(bad({.taken_by = AuthorId{99}}), ErrorCode::invalid_input) << "that author has not joined";
+  EXPECT_EQ(bad({.guide = all.trainee}), ErrorCode::invalid_input) << "a tool cannot be guided along itself";
+  EXPECT_EQ(bad({.tools = {Digest{{1}}}}), ErrorCode::invalid_input) << "the tool is unknown";
   EXPECT_EQ(bad({.guide_share = 1001}), ErrorCode::invalid_input);
   EXPECT_EQ(bad({.force_limit = -1}), ErrorCode::invalid_input);
-  EXPECT_EQ(all.room.room_seq().value, 5u) << "nothing of it has a place";
-  // Of a room whose server knows nobody by name.
+  EXPECT_EQ(all.room.room_seq().value, 5u) << "no refused decision has a sequence number";
+  // In a room whose server knows nobody by name.
   Room plain(test_block());
   const AuthorId one = plain.join(MemberKind::watcher), hand = plain.join(MemberKind::surgeon);
   EXPECT_TRUE(plain.supervise(one, hand, {.stopped = true}));
@@ -140,15 +141,15 @@ TEST(TakeBack, ATraineeTakesBackOnlyTheirOwn) {
   EXPECT_EQ(all.refused(all.room.undo_to(all.trainee, RoomSeq{own.value - 1})), ErrorCode::denied);
   const auto undone = all.room.undo_last(all.trainee, 1, {});
   ASSERT_TRUE(undone) << undone.error().message;
-  EXPECT_EQ(undone->seqs, std::vector{own}) << "the newest of all is another's";
-  EXPECT_EQ(all.refused(all.room.redo_last(all.other, 1)), ErrorCode::denied) << "another's undo";
+  EXPECT_EQ(undone->seqs, std::vector{own}) << "the newest cut of all is another author's";
+  EXPECT_EQ(all.refused(all.room.redo_last(all.other, 1)), ErrorCode::denied) << "another author made that undo";
   EXPECT_TRUE(all.room.redo_last(all.trainee, 1));
   const auto any = all.room.undo_last(all.collaborator, 1, {});
   ASSERT_TRUE(any);
   EXPECT_EQ(any->seqs, std::vector{others});
 }
 
-// However it is asked for, and whatever they have done themselves.
+// However the undo is requested, and whatever they have done themselves.
 TEST(TakeBack, ACollaboratorTakesBackAnyonesButNeverAllThatTheOthersDid) {
   Class all;
   const RoomSeq first = all.cut(all.trainee).room_seq;
@@ -158,7 +159,7 @@ TEST(TakeBack, ACollaboratorTakesBackAnyonesButNeverAllThatTheOthersDid) {
   const RoomSeq both[] = {first, second}, one[] = {second}, all_three[] = {first, own, second};
   const AuthorId by = all.collaborator;
   const auto refused = [&](const Result<RoomEvent>& undo) {
-    if (all.refused(undo) != ErrorCode::denied) return ADD_FAILURE() << "it was not denied";
+    if (all.refused(undo) != ErrorCode::denied) return ADD_FAILURE() << "the undo was not denied";
     EXPECT_NE(undo.error().message.find("only an instructor"), std::string::npos) << undo.error().message;
   };
   refused(all.room.undo_last(by, 1'000'000, {}));
@@ -169,30 +170,30 @@ TEST(TakeBack, ACollaboratorTakesBackAnyonesButNeverAllThatTheOthersDid) {
   refused(all.room.undo(by, both));
   refused(all.room.undo(by, all_three));
   EXPECT_EQ(all.room.field_hash(), bone);
-  // One of them, and then the other is all that there is of others.
+  // After the undo of one cut, the other is everything that is left of others.
   ASSERT_TRUE(all.room.undo(by, one));
   refused(all.room.undo_last(by, 1, all.trainee));
   refused(all.room.undo_last(by, 1'000'000, {}));
-  // Their own at any count.
+  // They may undo their own work at any count.
   const auto undone = all.room.undo_last(by, 1'000'000, by);
   ASSERT_TRUE(undone) << undone.error().message;
   EXPECT_EQ(undone->seqs, std::vector{own});
-  ASSERT_TRUE(all.room.redo_last(by, 2)) << "what a collaborator took back, and others'";
+  ASSERT_TRUE(all.room.redo_last(by, 2)) << "a redo of what a collaborator undid, also of others' cuts";
   EXPECT_EQ(all.room.field_hash(), bone);
 
-  // An instructor takes all back, and gives it back.
+  // An instructor undoes everything and redoes it.
   ASSERT_TRUE(all.room.undo_last(all.instructor, 1'000'000, {}));
   EXPECT_EQ(all.room.field_hash(), Room(test_block()).field_hash());
   refused(all.room.redo_last(by, 1));
   refused(all.room.redo_last(by, 1'000'000));
   ASSERT_TRUE(all.room.redo_last(all.instructor, 1));
   EXPECT_EQ(all.room.field_hash(), bone);
-  // A part of it anybody who takes back anyone's.
+  // Whoever may undo anyone's work may redo a part of it.
   ASSERT_TRUE(all.room.undo_last(all.instructor, 1, {}));
   EXPECT_TRUE(all.room.redo_last(by, 1));
 }
 
-// By who they are, not by which of their programs it was: rooms in which a collaborator alone has worked are theirs.
+// The person decides, not the program: a room in which only one collaborator has worked is wholly theirs to undo.
 TEST(TakeBack, ACollaboratorTakesBackAllOfTheirOwnAlsoOfAnEarlierJoin) {
   Class all;
   ASSERT_TRUE(all.cut(all.collaborator).committed());
@@ -232,7 +233,7 @@ TEST(Annotations, AreTheirAuthorsAndTheInstructorsToWipeOff) {
   const auto first = all.room.annotate(all.trainee, line(2));
   ASSERT_TRUE(first) << first.error().message;
   ASSERT_TRUE(all.room.people().annotations().contains(1));
-  EXPECT_EQ(all.room.people().annotations().at(1).author, all.trainee) << "the room says whose it is";
+  EXPECT_EQ(all.room.people().annotations().at(1).author, all.trainee) << "the room sets the author";
   Annotation again = line(5);
   again.id = 1;
   EXPECT_EQ(all.refused(all.room.annotate(all.other, again)), ErrorCode::denied);
@@ -245,7 +246,7 @@ TEST(Annotations, AreTheirAuthorsAndTheInstructorsToWipeOff) {
   ASSERT_TRUE(all.room.wipe_off(all.instructor, 1));
   EXPECT_TRUE(all.room.people().annotations().empty());
   ASSERT_TRUE(all.room.annotate(all.trainee, line(2)));
-  EXPECT_TRUE(all.room.people().annotations().contains(2)) << "a number is given once";
+  EXPECT_TRUE(all.room.people().annotations().contains(2)) << "a number is used only once";
 
   // An author has one pointer.
   Annotation pointer{.points = {{1, 2, 3}}};
@@ -265,7 +266,7 @@ TEST(Annotations, AreBounded) {
   EXPECT_EQ(bad({.points = {}}), ErrorCode::invalid_input);
   EXPECT_EQ(bad({.points = {{1, 2, 3}, {1, 2, 3}}}), ErrorCode::invalid_input);
   EXPECT_EQ(bad({.kind = AnnotationKind::label, .points = {{1, 2, 3}}}), ErrorCode::invalid_input)
-      << "a label without words";
+      << "a label needs text";
   EXPECT_EQ(bad({.points = {{1, 2, 3}}, .words = std::string(kMostAnnotationWords + 1, 'x')}),
             ErrorCode::invalid_input);
   EXPECT_EQ(bad({.points = {{1, 2, 3}}, .colour = 0x1000000}), ErrorCode::invalid_input);
@@ -297,8 +298,8 @@ LogEntry through_bytes(const LogEntry& entry) {
   return std::move(*read);
 }
 
-// Whatever they do: through the journal's bytes, the entries make the same room again.
-TEST(PeopleRows, ReplayedMakeTheSameRoom) {
+// Whatever the people do, a replay of the log entries, through the journal's bytes, makes the same room again.
+TEST(PeopleEntries, ReplayedMakeTheSameRoom) {
   for (unsigned seed = 1; seed <= 4; ++seed) {
     Class all;
     Room replayed(test_block());
@@ -352,7 +353,7 @@ TEST(PeopleRows, ReplayedMakeTheSameRoom) {
   }
 }
 
-TEST(PeopleRows, EveryOneOfThemIsInTheHash) {
+TEST(PeopleEntries, EveryOneOfThemIsInTheHash) {
   Class plain, all;
   EXPECT_EQ(plain.room.room_hash(), all.room.room_hash());
   std::set<std::string> hashes{to_hex(all.room.room_hash())};
@@ -360,7 +361,7 @@ TEST(PeopleRows, EveryOneOfThemIsInTheHash) {
     EXPECT_TRUE(hashes.insert(to_hex(all.room.room_hash())).second) << what;
   };
   const auto decide = [&](const char* what, const Restrictions& word) {
-    // At the same place of the order each time: beside the others, not after them.
+    // At the same sequence number each time: instead of the others, not after them.
     all = Class();
     EXPECT_TRUE(all.room.supervise(all.instructor, all.trainee, word)) << what;
     changed(what);
@@ -380,8 +381,8 @@ TEST(PeopleRows, EveryOneOfThemIsInTheHash) {
   changed("a line");
 }
 
-// What no room would have decided is no entry of one.
-TEST(PeopleRows, ThatCannotBeAreRefused) {
+// An entry that no room would have decided is refused.
+TEST(PeopleEntries, ThatCannotBeAreRefused) {
   Class all;
   const auto refused = [&](decltype(LogEntry::what) what) {
     const LogEntry entry{RoomSeq{all.room.room_seq().value + 1}, all.room.time(), all.instructor, std::move(what)};

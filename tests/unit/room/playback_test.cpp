@@ -22,8 +22,8 @@ Playback of(std::deque<std::chrono::nanoseconds> times, double speed) {
           speed};
 }
 
-// Rows of 10 s, 12 s and 16 s, in a room that was at 10 s when somebody began to watch.
-TEST(Player, GivesRowsAtTheirTimesOverItsSpeed) {
+// Log entries of 10 s, 12 s and 16 s, in a room that was at 10 s when somebody began to watch.
+TEST(Player, GivesLogEntriesAtTheirTimesOverItsSpeed) {
   for (const double speed : {0.5, 1.0, 4.0}) {
     Player player(of({10s, 12s, 16s}, speed), 10s);
     const auto at = [&](double s) {
@@ -47,7 +47,7 @@ TEST(Player, StandsStillAndStops) {
   Player stopped(of({1s, 2s}, 1.0), 0s);
   (void)stopped.take(0s);
   ASSERT_TRUE(stopped.take(1500ms));
-  ASSERT_FALSE(stopped.take(1600ms)) << "the entry of 2 s is waited for";
+  ASSERT_FALSE(stopped.take(1600ms)) << "the entry of 2 s is not due yet";
   stopped.stop();
   EXPECT_FALSE(stopped.take(20s));
 }

@@ -1,4 +1,4 @@
-// Rooms as files of a folder: looking into one that is in use, who its people are and were, its branches, its end.
+// Rooms as files in a folder: reading a room that is in use, its people of now and before, its branches, its deletion.
 #include "server/net/room_files.hpp"
 
 #include <gmock/gmock.h>
@@ -45,7 +45,7 @@ TEST(RoomsFolder, IsOneServersAsLongAsItHoldsIt) {
   EXPECT_EQ(second.error().code, ErrorCode::exists);
   EXPECT_THAT(second.error().message,
               AllOf(HasSubstr(dir.path().string()), HasSubstr("--rooms"), HasSubstr("end that one first")));
-  // What is done to a journal that no server has open goes on beside it, and the lock is no room.
+  // Work on a journal that no server has open goes on beside the lock. The lock file is not taken for a room.
   KeptCuts kept(dir / "femur.journal", nullptr, "femur");
   kept.cut(3);
   ASSERT_TRUE(kept.store->close());
@@ -79,10 +79,10 @@ TEST_F(RoomFilesTest, WhatAJournalBeganAsIsReadBesideWhoeverUsesIt) {
   ASSERT_NE(name, std::string::npos);
   spoiled.replace(name, 5, "tibia");
   disk_.put("/rooms/list", spoiled);
-  EXPECT_EQ(peek_genesis("/rooms/list", &disk_).error().code, ErrorCode::invalid_input) << "it does not fit its seal";
+  EXPECT_EQ(peek_genesis("/rooms/list", &disk_).error().code, ErrorCode::invalid_input) << "the seal does not match";
 }
 
-// By SQLite's locks on the computer's disk, too.
+// The same with SQLite's locks on the computer's disk.
 TEST(RoomFiles, APeekOnTheComputersDiskDisturbsNobody) {
   const test::TempDir folder;
   const fs::path file = folder.path() / "a room? 100 %#1";
@@ -123,7 +123,7 @@ TEST_F(RoomFilesTest, ARoomIsOpenedOnlyUnderItsName) {
   EXPECT_EQ(renamed->store->genesis().room, "tibia");
 }
 
-TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
+TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsErased) {
   std::int32_t today = 100;
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
@@ -136,15 +136,15 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   ASSERT_EQ(kept.store->person("Bela Neu").value(), 2u);
   ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u) << "she is still known";
   today = 130;
-  EXPECT_EQ(kept.store->erase_old_people().value(), 0u) << "30 days are not more than 30";
+  EXPECT_EQ(kept.store->erase_old_people().value(), 0u) << "30 days are not more than 30 days";
   EXPECT_TRUE(anywhere("Anna Alt"));
   today = 131;
   EXPECT_EQ(kept.store->erase_old_people().value(), 1u);
   EXPECT_FALSE(anywhere("Anna Alt"));
   EXPECT_TRUE(anywhere("Bela Neu"));
-  EXPECT_EQ(kept.store->person("Anna Alt").value(), 3u) << "nobody knows any more that this was 1";
+  EXPECT_EQ(kept.store->person("Anna Alt").value(), 3u) << "the name no longer belongs to number 1";
 
-  // And at the opening.
+  // The same when the room is opened.
   kept.cut(3);
   kept.store.reset();
   today = 151;
@@ -156,13 +156,13 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsForgotten) {
   kept.options.retention_days = 0;
   kept.open(kFile);
   EXPECT_EQ(kept.store->erase_old_people().value(), 0u);
-  EXPECT_TRUE(anywhere("Anna Alt")) << "for ever";
+  EXPECT_TRUE(anywhere("Anna Alt")) << "the name stays for ever";
   EXPECT_TRUE(kept.store->erase_person(3).value());
   EXPECT_FALSE(kept.store->erase_person(3).value());
   EXPECT_FALSE(anywhere("Anna Alt"));
 }
 
-// What one person said, drew as words and called moments, and what was decided about and said to it.
+// Messages, labels and names of marks of one person, and what was decided about them and said to them.
 TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   KeptCuts kept(kFile, &disk_, "femur");
   ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u);
@@ -193,9 +193,9 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   for (const char* stays : {"Bela Neu", "of another", "anna altmann is somebody else"})
     EXPECT_TRUE(anywhere(stays)) << stays;
   EXPECT_EQ(kept.store->head(), head);
-  EXPECT_FALSE(kept.store->erase_person(1).value()) << "nothing is left to forget";
+  EXPECT_FALSE(kept.store->erase_person(1).value()) << "nothing is left to erase";
 
-  // The room goes on, and what it was is made again from its entries.
+  // The room goes on. A replay of its entries makes the earlier room again.
   kept.cut(2);
   const Digest later = room.field_hash();
   ASSERT_TRUE(kept.store->close());
@@ -214,7 +214,7 @@ TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
   KeptCuts kept(kFile, &disk_, "femur");
   ASSERT_EQ(kept.store->person("Anna \"A\"\n").value(), 1u);
   ASSERT_EQ(kept.store->person("Bela").value(), 2u);
-  kept.cut(4);  // by 1: its coming, 4 cuts, 4 marks
+  kept.cut(4);  // By 1: its join, 4 cuts, 4 marks.
   const AuthorId other = kept.room->join(MemberKind::surgeon, 2), nobody = kept.room->join(MemberKind::watcher, 0);
   ASSERT_TRUE(kept.room->mark(other, "of another"));
   ASSERT_TRUE(kept.room->mark(nobody, "of nobody"));
@@ -242,11 +242,11 @@ TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
   ASSERT_TRUE(kept.store->erase_person(1));
   lines.clear();
   ASSERT_TRUE(kept.store->export_person(1, take));
-  EXPECT_THAT(lines, SizeIs(12)) << "what it did stays, under its number";
+  EXPECT_THAT(lines, SizeIs(12)) << "its work stays, under its number";
   EXPECT_EQ(kept.store->export_person(7, take).error().code, ErrorCode::not_found);
 }
 
-// Of a folder with this family, among rooms of the same names that are not of it:
+// A folder with this family of rooms, among other rooms of the same names:
 //   femur --+-- b1 --- b11
 //           +-- b2
 class FamilyTest : public RoomFilesTest {
@@ -284,14 +284,14 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
   EXPECT_FALSE(has_head(kFile, {RoomSeq{5}, {}}, &disk_).value());
   EXPECT_FALSE(has_head(kFile, {RoomSeq{5000}, {}}, &disk_).value());
 
-  // In use, with entries that are only in the log.
+  // In use, with entries that are only in its log.
   KeptCuts live(kFile, &disk_, "femur");
-  EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "of entries that are in its file";
+  EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "these branches are of entries in the database file";
   live.cut(2);
   const RoomSeq newest = live.store->head().seq;
   ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
   EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists)
-      << "nobody but the store can know";
+      << "only the store can know";
   const HasHead has = [&](const fs::path& file, const JournalHead& head) {
     return file == kFile ? live.store->has_head(head) : has_head(file, head, &disk_);
   };
@@ -327,7 +327,8 @@ TEST_F(FamilyTest, AloneItLeavesItsBranchesWhole) {
   EXPECT_TRUE(disk_.size("/rooms/b2").value());
 }
 
-// A journal that has lost its end gives what is confirmed to who asks for that, and never less than was asked for.
+// A branch of a journal that has lost its end contains what is confirmed, if that was requested, and never less than
+// what was requested.
 TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   RoomSeq last;
   {
@@ -352,8 +353,8 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   EXPECT_EQ(confirmed->seq, RoomSeq{29});
 }
 
-// Not closed, so that its last entries are only in its log; the power fails at every write and sync of the deletion in
-// turn.
+// The room is not closed, so its last entries are only in its log. The power fails at every write and sync of the
+// deletion in turn.
 TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   RoomSeq head;
   {
@@ -366,7 +367,7 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   }
   const MemoryDisk::Image before = disk_.image();
   int whole = 0, none = 0, cases = 0;
-  // What the power leaves of what was not synced is drawn: so each place several times.
+  // Random which unsynced data survives the power failure, so each point is tried several times.
   for (bool failed = true; failed; ++cases) {
     disk_.load(before);
     disk_.fail_power_at(static_cast<std::uint64_t>(cases / 5 + 1));
@@ -387,7 +388,7 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
     }
     const auto again = delete_room(kFile, true, &disk_);
     EXPECT_TRUE(again || again.error().code == ErrorCode::not_found) << again.error().message;
-    EXPECT_TRUE(Journal::create(kFile, "bone", {.disk = &disk_})) << "nothing is in its way";
+    EXPECT_TRUE(Journal::create(kFile, "bone", {.disk = &disk_})) << "nothing prevents a new journal";
   }
   std::printf("%d places to fail at: %d journals whole, %d gone\n", cases / 5, whole, none);
   EXPECT_GT(whole, 2);

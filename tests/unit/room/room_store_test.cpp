@@ -1,4 +1,4 @@
-// What is done to the journal of a room in use: reading, checking, copying and branching it, and its checkpoints.
+// Work on the journal of a room in use: reading, verifying, copying and branching it, and its checkpoints.
 #include "server/net/room_store.hpp"
 
 #include <gmock/gmock.h>
@@ -30,9 +30,9 @@ using ::testing::SizeIs;
 
 constexpr const char *kFile = "/rooms/femur", *kTo = "/else/copy";
 
-class KeeperTest : public ::testing::Test {
+class RoomStoreTest : public ::testing::Test {
  protected:
-  // Writes an entry whenever it is called: where the journal were held meanwhile, for ever.
+  // Writes an entry at every call. If the journal were locked meanwhile, it would wait for ever.
   MaintenanceCalls writing(KeptCuts& kept, int& written) {
     return {[&kept, &written](double) {
               kept.cut(1);
@@ -48,7 +48,7 @@ class KeeperTest : public ::testing::Test {
   MemoryDisk disk_{1};
 };
 
-TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
+TEST_F(RoomStoreTest, OnceClosedItSaysSoAndTouchesNothing) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(3);
   RoomStore& store = *kept.store;
@@ -85,7 +85,7 @@ TEST_F(KeeperTest, OnceClosedItSaysSoAndTouchesNothing) {
   EXPECT_EQ(disk_.counts().writes, counts.writes);
 }
 
-TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
+TEST_F(RoomStoreTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(2);
   const Witness early = kept.store->witness();
@@ -94,12 +94,13 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   const Witness late = kept.store->witness();
   ASSERT_GT(late.head.seq, early.head.seq);
   EXPECT_TRUE(kept.store->check_witness(early));
-  EXPECT_TRUE(kept.store->check_witness({early.head, {}})) << "what it has needs no seal";
+  EXPECT_TRUE(kept.store->check_witness({early.head, {}})) << "no seal is needed for entries that the store has";
   Witness other = early;
   other.head.chain.bytes[0] ^= 1;
-  EXPECT_EQ(kept.store->check_witness(other).error().code, ErrorCode::invalid_input) << "another history";
+  EXPECT_EQ(kept.store->check_witness(other).error().code, ErrorCode::invalid_input)
+      << "the witness is of another history";
 
-  // The disk forgets what it said it had.
+  // The disk loses data that it had reported as synced.
   kept.store.reset();
   disk_.load(image);
   kept.open(kFile);
@@ -121,15 +122,16 @@ TEST_F(KeeperTest, BelievesWhatItSealedAndNothingElseOfWhatItLacks) {
   EXPECT_THAT(lost.error().message,
               HasSubstr("the room femur has lost " + std::to_string(less) + " of the " + std::to_string(told) +
                         " events that were acknowledged to you, and takes no more cuts"));
-  EXPECT_EQ(kept.store->check_witness(late).error().message, lost.error().message) << "so does the next";
+  EXPECT_EQ(kept.store->check_witness(late).error().message, lost.error().message)
+      << "the next witness gets the same error";
   EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().seq, 1))) << "entries were lost: it takes no more";
   kept.store.reset();
   kept.open(kFile);
   EXPECT_FALSE(kept.store->write(plain_entries(kept.store->head().seq, 1))) << "nor when it is opened again";
 }
 
-// Whatever has become of the journal: the sentence names it, and what is lost.
-TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
+// In whatever way the journal was damaged, the message names the journal and what is lost.
+TEST_F(RoomStoreTest, SaysToWhomeverItSentMoreWhatIsLost) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(2);
   const RoomSeq copied = kept.store->head().seq;
@@ -139,13 +141,13 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   const std::string of_all = " of the " + std::to_string(late.head.seq.value) + " events that were acknowledged to you";
   const std::string lost = "the room femur has lost " + std::to_string(late.head.seq.value - copied.value) + of_all;
   const auto told = [&](const fs::path& file, MemoryDisk& disk) {
-    KeptCuts room(file, &disk, "femur", 2);  // with other cuts
+    KeptCuts room(file, &disk, "femur", 2);  // With other cuts.
     const auto say = [&] {
       const Result<void> checked = room.store->check_witness(late);
       return checked ? std::string("nothing") : checked.error().message;
     };
     const std::string at_once = say();
-    room.cut(20);  // it goes on beyond what was told
+    room.cut(20);  // It goes on beyond the acknowledged entry.
     return std::pair(at_once, say());
   };
   kept.store.reset();
@@ -169,17 +171,17 @@ TEST_F(KeeperTest, SaysToWhomeverItToldMoreWhatIsLost) {
   copy.cut(20);
   EXPECT_THAT(copy.store->check_witness(late).error().message,
               HasSubstr("the room femur has lost some" + of_all + ": an older copy of its journal has gone on"));
-  EXPECT_EQ(copy.store->closed_to_entries(), nullptr) << "what stands in it now may go on";
+  EXPECT_EQ(copy.store->closed_to_entries(), nullptr) << "the salvaged journal may go on";
 }
 
-TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
-  // What a hand may have done since the last entry: cuts until it hears nothing for so long, or leaves so many
-  // unconfirmed.
+TEST_F(RoomStoreTest, TimeAdvancesByMoreThanClientsWorkUnacknowledged) {
+  // The most that a client may have done since the last entry: it cuts until it has received nothing for this time, or
+  // until this many cuts are unacknowledged.
   constexpr double kTick_s = 0.001, kAway_s = std::chrono::duration<double>(kTimeAway).count();
   static_assert(kAway_s > haptic::ConfirmationMonitor::kSilence_s);
   static_assert(kAway_s > haptic::ConfirmationMonitor::kMostUnconfirmed * haptic::CutRecorder::kTicksPerCut * kTick_s);
   KeptCuts kept(kFile, &disk_, "femur");
-  EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "a new one";
+  EXPECT_EQ(reopened_time(Room(test_block())), 0ns) << "the room is new";
   kept.cut(3);
   const auto at = kept.room->time();
   kept.store.reset();
@@ -188,7 +190,7 @@ TEST_F(KeeperTest, TimeGoesOnByMoreThanHandsWorkInSilence) {
   EXPECT_EQ(reopened_time(*kept.room), at + kTimeAway);
 }
 
-TEST_F(KeeperTest, IsReadWhileItIsWritten) {
+TEST_F(RoomStoreTest, IsReadWhileItIsWritten) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(300);
   const BoneAt bone = kept.bone();
@@ -221,7 +223,7 @@ TEST_F(KeeperTest, IsReadWhileItIsWritten) {
   EXPECT_THAT(seqs, IsEmpty());
 }
 
-TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
+TEST_F(RoomStoreTest, AVerifyConfirmsLogEntriesCheckpointsAndBone) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(30);
   kept.checkpoint();
@@ -267,7 +269,7 @@ TEST_F(KeeperTest, AVerifyConfirmsRowsCheckpointsAndBone) {
   EXPECT_EQ(asked, 10);
 }
 
-TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
+TEST_F(RoomStoreTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(10);
   const std::vector<FieldLeaf> earlier = kept.room->all_leaves();
@@ -276,14 +278,14 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   const RoomSeq good = kept.room->room_seq();
   kept.cut(1);
   ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), earlier))
-      << "which it cannot know to be of an earlier place";
+      << "it cannot know that they are of an earlier sequence number";
   Result<RoomReport> report = kept.store->verify(test_block(), kept.bone());
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults[0],
               AllOf(HasSubstr("the checkpoint at event " + std::to_string(kept.room->room_seq().value)),
                     HasSubstr("is not what its entries make")));
-  EXPECT_EQ(report->checkpoints, 2u) << "its bytes are those that were written";
+  EXPECT_EQ(report->checkpoints, 2u) << "the checkpoint's bytes are as they were written";
 
   for (const auto& [name, bytes] : disk_.image())
     if (name.find("-" + std::to_string(good.value) + "-") != std::string::npos) disk_.flip_bit(name, 4 * bytes.size());
@@ -296,8 +298,8 @@ TEST_F(KeeperTest, AVerifyFindsCheckpointsThatWereSpoiledOrMadeOfAnotherBone) {
   EXPECT_EQ(files_of("/else/"), 0u);
 }
 
-// Nobody makes the bone of a checkpoint again before it is served.
-TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
+// Nobody recomputes the bone of a checkpoint before it is used.
+TEST_F(RoomStoreTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
   KeptCuts kept(kFile, &disk_, "femur");
   const auto reopen = [&](const std::shared_ptr<const SigningKeys>& keys) {
     ASSERT_TRUE(kept.store->close());
@@ -310,20 +312,20 @@ TEST_F(KeeperTest, ServesTheBoneOfNoCheckpointThatItsKeyDidNotSign) {
   const Digest cut = kept.room->field_hash();
   ASSERT_TRUE(kept.store->checkpoint(kept.room->room_seq(), uncut));
   reopen(nullptr);
-  ASSERT_NE(kept.room->field_hash(), cut) << "without a key it is taken for the server's";
+  ASSERT_NE(kept.room->field_hash(), cut) << "without a key the bone is accepted as the server's";
   reopen(std::make_shared<const SigningKeys>(SigningKey::make()));
   EXPECT_EQ(kept.room->field_hash(), cut);
 }
 
-// On the disk, under a journal that is open: beyond what SQLite still has in memory.
-TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
+// Damage on the disk, under an open journal, beyond what SQLite has in memory.
+TEST_F(RoomStoreTest, DamageUnderAnOpenJournalIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
   ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().seq, 600, 20'000)));
   const JournalHead head = kept.store->head();
   const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find("100." + std::string(50, 'x'));
-  ASSERT_NE(at, std::string::npos) << "more than the log takes is in the database";
+  ASSERT_NE(at, std::string::npos) << "what exceeds the log is in the database";
   disk_.flip_bit(kFile, 8 * (at + 20) + 1);
   const Result<RoomReport> report = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(report);
@@ -338,11 +340,11 @@ TEST_F(KeeperTest, DamageUnderAnOpenJournalIsFound) {
   EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(kept.store->branch(kTo, {}, "b").error().code, ErrorCode::invalid_input);
   EXPECT_EQ(files_of("/else/"), 0u);
-  EXPECT_TRUE(kept.store->branch(kTo, RoomSeq{99}, "b")) << "which the damage does not reach";
+  EXPECT_TRUE(kept.store->branch(kTo, RoomSeq{99}, "b")) << "the damage does not reach the branch";
 }
 
-// Also where SQLite has the entries in memory, from when they were written.
-TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
+// Also if SQLite still has the entries in memory since they were written.
+TEST_F(RoomStoreTest, DamageUnderLogEntriesThatWereJustWrittenIsFound) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(3);
   const RoomSeq before = kept.store->head().seq;
@@ -350,7 +352,7 @@ TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
   ASSERT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
   const std::string entry = std::to_string(before.value + 7) + "." + std::string(20, 'x');
   const std::size_t at = disk_.image().at(kFile).rfind(entry);
-  ASSERT_NE(at, std::string::npos) << "a check carries the log into the database";
+  ASSERT_NE(at, std::string::npos) << "a check moves the log into the database";
   disk_.flip_bit(kFile, 8 * (at + 10) + 1);
   const Result<RoomReport> report = kept.store->verify(test_block(), std::nullopt);
   ASSERT_TRUE(report);
@@ -358,7 +360,7 @@ TEST_F(KeeperTest, DamageUnderRowsThatWereJustWrittenIsFound) {
   EXPECT_FALSE(report->sound());
 }
 
-TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
+TEST_F(RoomStoreTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.keep();
   const auto file_bytes = [&] { return disk_.size(kFile).value().value(); };
@@ -366,13 +368,13 @@ TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   const std::uint64_t before = file_bytes();
   ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().seq, 20, 20'000)));
   ASSERT_TRUE(kept.store->tidy_if_idle());
-  EXPECT_EQ(file_bytes(), before) << "entries have come since it was asked";
+  EXPECT_EQ(file_bytes(), before) << "entries were added since the last request";
   ASSERT_TRUE(kept.store->tidy_if_idle());
   EXPECT_GT(file_bytes(), before + 20u * 20'000);
   ASSERT_TRUE(kept.store->write(plain_entries(kept.store->head().seq, 3)));
   EXPECT_TRUE(kept.store->verify(test_block(), std::nullopt)->sound());
 
-  // One that takes no entries is left alone, and nobody is told of that every few seconds.
+  // A store that takes no entries is left alone, and does not report that every few seconds.
   disk_.fail_write_at(1, EIO);
   ASSERT_FALSE(kept.store->write(plain_entries(kept.store->head().seq, 200, 20'000)));
   const MemoryDisk::Image failed = disk_.image();
@@ -380,9 +382,8 @@ TEST_F(KeeperTest, AnIdleRoomsLogGoesIntoTheDatabase) {
   EXPECT_EQ(disk_.image(), failed);
 }
 
-// On the computer's disk, and each waits for the other: so entries get through between any two slices of a check or a
-// copy.
-TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
+// On the computer's disk, with locks between them: entries are written between any two slices of a check or a copy.
+TEST(RoomStoreThreads, LogEntriesAreWrittenWhileAJournalIsCheckedAndCopied) {
   const test::TempDir folder;
   KeptCuts kept(folder.path() / "room", nullptr, "room");
   kept.keep();
@@ -421,7 +422,7 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
                 static_cast<unsigned long long>(head.seq.value), static_cast<unsigned long long>(written - before),
                 waits / 20);
   }
-  // Without any waiting: how often is the scheduler's to say.
+  // Without any waits: the scheduler decides how often entries are written.
   const std::uint64_t before = written;
   ASSERT_TRUE(store.verify(test_block(), std::nullopt));
   std::printf("a check that waits for nobody: %llu entries written meanwhile\n",
@@ -434,7 +435,7 @@ TEST(KeeperThreads, RowsAreWrittenWhileAJournalIsCheckedAndCopied) {
   EXPECT_TRUE(copy->sound());
 }
 
-TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
+TEST_F(RoomStoreTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(150);
   kept.checkpoint();
@@ -456,7 +457,7 @@ TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
     const Result<PersistedRoom> again = RoomStore::open(kTo, test_block(), kept.options);
     ASSERT_TRUE(again) << again.error().message;
     EXPECT_EQ(again->room.room_hash(), hash);
-    EXPECT_EQ(again->store->evaluated(), head.seq.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied, too";
+    EXPECT_EQ(again->store->evaluated(), head.seq.value - (1 + 150 * 2 + 30)) << "its checkpoint was copied too";
     EXPECT_THAT(again->store->people().value(), SizeIs(1));
   }
   EXPECT_EQ(kept.store->backup(kTo).error().code, ErrorCode::exists);
@@ -467,8 +468,8 @@ TEST_F(KeeperTest, ABackupIsTheRoomAsItWasWhileItGoesOn) {
   EXPECT_EQ(files_of("/"), before);
 }
 
-// The checkpoints that it found when it began are gone when it comes to them.
-TEST_F(KeeperTest, ABackupPassesOverCheckpointsThatWereReplacedMeanwhile) {
+// The checkpoints that the backup found when it began are gone when it reaches them.
+TEST_F(RoomStoreTest, ABackupPassesOverCheckpointsThatWereReplacedMeanwhile) {
   KeptCuts kept(kFile, &disk_, "femur");
   for (int i = 0; i < 2; ++i) {
     kept.cut(20);
@@ -493,7 +494,7 @@ TEST_F(KeeperTest, ABackupPassesOverCheckpointsThatWereReplacedMeanwhile) {
   EXPECT_EQ(again->room.room_hash(), hash);
 }
 
-TEST_F(KeeperTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
+TEST_F(RoomStoreTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(150);
   std::optional<MemoryDisk::Image> half;
@@ -511,7 +512,7 @@ TEST_F(KeeperTest, ABackupThatWasCutShortIsNotInTheWayOfTheNext) {
   EXPECT_EQ(files_of("/else/"), 1u);
 }
 
-TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
+TEST_F(RoomStoreTest, ACheckpointIsOfItsSequenceNumberThoughEntriesFollow) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(40);
   const RoomSeq seq = kept.room->room_seq();
@@ -524,9 +525,10 @@ TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
   EXPECT_GT(written, 0);
   EXPECT_EQ(kept.store->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
   const std::size_t files = files_of(kFile);
-  ASSERT_TRUE(kept.store->checkpoint(seq, leaves)) << "there is one";
-  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{5}, leaves)) << "there is a newer one";
-  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{kept.store->head().seq.value + 1}, leaves)) << "not kept yet";
+  ASSERT_TRUE(kept.store->checkpoint(seq, leaves)) << "there is a checkpoint already";
+  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{5}, leaves)) << "there is a newer checkpoint";
+  ASSERT_TRUE(kept.store->checkpoint(RoomSeq{kept.store->head().seq.value + 1}, leaves))
+      << "the entry is not durable yet";
   EXPECT_EQ(files_of(kFile), files);
   EXPECT_EQ(
       kept.store->checkpoint(kept.room->room_seq(), kept.room->all_leaves(), {{}, [] { return true; }}).error().code,
@@ -536,14 +538,14 @@ TEST_F(KeeperTest, ACheckpointIsOfItsPlaceThoughRowsGoOn) {
   const Digest hash = kept.room->room_hash();
   const RoomSeq head = kept.store->head().seq;
   ASSERT_TRUE(kept.store->verify(test_block(), kept.bone())->sound());
-  kept.store.reset();  // as if it had been killed
+  kept.store.reset();  // As if the server had been killed.
   kept.open(kFile);
   EXPECT_EQ(kept.store->evaluated(), head.value - seq.value);
   EXPECT_EQ(kept.store->changes_since_checkpoint(), static_cast<std::uint64_t>(12 + written));
   EXPECT_EQ(kept.room->room_hash(), hash);
 }
 
-TEST_F(KeeperTest, ALargeCheckpointIsSyncedBitByBit) {
+TEST_F(RoomStoreTest, ALargeCheckpointIsSyncedBitByBit) {
   KeptCuts kept(kFile, &disk_, "femur");
   kept.cut(1);
   std::vector<FieldLeaf> leaves;
@@ -568,8 +570,8 @@ TEST_F(KeeperTest, ALargeCheckpointIsSyncedBitByBit) {
               static_cast<unsigned long long>(most));
 }
 
-// Whichever comes first, nothing of it is half there.
-TEST(KeeperThreads, ACheckpointThatIsBeingWrittenIsGivenUpByClosing) {
+// Whichever comes first, no checkpoint is left half written.
+TEST(RoomStoreThreads, ACheckpointThatIsBeingWrittenIsGivenUpByClosing) {
   const test::TempDir folder;
   KeptCuts kept(folder.path() / "room", nullptr, "room");
   kept.cut(5);
@@ -609,8 +611,8 @@ TEST(CheckpointPolicyTest, AsksForWorkAndForTime) {
   EXPECT_FALSE(policy.is_due(1'000'000, 59s));
 }
 
-// Rows of the branch are those of its parent; everything else is its own.
-TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
+// The branch shares the entries of its parent. Everything else is its own.
+TEST_F(RoomStoreTest, ABranchIsARoomOfItsOwn) {
   KeptCuts kept(kFile, &disk_, "femur");
   ASSERT_EQ(kept.store->person("Anna").value(), 1u);
   ASSERT_EQ(kept.store->person("Bela").value(), 2u);
@@ -633,12 +635,13 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
   EXPECT_EQ(kept.store->branch("/else/live", seq, "second try").error().code, ErrorCode::exists);
   const RoomSeq beyond{kept.store->head().seq.value + 1};
   EXPECT_EQ(kept.store->branch("/else/beyond", beyond, "b").error().code, ErrorCode::invalid_input);
-  EXPECT_EQ(branch_journal(kFile, "/else/file", seq, "b", {}, &disk_).error().code, ErrorCode::exists) << "in use";
+  EXPECT_EQ(branch_journal(kFile, "/else/file", seq, "b", {}, &disk_).error().code, ErrorCode::exists)
+      << "the journal is in use";
 
   ASSERT_TRUE(kept.store->close());
   const Result<JournalHead> from_file = branch_journal(kFile, "/else/file", seq, "second try", {}, &disk_);
   ASSERT_TRUE(from_file) << from_file.error().message;
-  EXPECT_EQ(*from_file, *live) << "the same, by the other road";
+  EXPECT_EQ(*from_file, *live) << "both ways make the same branch";
   EXPECT_TRUE(verify_journal(kFile, &disk_)->closed_cleanly);
   for (const char* file : {"/else/live", "/else/file"}) {
     EXPECT_TRUE(verify_journal(file, &disk_)->sound());
@@ -648,10 +651,10 @@ TEST_F(KeeperTest, ABranchIsARoomOfItsOwn) {
     ASSERT_TRUE(branch) << branch.error().message;
     EXPECT_EQ(branch->room.room_hash(), expected.room_hash());
     EXPECT_EQ(branch->store->head(), *live);
-    EXPECT_EQ(branch->store->evaluated(), 5u) << "its parent's checkpoint serves";
+    EXPECT_EQ(branch->store->evaluated(), 5u) << "the checkpoint of the parent is used";
     EXPECT_EQ(branch->store->server_epoch(), 1u);
     EXPECT_THAT(branch->store->people().value(), IsEmpty());
-    EXPECT_EQ(branch->store->person("Cora").value(), 3u) << "1 and 2 are others in its entries";
+    EXPECT_EQ(branch->store->person("Cora").value(), 3u) << "1 and 2 are other people in its entries";
   }
   const Result<JournalHead> whole = branch_journal(kFile, "/else/whole", {}, "all", {}, &disk_);
   ASSERT_TRUE(whole);

@@ -20,7 +20,7 @@ Outcome commit(Room& room, const Cut& cut) {
   return *outcome;
 }
 
-TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
+TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextSequenceNumber) {
   Room room(test_block());
   const AuthorId a = room.join(MemberKind::surgeon), b = room.join(MemberKind::surgeon),
                  c = room.join(MemberKind::watcher);
@@ -31,7 +31,7 @@ TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
   EXPECT_FALSE(room.knows(AuthorId{}));
 
   const auto of_a = strokes(a, 3, 1), of_b = strokes(b, 3, 2);
-  std::uint64_t seq = 3;  // those who came have each a place too
+  std::uint64_t seq = 3;  // Each join has a sequence number too.
   for (int i = 0; i < 3; ++i) {
     EXPECT_EQ(commit(room, of_b[static_cast<std::size_t>(i)]).room_seq.value, ++seq);
     EXPECT_EQ(commit(room, of_a[static_cast<std::size_t>(i)]).room_seq.value, ++seq);
@@ -39,7 +39,7 @@ TEST(Room, GivesNoAuthorTwiceAndEveryCutTheNextPlace) {
   EXPECT_EQ(room.room_seq().value, 9u);
 }
 
-// The bone is a function of the set of cuts: any interleaving of two hands leaves the same bone.
+// The bone is a function of the set of cuts: any interleaving of two authors leaves the same bone.
 TEST(Room, LeavesTheSameBoneForEveryInterleaving) {
   const auto hash_of = [](const std::vector<int>& turns) {
     Room room(test_block());
@@ -58,7 +58,7 @@ TEST(Room, LeavesTheSameBoneForEveryInterleaving) {
 TEST(Room, AnswersACutSentAgainWithItsFirstOutcome) {
   Room room(test_block());
   auto cuts = strokes(room.join(MemberKind::surgeon), 3, 5);
-  cuts[1].level = kLevels;  // rejected, and stays so
+  cuts[1].level = kLevels;  // It is rejected, and stays so.
   const RoomSeq first = commit(room, cuts[0]).room_seq;
   const Outcome second = room.submit(cuts[1]).value();
   EXPECT_EQ(second.rejection, Rejection::level);
@@ -76,9 +76,9 @@ TEST(Room, AnswersACutSentAgainWithItsFirstOutcome) {
   EXPECT_EQ(room.room_seq().value, 4u);
   EXPECT_EQ(room.field_hash(), hash);
   EXPECT_EQ(room.counts().repeated, 2u);
-  // As whoever comes back is told them.
+  // As a client that reconnects is sent them.
   EXPECT_EQ(room.decided_seqs(cuts[0].author, 8), (std::vector<RoomSeq>{first, RoomSeq{}, RoomSeq{4}}));
-  EXPECT_EQ(room.decided_seqs(cuts[0].author, 2), (std::vector<RoomSeq>{RoomSeq{}, RoomSeq{4}})) << "the newest";
+  EXPECT_EQ(room.decided_seqs(cuts[0].author, 2), (std::vector<RoomSeq>{RoomSeq{}, RoomSeq{4}})) << "only the newest";
   EXPECT_TRUE(room.decided_seqs(AuthorId{9}, 8).empty());
 }
 
@@ -91,8 +91,8 @@ TEST(Room, RefusesWhatBreaksTheOrderOfAnAuthor) {
 
   Cut other = cuts[1];
   other.author_seq = 1;
-  EXPECT_FALSE(room.submit(other)) << "the number of a decided cut with other bytes";
-  EXPECT_FALSE(room.submit(cuts[2])) << "a gap";
+  EXPECT_FALSE(room.submit(other)) << "a decided cut's number with other bytes";
+  EXPECT_FALSE(room.submit(cuts[2])) << "a cut is missing";
   Cut zero = cuts[0];
   zero.author_seq = 0;
   EXPECT_FALSE(room.submit(zero));
@@ -104,9 +104,9 @@ TEST(Room, RefusesWhatBreaksTheOrderOfAnAuthor) {
   EXPECT_FALSE(room.submit(stranger));
 
   EXPECT_EQ(room.counts().refused, 5u);
-  EXPECT_EQ(room.room_seq().value, 3u) << "a breach gets no place in the order";
+  EXPECT_EQ(room.room_seq().value, 3u) << "a breach gets no sequence number";
   EXPECT_EQ(room.field_hash(), hash);
-  EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 4u) << "the author goes on";
+  EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 4u) << "the author can go on";
 }
 
 struct Breach {
@@ -117,7 +117,7 @@ struct Breach {
 
 class RoomLimits : public ::testing::TestWithParam<Breach> {};
 
-TEST_P(RoomLimits, RejectTheCutAsARowAndLeaveTheBone) {
+TEST_P(RoomLimits, RejectTheCutAsALogEntryAndLeaveTheBone) {
   Room room(test_block());
   auto cuts = strokes(room.join(MemberKind::surgeon), 2, 7);
   const Digest uncut = room.field_hash();
@@ -178,7 +178,7 @@ INSTANTIATE_TEST_SUITE_P(
         Breach{"spindle", Rejection::spindle, [](Cut& c) { c.spindle_rpm = 1'000'000; }}),
     [](const auto& test_case) { return std::string(test_case.param.name); });
 
-// The same burr over a case that is finer already: what is kept of its cuts goes no further than kFinestCut_mm.
+// The same burr on a finer case: its cuts are stored no finer than kFinestCut_mm.
 TEST(Room, TakesNoCutFinerThanTheCaseAllows) {
   Room room(test::plain_block(8.0, 4.0, 0.3));
   auto cuts = strokes(room.join(MemberKind::surgeon), 2, 12);
@@ -191,7 +191,7 @@ TEST(Room, TakesNoCutFinerThanTheCaseAllows) {
   commit(room, cuts[1]);
 }
 
-// Whoever joins at any moment and applies what is committed from then on has the server's bone.
+// Whoever joins at any moment and applies the cuts committed from then on has the server's bone.
 TEST(Room, SnapshotAndStreamGiveEveryHolderTheSameHash) {
   Room room(test_block());
   const auto cuts = strokes(room.join(MemberKind::surgeon), 12, 8);
@@ -205,7 +205,8 @@ TEST(Room, SnapshotAndStreamGiveEveryHolderTheSameHash) {
   for (const CutField& holder : holders) EXPECT_EQ(holder.hash(), room.field_hash());
 }
 
-// Two roads to one surface: blocks made anew after every cut, newest wins, or each once at the end.
+// Compares two ways to the surface: remaking blocks after every cut, where the newest replaces older ones, and making
+// each once at the end.
 TEST(RoomSurface, StaleBlocksAreAllThatACutChanges) {
   Room room(test_block());
   const auto cuts = strokes(room.join(MemberKind::surgeon), 10, 9);
@@ -223,7 +224,7 @@ TEST(RoomSurface, StaleBlocksAreAllThatACutChanges) {
     for (const BlockKey& key : room.take_stale_blocks()) make(live, key);
     EXPECT_EQ(room.stale_blocks(), 0u);
   }
-  // Neighbours too: a block that was never stale must not have changed either.
+  // Neighbours too: a block that was never stale must not have changed.
   for (BlockKey key : std::set<BlockKey>(keys))
     for (const int step : {-1, 1}) {
       BlockKey beside = key;
@@ -251,7 +252,7 @@ TEST(RoomSurface, ACutLeavesFarBlocksAlone) {
   Cut cut = test::straight_cut(burr, {-9, -9, -1}, {-9, -9, -1}, {0, 0, -1});
   cut.author = surgeon;
   commit(room, cut);
-  // A sphere of radius 2.5 mm with the band and a block around it stays on its side of the middle.
+  // A ball of radius 2.5 mm, with the band and a block around it, stays on its side of the middle.
   for (const BlockKey& key : room.take_stale_blocks()) {
     const double edge_mm = kBlockCells * level_pitch_mm(test::kBlockPitch_mm, key.level);
     EXPECT_LT(key.index.x * edge_mm, 2.0);
@@ -262,13 +263,13 @@ TEST(RoomSurface, ACutLeavesFarBlocksAlone) {
 TEST(BlockStore, VersionsRiseWithChangesOnly) {
   BlockStore store;
   const BlockKey key{BodyId{0}, 1, {2, 3, 4}};
-  EXPECT_EQ(store.put(key, {}), nullptr) << "never had a surface";
+  EXPECT_EQ(store.put(key, {}), nullptr) << "the block never had a surface";
   const BlockPayload a{{1, 2, 3}}, b{{4, 5}};
   EXPECT_EQ(store.put(key, a)->version, 1u);
   EXPECT_EQ(store.put(key, a), nullptr);
   EXPECT_EQ(store.put(key, b)->version, 2u);
   const StoredBlock* gone = store.put(key, {});
-  ASSERT_NE(gone, nullptr) << "a surface that vanishes is news";
+  ASSERT_NE(gone, nullptr) << "the loss of a surface is a change";
   EXPECT_EQ(gone->version, 3u);
 }
 

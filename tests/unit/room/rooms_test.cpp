@@ -1,5 +1,5 @@
-// Many rooms in one server: who is in one hears nothing of another, and each can be closed, opened again, branched,
-// shown again, checked, copied and deleted while the others go on.
+// Many rooms in one server. Whoever is in one room receives nothing of another. Each room can be closed, opened again,
+// branched, replayed, verified, copied and deleted while the others go on.
 #include <gtest/gtest.h>
 
 #include <fstream>
@@ -81,7 +81,7 @@ class RoomsTest : public ::testing::Test {
   std::optional<RoomAdminClient> client_;
 };
 
-TEST_F(RoomsTest, WhoIsInOneHearsNothingOfAnother) {
+TEST_F(RoomsTest, WhoIsInOneReceivesNothingOfAnother) {
   ASSERT_TRUE(client_->create("anna", ""));
   ASSERT_TRUE(client_->create("berta", ""));
   const auto anna = surgeon("anna"), berta = surgeon("berta");
@@ -92,11 +92,11 @@ TEST_F(RoomsTest, WhoIsInOneHearsNothingOfAnother) {
   EXPECT_NE(hash_of("anna"), hash_of("berta"));
   EXPECT_EQ(anna->own(), 10u);
   EXPECT_EQ(berta->own(), 7u);
-  EXPECT_EQ(anna->author(), berta->author()) << "each room counts its own";
+  EXPECT_EQ(anna->author(), berta->author()) << "each room has its own author numbers";
   EXPECT_EQ(listed(true), (std::vector<std::string>{"anna", "berta"}));
 }
 
-// Open ones hold bones and threads, closed ones journals: both are of those that there may be.
+// Open rooms use bones and threads, closed rooms use journals: both count towards the largest number of rooms.
 TEST_F(RoomsTest, NoMoreAreMadeThanThereMayBe) {
   client_.reset();
   server_.reset();
@@ -112,7 +112,7 @@ TEST_F(RoomsTest, NoMoreAreMadeThanThereMayBe) {
     EXPECT_EQ(refused->error().code, ErrorCode::exhausted) << refused->error().message;
   }
   EXPECT_FALSE(fs::exists(dir_ / "rooms" / "dora.journal"));
-  EXPECT_TRUE(rooms.resume("berta")) << "those that there are may be opened";
+  EXPECT_TRUE(rooms.resume("berta")) << "existing rooms may be opened";
   ASSERT_TRUE(rooms.remove("carla", false));
   EXPECT_TRUE(rooms.create("dora", nullptr));
 }
@@ -127,7 +127,7 @@ TEST_F(RoomsTest, ACallWithoutANameIsToTheOnlyRoom) {
   EXPECT_NE(refusal_of("carla").find("no room carla"), std::string::npos);
 }
 
-// Who joined the only room stays in it, whatever is opened beside it.
+// Whoever joined the only room stays in it, also if another room is opened.
 TEST_F(RoomsTest, WhoJoinedWithoutANameStaysInThatRoom) {
   ASSERT_TRUE(client_->create("anna", ""));
   const auto hand = surgeon("");
@@ -143,7 +143,7 @@ TEST_F(RoomsTest, WhoJoinedWithoutANameStaysInThatRoom) {
   ASSERT_TRUE(client_->close("anna"));
   grpc::ClientContext again;
   EXPECT_FALSE(v1::RoomService::NewStub(hand->session().room().channel)->Undo(&again, undo, &undone).ok())
-      << "the room that is left is another";
+      << "the remaining room is another one";
 }
 
 TEST_F(RoomsTest, AClosedRoomSaysSoAndGoesOnWhereItWas) {
@@ -160,7 +160,7 @@ TEST_F(RoomsTest, AClosedRoomSaysSoAndGoesOnWhereItWas) {
   EXPECT_NE(refusal_of("anna").find("rooms resume anna"), std::string::npos);
   EXPECT_FALSE(client_->close("anna").has_value());
   EXPECT_EQ(listed(false), std::vector<std::string>{"anna"});
-  cut(*berta, 5, 2);  // goes on
+  cut(*berta, 5, 2);  // It goes on.
   ASSERT_TRUE(client_->resume("anna"));
   EXPECT_EQ(hash_of("anna"), before);
   const auto late = surgeon("anna");
@@ -184,7 +184,7 @@ TEST_F(RoomsTest, TheRoomsThatWereOpenAreOpenAgain) {
   EXPECT_EQ(hash_of("anna"), before);
 }
 
-// One that cannot be opened today is tried again tomorrow.
+// A room that cannot be opened this time is tried again at the next start.
 TEST_F(RoomsTest, ARoomThatCannotBeOpenedStaysOnTheListOfThoseThatWere) {
   for (const char* name : {"anna", "berta", "carla"}) ASSERT_TRUE(client_->create(name, ""));
   server_->stop_all();
@@ -209,7 +209,7 @@ TEST_F(RoomsTest, ABranchBeginsWithWhatWasAndGoesItsOwnWay) {
   const std::string at_fork = hash_of("anna");
   cut(*anna, 5, 2, 11);
   const std::string after = hash_of("anna");
-  const auto branch = client_->branch("anna", "what-if", fork);  // while the room is open
+  const auto branch = client_->branch("anna", "what-if", fork);  // While the room is open.
   ASSERT_TRUE(branch.has_value()) << branch.error().message;
   EXPECT_EQ(branch->parent, "anna");
   EXPECT_EQ(branch->parent_room_seq, fork);
@@ -218,7 +218,7 @@ TEST_F(RoomsTest, ABranchBeginsWithWhatWasAndGoesItsOwnWay) {
   cut(*other, 4, 3);
   EXPECT_NE(hash_of("what-if"), at_fork);
   EXPECT_EQ(hash_of("anna"), after);
-  // Of a closed one, all of it; and what was cut before the fork can be undone.
+  // A branch of all of a closed room. Cuts from before the branch can be undone.
   ASSERT_TRUE(client_->close("anna"));
   ASSERT_TRUE(client_->branch("anna", "copy", RoomSeq{}));
   EXPECT_EQ(hash_of("copy"), after);
@@ -251,7 +251,7 @@ TEST_F(RoomsTest, DeletingLeavesNothingAndAsksAboutBranches) {
   EXPECT_FALSE(client_->remove("anna", true).has_value());
 }
 
-// A backup in the folder is no room, whatever its name, and stands in nobody's way.
+// A backup in the folder is no room, whatever its name, and prevents no other room.
 TEST_F(RoomsTest, ABackupOfABranchIsNotTakenForARoomOfItsName) {
   for (const char* name : {"anna", "bob"}) ASSERT_TRUE(client_->create(name, ""));
   const auto anna = surgeon("anna");
@@ -273,10 +273,10 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   cut(*anna, 10, 2, 11);
   const RoomSeq last = anna->seq();
   const std::string now = hash_of("anna");
-  // Standing still at a moment.
+  // Stopped at one moment.
   ASSERT_TRUE(client_->replay("anna", "still", middle, last, 0.0));
   EXPECT_EQ(hash_of("still"), then);
-  // From the beginning, much faster than it was; beside the room, which goes on.
+  // From the beginning and much faster than it was, while the replayed room goes on.
   ASSERT_TRUE(client_->replay("anna", "film", RoomSeq{}, last, 1000.0));
   cut(*anna, 3, 3, 21);
   ASSERT_TRUE(wait_until([&] { return hash_of("film") == now; }, kPatience));
@@ -285,7 +285,7 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   EXPECT_TRUE(viewer.read_to(last));
   EXPECT_TRUE(as_it_is.read_to(middle));
   EXPECT_NE(viewer.hashes(), as_it_is.hashes());
-  // Its tools are seen, and seen at rest once nothing more happens.
+  // The tools of the replay are visible, and at rest once nothing more happens.
   v1::WatchCuttingRequest watching;
   const wire::JoinedRoom gallery = join(server_->address(), wire::ClientKind::viewer, "film");
   watching.set_author(gallery.author.value);
@@ -304,7 +304,7 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   EXPECT_TRUE(at_rest);
   seeing.TryCancel();
   (void)tools->Finish();
-  // Nobody changes it.
+  // Nobody can change it.
   const auto hand =
       wire::join_room(server_->address(), wire::ClientKind::haptic, "test", std::chrono::seconds(5), {}, "film");
   ASSERT_FALSE(hand.has_value());
@@ -316,7 +316,7 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   v1::UndoResponse undone;
   grpc::ClientContext context;
   EXPECT_FALSE(v1::RoomService::NewStub(watcher.channel)->Undo(&context, undo, &undone).ok());
-  // Nor does the surgeon of what is shown, who is known there with his secret.
+  // The author of the replayed room cannot either, although the replay knows him and his secret.
   wire::JoinedRoom author = anna->session().room();
   author.channel = watcher.channel;
   EXPECT_FALSE(wire::join_again(author, wire::ClientKind::haptic, {}).has_value());
@@ -331,9 +331,9 @@ TEST_F(RoomsTest, WhatHappenedHappensAgainForThoseWhoWatch) {
   EXPECT_FALSE(session->Read(&nothing));
   EXPECT_NE(session->Finish().error_message().find("watched"), std::string::npos);
   EXPECT_FALSE(client_->replay("anna", "beyond", RoomSeq{}, RoomSeq{1000000}, 1.0).has_value());
-  // Its room may be closed meanwhile; then it ends.
+  // The replayed room may be closed. Then the replay ends.
   ASSERT_TRUE(client_->close("film"));
-  EXPECT_TRUE(listed(false).empty()) << "a film is not kept";
+  EXPECT_TRUE(listed(false).empty()) << "a replay is not stored";
 }
 
 TEST_F(RoomsTest, AJournalIsCheckedAndCopiedWhileItsRoomIsCut) {
@@ -365,7 +365,7 @@ TEST_F(RoomsTest, AJournalIsCheckedAndCopiedWhileItsRoomIsCut) {
   EXPECT_GE(copied->room_seq, checked->room_seq);
   EXPECT_FALSE(client_->back_up("anna", "../anna.backup").has_value());
   EXPECT_FALSE(client_->back_up("anna", "anna.journal").has_value());
-  EXPECT_FALSE(client_->back_up("anna", "anna.backup").has_value()) << "something is there";
+  EXPECT_FALSE(client_->back_up("anna", "anna.backup").has_value()) << "the file exists already";
 }
 
 TEST_F(RoomsTest, NamesAreNamesOfFiles) {
@@ -374,7 +374,7 @@ TEST_F(RoomsTest, NamesAreNamesOfFiles) {
     EXPECT_FALSE(client_->create(name, "").has_value()) << name;
   ASSERT_TRUE(client_->create("anna_2-b", ""));
   EXPECT_FALSE(client_->create("anna_2-b", "").has_value());
-  EXPECT_FALSE(client_->create("berta", std::string(64, 'a')).has_value()) << "no such case";
+  EXPECT_FALSE(client_->create("berta", std::string(64, 'a')).has_value()) << "there is no such case";
   std::ofstream(dir_ / "rooms" / "notes.journal") << "not a journal";
   EXPECT_FALSE(client_->resume("notes").has_value());
   EXPECT_EQ(listed(true), std::vector<std::string>{"anna_2-b"});
@@ -396,7 +396,7 @@ TEST_F(RoomsTest, WithoutAFolderRoomsEndWithTheServer) {
   EXPECT_TRUE(listed(true).empty());
 }
 
-// A marked moment is found again, and returned to.
+// A mark is found again, and the room returns to it.
 TEST_F(RoomsTest, AMarkIsReturnedTo) {
   ASSERT_TRUE(client_->create("anna", ""));
   const auto anna = surgeon("anna");

@@ -1,4 +1,4 @@
-// What members ask of a served room beside cutting, with real clients.
+// Requests of members to a served room other than cuts, with real clients.
 #include <filesystem>
 
 #include "osteon/v1/people.grpc.pb.h"
@@ -12,7 +12,7 @@ using namespace test;
 
 class RoomRpc : public ServedRoom {
  protected:
-  // One call of a member who joined to watch.
+  // One call of a member who joined as an observer.
   template <class Request, class Response>
   grpc::Status call(grpc::Status (v1::RoomService::Stub::*rpc)(grpc::ClientContext*, const Request&, Response*),
                     Request request, Response& response, std::optional<std::uint64_t> author = std::nullopt) {
@@ -31,7 +31,7 @@ class RoomRpc : public ServedRoom {
   std::optional<wire::JoinedRoom> watcher_;
 };
 
-// Twelve cuts in two entries, of which no crumb comes off.
+// Twelve cuts in two rows of six, none of which separates debris.
 std::vector<Cut> dimples(AuthorId author, double y_mm) {
   std::vector<Cut> cuts;
   for (int i = 0; i < 12; ++i) {
@@ -49,8 +49,8 @@ Tool own_tool() {
   return tool;
 }
 
-// Stops, or frees, all of them, at the place that is answered.
-TEST_F(RoomRpc, AWordAboutAllIsARowForThoseAloneWhomItChanges) {
+// Stops all of them, or lets all go on. The answer has the sequence number.
+TEST_F(RoomRpc, ADecisionAboutAllIsALogEntryOnlyForThoseWhomItChanges) {
   auto away = surgeon();
   const auto here = surgeon();
   const auto viewer = join(address(), wire::ClientKind::viewer);
@@ -70,15 +70,15 @@ TEST_F(RoomRpc, AWordAboutAllIsARowForThoseAloneWhomItChanges) {
   };
   const auto head = [&] { return runtime().room_seq().value; };
   const std::uint64_t before = head();
-  EXPECT_EQ(tell(0, false), before) << "nobody was ever stopped";
+  EXPECT_EQ(tell(0, false), before) << "nobody was stopped before";
   EXPECT_EQ(head(), before);
-  EXPECT_EQ(tell(0, true), before + 2) << "also who is away";
+  EXPECT_EQ(tell(0, true), before + 2) << "also for those who are away";
   EXPECT_EQ(tell(0, true), before + 2);
-  EXPECT_EQ(head(), before + 2) << "and once";
+  EXPECT_EQ(head(), before + 2) << "only once for each";
   EXPECT_EQ(tell(absent.value, false), before + 3);
   EXPECT_EQ(tell(0, true), before + 4);
-  EXPECT_EQ(head(), before + 4) << "the one who was freed alone";
-  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a word about one is an entry";
+  EXPECT_EQ(head(), before + 4) << "only for the one who was let go on";
+  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a decision about one is always an entry";
 }
 
 TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
@@ -88,7 +88,7 @@ TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
   MeshReader viewer(address());
   ASSERT_TRUE(wait_until([&] { return first->own() == 12 && second->own() == 12 && first->seq() == second->seq(); },
                          kPatience));
-  // Who watches may have come after the last cut, which is an entry as well.
+  // The observer may have joined after the last cut. A join is an entry as well.
   const RoomSeq last_cut = std::max(first->acknowledged().at(12), second->acknowledged().at(12));
   ASSERT_TRUE(viewer.read_to(last_cut));
   const auto surface = viewer.hashes();
@@ -119,7 +119,7 @@ TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {
   ASSERT_TRUE(wait_until([&] { return second->seq().value == redone.room_seq(); }, kPatience));
   EXPECT_EQ(second->hash(), all);
   ASSERT_TRUE(viewer.read_to(RoomSeq{redone.room_seq()}));
-  EXPECT_EQ(viewer.hashes(), surface) << "the surface of before";
+  EXPECT_EQ(viewer.hashes(), surface) << "the surface is as before the cut";
 }
 
 TEST_F(RoomRpc, AToolIsAddedAtRunTimeAndCuts) {
@@ -130,7 +130,7 @@ TEST_F(RoomRpc, AToolIsAddedAtRunTimeAndCuts) {
   v1::AddToolResponse added;
   const grpc::Status status = call(&v1::RoomService::Stub::AddTool, request, added);
   ASSERT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(added.room_seq(), 3u) << "after two who came";
+  EXPECT_EQ(added.room_seq(), 3u) << "two have joined before";
   EXPECT_EQ(added.tool_hash(), wire::to_wire(own_tool().hash()));
   ASSERT_TRUE(wait_until([&] { return hand->seq().value == added.room_seq(); }, kPatience));
   ASSERT_NE(hand->session().tools()->find(own_tool().hash()), nullptr);
@@ -141,7 +141,7 @@ TEST_F(RoomRpc, AToolIsAddedAtRunTimeAndCuts) {
   ASSERT_TRUE(wait_until([&] { return hand->own() == 1; }, kPatience));
   const auto late = surgeon();
   ASSERT_TRUE(wait_until([&] { return late->complete(); }, kPatience));
-  EXPECT_NE(late->session().tools()->find(own_tool().hash()), nullptr) << "who joins later is sent it";
+  EXPECT_NE(late->session().tools()->find(own_tool().hash()), nullptr) << "whoever joins later is sent the tool";
   EXPECT_EQ(wire::to_wire(late->hash()), status_of(late->session().room()).field_hash());
 
   v1::ListToolsResponse list;
@@ -175,7 +175,7 @@ TEST_F(RoomRpc, ItemsStandInTheSceneOfEveryMember) {
   grpc::ClientContext context;
   const auto stream = v1::WatchService::NewStub(viewer.channel)->WatchCutting(&context, watch);
   v1::WatchCuttingResponse seen;
-  ASSERT_TRUE(stream->Read(&seen)) << "who comes late is shown the scene at once";
+  ASSERT_TRUE(stream->Read(&seen)) << "whoever joins late is sent the scene at once";
   ASSERT_EQ(seen.items_size(), 1);
   EXPECT_EQ(seen.items(0).item(), *id);
   EXPECT_EQ(seen.bodies_size(), 1);
@@ -200,8 +200,8 @@ TEST_F(RoomRpc, SavesOnRequestAndAtTheEnd) {
   v1::SaveFieldsResponse saved;
   const grpc::Status status = call(&v1::RoomService::Stub::SaveFields, request, saved);
   ASSERT_TRUE(status.ok()) << status.error_message();
-  EXPECT_EQ(saved.room_seq(), 10u) << "two who came and eight cuts";
-  EXPECT_EQ(saved.file(), "half.vdb") << "a path of the server";
+  EXPECT_EQ(saved.room_seq(), 10u) << "two joins and eight cuts";
+  EXPECT_EQ(saved.file(), "half.vdb") << "it is a path on the server";
   EXPECT_EQ(saved.field_hash(), wire::to_wire(hand->hash()));
   const auto fields = load_fields(dir_ / "half.vdb", test_block());
   ASSERT_TRUE(fields) << fields.error().message;
@@ -221,7 +221,7 @@ TEST_F(RoomRpc, SavesOnRequestAndAtTheEnd) {
   EXPECT_EQ(field_hash(summary.fields.leaves, test_block().pitch_mm()), hash);
 }
 
-TEST_F(RoomRpc, RefusesStrangersAndNonsenseInOneSentence) {
+TEST_F(RoomRpc, RefusesUnknownMembersAndNonsenseInOneSentence) {
   const auto expect = [](const grpc::Status& status, grpc::StatusCode code) {
     EXPECT_EQ(status.error_code(), code) << status.error_message();
     EXPECT_FALSE(status.error_message().empty());
@@ -262,14 +262,14 @@ TEST_F(RoomRpc, RefusesStrangersAndNonsenseInOneSentence) {
   expect(call(&Stub::AddTool, add, added), StatusCode::INVALID_ARGUMENT);
   *add.mutable_tool() = wire::to_wire(own_tool());
   expect(call(&Stub::AddTool, add, added, kStranger), StatusCode::INVALID_ARGUMENT);
-  EXPECT_EQ(server_->health().room_seq.value, 1u) << "none of these has a place in the order, only who asked";
+  EXPECT_EQ(server_->health().room_seq.value, 1u) << "only the join of the caller has a sequence number";
 }
 
-// A slot right through the block: the room itself finds that it has come apart.
+// A slot through the whole block: the room itself detects that the block is in two parts.
 TEST_F(RoomRpc, ASawnOffPieceBecomesABodyForEveryone) {
   const auto hand = surgeon(), other = surgeon();
   MeshReader viewer(address());
-  // The block is 24 mm wide and 12 mm deep; the slot leaves 24 x 7 mm of it on one side.
+  // The block is 24 mm wide and 12 mm deep. The slot leaves 24 x 7 mm of it on one side.
   Tool saw = tool_named("burr-round-5");
   std::vector<Cut> cuts;
   for (double z = 0.0; z > -14.0; z -= 2.0) {
@@ -292,7 +292,7 @@ TEST_F(RoomRpc, ASawnOffPieceBecomesABodyForEveryone) {
     return std::ranges::count_if(viewer.hashes(), [](const auto& block) { return block.first.body == BodyId{1}; });
   };
   EXPECT_GT(of_piece(), 0);
-  // Slot: 24 x 12 mm and 5 mm wide, less its rounded floor; the piece is not removed.
+  // The slot is 24 x 12 mm and 5 mm wide, less its rounded floor. The piece is not removed.
   EXPECT_NEAR(status.removed_mm3(), 24.0 * 12.0 * 5.0, 0.12 * 24.0 * 12.0 * 5.0);
 
   v1::RemoveBodyRequest remove;
@@ -306,7 +306,7 @@ TEST_F(RoomRpc, ASawnOffPieceBecomesABodyForEveryone) {
   status = status_of(hand->session().room());
   EXPECT_EQ(wire::to_wire(other->hash()), status.field_hash());
 
-  // Everything back: the piece first, then the whole block with all its cuts undone.
+  // Everything is undone: first the split, then all cuts, so that the whole block is back.
   v1::UndoResponse undone;
   ASSERT_TRUE(undo(1000, undone).ok());
   ASSERT_TRUE(wait_until([&] { return other->seq().value == undone.room_seq(); }, kPatience));
@@ -315,7 +315,7 @@ TEST_F(RoomRpc, ASawnOffPieceBecomesABodyForEveryone) {
   EXPECT_EQ(of_piece(), 0);
 }
 
-// Saved and stopped right after the cut that separates a piece: the piece is a body in both.
+// The room is saved and stopped right after the cut that separates a piece. In both, the piece is a body.
 TEST_F(RoomRpc, ThePieceOfTheLastCutIsFoundBeforeTheBoneIsSaved) {
   const auto hand = surgeon();
   std::vector<Cut> cuts;

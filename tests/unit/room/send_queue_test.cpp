@@ -13,7 +13,7 @@ namespace {
 
 BlockKey key_at(int x) { return {BodyId{0}, 0, {x, 0, 0}}; }
 
-// A block's message of about `size` bytes.
+// The message of a block, of about `size` bytes.
 Bytes block(int x, std::uint64_t version, std::size_t size = 100) {
   v1::WatchMeshResponse response;
   v1::MeshBlock& out = *response.add_blocks();
@@ -31,7 +31,7 @@ v1::WatchMeshResponse received(const MessageParts& parts) {
   return response;
 }
 
-// What a reader holds, and whether what a message claims is true of it.
+// What a reader holds. Checks that it really holds what each message claims.
 struct Reader {
   std::map<int, std::uint64_t> versions;
   std::uint64_t room_seq = 0;
@@ -64,14 +64,14 @@ TEST(MeshSendQueue, ASlowReaderHoldsOneVersionOfEachBlock) {
   for (int x = 0; x < 10; ++x) EXPECT_EQ(reader.versions[x], 9'991u + static_cast<unsigned>(x == 0 ? 10 : x));
 }
 
-// However many readers stall and however long: of every block, its newest version is all that is held.
+// However many readers stall and however long, only the newest version of each block is held.
 TEST(MeshSendQueue, StalledReadersShareOneVersionOfEachBlock) {
   constexpr int kBlocks = 30, kReaders = 150;
   MeshUpdate surface;
   for (int x = 0; x < kBlocks; ++x) surface.blocks[key_at(x)] = block(x, 1);
   std::vector<MeshSendQueue> stalled(kReaders, MeshSendQueue(surface));
   for (MeshSendQueue& send_queue : stalled)
-    EXPECT_FALSE(send_queue.take().empty()) << "a message in flight, never finished";
+    EXPECT_FALSE(send_queue.take().empty()) << "a message under way that is never finished";
   std::vector<std::weak_ptr<const std::string>> made;
   for (std::uint64_t seq = 1; seq <= 1000; ++seq) {
     const int x = static_cast<int>(seq * 7 % kBlocks);
@@ -82,7 +82,7 @@ TEST(MeshSendQueue, StalledReadersShareOneVersionOfEachBlock) {
   EXPECT_EQ(std::ranges::count_if(made, [](const auto& version) { return !version.expired(); }), kBlocks);
   for (const auto& version : made) {
     const Bytes held = version.lock();
-    EXPECT_TRUE(!held || held.use_count() == kReaders + 1) << "shared, never copied";
+    EXPECT_TRUE(!held || held.use_count() == kReaders + 1) << "the version is shared, not copied";
   }
 }
 
@@ -100,15 +100,16 @@ TEST(MeshSendQueue, MessagesAreBoundedAndTheSnapshotEndsOnce) {
     ++messages;
     EXPECT_EQ(reader.complete, reader.versions.size() == 100);
   }
-  EXPECT_EQ(messages, 13);  // 8 blocks of 30 kB fit into 256 kB
+  EXPECT_EQ(messages, 13);  // 8 blocks of 30 kB fit into 256 kB.
   EXPECT_EQ(reader.room_seq, 7u);
 }
 
-TEST(MeshSendQueue, AnEmptySurfaceIsCompleteAtOnceAndRowsWithoutBlocksAreTold) {
+TEST(MeshSendQueue, AnEmptySurfaceIsCompleteAtOnceAndEntriesWithoutBlocksAreSent) {
   MeshSendQueue send_queue(MeshUpdate{});
   EXPECT_TRUE(received(send_queue.take()).snapshot_complete());
   EXPECT_TRUE(send_queue.take().empty());
-  send_queue.add({RoomSeq{3}, {}});  // a rejected cut changes no block, yet who waits for its place must hear of it
+  // A rejected cut changes no block. Its sequence number must still be sent, since somebody may wait for it.
+  send_queue.add({RoomSeq{3}, {}});
   EXPECT_EQ(received(send_queue.take()).room_seq(), 3u);
 }
 
@@ -127,8 +128,8 @@ TEST(MeshSendQueue, BlocksThatChangeAllTheTimeStarveNoOther) {
   for (int x = 0; x < 40; ++x) EXPECT_GE(reader.versions[x], 1u);
 }
 
-// Whatever order changes and messages come in: a message that says "contains room_seq N" leaves the reader with every
-// block at least as new as at N.
+// For any order of changes and messages: after a message that says "contains room_seq N", the reader has every block at
+// least as new as at N.
 TEST(MeshSendQueue, ClaimsOnlyWhatTheReaderHolds) {
   std::mt19937 random(11);
   for (int run = 0; run < 50; ++run) {
@@ -184,32 +185,32 @@ v1::SessionResponse parsed(const MessageParts& parts) {
   return response;
 }
 
-TEST(SessionSendQueue, SendsLeavesThenCompleteThenOnlyTheRowsAfterThem) {
+TEST(SessionSendQueue, SendsLeavesThenCompleteThenOnlyTheEntriesAfterThem) {
   SessionSendQueue send_queue;
   send_queue.begin(RoomSeq{4}, {tool()}, complete(4));
   std::vector<FieldLeaf> leaves(2);
   for (FieldLeaf& leaf : leaves) leaf.values.assign(kLeafVoxels, 5);
   leaves[1].origin = {8, 0, 0};
-  // The publisher may still bring the entry that the leaves already contain.
+  // The publisher may still offer the entry that the leaves already contain.
   EXPECT_TRUE(send_queue.add(RoomSeq{4}, entry(4)));
   EXPECT_TRUE(send_queue.add(RoomSeq{5}, entry(5)));
-  EXPECT_TRUE(send_queue.take().empty()) << "nothing before the leaves are known";
+  EXPECT_TRUE(send_queue.take().empty()) << "nothing is sent before the leaves are known";
   send_queue.set_leaves(leaves);
-  EXPECT_TRUE(parsed(send_queue.take()).has_tool()) << "tools go before the leaves";
+  EXPECT_TRUE(parsed(send_queue.take()).has_tool()) << "tools are sent before the leaves";
   EXPECT_EQ(parsed(send_queue.take()).leaf().origin().x(), 0);
   EXPECT_EQ(parsed(send_queue.take()).leaf().origin().x(), 8);
   EXPECT_EQ(parsed(send_queue.take()).complete().room_seq(), 4u);
   const v1::SessionResponse first = parsed(send_queue.take());
   EXPECT_EQ(first.committed().room_seq(), 5u);
-  EXPECT_EQ(first.index(), 1u) << "the first after the leaves";
+  EXPECT_EQ(first.index(), 1u) << "the first entry after the leaves";
   EXPECT_TRUE(send_queue.take().empty());
-  EXPECT_TRUE(send_queue.add_answer(entry(2))) << "an old outcome told again";
+  EXPECT_TRUE(send_queue.add_answer(entry(2))) << "an old outcome is sent again";
   const v1::SessionResponse again = parsed(send_queue.take());
   EXPECT_EQ(again.committed().room_seq(), 2u);
-  EXPECT_EQ(again.index(), 0u) << "it has no place in the order of this session";
+  EXPECT_EQ(again.index(), 0u) << "it is not in the order of this session";
 }
 
-// What a reader has had by another way is not sent again; its numbers stay.
+// An entry that the reader has received over the other transport is not sent again. Its number is kept.
 TEST(SessionSendQueue, LeavesOutWhatHasArrived) {
   SessionSendQueue send_queue;
   send_queue.begin(RoomSeq{0}, {}, complete(0));
@@ -222,7 +223,7 @@ TEST(SessionSendQueue, LeavesOutWhatHasArrived) {
   EXPECT_EQ(send_queue.index(), 5u);
   EXPECT_EQ(parsed(send_queue.take()).index(), 4u);
   EXPECT_EQ(parsed(send_queue.take()).index(), 5u);
-  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not an entry of the order";
+  EXPECT_EQ(parsed(send_queue.take()).index(), 0u) << "an answer is not in the order of entries";
 }
 
 TEST(SessionSendQueue, GivesUpAReaderThatIsTooFarBehind) {

@@ -1,4 +1,4 @@
-// The gRPC services with real clients in this process, on the loopback device and ports that the system chooses.
+// The gRPC services with real clients in this process, on the loopback device, with ports that the system chooses.
 #include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -32,10 +32,10 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   ASSERT_NE(first->author(), second->author());
   send(*first, strokes(first->author(), 30, 1));
   send(*second, strokes(second->author(), 30, 2));
-  const auto late = surgeon();  // while cuts are on their way
+  const auto late = surgeon();  // It joins while cuts are under way.
   ASSERT_TRUE(wait_until([&] { return first->own() == 30 && second->own() == 30; }, kPatience));
   const auto later = surgeon();
-  // Crumbs that came off are events of their own, in their own time.
+  // Debris that has separated makes events of its own, at a later time.
   const std::vector<Surgeon*> holders{first.get(), second.get(), late.get(), later.get()};
   ASSERT_TRUE(wait_until([&] { return settled(runtime(), holders); }, kPatience));
   const auto status = status_of(later->session().room());
@@ -46,15 +46,15 @@ TEST_F(RoomServerTest, EveryHolderHasTheServersHashHoweverLateItJoins) {
   EXPECT_EQ(status.rejected(), 0u);
 }
 
-// Nobody who has come back stays pending until the next event.
-TEST_F(RoomServerTest, AHandSaysThatTheLeavesHaveCome) {
+// A client that comes back must not stay pending until the next event.
+TEST_F(RoomServerTest, AHapticClientAcknowledgesTheLeaves) {
   const auto hand = surgeon();
   EXPECT_TRUE(
       wait_until([&] { return runtime().people().acknowledged_by(AuthorId{1}) == runtime().room_seq(); }, kPatience));
 }
 
-// As one would that was told of more, by a server whose journal has lost its end.
-TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
+// Such a client has acknowledged more than exists, since the server's journal has lost its end.
+TEST_F(RoomServerTest, AClientThatHasAcknowledgedMoreThanThereIsIsNotRefused) {
   const wire::JoinedRoom room = join(address(), wire::ClientKind::haptic);
   grpc::ClientContext context;
   context.set_deadline(std::chrono::system_clock::now() + kPatience);
@@ -76,7 +76,7 @@ TEST_F(RoomServerTest, AHandThatHasHeardMoreThanThereIsIsNotTurnedAway) {
   EXPECT_TRUE(response.has_committed()) << "its session goes on";
   const RoomSeq heard = runtime().people().acknowledged_by(room.author);
   EXPECT_GT(heard, RoomSeq{});
-  EXPECT_LE(heard, runtime().room_seq()) << "as far as there is anything";
+  EXPECT_LE(heard, runtime().room_seq()) << "no further than the room";
   context.TryCancel();
   const grpc::Status status = stream->Finish();
   EXPECT_EQ(status.error_code(), grpc::StatusCode::CANCELLED) << status.error_message();
@@ -96,7 +96,7 @@ TEST_F(RoomServerTest, ACutBeyondTheLimitsIsRejectedToItsAuthorAndTheRoomGoesOn)
   EXPECT_EQ(status_of(one->session().room()).rejected(), 1u);
 }
 
-// Whoever comes back and has not heard says it again, also where the room decided it in the session before.
+// A client that reconnects sends its unacknowledged cuts again, also those that the room decided in the session before.
 TEST_F(RoomServerTest, ACutOfAnEarlierSessionIsAnsweredAgainWithItsFirstOutcome) {
   const wire::JoinedRoom room = join(address(), wire::ClientKind::haptic);
   const auto stub = v1::CuttingService::NewStub(room.channel);
@@ -131,7 +131,7 @@ TEST_F(RoomServerTest, ALateViewerSeesTheBlocksOfAnEarlyOne) {
   const auto uncut = early.hashes();
   const auto hand = surgeon();
   send(*hand, strokes(hand->author(), 40, 4));
-  // Joins have places in the order too, and so has the crumb that is found a moment after the last stroke.
+  // Joins have sequence numbers too. So has the debris that is found a moment after the last stroke.
   ASSERT_TRUE(wait_until([&] { return hand->own() == 40 && settled(runtime(), {hand.get()}); }, kPatience));
   const RoomSeq last = hand->seq();
   ASSERT_TRUE(early.read_to(last));
@@ -152,7 +152,7 @@ TEST_F(RoomServerTest, ASlowReaderIsBoundedAndCatchesUp) {
   }
   ASSERT_TRUE(prompt.read_to(RoomSeq{400}));
   const RuntimeHealth health = server_->health();
-  // A waiting set holds each block once: those with a surface and those that lost it.
+  // The set that waits holds each block once: blocks with a surface and blocks that lost it.
   EXPECT_LE(furthest, 2 * health.blocks);
   EXPECT_EQ(health.mesh_streams, 2u);
   ASSERT_TRUE(slow.read_to(RoomSeq{400}));
@@ -170,7 +170,7 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
     ASSERT_TRUE(wait_until([&] { return gone.own() == 5; }, kPatience));
   }
   send(*survivor, strokes(survivor->author(), 20, 7));
-  // The strokes leave a crumb, which is found a moment after the last of them.
+  // The strokes separate debris, which is found a moment after the last of them.
   ASSERT_TRUE(wait_until([&] { return survivor->own() == 20 && settled(runtime(), {survivor.get()}); }, kPatience));
   EXPECT_TRUE(watcher.read_to(survivor->seq()));
   EXPECT_EQ(wire::to_wire(survivor->hash()), status_of(survivor->session().room()).field_hash());
@@ -178,7 +178,7 @@ TEST_F(RoomServerTest, AKilledClientDisturbsNobody) {
       wait_until([&] { return server_->health().mesh_streams == 1 && server_->health().sessions == 1; }, kPatience));
 }
 
-TEST_F(RoomServerTest, ShowsTheNewestStateAndAnIdleToolOnceItsHandIsGone) {
+TEST_F(RoomServerTest, ShowsTheNewestStateAndAnIdleToolOnceItsClientIsGone) {
   const wire::JoinedRoom room = join(address(), wire::ClientKind::audio);
   grpc::ClientContext context;
   v1::WatchCuttingRequest request;
@@ -244,7 +244,7 @@ TEST_F(RoomServerTest, VersionsMustAgree) {
             grpc::StatusCode::INVALID_ARGUMENT);
 }
 
-// One session whose requests are made by hand; what the server says of them.
+// One session whose requests the test writes itself, and what the server answers.
 class RawSession {
  public:
   explicit RawSession(const std::string& address) : room(join(address, wire::ClientKind::haptic)) {
@@ -280,7 +280,7 @@ TEST_F(RoomServerTest, MalformedRequestsAreRefusedByTheNameOfTheirField) {
     EXPECT_NE(status.error_message().find(named), std::string::npos) << status.error_message();
   };
   expect_refused("open", [](RawSession& s) { s.write({}); });
-  // Who joined a server that was killed meanwhile may come again.
+  // Whoever joined a server that was killed may join again.
   expect_refused(
       "server_epoch",
       [](RawSession& s) {
@@ -314,7 +314,7 @@ TEST_F(RoomServerTest, MalformedRequestsAreRefusedByTheNameOfTheirField) {
   EXPECT_TRUE(wait_until([&] { return hand->own() == 1; }, kPatience)) << "the server goes on";
 }
 
-TEST_F(RoomServerTest, ACutSentAgainIsAnsweredWithItsFirstPlace) {
+TEST_F(RoomServerTest, ACutSentAgainIsAnsweredWithItsFirstSequenceNumber) {
   RawSession session(address());
   session.open();
   const Cut cut = strokes(session.room.author, 1, 10).front();
@@ -342,7 +342,7 @@ TEST_F(RoomServerTest, TheCaseIsFetchedOnceAndABrokenCopyAgain) {
   EXPECT_EQ(hand->session().bone().hash(), test::test_block().hash());
   EXPECT_TRUE(Case::load(kept).has_value());
   const std::filesystem::directory_iterator entries(dir_ / "cache");
-  EXPECT_EQ(std::distance(begin(entries), end(entries)), 1) << "nothing half-written is left";
+  EXPECT_EQ(std::distance(begin(entries), end(entries)), 1) << "no half-written file is left";
 }
 
 TEST_F(RoomServerTest, StoppingEndsEveryStreamWithAReason) {
@@ -374,19 +374,19 @@ TEST_F(RoomServerTest, RefusesAPortInUseAndAddressesOfOtherMachines) {
     EXPECT_EQ(start(broken).error().code, ErrorCode::invalid_input) << broken;
 }
 
-// Whether listening fails, and says why in the system's words rather than that the port is in use.
+// Whether listening fails with the system's message, and not with the message that the port is in use.
 bool refused_because(const std::string& listen, int reason) {
   const Result<void> usable = RoomServer::check_listen(listen);
   return !usable && usable.error().code != ErrorCode::exists &&
          usable.error().message.find(std::generic_category().message(reason)) != std::string::npos;
 }
 
-// In a process of its own, which gives up what would let it listen.
+// In a process of its own, which gives up the privileges that it would need to listen.
 TEST(RoomServerListen, APortThatTheSystemRefusesIsNotSaidToBeInUse) {
   const pid_t child = ::fork();
   if (child == 0) {
     if (::geteuid() == 0 && ::setuid(65534) != 0) ::_exit(2);
-    // Ports below this one are for the privileged; a system may have none.
+    // Ports below this one are privileged. A system may have none.
     int first_open_port = 1024;
     std::ifstream("/proc/sys/net/ipv4/ip_unprivileged_port_start") >> first_open_port;
     if (first_open_port > 1 && !refused_because("127.0.0.1:1", EACCES)) ::_exit(3);

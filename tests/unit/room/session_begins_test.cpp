@@ -1,4 +1,4 @@
-// What a session is told of its beginning, and when: nothing that a room that is killed then would not have.
+// What a session is sent at its beginning, and when: nothing that a killed room would have lost.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -24,10 +24,10 @@ using test::test_block;
 
 const Digest kSecret{{7}};
 
-// What its reader is told at once, as over a line that takes everything.
-class Told final : public SessionSubscriber {
+// Keeps what its reader is sent at once, as over a connection that takes everything.
+class ReceivedAtOnce final : public SessionSubscriber {
  public:
-  explicit Told(AuthorId author) : author_(author) {}
+  explicit ReceivedAtOnce(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
   void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
     send_queue_.begin(contained, std::move(before), std::move(complete));
@@ -65,7 +65,7 @@ class Told final : public SessionSubscriber {
   SessionSendQueue send_queue_;
 };
 
-// A driven runtime over a disk in memory, with an instructor and a hand.
+// A driven runtime over a disk in memory, with an instructor and a haptic client.
 class BegunSession : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -87,7 +87,7 @@ class BegunSession : public ::testing::Test {
     options.journal.disk = &disk;
     return options;
   }
-  // What no transaction has is lost.
+  // Everything outside a transaction is lost.
   void kill() {
     runtime.reset();
     store.reset();
@@ -100,12 +100,12 @@ class BegunSession : public ::testing::Test {
     tick(true);
     return author;
   }
-  std::shared_ptr<Told> session() {
-    auto subscriber = std::make_shared<Told>(ben);
+  std::shared_ptr<ReceivedAtOnce> session() {
+    auto subscriber = std::make_shared<ReceivedAtOnce>(ben);
     EXPECT_TRUE(runtime->open_session(subscriber, kSecret));
     return subscribers.emplace_back(std::move(subscriber));
   }
-  // A mark, a cut and a word about the hand: decided, and on no disk yet.
+  // A mark, a cut and a decision about the haptic client: decided, but not yet durable.
   void change_all() {
     const auto ask = [&](std::function<Result<RoomEvent>(Room&)> change) {
       runtime->queue_event(std::move(change), [](const Result<RoomEvent>&) {});
@@ -113,7 +113,7 @@ class BegunSession : public ::testing::Test {
     ask([this](Room& room) { return room.mark(ada, "here"); });
     Cut cut = strokes(ben, 1, 3)[0];
     cut.lease_epoch = runtime->lease_epoch(ben);
-    runtime->queue_cut(std::make_shared<Told>(ben), cut, {});
+    runtime->queue_cut(std::make_shared<ReceivedAtOnce>(ben), cut, {});
     ask([this](Room& room) { return room.supervise(ada, ben, {.stopped = true, .words = "wait"}); });
     tick(false);
   }
@@ -121,17 +121,17 @@ class BegunSession : public ::testing::Test {
   test::MemoryDisk disk{1};
   std::unique_ptr<RoomStore> store;
   std::unique_ptr<RoomRuntime> runtime;
-  std::vector<std::shared_ptr<Told>> subscribers;  // the runtime's until they go
+  std::vector<std::shared_ptr<ReceivedAtOnce>> subscribers;  // The runtime uses them until they leave.
   std::chrono::nanoseconds now{};
   AuthorId ada, ben;
 };
 
-std::size_t count(const Told& subscriber, v1::SessionResponse::MessageCase kind) {
+std::size_t count(const ReceivedAtOnce& subscriber, v1::SessionResponse::MessageCase kind) {
   return static_cast<std::size_t>(std::ranges::count(subscriber.told, kind, &v1::SessionResponse::message_case));
 }
 
-// The newest place that it was told that the room stands at.
-std::uint64_t furthest(const Told& subscriber) {
+// The newest sequence number of the room that it was sent.
+std::uint64_t furthest(const ReceivedAtOnce& subscriber) {
   std::uint64_t seq = 0;
   for (const v1::SessionResponse& one : subscriber.told)
     seq = std::max({seq, one.scene().room_seq(), one.complete().room_seq(), one.committed().room_seq(),
@@ -139,11 +139,11 @@ std::uint64_t furthest(const Told& subscriber) {
   return seq;
 }
 
-TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
+TEST_F(BegunSession, SendsNothingBeforeItIsDurable) {
   const RoomSeq kept = store->head().seq;
   change_all();
   ASSERT_EQ(runtime->room_seq().value, kept.value + 3) << "all of it is decided";
-  ASSERT_EQ(store->head().seq, kept) << "and none of it kept";
+  ASSERT_EQ(store->head().seq, kept) << "none of it is durable";
   const auto hand = session();
   tick(false);
   tick(false);
@@ -160,12 +160,12 @@ TEST_F(BegunSession, TellsNothingBeforeItIsKept) {
       std::ranges::any_of(hand->told, [](const auto& one) { return one.supervised().supervision().stopped(); }));
 }
 
-// Whoever comes while the disk is slow, and the room is killed before it was done: nobody knows of what it has lost.
+// A client joins while the disk is slow, and the room is killed before the write is done. Nobody was sent what is lost.
 TEST_F(BegunSession, OfARoomThatIsKilledSaysNoMoreThanWasLeft) {
   const auto before = session();
   tick(true);
   change_all();
-  const auto again = session();  // the same hand, over another line
+  const auto again = session();  // The same haptic client over another connection.
   tick(false);
   const std::uint64_t heard = std::max(furthest(*before), furthest(*again));
   const RoomSeq decided = runtime->room_seq();
@@ -176,7 +176,7 @@ TEST_F(BegunSession, OfARoomThatIsKilledSaysNoMoreThanWasLeft) {
   EXPECT_EQ(count(*before, v1::SessionResponse::kComplete), 1u);
   const auto after = session();
   tick(true);
-  EXPECT_EQ(count(*after, v1::SessionResponse::kSupervised), 0u) << "what nobody heard of holds for nobody";
+  EXPECT_EQ(count(*after, v1::SessionResponse::kSupervised), 0u) << "a decision that was never sent has no effect";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Viewers of a served room that come, go, stall and come back: all end with the room's surface.
+// Viewers of a served room that join, leave, stall and come back. All end with the room's surface.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -23,7 +23,7 @@ TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
   const auto hand = surgeon();
   std::vector<std::unique_ptr<MeshReader>> readers;
   for (int i = 0; i < 4; ++i)
-    readers.push_back(std::make_unique<MeshReader>(address()));  // two of them read only at the end
+    readers.push_back(std::make_unique<MeshReader>(address()));  // Two of them read only at the end.
   std::atomic<bool> cutting{true};
   std::atomic<int> comings{0};
   std::vector<std::thread> people;
@@ -31,7 +31,7 @@ TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
     people.emplace_back([&, i] {
       for (std::uint64_t seq = 20; seq < 380; seq += 20) EXPECT_TRUE(readers[i]->read_to(RoomSeq{seq}));
     });
-  // One whose stream ends now and then, in the middle of a surface or behind it.
+  // A viewer whose stream ends sometimes, in the middle of a surface or after it.
   people.emplace_back([&] {
     while (cutting || comings < 4) {
       MeshReader again(address());
@@ -42,16 +42,16 @@ TEST_F(Watching, WhoeverComesGoesStallsOrComesBackEndsWithTheRoomsSurface) {
   const std::vector<Cut> cuts = strokes(hand->author(), kCuts, 21);
   for (int i = 0; i < kCuts - kLast; ++i) {
     send(*hand, {cuts[i]});
-    if (i % 100 == 50) readers.push_back(std::make_unique<MeshReader>(address()));  // late, while it is cut
+    if (i % 100 == 50) readers.push_back(std::make_unique<MeshReader>(address()));  // These join late, during the cuts.
     std::this_thread::sleep_for(1ms);
   }
   cutting = false;
   for (std::thread& person : people) person.join();
   readers.push_back(std::make_unique<MeshReader>(address()));
-  // Nobody comes any more: the entries that are left are those that the hand hears of.
+  // Nobody joins any more: the remaining entries are those that the haptic client receives.
   send(*hand, {cuts.end() - kLast, cuts.end()});
   ASSERT_TRUE(wait_until([&] { return hand->own() == kCuts; }, kPatience));
-  // Crumbs may still come off, each an event of its own.
+  // Debris may still separate. Each piece of it is an event of its own.
   ASSERT_TRUE(wait_until([&] { return settled(runtime(), {hand.get()}); }, kPatience));
   const RoomSeq last = server_->health().room_seq;
   for (const auto& reader : readers) EXPECT_TRUE(reader->read_to(last));
@@ -93,7 +93,7 @@ TEST_F(Watching, WhoWantsStatesSeldomIsSentFewAndTheLast) {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   hands.join();
   EXPECT_EQ(newest, kStates);
-  EXPECT_LE(messages, 20.0 * took.count() + 3.0) << "the one at joining, and a turn that comes early";
+  EXPECT_LE(messages, 20.0 * took.count() + 3.0) << "one more at the join, and one turn that comes early";
   context.TryCancel();
   stream->Finish();
 }

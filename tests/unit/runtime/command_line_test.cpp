@@ -23,7 +23,7 @@ TEST(Wrapped, KeepsLineBreaksAndLongWords) {
 
 TEST(Wrapped, CountsCharactersAndNotBytes) { EXPECT_EQ(wrapped("ä ö ü", 5, 0, 0), "ä ö ü"); }
 
-// Any text: the same words in the same order, and no line is wider unless it is one word.
+// For any text: the same words in the same order, and no line is too wide unless it is a single word.
 TEST(Wrapped, LosesNoWord) {
   std::string text;
   for (int i = 0; i < 200; ++i) text += std::string(static_cast<std::size_t>(i * 7 % 13 + 1), 'x') + " ";

@@ -1,4 +1,4 @@
-// Pages that a thread has to wait for, with a reserve and without one.
+// The pages that a thread waits for, with a memory reserve and without one.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
@@ -18,7 +18,8 @@ long pages_waited_for() {
   return usage.ru_minflt;
 }
 
-// Takes small blocks, as a cut field's leaves are, and writes all of each; what the system had to give meanwhile.
+// Allocates small blocks, as the leaves of a cut field are, and writes all of each. Returns the number of pages that
+// the system had to provide.
 long pages_for_blocks(std::vector<std::unique_ptr<char[]>>& kept, int count) {
   constexpr std::size_t kBlock = 2048;
   const long before = pages_waited_for();
@@ -31,10 +32,10 @@ long pages_for_blocks(std::vector<std::unique_ptr<char[]>>& kept, int count) {
 
 TEST(MemoryReserve, SmallBlocksNeedNoNewPagesAfterARefill) {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-  GTEST_SKIP() << "a sanitizer replaces the system's heap, of which the reserve is";
+  GTEST_SKIP() << "a sanitizer replaces the system's heap, which the reserve uses";
 #endif
   constexpr int kBlocks = 512;  // 1 MB
-  // A thread of its own, so that nothing was freed in its part of the heap before.
+  // In a thread of its own, so that its part of the heap has no freed memory.
   long without = 0, with = 0, again = 0;
   std::thread([&] {
     std::vector<std::unique_ptr<char[]>> kept;

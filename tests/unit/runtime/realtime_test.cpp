@@ -1,4 +1,4 @@
-// What is said of a machine, fact by fact, and that a watchdog notices a loop that stands.
+// The findings about a machine, fact by fact. A watchdog detects a loop that has stopped.
 #include "common/runtime/realtime.hpp"
 
 #include <gtest/gtest.h>
@@ -32,7 +32,7 @@ MachineFacts good_machine() {
   return facts;
 }
 
-// Findings that are not fine, as one text.
+// The findings that are not fine, as one text.
 std::string complaints(const MachineFacts& facts, Finding least = Finding::note) {
   std::string text;
   for (const MachineFinding& finding : judge(facts, kPriority, kMemory_kib))
@@ -74,7 +74,7 @@ TEST(Machine, EachLackIsNamedWithItsRemedy) {
     MachineFacts facts = good_machine();
     one.spoil(facts);
     const auto findings = judge(facts, kPriority, kMemory_kib);
-    EXPECT_EQ(findings.front().kind, one.kind) << one.sentence;  // what matters most comes first
+    EXPECT_EQ(findings.front().kind, one.kind) << one.sentence;  // the most important finding comes first
     EXPECT_EQ(std::ranges::count_if(findings, [](const MachineFinding& f) { return f.kind != Finding::fine; }), 1)
         << one.sentence;
     EXPECT_NE(findings.front().sentence.find(one.sentence), std::string::npos) << findings.front().sentence;
@@ -82,8 +82,8 @@ TEST(Machine, EachLackIsNamedWithItsRemedy) {
   }
 }
 
-// All the time there is, or a kernel that does not say: no complaint.
-TEST(Machine, WhatIsNotToldIsNoLack) {
+// Unlimited time, or a kernel that does not report it, is no finding.
+TEST(Machine, WhatIsNotReportedIsNoLack) {
   MachineFacts facts = good_machine();
   facts.rt_runtime_us = -1;
   facts.governors.clear();
@@ -92,7 +92,7 @@ TEST(Machine, WhatIsNotToldIsNoLack) {
   EXPECT_EQ(complaints(facts), "");
 }
 
-// This one, whatever it is: facts agree with each other and with what a thread gets.
+// The facts of this machine agree with each other and with what a thread gets.
 TEST(Machine, ThisOneIsSeenAsItIs) {
   const MachineFacts facts = look_at_machine(kPriority);
   EXPECT_GE(facts.cores, 1);
@@ -109,18 +109,18 @@ TEST(Watchdog, SaysWhenALoopStands) {
   std::atomic<int> called{0};
   Watchdog watchdog(20ms, 0, [&] { ++called; });
   std::this_thread::sleep_for(60ms);
-  EXPECT_EQ(watchdog.stalls(), 0u) << "it has not begun";
+  EXPECT_EQ(watchdog.stalls(), 0u) << "the loop has not begun";
   watchdog.beat();
   const auto start = std::chrono::steady_clock::now();
   while (called == 0 && std::chrono::steady_clock::now() - start < 10s) std::this_thread::sleep_for(1ms);
   EXPECT_EQ(called, 1);
   EXPECT_GE(std::chrono::steady_clock::now() - start, 15ms);
   std::this_thread::sleep_for(60ms);
-  EXPECT_EQ(called, 1) << "once for each stall";
+  EXPECT_EQ(called, 1) << "called once for each stall";
   EXPECT_EQ(watchdog.stalls(), 1u);
   EXPECT_GE(watchdog.longest(), 20ms);
 
-  // It goes on, and stands again.
+  // The loop goes on and stops again.
   watchdog.beat();
   const auto again = std::chrono::steady_clock::now();
   while (called == 1 && std::chrono::steady_clock::now() - again < 10s) std::this_thread::sleep_for(1ms);
@@ -128,7 +128,7 @@ TEST(Watchdog, SaysWhenALoopStands) {
   watchdog.beat();
   watchdog.rest();
   std::this_thread::sleep_for(80ms);
-  EXPECT_EQ(called, 2) << "it means to stop";
+  EXPECT_EQ(called, 2) << "it stops on purpose";
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ TEST(PeriodicTimer, NeverTicksEarlyAndCountsWhatItMissed) {
   }
   EXPECT_GE(std::chrono::steady_clock::now() - start, 2ms * periods);
   EXPECT_GE(stats.missed, 3u);
-  EXPECT_EQ(stats.missed + 20u, static_cast<unsigned>(periods)) << "a period has its tick or is missed";
+  EXPECT_EQ(stats.missed + 20u, static_cast<unsigned>(periods)) << "every period has either a tick or a miss";
   EXPECT_EQ(stats.lateness.count(), 20u);
   EXPECT_EQ(stats.work.count(), 20u);
 }
@@ -128,7 +128,7 @@ TEST(StopSignal, IsRaisedBySigterm) {
   EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
 }
 
-// Whoever presses Ctrl-C again must not cut off what the program writes before it ends.
+// If somebody presses Ctrl-C again, the program must still write everything before it ends.
 TEST(StopSignal, ASecondSigintCutsNothingOff) {
   const pid_t child = ::fork();
   if (child == 0) {
@@ -152,13 +152,13 @@ TEST(Files, AreWrittenWholeAndReadBack) {
   EXPECT_NE(missing.error().message.find("b"), std::string::npos);
   EXPECT_FALSE(write_file(temp / "no-folder" / "c", "x"));
 
-  // A folder in the file's place cannot be renamed over.
+  // A rename cannot replace a folder.
   std::filesystem::create_directory(temp / "folder");
   EXPECT_FALSE(write_file(temp / "folder", "x"));
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(temp.path()), {}), 2) << "a partial file was left";
 }
 
-// Asked before hours of work: the answer is that of the writing itself, and nothing is left behind.
+// Asked before hours of work: the answer is the same as that of writing, and no file is left.
 TEST(Files, SayBeforehandWhetherTheyCanBeWritten) {
   const osteon::test::TempDir temp;
   EXPECT_TRUE(check_writable({}, "the log", "--log"));
@@ -167,7 +167,7 @@ TEST(Files, SayBeforehandWhetherTheyCanBeWritten) {
   ASSERT_TRUE(write_file(temp / "old", "kept"));
   EXPECT_TRUE(check_writable(temp / "old", "the log", "--log"));
   EXPECT_EQ(*read_file(temp / "old"), "kept");
-  // Root may write into /proc, and still no file can be made there.
+  // Root may write into /proc, but even root cannot create a file there.
   for (const std::filesystem::path& wrong :
        {temp / "no-folder" / "a", temp.path(), std::filesystem::path("/proc/a.log")}) {
     const Result<void> answer = check_writable(wrong, "the log", "--log");

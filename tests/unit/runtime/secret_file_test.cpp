@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 TEST(SecretFile, IsForItsOwnerAlone) {
   const test::TempDir dir;
   const fs::path file = dir / "a.key";
-  EXPECT_FALSE(who_else_reads(file)) << "nobody reads what is not there";
+  EXPECT_FALSE(who_else_reads(file)) << "a file that does not exist has no readers";
   std::ofstream(file) << "secret";
   for (const int mode : {0600, 0400, 0700}) {
     fs::permissions(file, fs::perms(mode));
@@ -34,9 +34,9 @@ TEST(SecretFile, IsForItsOwnerAlone) {
   }
 }
 
-// The unit of deploy/systemd reads certificates as one of a group: a warning would be about what it needs.
+// The unit of deploy/systemd reads certificates through its group. A warning would be about a permission that it needs.
 TEST(SecretFile, MayBeReadByTheGroupThroughWhichThisProcessReadsIt) {
-  if (::geteuid() != 0) GTEST_SKIP() << "needs root, to be somebody else";
+  if (::geteuid() != 0) GTEST_SKIP() << "needs root, to become another user";
   const test::TempDir dir;
   const fs::path file = dir / "a.key";
   std::ofstream(file) << "secret";

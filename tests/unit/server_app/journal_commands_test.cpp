@@ -1,4 +1,4 @@
-// The program's commands on journals: what they must never replace, and what they say of a journal that is damaged.
+// The program's journal commands: what they must never replace, and what they report about a damaged journal.
 #include <gmock/gmock.h>
 
 #include <chrono>
@@ -29,7 +29,7 @@ std::string bytes_of(const fs::path& file) {
 
 class JournalCommands : public ::testing::Test {
  protected:
-  // Some cuts of one person, then 40 marks.
+  // A journal with some cuts of one person, then 40 marks.
   void SetUp() override {
     ASSERT_TRUE(test_block().save(dir_ / "case"));
     KeptCuts kept(file_, nullptr, "femur");
@@ -43,7 +43,7 @@ class JournalCommands : public ::testing::Test {
     ASSERT_TRUE(kept.store->close());
     whole_ = bytes_of(file_);
   }
-  // One bit of the entry 10 places before the last.
+  // Flips one bit of the tenth entry before the last.
   void damage() {
     bad_ = last_ - 10;
     std::string bytes = whole_;
@@ -89,7 +89,7 @@ TEST_F(JournalCommands, AnExportReplacesNothing) {
   fs::create_symlink(dir_ / "elsewhere", dir_ / "link");
   refused("export", {(dir_ / "link").string()}, {"already"});
   EXPECT_FALSE(there("elsewhere"));
-  // What the next opening would take for its own.
+  // Files that the next start would take for its own.
   for (const std::string end : {"-log", "-mirror", "-wal", ".failed", ".lock"}) {
     refused("export", {file_.string() + end}, {"give another name"});
     EXPECT_EQ(bytes_of(file_), whole_);
@@ -122,7 +122,7 @@ TEST_F(JournalCommands, AReplayReplacesOnlyFields) {
   EXPECT_EQ(bytes_of(notes), "of the day");
   refused("replay", fields(file_.string()), {"give another name"});
   EXPECT_EQ(bytes_of(file_), whole_);
-  // Said before the long replay, which a case that is none would end with another sentence.
+  // The error comes before the long replay. The replay of a folder that is no case would end with another message.
   refused("replay", {"--case", (dir_ / "no case").string(), "--fields", (dir_ / "none" / "f.vdb").string()},
           {"there is no folder"});
   done("replay", fields((dir_ / "f.vdb").string()));
@@ -147,7 +147,7 @@ TEST_F(JournalCommands, ADamagedJournalIsSaidToBeOneAndGivesWhatIsConfirmed) {
   refused("branch", {file("b")}, {fault, "--at " + confirmed});
   refused("export", {file("lines")}, {fault, "--to " + confirmed});
   refused("people", {}, {fault});
-  EXPECT_THAT(server("people", {}).out, HasSubstr("Anna")) << "what can be read is there";
+  EXPECT_THAT(server("people", {}).out, HasSubstr("Anna")) << "the readable part is there";
   refused("erase-person", {"--person", "1"}, {fault});
   refused("replay", {"--case", bone, "--to", beyond}, {"--to " + beyond, "that is confirmed"});
   refused("branch", {file("b"), "--at", beyond}, {confirmed});
@@ -176,20 +176,20 @@ TEST_F(JournalCommands, ASoundOneStillVouchesForItsEndAfterwards) {
   EXPECT_EQ(report->witnessed.value, last_);
 }
 
-TEST_F(JournalCommands, NobodyIsForgottenWhomNobodyKnows) {
+TEST_F(JournalCommands, NobodyUnknownIsErased) {
   refused("erase-person", {"--person", "77"}, {"nobody in", "has the number 77"});
   EXPECT_THAT(server("people", {}).out, HasSubstr("Anna"));
   done("erase-person", {"--person", "1"});
   EXPECT_THAT(server("people", {}).out, Not(HasSubstr("Anna")));
   refused("erase-person", {"--person", "1"}, {"has the number 1"});
   done("erase-person", {"--older-than", "1"});
-  done("erase-person", {"--older-than", "0"});  // all who came before today: nobody here
+  done("erase-person", {"--older-than", "0"});  // This erases everybody who joined before today, which is nobody.
   refused("erase-person", {}, {"either --person", "or --older-than"});
   refused("erase-person", {"--person", "2", "--older-than", "0"}, {"either --person", "or --older-than"});
 }
 
-// No day is a number of days like any other.
-TEST_F(JournalCommands, ForgettingWhoCameBeforeTodayLeavesTheOthers) {
+// 0 days is a valid number of days.
+TEST_F(JournalCommands, ErasingWhoCameBeforeTodayLeavesTheOthers) {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const auto today = static_cast<std::int32_t>(std::chrono::duration_cast<std::chrono::days>(now).count());
   {
@@ -205,8 +205,8 @@ TEST_F(JournalCommands, ForgettingWhoCameBeforeTodayLeavesTheOthers) {
   EXPECT_THAT(server("people", {}).out, AllOf(Not(HasSubstr("Bert")), HasSubstr("Cora")));
 }
 
-// Names and words are in no file of the folder, and copies of the journal have neither.
-TEST_F(JournalCommands, WhoIsForgottenLeavesNoWords) {
+// Names and texts of an erased person are in no file of the folder, and in no copy of the journal.
+TEST_F(JournalCommands, WhoIsErasedLeavesNoWords) {
   const auto keys = load_or_make_signing_keys(dir_ / "signing.key");
   ASSERT_TRUE(keys) << keys.error().message;
   const auto anywhere = [&](const std::string& text) {
@@ -239,7 +239,7 @@ TEST_F(JournalCommands, ASecondBackupNamesTheFirst) {
   refused("backup", {(dir_ / "b.backup").string()}, {"there is " + (dir_ / "b.backup").string() + " already"});
 }
 
-// Neither served nor left with a lock beside it.
+// The file is neither served nor is a lock file left beside it.
 TEST_F(JournalCommands, AFileThatIsNoJournalIsSaidToBeNone) {
   const std::string json = make("case.json", std::string("{\"a\": \"") + std::string(180, 'x') + "\"}");
   fs::create_directory(dir_ / "folder");

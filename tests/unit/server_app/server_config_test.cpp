@@ -1,4 +1,4 @@
-// What a configuration file says, and what is said of a wrong one.
+// The fields of a configuration file, and the messages about a wrong one.
 #include "server/app/server_config.hpp"
 
 #include <gtest/gtest.h>
@@ -24,7 +24,7 @@ class ServerConfigTest : public ::testing::Test {
     EXPECT_TRUE(got.has_value()) << got.error().message;
     return got.value_or(ConfigRead{});
   }
-  // A case that osteon-import could have written, as far as a look at the folder tells.
+  // A case as osteon-import could have written it, as far as the folder shows.
   void make_case(const std::string& name) {
     fs::create_directories(dir_ / name);
     std::ofstream(dir_ / name / "case.json") << "{}";
@@ -106,7 +106,7 @@ limits:
   EXPECT_EQ(c.limits.blow_j, 15);
 }
 
-// One wrong value for every field that there is, and a word of the remedy.
+// One wrong value for every field, and a word of the remedy in the message.
 const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"address_file", {"[a, b]", "write a path"}},
     {"audit", {"[x]", "write a path"}},
@@ -167,10 +167,10 @@ TEST_F(ServerConfigTest, EveryFieldIsWrongOnce) {
     EXPECT_EQ(said.find('\n'), std::string::npos);
   }
   const std::vector<std::string> known = server_config_fields();
-  EXPECT_EQ(tried, (std::set<std::string>{known.begin(), known.end()})) << "a field without a wrong value here";
+  EXPECT_EQ(tried, (std::set<std::string>{known.begin(), known.end()})) << "a field has no wrong value in this test";
 }
 
-TEST_F(ServerConfigTest, AnUnknownFieldIsToldTheNearestKnownOne) {
+TEST_F(ServerConfigTest, AnUnknownFieldIsReportedWithTheNearestKnownOne) {
   const std::map<std::string, std::string> nearest{{"lisen: x:1", "\"listen\""},
                                                    {"case: skull", "\"cases\""},
                                                    {"Metrics: 1", "\"metrics\""},
@@ -185,12 +185,12 @@ TEST_F(ServerConfigTest, AnUnknownFieldIsToldTheNearestKnownOne) {
   }
 }
 
-TEST_F(ServerConfigTest, AllFaultsAreTold) {
+TEST_F(ServerConfigTest, AllFaultsAreReported) {
   const ConfigRead got = read("listen: here\nlisten: 127.0.0.1:1\nfoo: 1\nlimits: 3\nmetrics: 9464\n");
   ASSERT_EQ(got.faults.size(), 4u);
   EXPECT_NE(got.faults[1].find("twice"), std::string::npos);
   EXPECT_NE(got.faults[3].find("\"limits\" is not a map"), std::string::npos);
-  EXPECT_EQ(got.config.metrics, "9464") << "what is right is read";
+  EXPECT_EQ(got.config.metrics, "9464") << "the correct fields are read";
 }
 
 TEST_F(ServerConfigTest, WhatIsNotYamlIsSaidWithItsLine) {
@@ -207,7 +207,7 @@ TEST_F(ServerConfigTest, WhatDoesNotFitTogetherIsSaid) {
   EXPECT_NE(check_server_config(config).error().message.find("--case"), std::string::npos);
   config.case_folders = {"a"};
   EXPECT_NE(check_server_config(config).error().message.find("--certificates"), std::string::npos)
-      << "nobody says how clients come in";
+      << "no option says how clients authenticate";
   config.certificates = "c";
   EXPECT_TRUE(check_server_config(config).has_value());
   config.plain = true;
@@ -275,14 +275,14 @@ TEST(ServerConfigExample, IsSoundAndNamesEveryField) {
   ASSERT_TRUE(got.has_value()) << got.error().message;
   for (const std::string& fault : got->faults) ADD_FAILURE() << fault;
   EXPECT_TRUE(check_server_config(got->config).has_value());
-  // What it leaves out as a comment is there to be found, too.
+  // The fields that it leaves out as comments must be in it too.
   std::ifstream in(file);
   const std::string text{std::istreambuf_iterator<char>(in), {}};
   for (const std::string& field : server_config_fields()) {
     const std::string name = field.substr(field.find('.') == std::string::npos ? 0 : field.find('.') + 1);
     EXPECT_NE(text.find(name + ":"), std::string::npos) << field;
   }
-  // Its limits are those that hold without it.
+  // The limits in the example are the defaults.
   EXPECT_EQ(got->config.limits.power_w, kServedLimits.power_w);
   EXPECT_EQ(got->config.limits.swept_voxels_per_s, kServedLimits.swept_voxels_per_s);
   EXPECT_EQ(got->config.limits.time_slack, kServedLimits.time_slack);

@@ -18,12 +18,12 @@ using Bytes = std::vector<std::byte>;
 struct Entry {
   std::string path;
   std::string content{};
-  std::string link{};  // where a symbolic link goes
-  bool hard = false;   // a hard one
+  std::string link{};  // target of a symbolic link
+  bool hard = false;   // a hard link
   unsigned type = AE_IFREG;
 };
 
-// A zip archive in memory, by another library than ours would be if we had one: whatever a stranger may put in.
+// A zip archive in memory, which can contain whatever an attacker may put in. libarchive makes it.
 Bytes zip(const std::vector<Entry>& entries, const char* options = nullptr) {
   Bytes bytes(64 << 20);
   std::size_t used = 0;
@@ -144,7 +144,7 @@ TEST(CaseArchive, BombsStopAtTheQuota) {
   });
   ASSERT_FALSE(bytes);
   EXPECT_EQ(bytes.error().code, ErrorCode::exhausted);
-  EXPECT_LE(put, small.unpacked_bytes);  // not a byte beyond it was written
+  EXPECT_LE(put, small.unpacked_bytes);  // no byte beyond the quota was written
 
   std::vector<Entry> many = kCase;
   for (int i = 0; i < 20; ++i) many.push_back({"d" + std::to_string(i) + "/", "", "", false, AE_IFDIR});

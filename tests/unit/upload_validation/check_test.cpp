@@ -1,4 +1,4 @@
-// The process that looks a case through stays within its memory, and so does every program that opens a case.
+// The process that validates an uploaded case stays within its memory limit. So does every program that opens a case.
 #include "server/upload_validation/case_check.hpp"
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr long kMostMib = 1024;
 
-// Of all children of this test so far.
+// The peak memory of all children of this test so far, MiB.
 long peak_mib() {
   rusage used{};
   ::getrusage(RUSAGE_CHILDREN, &used);
@@ -46,7 +46,7 @@ class CheckTest : public ::testing::Test {
     EXPECT_TRUE(pack_case(temp_ / "case", temp_ / "place" / "case.zip"));
     return check_case(reader, temp_ / "place" / "case.zip", temp_ / "place", quota);
   }
-  // Refused in one short line, by the process and by osteon-import.
+  // Expects a refusal in one short line, from the validating process and from osteon-import.
   void expect_refused() const {
     const auto out = checked();
     ASSERT_FALSE(out);
@@ -74,7 +74,7 @@ TEST_F(CheckTest, ChangedFilesStayWithinTheMemory) {
   EXPECT_LE(peak_mib(), kMostMib);
 }
 
-// One byte each. `osteon-import info` took 12 and 6 GB of them, and the process as much as it might.
+// Each of these changes one byte. `osteon-import info` used 12 and 6 GB for them, and the process as much as its limit.
 TEST_F(CheckTest, TheWorstChangesAreRefused) {
   for (const auto& [at, value] : {std::pair<std::size_t, int>{102, 16}, {129, 253}, {135, 127}}) {
     std::string vdb = sound_;
@@ -85,7 +85,7 @@ TEST_F(CheckTest, TheWorstChangesAreRefused) {
   EXPECT_LE(peak_mib(), kMostMib);
 }
 
-// What a file says of itself may be all of an error: here a name of a megabyte, with line breaks.
+// An error may quote what a file contains: here a title of almost a megabyte with line breaks.
 TEST_F(CheckTest, ErrorsAreOneShortLine) {
   fs::resize_file(temp_ / "case" / "case.json", 0);
   std::ofstream(temp_ / "case" / "case.json")
@@ -95,7 +95,7 @@ TEST_F(CheckTest, ErrorsAreOneShortLine) {
 
 TEST_F(CheckTest, TheProcessGetsNoMoreMemoryThanItsQuota) {
   const fs::path reader = temp_ / "reader";
-  // The server limits a process that has begun. What that process starts before has no limit.
+  // The server limits a process after its start. What the process does before has no limit.
   std::ofstream(reader) << R"sh(#!/bin/sh
 while [ "$(ulimit -v)" = unlimited ]; do sleep 0.01; done
 head -c 400000000 /dev/zero | tail -c 400000000 > /dev/null && echo '{"error":"it had the memory"}'

@@ -1,4 +1,4 @@
-// What a process that has confined itself can still do. Each attempt is one of a child's own, made by the system's own
+// What a process that has confined itself can still do. A child process makes each attempt, with the system's own
 // calls.
 #include "server/upload_validation/confine.hpp"
 
@@ -35,10 +35,10 @@ class ConfineTest : public ::testing::Test {
     fs::create_directory(own_);
     std::ofstream(own_ / "given") << "x";
     std::ofstream(other_) << "x";
-    // Whether this kernel can do it at all is the kernel's word, not the code's.
+    // Only the kernel decides whether it supports Landlock. The code is not asked.
     can_hold_files_ = ::syscall(SYS_landlock_create_ruleset, nullptr, 0, 1u) >= 1;
   }
-  // What becomes of an attempt: 0 where it worked, else the reason; -1: the child did not live to say so.
+  // Result of an attempt in a child process: 0 if it worked, otherwise errno; -1 if the child was killed.
   static int in_child(const std::function<int()>& attempt, const fs::path* confined) {
     const pid_t child = ::fork();
     if (child == 0) {
@@ -51,9 +51,9 @@ class ConfineTest : public ::testing::Test {
     ::waitpid(child, &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
   }
-  // It works for anybody, and not for who is confined.
+  // The attempt works in any process, and fails in a confined one.
   void expect_taken_away(const char* what, const std::function<int()>& attempt) const {
-    EXPECT_EQ(in_child(attempt, nullptr), 0) << what << " is no attempt";
+    EXPECT_EQ(in_child(attempt, nullptr), 0) << what << " does not work without confinement either";
     EXPECT_GT(in_child(attempt, &own_), 0) << what;
   }
   void expect_left(const char* what, const std::function<int()>& attempt) const {
@@ -116,7 +116,7 @@ TEST_F(ConfineTest, WhatItNeedsIsLeft) {
     rlimit now{};
     return ::getrlimit(RLIMIT_AS, &now);
   });
-  // It can die by its own hand, as a library does that finds itself in disorder.
+  // It can abort, as a library does that detects an inconsistency.
   EXPECT_EQ(in_child([]() -> int { std::abort(); }, &own_), -1);
 }
 
@@ -128,7 +128,7 @@ TEST_F(ConfineTest, SaysWhatHolds) {
   }
 }
 
-// The process that looks cases through: an archive that is not in its folder is out of its reach.
+// The process that validates cases cannot reach an archive that is not in its folder.
 TEST_F(ConfineTest, TheProcessThatLooksCasesThroughIsConfined) {
   ASSERT_TRUE(test::plain_block(6, 3, 0.5).save(temp_ / "case"));
   ASSERT_TRUE(pack_case(temp_ / "case", own_ / "upload.zip"));

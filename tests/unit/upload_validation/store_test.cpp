@@ -62,7 +62,7 @@ TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
   const auto again = Case::load(stored->folder);
   ASSERT_TRUE(again) << again.error().message;
   EXPECT_EQ(again->hash(), bone_.hash());
-  // What it takes in memory is known before it is read again.
+  // Its size in memory is known before it is read again.
   EXPECT_EQ(stored->memory_bytes, bone_.memory_bytes());
   const auto peeked = CaseRepository::peek(stored->folder);
   ASSERT_TRUE(peeked) << peeked.error().message;
@@ -77,7 +77,7 @@ TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
   EXPECT_EQ(store_->folders().size(), 1U);
 }
 
-// Every byte of a case is covered by its hash or by the form of its files: flipped, it is another case, or none.
+// The hash of a case or the format of its files covers every byte. With a flipped byte it is another case, or none.
 TEST_F(StoreTest, ADamagedCaseIsRefusedAndNothingIsLeft) {
   const std::string vdb = content_of(temp_ / "case" / "bone.vdb");
   for (int i = 0; i < 12; ++i) {
@@ -87,7 +87,7 @@ TEST_F(StoreTest, ADamagedCaseIsRefusedAndNothingIsLeft) {
     ASSERT_TRUE(pack_case(temp_ / "case", temp_ / "broken.zip"));
     const auto out = keep(*store_, content_of(temp_ / "broken.zip"));
     if (out) {
-      EXPECT_EQ(out->hash, bone_.hash());  // it was a byte that says nothing
+      EXPECT_EQ(out->hash, bone_.hash());  // the byte has no meaning
       continue;
     }
     EXPECT_TRUE(out.error().code == ErrorCode::invalid_input || out.error().code == ErrorCode::exhausted)
@@ -106,7 +106,7 @@ TEST_F(StoreTest, QuotasHold) {
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::exhausted);
 
-  // One byte less than the case takes once it is written anew: that shows at the end, and nothing of it stays.
+  // One byte less than the case needs once it is written again. That shows only at the end, and nothing of it is left.
   const auto kept = keep(*store_, archive);
   ASSERT_TRUE(kept) << kept.error().message;
   fs::remove_all(kept->folder);
@@ -115,7 +115,7 @@ TEST_F(StoreTest, QuotasHold) {
   ASSERT_FALSE(beyond);
   EXPECT_EQ(beyond.error().code, ErrorCode::exhausted);
   EXPECT_TRUE(tight->folders().empty());
-  // As much as it takes: it is kept, and then the store is full before anything is sent.
+  // Exactly as much as it needs: it is stored, and then the store is full before anything is sent.
   auto full = make_store({.kept_bytes = kept->bytes});
   ASSERT_TRUE(keep(*full, archive));
   const auto no_more = full->begin();
@@ -148,20 +148,21 @@ TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
   EXPECT_EQ(with("exit 0").code, ErrorCode::invalid_input);
   EXPECT_EQ(with("echo '{\"hash\":\"00\",\"title\":\"x\"}'").code, ErrorCode::invalid_input);
   EXPECT_EQ(with("exec sleep 60", {.time = std::chrono::seconds(1)}).code, ErrorCode::exhausted);
-  // One that was taken over leaves what is no case.
+  // A process that an attacker has taken over leaves something that is not a case.
   const std::string hash(64, 'a');
   const std::string lie = "echo '{\"hash\":\"" + hash + "\",\"title\":\"x\",\"memory_bytes\":1}'";
-  EXPECT_EQ(with(lie).code, ErrorCode::invalid_input) << "nothing";
+  EXPECT_EQ(with(lie).code, ErrorCode::invalid_input) << "there is no case";
   const std::string plain = "mkdir $3/sound; echo > $3/sound/case.json; ";
-  EXPECT_EQ(with(plain + "ln -s /etc/passwd $3/sound/bone.vdb; " + lie).code, ErrorCode::invalid_input) << "a link";
+  EXPECT_EQ(with(plain + "ln -s /etc/passwd $3/sound/bone.vdb; " + lie).code, ErrorCode::invalid_input)
+      << "the file is a link";
   EXPECT_EQ(with(plain + "echo > $3/sound/bone.vdb; echo > $3/sound/more; " + lie).code, ErrorCode::invalid_input)
-      << "more than a case has";
+      << "there are more files than in a case";
   EXPECT_EQ(with("mkdir $3/real; ln -s real $3/sound; echo > $3/real/case.json; echo > $3/real/bone.vdb; " + lie).code,
             ErrorCode::invalid_input);
   EXPECT_EQ(with("exec yes").code, ErrorCode::exhausted);
-  EXPECT_EQ(with("exec 1>&-; exec sleep 60").code, ErrorCode::invalid_input);  // says nothing more, and stays
+  EXPECT_EQ(with("exec 1>&-; exec sleep 60").code, ErrorCode::invalid_input);  // it closes its output and stays
   EXPECT_EQ(left_over(), 0U);
-  // The real one, with less memory than a case takes.
+  // The real program, with less memory than a case needs.
   auto poor = make_store({.memory_bytes = 8 << 20});
   EXPECT_FALSE(keep(*poor, archive));
   auto none = make_store({}, temp_ / "no-such-program");
