@@ -147,8 +147,8 @@ TEST_F(Refused, ATicketIsItsOwnersAlone) {
   }
   EXPECT_EQ(counted("request"), static_cast<std::uint64_t>(kTimes));
   const std::vector<std::string> lines = logged("refused who=");
-  EXPECT_EQ(lines.size(), 3u)
-      << "one of Ben, one of the ended stream, one of the call: " << testing::PrintToString(lines);
+  EXPECT_EQ(lines.size(), 3u) << "one of Ben, one of the ended stream, one of the call: "
+                              << testing::PrintToString(lines);
 }
 
 TEST_F(Refused, TheUnauthenticatedAreCountedAndLoggedOnce) {

@@ -290,8 +290,7 @@ TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
   live.cut(2);
   const RoomSeq newest = live.store->head().seq;
   ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
-  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists)
-      << "only the store can know";
+  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists) << "only the store can know";
   const HasHead has = [&](const fs::path& file, const JournalHead& head) {
     return file == kFile ? live.store->has_head(head) : has_head(file, head, &disk_);
   };
