@@ -3,6 +3,7 @@ import os
 import re
 import shutil
 import subprocess
+import tempfile
 import unittest
 from pathlib import Path
 
@@ -25,12 +26,12 @@ def subcommands(text):
     return listed + (others[1].split(", ") if others else [])
 
 
-def all_helps(*command):
-    """Yields (command, its help) of a program and of all its subcommands."""
-    text = said(*command, "--help")
+def all_helps(*command, run=None):
+    """Yields (command, its help) of a program and of all its subcommands. `run`: the file of the program."""
+    text = said(run or command[0], *command[1:], "--help")
     yield command, text
     for name in subcommands(text):
-        yield from all_helps(*command, name)
+        yield from all_helps(*command, name, run=run)
 
 
 def completed(program, *words):
@@ -55,10 +56,14 @@ class Help(unittest.TestCase):
 
     @unittest.skipUnless(shutil.which("help2man"), "help2man is not installed; deploy/install does that")
     def test_makes_a_man_page(self):
+        with tempfile.TemporaryDirectory() as folder:
+            said("env", f"OSTEON_BIN={BIN}", SOURCE / "deploy" / "man", folder)
+            pages = {page.stem: page.read_text(encoding="utf-8") for page in Path(folder, "man1").glob("*.1")}
         for program in PROGRAMS:
-            page = said("help2man", "--no-info", BIN / program)
-            self.assertIn(".SH OPTIONS", page)
-            self.assertIn(program, page)
+            for command, _ in all_helps(program, run=BIN / program):
+                page = pages["-".join(command)]
+                self.assertIn(".SH OPTIONS", page)
+                self.assertIn(program, page)
 
     def test_completes(self):
         self.assertIn("erase-person", completed("osteon-server", "er"))
