@@ -89,7 +89,7 @@ bool Mounter::mount(const std::string& size) {
 bool Mounter::make_read_only() { return run("mount -o remount,ro " + place_.string()); }
 
 std::vector<std::string> Mounter::prefix() const {
-  return {"nsenter", "--target", std::to_string(shell_.pid()), "--user", "--compliant-mount", "--preserve-credentials"};
+  return {"nsenter", "--target", std::to_string(shell_.pid()), "--user", "--mount", "--preserve-credentials"};
 }
 
 fs::path Mounter::root() const { return "/proc/" + std::to_string(shell_.pid()) + "/root"; }

@@ -243,21 +243,21 @@ TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   const json steps = json::array({drill_at(0, 0, "rig"), drill_at(0, 8, "rig")});
   // They join one after the other, so that their numbers are known. 1 is the console.
   Process first = stage.start_haptic("first", {{"steps", steps}});
-  ASSERT_TRUE(there("#2 \"\" here hand")) << first.err();
+  ASSERT_TRUE(there("#2 \"\" here haptic")) << first.err();
   ASSERT_TRUE(ask("freeze #2").starts_with("ok"));
   Process second = stage.start_haptic("second", {{"steps", steps}});
-  ASSERT_TRUE(there("#3 \"\" here hand")) << second.err();
-  EXPECT_TRUE(there("#2 \"\" here hand frozen"));
-  EXPECT_EQ(ask("people").find("#3 \"\" here hand frozen"), std::string::npos) << "this hand is not stopped";
+  ASSERT_TRUE(there("#3 \"\" here haptic")) << second.err();
+  EXPECT_TRUE(there("#2 \"\" here haptic frozen"));
+  EXPECT_EQ(ask("people").find("#3 \"\" here haptic frozen"), std::string::npos) << "this hand is not stopped";
   ASSERT_TRUE(second.terminate(20s).has_value());
 
   Process ben = start_hand(stage, "ben", steps);
-  ASSERT_TRUE(there("#4 \"ben\" here hand")) << ben.err();
+  ASSERT_TRUE(there("#4 \"ben\" here haptic")) << ben.err();
   ASSERT_TRUE(ask("freeze ben").starts_with("ok"));
   ASSERT_TRUE(ben.terminate(20s).has_value());
   std::filesystem::remove(stage / "ben.h5");
   Process again = start_hand(stage, "ben", steps);
-  EXPECT_TRUE(there("#5 \"ben\" here hand frozen")) << "the same person, by the name";
+  EXPECT_TRUE(there("#5 \"ben\" here haptic frozen")) << "the same person, by the name";
   ASSERT_TRUE(again.terminate(20s).has_value());
   ASSERT_TRUE(first.terminate(20s).has_value());
   EXPECT_EQ(ask("quit"), "ok");

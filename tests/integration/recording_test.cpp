@@ -49,7 +49,7 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
   const json summary = read_json(stage / "made.json");
   const auto file = stage / "made.h5";
   EXPECT_EQ(ask(file, "n"), summary["loop"]["ticks"]);
-  EXPECT_EQ(summary["recording"]["entries"], summary["loop"]["ticks"]);
+  EXPECT_EQ(summary["recording"]["rows"], summary["loop"]["ticks"]);
   EXPECT_EQ(summary["recording"]["trouble"], "");
   EXPECT_EQ(ask(file, "f['metadata/field_hash'][()].decode()"), summary["field_hash"]);
   EXPECT_EQ(ask(file, "int(f['metadata/finished'][()])"), 1);
@@ -135,7 +135,7 @@ TEST_F(RecordedRoom, OfALostRoomSaysThatItDidNotEndAsItShould) {
   const json summary = read_json(stage / "lost.json");
   ASSERT_TRUE(summary.is_object());
   EXPECT_THAT(haptic.err(), testing::HasSubstr(summary["lost"].get<std::string>()));
-  EXPECT_EQ(ask(file, "n"), summary["recording"]["entries"]);
+  EXPECT_EQ(ask(file, "n"), summary["recording"]["rows"]);
   EXPECT_GT(summary["cuts"].get<int>(), 0);
 }
 
@@ -157,9 +157,9 @@ TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   EXPECT_THAT(summary["recording"]["trouble"].get<std::string>(), testing::HasSubstr("the disk is full"));
   EXPECT_THAT(haptic.err(), testing::HasSubstr("the session continues"));
   EXPECT_EQ(summary["steps"][0]["completed"], true);
-  EXPECT_EQ(ask(stage / "full.h5", "n"), summary["recording"]["entries"]);
-  EXPECT_GE(summary["recording"]["entries"].get<int>(), 500);
-  EXPECT_LT(summary["recording"]["entries"].get<int>(), summary["loop"]["ticks"].get<int>());
+  EXPECT_EQ(ask(stage / "full.h5", "n"), summary["recording"]["rows"]);
+  EXPECT_GE(summary["recording"]["rows"].get<int>(), 500);
+  EXPECT_LT(summary["recording"]["rows"].get<int>(), summary["loop"]["ticks"].get<int>());
 }
 
 TEST_F(RecordedRoom, APlaceThatCannotBeWrittenOrReadIsSaidAtOnce) {

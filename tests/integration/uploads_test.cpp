@@ -60,7 +60,7 @@ TEST_F(Uploads, WhatIsNoSoundCaseIsOneSentenceAndNothingIsKept) {
   };
   expect_refused(stage_ / "text.zip", "zip archive");
   expect_refused(stage_ / "no-such-file", "no-such-file");
-  expect_refused(rooms_.path(), "is no case");
+  expect_refused(rooms_.path(), "is not a case");
 
   fs::create_directory(stage_ / "broken");
   fs::copy_file(stage_ / "other" / "case.json", stage_ / "broken" / "case.json");

@@ -217,7 +217,7 @@ std::string Console::text_of(const PersonSeen& person) const {
   if (person.role != Role::none) out += " " + std::string(to_string(person.role));
   out += person.here ? " here" : " away";
   if (person.author == room_.self()) out += " you";
-  if (person.hand) out += " hand";
+  if (person.hand) out += " haptic";
   const Restrictions& word = person.supervision;
   if (word.stopped) out += " frozen";
   if (word.taken_by) out += " taken by #" + std::to_string(word.taken_by.value);

@@ -79,19 +79,18 @@ TEST(Skull, ImportsToOneHash) {
   }
 }
 
-// The script in README, with the results that README gives: both steps remove bone from the skull, as osteon-import
-// makes it.
-TEST(Skull, TheReadmesCarveScriptRemovesBone) {
+// The script of deploy/docs/tools.md: both steps remove bone from the skull, as osteon-import makes it.
+TEST(Skull, TheCarveScriptOfTheDocsRemovesBone) {
   const auto file = test::find_skull();
   ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
-  std::ifstream readme(test::source_dir() / "README.md");
+  std::ifstream page(test::source_dir() / "deploy" / "docs" / "tools.md");
   std::string script, text;
-  for (bool found = false; std::getline(readme, text);) {
-    found = found || text == "    steps:";
-    if (found && !text.starts_with("    ")) break;
-    if (found) script += text.substr(4) + "\n";
+  for (bool found = false; std::getline(page, text);) {
+    found = found || text == "steps:";
+    if (found && text.starts_with("```")) break;
+    if (found) script += text + "\n";
   }
-  ASSERT_NE(script.find("burr-round-5"), std::string::npos) << "README has no script";
+  ASSERT_NE(script.find("burr-round-5"), std::string::npos) << "deploy/docs/tools.md has no script";
   const test::TempDir folder;
   std::ofstream(folder / "script.yaml") << script;
   const auto steps = read_carve_script(folder / "script.yaml");

@@ -265,7 +265,7 @@ TEST_F(DrainTest, EveryHandLeavesWithWhatItSentDecidedAndNobodyComesIn) {
   EXPECT_EQ(hand->lost(), "");
   const auto late = wire::join_room(address(), wire::ClientKind::viewer, "late", 5s, {});
   ASSERT_FALSE(late.has_value());
-  EXPECT_NE(late.error().message.find("is stopping; come again"), std::string::npos) << late.error().message;
+  EXPECT_NE(late.error().message.find("is stopping; connect again"), std::string::npos) << late.error().message;
   EXPECT_EQ(server_->rooms().refusals.counts().at("draining"), 1u);
 }
 

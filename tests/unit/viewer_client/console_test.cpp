@@ -179,7 +179,7 @@ TEST_F(ConsoleTest, DecisionsAddUp) {
                          .tools = {digest(1), digest(2)},
                          .words = "look here"};
   EXPECT_EQ(desk.asked_.back(), (std::pair(AuthorId{2}, all)));
-  EXPECT_NE(say("people").find("#2 \"Ben\" trainee here hand frozen taken by #1 guided along #1 share 0.250 force "
+  EXPECT_NE(say("people").find("#2 \"Ben\" trainee here haptic frozen taken by #1 guided along #1 share 0.250 force "
                                "2.500 zone 1.000 -2.000 3.000 "
                                "10.000 tools burr,drill words \"look here\" pending cuts 7"),
             std::string::npos)
