@@ -197,7 +197,7 @@ std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
   const bool is_verified = chain || chain.error().fault == ChainFault::revoked;
   std::string who =
       certificate ? certificate->user + ", certificate " + certificate->serial : "a certificate without a name";
-  if (!is_verified && certificate) who = "a stranger who says to be " + who;
+  if (!is_verified && certificate) who = "an unauthenticated client that claims to be " + who;
   const std::string from = connections_ ? some_addresses(*connections_) : "";
   refusals_.note(refusal->reason, who, refusal->sentence, from);
   if (trail_) {
@@ -368,13 +368,13 @@ void Authorizer::note_refused(std::string_view reason, std::string_view sentence
     const std::lock_guard lock(mutex_);
     ++counts_.refused;
   }
-  refusals_.note(reason, "a stranger", sentence, call.peer.address);
+  refusals_.note(reason, "an unauthenticated client", sentence, call.peer.address);
   audit_refusal(reason, call);
 }
 
 void Authorizer::note_flood(const PeerClaims& peer) {
   const bool is_open = !connections_ || peer.by_proxy || connections_->is_open(peer.peer);
-  std::string who = "a stranger";
+  std::string who = "an unauthenticated client";
   {
     const std::lock_guard lock(mutex_);
     if (const Result<PersonCertificate> certificate = certificate_of(peer.certificate_pem)) {

@@ -102,7 +102,7 @@ def open_door(run, household, out):
 
 
 def knocking(run):
-    run.say(f"{KNOCKS} strangers at the door of a server in which a hand works")
+    run.say(f"{KNOCKS} unauthenticated clients knock at a server in which a haptic client works")
     out = run.folder / "knocking"
     (out / "logs").mkdir(parents=True, exist_ok=True)
     certificates = Certificates(run.programs, out)  # of a folder that is new in every run
@@ -122,10 +122,9 @@ def knocking(run):
         plan.write_text(json.dumps(plans.drill("rig", feed_mm_per_s=0.14, beyond_mm=1)), encoding="utf-8")
         hand = household.start("hand",
                                [run.programs / "osteon-haptic", "--server", address,
-                                *certificates.person("anna", "trainee"),
-                                        "--room", ROOM, "--plan", plan, "--cut-log", out / "cuts.csv", "--summary",
-                                out / "hand.json",
-                                        "--session-log", out / "hand.csv"])
+                                *certificates.person("anna", "trainee"), "--room", ROOM, "--plan", plan,
+                                "--cut-log", out / "cuts.csv", "--summary", out / "hand.json",
+                                "--session-log", out / "hand.csv"])
         hand.may_end = True
         time.sleep(QUIET_S)
         pid = int(subprocess.run(["pgrep", "-f", str(address_file)], capture_output=True, text=True,
@@ -134,7 +133,7 @@ def knocking(run):
         refused = knocks((host, int(port)), KNOCKS)
         ended, after = time.monotonic_ns(), resident_mb(pid)
         if hand.exit_code is not None:
-            raise Failure("the hand ended before the strangers did; its last lines:", hand.last_words())
+            raise Failure("the haptic client ended before the others did; its last lines:", hand.last_words())
         code = hand.wait(240.0)
         household.check()
         log = server.log.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -148,7 +147,7 @@ def knocking(run):
     before = (cuts["closed_mono_ns"] < began) & (cuts["room_seq"] > 0)
     said = [line for line in log if " refused who=" in line]
     if not any("reason=tls" in line for line in said):
-        raise Failure("the server's log does not say that there were strangers; its last lines:", "\n".join(log[-5:]))
+        raise Failure("the server's log names no unauthenticated client; its last lines:", "\n".join(log[-5:]))
     same = record.read_json(out / "server.json")["field_hash"] == record.read_json(out / "hand.json")["field_hash"]
     run.tables.append(("Strangers at the door",
                        [("seconds", round((ended - began) / 1e9, 1)), ("cuts meanwhile", int(during.sum())),
