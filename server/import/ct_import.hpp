@@ -16,7 +16,7 @@ struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
   DensityCalibration calibration = imaging::kRho1995;
-  std::string title = "CT";  // never taken from the scan, because its names may be a patient's
+  std::string title = "CT";  // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;     // islands by number, from 1; empty: the largest
   bool keep_all = false;
   bool merge = false;      // the kept islands count as one bone
