@@ -11,7 +11,7 @@ enum class ErrorCode {
   unsupported,    // well-formed, but of a version or kind that this program does not know
   unavailable,    // a peer or device does not answer now; trying again may help
   cancelled,      // the caller asked to stop the work before it was complete
-  denied,         // the caller has no right to do this, by identity, role or state
+  denied,         // the caller's identity, role or rights do not permit this
   exhausted,      // more than a quota allows
   exists,         // it already exists, or another uses it
   internal,       // a library failed in a way that the user cannot fix

@@ -85,9 +85,9 @@ struct LeafChange {
   bool removed = false;   // of a changed leaf: every sample is now at the lower end of the band
 };
 
-// A cut prepared for one pitch: its path as translations of the cutting body. Translations are exact with two
-// exceptions. Rings and sampled bodies move in steps of a quarter pitch. The search for oblique motions leaves an error
-// of 0.03 pitches. Rotations are split into steps that move no point by more than a quarter pitch.
+// A cut prepared for one pitch: its path as translations of the cutting body. They are exact, except that rings (turned
+// bodies with a hole) and sampled bodies move in steps of a quarter pitch, and that the search for oblique motions errs
+// by 0.03 pitches. Rotations are split into steps that move no point by more than a quarter pitch.
 class SweptTool {
  public:
   // `body`: cutting body of the cut's tool. `pitch_mm`: h of the case; the level comes from the cut.

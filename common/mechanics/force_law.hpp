@@ -1,4 +1,4 @@
-// The force laws of chapter 7, and of the tools that it does not treat, in one table. Each law turns the speed, density
+// The force laws of Niu 2008, chapter 7, and of tools not treated there, in one table. Each law turns speed, density
 // and engagement of a moment into a FeedLaw: resistance as a function of feed. The law of a tool can be chosen, because
 // the laws disagree with each other. force_laws.cpp is the table. The header of each law has its equations.
 #pragma once

@@ -74,7 +74,7 @@ class Case {
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
-  // match its hash), unsupported (schema version), exhausted (more memory than a case of its size takes).
+  // match its hash), unsupported (schema version), exhausted (more memory than a file of its size may need).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
   // Writes beside `folder` and renames, so that a partly written case is never visible. `keep_going` is called before
   // the renaming, too. Errors: exists, internal (disk), cancelled.

@@ -13,10 +13,10 @@ namespace osteon::haptic {
   return wanted - (square > 0.0 ? std::clamp(wanted.dot(now) / square, 0.0, 1.0) : 0.0) * now;
 }
 
-// Two forces that grow slowly may have a sum that grows fast: one held the other back, and decreases at once. Example:
-// a hand is led against bone, and the bone gives way. Returns the value of `part_n` with which the whole, including
-// `rest_n`, grows by at most `most_n` from `before_n`. The whole is never larger than both the unlimited whole and
-// `before_n`.
+// Two forces that grow slowly may have a sum that grows fast. This happens when one held the other back and decreases
+// at once. Example: a hand is led against bone, and the bone gives way. Returns the value of `part_n` with which the
+// whole, including `rest_n`, grows by at most `most_n` from `before_n`. The whole never exceeds the larger of
+// `before_n` and the unlimited whole.
 [[nodiscard]] inline Vec3 held_to(double most_n, const Vec3& part_n, const Vec3& rest_n,
                                   const Vec3& before_n) noexcept {
   const Vec3 grown_n = growth(rest_n + part_n, before_n);

@@ -4,8 +4,8 @@
 //
 // Two threads use a device. The connection thread (connection.hpp) opens, tends, closes and reopens it. The haptic
 // thread reads and writes at any time, even while the other opens or closes. A missing device reads as absent and
-// ignores forces. So a device has a DeviceExchange (device_exchange.hpp) between its own I/O thread and the haptic
-// thread. It also removes the force when the haptic thread is late.
+// ignores forces. So a DeviceExchange (device_exchange.hpp) is between the device's own I/O thread and the haptic
+// thread. The exchange also removes the force when the haptic thread is late.
 //
 // The header of each kind of device has `std::unique_ptr<HapticDevice> make_X(options)` and `DeviceFinding
 // look_for_X()`.
@@ -107,8 +107,8 @@ class HapticDevice {
 
   // [haptic]
   [[nodiscard]] virtual DeviceReading read() noexcept = 0;
-  // [haptic] Of a recording: pose of the bone on its mount at the last reading, relative to its rest pose. Who plays
-  // the recording uses this pose, too. Null: not recorded; the room gives the bone's pose.
+  // [haptic] Of a recording: pose of the bone on its mount at the last reading, relative to its rest pose. A client
+  // that plays the recording uses this pose, too. Null: not recorded; the room gives the bone's pose.
   [[nodiscard]] virtual const Pose* pose_rest_bone() const noexcept { return nullptr; }
   // [haptic] It has given its last reading, as a recording does at its end.
   [[nodiscard]] virtual bool over() const noexcept { return false; }

@@ -31,7 +31,7 @@ struct CtSegmentation {
   bool merged = false;                   // the kept islands are one bone
   double left_out_cm3 = 0.0;             // of the islands that were not kept
   double marrow_cm3 = 0.0;               // below the threshold, within the kept islands
-  std::vector<double> joined_cm3;  // large parts of dense and cancellous bone that only marrow connects, if several
+  std::vector<double> joined_cm3;  // parts of dense and cancellous bone that only marrow joins, if several are large
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
   Box region;                                // part of the scan around everything that reaches the threshold, LPS

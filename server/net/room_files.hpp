@@ -67,7 +67,7 @@ struct RoomFile {
                                            const std::string& name);
 
 // Error: the journal accepts no entries, so nobody knows whether its entries are complete. The message names `option`,
-// the command-line option for a branch up to a sequence number; up to that number the journal is confirmed.
+// a command-line option that takes a sequence number. Up to the number in the message the journal is confirmed.
 [[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);
 
 // As branch_journal(), step by step, of a journal that is in use.

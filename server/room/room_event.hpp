@@ -49,7 +49,7 @@ struct RoomEvent {
   bool scene = false;             // items changed
   std::vector<BodyId> bodies;     // those that exist from now on
   std::vector<FieldLeaf> leaves;  // changed leaves in their new state, and all leaves of a new body
-  // New epoch of every lease that was granted before; 0: unchanged. For supervise: of the subject's lease only.
+  // New epoch of every lease that was granted before; 0: unchanged. For supervise: epoch of the subject's lease.
   std::uint64_t lease_epoch = 0;
   const ToolBox::Entry* tool = nullptr;  // the tool that was added
   std::uint32_t item = 0;                // the item that was set or removed
