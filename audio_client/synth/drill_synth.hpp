@@ -30,10 +30,10 @@ class DrillSynth {
   // [audio] Fills `frames` with samples in -1 to 1; exactly zero when no tool sounds.
   void process(std::span<float> frames) noexcept;
 
-  [[nodiscard]] bool silent() const noexcept;  // no tool sounds, nor will one without a new scene
+  [[nodiscard]] bool silent() const noexcept;  // no tool sounds, and none will before a new scene
 
  private:
-  // A tool that was changed runs down beside the new one. So there are more voices than tools.
+  // When a tool is exchanged, the old one runs down while the new one sounds. So there are more voices than tools.
   static constexpr int kVoices = 2 * kMaxTools;
 
   void render_block() noexcept;

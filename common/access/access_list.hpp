@@ -19,8 +19,8 @@ namespace osteon {
 //   revoke user NAME
 //   revoke ticket ID              hexadecimal, as osteon-server ticket prints it
 //   role NAME ROLE [ROOM]         replaces the role of the ticket, in all rooms or only in ROOM
-// A role opens no room that the ticket is not for. Calls that concern no room (cases) use the ticket's role or the line
-// without a room.
+// A role applies only in the rooms that the ticket is for. Calls that concern no room (cases) use the line without a
+// room if there is one, otherwise the ticket's role.
 class AccessList {
  public:
   // Error invalid_input: a line is none of these. `name` is the name of the file, for the message.

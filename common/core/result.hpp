@@ -10,8 +10,8 @@ enum class ErrorCode {
   not_found,      // a file, case, server or device is not there
   unsupported,    // well-formed, but of a version or kind that this program does not know
   unavailable,    // a peer or device does not answer now; trying again may help
-  cancelled,      // the caller may not do this here
-  denied,         // the caller may not do that here
+  cancelled,      // the caller asked to stop the work before it was complete
+  denied,         // the caller's identity, role or rights do not permit this
   exhausted,      // more than a quota allows
   exists,         // it already exists, or another uses it
   internal,       // a library failed in a way that the user cannot fix

@@ -26,8 +26,8 @@ inline constexpr int kBandVoxels = 4;
   return static_cast<float>(band_quanta(level_pitch)) * static_cast<float>(kQuantum_mm);
 }
 
-// How one translation of the cutting body is evaluated. The distance to a convex body is convex along a line. The
-// distance to a body of revolution that reaches its axis grows with the distance from the axis. From this follows:
+// How one translation of the cutting body is evaluated. The distance to a convex body is convex along a line. If a body
+// of revolution has no hole along its axis, the distance to it grows with the distance from the axis. Hence:
 enum class SweepKind : std::uint8_t {
   ball,     // a capsule, in closed form
   axial,    // a turned body that moves along its axis is a turned body with a stretched outline
@@ -49,7 +49,7 @@ struct ToolSweep {
   float axis[3], u[3], v[3];    // turned: +z of the tool, and two directions perpendicular to it; sampled: +z, +x, +y
   float across_mm, along_mm;    // turned: motion along u and along the axis
   float length_mm;              // oblique: length of the motion
-  float dome, up_mm, down_mm;   // turned: radius of the ball, 0 for none, and how far the sweep moves its centre
+  float dome, up_mm, down_mm;   // turned: radius of the ball that clips it (0: none); the sweep moves its centre so far
   std::uint32_t first, count;   // turned: edges; hull: planes
 };
 
@@ -76,7 +76,7 @@ struct CutPlan {
   };
   std::vector<Leaf> leaves;  // sorted
   std::vector<Near> near;
-  std::int64_t visited = 0;  // leaves of the world bounding block, including the planned ones
+  std::int64_t visited = 0;  // leaves in the world bounding block (box of the cut), including the planned ones
 };
 
 struct LeafChange {
@@ -85,9 +85,9 @@ struct LeafChange {
   bool removed = false;   // of a changed leaf: every sample is now at the lower end of the band
 };
 
-// A cut prepared for one pitch: its path as translations of the cutting body. Translations are exact with two
-// exceptions. Rings and sampled bodies move in steps of a quarter pitch. The search for oblique motions leaves an error
-// of 0.03 pitches. Rotations are split into steps that move no point by more than a quarter pitch.
+// A cut prepared for one pitch: its path as translations of the cutting body. They are exact, except that rings (turned
+// bodies with a hole) and sampled bodies move in steps of a quarter pitch, and that the search for oblique motions errs
+// by 0.03 pitches. Rotations are split into steps that move no point by more than a quarter pitch.
 class SweptTool {
  public:
   // `body`: cutting body of the cut's tool. `pitch_mm`: h of the case; the level comes from the cut.

@@ -23,8 +23,8 @@ struct AgusParams {
 // (7.4) and its inverse, h = R (F / (C1 R^2))^(2/3).
 [[nodiscard]] Newtons agus_elastic_force(const AgusParams& params, double depth_mm) noexcept;
 [[nodiscard]] double agus_depth_mm(const AgusParams& params, Newtons force) noexcept;
-// (7.5): friction of a contact whose middle is `axis_distance_mm` from the spindle's axis, along omega x r there. It is
-// mu F far from the pole, less near it, where the directions in the contact differ, and zero at the pole. [haptic]
+// (7.5): friction of a contact whose middle is `axis_distance_mm` from the spindle's axis, along omega x r there. mu F
+// far from the pole; less near the pole, where directions in the contact differ; zero at the pole. [haptic]
 [[nodiscard]] Newtons agus_friction(const AgusParams& params, Newtons normal, double axis_distance_mm) noexcept;
 // Feed under a force, not limited. `area_mm2` is projected on the feed.
 [[nodiscard]] MillimetresPerSecond agus_erosion(const AgusParams& params, RevolutionsPerMinute speed, Newtons force,

@@ -1,4 +1,4 @@
-// The force laws of chapter 7, and of the tools that it does not treat, in one table. Each law turns the speed, density
+// The force laws of Niu 2008, chapter 7, and of tools not treated there, in one table. Each law turns speed, density
 // and engagement of a moment into a FeedLaw: resistance as a function of feed. The law of a tool can be chosen, because
 // the laws disagree with each other. force_laws.cpp is the table. The header of each law has its equations.
 #pragma once
@@ -21,8 +21,8 @@ struct LawInputs {
   double engaged_area_mm2 = 0;  // that area
   double milling_sum = 0;  // sum of milling_resistance() of a sharp tool (MillingParams::wear 1), N·s/mm per rad/s
   double directed_density =
-      0;  // sum over engaged points of share of the active area · density · max(0, -inward·feed), g/cm3
-  // of the cutting edges in bone, all teeth, counted as LawTool does; 0: derived from `engaged`
+      0;  // sum over engaged points: (share of active area) · density · max(0, -inward·feed), g/cm3
+  // total length of the cutting edges in bone, of all teeth; counted as in LawTool; 0: derived from `engaged`
   double edge_length_mm = 0;
   double mean_arm_mm = 0;    // mean distance of the engaged area from the axis; 0: LawTool::arm_mm
   double teeth_engaged = 0;  // of a saw; 0: derived from `engaged`
@@ -68,7 +68,7 @@ struct ForceLaw {
   bool (*fits)(ToolKind kind) noexcept = nullptr;  // whether it can be chosen for such a tool
   // [haptic] Any thread. A stopped spindle gives the law that does not cut: no feed at all.
   FeedLaw (*feed_law)(const LawTool& tool, const LawInputs& inputs) noexcept = nullptr;
-  // [haptic] Torque on the spindle, N mm, for a resistance along the feed. For saws, the torque of equal power.
+  // [haptic] Torque on the spindle, N mm, for a resistance along the feed. For saws, the torque of the same power.
   double (*torque_nmm)(const LawTool& tool, const LawInputs& inputs, double thrust_n) noexcept = nullptr;
   // [haptic] Force across the feed for a resistance along it, N. For rotating tools, it acts against the motion of the
   // flank. For saws, it acts along the stroke and changes direction with the teeth. Null: the forces of all edges

@@ -38,21 +38,21 @@ enum class ToolKind : std::uint8_t {
   mesh = 19,        // any solid, from a triangle mesh
 };
 
-// Every kind uses the dimensions whose comments name it. The others are zero.
+// The comment of a dimension names the kinds that use it. For the others it is zero.
 struct Tool {
   std::string name;   // "burr-round-5": lower case, digits, '-' and '.'
   std::string title;  // shown to people
   ToolKind kind = ToolKind::drill;
-  // of the cutting part, pin or screw's thread; outside of a sleeve or cup; pin holes of blocks
+  // of the cutting part, pin or screw's thread; sleeve, cup: outer diameter; blocks: diameter of the pin holes
   double diameter_mm = 0;
   double cutting_length_mm =
       0;  // from the tip along the axis; of a saw, the toothed part; of a tool that does not cut, the whole length
   double point_angle_rad = 0;  // drill, pin, screw: full angle of the point
   double shank_diameter_mm = 0;
   double shank_length_mm = 0;  // saw: the plate behind the teeth
-  double width_mm = 0;         // blade, block; broach, stem: of the upper end; along x
+  double width_mm = 0;         // along x: of a blade or block; of the upper end of a broach or stem
   double thickness_mm =
-      0;              // blade's plate, block; broach, stem: of the upper end; along y. Cup: wall; outside reamer: back
+      0;              // along y: of a blade or block; broach, stem: at the upper end. Cup: wall; outside reamer: back
   double set_mm = 0;  // saw: how much wider its teeth cut than the plate, both sides together
   double swing_rad = 0;         // oscillating saw: full angle of the stroke
   double stroke_mm = 0;         // reciprocating saw: full length of the stroke
@@ -85,7 +85,7 @@ struct Tool {
 [[nodiscard]] double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm);
 // Unit gradient of the distance. It points out of the tool (eq. 6.2).
 [[nodiscard]] Vec3 normal(const Tool& tool, const Vec3& point_tool_mm);
-// Box of the whole tool in its frame (Local Bounding Block, Niu 2008, §6.1) and around it at a pose (World), mm.
+// Boxes of the whole tool, mm: in its frame (Local Bounding Block, Niu 2008, §6.1); at a pose, in bone's frame (World).
 [[nodiscard]] Box local_bounds(const Tool& tool);
 [[nodiscard]] Box world_bounds(const Tool& tool, const Pose& pose_bone_tool);
 

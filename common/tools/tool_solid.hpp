@@ -9,8 +9,8 @@ namespace osteon {
 [[nodiscard]] Implicit cutting_part(const Tool& tool);
 // Cutting part and shank: everything that can be touched. Equal to signed_distance_mm(), but made once for many points.
 [[nodiscard]] Implicit tool_solid(const Tool& tool);
-// What a cut removes at one pose, which Tool::cut_body() holds in whole numbers: a drill's lips with the land behind
-// them (deploy/decisions/0005), the envelope of a saw's stroke. Only for tools that cut.
+// The solid that a cut removes at one pose: a drill's lips with the land behind them (deploy/decisions/0005), or the
+// envelope of a saw's stroke. Tool::cut_body() holds it in whole numbers. Only for tools that cut.
 [[nodiscard]] Implicit cut_solid(const Tool& tool);
 
 // The same as outlines, mm. Empty if the cutting body is of another kind.
@@ -28,7 +28,7 @@ struct CutOutline {
 // Where the shank begins: behind the cutting part, or inside the ball of a round bur, where the ball is as thin as the
 // shank.
 [[nodiscard]] double shank_start_mm(const Tool& tool);
-// The radius of a contoured bur's end for which its taper ends at its diameter and length.
+// Radius of a contoured bur's rounded end, such that the taper reaches the bur's diameter at its cutting length.
 [[nodiscard]] double end_radius_mm(const Tool& contoured_burr);
 // How far the ends of an oscillating saw's tooth line are behind its middle, at the ends of the stroke.
 [[nodiscard]] double tooth_line_drop_mm(const Tool& oscillating_saw);

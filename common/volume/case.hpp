@@ -35,12 +35,12 @@ struct CaseInfo {
   friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
 };
 
-// What an importer knows about the samples beside distance and density. Each volume is empty or has the box of the
-// distance.
+// What an importer knows about the samples beside distance and density. Each volume is empty or covers the same box as
+// the distance.
 struct SampleLabels {
-  // number of the bone, from 1; read inside the surface. Empty: all samples are bone 1.
+  // Number of the bone, from 1; used only for samples inside the surface. Empty: all samples are bone 1.
   DenseVolume<std::uint8_t> bone;
-  DenseVolume<Tissue> tissue;  // metal, enamel, or none: the density decides. Empty: it decides everywhere.
+  DenseVolume<Tissue> tissue;  // metal, enamel, or none (the density decides). Empty: none everywhere.
 };
 
 // What a part of a bone contains, so that a builder need not read every sample of a uniform part.
@@ -56,8 +56,8 @@ struct PartSamples {
   std::vector<std::uint8_t> bone;  // as SampleLabels; empty unless filled
   std::vector<Tissue> tissue;      // the same
 };
-// Fills the samples of a box. Distance and density have its size; the labels are empty. Called once for each part,
-// always in the same order, by one thread.
+// Fills the samples of a box. Distance and density have one value for each sample of the box; the labels are empty.
+// Called once for each part, always in the same order, by one thread.
 using FillPart = std::function<PartKind(const CoordBox& box, PartSamples& samples)>;
 
 // Read-only after construction, so any thread may read it at any time.
@@ -74,7 +74,7 @@ class Case {
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
   // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
-  // match its hash), unsupported (schema version), exhausted (more memory than a case of its size takes).
+  // match its hash), unsupported (schema version), exhausted (more memory than a file of its size may need).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
   // Writes beside `folder` and renames, so that a partly written case is never visible. `keep_going` is called before
   // the renaming, too. Errors: exists, internal (disk), cancelled.
@@ -103,7 +103,7 @@ class Case {
   // cases.
   [[nodiscard]] const std::vector<Coord>& metal_leaves() const;
   [[nodiscard]] const std::vector<Coord>& hard_leaves() const;
-  // On the samples of a level: metal, enamel or none, as the nearest sample of level 0 that is bone. z fastest.
+  // On the samples of a level: metal, enamel or none, taken from the nearest bone sample of level 0. z fastest.
   void gather_hard(int level, const CoordBox& box, std::span<Tissue> out) const;
   // Number of the bone that the sample belongs to, from 1; 0: no bone.
   [[nodiscard]] int bone_number(Coord sample) const;

@@ -18,9 +18,9 @@ struct RefineReport {
   std::size_t resampled = 0;  // sub-volumes that this cut touched for the first time
 };
 
-// Cuts of one level, by method 1. At the first touch, the surface S of a sub-volume is resampled to the level's lattice
-// and stored, and all its leaves of the level are made, cut or not. From then on there is one set of samples, and f
-// needs no interpolation. The bone and its hash are the same as by method 2.
+// Cuts of one level, by method 1. At the first touch, a sub-volume's surface distance S is resampled to the level's
+// lattice and stored, and all its leaves of the level are made, cut or not. Then S and the removed volume's distance R
+// share one set of samples: f = max(S, −R) needs no interpolation. Bone and hash are the same as by method 2.
 class SubVolumeField {
  public:
   SubVolumeField(Case bone, int level, std::shared_ptr<const ToolBox> tools = builtin_tool_box());

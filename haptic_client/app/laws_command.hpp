@@ -6,7 +6,7 @@ namespace osteon::haptic {
 
 // One paragraph for each law, the tools that use it by default, and how to choose another.
 [[nodiscard]] std::string laws_text();
-// {"laws": [...], "defaults": {kind: law}, "points": [...]}: the points of comparison are computed, not quoted.
+// {"laws": [...], "defaults": {kind: law}, "points": [...]}: the laws compute the compared points; none is quoted.
 [[nodiscard]] std::string laws_json();
 
 // The whole command; `argv[0]` is "laws". Returns the exit code.

@@ -33,7 +33,7 @@ class Recorder {
   // Without a path nothing is recorded. Error internal: the file cannot be created.
   [[nodiscard]] Result<void> open(const std::filesystem::path& file, const RecordingInfo& info);
   [[nodiscard]] bool recording() const { return thread_.joinable(); }
-  // Any thread except the haptic one: the hash of the room's field as it was joined, in hexadecimal digits.
+  // `field_hash`: of the room's field as it was joined, hexadecimal. Any thread except the haptic one.
   void begin_on(const std::string& field_hash);
   // Any thread except the haptic one, one at a time.
   void push(const TickRow& row);

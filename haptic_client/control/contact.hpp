@@ -1,7 +1,7 @@
 // Evaluates many points of a tool against the bone around it in one pass. It gives each point's distance from the
 // surface, the surface's direction and the density of the bone. It also gives sums over the points in bone. It computes
-// 4, 8 or 16 points at a time, depending on the processor, with the same numbers. It skips groups of neighbours that,
-// by the case's clearance, are far from bone.
+// 4, 8 or 16 points at a time, depending on the processor, with the same numbers. It skips groups of neighbours that
+// are far from bone by the case's clearance, a lower bound of the distance to bone.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace osteon::haptic {
 
 struct ContactPoint {
   Vec3 surface_mm;  // on the tool, tool frame
-  Vec3 inset_mm;    // moved inwards by half a patch pitch and the pose quantum; otherwise a tool jams in its own hole
+  Vec3 inset_mm;    // moved inwards by half a Patch pitch and the rounding of poses; else a tool jams in its own hole
   Vec3 outward;     // unit normal out of the tool
   double area_mm2;
   double axis_distance_mm;
@@ -56,10 +56,10 @@ struct ContactQuery {
   Pose pose_bone_tool;
   int first_group = 0, groups = 0;
   double lift_mm = 0;      // points are moved out of the tool along their normals by this much
-  double margin_mm = 0.5;  // groups farther than this from bone may be skipped: their points get a lower bound
+  double margin_mm = 0.5;  // groups farther than this from bone may be skipped: distance is then a lower bound
   bool density = false;    // compute the density at points in bone
   // Evaluates the bone ahead of the faces that point along a direction. Each point is moved along the direction until
-  // it is `ahead_mm` in front of its own face, but at most by `most_mm`. Faces whose normal has less than
+  // it is `ahead_mm` in front of the face that it lies on, but at most by `most_mm`. Faces whose normal has less than
   // `least_facing` along the direction are left out.
   bool ahead = false;
   Vec3 direction_bone = Vec3::UnitZ();
@@ -74,12 +74,12 @@ struct ContactValues {
   std::vector<float> gx, gy, gz;     // its gradient in the cell that the point is in, bone frame; zero where unknown
   std::vector<float> density_g_cm3;  // where the query asks for it
   std::vector<float> nearest_mm;     // of each group
-  bool covered = true;               // every point was where bone or clearance is known
+  bool covered = true;               // at every point, the bone or a clearance was known
   void make_room(int points);
 };
 
-// Sums over the evaluated points, each weighted by its area projected on the direction. They contain the inputs of the
-// force laws, and force and torque of (7.12) and (7.14) for K_1 · speed = 1. Tool frame; torque about the tip.
+// Sums over the evaluated points, each weighted by its area projected on the direction. They hold the force laws'
+// inputs, and force and torque of Niu 2008, (7.12), (7.14), for K_1 · speed = 1. Tool frame; torque about the tip.
 struct ContactSums {
   double area_mm2 = 0;     // of all faces that point along the direction
   double engaged_mm2 = 0;  // those with bone ahead of them
@@ -100,15 +100,15 @@ ContactSums evaluate_contact(const Patch& patch, const ContactSet& set, const Co
 
 // One number for each point of a group.
 using Lanes = std::array<float, kGroupPoints>;
-// The pose of a convex body as seen from the points. A point p of theirs has the body's own coordinates rotation · p +
-// at. HullFace: normal and offset of a plane, mm.
+// The pose of a convex body as seen from the points. The point p has the coordinates rotation · p + at in the body's
+// frame. HullFace: normal and offset of a plane, mm.
 struct HullPlace {
   Eigen::Matrix3f rotation = Eigen::Matrix3f::Identity();
   Eigen::Vector3f at = Eigen::Vector3f::Zero();
 };
 using HullFace = std::array<float, 4>;
 // [haptic] Distance of a group's points to the farthest of the body's planes, mm. `p`: x, y, z. Exact inside and in
-// front of faces. Too small in front of edges, where only the sign counts.
+// front of faces. In front of edges the result is too small, but only its sign is used there.
 [[nodiscard]] Lanes hull_distance_mm(const HullPlace& place, std::span<const HullFace> faces,
                                      const Lanes (&p)[3]) noexcept;
 

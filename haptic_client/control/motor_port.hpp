@@ -4,7 +4,7 @@
 //
 // These forces are active, unlike the coupling's: they may put energy into the hand as a real motor does. So they go
 // through a port of their own. Its force is bounded by friction times the normal force. The port closes soon after the
-// pedal.
+// pedal is released.
 #pragma once
 #include "common/geometry/pose.hpp"
 
@@ -12,12 +12,12 @@ namespace osteon::haptic {
 
 struct MotorPortParams {
   double friction = 0.3;    // mu: bound of all motor forces, relative to the normal force [A]
-  double drag = 0.6;        // of the bound: the sideways pull of a rubbing flank, and the largest force of the law [A]
-  double kick = 0.8;        // share of a sudden rise of the normal force that pulls too [A]
-  double vibration = 0.15;  // of the bound, at the rate at which the teeth bite [A]
+  double drag = 0.6;        // share of the bound: pull of a rubbing flank, and the largest force of the law [A]
+  double kick = 0.8;        // share of friction times a sudden rise of the normal force, added to the drag [A]
+  double vibration = 0.15;  // share of the bound, at the rate at which the teeth bite [A]
   double kick_s = 0.03;     // a slower rise is no kick [A]
   double most_hz = 300.0;   // faster vibration is beyond a 1 kHz loop: it averages out, and sound represents it
-  double on_s = 0.02, off_s = 0.01;  // after the pedal
+  double on_s = 0.02, off_s = 0.01;  // time to open after the pedal is pressed, to close after its release
 };
 
 struct MotorMoment {
@@ -37,9 +37,9 @@ class MotorPort {
   explicit MotorPort(const MotorPortParams& params = {}) : params_(params) {}
   void reset() noexcept;
   // [haptic] Force on the tool, physical, N, in the frame of the moment's vectors. Its size is at most friction times
-  // that of the normal force. It is zero from off_s after the pedal on.
+  // that of the normal force. It is zero as soon as the pedal has been released for off_s.
   [[nodiscard]] Vec3 step(const MotorMoment& moment, double dt_s) noexcept;
-  // [haptic] 0 … 1: the share of the motor's force that passes now; zero from off_s after the pedal on.
+  // [haptic] 0 … 1: share of the motor's force that passes now; zero once the pedal has been released for off_s.
   [[nodiscard]] double open() const noexcept { return open_; }
   [[nodiscard]] const MotorPortParams& params() const noexcept { return params_; }
 

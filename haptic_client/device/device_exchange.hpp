@@ -12,9 +12,9 @@ namespace osteon::haptic {
 class DeviceExchange {
  public:
   using Time = std::chrono::steady_clock::time_point;
-  // Three ticks of the haptic thread: a frame of the device that comes after the third missed tick shows no force.
+  // Three ticks of the haptic thread. After the third missed tick, the device's next frame shows no force.
   static constexpr std::chrono::milliseconds kForceHeld{3};
-  static constexpr int kReadsWithoutSample = 20;  // [A] after this number of reads the device counts as silent
+  static constexpr int kReadsWithoutSample = 20;  // reads without a sample until the device is silent; assumption [A]
 
   DeviceExchange() { go_absent(); }
 
@@ -32,8 +32,8 @@ class DeviceExchange {
     publish(last_);
   }
   void go_absent() noexcept { go(DeviceStatus::absent); }
-  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. The time of
-  // writing counts. So a force also ends on time when this thread was late and sees it for the first time.
+  // [I/O] The force that is wanted now; none when the haptic thread has written nothing for kForceHeld. The age counts
+  // from the time of writing. So a force ends on time even if this thread is late to see it.
   [[nodiscard]] DeviceOutput demanded(Time now) noexcept {
     if (outputs_.refresh()) any_written_ = true;
     const Written& last = outputs_.value();

@@ -4,8 +4,8 @@
 //
 // Two threads use a device. The connection thread (connection.hpp) opens, tends, closes and reopens it. The haptic
 // thread reads and writes at any time, even while the other opens or closes. A missing device reads as absent and
-// ignores forces. So a device has a DeviceExchange (device_exchange.hpp) between its own I/O thread and the haptic
-// thread. It also removes the force when the haptic thread is late.
+// ignores forces. So a DeviceExchange (device_exchange.hpp) is between the device's own I/O thread and the haptic
+// thread. The exchange also removes the force when the haptic thread is late.
 //
 // The header of each kind of device has `std::unique_ptr<HapticDevice> make_X(options)` and `DeviceFinding
 // look_for_X()`.
@@ -78,7 +78,7 @@ struct DeviceOutput {
 struct DeviceInfo {
   std::string model, serial, driver;  // as the device and its library report them; empty: not reported
   bool places = true, turns = true;   // what it reads: position, rotation
-  bool pedals = false;                // it drives the spindle: another device's spindle button becomes a second clutch
+  bool pedals = false;                // it drives the spindle; a spindle button on another device is then a clutch, too
   int force_axes = 3, torque_axes = 0;  // what it shows: 0 or 3 of each
 };
 
@@ -107,8 +107,8 @@ class HapticDevice {
 
   // [haptic]
   [[nodiscard]] virtual DeviceReading read() noexcept = 0;
-  // [haptic] Of a recording: pose of the bone on its mount at the last reading, relative to its rest pose. It also
-  // applies to whoever plays the recording. Null: not recorded; the room gives the bone's pose.
+  // [haptic] Of a recording: pose of the bone on its mount at the last reading, relative to its rest pose. A client
+  // that plays the recording uses this pose, too. Null: not recorded; the room gives the bone's pose.
   [[nodiscard]] virtual const Pose* pose_rest_bone() const noexcept { return nullptr; }
   // [haptic] It has given its last reading, as a recording does at its end.
   [[nodiscard]] virtual bool over() const noexcept { return false; }

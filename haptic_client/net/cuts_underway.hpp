@@ -30,7 +30,7 @@ class CutsUnderway {
   void decided(std::uint64_t author_seq);
 
   [[nodiscard]] bool something_to_send() const { return may_go_ && (next_ < cuts_.size() || state_); }
-  // Cuts before states, so that a state never describes bone that the server still has.
+  // Take cuts before states. Otherwise a state could describe bone as removed that the server still has.
   [[nodiscard]] std::optional<Cut> take_cut();
   [[nodiscard]] std::optional<CuttingState> take_state();
   [[nodiscard]] std::size_t undecided() const { return cuts_.size(); }

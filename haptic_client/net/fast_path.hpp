@@ -30,7 +30,7 @@ struct FastPathEvents {
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
 };
 
-// One for each stream: keys and numbers begin anew with it. Any thread, except from within the functions that it calls.
+// One for each stream, which has its own keys and numbers. Any thread may call it, but not from its own callbacks.
 class FastPath {
  public:
   // Error: not_found (the server's name), unavailable (no socket).

@@ -16,7 +16,7 @@ struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
   DensityCalibration calibration = imaging::kRho1995;
-  std::string title = "CT";  // never taken from the scan, because its names may be a patient's
+  std::string title = "CT";  // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;     // islands by number, from 1; empty: the largest
   bool keep_all = false;
   bool merge = false;      // the kept islands count as one bone
@@ -31,7 +31,7 @@ struct CtSegmentation {
   bool merged = false;                   // the kept islands are one bone
   double left_out_cm3 = 0.0;             // of the islands that were not kept
   double marrow_cm3 = 0.0;               // below the threshold, within the kept islands
-  std::vector<double> joined_cm3;  // large parts of dense and cancellous bone that only marrow connects, if several
+  std::vector<double> joined_cm3;  // parts of dense and cancellous bone that only marrow joins, if several are large
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
   Box region;                                // part of the scan around everything that reaches the threshold, LPS

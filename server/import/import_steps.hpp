@@ -6,7 +6,7 @@
 
 namespace osteon::import {
 
-// Samples of one import. At 8 bytes each, and with the sparse case, they stay within 20 GB.
+// Largest number of samples of one import. With 8 bytes for each, and the sparse case, they need at most 20 GB.
 inline constexpr double kLargestLattice = 1.0e9;
 // Error: invalid_input, with the remedy.
 [[nodiscard]] Result<void> check_lattice(const CoordBox& box, double pitch_mm);

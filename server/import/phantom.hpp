@@ -35,8 +35,8 @@ struct Phantom {
   [[nodiscard]] double surface_mm(const Vec3& point_mm) const;
   // Depth below the layered face, where the first layer begins.
   [[nodiscard]] double depth_mm(const Vec3& point_mm) const;
-  // Mean over `blur_mm` of depth. So samples one pitch apart preserve each layer's mass and each interface's position.
-  // The outer layers continue beyond the surface, because only the surface says where the bone ends.
+  // Mean of the density over `blur_mm` of depth. With blur_mm equal to the pitch, samples preserve each layer's mass
+  // and each interface's position. The outer layers continue beyond the surface: only the surface says where bone ends.
   [[nodiscard]] double density_g_cm3(const Vec3& point_mm, double blur_mm) const;
 };
 
@@ -48,9 +48,9 @@ struct Phantom {
 [[nodiscard]] Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm,
                                                      const KeepGoing& keep_going);
 
-// The threshold with the smallest error for all layers that reach the surface. Half way between air and bone puts the
-// edge of a blurred step where it was. So this is the middle between the half values of the lightest and the densest
-// layer.
+// The threshold with the smallest error for all layers that reach the surface. A layer's half value is midway between
+// the HU of air and of the layer; there, a blurred edge keeps its position. The threshold is midway between the half
+// values of the lightest and the densest layer.
 [[nodiscard]] double suitable_threshold_hu(const Phantom& phantom);
 
 }  // namespace osteon::import

@@ -30,10 +30,10 @@ struct MaintenanceCalls {
 // invalid_input (no journal, or its beginning cannot be read before it is opened), unsupported.
 [[nodiscard]] Result<RoomGenesis> peek_genesis(const std::filesystem::path& file, Disk* disk = nullptr);
 
-// Makes a new room in `to` that begins with everything that another room was up to sequence number `place` (null: all
-// of it): entries and checkpoints. The branch has the numbers of people, not their names. The journal must not be in
+// Makes a new room in `to` that begins with everything that another room was up to sequence number `seq` (null: all of
+// it): entries and checkpoints. The branch has people's author numbers, but not their names. The journal must not be in
 // use; for one in use see RoomStore::branch. Errors: not_found; exists (in use, or something is in `to`); invalid_input
-// (no such sequence number, or damaged); unavailable (all of it was asked for, and the journal is closed to entries);
+// (no such sequence number, or damaged); unavailable (all of it was asked for, and the journal accepts no entries);
 // cancelled.
 [[nodiscard]] Result<JournalHead> branch_journal(const std::filesystem::path& from, const std::filesystem::path& to,
                                                  RoomSeq seq, const std::string& name,
@@ -43,8 +43,8 @@ struct MaintenanceCalls {
 using HasHead = std::function<Result<bool>(const std::filesystem::path& file, const JournalHead& head)>;
 
 // Finds the branches of a room in a folder, and their branches, each after the one that it was made from. Compares the
-// name of the room and its history, which a branch records. `has_head` is for rooms that are in use; null: has_head()
-// of server/journal/maintenance.hpp. Errors: those of `has_head`.
+// name of the room and its history, which a branch records. `has` is for rooms that are in use; null: has_head() of
+// server/journal/maintenance.hpp is used. Errors: those of `has`.
 struct RoomFile {
   std::filesystem::path file;
   RoomGenesis genesis;
@@ -66,8 +66,8 @@ struct RoomFile {
 [[nodiscard]] Result<void> check_room_name(Journal& journal, const std::filesystem::path& file,
                                            const std::string& name);
 
-// Error: the journal is closed to entries, so nobody knows whether its entries are complete. `option` is the
-// command-line option that asks for a sequence number instead; up to that number the journal is confirmed.
+// Error: the journal accepts no entries, so nobody knows whether its entries are complete. The message names `option`,
+// a command-line option that takes a sequence number. Up to the number in the message the journal is confirmed.
 [[nodiscard]] Result<void> check_whole(const Journal& journal, const std::string& option);
 
 // As branch_journal(), step by step, of a journal that is in use.

@@ -45,11 +45,11 @@ struct RoomEvent {
   RoomSeq room_seq;
   EventKind kind = EventKind::cut;
   AuthorId author;                // null: the room itself
-  bool bone = false;              // bodies or leaves changed
+  bool bone = false;              // bodies, or leaves (blocks of the field), changed
   bool scene = false;             // items changed
   std::vector<BodyId> bodies;     // those that exist from now on
   std::vector<FieldLeaf> leaves;  // changed leaves in their new state, and all leaves of a new body
-  // Epoch, from now on, of every lease that was granted before; 0: unchanged. supervise: epoch of the subject's lease.
+  // New epoch of every lease that was granted before; 0: unchanged. For supervise: epoch of the subject's lease.
   std::uint64_t lease_epoch = 0;
   const ToolBox::Entry* tool = nullptr;  // the tool that was added
   std::uint32_t item = 0;                // the item that was set or removed

@@ -32,7 +32,7 @@ struct ViewerOptions {
   std::function<SpaceMouseState()> cap;           // moves the camera; first button: overview, second button: tool
   // Sends a request to the room and waits for its answer.
   std::function<Result<RoomAnswer>(const RoomRequest&)> ask;
-  // of the room; must outlive the viewer. Null: people are neither shown nor drawn for.
+  // of the room; must outlive the viewer. Null: people are not shown, and nothing is drawn for them.
   SupervisionClient* people = nullptr;
   std::string hand;  // the tool operator at this window, a name or #NUMBER; empty: nobody
 };

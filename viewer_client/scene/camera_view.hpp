@@ -17,15 +17,15 @@ struct CameraView {
 [[nodiscard]] ViewFrustum look_of(const CameraView& view, int width_px, int height_px);
 
 // The view of another person. If they do not name an up direction, up is towards the head, or towards the face if they
-// look along the body. A ViewFrustum does not contain the picture's height. The angle is therefore that of `now`, this
-// window's own view.
+// look along the body. A ViewFrustum does not contain the picture's height, so the vertical angle is taken from `now`,
+// this window's own view.
 [[nodiscard]] CameraView looking_as(const ViewFrustum& look, const CameraView& now);
 
 // The whole bone from the front, from its left and slightly above (DICOM LPS: +x left, -y front, +z up).
 [[nodiscard]] CameraView overview(const Box& bone);
 
-// The tool's tip from `distance_mm`. The camera is behind the tool and beside its axis, so that the shank does not hide
-// the hole.
+// Looks at the tool's tip from a distance of `distance_mm`. The camera is behind the tool and beside its axis, so that
+// the shank does not hide the hole.
 [[nodiscard]] CameraView beside_tool(const Pose& pose_bone_tool, double distance_mm);
 
 // The view after a SpaceMouse cap was pushed and twisted for dt_s. Push and twist are fractions −1 … 1 of the full

@@ -1,4 +1,4 @@
-// The pose that a user asks for an item, and the item's pose in words.
+// The pose that a user requests for an item, and the item's pose in words.
 #pragma once
 #include <optional>
 #include <string>
@@ -10,7 +10,7 @@ namespace osteon {
 struct ItemPlace {
   Vec3 point_mm;               // bone frame
   bool on_bone = false;        // at the surface nearest to the point, not at the point
-  std::optional<Vec3> along;   // its +z. None is allowed only with `on_bone`: then against the surface's normal.
+  std::optional<Vec3> along;   // its +z; may be absent only with `on_bone`: then opposite to the surface's normal
   std::optional<Vec3> across;  // its +x is as near to this as its +z allows
 };
 // The pose for a place that is not on the bone. `across_else` applies if the place names no `across`. An `across` along

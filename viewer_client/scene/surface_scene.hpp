@@ -20,7 +20,7 @@ struct ReceivedBlock {
 };
 
 // 4³ blocks of one level, drawn as one object. Fine blocks have their own regions. A cut with a small tool therefore
-// rebuilds a region of at most 64 h / 4, never the bone around it.
+// rebuilds a region of at most 64 h / 4 (h: pitch of the case), never the bone around it.
 inline constexpr int kRegionShift = 2;
 
 struct RegionKey {
