@@ -53,7 +53,7 @@ struct ClientOutcome {
   double removed_total_mm3 = 0;
   std::size_t unconfirmed = 0;  // own cuts that are not in it, because the room never confirmed them
   std::uint64_t rejected = 0, patches = 0, uncovered_ticks = 0, cuts_waiting_ticks = 0, rows_dropped = 0;
-  std::uint64_t held_for_room_ticks = 0;    // ticks in which the spindle was held because the room was silent or behind
+  std::uint64_t held_for_room_ticks = 0;  // ticks in which the spindle was held because the room was silent or behind
   std::vector<RestrictionNote> restrictions;  // in the order received
   std::vector<WordsNote> words;
   std::int64_t began_ns = 0;          // the session's first time

@@ -551,8 +551,8 @@ FIGURES = [
            "times that each of these took hold of a tool on bone: the rarest, at the delay and on "
            "the bone where it was rarest", "override", (">=", 5), full=True),
     # Authentication.
-    Figure("knocks", "count", "unauthenticated clients while a haptic client works: silent, in plain HTTP/2, noise, TLS without a "
-           "certificate", "knocking", (">=", 100_000), full=True),
+    Figure("knocks", "count", "unauthenticated clients while a haptic client works: silent, in plain HTTP/2, noise, "
+           "TLS without a certificate", "knocking", (">=", 100_000), full=True),
     Figure("knocks_let_in", "count", "of them answered but by a refusal, or not hung up on", "knocking", ("==", 0),
            full=True),
     Figure("knocks_noticed", "count",

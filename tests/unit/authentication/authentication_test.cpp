@@ -1,5 +1,4 @@
-// The authentication of a server in this process, on TLS and the loopback device: every call by every role, and clients
-// with wrong credentials.
+// Authentication of a server in this process, over TLS: every call by every role, and clients with wrong credentials.
 #include <gmock/gmock.h>
 #include <google/protobuf/dynamic_message.h>
 #include <grpcpp/generic/generic_stub.h>
