@@ -13,10 +13,6 @@
 #include "common/wire/x509.hpp"
 
 namespace osteon::test {
-namespace {
-
-}  // namespace
-
 void resign(const std::filesystem::path& certificate, const std::filesystem::path& authority,
             std::chrono::seconds begins, std::chrono::seconds ends) {
   const auto all = wire::certificates_of(content(certificate));

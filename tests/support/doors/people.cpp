@@ -7,10 +7,6 @@
 #include "tests/support/process.hpp"
 
 namespace osteon::test {
-namespace {
-
-}  // namespace
-
 People::People() {
   certs({"authority"});
   certs({"server", "127.0.0.1", "localhost"});
