@@ -211,13 +211,18 @@ TEST_P(Pages, RunFromAnEmptyFolder) {
   int count = 0;
   for (const Block& block : blocks_of(GetParam())) {
     std::string text;
-    for (const std::string& line : block.lines)
-      if (!builds(line)) text += line + "\n", ++count;
+    for (const std::string& line : block.lines) {
+      if (builds(line)) continue;
+      text += line + "\n", ++count;
+      // A reader goes on when the server has started.
+      if (line.starts_with("build/dev/bin/osteon-server ") && line.ends_with("&"))
+        text += "until (exec 3<>/dev/tcp/127.0.0.1/50000) 2>/dev/null; do sleep 0.1; done\n";
+    }
     text = replaced(text, "50000", port);
     if (!block.file.empty()) std::ofstream(folder / block.file) << text;
     if (block.language == "sh") commands += text;
   }
-  ASSERT_GT(count, 5) << "the page has hardly a command";
+  ASSERT_GE(count, 3) << "the page has hardly a command";
   // Programs that the page leaves running end with it.
   std::ofstream(folder / "commands.sh") << commands << "kill $(jobs -p) 2>/dev/null || true\nwait\n";
   ProcessOptions options = screen->options();

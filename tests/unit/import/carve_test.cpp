@@ -10,6 +10,7 @@
 #include "server/import/carving.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
@@ -409,6 +410,33 @@ TEST_F(Scripts, AToolOfTheBoxIsChangedWithoutWritingAFile) {
   refused({"drill-3.2", "--set", "teeth=3", "--out", path("no.txt")}, ".yaml");
   refused({"drill-3.2", "--set", "teeth=3", "--out", out, "--name", "My Drill"}, "lower-case");
   refused({"drill-3.2", "--set", "teeth=3", "--out", path("drill-4.5.yaml")}, "already there");
+}
+
+// The script of deploy/docs/tools.md: both steps remove bone from the block that the page makes.
+TEST(ScriptOfTheDocs, RemovesBone) {
+  std::ifstream page(test::source_dir() / "deploy" / "docs" / "tools.md");
+  std::string script, text;
+  for (bool found = false; std::getline(page, text);) {
+    found = found || text == "steps:";
+    if (found && text.starts_with("```")) break;
+    if (found) script += text + "\n";
+  }
+  ASSERT_NE(script.find("burr-round-5"), std::string::npos) << "deploy/docs/tools.md has no script";
+  const test::TempDir folder;
+  std::ofstream(folder / "script.yaml") << script;
+  const auto steps = read_carve_script(folder / "script.yaml");
+  ASSERT_TRUE(steps) << steps.error().message;
+  const Result<std::vector<Layer>> layers = parse_layers("5:1.9,20:0.3,5:1.9");
+  ASSERT_TRUE(layers);
+  auto bone = build_phantom_case({.layers = *layers, .width_mm = 40.0}, 0.4, "block", keep_going);
+  ASSERT_TRUE(bone);
+  Carving carving(std::move(*bone), 1.0);
+  ASSERT_EQ(steps->size(), 2u);
+  for (const CarveStep& step : *steps) {
+    const auto report = carving.run(step, keep_going);
+    ASSERT_TRUE(report);
+    EXPECT_GT(report->removed_mm3, 20.0) << report->tool;
+  }
 }
 
 }  // namespace

@@ -79,35 +79,6 @@ TEST(Skull, ImportsToOneHash) {
   }
 }
 
-// The script of deploy/docs/tools.md: both steps remove bone from the skull, as osteon-import makes it.
-TEST(Skull, TheCarveScriptOfTheDocsRemovesBone) {
-  const auto file = test::find_skull();
-  ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
-  std::ifstream page(test::source_dir() / "deploy" / "docs" / "tools.md");
-  std::string script, text;
-  for (bool found = false; std::getline(page, text);) {
-    found = found || text == "steps:";
-    if (found && text.starts_with("```")) break;
-    if (found) script += text + "\n";
-  }
-  ASSERT_NE(script.find("burr-round-5"), std::string::npos) << "deploy/docs/tools.md has no script";
-  const test::TempDir folder;
-  std::ofstream(folder / "script.yaml") << script;
-  const auto steps = read_carve_script(folder / "script.yaml");
-  ASSERT_TRUE(steps) << steps.error().message;
-  auto scan = read_inv3(*file, keep_going);
-  ASSERT_TRUE(scan);
-  auto bone = import_bone(std::move(*scan), {}, keep_going);
-  ASSERT_TRUE(bone);
-  Carving carving(std::move(*bone), 1.0);
-  ASSERT_EQ(steps->size(), 2u);
-  for (const CarveStep& step : *steps) {
-    const auto report = carving.run(step, keep_going);
-    ASSERT_TRUE(report);
-    EXPECT_GT(report->removed_mm3, 20.0) << report->tool;
-  }
-}
-
 class SharedScans : public ::testing::Test {
  protected:
   void SetUp() override {
