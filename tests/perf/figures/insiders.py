@@ -43,7 +43,7 @@ class Place:
     def __init__(self, run, household, folder, proxied, *more):
         folder.mkdir(parents=True, exist_ok=True)
         self.certificates = Certificates(run.programs, folder)
-        self.programs, self.folder, self.certificates = run.programs, folder, folder / "certs" / "server"
+        self.programs, self.folder, server_folder = run.programs, folder, folder / "certs" / "server"
         address_file = folder / "address"
         address_file.unlink(missing_ok=True)
         socket_file = folder / "proxy.sock"
@@ -56,12 +56,12 @@ class Place:
         if proxied:
             address = f"127.0.0.1:{free_port()}"
             admin = folder / "admin.sock"
-            environment = {"OSTEON_LISTEN": address, "OSTEON_CERTIFICATES": str(self.certificates),
+            environment = {"OSTEON_LISTEN": address, "OSTEON_CERTIFICATES": str(server_folder),
                            "OSTEON_PROXY_SOCKET": str(socket_file), "OSTEON_ADMIN_SOCKET": str(admin)}
             proxy = household.start("haproxy", [HAPROXY, "-db", "-f", ROOT / "deploy" / "haproxy.cfg"],
                                     {**os.environ, **environment})
             self.children.append(proxy)
-            household.start("proxy-revoked", [ROOT / "deploy" / "proxy-revoked", "--watch", admin, self.certificates])
+            household.start("proxy-revoked", [ROOT / "deploy" / "proxy-revoked", "--watch", admin, server_folder])
         self.address = address
         self.host, self.port = address.rsplit(":", 1)[0], int(address.rsplit(":", 1)[1])
         wait_for_port(self.host, self.port)
