@@ -1,7 +1,7 @@
-// The replicated arithmetic. Everything here must give the same bytes on every compiler and processor. It uses only + −
-// × ÷ and square roots (correctly rounded by IEEE 754), comparisons, and conversions of in-range numbers to integers.
-// The loops over samples are written once (kernel_rows.inl) for registers of 4, 8 and 16 floats. At run time the widest
-// that the processor has is chosen. Each width gives the same bytes.
+// The replicated arithmetic. Everything here must give the same bytes on every compiler and processor. It uses only +
+// − × ÷ and square roots (correctly rounded by IEEE 754), comparisons, and conversions of in-range numbers to
+// integers. The loops over samples are written once (kernel_rows.inl) for registers of 4, 8 and 16 floats. At run time
+// the widest that the processor has is chosen. Each width gives the same bytes.
 #include "common/field/kernel.hpp"
 
 #include <algorithm>
@@ -160,8 +160,8 @@ void add_edge(std::vector<OutlineEdge>& edges, double r0, double s0, double r1, 
   edges.push_back({f(r0), f(s0), f(dr / length), f(ds / length), f(length)});
 }
 
-// The outline when the body moves along its axis from `down` ≤ 0 to `up` ≥ 0. Edges that face forwards move up, edges
-// that face backwards move down, and the part between them stretches.
+// The outline when the body moves along its axis from `down` ≤ 0 to `up` ≥ 0. Edges that face forwards move up,
+// edges that face backwards move down, and the part between them stretches.
 void add_outline(std::vector<OutlineEdge>& edges, const std::vector<ProfileCorner>& profile, double down, double up) {
   std::array<std::array<double, 2>, 2 * kMostProfileCorners> corners;
   std::size_t count = 0;
@@ -432,9 +432,9 @@ void SweptTool::add_turned(const CutBody& body, const double from[3], const doub
   sweeps_.push_back(sweep);
 }
 
-// p is in the swept hull if some t in [0, 1] has n_i · (p − t m) ≤ d_i for all i. Eliminating t (Fourier and Motzkin)
-// gives three kinds of planes. Planes that face against the motion stay. Planes that face along it move with it. Each
-// pair of the two kinds gives the plane through their common direction along m.
+// p is in the swept hull if some t in [0, 1] has n_i · (p − t m) ≤ d_i for all i. Eliminating t (Fourier and
+// Motzkin) gives three kinds of planes. Planes that face against the motion stay. Planes that face along it move with
+// it. Each pair of the two kinds gives the plane through their common direction along m.
 void SweptTool::add_hull(const CutBody& body, const double from[3], const double to[3], const double turn[3][3]) {
   ToolSweep sweep{};
   sweep.kind = SweepKind::hull;

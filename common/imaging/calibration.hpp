@@ -7,8 +7,8 @@
 namespace osteon::imaging {
 
 // Density from Hounsfield units (Rho 1995). The authors measured human bone of many regions, and fitted one line for
-// each bone and region. Finite element studies quote ρ = 131 + 1.067 HU kg/m³ as their line for cancellous bone of the
-// proximal femur.
+// each bone and region. Finite element studies quote ρ = 131 + 1.067 HU kg/m³ as their line for cancellous bone of
+// the proximal femur.
 // [A] It is used here for all bone, also cortex, and for every scanner, kernel and tube voltage. Cortex is outside the
 // densities of that fit: a scan of 1700 HU gives 1.94 g/cm³, while compact bone has 1.8 to 2.1.
 inline constexpr DensityCalibration kRho1995{.slope_g_cm3_per_hu = 0.001067, .intercept_g_cm3 = 0.131};

@@ -7,8 +7,8 @@
 
 namespace osteon::imaging {
 
-// Trilinear HU at exactly (i, j, k) · pitch in LPS, for every sample of the box. Beyond the centres of the outer voxels
-// the value of the nearest one continues. Error: cancelled.
+// Trilinear HU at exactly (i, j, k) · pitch in LPS, for every sample of the box. Beyond the centres of the outer
+// voxels the value of the nearest one continues. Error: cancelled.
 [[nodiscard]] Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box, double pitch_mm,
                                                   const KeepGoing& keep_going);
 

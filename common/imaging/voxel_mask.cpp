@@ -9,8 +9,8 @@ namespace {
 
 constexpr float kFar = std::numeric_limits<float>::infinity();
 
-// Squared distance along the row of voxels to the nearest voxel of the mask, mm², or kFar beyond `reach` voxels. False:
-// the row has none.
+// Squared distance along the row of voxels to the nearest voxel of the mask, mm², or kFar beyond `reach` voxels.
+// False: the row has none.
 bool along_row(const std::uint8_t* mask, int columns, float spacing_mm, int reach, float* squared) {
   const auto step = spacing_mm * spacing_mm;
   std::fill(squared, squared + columns, kFar);

@@ -60,8 +60,8 @@ class FluteClogging {
 [[nodiscard]] bool has_flutes(ToolKind kind) noexcept;
 
 // When the point comes out on the far side, the lips catch the remaining rim and the flutes pull the drill forward. The
-// pull is ratio · (the last whole thrust) · 4 e (1 - e) with the engaged fraction e, and the torque rises accordingly.
-// It needs that the whole point was in bone before, so there is no pull on entry.
+// pull is ratio · (the last whole thrust) · 4 e (1 - e) with the engaged fraction e, and the torque rises
+// accordingly. It needs that the whole point was in bone before, so there is no pull on entry.
 struct GrabParams {
   double whole = 0.9;        // fraction from which the point counts as whole
   double gone = 0.02;        // fraction below which it counts as out

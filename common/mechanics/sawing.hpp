@@ -4,8 +4,8 @@
 // the split of the resultant, the growth with density like Chi's thrust, and the fraction of the teeth in a kerf that
 // cut at a time, because the edge swings over an arc and bends.
 //
-// The depth of cut follows from volume. What the cutting teeth remove at their speed equals the growth of the kerf: v ·
-// pitch = share · depth · mean speed, for any number of teeth.
+// The depth of cut follows from volume. What the cutting teeth remove at their speed equals the growth of the kerf:
+// v · pitch = share · depth · mean speed, for any number of teeth.
 #pragma once
 #include "common/core/units.hpp"
 #include "common/mechanics/feed_law.hpp"

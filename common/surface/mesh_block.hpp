@@ -40,12 +40,13 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-// Cells of a coarse block that are drawn at a finer level: one bit for each of 4³ groups of 4³ cells, (x·4 + y)·4 + z.
+// Cells of a coarse block that are drawn at a finer level: one bit for each of 4³ groups of 4³ cells, (x·4 + y)·4
+// + z.
 using CoveredGroups = std::uint64_t;
 inline constexpr CoveredGroups kWhollyCovered = ~CoveredGroups{0};
 
-// How many levels coarser the surroundings of a block are drawn, in half blocks: 4³ of them, (x·4 + y)·4 + z. The inner
-// 2³ are the block itself and stay 0. Finer or equal surroundings are 0.
+// How many levels coarser the surroundings of a block are drawn, in half blocks: 4³ of them, (x·4 + y)·4 + z. The
+// inner 2³ are the block itself and stay 0. Finer or equal surroundings are 0.
 struct Seams {
   std::array<std::uint8_t, 64> coarser{};
   [[nodiscard]] int most() const;  // 0: no seam

@@ -53,8 +53,8 @@ inline constexpr std::size_t kMostHullPlanes = 20;
 struct CutBody {
   CutKind kind = CutKind::none;
   std::int32_t radius = 0;  // ball
-  // turned: counter-clockwise in (r, z), with r to the right and z up; convex, r ≥ 0. A body that reaches the axis has
-  // two corners on it (or one, a point). A body that does not is a ring, such as a hollow mill.
+  // turned: counter-clockwise in (r, z), with r to the right and z up; convex, r ≥ 0. A body that reaches the axis
+  // has two corners on it (or one, a point). A body that does not is a ring, such as a hollow mill.
   std::vector<ProfileCorner> profile;
   std::int32_t dome = 0;          // turned: radius of the ball, 0 for none; like CutKind::ball, it ends at the tip
   std::vector<HullPlane> planes;  // hull

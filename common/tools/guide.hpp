@@ -54,12 +54,12 @@ struct GuidedPose {
 };
 
 // The allowed pose nearest to the wanted one. Nothing once the tip is drawn back beyond the lead-in. A bore leaves
-// rotation about the axis and motion along it free. Across it, the play is c = (bore − tool) / 2 from its mouth to its
-// end or the tip. Beyond a bore of length L the tip stays within c (1 + 2 l / L) of the middle, l from the end. A slot
-// constrains the blade's plate in the same way across its flat, and by its width along it. Nearest means: the smallest
-// sum of squares of the change of the axis in the middle of the opening, and of the change of its slope times four
-// times the opening's length. The tip's depth stays. The result is continuous in the wanted pose, and an allowed pose
-// is returned unchanged. Pure, no allocation.
+// rotation about the axis and motion along it free. Across it, the play is c = (bore − tool) / 2 from its mouth to
+// its end or the tip. Beyond a bore of length L the tip stays within c (1 + 2 l / L) of the middle, l from the end. A
+// slot constrains the blade's plate in the same way across its flat, and by its width along it. Nearest means: the
+// smallest sum of squares of the change of the axis in the middle of the opening, and of the change of its slope times
+// four times the opening's length. The tip's depth stays. The result is continuous in the wanted pose, and an allowed
+// pose is returned unchanged. Pure, no allocation.
 [[nodiscard]] std::optional<GuidedPose> constrain(const GuideShape& shape, std::size_t opening,
                                                   const Pose& pose_bone_guide, const Tool& tool,
                                                   const Pose& wanted_bone_tool) noexcept;

@@ -85,7 +85,8 @@ struct Tool {
 [[nodiscard]] double signed_distance_mm(const Tool& tool, const Vec3& point_tool_mm);
 // Unit gradient of the distance. It points out of the tool (eq. 6.2).
 [[nodiscard]] Vec3 normal(const Tool& tool, const Vec3& point_tool_mm);
-// Boxes of the whole tool, mm: in its frame (Local Bounding Block, Niu 2008, §6.1); at a pose, in bone's frame (World).
+// Boxes of the whole tool, mm: in its frame (Local Bounding Block, Niu 2008, §6.1); at a pose, in bone's frame
+// (World).
 [[nodiscard]] Box local_bounds(const Tool& tool);
 [[nodiscard]] Box world_bounds(const Tool& tool, const Pose& pose_bone_tool);
 

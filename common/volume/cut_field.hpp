@@ -68,8 +68,8 @@ class CutField {
   // S of the case on the samples of a level, trilinear between samples of level 0.
   void gather_surface(int level, const CoordBox& box, std::span<float> out) const;
   void gather_surface(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const;
-  // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm. Where a level has no cut
-  // within its band, its R is ignored and f has the depth of S.
+  // f = max(S, −R₀, −R₁, −R₂) on the samples of a level: negative where bone is left, mm. Where a level
+  // has no cut within its band, its R is ignored and f has the depth of S.
   void gather_solid(int level, const CoordBox& box, std::span<float> out) const;
   void gather_solid(int level, const CoordBox& box, std::span<float> out, GatherScratch& scratch) const;
   // Gathers both for a mesh block of 19³ samples. Writes nothing if all samples are on one side of the surface and no

@@ -9,12 +9,12 @@
 #include "common/field/kernel.hpp"
 #include "common/volume/solid_labels.hpp"
 
-// The masks. Let M be −band on the piece's samples and +band on the samples of the rest. On air beside the piece it is
-// −band, beside the rest +band, beside both 0. The parent takes R = min(R, M), the piece R = min(R, −M). Trilinear M is
-// negative around the piece and positive around the rest. So the parent keeps the points with M > 0, the piece those
-// with M < 0, and no point is in both. Where piece and rest are within a cell of each other, M is written on one
-// lattice: that of the finest cut there. Farther away only one of them is near, and whole leaves of level 0 are
-// constants. The constants extend one sample over the seam, so that both lattices cover it.
+// The masks. Let M be −band on the piece's samples and +band on the samples of the rest. On air beside the piece it
+// is −band, beside the rest +band, beside both 0. The parent takes R = min(R, M), the piece R = min(R, −M).
+// Trilinear M is negative around the piece and positive around the rest. So the parent keeps the points with M > 0,
+// the piece those with M < 0, and no point is in both. Where piece and rest are within a cell of each other, M is
+// written on one lattice: that of the finest cut there. Farther away only one of them is near, and whole leaves of
+// level 0 are constants. The constants extend one sample over the seam, so that both lattices cover it.
 namespace osteon {
 namespace {
 

@@ -9,8 +9,8 @@
 
 namespace osteon {
 
-// A sub-volume is a cube with this many samples of level 0 along each side, about the 30000 voxels that Niu 2008, §5.3,
-// found best.
+// A sub-volume is a cube with this many samples of level 0 along each side, about the 30000 voxels that Niu 2008,
+// §5.3, found best.
 inline constexpr std::int32_t kSubVolumeSamples = 32;
 
 struct RefineReport {

@@ -26,7 +26,8 @@ struct Wrench {
   Vec3 force_n = Vec3::Zero(), torque_nmm = Vec3::Zero();
 };
 
-// Energies at the handle, mJ: force shown to the hand times the handle's path, and torque times its rotation: N·mm·rad.
+// Energies at the handle, mJ: force shown to the hand times the handle's path, and torque times its rotation:
+// N·mm·rad.
 struct EnergyReport {
   // Given to the hand and to cutting in this contact, minus what the hand put in. Negative: dissipated.
   double episode_mj = 0;

@@ -5,9 +5,9 @@
 //   F = k d + b v,  never pulling, at most most_n        d: deepest point; v: its own speed inwards
 //
 // Each user holds one end of this spring, and sees the other's position as it was T ago. Two springs over a delay with
-// a damper beside either make no energy as long as b >= k T (Nuño, Ortega, Barabanov and Basañez, 2008). So k is what b
-// permits for the lag of the partner's pose, its low pass included. Poses are not extrapolated: that would cancel the
-// damping.
+// a damper beside either make no energy as long as b >= k T (Nuño, Ortega, Barabanov and Basañez, 2008). So k is
+// what b permits for the lag of the partner's pose, its low pass included. Poses are not extrapolated: that would
+// cancel the damping.
 #pragma once
 #include <array>
 #include <cstdint>

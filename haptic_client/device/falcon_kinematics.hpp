@@ -39,8 +39,8 @@ inline constexpr int kFalconMaxMotor = 4096;
 [[nodiscard]] Eigen::Vector3d falcon_torques(const Eigen::Vector3d& angles_rad, const Eigen::Vector3d& grip_m,
                                              const Eigen::Vector3d& force_n) noexcept;
 
-// [haptic] Motor commands −10⁴ τ. Where one would exceed the motors' range, all three are scaled down equally. So the
-// force keeps its direction.
+// [haptic] Motor commands −10⁴ τ. Where one would exceed the motors' range, all three are scaled down equally. So
+// the force keeps its direction.
 [[nodiscard]] FalconCounts falcon_motors(const Eigen::Vector3d& torques_nm) noexcept;
 
 }  // namespace osteon::haptic

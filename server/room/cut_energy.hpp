@@ -16,8 +16,8 @@ class CutEnergy {
  public:
   // A lower bound of the energy of a cut, J. After the cut no bone is left inside the cutting body, at any pose of the
   // path. So the energy to remove the bone inside it at one pose is a lower bound; the pose with the most counts.
-  // The energy is ∫ u(ρ) dV with u the ultimate stress [A]. It is summed over samples of the body, so it is exact only
-  // over many cuts: see resolution_j(). `fields`: those of all bodies that the room has.
+  // The energy is ∫ u(ρ) dV with u the ultimate stress [A]. It is summed over samples of the body, so it is exact
+  // only over many cuts: see resolution_j(). `fields`: those of all bodies that the room has.
   [[nodiscard]] double least_j(const Cut& cut, const ToolBox::Entry& tool, std::span<const CutField* const> fields);
   // Energy that one sample stands for in cortical bone, J.
   [[nodiscard]] double resolution_j(const ToolBox::Entry& tool);

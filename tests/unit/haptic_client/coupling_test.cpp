@@ -118,7 +118,8 @@ TEST(EnergyLedger, CountsWhatTheDamperTook) {
   }
   given_mj = ledger.report().ended_mj;
   ASSERT_TRUE(ledger.report().ended);
-  // Inwards: force of tick i over the way of tick i + 1. The sum over in and out of k·(e ± d)·d was computed by hand.
+  // Inwards: force of tick i over the way of tick i + 1. The sum over in and out of k·(e ± d)·d was computed by
+  // hand.
   double expected = 0.0;
   for (int i = 1; i < n; ++i) expected -= k * d * (i + 1) * d;  // in, i = 1 … n-1
   expected += k * d * (n + 1) * d;                              // turning: the damper still pushes

@@ -164,7 +164,8 @@ TEST_F(FalconOnUsb, MotorsDoTheWorkOfTheForceAndStopWithTheHapticThread) {
     shown = told.control == kFalconGreen;
   }
   ASSERT_TRUE(shown);
-  // Compares the work of the torques −motors/10⁴ over a small move, by the inverse kinematics, with the force's work.
+  // Compares the work of the torques −motors/10⁴ over a small move, by the inverse kinematics, with the force's
+  // work.
   const Vec3 move_m(2e-4, 3e-4, -1e-4);
   const Eigen::Vector3d turned = *falcon_angles(grip_m + move_m) - *falcon_angles(grip_m - move_m);
   double work = 0.0;

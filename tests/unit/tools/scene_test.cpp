@@ -186,8 +186,8 @@ TEST(TrialCup, FillsItsOwnHemisphere) {
   EXPECT_LE(seating.fit.largest_overlap_mm, 0.02 + 1e-6);
 }
 
-// In a hemisphere of 52 it lies on its pole, 1 mm deeper than centred. The gap at polar angle t is 26 − √(25² + 1 + 50
-// cos t). The gap is within 0.2 mm for the share 1 − cos t of the hemisphere.
+// In a hemisphere of 52 it lies on its pole, 1 mm deeper than centred. The gap at polar angle t is 26 − √(25² + 1
+// + 50 cos t). The gap is within 0.2 mm for the share 1 − cos t of the hemisphere.
 TEST(TrialCup, IsLooseInALargerOne) {
   const Seating seating = driven(50, 52);
   std::printf("  50 in 52: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",
@@ -201,8 +201,8 @@ TEST(TrialCup, IsLooseInALargerOne) {
   EXPECT_NEAR(seating.fit.contact_fraction, share, 0.04);
 }
 
-// In a hemisphere of 48 it hangs on the rim. A sphere of 25 mm meets the mouth of radius 24 at √(25² − 24²) = 7 mm
-// below its middle. So its pole is at 18 mm, 6 mm above the cavity's, and its rim stands 7 mm above the bone.
+// In a hemisphere of 48 it hangs on the rim. A sphere of 25 mm meets the mouth of radius 24 at √(25² − 24²) = 7
+// mm below its middle. So its pole is at 18 mm, 6 mm above the cavity's, and its rim stands 7 mm above the bone.
 TEST(TrialCup, StandsProudInASmallerOne) {
   const Seating seating = driven(50, 48);
   std::printf("  50 in 48: pole at %.3f mm, contact %.3f, gap %.3f, overlap %.3f mm\n",
