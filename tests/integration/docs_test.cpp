@@ -203,7 +203,7 @@ class Pages : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(Pages, RunFromAnEmptyFolder) {
   const auto screen = Xvfb::start();
-  if (!screen) GTEST_SKIP() << "Xvfb is not installed; deploy/install does that";
+  ASSERT_TRUE(screen) << "Xvfb does not start; deploy/install installs it";
   const TempDir folder;
   prepare(folder);
   const std::string port = std::to_string(free_port());
