@@ -95,7 +95,7 @@ void print_json(const AuditEntry& entry) {
   const nlohmann::ordered_json fields{{"sequence", record.sequence}, {"time", record.time},
                                       {"person", entry.who.person},  {"certificate", entry.who.certificate},
                                       {"ticket", entry.who.ticket},  {"address", entry.who.address},
-                                      {"identity", record.identity}, {"forgotten", entry.is_erased},
+                                      {"identity", record.identity}, {"erased", entry.is_erased},
                                       {"action", record.action},     {"object", record.object},
                                       {"result", record.result},     {"detail", record.detail}};
   std::printf("%s\n", fields.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace).c_str());

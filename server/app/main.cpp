@@ -191,7 +191,7 @@ Result<std::vector<KnownCase>> open_uploads(const std::filesystem::path& folder,
     log::info("case", {{"title", stored->title}, {"hash", to_hex(stored->hash)}, {"uploaded", true}});
     known.push_back({stored->hash, stored->title, kept, stored->memory_bytes});
   }
-  rooms.store = std::move(*store);
+  rooms.case_repository = std::move(*store);
   return known;
 }
 

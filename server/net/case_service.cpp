@@ -46,7 +46,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   static constexpr std::string_view kMethod = "/osteon.v1.CaseService/UploadCase";
 
   UploadStream(Rooms& rooms, v1::UploadCaseResponse* response)
-      : rooms_(rooms), store_(rooms.store()), response_(response) {}
+      : rooms_(rooms), store_(rooms.case_repository()), response_(response) {}
 
   // gRPC holds the stream until OnDone. The thread that validates cases, the authorizer and the alarm may hold it
   // longer.

@@ -22,8 +22,8 @@ Time now_of_links() {
 
 }  // namespace
 
-SessionLink::SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& subscriber)
-    : keys_(keys), author_(author), subscriber_(&subscriber), link_(keys, author, system_random(), first_author_seq) {}
+SessionLink::SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& receiver)
+    : keys_(keys), author_(author), receiver_(&receiver), link_(keys, author, system_random(), first_author_seq) {}
 
 SessionLink::News SessionLink::news() {
   News news;
@@ -38,11 +38,11 @@ SessionLink::News SessionLink::news() {
 }
 
 void SessionLink::say(News news) {
-  if (!subscriber_) return;
-  for (Cut& cut : news.cuts) subscriber_->take(std::move(cut));
-  if (news.state) subscriber_->take(std::move(*news.state));
-  if (news.push) subscriber_->pushed(*news.push);
-  if (news.arrived > 0) subscriber_->arrived(news.arrived);
+  if (!receiver_) return;
+  for (Cut& cut : news.cuts) receiver_->take(std::move(cut));
+  if (news.state) receiver_->take(std::move(*news.state));
+  if (news.push) receiver_->pushed(*news.push);
+  if (news.arrived > 0) receiver_->arrived(news.arrived);
 }
 
 void SessionLink::offer(const Cut& cut) {
@@ -95,7 +95,7 @@ bool SessionLink::set_bone(const MountPose& seen) {
 
 void SessionLink::close() {
   const std::lock_guard delivery(delivery_mutex_);
-  subscriber_ = nullptr;
+  receiver_ = nullptr;
 }
 
 Result<std::unique_ptr<LinkServer>> LinkServer::open(const std::string& address, std::uint16_t port) {
@@ -118,7 +118,7 @@ LinkServer::~LinkServer() {
 }
 
 std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t first_author_seq,
-                                             SessionLink::Receiver& subscriber) {
+                                             SessionLink::Receiver& receiver) {
   std::shared_ptr<SessionLink> link;
   {
     const std::lock_guard lock(mutex_);
@@ -129,7 +129,7 @@ std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t firs
       session = std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 | std::uint32_t{bytes[2]} << 16 |
                 std::uint32_t{bytes[3]} << 24;
     }
-    link = std::make_shared<SessionLink>(make_session_keys(session, random_), author, first_author_seq, subscriber);
+    link = std::make_shared<SessionLink>(make_session_keys(session, random_), author, first_author_seq, receiver);
     link->server_ = this;
     links_[session] = link;
   }

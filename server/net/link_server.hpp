@@ -19,8 +19,8 @@
 
 namespace osteon {
 
-// One session's link as its owner uses it. Any thread may call it, except from within the subscriber. Calls to the
-// subscriber come on the link server's thread.
+// One session's link as its owner uses it. Any thread may call it, except from within the receiver. Calls to the
+// receiver come on the link server's thread.
 class SessionLink {
  public:
   class Receiver {
@@ -34,10 +34,10 @@ class SessionLink {
     virtual void arrived(std::uint64_t index) = 0;
   };
 
-  SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& subscriber);
+  SessionLink(const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& receiver);
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
 
-  // A cut that came over the stream. The subscriber gets it in order, within this call or later.
+  // A cut that came over the stream. The receiver gets it in order, within this call or later.
   void offer(const Cut& cut);
   // Takes every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::tell.
   // Returns false if this entry goes over the stream alone.
@@ -47,12 +47,12 @@ class SessionLink {
   bool set_partners(std::span<const CuttingState> partners);
   // The pose of the bone on its mount. Returns false as above.
   bool set_bone(const MountPose& seen);
-  // The subscriber is not called any more once this has returned.
+  // The receiver is not called any more once this has returned.
   void close();
 
  private:
   friend class LinkServer;
-  // What has arrived for the subscriber, to be delivered without the lock.
+  // What has arrived for the receiver, to be delivered without the lock.
   struct News {
     std::vector<Cut> cuts;
     std::optional<CuttingState> state;
@@ -64,9 +64,9 @@ class SessionLink {
 
   const SessionKeys keys_;
   const AuthorId author_;
-  // Order: told_mutex_, then mutex_.
-  std::mutex delivery_mutex_;  // held while the subscriber is called, so that its calls keep their order
-  Receiver* subscriber_;
+  // Order: delivery_mutex_, then mutex_.
+  std::mutex delivery_mutex_;  // held while the receiver is called, so that its calls keep their order
+  Receiver* receiver_;
   std::mutex mutex_;
   wire::ServerLink link_;
   std::uint64_t arrived_ = 0;
@@ -90,7 +90,7 @@ class LinkServer {
   [[nodiscard]] std::uint16_t port() const { return port_->local().port; }
   // Adds a link with its own keys. It receives datagrams until it is removed.
   [[nodiscard]] std::shared_ptr<SessionLink> add(AuthorId author, std::uint64_t first_author_seq,
-                                                 SessionLink::Receiver& subscriber);
+                                                 SessionLink::Receiver& receiver);
   void remove(const std::shared_ptr<SessionLink>& link);
   void wake() { port_->wake(); }
   [[nodiscard]] LinkServerHealth health() const;

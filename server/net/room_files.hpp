@@ -31,7 +31,7 @@ struct MaintenanceCalls {
 [[nodiscard]] Result<RoomGenesis> peek_genesis(const std::filesystem::path& file, Disk* disk = nullptr);
 
 // Makes a new room in `to` that begins with everything that another room was up to sequence number `seq` (null: all of
-// it): entries and checkpoints. The branch has people's author numbers, but not their names. The journal must not be in
+// it): entries and checkpoints. The branch has the numbers of people, but not their names. The journal must not be in
 // use; for one in use see RoomStore::branch. Errors: not_found; exists (in use, or something is in `to`); invalid_input
 // (no such sequence number, or damaged); unavailable (all of it was asked for, and the journal accepts no entries);
 // cancelled.

@@ -141,7 +141,7 @@ class RoomRuntime {
   // store).
   [[nodiscard]] Result<void> check_witness(const Witness& kept);
   // Checks whether an earlier connection may go on. `kept`: the witness that the client was sent, if any. Errors: first
-  // those of check_kept; invalid_input (the secret does not match the author's digest); denied (`role` is given, and
+  // those of check_witness; invalid_input (the secret does not match the author's digest); denied (`role` is given, and
   // the author joined with another).
   [[nodiscard]] Result<void> resume(AuthorId author, const Digest& secret, const std::optional<Witness>& kept,
                                     std::optional<Role> role = {});

@@ -57,9 +57,9 @@ Result<std::unique_ptr<LinkServer>> open_fast_path(const ConnectionOptions& conn
     return failure(ErrorCode::invalid_input, "--udp-listen " + connections.udp_listen +
                                                  " is reachable from other machines, but this server speaks plain "
                                                  "text; use 127.0.0.1 or [::1], or give --certificates DIR");
-  std::string runtime = at->host;
-  if (runtime.front() == '[' && runtime.back() == ']') runtime = runtime.substr(1, runtime.size() - 2);
-  return LinkServer::open(runtime, static_cast<std::uint16_t>(at->port)).map_error([&](const Error& error) {
+  std::string host = at->host;
+  if (host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  return LinkServer::open(host, static_cast<std::uint16_t>(at->port)).map_error([&](const Error& error) {
     return Error{error.code, "--udp-listen " + connections.udp_listen + ": " + error.message};
   });
 }
@@ -69,8 +69,8 @@ constexpr int kMaxSendBytes = 4 * 1024 * 1024;     // a part of a case is 1 MiB
 constexpr int kShortestPingMs = 500;               // clients may ping the server this often
 constexpr int kMostStreams = 64;                   // of one connection
 constexpr int kMostMetadataBytes = 8 * 1024;       // of one call; a ticket is below 1 kB
-// Calls that are begun and reset are bounded after each read (call_flood.hpp). A read of gRPC's default 4 MiB has 20
-// 000 of them.
+// Calls that are begun and reset are bounded after each read (call_flood.hpp). A read of gRPC's default 4 MiB has
+// 20 000 of them.
 constexpr int kMostReadBytes = 16 * 1024;
 constexpr int kHandshakeMs = 5'000;                                  // limit of the handshake
 constexpr std::size_t kMostTransportBytes = std::size_t{512} << 20;  // of all connections, in gRPC
@@ -152,7 +152,7 @@ Result<std::unique_ptr<RoomServer>> RoomServer::start(std::unique_ptr<Rooms> roo
   if (!connections.proxy_socket.empty()) {
     if (!impl->authorizer)
       return failure(ErrorCode::invalid_input,
-                     "--proxy-socket needs --certificates DIR: a proxy brings calls of people");
+                     "--proxy-socket needs --certificates DIR: a proxy passes on calls of people");
     Result<std::unique_ptr<Listener>> proxy = Listener::open_at(connections.proxy_socket, connections.most_connections);
     if (!proxy)
       return failure(proxy.error().code, "cannot listen at --proxy-socket " + connections.proxy_socket.string() + ": " +

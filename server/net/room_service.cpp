@@ -422,7 +422,7 @@ class RoomServiceImpl final : public RoomBase {
   static Result<void> check_witness(RoomRuntime& runtime, const v1::JoinRequest& request) {
     if (request.durable_room_seq() == 0) return {};
     const Result<Digest> chain = wire::digest_from_wire(request.durable_chain());
-    if (!chain) return failure(ErrorCode::invalid_input, "kept_chain is not a digest of 32 bytes");
+    if (!chain) return failure(ErrorCode::invalid_input, "durable_chain is not a digest of 32 bytes");
     // Programs from before there were seals send none.
     const Result<Digest> seal = wire::digest_from_wire(request.durable_seal());
     return runtime.check_witness({{RoomSeq{request.durable_room_seq()}, *chain}, seal ? *seal : Digest{}});

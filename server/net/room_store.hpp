@@ -150,7 +150,7 @@ class RoomStore {
   // Whether this head is in the journal's history. For branches_of().
   [[nodiscard]] Result<bool> has_head(const JournalHead& head);
 
-  // Writes all leaves of the room as they were at `place`, so that the next opening need not evaluate every cut again.
+  // Writes all leaves of the room as they were at `seq`, so that the next opening need not evaluate every cut again.
   // Entries may have come since. The leaves are written and synced in parts, and noted in their own transaction. Does
   // nothing if the entries up to there are not durable yet, or if a checkpoint already reaches that far. Error
   // cancelled.

@@ -65,7 +65,7 @@ struct RoomsOptions {
   int retention_days = 0;                             // after which people are erased; 0: never
   std::shared_ptr<AuditTrail> trail = nullptr;        // shared with the server's calls; null: nothing is recorded
   // Stores uploaded cases; shared with uploads in progress. Null: uploads are refused.
-  std::shared_ptr<CaseRepository> store{};
+  std::shared_ptr<CaseRepository> case_repository{};
   std::uint64_t case_memory_bytes = kMostCaseMemory;  // limit of all cases that rooms use
   int most_rooms = kMostRooms;                        // open and closed ones together; no more are made
   // Of one person: rooms, branches and playbacks together, and backups in the folder.
@@ -143,7 +143,7 @@ class Rooms {
   void add_case(KnownCase known) { cases_.add(std::move(known)); }
   [[nodiscard]] std::uint64_t case_bytes() const { return cases_.loaded_bytes(); }  // memory of all cases
   [[nodiscard]] const std::shared_ptr<AuditTrail>& trail() const { return options_.trail; }
-  [[nodiscard]] const std::shared_ptr<CaseRepository>& store() const { return options_.store; }
+  [[nodiscard]] const std::shared_ptr<CaseRepository>& case_repository() const { return options_.case_repository; }
   [[nodiscard]] std::vector<RoomListing> list() const;
 
   // Adds a room that was made elsewhere, with its store. `save`: see OpenRoom. `progress` gets the progress of its

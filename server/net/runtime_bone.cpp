@@ -43,7 +43,7 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
     std::vector<Cut> cuts;
     std::uint64_t changes = 0;
     {
-      // Only this thread uses `meanwhile`, and the tick thread, which holds the lock exclusively.
+      // Only this thread uses `cuts_during_copy`, and the tick thread, which holds the lock exclusively.
       const std::shared_lock lock(room_mutex);
       changes = room.bone_changes();
       leaves = origins();

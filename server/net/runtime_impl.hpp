@@ -31,7 +31,7 @@ namespace osteon {
 inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
 // Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the state publisher, then a
-// stream's own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of the figures are
+// stream's own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of `metrics` are
 // never held with another.
 struct RoomRuntime::Impl {
   using Clock = RoomRuntime::Clock;

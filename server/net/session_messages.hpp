@@ -26,7 +26,7 @@ namespace osteon {
 [[nodiscard]] Bytes redial_message(std::chrono::milliseconds after, const std::string& why);
 [[nodiscard]] Bytes tool_message(RoomSeq seq, const Tool& tool, std::uint32_t number);
 [[nodiscard]] Bytes scene_message(RoomSeq seq, const std::vector<SceneItem>& items);
-// What an instructor has decided. `place` null: what was valid before. `by`: who decided it, as far as known.
+// What an instructor has decided. `seq` null: what was valid before. `by`: who decided it, as far as known.
 [[nodiscard]] Bytes supervised_message(RoomSeq seq, const Restrictions& supervision, std::uint64_t lease_epoch,
                                        const Decider& by);
 [[nodiscard]] Bytes said_message(RoomSeq seq, AuthorId from, const WordsEntry& words);

@@ -191,7 +191,7 @@ Result<void> Room::know(const Tool& tool) const {
   return {};
 }
 
-// Adds the events that depend on `places`.
+// Adds the events that depend on `seqs`.
 // - With a split: what was done to its piece as such.
 // - With a cut: every later split of a body that the cut had reached, because the bone that comes back may hold the
 //   piece.

@@ -244,27 +244,26 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   Stage stage(16.0, {});
   ASSERT_EQ(stage.server().terminate(), 0);
   TriangleMesh ball;
-  constexpr int kAround = 96, kEntries = 48;
-  const auto corner = [&](int entry, int i) {
-    const double polar = std::numbers::pi * entry / kEntries, angle = 2.0 * std::numbers::pi * i / kAround;
+  constexpr int kAround = 96, kRows = 48;
+  const auto corner = [&](int row, int i) {
+    const double polar = std::numbers::pi * row / kRows, angle = 2.0 * std::numbers::pi * i / kAround;
     const Vec3 p =
         kRadius_mm * Vec3{std::sin(polar) * std::cos(angle), std::sin(polar) * std::sin(angle), std::cos(polar) - 1.0};
     return std::array<float, 3>{static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())};
   };
   ball.positions_mm.push_back(corner(0, 0));
-  for (int entry = 1; entry < kEntries; ++entry)
-    for (int i = 0; i < kAround; ++i) ball.positions_mm.push_back(corner(entry, i));
-  ball.positions_mm.push_back(corner(kEntries, 0));
-  const auto index = [&](int entry, int i) {
-    return static_cast<std::uint32_t>(entry == 0          ? 0
-                                      : entry == kEntries ? 1 + (kEntries - 1) * kAround
-                                                          : 1 + (entry - 1) * kAround + i % kAround);
+  for (int row = 1; row < kRows; ++row)
+    for (int i = 0; i < kAround; ++i) ball.positions_mm.push_back(corner(row, i));
+  ball.positions_mm.push_back(corner(kRows, 0));
+  const auto index = [&](int row, int i) {
+    return static_cast<std::uint32_t>(row == 0       ? 0
+                                      : row == kRows ? 1 + (kRows - 1) * kAround
+                                                     : 1 + (row - 1) * kAround + i % kAround);
   };
-  for (int entry = 0; entry < kEntries; ++entry)
+  for (int row = 0; row < kRows; ++row)
     for (int i = 0; i < kAround; ++i) {
-      if (entry > 0) ball.triangles.push_back({index(entry, i), index(entry + 1, i), index(entry, i + 1)});
-      if (entry < kEntries - 1)
-        ball.triangles.push_back({index(entry, i + 1), index(entry + 1, i), index(entry + 1, i + 1)});
+      if (row > 0) ball.triangles.push_back({index(row, i), index(row + 1, i), index(row, i + 1)});
+      if (row < kRows - 1) ball.triangles.push_back({index(row, i + 1), index(row + 1, i), index(row + 1, i + 1)});
     }
   ASSERT_TRUE(write_stl(ball, tools / "ball.stl"));
   std::ofstream(tools / "ball.yaml")

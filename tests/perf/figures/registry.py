@@ -60,7 +60,7 @@ FUZZED = (
     ("journal_entries", "rows of journals, many in each input,", "a room", 10_000_000),
     ("journal_entries_evaluated", "rows of journals, many in each input,", "a room with its bone", 1_000_000),
     ("journal_genesis", "beginnings of rooms", "a room", 10_000_000),
-    ("journal_file", "files of journals", "verify, recover and open", 1_000_000),
+    ("journal_file", "files of journals", "verify, salvage and open", 1_000_000),
 )
 INSIDER_WAYS = (("", ""), ("_proxied", ", through the proxy"))
 INSIDER_ATTACKS = (("killing", "send a header that once ended the server"),

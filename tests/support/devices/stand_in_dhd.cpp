@@ -136,12 +136,12 @@ int dhdGetPositionAndOrientationFrame(double* x, double* y, double* z, double (*
   const ArmControl& c = *world().control;
   const double q[4] = {c.rotation[0], c.rotation[1], c.rotation[2], c.rotation[3]};
   const double s = 2.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
-  const double entries[3][3] = {
+  const double rows[3][3] = {
       {1 - s * (q[2] * q[2] + q[3] * q[3]), s * (q[1] * q[2] - q[3] * q[0]), s * (q[1] * q[3] + q[2] * q[0])},
       {s * (q[1] * q[2] + q[3] * q[0]), 1 - s * (q[1] * q[1] + q[3] * q[3]), s * (q[2] * q[3] - q[1] * q[0])},
       {s * (q[1] * q[3] - q[2] * q[0]), s * (q[2] * q[3] + q[1] * q[0]), 1 - s * (q[1] * q[1] + q[2] * q[2])}};
-  for (int entry = 0; entry < 3; ++entry)
-    for (int column = 0; column < 3; ++column) m[entry][column] = entries[entry][column];
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 3; ++column) m[row][column] = rows[row][column];
   return 0;
 }
 

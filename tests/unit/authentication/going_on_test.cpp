@@ -36,7 +36,7 @@ class GoingOn : public ::testing::Test {
     auto store = CaseRepository::open(dir_ / "cases", checker, quota);
     ASSERT_TRUE(store.has_value()) << store.error().message;
     store_ = std::move(*store);
-    RoomsOptions options{.cases = {{bone, dir_ / "case"}}, .folder = dir_ / "rooms", .store = store_};
+    RoomsOptions options{.cases = {{bone, dir_ / "case"}}, .folder = dir_ / "rooms", .case_repository = store_};
     auto rooms = std::make_unique<Rooms>(std::move(options));
     fs::create_directories(dir_ / "rooms");
     ASSERT_TRUE(rooms->create("ward", nullptr));

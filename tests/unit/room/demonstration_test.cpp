@@ -104,7 +104,7 @@ class DemonstrationTest : public ::testing::Test {
     auto store = CaseRepository::open(dir_ / "cases", dir_ / "checker", {});
     ASSERT_TRUE(store.has_value()) << store.error().message;
     RoomsOptions options{
-        .cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .store = std::move(*store)};
+        .cases = {{test_block(), dir_ / "case"}}, .folder = dir_ / "rooms", .case_repository = std::move(*store)};
     options.rates.mount = true;
     auto rooms = std::make_unique<Rooms>(std::move(options));
     ASSERT_TRUE(rooms->resume("ward"));

@@ -56,7 +56,7 @@ most_ticket_hours: 168
 most_rooms_per_person: 3
 most_backups_per_person: 4
 case_memory_mib: 2000
-mount: true
+compliant_mount: true
 metrics: 9464
 drain_seconds: 7
 limits:
@@ -116,6 +116,7 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"cases", {"{}", "list of paths"}},
     {"cases", {"[]", "list of paths"}},
     {"certificates", {"[x]", "write a path"}},
+    {"compliant_mount", {"soft", "true or false"}},
     {"detail", {"fine", "auto, full or near"}},
     {"drain_seconds", {"-1", "from 0 to 600"}},
     {"drain_seconds", {"1.5", "whole number"}},
@@ -138,7 +139,6 @@ const std::multimap<std::string, std::pair<std::string, std::string>> kWrong{
     {"most_rooms", {"0", "from 1 to 65536"}},
     {"most_rooms_per_person", {"0", "from 1 to 65536"}},
     {"most_ticket_hours", {"0", "from 1 to 87600"}},
-    {"mount", {"soft", "true or false"}},
     {"plain", {"yes please", "true or false"}},
     {"proxy_socket", {"[x]", "write a path"}},
     {"resume", {"''", "write a path"}},
