@@ -33,7 +33,7 @@ std::string BreakerJudge::unsaid(const std::string& what, const std::string& tex
   std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with("fault:")) faults += line + "\n";
-  const std::regex missing("([0-9]+) entries? (is|are) missing");
+  const std::regex missing("([0-9]+) (entry is|entries are) missing");
   for (std::sregex_iterator one(faults.begin(), faults.end(), missing), end; one != end; ++one)
     lost = std::max<std::uint64_t>(lost, std::stoull((*one)[1]));
   const std::string numbers = what + " goes to " + std::to_string(events) + " and misses " + std::to_string(lost) +
@@ -92,12 +92,12 @@ std::string BreakerJudge::try_recover(const Trial& trial, const Verified& found,
   const RunResult result = stage_->command({"salvage", trial.file(), to});
   std::string fault;
   if (result.exit_code != 0) {
-    fault = found.read ? "verify reads it, and recover does not: " + said(result)
+    fault = found.read ? "verify reads it, and salvage does not: " + said(result)
                        : refusal("salvage", result, trial.file());
   } else {
     const std::uint64_t events = number_after(result.out, "recovered").value_or(0);
     const std::uint64_t lost = number_after(result.out, "lost").value_or(0);
-    if (events < found.events) fault = "recover leaves out what verify confirms: " + said(result);
+    if (events < found.events) fault = "salvage leaves out what verify confirms: " + said(result);
     if (fault.empty()) fault = unsaid("salvage", said(result), events, lost, trial, without_number);
     const bool own = !has(result.out, "belongs to another journal") && !has(result.out, "another history");
     if (fault.empty() && own)
