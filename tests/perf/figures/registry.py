@@ -60,7 +60,7 @@ FUZZED = (
     ("journal_entries", "rows of journals, many in each input,", "a room", 10_000_000),
     ("journal_entries_evaluated", "rows of journals, many in each input,", "a room with its bone", 1_000_000),
     ("journal_genesis", "beginnings of rooms", "a room", 10_000_000),
-    ("journal_file", "files of journals", "verify, recover and open", 1_000_000),
+    ("journal_file", "files of journals", "verify, salvage and open", 1_000_000),
 )
 INSIDER_WAYS = (("", ""), ("_proxied", ", through the proxy"))
 INSIDER_ATTACKS = (("killing", "send a header that once ended the server"),
@@ -574,7 +574,7 @@ FIGURES = [
            ("<=", 1024), full=True),
     Figure("damaged_cases_sentence", "bytes", "longest sentence of why one was refused", "damaged_cases", ("<=", 4100),
            full=True),
-    # Attackers with a valid certificate, with a revoked one, and without one: four connections at a time for six
+    # Attackers with a valid certificate, with a revoked one, and without one: four connections at a time for 24
     # seconds, at a lower priority on the same machine, while another person calls.
     *[Figure(f"insider{way}_{attack}_p99", "ratio",
              f"a person's calls, 99th percentile, while others {what}{through}, over the same "
