@@ -85,6 +85,8 @@ def journal(run):
 def journal_commits(run):
     """In turns with an earlier osteon-journal-commits, if OSTEON_EARLIER_JOURNAL names one."""
     earlier = os.environ.get("OSTEON_EARLIER_JOURNAL")
+    if not earlier:
+        run.skip("journal_commit", "OSTEON_EARLIER_JOURNAL names no earlier program")
     programs = {"now": "osteon-journal-commits"} | ({"before": earlier} if earlier else {})
     values, rows = {}, []
     for per_commit in (1, 4):
