@@ -149,7 +149,7 @@ def knocking(run):
     if not any("reason=tls" in line for line in said):
         raise Failure("the server's log names no unauthenticated client; its last lines:", "\n".join(log[-5:]))
     same = record.read_json(out / "server.json")["field_hash"] == record.read_json(out / "hand.json")["field_hash"]
-    run.tables.append(("Strangers at the door",
+    run.tables.append(("Unauthenticated connections",
                        [("seconds", round((ended - began) / 1e9, 1)), ("cuts meanwhile", int(during.sum())),
                                                 ("commit p99 before, ms",
                                                  round(float(np.percentile(took[before], 99)), 2)),

@@ -57,8 +57,8 @@ FUZZED = (
     ("down_packet", "datagrams, and packets with the key,", "the client's end of a fast path", 10_000_000),
     ("requests", "requests of all calls together", "the wire", 10_000_000),
     ("calls", "requests of all calls together", "a server with a room", 10_000_000),
-    ("journal_entries", "rows of journals, many in each input,", "a room", 10_000_000),
-    ("journal_entries_evaluated", "rows of journals, many in each input,", "a room with its bone", 1_000_000),
+    ("journal_entries", "entries of journals, many in each input,", "a room", 10_000_000),
+    ("journal_entries_evaluated", "entries of journals, many in each input,", "a room with its bone", 1_000_000),
     ("journal_genesis", "beginnings of rooms", "a room", 10_000_000),
     ("journal_file", "files of journals", "verify, salvage and open", 1_000_000),
 )
@@ -454,7 +454,7 @@ FIGURES = [
     Figure("simulated_seeds", "count", "small rooms simulated with bad networks, disks and crashes", "simulated",
            (">=", 10_000), full=True),
     Figure("simulated_failures", "count", "of them, those that broke an invariant", "simulated", ("==", 0), full=True),
-    Figure("simulated_acknowledged", "count", "rows acknowledged in them", "simulated", full=True),
+    Figure("simulated_acknowledged", "count", "entries acknowledged in them", "simulated", full=True),
     Figure("simulated_crashes", "count", "servers that crashed in them", "simulated", full=True),
     Figure("simulated_cpu", "of_budget", "processor time of such a room, median, as a part of 50 ms", "simulated",
            ("<=", 1.0), full=True),
@@ -470,10 +470,10 @@ FIGURES = [
     Figure("simulated_breakage_least", "count", "of 300 seeds, those that fail for the rule that is missed most often",
            "simulated_broken", full=True),
     Figure("journal_trials", "count", "journals whose power or disk failed", "journal", (">=", 4000)),
-    Figure("journal_acknowledged", "count", "rows acknowledged in them", "journal", (">=", 100_000)),
-    Figure("journal_lost", "count", "of these rows, those lost or different", "journal", ("==", 0)),
+    Figure("journal_acknowledged", "count", "entries acknowledged in them", "journal", (">=", 100_000)),
+    Figure("journal_lost", "count", "of these entries, those lost or different", "journal", ("==", 0)),
     Figure("journal_bad_trials", "count", "trials with anything that must not be", "journal", ("==", 0)),
-    Figure("journal_not_durable_lost", "count", "rows lost in 100 trials without waiting for the disk", "journal",
+    Figure("journal_not_durable_lost", "count", "entries lost in 100 trials without waiting for the disk", "journal",
            (">=", 1)),
     Figure("journal_damage_trials", "count", "killed journals of which one file was damaged", "journal",
            (">=", 10_000)),
@@ -482,12 +482,12 @@ FIGURES = [
            "journal", (">=", 1)),
     Figure("journal_kill_trials", "count", "journals killed or without power at a write or sync, and not damaged",
            "journal", (">=", 3900)),
-    Figure("journal_false_alarms", "count", "of them, those called damaged or with rows lost", "journal", ("==", 0)),
-    *[Figure(f"journal_commit_{name}_{per_commit}", "ratio", f"{what}, {per_commit} rows of 150 bytes a commit",
+    Figure("journal_false_alarms", "count", "of them, those called damaged or with entries lost", "journal", ("==", 0)),
+    *[Figure(f"journal_commit_{name}_{per_commit}", "ratio", f"{what}, {per_commit} entries of 150 bytes a commit",
              "journal_commits", ("<=", most), baseline="the earlier program named by OSTEON_EARLIER_JOURNAL")
       for per_commit, bytes_most in ((1, 0.5), (4, 0.334)) for name, what, most in (
           ("p50", "wait for a commit, median", 1.3), ("p99", "the same, 99th percentile", 1.3),
-          ("bytes", "bytes written for a row, the database's too", bytes_most))],
+          ("bytes", "bytes written for an entry, the database's too", bytes_most))],
     Figure("server_kills", "count", "servers killed at work", "server_kills", (">=", 2000), full=True),
     Figure("server_kills_acknowledged", "count", "cuts that they had acknowledged", "server_kills", (">=", 20_000),
            full=True),
@@ -574,7 +574,7 @@ FIGURES = [
            ("<=", 1024), full=True),
     Figure("damaged_cases_sentence", "bytes", "longest sentence of why one was refused", "damaged_cases", ("<=", 4100),
            full=True),
-    # Attackers with a valid certificate, with a revoked one, and without one: four connections at a time for six
+    # Attackers with a valid certificate, with a revoked one, and without one: four connections at a time for 24
     # seconds, at a lower priority on the same machine, while another person calls.
     *[Figure(f"insider{way}_{attack}_p99", "ratio",
              f"a person's calls, 99th percentile, while others {what}{through}, over the same "

@@ -85,10 +85,12 @@ def journal(run):
 def journal_commits(run):
     """In turns with an earlier osteon-journal-commits, if OSTEON_EARLIER_JOURNAL names one."""
     earlier = os.environ.get("OSTEON_EARLIER_JOURNAL")
+    if not earlier:
+        run.skip("journal_commit", "OSTEON_EARLIER_JOURNAL names no earlier program")
     programs = {"now": "osteon-journal-commits"} | ({"before": earlier} if earlier else {})
     values, rows = {}, []
     for per_commit in (1, 4):
-        run.say(f"commits of {per_commit} rows")
+        run.say(f"commits of {per_commit} entries")
         found = {which: [] for which in programs}
         for turn in range(15 if run.soak else 7):
             for which, program in programs.items():
@@ -100,7 +102,7 @@ def journal_commits(run):
         for name, key in (("p50", "p50_us"), ("p99", "p99_us"), ("bytes", "with_close")):
             now, before = middle["now"][key], middle.get("before", {}).get(key)
             values[f"journal_commit_{name}_{per_commit}"] = (now / before if before else None, None)
-    run.tables.append(("Commits of rows of 150 bytes", rows))
+    run.tables.append(("Commits of entries of 150 bytes", rows))
     return values
 
 
@@ -176,7 +178,7 @@ def uplink(run):
     kept = clean["journal_bytes"]
     hour = 3600.0 * (kept["database"]["at_last"] - kept["database"]["at_first"]) / clean["cutting_s"]
     run.tables.append(("Journal of that tool", [
-        ("rows, MB in an hour of cutting", f"{1e-6 * hour:.1f}"),
+        ("entries, MB in an hour of cutting", f"{1e-6 * hour:.1f}"),
         ("a checkpoint, at a clean end, MB", f"{1e-6 * kept['checkpoints']['at_last']:.2f}"),
         ("log beside it, used again and again, at most, MB", f"{1e-6 * kept['log_most']:.2f}")]))
     return {
