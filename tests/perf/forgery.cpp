@@ -25,11 +25,12 @@ int main(int argc, char** argv) {
               number(report.accepted), number(report.answered_bytes));
   for (std::size_t i = 0; i < osteon::test::kForgeries; ++i)
     std::printf("\"%s\": %llu, ", osteon::test::kForgeryNames[i], number(report.sent[i]));
-  std::printf("\"refused_as\": {\"strangers\": %llu, \"malformed\": %llu, \"replayed\": %llu, \"forged\": %llu}, ",
-              number(report.strangers), number(report.malformed), number(report.replayed), number(report.forged));
+  std::printf(
+      "\"refused_as\": {\"unknown_session\": %llu, \"malformed\": %llu, \"replayed\": %llu, \"forged\": %llu}, ",
+      number(report.unknown_session), number(report.malformed), number(report.replayed), number(report.forged));
   std::printf("\"genuine\": %llu, \"genuine_accepted\": %llu, \"genuine_answered\": %llu, ", number(report.genuine),
               number(report.genuine_accepted), number(report.genuine_answered));
-  std::printf("\"cuts\": %llu, \"cuts_told\": %llu, ", number(report.cuts), number(report.cuts_told));
+  std::printf("\"cuts\": %llu, \"cuts_returned\": %llu, ", number(report.cuts), number(report.cuts_returned));
   std::printf("\"moves\": %llu, \"moves_noticed\": %llu, ", number(report.moves), number(report.moves_noticed));
   std::printf("\"generations\": %llu, \"seconds\": %.3f, \"packets_per_s\": %.0f}\n", number(report.generations),
               seconds, static_cast<double>(forged) / seconds);

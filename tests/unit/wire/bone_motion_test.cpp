@@ -1,4 +1,4 @@
-// A bone on its mount on the wire, and on both ends of the fast path.
+// The motion of a mounted bone on the wire, and at both ends of the fast path.
 #include "common/wire/bone_motion.hpp"
 
 #include <gtest/gtest.h>
@@ -40,7 +40,7 @@ TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
   EXPECT_DOUBLE_EQ(seen->lag_s, 0.150);
 }
 
-// What rounding adds would be energy that nobody put in.
+// Rounding up would add energy that nobody put in.
 TEST(BoneOnTheWire, RoundsEnergyDown) {
   for (const double mj : {0.0, 0.0004, 0.0019999, 12.3459, 1e6 + 0.00099}) {
     MountLoad push = some_push(1);
@@ -59,7 +59,7 @@ TEST(BoneOnTheWire, RoundsEnergyDown) {
   }
 }
 
-// Every field, what no correct peer sends in it, and its name in the error.
+// For each field: a value that no correct peer sends, and the field's name in the error.
 TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
   const std::map<std::string, std::function<void(v1::MountLoad&)>> pushes{
       {"push_seq", [](auto& m) { m.set_push_seq(0); }},
@@ -91,8 +91,8 @@ TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
   }
 }
 
-// Both ends on a line that loses 30 % and reorders: the newest wins, none comes twice, and no more than one each 8 ms
-// goes.
+// Both ends, on a network that loses 30 % and reorders. The newest wins. None arrives twice. At most one is sent in 8
+// ms.
 TEST(BoneOnTheLink, TheNewestWins) {
   Trial trial({.quality = test::hostile(40ms), .long_cuts = 0, .events = 0});
   wire::ClientLink& client = trial.clients[0]->link;
@@ -117,7 +117,7 @@ TEST(BoneOnTheLink, TheNewestWins) {
       ++bones;
     }
   }
-  // A thousand were set at either end, in two seconds.
+  // Each end set a thousand in two seconds.
   EXPECT_LE(pushes, 250u);
   EXPECT_LE(bones, 250u);
   EXPECT_GE(pushes, 60u);
@@ -130,7 +130,7 @@ TEST(BoneOnTheLink, TheNewestWins) {
   trial.cut(false);
   trial.settle(8s);
   EXPECT_TRUE(trial.settled() && trial.exact());
-  // The other session has no mount: it is told of none.
+  // The other session has no mount, and receives no motion.
   EXPECT_FALSE(trial.clients[1]->link.take_bone());
   EXPECT_FALSE(trial.sessions[1]->link.take_push());
 }

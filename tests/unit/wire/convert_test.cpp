@@ -57,7 +57,7 @@ TEST(Wire, AStateComesBack) {
   EXPECT_LT((back->pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 1e-9);
 }
 
-// Each change makes the cut one that no correct client sends; the message must name the field.
+// Each change makes a cut that no correct client sends. The message must name the field.
 TEST(Wire, RefusesBadCutsByTheNameOfTheField) {
   const auto refused = [](const std::function<void(v1::Cut&)>& change, const std::string& field) {
     v1::Cut cut = wire::to_wire(sample_cut());
@@ -99,7 +99,7 @@ TEST(Wire, ASupervisionComesBackWhole) {
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(*back, one);
   }
-  // Tools in any order, however often.
+  // Tools may come in any order, and more than once.
   v1::Restrictions message;
   for (const std::uint8_t tool : {2, 1, 2}) message.add_tools(wire::to_wire(all_of(tool)));
   EXPECT_EQ(wire::from_wire(message).value().tools, (std::vector{all_of(1), all_of(2)}));

@@ -32,7 +32,7 @@ Digest digest(std::uint8_t n) {
   return out;
 }
 
-// Any number at all, small ones and the ends more often than chance would have them.
+// Any number. Small ones and both ends of the range come more often than by chance.
 std::uint64_t any(Random& random) {
   const std::uint64_t bits = random.index(~std::size_t{0});
   return random.unit() < 0.1 ? ~std::uint64_t{0} : bits >> random.index(64);
@@ -49,7 +49,8 @@ QuantisedPose any_pose(Random& random) {
   return pose;
 }
 
-// A cut after `before`, like it in a random number of ways: going on from it, with the same tool, or as wild as can be.
+// A cut after `before`. It shares a random number of properties with it: it may continue its path, or use its tool. A
+// `wild` cut shares none.
 Cut any_cut(Random& random, const Cut& before, bool wild) {
   Cut cut = before;
   ++cut.author_seq;
@@ -143,7 +144,7 @@ TEST(CutRun, AnyCutsComeBackByteForByte) {
   std::printf("%zu cuts in %zu runs\n", cuts_seen, runs_seen);
 }
 
-// Runs end where something in their head changes, and only there.
+// A run ends where something in its head changes, and only there.
 TEST(CutRun, ARunEndsWhereItsHeadChanges) {
   const wire::ToolNumbers numbers = numbers_1_to_3();
   const auto runs_of = [&](const std::function<void(Cut&)>& change) {
@@ -173,8 +174,8 @@ TEST(CutRun, ARunEndsWhereItsHeadChanges) {
   EXPECT_EQ(runs_of([](Cut& c) { c.spindle_rpm = 1; }), 1) << "a spindle under load has another speed in every cut";
 }
 
-// By hand. Steps of 300, -200 and 100: a byte that says which numbers, and 2 bytes for each; the same step again: that
-// one byte. Before the knots a byte with their number.
+// Counted by hand. A step of 300, -200 and 100 takes one byte that says which numbers follow, and 2 bytes for each. The
+// same step again takes that one byte. One byte before the knots gives their number.
 TEST(CutRun, TakesAsFewBytesAsItSays) {
   const wire::ToolNumbers numbers = numbers_1_to_3();
   SendWindow window(kWide);
@@ -221,7 +222,7 @@ TEST(CutRun, IsNeverTwiceAsLongAsThePlainMessage) {
   double worst = 0;
   for (std::uint64_t seed = 1; seed <= 20000; ++seed) {
     Random random(seed);
-    // The worst: alone, without a number for its tool.
+    // The worst case is a single cut whose tool has no number.
     const Cut before = any_cut(random, {}, true), cut = any_cut(random, before, true);
     SendWindow window(kWide, before.author_seq);
     const wire::ToolNumbers none;
@@ -241,8 +242,8 @@ TEST(CutRun, IsNeverTwiceAsLongAsThePlainMessage) {
   EXPECT_LE(worst, 2.0);
 }
 
-// Of a speed only the difference goes, and what it leads to must be one.
-TEST(CutRun, SpeedsBeyondWhatANumberHoldsAreNone) {
+// A run carries only the difference of a speed. The sum must be a valid speed.
+TEST(CutRun, ASpeedBeyondTheRangeIsRefused) {
   const wire::ToolNumbers numbers = numbers_1_to_3();
   const auto speed_after = [&](std::uint32_t before,
                                std::initializer_list<std::uint8_t> difference) -> std::optional<std::uint32_t> {
@@ -266,7 +267,7 @@ TEST(CutRun, SpeedsBeyondWhatANumberHoldsAreNone) {
   EXPECT_EQ(speed_after(1, {0xfe, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1}), std::nullopt);
 }
 
-// The longest that fits_a_packet() lets through, with the numbers that take most bytes.
+// The longest cut that fits_a_packet() accepts, with the numbers that take most bytes.
 TEST(CutRun, TheLongestCutFitsAPacket) {
   Cut cut;
   cut.author = {~std::uint64_t{0}};
@@ -284,7 +285,7 @@ TEST(CutRun, TheLongestCutFitsAPacket) {
     cut.path.push_back(pose);
   }
   ASSERT_TRUE(wire::fits_a_packet(cut));
-  // After one of which nothing is the same.
+  // The cut before shares nothing with it.
   Cut before = cut;
   --before.author_seq;
   before.spindle_rpm = before.path_us = 0;
@@ -357,7 +358,7 @@ TEST(CutRun, AFullWindowChangesNothing) {
   EXPECT_EQ(back, cuts);
 }
 
-// The longest supervision that goes in a packet; one of more tools goes over the stream.
+// The longest supervision that fits a packet. One with more tools takes the stream.
 TEST(EntryRun, TheLongestSupervisionFitsAPacket) {
   wire::SessionEntry entry{
       .room_seq = {~std::uint64_t{0}}, .kind = wire::SessionEntryKind::supervised, .lease_epoch = ~std::uint64_t{0}};
@@ -399,9 +400,9 @@ TEST(EntryRun, ASupervisionThatNobodyDecidesSpoilsItsPacket) {
   EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
 }
 
-// Rows of three authors, rejections, supervisions and events of the stream, in packets that are lost, repeated and
-// overtaken and may come before the tools' numbers do: the session's order comes out.
-TEST(EntryRun, AnyRowsComeBackInTheSessionsOrder) {
+// Log entries of three authors, rejections, supervisions and events of the stream. Their packets are lost, repeated and
+// reordered, and may arrive before the tools' numbers. The session's order must result.
+TEST(EntryRun, AnyEntriesArriveInTheSessionsOrder) {
   const wire::ToolNumbers numbers = numbers_1_to_3(), none;
   std::size_t entries_seen = 0, packets = 0, left_out = 0;
   for (std::uint64_t seed = 1; seed <= 300; ++seed) {
@@ -469,7 +470,7 @@ TEST(EntryRun, AnyRowsComeBackInTheSessionsOrder) {
   EXPECT_GT(left_out, 0u);
 }
 
-// What is damaged is refused or read as something else, and never does harm.
+// Damaged bytes are refused or read as another cut. They never do harm.
 TEST(CutRun, DamagedBytesDoNoHarm) {
   const wire::ToolNumbers numbers = numbers_1_to_3();
   std::size_t refused = 0, read_so = 0;
@@ -577,9 +578,9 @@ TEST(CutRun, BytesOfRealCuts) {
   EXPECT_LE(wild.a_cut, 40.0);
 }
 
-// A surgeon drills and burrs as recorded for 8 s, then holds the tool still for 8 s: what the way up takes, headers and
-// seal included, with the pose in every packet while it moves and the effort 30 times a second.
-TEST(PacketFiller, BytesOfTheWayUp) {
+// A surgeon drills and burrs as recorded for 8 s, then holds the tool still for 8 s. Counts the bytes of the uplink
+// with headers and seal. Every packet has the pose while the tool moves. 30 packets a second have the effort.
+TEST(PacketFiller, UplinkBytesOfDrillingAndRest) {
   const auto recording =
       test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
   ASSERT_TRUE(recording) << recording.error().message;
@@ -593,7 +594,7 @@ TEST(PacketFiller, BytesOfTheWayUp) {
     SendRate rate;
     ReceiveWindow<int> in;
     std::deque<std::pair<SendWindow::Time, std::uint64_t>> answers;  // at the sender, 80 ms after the packet
-    std::uint64_t counter = 0, received = 0, said_answer = 0;
+    std::uint64_t counter = 0, received = 0, answered = 0;
     std::array<double, 2> bytes{};
     std::array<int, 2> packets{};
     SendWindow::Time effort_at{};
@@ -642,7 +643,7 @@ TEST(PacketFiller, BytesOfTheWayUp) {
       for (const std::uint64_t number : picked.numbers) in.offer(number, 0);
       while (in.take()) {
       }
-      if (in.acknowledged() > said_answer) answers.emplace_back(t + 80ms, said_answer = in.acknowledged());
+      if (in.acknowledged() > answered) answers.emplace_back(t + 80ms, answered = in.acknowledged());
     }
     const double cutting_kbit = bytes[0] * 8 / 8000.0, idle_kbit = bytes[1] * 8 / 8000.0;
     std::printf("loss %2.0f %%: %.0f kbit/s in %.0f B packets while cutting, %.1f kbit/s idle (%.1f %% less)\n",
@@ -725,7 +726,7 @@ TEST(ToolState, ComesBackWithinItsSteps) {
   EXPECT_EQ(known.state.phase, state.phase);
   EXPECT_LT((known.state.pose_bone_tool.position_mm - state.pose_bone_tool.position_mm).norm(), 0.001);
   EXPECT_LT(known.state.pose_bone_device.rotation.angularDistance(state.pose_bone_device.rotation), 2e-4);
-  // A pose alone leaves the effort as it was, and an old state changes nothing.
+  // A pose alone leaves the effort unchanged. An old state changes nothing.
   state.state_seq = 100;
   state.pose_bone_tool.position_mm.x() = 7;
   state.force_physical_N = {0, 0, 0};

@@ -23,7 +23,7 @@ using Bytes = std::vector<std::uint8_t>;
 constexpr std::size_t kPeers = 4, kMoveEvery = 500;
 constexpr std::uint64_t kForgedForEachGenuine = 31;
 constexpr Time kBetween = 50us, kCut = 8ms, kRest = 500ms;
-constexpr std::uint64_t kRekeyPackets = 700;  // a key is over soon
+constexpr std::uint64_t kRekeyPackets = 700;  // so that keys change often
 
 FillRandom seeded(std::uint64_t seed) {
   return [random = std::make_shared<std::mt19937_64>(seed)](std::span<std::uint8_t> into) {
@@ -38,13 +38,13 @@ wire::LinkOptions rekeyed(wire::LinkOptions options) {
 
 using Sent = std::vector<std::pair<Endpoint, Bytes>>;
 
-// One session as the server keeps it, and the owner's side of it: every cut is decided at once, and told.
+// One session as the server keeps it, with its owner. The owner commits each cut at once and sends its log entry.
 class ServerEnd {
  public:
   ServerEnd(const SessionKeys& keys, AuthorId author)
       : author_(author), link(keys, author, seeded(keys.session), 1, 1, rekeyed(wire::server_link_options())) {}
 
-  // What it has for its owner.
+  // Takes all that the link holds for its owner. Returns how much that was.
   std::uint64_t take(bool decide) {
     std::uint64_t taken = link.take_state().has_value() ? 1 : 0;
     taken += link.take_push().has_value() ? 1 : 0;
@@ -73,8 +73,8 @@ class ServerEnd {
   wire::ServerLink link;
 };
 
-// What a server does with each datagram before anything of it reaches a room. Every session is there twice: the twins
-// hear the clients and nobody else.
+// What a server does with each datagram before a room sees it. Every session exists twice. A twin receives the clients'
+// datagrams, and no forgery.
 class Server {
  public:
   explicit Server(const std::vector<SessionKeys>& sessions) {
@@ -95,7 +95,7 @@ class Server {
     const auto number = session_of(bytes);
     const auto found = number ? sessions_.find(*number) : sessions_.end();
     if (found == sessions_.end()) {
-      ++report.strangers;
+      ++report.unknown_session;
       return;
     }
     wire::ServerLink &link = found->second->end.link, &twin = found->second->twin.link;
@@ -112,12 +112,12 @@ class Server {
     report.accepted += same && found->second->end.take(false) == 0 ? 0 : 1;
   }
 
-  // What is due, of all sessions; the twins' is not for anybody. After every datagram: an answer may come at once, or
-  // later.
+  // Sends what is due in all sessions. The twins' datagrams reach nobody. Called after every datagram, because an
+  // answer may come at once or later.
   void send(Time now, ForgeryReport& report) {
     for (auto& [number, session] : sessions_) send(*session, now, report);
   }
-  // Since this was last asked.
+  // What was sent since the last call.
   Sent sent() { return std::exchange(sent_, {}); }
 
   [[nodiscard]] std::uint64_t moves() const {
@@ -144,7 +144,8 @@ class Server {
   Sent sent_;
 };
 
-// A hand that cuts all the time, or one that mostly rests: to it a server says little that an answer could hide behind.
+// A client that cuts all the time, or one that mostly rests. The server sends little to a resting client, so an answer
+// to a forgery would stand out.
 struct Peer {
   Peer(const SessionKeys& keys, const Endpoint& first, Time apart)
       : link(keys, 1, 1, rekeyed({})), address(first), between_cuts(apart) {
@@ -158,13 +159,13 @@ struct Peer {
   }
   wire::ClientLink link;
   Endpoint address;
-  Cut cut;  // its newest
+  Cut cut;  // the newest
   CuttingState state;
   Time between_cuts, next_cut{};
-  Bytes last;  // that it sent, and the server has
+  Bytes last;  // the last datagram that the server received
   std::uint64_t sent = 0;
 
-  // What is due; empty: nothing.
+  // The datagram that is due. Empty if none is.
   Bytes next(std::mt19937_64& random, Time now) {
     if (now >= next_cut) {
       next_cut = now + between_cuts;
@@ -185,11 +186,11 @@ struct Peer {
     const std::uint64_t before = link.half().open_counts().opened;
     link.receive(bytes, now);
     report.genuine_answered += link.half().open_counts().opened - before;
-    while (const auto entry = link.take_entry()) ++report.cuts_told;
+    while (const auto entry = link.take_entry()) ++report.cuts_returned;
   }
 };
 
-// Never equal to a datagram of a client that is still on its way.
+// A forgery. It never equals a client's datagram that is still on its way.
 Bytes forged(Forgery kind, const Bytes& on_its_way, const Bytes& replayed, const Bytes& of_another,
              const Bytes& reflected, std::mt19937_64& random) {
   Bytes bytes = on_its_way;
@@ -206,7 +207,8 @@ Bytes forged(Forgery kind, const Bytes& on_its_way, const Bytes& replayed, const
       noise(13);
       break;
     case Forgery::flipped:
-      for (std::uint64_t flips = 1 + 2 * (random() % 2); flips > 0; --flips)  // an odd number never undoes itself
+      for (std::uint64_t flips = 1 + 2 * (random() % 2); flips > 0;
+           --flips)  // an odd number of flips never cancels out
         bytes[random() % bytes.size()] ^= static_cast<std::uint8_t>(1 << random() % 8);
       break;
     case Forgery::cut_short:
@@ -248,7 +250,7 @@ ForgeryReport forge(std::uint64_t count, std::uint64_t seed) {
 
   ForgeryReport report;
   Time now{};
-  std::vector<Bytes> replays;  // a sample of what the server has opened, of all ages
+  std::vector<Bytes> replays;  // a sample of the datagrams that the server has opened, old and new
   Bytes reflected;
   const auto answers = [&] {
     server.send(now, report);
@@ -269,13 +271,13 @@ ForgeryReport forge(std::uint64_t count, std::uint64_t seed) {
     }
     answers();
   };
-  // Before he comes all have been heard, and answered.
-  for (bool all_heard = false; !all_heard; now += 1ms) {
+  // Before the attack, every client has sent a datagram and received an answer.
+  for (bool all_answered = false; !all_answered; now += 1ms) {
     answers();
-    all_heard = !reflected.empty();
+    all_answered = !reflected.empty();
     for (const auto& peer : peers) {
       if (const Bytes bytes = peer->next(random, now); !bytes.empty()) deliver(*peer, bytes);
-      all_heard = all_heard && !peer->last.empty();
+      all_answered = all_answered && !peer->last.empty();
     }
   }
 

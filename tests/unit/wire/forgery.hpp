@@ -1,12 +1,13 @@
-// The server's end of fast paths, its clients, and somebody on the way who knows all that passes but no key.
+// The server's end of fast paths, its clients, and an attacker on the path. The attacker sees every datagram, and has
+// no key.
 #pragma once
 #include <array>
 #include <cstdint>
 
 namespace osteon::test {
 
-// What he sends. Those made from a datagram of a client are made while it is still on its way, so that nothing but the
-// seal tells them from it.
+// What the attacker sends. A forgery of a client's datagram is made while that datagram is still on its way. So only
+// the seal tells one from the other.
 enum class Forgery {
   noise,
   plausible_header,
@@ -25,22 +26,21 @@ inline constexpr std::array<const char*, kForgeries> kForgeryNames{"noise",     
 
 struct ForgeryReport {
   std::array<std::uint64_t, kForgeries> sent{};  // by kind
-  // Forged ones that were opened, or after which the session's wire::ServerLink was another than before: in what it has
-  // for its owner, where it takes its client to be, or when it sends.
+  // Forged datagrams that were opened, or that changed the session's wire::ServerLink: what it holds for its owner, its
+  // client's address, or when it sends.
   std::uint64_t accepted = 0;
-  // Bytes that it sent, anywhere and at any time, and that the same class with the same keys did not send which heard
-  // none of the forged ones.
+  // Bytes that the server sent, and its twin did not. The twin has the same class and keys, and receives no forgery.
   std::uint64_t answered_bytes = 0;
-  // Why the forged ones went no further, by the server's own counts.
-  std::uint64_t strangers = 0, malformed = 0, replayed = 0, forged = 0;
-  // The clients' own, in between; they also move to other addresses and change keys.
+  // Why the server refused the forgeries, by its own counts. `unknown_session`: no such session.
+  std::uint64_t unknown_session = 0, malformed = 0, replayed = 0, forged = 0;
+  // The clients' own datagrams, in between. The clients also move to other addresses and change keys.
   std::uint64_t genuine = 0, genuine_accepted = 0, genuine_answered = 0;
-  std::uint64_t cuts = 0, cuts_told = 0;  // that clients made, and entries of them that came back
+  std::uint64_t cuts = 0, cuts_returned = 0;  // cuts that clients made, and log entries of them that clients received
   std::uint64_t moves = 0, moves_noticed = 0;
   std::uint64_t generations = 0;  // keys used by the busiest client
 };
 
-// `count` forged datagrams. Everything follows from `seed`, on virtual time.
+// Sends `count` forged datagrams. `seed` determines everything. Time is virtual.
 [[nodiscard]] ForgeryReport forge(std::uint64_t count, std::uint64_t seed);
 
 }  // namespace osteon::test

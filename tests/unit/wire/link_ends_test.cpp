@@ -81,7 +81,7 @@ TEST(LinkEnds, EverythingOnceAndInOrderOnAHostileNetwork) {
   EXPECT_GT(words, 100u);
   EXPECT_GT(long_words, 20u);
   EXPECT_GT(words - long_words, long_words / 2);
-  // Duplicates of spoiled ones count twice; flips in the session or the counter count as something else.
+  // Duplicates of corrupted datagrams count twice. Flips in the session or the counter count as another fault.
   EXPECT_GT(forged, corrupted / 3);
   EXPECT_LE(most_waiting, 16u * 1024);
   EXPECT_LT(share_of(settled_ms, 1.0), 2000.0);
@@ -113,7 +113,7 @@ TEST(LinkEnds, DelayUntilAPartnerHasACut) {
 }
 
 // Drilling and burring as recorded at 125 cuts a second for 8 s, then a hand that holds the tool still for 8 s.
-TEST(LinkEnds, BytesOfTheWayUp) {
+TEST(LinkEnds, UplinkBytesOfDrillingAndRest) {
   const auto recording =
       test::read_recording(test::source_dir() / "tests" / "scenario" / "recordings" / "drill_and_burr");
   ASSERT_TRUE(recording) << recording.error().message;
@@ -174,7 +174,7 @@ TEST(LinkEnds, NewKeysWhilePacketsAreInFlight) {
       by_stream += trial.clients[c]->entries_by_stream;
     }
   }
-  // Beside the beginning and cuts too long for a packet all went the fast way.
+  // All entries took the fast path, but for those of the first moments and of cuts too long for a packet.
   std::printf("%zu entries, %zu by stream\n", entries, by_stream);
   EXPECT_LT(by_stream, entries / 5);
 }
@@ -206,7 +206,7 @@ TEST(LinkEnds, AClientThatMovesIsFoundWithinASecond) {
   EXPECT_LT(share_of(found_ms, 0.99), 1000.0);
 }
 
-// Somebody on the way sends copies from another address: of what has come, and of what has not, ahead of the original.
+// An attacker on the path sends copies from another address. Some follow the original. Some come before it.
 TEST(LinkEnds, AThirdPartyMovesNothing) {
   Trial trial({.quality = {.delay = 20ms}});
   const auto third = trial.network.open(node(9));
@@ -216,7 +216,7 @@ TEST(LinkEnds, AThirdPartyMovesNothing) {
     DatagramBuffer buffer;
     while (const auto got = third->receive(buffer)) {
       answered_bytes += got->bytes.size();
-      // Passed on to the client, which answers to the server from where it is.
+      // The attacker passes it on to the client. The client answers the server from its own address.
       third->send(trial.clients[0]->port->local(), got->bytes);
     }
   });
@@ -226,7 +226,7 @@ TEST(LinkEnds, AThirdPartyMovesNothing) {
     if (c != 0) return false;
     ++seen;
     if (!ahead) {
-      // Later than the original, many times.
+      // After the original, several times.
       trial.time.post_in(1ms, [&, copy = std::vector(bytes.begin(), bytes.end())] {
         for (int i = 0; i < 3; ++i) third->send(trial.server_port->local(), copy);
       });
@@ -235,7 +235,7 @@ TEST(LinkEnds, AThirdPartyMovesNothing) {
     if (seen % 25 != 0) return false;
     copied_bytes += bytes.size();
     third->send(trial.server_port->local(), bytes);
-    return true;  // and the original never comes
+    return true;  // and the original never arrives
   };
   trial.time.run_until(500ms);
   trial.cut(true);
@@ -269,7 +269,7 @@ TEST(LinkEnds, WithoutDatagramsAllGoesOverTheStream) {
       EXPECT_EQ(trial.clients[c]->entries.size(), trial.sessions[c]->entries.size());
       EXPECT_GT(trial.clients[c]->entries.size(), 4000u);
       EXPECT_LE(trial.clients[c]->most_waiting, 16u * 1024);
-      // Asking now and then whether anybody is there takes little.
+      // The probes for a living peer take little.
       EXPECT_LT(static_cast<double>(trial.clients[c]->uplink_bytes) * 8 / 20e3, 100.0);
       if (dies == 0s) {
         EXPECT_EQ(trial.sessions[c]->downlink_bytes, 0u);
@@ -291,7 +291,7 @@ TEST(LinkEnds, BackAndForthBetweenDatagramsAndStream) {
       by_stream[c] = trial.clients[c]->entries_by_stream;
       entries[c] = trial.clients[c]->entries.size();
     }
-    // After the last change it is the fast way again, beside what is too long for it.
+    // After the last change the fast path is used again, but for what is too long for it.
     trial.time.run_until(20s);
     for (std::size_t c = 0; c < 2; ++c)
       EXPECT_LT(trial.clients[c]->entries_by_stream - by_stream[c], (trial.clients[c]->entries.size() - entries[c]) / 8)
@@ -302,7 +302,7 @@ TEST(LinkEnds, BackAndForthBetweenDatagramsAndStream) {
   }
 }
 
-// A challenge is answered from where it was sent to, or not at all.
+// Only the challenged address can answer a challenge.
 TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
   LinkPair pair;
   pair.run(300ms);
@@ -311,7 +311,7 @@ TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
     DatagramBuffer buffer;
     const std::string plain = packet.SerializeAsString();
     const auto bytes =
-        pair.liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, pair.now, buffer);
+        pair.forger_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, pair.now, buffer);
     return std::vector(bytes.begin(), bytes.end());
   };
   const auto token_sent_to = [&](const Endpoint& to) {
@@ -328,7 +328,7 @@ TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
   pair.server.receive(node(9), sealed(empty), pair.now);
   echo.set_path_echo(token_sent_to(node(9)));
   ASSERT_EQ(echo.path_echo().size(), sizeof(PathToken));
-  // A later packet comes from the new address first, so that the one with the echo is not the newest.
+  // A later packet arrives from the new address first, so the packet with the echo is not the newest.
   const auto from_old = sealed(echo), from_new = sealed(empty);
   pair.server.receive(node(9), from_new, pair.now);
   pair.server.receive(node(2), from_old, pair.now);
@@ -340,7 +340,8 @@ TEST(LinkEnds, AnEchoFromElsewhereProvesNothing) {
 }
 
 TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
-  // A challenge shows the client that the server hears it, not that the server knows where it is.
+  // A challenge shows the client that the server receives its packets. It does not show that the server knows its
+  // address.
   LinkPair challenged;
   challenged.lost = [](const v1::UpPacket& packet) { return !packet.path_echo().empty(); };
   challenged.run(300ms);
@@ -350,7 +351,7 @@ TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
   challenged.run(300ms);
   EXPECT_TRUE(challenged.client.alive(challenged.now) && challenged.server.alive(challenged.now));
 
-  // The server is heard no more, then nobody is; and who speaks from elsewhere is not yet reached there.
+  // First the server's packets are lost, then those of both. A client at a new address is not yet reached there.
   LinkPair pair;
   pair.run(300ms);
   pair.lost_down = [](const v1::DownPacket&) { return true; };
@@ -361,12 +362,12 @@ TEST(LinkEnds, AliveIsWhoGetsThroughBothWays) {
   pair.run(600ms);
   EXPECT_FALSE(pair.server.alive(pair.now));
   DatagramBuffer buffer;
-  pair.server.receive(node(9), pair.liar_up.seal({}, pair.now, buffer), pair.now);
+  pair.server.receive(node(9), pair.forger_up.seal({}, pair.now, buffer), pair.now);
   EXPECT_FALSE(pair.server.alive(pair.now));
 }
 
-// A client that hears its server, and is not heard, would put its cuts into datagrams for ever.
-TEST(LinkEnds, WhoIsNotHeardIsNotAliveThoughHeHears) {
+// A client receives its server's packets, but its own are lost. It must not put its cuts into datagrams for ever.
+TEST(LinkEnds, AClientWhosePacketsAreLostIsNotAlive) {
   LinkPair pair;
   pair.run(300ms);
   ASSERT_TRUE(pair.client.alive(pair.now));
@@ -380,7 +381,7 @@ TEST(LinkEnds, WhoIsNotHeardIsNotAliveThoughHeHears) {
   EXPECT_TRUE(pair.client.alive(pair.now));
 }
 
-// Both ends meet cuts that an earlier session of the author has brought, and that are decided only now.
+// An earlier session of the author brought some cuts, and the room decides them only now. Both ends meet them.
 TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
   LinkPair pair;
   pair.run(300ms);
@@ -399,8 +400,8 @@ TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
   EXPECT_TRUE(pair.client.half().window().empty());
 }
 
-// What a session's client is told says of itself what it decides.
-TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
+// A log entry of the client's own cut also decides that cut.
+TEST(LinkEnds, AnEntryDecidesTheOwnCutInIt) {
   LinkPair pair;
   pair.run(300ms);
   for (std::uint64_t n = 1; n <= 3; ++n) ASSERT_TRUE(pair.client.push(pair.cut(n)));
@@ -429,8 +430,8 @@ TEST(LinkEnds, ARowDecidesTheOwnCutInIt) {
   EXPECT_EQ(heard, (std::vector<std::uint64_t>{1, 2, 3})) << "the one without a number is not said";
 }
 
-// Whoever is stopped knows it by the packet itself, before the entry has its turn.
-TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
+// The packet itself tells a client that it is frozen, before the log entry has its turn.
+TEST(LinkEnds, AnInstructorsDecisionFreezesAndEndsTheLease) {
   LinkPair pair;
   pair.run(300ms);
   wire::SessionEntry word{.room_seq = {5},
@@ -460,8 +461,8 @@ TEST(LinkEnds, AnInstructorsWordFreezesAndEndsTheLease) {
   EXPECT_EQ(second->entry, word);
 }
 
-// After a long stop the stream brings thousands of entries in a moment.
-TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
+// After a long stop the stream delivers thousands of log entries at once.
+TEST(LinkEnds, EntriesGoOnAfterAnyNumberThatTheStreamDelivered) {
   constexpr std::uint64_t kEntries = 5000;
   LinkPair pair;
   pair.run(300ms);
@@ -483,7 +484,7 @@ TEST(LinkEnds, RowsGoOnBehindAnyNumberThatTheStreamBrought) {
   EXPECT_EQ(taken->entry.cut, pair.cut(kEntries + 1));
 }
 
-// What is known to have come ahead of its turn is not sent again.
+// A packet that arrived ahead of its turn is known, and is not sent again.
 TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
   wire::LinkOptions up, down = wire::server_link_options();
   up.rate.fewest_repeats = up.rate.most_repeats = down.rate.fewest_repeats = down.rate.most_repeats = 1;
@@ -528,7 +529,7 @@ TEST(LinkEnds, OnlyWhatIsMissingIsRepeated) {
     EXPECT_EQ(entry->index, n);
     EXPECT_EQ(entry->entry.cut, pair.cut(n));
   }
-  // Come is not kept: only what was decided is acknowledged.
+  // Received is not committed. Only decided cuts are acknowledged.
   EXPECT_EQ(pair.client.acknowledged(), 0u);
   pair.server.decided(12);
   pair.run(50ms);
@@ -545,7 +546,7 @@ TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
   ++number;  // refused
   const std::uint64_t refused = number;
   for (int i = 0; i < 50; ++i) EXPECT_FALSE(pair.client.push(pair.cut(++number, 20)));
-  // The stream brought those refused; the others come by datagrams.
+  // The stream delivers the refused cuts. The others arrive in datagrams.
   for (std::uint64_t n = refused; n <= number; ++n) EXPECT_TRUE(pair.server.offer(pair.cut(n, 20)));
   std::uint64_t taken = 0;
   for (int i = 0; i < 20; ++i) {
@@ -557,7 +558,7 @@ TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
   pair.run(100ms);
   EXPECT_EQ(pair.client.acknowledged(), number);
   EXPECT_TRUE(pair.client.half().window().empty());
-  // And it goes on from there, with one too long for a packet between two others.
+  // The link goes on from there, with a cut too long for a packet between two others.
   EXPECT_TRUE(pair.client.push(pair.cut(number + 1)));
   EXPECT_FALSE(pair.client.push(pair.cut(number + 2, 40)));
   EXPECT_TRUE(pair.client.push(pair.cut(number + 3)));
@@ -588,16 +589,16 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   up.mutable_times()->set_echo_sent_us(~std::uint64_t{0});
   const double loss = pair.server.loss();
   const auto clock = pair.server.clock(pair.now);
-  pair.say(up);
+  pair.forge(up);
   EXPECT_EQ(pair.server.acknowledged(), 0u);
   EXPECT_EQ(pair.server.loss(), loss);
   EXPECT_EQ(pair.server.clock(pair.now)->round_trip, clock->round_trip);
   v1::DownPacket down;
   down.set_acknowledged(~std::uint64_t{0});
-  pair.say(down);
+  pair.forge(down);
   EXPECT_EQ(pair.client.acknowledged(), 0u);
 
-  // Cuts of any number, up to the end of the window and far beyond: nothing grows.
+  // Cuts with any number, up to the end of the window and far beyond it. No memory grows.
   SendWindow window({1 << 20, 1 << 16, wire::kRunBytes}, 1);
   wire::ToolNumbers none;
   wire::CutSender sender(window, none);
@@ -607,16 +608,17 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
     far.add_cuts()->ParseFromString(window.item(n).head);
     far.mutable_cuts(0)->set_cuts(window.item(n).bytes);
     far.mutable_cuts(0)->set_author_seq(n % 7 == 0 ? ~std::uint64_t{0} - n : n);
-    pair.say(far);
+    pair.forge(far);
   }
   EXPECT_FALSE(pair.server.take_cut());
   EXPECT_EQ(pair.server.half().counts().malformed, 0u);
 
-  // What cannot be read, or is not sent by any program: counted, and not even what is good of it is taken.
+  // A packet that cannot be read, or that no program sends, is counted. Nothing of it is taken, not even its valid
+  // part.
   const auto malformed = [&](v1::UpPacket packet) {
     const std::uint64_t before = pair.server.half().counts().malformed;
     packet.set_acknowledged(3);
-    pair.say(packet);
+    pair.forge(packet);
     EXPECT_EQ(pair.server.half().counts().malformed, before + 1);
     EXPECT_EQ(pair.server.acknowledged(), 0u);
   };
@@ -633,7 +635,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
     const std::uint64_t before = pair.client.half().counts().malformed;
     packet.set_acknowledged(3);
     packet.set_frozen(true);
-    pair.say(packet);
+    pair.forge(packet);
     EXPECT_EQ(pair.client.half().counts().malformed, before + 1);
     EXPECT_EQ(pair.client.acknowledged(), 0u);
     EXPECT_FALSE(pair.client.frozen());
@@ -647,14 +649,14 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   bad_down.Clear();
   bad_down.add_entries();
   malformed_down(bad_down);
-  // An entry whose content is not here yet does not come out before the stream's copy of it.
+  // An entry without its content waits for the stream's copy.
   v1::DownPacket marker;
   marker.add_streamed()->set_index(1);
-  pair.say(marker);
+  pair.forge(marker);
   EXPECT_FALSE(pair.client.take_entry());
   EXPECT_TRUE(pair.client.offer({1, {.room_seq = {1}}}));
   EXPECT_EQ(pair.client.take_entry()->index, 1u);
-  // Partners without end: the latest are kept.
+  // The link keeps the latest partners, however many there are.
   CuttingState state;
   state.phase = CuttingPhase::free;
   for (std::uint64_t author = 1; author <= 1000; ++author) {
@@ -662,7 +664,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
     state.state_seq = 1;
     v1::DownPacket packet;
     *packet.add_partners() = wire::to_tool_state(state, 0, false);
-    pair.say(packet);
+    pair.forge(packet);
     pair.now += 1us;
   }
   const auto kept = pair.client.partners(pair.now);
@@ -670,7 +672,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
   for (const auto& partner : kept) EXPECT_GT(partner.state.author.value, 1000 - wire::ClientLink::kMostPartners);
 }
 
-// A hand that trembles by less than the deadband costs what a resting one does; one that moves is followed.
+// A hand that trembles within the deadband costs as much as a resting hand. A moving hand is followed.
 TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
   const auto packets_in_4s = [](double tremor_mm, double speed_mm_per_s) {
     LinkPair pair;
@@ -701,8 +703,8 @@ TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
     }
     std::printf("tremor %.3f mm, %.0f mm/s: %zu packets in 4 s, partner's picture off by %.3f mm at most\n", tremor_mm,
                 speed_mm_per_s, pair.ups.size() - before, worst_mm);
-    // Within the deadband and a quantum at rest; else what it goes in two intervals up, two down, and what the test
-    // waits.
+    // At rest the error is at most the deadband and a quantum. A moving hand adds the distance of two intervals up, two
+    // down, and the wait of this test.
     EXPECT_LE(worst_mm, 0.02 + 0.002 + speed_mm_per_s * 0.064);
     return pair.ups.size() - before;
   };
@@ -748,7 +750,7 @@ TEST(LinkEnds, KnowTheRoundTripTheClocksAndTheLoss) {
       EXPECT_LE(reading.round_trip, 100ms);
       EXPECT_LE(std::abs(reading.offset.count()), (reading.error + 1us).count()) << "both clocks are one";
     }
-    // 30 % lost and 1 % spoiled; smoothed over 64 packets, so within 4 sigma of sqrt(0.3 x 0.7 / 128).
+    // 30 % are lost and 1 % corrupted. Smoothing covers 64 packets, so the bound is 4 sigma of sqrt(0.3 x 0.7 / 128).
     EXPECT_NEAR(trial.clients[c]->link.loss(), 0.307, 0.17);
     EXPECT_NEAR(trial.sessions[c]->link.loss(), 0.307, 0.17);
   }

@@ -20,7 +20,7 @@ struct LinkPair {
         reads_up(3, keys.up),
         reads_down(3, keys.down) {}
 
-  // Runs both for this time. What they send arrives at once, unless `lost` takes it.
+  // Runs both ends for this time. What they send arrives at once, unless `lost` drops it.
   void run(Time span) {
     DatagramBuffer buffer, plain;
     for (const Time until = now + span; now < until; now += 1ms) {
@@ -51,17 +51,17 @@ struct LinkPair {
       cut.path[k].position[0] = static_cast<std::int32_t>(10 * (number + k));
     return cut;
   }
-  // A packet of the client's that its program would never make.
-  void say(const v1::UpPacket& packet) {
+  // Sends a packet that no correct client makes.
+  void forge(const v1::UpPacket& packet) {
     DatagramBuffer buffer;
     const std::string plain = packet.SerializeAsString();
-    server.receive(node(2),
-                   liar_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer), now);
+    server.receive(
+        node(2), forger_up.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer), now);
   }
-  void say(const v1::DownPacket& packet) {
+  void forge(const v1::DownPacket& packet) {
     DatagramBuffer buffer;
     const std::string plain = packet.SerializeAsString();
-    client.receive(liar_down.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer),
+    client.receive(forger_down.seal({reinterpret_cast<const std::uint8_t*>(plain.data()), plain.size()}, now, buffer),
                    now);
   }
 
@@ -69,7 +69,7 @@ struct LinkPair {
   wire::ClientLink client;
   wire::ServerLink server;
   Opener reads_up, reads_down;
-  Sealer liar_up{3, keys.up, {.first_counter = 100'000}}, liar_down{3, keys.down, {.first_counter = 100'000}};
+  Sealer forger_up{3, keys.up, {.first_counter = 100'000}}, forger_down{3, keys.down, {.first_counter = 100'000}};
   Time now = 1s;
   std::vector<v1::UpPacket> ups;
   std::vector<v1::DownPacket> downs;

@@ -8,7 +8,7 @@ namespace osteon::test {
 Trial::Trial(const TrialOptions& options)
     : options_(options), network(time, options.seed), random_(options.seed), server_port(network.open(node(1))) {
   network.set_quality(options.quality);
-  server_port->on_arrival([this] { hear_server(); });
+  server_port->on_arrival([this] { receive_server(); });
   for (std::size_t c = 0; c < kClients; ++c) {
     const SessionKeys keys = make_session_keys(static_cast<std::uint32_t>(c + 1), seeded(options.seed * 3 + c));
     clients.push_back(std::make_unique<Client>(c, keys, options));
@@ -32,10 +32,10 @@ void Trial::move_client(std::size_t c, const Endpoint& to) {
 
 bool Trial::settled() const {
   for (std::size_t c = 0; c < kClients; ++c) {
-    if (sessions[c]->cuts.size() != clients[c]->cuts.size() || sessions[c]->kept != clients[c]->cuts.size())
+    if (sessions[c]->cuts.size() != clients[c]->cuts.size() || sessions[c]->durable != clients[c]->cuts.size())
       return false;
     if (clients[c]->entries.size() != sessions[c]->entries.size()) return false;
-    if (clients[c]->link.acknowledged() != sessions[c]->kept) return false;
+    if (clients[c]->link.acknowledged() != sessions[c]->durable) return false;
   }
   return true;
 }
@@ -54,7 +54,7 @@ bool Trial::exact() const {
     if (taken.size() > told.size()) return false;
     for (std::size_t i = 0; i < taken.size(); ++i)
       if (taken[i].index != i + 1 || taken[i].entry != told[i].entry) return false;
-    if (clients[c]->link.acknowledged() > sessions[c]->kept) return false;
+    if (clients[c]->link.acknowledged() > sessions[c]->durable) return false;
   }
   return true;
 }
@@ -80,7 +80,7 @@ void Trial::make_cuts(std::size_t c) {
   ++state.state_seq;
   state.phase = client.cutting ? CuttingPhase::cutting : CuttingPhase::free;
   state.tool_name = "drill-3.5";
-  // A hand trembles by less than anyone sees.
+  // The hand trembles by less than anyone sees.
   const Pose tremor{.position_mm = random_.in_cube(0.004)};
   if (client.cutting) {
     const std::uint64_t number = client.cuts.size() + 1;
@@ -145,9 +145,9 @@ void Trial::turn(std::size_t c) {
       stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.offer(cut); });
       client.streamed_cuts = n;
     }
-    if (client.said_entries != client.link.entries_taken()) {
-      client.said_entries = client.link.entries_taken();
-      stream([this, c, upto = client.said_entries] { sessions[c]->link.acknowledge(upto); });
+    if (client.acknowledged_entries != client.link.entries_taken()) {
+      client.acknowledged_entries = client.link.entries_taken();
+      stream([this, c, upto = client.acknowledged_entries] { sessions[c]->link.acknowledge(upto); });
     }
   }
   for (;;) {
@@ -159,7 +159,7 @@ void Trial::turn(std::size_t c) {
   wake(client.wakes_at, client.link.next(now), [this, c] { turn(c); });
 }
 
-void Trial::hear_server() {
+void Trial::receive_server() {
   DatagramBuffer buffer;
   while (const auto got = server_port->receive(buffer)) {
     const auto session = session_of(got->bytes);
@@ -179,7 +179,7 @@ void Trial::server_turn(std::size_t c) {
   wake(session.wakes_at, session.link.next(time.now()), [this, c] { server_turn(c); });
 }
 
-void Trial::tell(std::size_t c, wire::SessionEntry entry) {
+void Trial::send_entry(std::size_t c, wire::SessionEntry entry) {
   Session& session = *sessions[c];
   session.entries.push_back({session.entries.size() + 1, std::move(entry)});
   if (!session.link.push(session.entries.back())) stream_entry(c, session.entries.size());
@@ -202,7 +202,7 @@ void Trial::tick() {
     }
   }
   const bool event = random_.unit() < options_.events;
-  if (!decided.empty() || event) time.post_in(kKeep, [this, decided, event] { keep(decided, event); });
+  if (!decided.empty() || event) time.post_in(kKeep, [this, decided, event] { make_durable(decided, event); });
   for (std::size_t c = 0; c < kClients; ++c) {
     Session& session = *sessions[c];
     if (auto state = sessions[c]->link.take_state()) {
@@ -213,16 +213,16 @@ void Trial::tick() {
       for (std::uint64_t i = std::max(session.link.acknowledged(), session.streamed_entries) + 1;
            i <= session.entries.size(); ++i)
         stream_entry(c, session.streamed_entries = i);
-      if (session.said_kept != session.kept) {
-        session.said_kept = session.kept;
-        stream([this, c, upto = session.kept] { clients[c]->link.acknowledge(upto); });
+      if (session.acknowledged != session.durable) {
+        session.acknowledged = session.durable;
+        stream([this, c, upto = session.durable] { clients[c]->link.acknowledge(upto); });
       }
     }
     server_turn(c);
   }
 }
 
-// An instructor's word on one of the clients; every third is too long for a packet.
+// An instructor's decision about one of the clients. Every third is too long for a packet.
 wire::SessionEntry Trial::supervised(RoomSeq seq) {
   wire::SessionEntry entry{.room_seq = seq, .kind = wire::SessionEntryKind::supervised, .lease_epoch = seq.value + 1};
   entry.supervision = {
@@ -232,28 +232,28 @@ wire::SessionEntry Trial::supervised(RoomSeq seq) {
   return entry;
 }
 
-void Trial::keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event) {
+void Trial::make_durable(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event) {
   for (const auto& [author, cut] : decided) {
     const RoomSeq seq{++room_seq_};
     if (options_.reject_each != 0 && cut.author_seq % options_.reject_each == 0) {
-      tell(author, {.room_seq = seq,
-                    .kind = wire::SessionEntryKind::rejected,
-                    .author_seq = cut.author_seq,
-                    .reason = 3,
-                    .lease_epoch = 1 + cut.author_seq / 300});
+      send_entry(author, {.room_seq = seq,
+                          .kind = wire::SessionEntryKind::rejected,
+                          .author_seq = cut.author_seq,
+                          .reason = 3,
+                          .lease_epoch = 1 + cut.author_seq / 300});
     } else {
       for (std::size_t c = 0; c < kClients; ++c)
-        tell(c, {.room_seq = seq, .kind = wire::SessionEntryKind::committed, .cut = cut});
+        send_entry(c, {.room_seq = seq, .kind = wire::SessionEntryKind::committed, .cut = cut});
     }
-    sessions[author]->kept = cut.author_seq;
+    sessions[author]->durable = cut.author_seq;
   }
   if (event) {
     const RoomSeq seq{++room_seq_};
     for (std::size_t c = 0; c < kClients; ++c)
-      tell(c, seq.value % 3 == c ? supervised(seq) : wire::SessionEntry{.room_seq = seq});
+      send_entry(c, seq.value % 3 == c ? supervised(seq) : wire::SessionEntry{.room_seq = seq});
   }
   for (std::size_t c = 0; c < kClients; ++c) {
-    sessions[c]->link.decided(sessions[c]->kept);
+    sessions[c]->link.decided(sessions[c]->durable);
     server_turn(c);
   }
 }

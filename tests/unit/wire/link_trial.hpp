@@ -1,6 +1,6 @@
-// Two haptic clients and a room, joined by ClientLink and ServerLink over a simulated network, with a stream beside it:
-// the owners' side of both ends, as simple as can be. The room decides cuts 120 times a second, keeps them 2 ms later,
-// and tells everyone.
+// Two haptic clients and a room, joined by ClientLink and ServerLink over a simulated network, with a stream beside it.
+// This is the simplest owner of each end. The room commits cuts 120 times a second, writes them 2 ms later, and sends
+// each client their log entries.
 #pragma once
 #include <array>
 #include <deque>
@@ -25,12 +25,12 @@ struct TrialOptions {
   wire::LinkOptions up{}, down = wire::server_link_options();
   Time stream_delay = 100ms;  // one way
   double long_cuts = 0.02;    // too long for a packet
-  double events = 0.01;       // of ticks: something that only the stream tells
+  double events = 0.01;       // share of ticks with an event that only the stream carries
   std::uint64_t reject_each = 40;
-  std::function<Cut(std::size_t client, std::uint64_t number)> cut{};  // none: a made-up drilling
+  std::function<Cut(std::size_t client, std::uint64_t number)> cut{};  // empty: an invented drilling
 };
 
-// A seeded generator as a session's source of tokens and keys.
+// A seeded generator, as a session's source of tokens and keys.
 inline FillRandom seeded(std::uint64_t seed) {
   return [random = std::make_shared<Random>(seed)](std::span<std::uint8_t> bytes) {
     for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random->index(256));
@@ -49,13 +49,13 @@ class Trial {
     SessionKeys keys;
     wire::ClientLink link;
     std::unique_ptr<SimPort> port;
-    std::vector<Cut> cuts;  // all that were made, by author_seq - 1
+    std::vector<Cut> cuts;  // all that the client made, by author_seq - 1
     std::vector<Time> made_at;
-    std::uint64_t streamed_cuts = 0;          // up to here they went over the stream
-    std::vector<wire::IndexedEntry> entries;  // all that were taken
-    std::vector<double> felt_ms;              // from a partner's cut until its entry was here
-    std::uint64_t said_entries = 0;           // over the stream
-    std::uint64_t uplink_bytes = 0;           // with 28 of headers each
+    std::uint64_t streamed_cuts = 0;          // the stream has carried these
+    std::vector<wire::IndexedEntry> entries;  // all that the client took
+    std::vector<double> felt_ms;              // from a partner's cut until its log entry arrived
+    std::uint64_t acknowledged_entries = 0;   // over the stream
+    std::uint64_t uplink_bytes = 0;           // with 28 bytes of headers each
     std::uint64_t entries_by_stream = 0, refused = 0;
     std::size_t most_waiting = 0;  // bytes unacknowledged
     std::optional<Time> wakes_at;
@@ -66,31 +66,31 @@ class Trial {
     Session(std::size_t which, const SessionKeys& keys, const TrialOptions& options)
         : link(keys, {10 + which}, seeded(options.seed * 7 + which), 1, 1, options.down) {}
     wire::ServerLink link;
-    std::vector<Cut> cuts;                    // as they came
-    std::vector<wire::IndexedEntry> entries;  // as they were told
-    std::uint64_t streamed_entries = 0;       // up to here they went over the stream
-    std::uint64_t kept = 0, said_kept = 0;
+    std::vector<Cut> cuts;                    // in the order of arrival
+    std::vector<wire::IndexedEntry> entries;  // as the room sent them
+    std::uint64_t streamed_entries = 0;       // the stream has carried these
+    std::uint64_t durable = 0, acknowledged = 0;
     std::uint64_t downlink_bytes = 0;
     std::optional<Time> wakes_at;
   };
 
   explicit Trial(const TrialOptions& options);
 
-  // The client goes on from another address.
+  // Moves the client to another address.
   void move_client(std::size_t c, const Endpoint& to);
 
-  // All that was made has been told to everyone and taken.
+  // True once every client has taken the log entry of every cut.
   [[nodiscard]] bool settled() const;
-  // Until settled or the patience is over; how long it took.
+  // Runs until settled, or until the patience ends. Returns how long it ran.
   Time settle(Time patience);
-  // Everything once, in order, as it was said.
+  // True if each log entry arrived once, in order, as the room sent it.
   [[nodiscard]] bool exact() const;
   void cut(bool on) {
     for (const auto& client : clients) client->cutting = on;
   }
-  // No datagram gets through in this time; the stream goes on.
+  // Drops all datagrams in this time. The stream goes on.
   void block(Time from, Time until) { network.partition(from, until); }
-  // Neither datagrams nor the stream, whose messages come when it is over.
+  // Drops all datagrams, and holds the stream's messages back until the end of this time.
   void partition(Time from, Time until) {
     network.partition(from, until);
     stream_stops_.push_back({from, until});
@@ -103,7 +103,7 @@ class Trial {
   std::unique_ptr<SimPort> server_port;
   std::vector<std::unique_ptr<Client>> clients;
   std::vector<std::unique_ptr<Session>> sessions;
-  // What a client sends, before the network has it; true: it shall not.
+  // Sees each datagram of a client before the network does. True: drop it.
   std::function<bool(std::size_t client, std::span<const std::uint8_t>)> tap;
 
  private:
@@ -118,14 +118,14 @@ class Trial {
 
   void turn(std::size_t c);
 
-  void hear_server();
+  void receive_server();
   void server_turn(std::size_t c);
 
-  void tell(std::size_t c, wire::SessionEntry entry);
+  void send_entry(std::size_t c, wire::SessionEntry entry);
   void stream_entry(std::size_t c, std::uint64_t index);
 
   void tick();
-  void keep(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event);
+  void make_durable(const std::vector<std::pair<std::size_t, Cut>>& decided, bool event);
 
   std::uint64_t room_seq_ = 0;
   Time stream_at_{};

@@ -1,4 +1,4 @@
-// What a client of the version before is told, and what one of another version is.
+// What a client of the previous version receives, and what a client of an unknown version receives.
 #include <gtest/gtest.h>
 
 #include <set>
@@ -26,7 +26,7 @@ TEST(Version, TheServerTakesItsOwnAndTheOneBefore) {
   }
 }
 
-// Every kind that there is, as the protocol's descriptor lists them: version 3 was made with those numbered up to 10.
+// Every kind of message, as the protocol's descriptor lists them. Version 3 knows the kinds up to number 10.
 TEST(Version, AnOlderSessionIsSentNoKindThatItDoesNotKnow) {
   const auto* kinds = v1::SessionResponse::descriptor()->FindOneofByName("message");
   ASSERT_NE(kinds, nullptr);
