@@ -88,7 +88,7 @@ Journal::~Journal() = default;
 
 // The journal is made under another name, so that it exists whole or not at all. The lock belongs to the file itself
 // and stays when the file is renamed.
-Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, JournalOptions options) {
+Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, const JournalOptions& options) {
   Disk& disk = disk_of(options);
   if (Result<void> clear = check_nothing_left(disk, file); !clear) return tl::unexpected(clear.error());
   const fs::path partial = with(file, kPartial);
@@ -113,7 +113,7 @@ Result<Journal> Journal::create(const fs::path& file, std::string_view genesis, 
   return open_locked(file, options, std::move(*lock));
 }
 
-Result<Journal> Journal::open(const fs::path& file, JournalOptions options) {
+Result<Journal> Journal::open(const fs::path& file, const JournalOptions& options) {
   Disk& disk = disk_of(options);
   if (Result<void> may_be = check_is_journal(file, disk); !may_be) return tl::unexpected(may_be.error());
   auto lock = take_lock(disk, file, LockKind::exclusive);

@@ -48,12 +48,12 @@ class Journal {
  public:
   // Error exists: a journal, or a file that belonged to one, is there.
   [[nodiscard]] static Result<Journal> create(const std::filesystem::path& file, std::string_view genesis,
-                                              JournalOptions options = {});
+                                              const JournalOptions& options = {});
   // Continues where the last process stopped, however that ended, and checks every entry. Errors: not_found; exists (in
   // use by another process); unsupported (an older version: migrate_journal; or a newer one); invalid_input (damaged so
   // that no entry can be read). If entries are damaged, or the journal is behind a witness, it opens but accepts no
   // entries.
-  [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, JournalOptions options = {});
+  [[nodiscard]] static Result<Journal> open(const std::filesystem::path& file, const JournalOptions& options = {});
   // Opens for reading only: it writes nothing to the file or beside it, and others may read the file too. Adding
   // entries fails. Errors: those of open(). If entries are damaged, closed_because() says so.
   [[nodiscard]] static Result<Journal> open_to_read(const std::filesystem::path& file, Disk* disk = nullptr);

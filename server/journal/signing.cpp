@@ -247,10 +247,8 @@ std::set<PublicKey> keys_of_line(const PublicKey& key, std::span<const Successio
   return line;
 }
 
-SigningKeys::SigningKeys(SigningKey key, std::vector<Succession> successions)
-    : key_(std::move(key)),
-      successions_(std::move(successions)),
-      line_(keys_of_line(key_.public_key(), successions_)) {}
+SigningKeys::SigningKeys(const SigningKey& key, std::vector<Succession> successions)
+    : key_(key), successions_(std::move(successions)), line_(keys_of_line(key_.public_key(), successions_)) {}
 
 Result<std::shared_ptr<const SigningKeys>> load_signing_keys(const fs::path& file) {
   OSTEON_CHECK(sodium_init() >= 0);

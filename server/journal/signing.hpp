@@ -65,7 +65,7 @@ struct Succession {
 // The key with which a server signs, and its earlier keys. Immutable, so any thread may use it.
 class SigningKeys {
  public:
-  explicit SigningKeys(SigningKey key, std::vector<Succession> successions = {});
+  explicit SigningKeys(const SigningKey& key, std::vector<Succession> successions = {});
   [[nodiscard]] const SigningKey& key() const { return key_; }
   [[nodiscard]] const std::vector<Succession>& successions() const { return successions_; }
   [[nodiscard]] bool trusts(const PublicKey& key) const { return line_.contains(key); }
