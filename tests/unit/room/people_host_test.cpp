@@ -129,9 +129,9 @@ struct Lesson {
   }
 
   std::chrono::nanoseconds now{};
+  std::map<AuthorId, std::shared_ptr<ReceivedSession>> sessions;  // outlive the runtime, whose threads use them
   RoomRuntime runtime;
   AuthorId instructor, trainee, other;
-  std::map<AuthorId, std::shared_ptr<ReceivedSession>> sessions;
 };
 
 // The role of the join decides what somebody may undo. Who returns with another role has to join again.
