@@ -21,7 +21,7 @@ MountLoad some_push(std::uint64_t seq) {
   return {seq, {{1.2345678, -40.0, 0.0004}, {-300.126, 0.0, 19999.5}}, 12.3459, 17};
 }
 
-MountPose some_place(std::uint64_t seq) { return {seq, {{0.25, -3.0, 1e-5}, {0.1, -0.2, 0.0}}, 0.9999, 4, 0.1504}; }
+MountPose some_pose(std::uint64_t seq) { return {seq, {{0.25, -3.0, 1e-5}, {0.1, -0.2, 0.0}}, 0.9999, 4, 0.1504}; }
 
 TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
   const Result<MountLoad> push = wire::from_wire(wire::to_wire(some_push(3)));
@@ -31,12 +31,12 @@ TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
   EXPECT_LE((push->load.force_n - some_push(3).load.force_n).cwiseAbs().maxCoeff(), 0.5e-3);
   EXPECT_LE((push->load.moment_nmm - some_push(3).load.moment_nmm).cwiseAbs().maxCoeff(), 0.5e-2);
 
-  const Result<MountPose> seen = wire::from_wire(wire::to_wire(some_place(5)));
+  const Result<MountPose> seen = wire::from_wire(wire::to_wire(some_pose(5)));
   ASSERT_TRUE(seen.has_value()) << seen.error().message;
   EXPECT_EQ(seen->seen_seq, 5u);
   EXPECT_EQ(seen->push_seq, 4u);
-  EXPECT_LE((seen->shift.place_mm - some_place(5).shift.place_mm).cwiseAbs().maxCoeff(), 0.5 / 65536);
-  EXPECT_LE((seen->shift.turn_rad - some_place(5).shift.turn_rad).cwiseAbs().maxCoeff(), 0.5 / 1048576);
+  EXPECT_LE((seen->shift.place_mm - some_pose(5).shift.place_mm).cwiseAbs().maxCoeff(), 0.5 / 65536);
+  EXPECT_LE((seen->shift.turn_rad - some_pose(5).shift.turn_rad).cwiseAbs().maxCoeff(), 0.5 / 1048576);
   EXPECT_DOUBLE_EQ(seen->lag_s, 0.150);
 }
 
@@ -44,7 +44,7 @@ TEST(BoneOnTheWire, ComesBackWithinHalfAStep) {
 TEST(BoneOnTheWire, RoundsEnergyDown) {
   for (const double mj : {0.0, 0.0004, 0.0019999, 12.3459, 1e6 + 0.00099}) {
     MountLoad push = some_push(1);
-    MountPose seen = some_place(1);
+    MountPose seen = some_pose(1);
     push.energy_mj = seen.energy_mj = mj;
     for (const double came :
          {wire::from_wire(wire::to_wire(push))->energy_mj, wire::from_wire(wire::to_wire(seen))->energy_mj}) {
@@ -75,15 +75,15 @@ TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
     EXPECT_EQ(read.error().code, ErrorCode::invalid_input);
     EXPECT_NE(read.error().message.find("push." + field), std::string::npos) << read.error().message;
   }
-  const std::map<std::string, std::function<void(v1::MountPose&)>> places{
+  const std::map<std::string, std::function<void(v1::MountPose&)>> poses{
       {"seen_seq", [](auto& m) { m.set_seen_seq(0); }},
       {"place", [](auto& m) { m.clear_place(); }},
       {"turn", [](auto& m) { m.set_turn(1, 4 << 20); }},
       {"energy", [](auto& m) { m.set_energy(std::numeric_limits<std::int64_t>::max()); }},
       {"lag_ms", [](auto& m) { m.set_lag_ms(60'001); }},
   };
-  for (const auto& [field, spoil] : places) {
-    v1::MountPose message = wire::to_wire(some_place(1));
+  for (const auto& [field, spoil] : poses) {
+    v1::MountPose message = wire::to_wire(some_pose(1));
     spoil(message);
     const Result<MountPose> read = wire::from_wire(message);
     ASSERT_FALSE(read.has_value()) << field;
@@ -91,8 +91,8 @@ TEST(BoneOnTheWire, RefusesWhatNoPeerSends) {
   }
 }
 
-// Both ends, on a network that loses 30 % and reorders. The newest wins. None arrives twice. At most one is sent in 8
-// ms.
+// Both ends, on a network that loses 30 % and reorders. The newest wins. None arrives twice. At most one is sent in
+// 8 ms.
 TEST(BoneOnTheLink, TheNewestWins) {
   Trial trial({.quality = test::hostile(40ms), .long_cuts = 0, .events = 0});
   wire::ClientLink& client = trial.clients[0]->link;
@@ -100,20 +100,20 @@ TEST(BoneOnTheLink, TheNewestWins) {
   trial.time.run_until(600ms);
   ASSERT_TRUE(client.alive(trial.time.now()) && server.alive(trial.time.now()));
   trial.cut(true);
-  std::uint64_t pushed = 0, told = 0, push_came = 0, bone_came = 0, pushes = 0, bones = 0;
+  std::uint64_t pushed = 0, bones_set = 0, push_received = 0, bone_received = 0, pushes = 0, bones = 0;
   for (Time now = 600ms; now < 2600ms; now += 2ms) {
     client.set_push(some_push(++pushed));
-    server.set_bone(some_place(++told));
+    server.set_bone(some_pose(++bones_set));
     trial.time.run_until(now);
     if (const auto push = server.take_push()) {
-      EXPECT_GT(push->push_seq, push_came);
-      push_came = push->push_seq;
+      EXPECT_GT(push->push_seq, push_received);
+      push_received = push->push_seq;
       ++pushes;
       EXPECT_FALSE(server.take_push());
     }
     if (const auto bone = client.take_bone()) {
-      EXPECT_GT(bone->seen_seq, bone_came);
-      bone_came = bone->seen_seq;
+      EXPECT_GT(bone->seen_seq, bone_received);
+      bone_received = bone->seen_seq;
       ++bones;
     }
   }
@@ -123,10 +123,10 @@ TEST(BoneOnTheLink, TheNewestWins) {
   EXPECT_GE(pushes, 60u);
   EXPECT_GE(bones, 60u);
   trial.time.run_until(2900ms);
-  if (const auto push = server.take_push()) push_came = push->push_seq;
-  if (const auto bone = client.take_bone()) bone_came = bone->seen_seq;
-  EXPECT_GE(push_came + 50, pushed);
-  EXPECT_GE(bone_came + 50, told);
+  if (const auto push = server.take_push()) push_received = push->push_seq;
+  if (const auto bone = client.take_bone()) bone_received = bone->seen_seq;
+  EXPECT_GE(push_received + 50, pushed);
+  EXPECT_GE(bone_received + 50, bones_set);
   trial.cut(false);
   trial.settle(8s);
   EXPECT_TRUE(trial.settled() && trial.exact());

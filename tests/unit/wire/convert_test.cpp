@@ -99,7 +99,7 @@ TEST(Wire, ASupervisionComesBackWhole) {
     ASSERT_TRUE(back) << back.error().message;
     EXPECT_EQ(*back, one);
   }
-  // Tools may come in any order, and more than once.
+  // Tools may arrive in any order, and more than once.
   v1::Restrictions message;
   for (const std::uint8_t tool : {2, 1, 2}) message.add_tools(wire::to_wire(all_of(tool)));
   EXPECT_EQ(wire::from_wire(message).value().tools, (std::vector{all_of(1), all_of(2)}));
@@ -309,7 +309,7 @@ TEST(Wire, ABlocksLevelHasASign) {
   }
 }
 
-TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
+TEST(Wire, AViewFrustumComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
   const ViewFrustum look{{1, -2, 300}, {4, 5, 6}, 0.0005, 0.4};
   const auto back = wire::from_wire(wire::to_wire(look));
   ASSERT_TRUE(back) << back.error().message;
@@ -326,7 +326,7 @@ TEST(Wire, ALookComesBackAndBadOnesAreRefusedByTheNameOfTheField) {
   refused([](v1::ViewFrustum& l) { l.set_pixel_rad(0); }, "pixel_rad");
   refused([](v1::ViewFrustum& l) { l.set_view_rad(std::numeric_limits<double>::infinity()); }, "view_rad");
   refused([](v1::ViewFrustum& l) { l.Clear(); }, "pixel_rad");
-  EXPECT_FALSE(back->up) << "of those who do not say it nobody knows which way is up";
+  EXPECT_FALSE(back->up) << "a client need not send its up direction";
 
   ViewFrustum upright = look;
   upright.up = Vec3(1, 0, 0);

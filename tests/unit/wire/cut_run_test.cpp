@@ -32,7 +32,7 @@ Digest digest(std::uint8_t n) {
   return out;
 }
 
-// Any number. Small ones and both ends of the range come more often than by chance.
+// Any number. Small ones and both ends of the range occur more often than by chance.
 std::uint64_t any(Random& random) {
   const std::uint64_t bits = random.index(~std::size_t{0});
   return random.unit() < 0.1 ? ~std::uint64_t{0} : bits >> random.index(64);
@@ -415,11 +415,11 @@ TEST(EntryRun, AnyEntriesArriveInTheSessionsOrder) {
     SendWindow window(kWide);
     wire::EntrySender sender(window, numbers);
     std::vector<wire::SessionEntry> entries;
-    RoomSeq place{random.index(1000)};
+    RoomSeq seq{random.index(1000)};
     for (std::size_t i = 0; i < 60; ++i) {
-      place.value += random.unit() < 0.8 ? 1 : random.index(1000);
+      seq.value += random.unit() < 0.8 ? 1 : random.index(1000);
       const double kind = random.unit();
-      wire::SessionEntry entry{.room_seq = place};
+      wire::SessionEntry entry{.room_seq = seq};
       if (kind < 0.05) {
         entry.kind = wire::SessionEntryKind::rejected;
         entry.author_seq = any(random);

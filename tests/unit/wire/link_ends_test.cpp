@@ -206,11 +206,10 @@ TEST(LinkEnds, AClientThatMovesIsFoundWithinASecond) {
   EXPECT_LT(share_of(found_ms, 0.99), 1000.0);
 }
 
-// An attacker on the path sends copies from another address. Some follow the original. Some come before it.
+// An attacker on the path sends copies from another address. Some follow the original. Some arrive before it.
 TEST(LinkEnds, AThirdPartyMovesNothing) {
   Trial trial({.quality = {.delay = 20ms}});
   const auto third = trial.network.open(node(9));
-  std::vector<std::vector<std::uint8_t>> heard_by_third;
   std::size_t copied_bytes = 0, answered_bytes = 0;
   third->on_arrival([&] {
     DatagramBuffer buffer;
@@ -372,9 +371,9 @@ TEST(LinkEnds, AClientWhosePacketsAreLostIsNotAlive) {
   pair.run(300ms);
   ASSERT_TRUE(pair.client.alive(pair.now));
   pair.lost = [](const v1::UpPacket&) { return true; };
-  const std::size_t heard = pair.downs.size();
+  const std::size_t received = pair.downs.size();
   pair.run(1500ms);
-  EXPECT_GT(pair.downs.size(), heard);
+  EXPECT_GT(pair.downs.size(), received);
   EXPECT_FALSE(pair.client.alive(pair.now));
   pair.lost = {};
   pair.run(700ms);
@@ -425,12 +424,12 @@ TEST(LinkEnds, AnEntryDecidesTheOwnCutInIt) {
   EXPECT_TRUE(pair.server.tell(3, rejection));
   EXPECT_EQ(acknowledged(), 3u);
   EXPECT_EQ(pair.client.lease_epoch(), 4u);
-  std::vector<std::uint64_t> heard;
-  while (const auto entry = pair.client.take_entry()) heard.push_back(entry->index);
-  EXPECT_EQ(heard, (std::vector<std::uint64_t>{1, 2, 3})) << "the one without a number is not said";
+  std::vector<std::uint64_t> received;
+  while (const auto entry = pair.client.take_entry()) received.push_back(entry->index);
+  EXPECT_EQ(received, (std::vector<std::uint64_t>{1, 2, 3})) << "the entry without a number is not sent";
 }
 
-// The packet itself tells a client that it is frozen, before the log entry has its turn.
+// The packet itself says that the client is frozen. The client need not wait for the log entry.
 TEST(LinkEnds, AnInstructorsDecisionFreezesAndEndsTheLease) {
   LinkPair pair;
   pair.run(300ms);
@@ -446,7 +445,7 @@ TEST(LinkEnds, AnInstructorsDecisionFreezesAndEndsTheLease) {
   word.lease_epoch = 8;
   word.supervision = {};
   for (std::uint8_t n = 0; n <= wire::kMostToolsInPacket; ++n) word.supervision.tools.push_back(Digest{{n}});
-  EXPECT_FALSE(pair.server.tell(2, word)) << "too long: its entry goes over the stream, what matters at once does not";
+  EXPECT_FALSE(pair.server.tell(2, word)) << "too long: the stream carries the entry, a packet the freeze and epoch";
   pair.run(100ms);
   EXPECT_FALSE(pair.client.frozen());
   EXPECT_EQ(pair.client.lease_epoch(), 8u);
@@ -574,7 +573,7 @@ TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
   EXPECT_EQ(pair.client.acknowledged(), number + 3);
 }
 
-TEST(LinkEnds, WhatNoCorrectPeerSaysChangesNothing) {
+TEST(LinkEnds, WhatNoCorrectPeerSendsChangesNothing) {
   LinkPair pair;
   pair.run(300ms);
   for (std::uint64_t n = 1; n <= 3; ++n) {
@@ -688,10 +687,10 @@ TEST(LinkEnds, StatesFollowTheToolWithinTheDeadband) {
       state.pose_bone_device = state.pose_bone_tool;
       pair.client.set_state(state, 0);
       pair.run(8ms);
-      if (const auto heard = pair.server.take_state()) {
-        EXPECT_EQ(heard->state.author, AuthorId{7});
-        EXPECT_LE(heard->state.state_seq, state.state_seq);
-        const std::vector<wire::KnownToolState> partners{*heard};
+      if (const auto received = pair.server.take_state()) {
+        EXPECT_EQ(received->state.author, AuthorId{7});
+        EXPECT_LE(received->state.state_seq, state.state_seq);
+        const std::vector<wire::KnownToolState> partners{*received};
         pair.server.set_partners(partners);
       }
       if (i < 10) continue;

@@ -40,20 +40,20 @@ bool Trial::settled() const {
   return true;
 }
 
-Time Trial::settle(Time patience) {
+Time Trial::settle(Time timeout) {
   const Time from = time.now();
-  while (!settled() && time.now() - from < patience) time.run_until(time.now() + 10ms);
+  while (!settled() && time.now() - from < timeout) time.run_until(time.now() + 10ms);
   return time.now() - from;
 }
 
 bool Trial::exact() const {
   for (std::size_t c = 0; c < kClients; ++c) {
-    const auto &came = sessions[c]->cuts, &made = clients[c]->cuts;
-    if (came.size() > made.size() || !std::equal(came.begin(), came.end(), made.begin())) return false;
-    const auto &taken = clients[c]->entries, &told = sessions[c]->entries;
-    if (taken.size() > told.size()) return false;
+    const auto &arrived = sessions[c]->cuts, &made = clients[c]->cuts;
+    if (arrived.size() > made.size() || !std::equal(arrived.begin(), arrived.end(), made.begin())) return false;
+    const auto &taken = clients[c]->entries, &sent = sessions[c]->entries;
+    if (taken.size() > sent.size()) return false;
     for (std::size_t i = 0; i < taken.size(); ++i)
-      if (taken[i].index != i + 1 || taken[i].entry != told[i].entry) return false;
+      if (taken[i].index != i + 1 || taken[i].entry != sent[i].entry) return false;
     if (clients[c]->link.acknowledged() > sessions[c]->durable) return false;
   }
   return true;
@@ -96,9 +96,9 @@ void Trial::make_cuts(std::size_t c) {
       stream([this, c, cut] { sessions[c]->link.offer(cut); });
     }
   }
-  CuttingState said = state;
-  said.pose_bone_tool.position_mm += tremor.position_mm;
-  client.link.set_state(said, 0);
+  CuttingState trembling = state;
+  trembling.pose_bone_tool.position_mm += tremor.position_mm;
+  client.link.set_state(trembling, 0);
   turn(c);
 }
 
@@ -202,7 +202,7 @@ void Trial::tick() {
     }
   }
   const bool event = random_.unit() < options_.events;
-  if (!decided.empty() || event) time.post_in(kKeep, [this, decided, event] { make_durable(decided, event); });
+  if (!decided.empty() || event) time.post_in(kWrite, [this, decided, event] { make_durable(decided, event); });
   for (std::size_t c = 0; c < kClients; ++c) {
     Session& session = *sessions[c];
     if (auto state = sessions[c]->link.take_state()) {

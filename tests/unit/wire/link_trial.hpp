@@ -40,7 +40,7 @@ inline FillRandom seeded(std::uint64_t seed) {
 class Trial {
  public:
   static constexpr std::size_t kClients = 2;
-  static constexpr Time kTick = Time(1'000'000'000 / 120), kCut = 8ms, kKeep = 2ms;
+  static constexpr Time kTick = Time(1'000'000'000 / 120), kCut = 8ms, kWrite = 2ms;
 
   struct Client {
     Client(std::size_t which, const SessionKeys& session, const TrialOptions& options)
@@ -81,8 +81,8 @@ class Trial {
 
   // True once every client has taken the log entry of every cut.
   [[nodiscard]] bool settled() const;
-  // Runs until settled, or until the patience ends. Returns how long it ran.
-  Time settle(Time patience);
+  // Runs until settled, or until the timeout. Returns how long it ran.
+  Time settle(Time timeout);
   // True if each log entry arrived once, in order, as the room sent it.
   [[nodiscard]] bool exact() const;
   void cut(bool on) {

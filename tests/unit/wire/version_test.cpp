@@ -43,7 +43,7 @@ TEST(Version, AnOlderSessionIsSentNoKindThatItDoesNotKnow) {
   EXPECT_EQ(newer, (std::set<std::string>{"supervised", "said", "partner", "bone", "redial"}));
 }
 
-TEST(Version, AnEventOfANewKindIsAPlaceInTheOrderToAnOlderSession) {
+TEST(Version, AnOlderSessionGetsTheSequenceNumberOfAnEventOfANewKind) {
   v1::SessionResponse entry;
   entry.mutable_supervised()->set_room_seq(17);
   entry.set_index(3);
