@@ -68,7 +68,7 @@ class PeopleServiceImpl final : public PeopleBase {
   explicit PeopleServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
   WriteReactor* WatchPeople(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
-    if (auto why = refusal_of<v1::WatchPeopleRequest>(rooms_, *context)) return refused(std::move(*why));
+    if (const auto why = refusal_of<v1::WatchPeopleRequest>(rooms_, *context)) return refused(*why);
     const auto request = parse<v1::WatchPeopleRequest>(*bytes);
     if (!request) return refused(invalid("the WatchPeopleRequest could not be parsed"));
     const AuthorId author{request->author()};

@@ -213,7 +213,7 @@ class RoomServiceImpl final : public RoomBase {
   }
 
   WriteReactor* GetCase(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
-    if (auto why = refusal_of<v1::GetCaseRequest>(rooms_, *context)) return refused(std::move(*why));
+    if (const auto why = refusal_of<v1::GetCaseRequest>(rooms_, *context)) return refused(*why);
     const auto request = parse<v1::GetCaseRequest>(*bytes);
     if (!request) return refused(invalid("the GetCaseRequest could not be parsed"));
     const Result<Digest> hash = wire::digest_from_wire(request->case_hash());

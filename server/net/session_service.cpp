@@ -391,7 +391,7 @@ class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMetho
   CuttingServiceImpl(Rooms& rooms, LinkServer* links) : rooms_(rooms), links_(links) {}
 
   BidiReactor* Session(grpc::CallbackServerContext* context) override {
-    if (auto why = refusal_of<v1::SessionRequest>(rooms_, *context)) return refused<BidiReactor>(std::move(*why));
+    if (const auto why = refusal_of<v1::SessionRequest>(rooms_, *context)) return refused<BidiReactor>(*why);
     Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context);
     if (!room) return refused<BidiReactor>(status_of(room.error()));
     Result<Caller> caller = caller_of(rooms_, *context);

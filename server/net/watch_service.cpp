@@ -103,7 +103,7 @@ class WatchServiceImpl final : public WatchBase {
   explicit WatchServiceImpl(Rooms& rooms) : rooms_(rooms) {}
 
   WriteReactor* WatchMesh(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
-    if (auto why = refusal_of<v1::WatchMeshRequest>(rooms_, *context)) return refused(std::move(*why));
+    if (const auto why = refusal_of<v1::WatchMeshRequest>(rooms_, *context)) return refused(*why);
     const auto request = parse<v1::WatchMeshRequest>(*bytes);
     if (!request) return refused(invalid("the WatchMeshRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
@@ -145,7 +145,7 @@ class WatchServiceImpl final : public WatchBase {
   }
 
   WriteReactor* WatchCutting(grpc::CallbackServerContext* context, const ByteBuffer* bytes) override {
-    if (auto why = refusal_of<v1::WatchCuttingRequest>(rooms_, *context)) return refused(std::move(*why));
+    if (const auto why = refusal_of<v1::WatchCuttingRequest>(rooms_, *context)) return refused(*why);
     const auto request = parse<v1::WatchCuttingRequest>(*bytes);
     if (!request) return refused(invalid("the WatchCuttingRequest could not be parsed"));
     const Result<std::shared_ptr<OpenRoom>> room = called_room(rooms_, *context, AuthorId{request->author()});
