@@ -31,7 +31,7 @@ std::string place_words(const Vec3& at, const Box& box) {
 }
 
 // For each island, in the order of the list.
-std::vector<bool> kept_labels(const CtSegmentation& found) {
+std::vector<bool> kept_flags(const CtSegmentation& found) {
   std::vector<bool> kept(found.islands.size(), false);
   for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
   return kept;
@@ -44,7 +44,7 @@ std::string segmentation_text(const CtSegmentation& found) {
   double kept_cm3 = 0.0, others_cm3 = 0.0, all_cm3 = 0.0, largest_other_cm3 = 0.0;
   std::size_t listed = 0, others = 0;
   text += "islands    number     cm3   g/cm3       centre, mm (LPS)\n";
-  const std::vector<bool> is_kept = kept_labels(found);
+  const std::vector<bool> is_kept = kept_flags(found);
   for (std::size_t i = 0; i < found.islands.size(); ++i) {
     const imaging::Island& island = found.islands[i];
     const bool kept = is_kept[i];

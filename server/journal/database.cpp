@@ -162,13 +162,13 @@ Result<void> Database::run(const std::string& sql) {
 
 Result<std::int64_t> Database::integer(std::string_view sql) {
   return prepare(sql).and_then([](Statement statement) {
-    return statement.step().map([&](bool entry) { return entry ? statement.integer(0) : std::int64_t{0}; });
+    return statement.step().map([&](bool row) { return row ? statement.integer(0) : std::int64_t{0}; });
   });
 }
 
 Result<std::string> Database::text(std::string_view sql) {
   return prepare(sql).and_then([](Statement statement) {
-    return statement.step().map([&](bool entry) { return entry ? std::string(statement.bytes(0)) : std::string(); });
+    return statement.step().map([&](bool row) { return row ? std::string(statement.bytes(0)) : std::string(); });
   });
 }
 

@@ -115,7 +115,7 @@ class JournalFile {
   [[nodiscard]] Result<std::vector<std::string>> registers();  // their names, without the journal's own
   [[nodiscard]] Result<std::optional<std::string>> find_register(std::string_view name);
   [[nodiscard]] Result<std::optional<SealedRegister>> find_sealed(std::string_view name);
-  // Who signed an entry that was read from here. None: nobody.
+  // Who signed the seal of a register or checkpoint that was read from here. None: nobody.
   [[nodiscard]] std::optional<PublicKey> signer_of(const SealedRegister& found) const;
   [[nodiscard]] std::optional<PublicKey> signer_of(const Checkpoint& found) const;
   // In the order of their sequence numbers, that of its log last. inspect() checks them against their keys and the log
@@ -130,7 +130,8 @@ class JournalFile {
   // Commits the entries of the log, so that the log is no longer needed. For a file that was opened for writing.
   [[nodiscard]] Result<void> keep_log();
 
-  // Signs all entries that are written from now on with this key. Null: with none. The key must outlive this object.
+  // Signs the seals of registers, checkpoints and people that are written from now on with this key. Null: with none.
+  // The key must outlive this object. sign_entries() signs log entries.
   void sign_with(const SigningKey* key) { key_ = key; }
 
   // Within a transaction. The entries continue from `head`, which is updated.

@@ -127,19 +127,19 @@ Result<Outcome> Room::submit(const Cut& cut) {
   const auto surgeon = surgeons_.find(cut.author);
   if (surgeon == surgeons_.end())
     return refuse("cut.author " + std::to_string(cut.author.value) + " has not joined this room to cut");
-  const std::vector<Decided>& entries = surgeon->second.decided;
-  const std::uint64_t next = entries.size() + 1;
+  const std::vector<Decided>& all = surgeon->second.decided;
+  const std::uint64_t next = all.size() + 1;
   if (cut.author_seq == 0 || cut.author_seq > next)
     return refuse("cut.author_seq is " + std::to_string(cut.author_seq) + " where " + std::to_string(next) +
                   " comes next");
 
   // A decision is final, so a cut may be sent again if its answer was lost.
   if (cut.author_seq < next) {
-    const Decided& entry = entries[cut.author_seq - 1];
-    if (entry.bytes != cut_digest(cut))
+    const Decided& known = all[cut.author_seq - 1];
+    if (known.bytes != cut_digest(cut))
       return refuse("cut.author_seq " + std::to_string(cut.author_seq) + " was used before for another cut");
     ++counts_.repeated;
-    return Outcome{entry.room_seq, entry.rejection, true, surgeon->second.epoch, {}};
+    return Outcome{known.room_seq, known.rejection, true, surgeon->second.epoch, {}};
   }
 
   const Rejection rejection = judge(cut);

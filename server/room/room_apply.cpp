@@ -37,7 +37,7 @@ CoordBox about(const Case& bone) { return bone.bounds_samples().grown(2 * kLeafS
 // Whether a split may have this mask: sorted leaves of the lattice, near the bone, that hold values.
 bool is_mask(const Mask& mask, const CoordBox& about) {
   if (!mask) return false;
-  const auto seq_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
+  const auto position_of = [](const FieldLeaf& leaf) { return std::pair(leaf.level, leaf.origin); };
   for (std::size_t i = 0; i < mask->size(); ++i) {
     const FieldLeaf& leaf = (*mask)[i];
     const auto off_lattice = [](std::int32_t at) { return at % kLeafSize != 0; };
@@ -45,7 +45,7 @@ bool is_mask(const Mask& mask, const CoordBox& about) {
         off_lattice(leaf.origin.y) || off_lattice(leaf.origin.z) ||
         !about.contains(shift_down(leaf.origin, leaf.level)))
       return false;
-    if (i > 0 && !(seq_of((*mask)[i - 1]) < seq_of(leaf))) return false;
+    if (i > 0 && !(position_of((*mask)[i - 1]) < position_of(leaf))) return false;
   }
   return true;
 }

@@ -17,12 +17,12 @@ constexpr std::uint64_t kLoaded = std::uint64_t{1} << 62;
 
 tl::unexpected<Error> refuse(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
 
-auto seq_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
+auto position_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
 
 // Unites the masks of several fragments. A leaf that several masks contain is kept once, with the smallest values.
 std::vector<FieldLeaf> united(std::vector<FieldLeaf> masks) {
-  if (std::ranges::is_sorted(masks, std::less_equal{}, seq_of)) return masks;
-  std::ranges::stable_sort(masks, {}, seq_of);
+  if (std::ranges::is_sorted(masks, std::less_equal{}, position_of)) return masks;
+  std::ranges::stable_sort(masks, {}, position_of);
   std::vector<FieldLeaf> out;
   for (FieldLeaf& leaf : masks) {
     if (out.empty() || out.back().level != leaf.level || out.back().origin != leaf.origin) {
@@ -140,10 +140,10 @@ Digest Room::field_hash() const {
 
 std::vector<SceneItem> Room::items() const {
   std::vector<SceneItem> standing;
-  for (const auto& [id, entries] : items_) {
-    const auto newest = std::find_if(entries.rbegin(), entries.rend(),
-                                     [&](const ItemState& entry) { return !events_.at(entry.seq).undone; });
-    if (newest != entries.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
+  for (const auto& [id, states] : items_) {
+    const auto newest = std::find_if(states.rbegin(), states.rend(),
+                                     [&](const ItemState& state) { return !events_.at(state.seq).undone; });
+    if (newest != states.rend() && newest->item && exists(newest->item->body)) standing.push_back(*newest->item);
   }
   // The pins in the scene decide whether a guide is fixed.
   const std::vector<Standing> scene = with_tools(standing);

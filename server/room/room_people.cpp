@@ -18,7 +18,7 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions su
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (!people_.supervises(by)) return deny(author_name(by) + " is not an instructor in this room");
   if (!surgeons_.contains(subject))
-    return failure(ErrorCode::not_found, author_name(subject) + " has no tool in this room");
+    return failure(ErrorCode::not_found, author_name(subject) + " has not joined this room to cut");
   if (Result<void> sound = check(supervision); !sound) return tl::unexpected(sound.error());
   for (const AuthorId named : {supervision.taken_by, supervision.guide}) {
     if (!named) continue;
