@@ -11,7 +11,7 @@ constexpr RoleSet kCutters{Role::trainee, Role::collaborator, Role::instructor};
 constexpr RoleSet kPartners{Role::collaborator, Role::instructor};
 constexpr RoleSet kInstructor{Role::instructor};
 constexpr RoleSet kOperator{Role::operator_};
-constexpr RoleSet kSupervisors{Role::instructor, Role::operator_};
+constexpr RoleSet kInstructorOrOperator{Role::instructor, Role::operator_};
 
 constexpr std::array kCalls{
     CallRow{"/osteon.v1.RoomService/Join", kInRoom},
@@ -38,17 +38,17 @@ constexpr std::array kCalls{
     CallRow{"/osteon.v1.PeopleService/Say", kCutters},
     CallRow{"/osteon.v1.PeopleService/Demonstrate", kInstructor},
     CallRow{"/osteon.v1.PeopleService/EndDemonstration", kInstructor},
-    CallRow{"/osteon.v1.RoomsService/ListRooms", kSupervisors},
+    CallRow{"/osteon.v1.RoomsService/ListRooms", kInstructorOrOperator},
     CallRow{"/osteon.v1.RoomsService/CreateRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/CloseRoom", kOperator},
     CallRow{"/osteon.v1.RoomsService/ResumeRoom", kOperator},
-    CallRow{"/osteon.v1.RoomsService/BranchRoom", kSupervisors},
-    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kSupervisors},  // an instructor: only rooms that they made
-    CallRow{"/osteon.v1.RoomsService/VerifyRoom", kSupervisors},
+    CallRow{"/osteon.v1.RoomsService/BranchRoom", kInstructorOrOperator},
+    CallRow{"/osteon.v1.RoomsService/DeleteRoom", kInstructorOrOperator},  // an instructor: only rooms that they made
+    CallRow{"/osteon.v1.RoomsService/VerifyRoom", kInstructorOrOperator},
     CallRow{"/osteon.v1.RoomsService/BackUpRoom", kOperator},
-    CallRow{"/osteon.v1.RoomsService/ReplayRoom", kSupervisors},
+    CallRow{"/osteon.v1.RoomsService/ReplayRoom", kInstructorOrOperator},
     CallRow{"/osteon.v1.CaseService/UploadCase", kOperator},
-    CallRow{"/osteon.v1.CaseService/ListCases", kSupervisors},
+    CallRow{"/osteon.v1.CaseService/ListCases", kInstructorOrOperator},
 };
 
 // In the order of the enumerations.

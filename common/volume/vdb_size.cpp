@@ -120,7 +120,7 @@ void skip_metadata(Bytes& bytes) {
     (void)bytes.text();
     const std::string kind = bytes.text();
     const auto size = bytes.number<std::uint32_t>();
-    // A hint for readers that load a grid gradually. forget_delayed_loading() makes OpenVDB treat it as plain bytes.
+    // A hint for readers that load a grid gradually. start_openvdb() makes OpenVDB treat it as plain bytes.
     const bool plain = kind == "string" || kind == "__delayedload";
     if (!plain && size_of_kind(kind) != size) damaged("its metadata has an entry of an unknown kind or size");
     bytes.skip(size);

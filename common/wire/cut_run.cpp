@@ -264,7 +264,7 @@ Result<void> entries_of_run(const v1::EntryRun& run, const ToolNumbers& tools, s
       state->last.author_seq += author_step;
     }
     Cut cut = state->last;
-    if (!get_cut(in, cut, state->pose)) return bad("entries", "is no entry of cuts");
+    if (!get_cut(in, cut, state->pose)) return bad("entries", "is not a sequence of entries");
     state = state_after(cut, *state);
     entries.push_back({index, {.room_seq = {room_seq}, .kind = SessionEntryKind::committed, .cut = std::move(cut)}});
   }
@@ -343,7 +343,7 @@ Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const T
   while (!in.rest.empty()) {
     Cut cut = state->last;
     cut.author_seq = run.author_seq() + cuts.size();
-    if (!get_cut(in, cut, state->pose)) return bad("cuts", "is no entry of cuts");
+    if (!get_cut(in, cut, state->pose)) return bad("cuts", "is not a sequence of cuts");
     state = state_after(cut, *state);
     cuts.push_back(std::move(cut));
   }

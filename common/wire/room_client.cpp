@@ -80,7 +80,7 @@ class RoomNamers final : public grpc::experimental::ClientInterceptorFactoryInte
 };
 
 std::shared_ptr<grpc::Channel> make_channel(const std::string& address,
-                                            const std::shared_ptr<grpc::ChannelCredentials>& tls, ClientKind kind,
+                                            const std::shared_ptr<grpc::ChannelCredentials>& security, ClientKind kind,
                                             const std::shared_ptr<const RoomName>& room,
                                             const ClientCredentials& credentials) {
   // The program reports failures in one sentence, so gRPC's own log lines are switched off.
@@ -97,10 +97,10 @@ std::shared_ptr<grpc::Channel> make_channel(const std::string& address,
   arguments.SetMaxReceiveMessageSize(kMaxReceiveBytes);
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> namers;
   if (room || !credentials.ticket.empty()) namers.push_back(std::make_unique<RoomNamers>(room, credentials));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(address, tls, arguments, std::move(namers));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(address, security, arguments, std::move(namers));
 }
 
-bool can_be_reached(const std::string& address) {
+bool is_server_address(const std::string& address) {
   const Result<HostPort> at = parse_host_port(address, "--server");
   return at && at->port > 0 && address.find('/') == std::string::npos;
 }
@@ -141,13 +141,13 @@ Error error_of(const grpc::Status& status, const std::string& server) {
 Result<std::shared_ptr<grpc::Channel>> reach(const std::string& address, const std::shared_ptr<const RoomName>& room,
                                              ClientKind kind, std::chrono::milliseconds patience,
                                              const std::function<bool()>& stop, const ClientCredentials& credentials) {
-  if (!can_be_reached(address))
+  if (!is_server_address(address))
     return failure(ErrorCode::invalid_input, "the server's address " + address +
                                                  " is not HOST:PORT; give the one that osteon-server prints, such as " +
                                                  "127.0.0.1:50151, without http:// and without a path");
-  const Result<std::shared_ptr<grpc::ChannelCredentials>> tls = channel_credentials(credentials, address);
-  if (!tls) return tl::unexpected(tls.error());
-  std::shared_ptr<grpc::Channel> channel = make_channel(address, *tls, kind, room, credentials);
+  const Result<std::shared_ptr<grpc::ChannelCredentials>> security = channel_credentials(credentials, address);
+  if (!security) return tl::unexpected(security.error());
+  std::shared_ptr<grpc::Channel> channel = make_channel(address, *security, kind, room, credentials);
   // Waits in short intervals, so that the caller can stop.
   const auto until = Clock::now() + patience;
   bool has_looked = false;

@@ -170,7 +170,7 @@ std::optional<ServerLink::Out> ServerLink::send(Time now, std::span<std::uint8_t
     bone_.reset();
     bone_at_ = now;
   }
-  // Tools may take half of the room. Entries come next, repeated as far as they fit, and use the rest.
+  // Tools may take half of the room. Entries come next, repeated as far as they fit. Waiting tools get what is left.
   add_partners(filler, now, std::max(filler.room() / 2, endpoint_.window().least_room(now)));
   endpoint_.add_items(filler, now);
   add_partners(filler, now, 0);
