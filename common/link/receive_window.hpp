@@ -25,7 +25,7 @@ class ReceiveWindow {
       : next_(first), most_ahead_(most_ahead) {}
 
   // False for an item that came before or is too far ahead.
-  bool offer(std::uint64_t number, Item item) {
+  bool insert(std::uint64_t number, Item item) {
     if (number < next_ || held_.contains(number)) {
       ++counts_.repeated;
       return false;

@@ -97,7 +97,7 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     frozen_ = packet.frozen();
   }
   for (const IndexedEntry& entry : *entries)
-    if (entry.entry.kind != SessionEntryKind::streamed) entries_.offer(entry.index, entry.entry);
+    if (entry.entry.kind != SessionEntryKind::streamed) entries_.insert(entry.index, entry.entry);
   if (!entries->empty() || left_out > 0) endpoint_.answer();
   for (KnownToolState& state : states) keep_partner(std::move(state), now);
   if (bone && bone->seen_seq > bone_seq_) {

@@ -48,7 +48,7 @@ class ClientLink {
   // Accepts any bytes.
   void receive(std::span<const std::uint8_t> datagram, Time now);
   // The stream's copy of an entry. False: it arrived before, or is too far ahead of what was taken.
-  bool offer(const IndexedEntry& entry) { return entries_.offer(entry.index, entry.entry); }
+  bool insert(const IndexedEntry& entry) { return entries_.insert(entry.index, entry.entry); }
   // The stream has delivered this entry and all entries before it that were not taken here. None of them comes out any
   // more.
   void received(std::uint64_t index) { entries_.skip(index); }

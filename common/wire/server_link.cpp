@@ -65,7 +65,7 @@ void ServerLink::receive(const Endpoint& from, std::span<const std::uint8_t> dat
   endpoint_.read_times(packet, *opened, now);
   for (Cut& cut : cuts) {
     const std::uint64_t number = cut.author_seq;
-    cuts_.offer(number, std::move(cut));
+    cuts_.insert(number, std::move(cut));
   }
   if (packet.cuts_size() > 0) endpoint_.answer();
   if (*newer) {
@@ -97,7 +97,7 @@ bool ServerLink::push(const IndexedEntry& entry) {
   return false;
 }
 
-bool ServerLink::tell(std::uint64_t index, const SessionEntry& entry) {
+bool ServerLink::enqueue(std::uint64_t index, const SessionEntry& entry) {
   if (entry.kind == SessionEntryKind::committed && entry.cut.author == author_) decided(entry.cut.author_seq);
   if (entry.kind == SessionEntryKind::rejected) {
     decided(entry.author_seq);

@@ -33,7 +33,7 @@ class ServerLink {
   // Accepts any bytes from any address. A datagram that is not authentic changes nothing and gets no answer.
   void receive(const Endpoint& from, std::span<const std::uint8_t> datagram, Time now);
   // A cut that came over the stream. False: it arrived before, or is too far ahead of what was taken.
-  bool offer(const Cut& cut) { return cuts_.offer(cut.author_seq, cut); }
+  bool insert(const Cut& cut) { return cuts_.insert(cut.author_seq, cut); }
   // Cuts in order of their author_seq, each once.
   [[nodiscard]] std::optional<Cut> take_cut() { return cuts_.take(); }
   // Cuts up to this one were decided and the decisions are durable, so they are acknowledged. This includes cuts of an
@@ -51,7 +51,7 @@ class ServerLink {
   // Sends an entry to the session's client. If it is the client's own cut, or rejects one, that cut is decided and
   // durable. A rejection also raises the lease. The entry is pushed unless `index` is 0; then it has no number, because
   // it was part of what the client received first.
-  bool tell(std::uint64_t index, const SessionEntry& entry);
+  bool enqueue(std::uint64_t index, const SessionEntry& entry);
   // The session reports over the stream that it has taken the entries up to this one.
   void acknowledge(std::uint64_t index) { endpoint_.acknowledge(index); }
   // The author has left and sends no more cuts.

@@ -197,7 +197,7 @@ json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string
 }
 
 // Reports events of the devices to the user, as they happen.
-void tell(DeviceEvent event, std::string_view device, const std::string& sentence) {
+void report(DeviceEvent event, std::string_view device, const std::string& sentence) {
   switch (event) {
     case DeviceEvent::lost:
       log::warn("device lost", {{"device", device}, {"because", sentence}, {"force", "none until it is back"}});
@@ -253,7 +253,7 @@ Result<void> run(Options& options, const StopSignal& stop) {
   if (!credentials) return tl::unexpected(credentials.error());
   options.room.credentials = *credentials;
   if (Result<void> usable = check_outputs(options); !usable) return usable;
-  Result<ToolOperator> hand = ToolOperator::make(options.hand, tell);
+  Result<ToolOperator> hand = ToolOperator::make(options.hand, report);
   if (!hand) return tl::unexpected(hand.error());
 
   options.room.patience = std::chrono::milliseconds(std::llround(1e3 * options.patience_s));

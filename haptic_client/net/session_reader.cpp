@@ -42,7 +42,7 @@ Result<void> SessionReader::take(v1::SessionResponse response) {
     return decided_(response.rejected().author_seq()), Result<void>{};
   if (response.index() == 0) return deliver(response);
   const std::uint64_t index = response.index();
-  entries_.offer(index, std::move(response));
+  entries_.insert(index, std::move(response));
   return pass_on();
 }
 
@@ -50,7 +50,7 @@ Result<void> SessionReader::take(wire::IndexedEntry entry) {
   // The stream sends what such an entry stands for. It also sends a cut whose tool is not known yet.
   if (entry.entry.kind == wire::SessionEntryKind::streamed) return {};
   if (entry.entry.kind == wire::SessionEntryKind::committed && !cuts(entry.entry.cut)) return {};
-  entries_.offer(entry.index, std::move(entry.entry));
+  entries_.insert(entry.index, std::move(entry.entry));
   return pass_on();
 }
 

@@ -35,7 +35,7 @@ Result<std::unique_ptr<AuditTrail>> AuditTrail::open(AuditOptions options, Disk*
   trail->batch_.push_back({.action = "start", .result = kOk});
   auto written = trail->log_.append(trail->batch_);
   if (!written) return tl::unexpected(written.error());
-  trail->tell(*written);
+  trail->send_to_syslog(*written);
   trail->maintain();
   trail->thread_ = std::thread([raw = trail.get()] { raw->run(); });
   return trail;
@@ -149,13 +149,13 @@ void AuditTrail::write(std::unique_lock<std::mutex>& lock) {
     log::error("the audit log cannot be written; the server goes on, and records wait in memory",
                {{"reason", written.error().message}});
   if (written && was_failing) log::warn("the audit log is written again");
-  if (written) tell(*written);
+  if (written) send_to_syslog(*written);
   lock.lock();
   counts_.failing = !written;
   if (written) counts_.written += written->size();
 }
 
-void AuditTrail::tell(const std::vector<AuditLog::Written>& written) {
+void AuditTrail::send_to_syslog(const std::vector<AuditLog::Written>& written) {
   for (std::size_t i = 0; i < written.size(); ++i)
     (void)syslog_.send(syslog_message(written[i].record, clean(batch_[i].who), written[i].hash));
   batch_.clear();

@@ -72,8 +72,8 @@ class AuditTrail {
   void end_window();
   void run();
   void write(std::unique_lock<std::mutex>& lock);  // writes what is waiting; releases the lock while it does so
-  void tell(const std::vector<AuditLog::Written>& written);  // [writer] the batch is on the disk
-  void maintain();                                           // [writer] retention
+  void send_to_syslog(const std::vector<AuditLog::Written>& written);  // [writer] the batch is on the disk
+  void maintain();                                                     // [writer] retention
 
   const AuditOptions options_;
   AuditLog log_;  // used by the writer only, like the next three

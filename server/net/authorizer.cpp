@@ -526,7 +526,7 @@ Result<bool> Authorizer::read_ticket_keys() {
 // A slow disk delays no call: files are read first, and only the result is stored under the lock that calls take.
 void Authorizer::refresh() {
   const std::lock_guard reading(reading_);
-  const auto tell = [](std::string_view what, const Result<bool>& read, std::string& logged) {
+  const auto report = [](std::string_view what, const Result<bool>& read, std::string& logged) {
     const std::string fault = read ? std::string() : read.error().message;
     if (!fault.empty() && fault != logged) log::error(what, {{"fault", fault}});
     logged = fault;
@@ -539,13 +539,13 @@ void Authorizer::refresh() {
     is_revocation = !access_.list().revokes_as(access_list_);
     access_list_ = access_.list();
   }
-  tell("access list", list, access_fault_);
+  report("access list", list, access_fault_);
   const Result<bool> authorities = read_authorities();
   if (authorities && *authorities) log::info("authorities", {{"revoked_certificates", listed_serials_.size()}});
-  tell("authorities", authorities, authorities_fault_);
+  report("authorities", authorities, authorities_fault_);
   const Result<bool> keys = read_ticket_keys();
   if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
-  tell("ticket keys were not read, and those before count on", keys, keys_fault_);
+  report("ticket keys were not read, and those before count on", keys, keys_fault_);
   // A changed role alone closes no connection, since this would also close connections before their first call.
   if (!is_revocation && !(authorities && *authorities)) return;
   const std::lock_guard lock(mutex_);

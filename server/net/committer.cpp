@@ -20,19 +20,19 @@ Committer::~Committer() {
   if (thread_.joinable()) thread_.join();
 }
 
-void Committer::commit(std::vector<LogEntry> entries, std::vector<Tell> tells) {
-  if (entries.empty() && tells.empty()) return;
-  if (!write_) return keep(entries, tells);
+void Committer::commit(std::vector<LogEntry> entries, std::vector<WhenDurable> callbacks) {
+  if (entries.empty() && callbacks.empty()) return;
+  if (!write_) return keep(entries, callbacks);
   const std::lock_guard lock(mutex_);
   std::ranges::move(entries, std::back_inserter(entries_));
-  std::ranges::move(tells, std::back_inserter(tells_));
+  std::ranges::move(callbacks, std::back_inserter(callbacks_));
   wake_.notify_all();
 }
 
 void Committer::drain() {
-  if (!thread_.joinable()) return keep(std::exchange(entries_, {}), std::exchange(tells_, {}));
+  if (!thread_.joinable()) return keep(std::exchange(entries_, {}), std::exchange(callbacks_, {}));
   std::unique_lock lock(mutex_);
-  wake_.wait(lock, [&] { return !busy_ && entries_.empty() && tells_.empty(); });
+  wake_.wait(lock, [&] { return !busy_ && entries_.empty() && callbacks_.empty(); });
 }
 
 std::size_t Committer::waiting() const {
@@ -50,7 +50,7 @@ std::optional<Error> Committer::failure() const {
   return failure_;
 }
 
-void Committer::keep(const std::vector<LogEntry>& entries, const std::vector<Tell>& tells) {
+void Committer::keep(const std::vector<LogEntry>& entries, const std::vector<WhenDurable>& callbacks) {
   Result<void> durable;
   if (const std::optional<Error> failed = failure()) durable = tl::unexpected(*failed);
   if (write_ && durable && !entries.empty()) {
@@ -63,20 +63,20 @@ void Committer::keep(const std::vector<LogEntry>& entries, const std::vector<Tel
     }
     if (!durable && failed_) failed_(durable.error());
   }
-  for (const Tell& tell : tells) tell(durable);
+  for (const WhenDurable& call : callbacks) call(durable);
 }
 
 void Committer::run() {
   std::unique_lock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [&] { return end_ || !entries_.empty() || !tells_.empty(); });
-    if (entries_.empty() && tells_.empty()) return;
+    wake_.wait(lock, [&] { return end_ || !entries_.empty() || !callbacks_.empty(); });
+    if (entries_.empty() && callbacks_.empty()) return;
     const std::vector<LogEntry> entries = std::exchange(entries_, {});
-    const std::vector<Tell> tells = std::exchange(tells_, {});
+    const std::vector<WhenDurable> callbacks = std::exchange(callbacks_, {});
     writing_ = entries.size();
     busy_ = true;
     lock.unlock();
-    keep(entries, tells);
+    keep(entries, callbacks);
     lock.lock();
     writing_ = 0;
     busy_ = false;

@@ -21,7 +21,7 @@ class Committer {
   // Returns when the entries are durable; blocks. It is not called again after an error.
   using Write = std::function<Result<void>(std::span<const LogEntry>)>;
   // Sends a decision once it is durable. Gets an error if it will never be durable.
-  using Tell = std::function<void(const Result<void>& durable)>;
+  using WhenDurable = std::function<void(const Result<void>& durable)>;
 
   // Without `write` nothing is written, and everything is sent at once on the caller's thread. `failed` is called once,
   // on the committing thread, before the error is sent to anybody. `apart` false: there is no thread, and drain()
@@ -32,7 +32,7 @@ class Committer {
   Committer& operator=(const Committer&) = delete;
 
   // [tick] Takes entries and then the functions that send them, in the order of the calls. Either may be empty.
-  void commit(std::vector<LogEntry> entries, std::vector<Tell> tells);
+  void commit(std::vector<LogEntry> entries, std::vector<WhenDurable> callbacks);
   // Returns when everything handed over is durable and sent.
   void drain();
 
@@ -43,14 +43,14 @@ class Committer {
  private:
   void run();
   // Writes and sends, without the mutex.
-  void keep(const std::vector<LogEntry>& entries, const std::vector<Tell>& tells);
+  void keep(const std::vector<LogEntry>& entries, const std::vector<WhenDurable>& callbacks);
 
   const Write write_;
   const std::function<void(const Error&)> failed_;
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::vector<LogEntry> entries_;
-  std::vector<Tell> tells_;
+  std::vector<WhenDurable> callbacks_;
   std::size_t writing_ = 0;  // entries in the current transaction
   bool busy_ = false, end_ = false;
   DurationHistogram times_;

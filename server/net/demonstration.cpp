@@ -90,8 +90,8 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     const std::lock_guard lock(mutex_);
     stopped_ = !supervised.supervision.may_cut();
   }
-  void offer(RoomSeq, const Bytes&) override {}
-  void offer(RoomSeq, const Bytes&, const wire::SessionEntry& entry) override {
+  void enqueue(RoomSeq, const Bytes&) override {}
+  void enqueue(RoomSeq, const Bytes&, const wire::SessionEntry& entry) override {
     const std::lock_guard lock(mutex_);
     if (entry.kind == wire::SessionEntryKind::supervised) {
       lease_ = entry.lease_epoch;
@@ -190,14 +190,14 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     std::optional<Clock::time_point> seen_at_work;
     for (Step step = next({}); step.what != Step::What::end; step = next(seen_at_work)) {
       if (step.what == Step::What::rest) {
-        for (CuttingState& state : tool.at_rest()) runtime_.offer_state(std::move(state));
+        for (CuttingState& state : tool.at_rest()) runtime_.publish_state(std::move(state));
         seen_at_work.reset();
         continue;
       }
       const Clock::time_point now = Clock::now();
       runtime_.queue_cut(shared_from_this(), step.cut.cut, now);
       if (std::optional<CuttingState> state = tool.see(step.cut.cut, runtime_.tools(), now.time_since_epoch())) {
-        runtime_.offer_state(std::move(*state));
+        runtime_.publish_state(std::move(*state));
         seen_at_work = now + Player::kSeenAfterCut;
       }
     }

@@ -45,22 +45,22 @@ void SessionLink::say(News news) {
   if (news.arrived > 0) receiver_->arrived(news.arrived);
 }
 
-void SessionLink::offer(const Cut& cut) {
+void SessionLink::insert(const Cut& cut) {
   const std::lock_guard delivery(delivery_mutex_);
   News next;
   {
     const std::lock_guard lock(mutex_);
-    link_.offer(cut);
+    link_.insert(cut);
     next = news();
   }
   say(std::move(next));
 }
 
-bool SessionLink::tell(std::uint64_t index, const wire::SessionEntry& entry) {
+bool SessionLink::enqueue(std::uint64_t index, const wire::SessionEntry& entry) {
   bool goes = false;
   {
     const std::lock_guard lock(mutex_);
-    goes = link_.tell(index, entry);
+    goes = link_.enqueue(index, entry);
   }
   if (server_) server_->wake();
   return goes;

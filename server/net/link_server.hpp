@@ -26,7 +26,7 @@ class SessionLink {
   class Receiver {
    public:
     virtual ~Receiver() = default;
-    // Cuts in order of their author_seq, whether they came over the link or by offer().
+    // Cuts in order of their author_seq, whether they came over the link or by insert().
     virtual void take(Cut cut) = 0;
     virtual void take(CuttingState state) = 0;
     virtual void pushed(const MountLoad& /*push*/) {}  // the newest load on the compliant mount
@@ -38,10 +38,10 @@ class SessionLink {
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
 
   // A cut that came over the stream. The receiver gets it in order, within this call or later.
-  void offer(const Cut& cut);
-  // Takes every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::tell.
+  void insert(const Cut& cut);
+  // Takes every entry of the session in order, also those that go over the stream alone: see wire::ServerLink::enqueue.
   // Returns false if this entry goes over the stream alone.
-  bool tell(std::uint64_t index, const wire::SessionEntry& entry);
+  bool enqueue(std::uint64_t index, const wire::SessionEntry& entry);
   void know_tool(std::uint32_t number, const Digest& tool);
   // The newest states of others' tools. Returns false if nothing gets through now, so that the stream must carry them.
   bool set_partners(std::span<const CuttingState> partners);

@@ -172,7 +172,7 @@ void MeshPublisher::make_stale_blocks(bool due) {
     }
     surface_.room_seq = update.room_seq;
     for (Stream& stream : streams_) {
-      stream.subscriber->offer(update);
+      stream.subscriber->enqueue(update);
       stream.owed = true;
     }
     owed_ = !streams_.empty();

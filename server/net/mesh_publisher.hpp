@@ -1,4 +1,4 @@
-// Publishes the surface of a room's bone to viewers. One thread makes the blocks that events have changed and offers
+// Publishes the surface of a room's bone to viewers. One thread makes the blocks that events have changed and enqueues
 // them to every open stream. Viewers take turns, so that no message waits behind those to all other viewers.
 #pragma once
 #include <chrono>
@@ -25,8 +25,8 @@ class MeshSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const { return {}; }
   virtual void begin(MeshUpdate whole_surface) = 0;
-  virtual void offer(const MeshUpdate& update) = 0;
-  virtual void send() {}  // sends what it was offered: it is this stream's turn
+  virtual void enqueue(const MeshUpdate& update) = 0;
+  virtual void send() {}  // sends what it was enqueued: it is this stream's turn
 };
 
 // How much of the bone is drawn: all of it in full, or in full only what viewers look at and tools work on.
@@ -66,8 +66,8 @@ class MeshPublisher {
   void make_whole_surface(const std::function<void(double)>& progress);
   void start();
   void stop();  // makes what is due, then joins the thread
-  // [mesh thread; any other before start() and after stop()] Makes the stale blocks and offers them. If none is stale
-  // and `due`, offers the room's sequence number alone. Then sends to the streams whose turn it is.
+  // [mesh thread; any other before start() and after stop()] Makes the stale blocks and enqueues them. If none is stale
+  // and `due`, enqueues the room's sequence number alone. Then sends to the streams whose turn it is.
   void update(bool due);
 
   void changed(Clock::time_point arrived);  // a cut or event that arrived at that time has made blocks stale
@@ -88,7 +88,7 @@ class MeshPublisher {
   struct Stream {
     MeshSubscriber* subscriber;
     Pace pace;
-    bool owed = false;  // it was offered something that was not sent yet
+    bool owed = false;  // it was enqueued something that was not sent yet
   };
   void run();
   void follow_looks(Clock::time_point now);

@@ -40,7 +40,7 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
       if (!committer.failure()) close_room(*store->closed_to_entries());
     });
   }
-  committer.commit(room.take_entries(), std::exchange(tells, {}));
+  committer.commit(room.take_entries(), std::exchange(callbacks, {}));
   board.publish(RoomSeq{room_seq});
   people.publish(RoomSeq{room_seq}, Clock::time_point(std::chrono::duration_cast<Clock::duration>(now)));
   return decided;
@@ -74,9 +74,9 @@ bool RoomRuntime::Impl::play(std::chrono::nanoseconds now) {
     if (!cut)
       show_scene();
     else if (std::optional<CuttingState> state = player->see(cut->cut, *room.tools(), now))
-      board.offer(std::move(*state));
+      board.update(std::move(*state));
   }
-  for (CuttingState& state : player->at_rest(now)) board.offer(std::move(state));
+  for (CuttingState& state : player->at_rest(now)) board.update(std::move(state));
   if (played > 0) note_changed(Clock::now());
   return played > 0;
 }

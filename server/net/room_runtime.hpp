@@ -35,9 +35,9 @@ class SessionSubscriber : public Subscriber {
   // Called once, after begin() and perhaps after entries. Entries apply to these leaves; applying one again that a leaf
   // already contains changes nothing.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
-  virtual void offer(RoomSeq seq, const Bytes& entry) = 0;  // a whole SessionResponse
+  virtual void enqueue(RoomSeq seq, const Bytes& entry) = 0;  // a whole SessionResponse
   // The same. `fast`: the entry's short form for the fast path.
-  virtual void offer(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& /*fast*/) { offer(seq, entry); }
+  virtual void enqueue(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& /*fast*/) { enqueue(seq, entry); }
   // [thread of the tools' states] The newest states of all tools. Returns true if some are still to be sent and it
   // wants to be called again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
@@ -174,7 +174,7 @@ class RoomRuntime {
 
   // Queued until the next tick. The subscriber is kept alive until then and gets the result.
   void queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut cut, Clock::time_point arrived);
-  void offer_state(CuttingState state);                    // newest of its author wins
+  void publish_state(CuttingState state);                  // newest of its author wins
   void push_bone(AuthorId author, const MountLoad& push);  // likewise; no effect without a mount
   // Queued until the next tick, behind the cuts that came before. `answer` is called there and must return at once. By
   // then the event was sent to every session. Error unavailable: the room has stopped.

@@ -299,7 +299,7 @@ std::size_t Rooms::count() const {
 
 std::vector<RoomListing> Rooms::list() const {
   std::map<std::string, RoomListing> all;
-  const auto tell_origin = [&](RoomListing& listing, const RoomGenesis& genesis) {
+  const auto set_origin = [&](RoomListing& listing, const RoomGenesis& genesis) {
     listing.case_hash = genesis.case_hash;
     listing.parent = genesis.parent;
     listing.parent_room_seq = genesis.parent_room_seq;
@@ -308,7 +308,7 @@ std::vector<RoomListing> Rooms::list() const {
   for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
     RoomListing& listing = all[room->name];
     const RuntimeHealth health = room->runtime().health();
-    if (room->store()) tell_origin(listing, room->store()->genesis());
+    if (room->store()) set_origin(listing, room->store()->genesis());
     listing.name = room->name;
     listing.open = health.serving;
     listing.kept = room->store() != nullptr;
@@ -331,7 +331,7 @@ std::vector<RoomListing> Rooms::list() const {
       RoomListing& listing = all[name];
       listing.name = name;
       listing.kept = true;
-      if (const Result<RoomGenesis> genesis = peek_genesis(entry.path())) tell_origin(listing, *genesis);
+      if (const Result<RoomGenesis> genesis = peek_genesis(entry.path())) set_origin(listing, *genesis);
     }
   std::vector<RoomListing> listed;
   for (auto& [name, listing] : all) listed.push_back(std::move(listing));

@@ -49,7 +49,7 @@ struct RoomRuntime::Impl {
     authors = room.authors();
     if (rates_.mount && !p) mount.emplace(MountServerParams{.mount = mount_about(room.bone().bounds().centre_mm())});
     if (p) player.emplace(std::move(*p), room.time());
-    board.tell_hands([this](const std::vector<CuttingState>& states) { return tell_hands(states); });
+    board.set_session_sender([this](const std::vector<CuttingState>& states) { return send_partners(states); });
   }
   [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomStore* store);
 
@@ -63,8 +63,8 @@ struct RoomRuntime::Impl {
   void run_pieces();
   void decide(QueuedCut& queued);
   void decide(QueuedEvent& queued);
-  // [tick] Calls `tell` when what was decided is durable.
-  void later(Committer::Tell tell) { tells.push_back(std::move(tell)); }
+  // [tick] Calls `when_durable` when what was decided is durable.
+  void later(Committer::WhenDurable when_durable) { callbacks.push_back(std::move(when_durable)); }
   [[nodiscard]] MessageParts entries_of(const RoomEvent& event);
   // What some sessions get in place of the entry that the others get.
   struct Personal {
@@ -85,7 +85,7 @@ struct RoomRuntime::Impl {
     Personal personal;
   };
   // Returns true if any session still lacks some of the states.
-  bool tell_hands(const std::vector<CuttingState>& states);
+  bool send_partners(const std::vector<CuttingState>& states);
   [[nodiscard]] std::uint32_t number_of(const Digest& tool);
   void publish_durable(std::chrono::nanoseconds now);
   void move_bone(std::chrono::nanoseconds now);  // [tick] on its mount
@@ -156,9 +156,9 @@ struct RoomRuntime::Impl {
   Bytes redial;                           // under sessions_mutex: sent to sessions when the process is about to stop
   std::mutex copy_mutex;                  // held while the bone is copied; of a stopped runtime by every caller
   std::optional<BoneStatus> last_status;  // under copy_mutex
-  std::map<std::string, std::uint32_t> persons;  // of the tick thread: numbers by name, if no journal gives them
-  std::vector<Queued> batch;                     // of the tick thread
-  std::vector<Committer::Tell> tells;            // of the tick thread
+  std::map<std::string, std::uint32_t> persons;   // of the tick thread: numbers by name, if no journal gives them
+  std::vector<Queued> batch;                      // of the tick thread
+  std::vector<Committer::WhenDurable> callbacks;  // of the tick thread
   // Of the tick thread: sessions were informed that the journal is closed to entries.
   bool closing_reported = false;
   // Of the tick thread: when sessions are next informed how much is durable.

@@ -80,9 +80,9 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(subscriber->author());
       if (!repeated && to_all)
-        sessions.each([&](SessionSubscriber& one) { one.offer(seq, entry, fast); });
+        sessions.each([&](SessionSubscriber& one) { one.enqueue(seq, entry, fast); });
       else if (author != open_authors.end())
-        repeated ? author->second->answer(entry) : author->second->offer(seq, entry, fast);
+        repeated ? author->second->answer(entry) : author->second->enqueue(seq, entry, fast);
     }
     if (durable && newly) metrics.acknowledged(done, kept, Clock::now());
     if (durable && newly) people.took_cut(subscriber->author());
@@ -124,9 +124,9 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
         for (const Bytes& entry : one.entries)
           sessions.each([&](SessionSubscriber& subscriber) {
             if (one.personal.is_for(subscriber.author()))
-              subscriber.offer(one.seq, one.personal.entry, one.personal.fast);
+              subscriber.enqueue(one.seq, one.personal.entry, one.personal.fast);
             else
-              subscriber.offer(one.seq, entry, {.room_seq = one.seq, .kind = wire::SessionEntryKind::streamed});
+              subscriber.enqueue(one.seq, entry, {.room_seq = one.seq, .kind = wire::SessionEntryKind::streamed});
           });
     }
     answer(event);
@@ -179,7 +179,7 @@ RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_message(const RoomEvent&
 }
 
 // [thread of the state publisher]
-bool RoomRuntime::Impl::tell_hands(const std::vector<CuttingState>& states) {
+bool RoomRuntime::Impl::send_partners(const std::vector<CuttingState>& states) {
   bool owed = false;
   const std::lock_guard lock(sessions_mutex);
   sessions.each([&](SessionSubscriber& subscriber) { owed |= subscriber.show_partners(states); });
@@ -257,7 +257,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
   MessageParts before;
   bool again = false;
   {
-    // Held until the subscriber is in the list. So every entry after `contained` is committed, and offered, later.
+    // Held until the subscriber is in the list. So every entry after `contained` is committed, and enqueued, later.
     const std::shared_lock room_lock(impl_->room_mutex);
     if (!impl_->room.may_cut(subscriber->author()))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
@@ -343,7 +343,7 @@ void RoomRuntime::leave(StateSubscriber& subscriber) {
   impl_->people.went(subscriber.author());
 }
 Presence& RoomRuntime::people() { return impl_->people; }
-void RoomRuntime::offer_state(CuttingState state) { impl_->board.offer(std::move(state)); }
+void RoomRuntime::publish_state(CuttingState state) { impl_->board.update(std::move(state)); }
 void RoomRuntime::push_bone(AuthorId author, const MountLoad& push) {
   if (impl_->mount) impl_->mount->push(author, push);
 }

@@ -123,7 +123,7 @@ MessageParts SessionSendQueue::take() {
   return {entry.bytes, serialised(number)};
 }
 
-void PartnerSendQueue::offer(const std::vector<CuttingState>& all, bool by_stream) {
+void PartnerSendQueue::enqueue(const std::vector<CuttingState>& all, bool by_stream) {
   std::erase_if(partners_, [&](const auto& known) {
     return std::ranges::find(all, known.first, &CuttingState::author) == all.end();
   });

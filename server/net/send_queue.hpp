@@ -114,7 +114,7 @@ class PartnerSendQueue {
 
   // Takes all current states; absent tools are not sent any more. `by_stream` false: they are sent another way, so
   // nothing waits.
-  void offer(const std::vector<CuttingState>& all, bool by_stream);
+  void enqueue(const std::vector<CuttingState>& all, bool by_stream);
   // The next state that is due.
   [[nodiscard]] std::optional<CuttingState> take(Clock::time_point now);
   [[nodiscard]] bool waits() const;

@@ -67,13 +67,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq seq, const Bytes& any) override {
+  void enqueue(RoomSeq seq, const Bytes& any) override {
     const Bytes entry = in_its_version(entry_for_role(seq, any));
     const std::lock_guard lock(mutex_);
     if (entry && !closing()) send_or_give_up(send_queue_.add(seq, entry));
   }
   // [committing thread]
-  void offer(RoomSeq seq, const Bytes& any, const wire::SessionEntry& fast) override {
+  void enqueue(RoomSeq seq, const Bytes& any, const wire::SessionEntry& fast) override {
     const Bytes entry = in_its_version(entry_for_role(seq, any));
     if (!entry) return;
     std::uint64_t index = 0;
@@ -87,10 +87,11 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     // Beside the stream, which carries everything.
     const bool goes = entry == any && may_carry(content_of(fast));
     if (link_)
-      link_->tell(index, goes ? fast : wire::SessionEntry{.room_seq = seq, .kind = wire::SessionEntryKind::streamed});
+      link_->enqueue(index,
+                     goes ? fast : wire::SessionEntry{.room_seq = seq, .kind = wire::SessionEntryKind::streamed});
   }
   void hold(const wire::SessionEntry& supervised) override {
-    if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->tell(0, supervised);
+    if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->enqueue(0, supervised);
   }
   bool show_partners(const std::vector<CuttingState>& states) override {
     if (is_closing()) return false;  // nor do they get them by datagram
@@ -100,7 +101,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     const bool by_link = link_ && may_carry(DatagramContent::partners) && link_->set_partners(others);
     const std::lock_guard lock(mutex_);
     if (closing() || !may_receive(StreamContent::tool_states)) return false;
-    partners_.offer(others, !by_link);
+    partners_.enqueue(others, !by_link);
     pump();
     return partners_.waits();
   }
@@ -202,7 +203,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
       return cut->author_seq <= taken_;
     }();
     if (link_ && !again)
-      link_->offer(*cut);
+      link_->insert(*cut);
     else
       take(std::move(*cut));
     read_on();
@@ -222,7 +223,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     runtime_.queue_cut(std::shared_ptr<SessionSubscriber>(self(), this), std::move(cut), RoomRuntime::Clock::now());
   }
   void take(CuttingState state) override {
-    if (may_carry(DatagramContent::tool_state)) runtime_.offer_state(std::move(state));
+    if (may_carry(DatagramContent::tool_state)) runtime_.publish_state(std::move(state));
   }
   void pushed(const MountLoad& push) override {
     if (may_carry(DatagramContent::bone_push)) runtime_.push_bone(author_, push);
@@ -247,7 +248,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (!state) return close(invalid(state.error().message));
     if (state->author != author_) return close(invalid("state.author is not the author who opened the session"));
     if (!may_carry(DatagramContent::tool_state)) return close(not_allowed());
-    runtime_.offer_state(std::move(*state));
+    runtime_.publish_state(std::move(*state));
     read_on();
   }
 

@@ -26,7 +26,7 @@ void StatePublisher::watch(StateSubscriber& subscriber) {
   const ShownNow shown = newest_;
   const std::uint64_t number = number_;
   states_lock.unlock();
-  if (number > 0) offer(stream, number, shown, Clock::now());
+  if (number > 0) enqueue(stream, number, shown, Clock::now());
   if (ended_) subscriber.end(*ended_);
 }
 
@@ -46,12 +46,12 @@ std::size_t StatePublisher::streams() const {
   return streams_.size();
 }
 
-void StatePublisher::tell_hands(TellHands tell) {
+void StatePublisher::set_session_sender(SendToSessions sender) {
   const std::lock_guard lock(states_mutex_);
-  tell_hands_ = std::move(tell);
+  send_to_sessions_ = std::move(sender);
 }
 
-void StatePublisher::offer(CuttingState state) {
+void StatePublisher::update(CuttingState state) {
   const std::lock_guard lock(states_mutex_);
   Shown& shown = states_[state.author];
   shown = {std::move(state)};
@@ -104,21 +104,21 @@ void StatePublisher::run() {
     wake_.wait(lock, [&] { return due_ || end_; });
     if (!std::exchange(due_, false)) return;
     lock.unlock();
-    tell(Clock::now());
+    send(Clock::now());
     lock.lock();
-    if (!tell_hands_) continue;
-    const TellHands tell = tell_hands_;
+    if (!send_to_sessions_) continue;
+    const SendToSessions send = send_to_sessions_;
     std::vector<CuttingState> states;
     for (const auto& [author, shown] : states_) states.push_back(shown.state);
     lock.unlock();
-    const bool owed = tell(states);
+    const bool owed = send(states);
     lock.lock();
     owed_ |= owed;
   }
 }
 
 // If sending to everyone takes longer than a tick, the next round sends the newest state and skips those between.
-void StatePublisher::tell(Clock::time_point now) {
+void StatePublisher::send(Clock::time_point now) {
   const std::lock_guard lock(streams_mutex_);
   std::unique_lock states_lock(states_mutex_);
   const ShownNow shown = newest_;
@@ -126,9 +126,9 @@ void StatePublisher::tell(Clock::time_point now) {
   states_lock.unlock();
   bool owed = false;
   for (Stream& stream : streams_) {
-    if (stream.offered == number) continue;
+    if (stream.enqueued == number) continue;
     if (stream.pace.due(now))
-      offer(stream, number, shown, now);
+      enqueue(stream, number, shown, now);
     else
       owed = true;
   }
@@ -136,10 +136,10 @@ void StatePublisher::tell(Clock::time_point now) {
   owed_ = owed;
 }
 
-void StatePublisher::offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
-  stream.offered = number;
+void StatePublisher::enqueue(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
+  stream.enqueued = number;
   stream.pace.done(now);
-  stream.subscriber->offer(shown);
+  stream.subscriber->enqueue(shown);
 }
 
 std::vector<Vec3> StatePublisher::tool_tips_mm() const {

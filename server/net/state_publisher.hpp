@@ -28,7 +28,7 @@ struct ShownNow {
 
 class StateSubscriber : public Subscriber {
  public:
-  virtual void offer(const ShownNow& now) = 0;  // the newest wins
+  virtual void enqueue(const ShownNow& now) = 0;  // the newest wins
   // The author of the stream; null: unknown.
   [[nodiscard]] virtual AuthorId author() const { return {}; }
   // Least average time between two messages that it wants.
@@ -48,20 +48,20 @@ class StatePublisher {
   StatePublisher& operator=(const StatePublisher&) = delete;
   void stop();  // sends what was published, then joins the thread
 
-  // Offers the newest message at once, and later ones until the subscriber leaves or all streams end.
+  // Enqueues the newest message at once, and later ones until the subscriber leaves or all streams end.
   void watch(StateSubscriber& subscriber);
   void leave(StateSubscriber& subscriber);
   void end_streams(const std::string& why);  // those open now and those opened later
   [[nodiscard]] std::size_t streams() const;
 
   // Sends the states to sessions, on the thread of the publisher. Returns true to be called again with the next tick.
-  using TellHands = std::function<bool(const std::vector<CuttingState>&)>;
-  void tell_hands(TellHands tell);
+  using SendToSessions = std::function<bool(const std::vector<CuttingState>&)>;
+  void set_session_sender(SendToSessions sender);
 
-  void offer(CuttingState state);  // the newest of its author wins
+  void update(CuttingState state);  // the newest of its author wins
   void session_over(AuthorId author);
   void show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies);
-  // [tick] Offers what has changed since the last call, and what is still owed to slower readers.
+  // [tick] Enqueues what has changed since the last call, and what is still owed to slower readers.
   void publish(RoomSeq room_seq);
   [[nodiscard]] std::vector<Vec3> tool_tips_mm() const;  // of the tools that somebody holds
 
@@ -74,11 +74,11 @@ class StatePublisher {
   struct Stream {
     StateSubscriber* subscriber;
     Pace pace;
-    std::uint64_t offered = 0;  // the newest message that it was offered
+    std::uint64_t enqueued = 0;  // the newest message that it was enqueued
   };
   void run();
-  void tell(Clock::time_point now);
-  static void offer(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now);
+  void send(Clock::time_point now);
+  static void enqueue(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now);
 
   mutable std::mutex streams_mutex_;
   std::vector<Stream> streams_;
@@ -93,7 +93,7 @@ class StatePublisher {
   bool changed_ = false;      // since the newest message was made
   bool due_ = false;          // to be sent
   bool owed_ = false;         // a reader lacks the newest message and wants it later
-  TellHands tell_hands_;
+  SendToSessions send_to_sessions_;
   bool end_ = false;
 
   std::thread thread_;

@@ -26,7 +26,7 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSubscriber {
     send_queue_.emplace(std::move(whole_surface));
     pump();
   }
-  void offer(const MeshUpdate& update) override {
+  void enqueue(const MeshUpdate& update) override {
     const std::lock_guard lock(mutex_);
     if (closing()) return;
     send_queue_->add(update);
@@ -63,7 +63,7 @@ class CuttingStream final : public OutStream<WriteReactor>, public StateSubscrib
   AuthorId author() const override { return author_; }
 
   std::chrono::nanoseconds apart() const override { return apart_; }
-  void offer(const ShownNow& now) override {
+  void enqueue(const ShownNow& now) override {
     const std::lock_guard lock(mutex_);
     if (closing()) return;
     waiting_ = now;

@@ -94,7 +94,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
     // A cut that does not fit into datagrams goes over the stream, which is not in this program. It is counted.
     if (!path_->send(cut)) {
       ++streamed;
-      link_->offer(cut);
+      link_->insert(cut);
     }
     (void)path_->send(state);
   }
@@ -114,11 +114,11 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
     path_->know_tool(number, tool);
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"entries come with what goes in few bytes of them"); }
-  void offer(RoomSeq, const Bytes&, const wire::SessionEntry& fast) override {
+  void enqueue(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"entries come with what goes in few bytes of them"); }
+  void enqueue(RoomSeq, const Bytes&, const wire::SessionEntry& fast) override {
     const bool committed = fast.kind == wire::SessionEntryKind::committed;
     if (committed && fast.cut.author == author_) times.note(told, fast.cut.author_seq);
-    if (!link_->tell(++index_, fast)) path_->received(index_);  // the stream's copy
+    if (!link_->enqueue(++index_, fast)) path_->received(index_);  // the stream's copy
   }
   void answer(const Bytes&) override {}
   void refuse(const Error&) override { ++refused; }
@@ -143,7 +143,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
     runtime_.queue_cut(shared_from_this(), std::move(cut), Clock::now());
     note(test::decided);
   }
-  void take(CuttingState state) override { runtime_.offer_state(std::move(state)); }
+  void take(CuttingState state) override { runtime_.publish_state(std::move(state)); }
   void arrived(std::uint64_t) override {}
 
   // --- the client's side

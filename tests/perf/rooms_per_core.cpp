@@ -46,7 +46,7 @@ class Listener final : public SessionSubscriber {
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override { open = true; }
-  void offer(RoomSeq, const Bytes&) override { ++told; }
+  void enqueue(RoomSeq, const Bytes&) override { ++told; }
   void answer(const Bytes&) override {}
   void refuse(const Error&) override { ++refused; }
   void decided() override {}

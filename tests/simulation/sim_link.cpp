@@ -185,14 +185,14 @@ std::size_t SimLinks::Link::say_news() {
   return cuts.size();
 }
 
-void SimLinks::Link::offer(const Cut& cut) {
-  link_.offer(cut);
+void SimLinks::Link::insert(const Cut& cut) {
+  link_.insert(cut);
   say_news();
 }
 
-bool SimLinks::Link::tell(std::uint64_t index, const wire::SessionEntry& entry) {
+bool SimLinks::Link::enqueue(std::uint64_t index, const wire::SessionEntry& entry) {
   const Time now = links_.datagrams_.time().now();
-  const bool goes = link_.tell(index, entry) && link_.alive(now);
+  const bool goes = link_.enqueue(index, entry) && link_.alive(now);
   links_.alarm_.set(now + std::chrono::microseconds(static_cast<int>(links_.random_.index(kWakingTakes_us))));
   return goes;
 }

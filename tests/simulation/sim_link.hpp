@@ -105,9 +105,9 @@ class SimLinks::Link {
  public:
   Link(SimLinks& links, const SessionKeys& keys, AuthorId author, std::uint64_t first_author_seq, Receiver& sink);
   [[nodiscard]] const SessionKeys& keys() const { return keys_; }
-  void offer(const Cut& cut);
+  void insert(const Cut& cut);
   // False: it is sent over the stream only, because it does not fit or the client cannot be reached.
-  bool tell(std::uint64_t index, const wire::SessionEntry& entry);
+  bool enqueue(std::uint64_t index, const wire::SessionEntry& entry);
   void know_tool(std::uint32_t number, const Digest& tool) { link_.tools().add(number, tool); }
 
  private:

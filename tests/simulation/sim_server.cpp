@@ -79,28 +79,28 @@ class SimServer::Session final : public SessionSubscriber,
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void offer(RoomSeq seq, const Bytes& entry) override { offer(seq, entry, {.room_seq = seq}); }
-  void offer(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
+  void enqueue(RoomSeq seq, const Bytes& entry) override { enqueue(seq, entry, {.room_seq = seq}); }
+  void enqueue(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
     if (closing_ || done_) return;
     const auto chance = [&] { return send_queue_.takes(seq) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
     if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionEntryKind::supervised &&
         server_.random_.index(2) == 0)
-      return tell(seq, noted_entry(seq, {}), {.room_seq = seq});
+      return send_entry(seq, noted_entry(seq, {}), {.room_seq = seq});
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
         held_back_.emplace(HeldBack{seq, entry, fast});
         return;
       }
-      tell(seq, entry, fast);
-      if (held_back_) tell(held_back_->seq, held_back_->entry, held_back_->fast);
+      send_entry(seq, entry, fast);
+      if (held_back_) send_entry(held_back_->seq, held_back_->entry, held_back_->fast);
       held_back_.reset();
       return;
     }
-    tell(seq, entry, fast);
+    send_entry(seq, entry, fast);
   }
   void hold(const wire::SessionEntry& supervised) override {
-    if (link_) link_->tell(0, supervised);
+    if (link_) link_->enqueue(0, supervised);
   }
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
@@ -149,7 +149,7 @@ class SimServer::Session final : public SessionSubscriber,
     // A cut that was accepted before is answered with its first decision. A cut ahead of its turn may follow others
     // that come in datagrams.
     if (link_ && cut->author_seq > taken_)
-      link_->offer(*cut);
+      link_->insert(*cut);
     else
       take(std::move(*cut));
     paused_ = queued_ >= kMaxQueuedCuts;
@@ -176,19 +176,19 @@ class SimServer::Session final : public SessionSubscriber,
     server_.runtime_->queue_cut(shared_from_this(), std::move(cut), {});
   }
   void take(CuttingState state) override {
-    if (!closing_ && !done_) server_.runtime_->offer_state(std::move(state));
+    if (!closing_ && !done_) server_.runtime_->publish_state(std::move(state));
   }
   void arrived(std::uint64_t index) override { send_queue_.arrived(index); }
 
-  void tell(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) {
+  void send_entry(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) {
     const std::uint64_t before = send_queue_.index();
     const bool taken = send_queue_.add(seq, entry);
-    tell_fast(fast, send_queue_.index() > before);
+    send_fast(fast, send_queue_.index() > before);
     add(taken);
   }
-  void tell_fast(const wire::SessionEntry& fast, bool numbered) {
+  void send_fast(const wire::SessionEntry& fast, bool numbered) {
     if (!link_) return;
-    const bool goes = link_->tell(numbered ? send_queue_.index() : 0, fast);
+    const bool goes = link_->enqueue(numbered ? send_queue_.index() : 0, fast);
     if (goes && server_.condition_.breakage == Breakage::pruning) send_queue_.arrived(send_queue_.index());
   }
   void unlink() {

@@ -97,7 +97,7 @@ class Peer {
         number = in.get<std::uint32_t>();
         length = in.get<std::uint8_t>();
       }
-      in_.offer(number, in.text(length));
+      in_.insert(number, in.text(length));
     }
     extremes_.held = std::max(extremes_.held, in_.held());
     while (auto item = in_.take()) take_(std::move(*item));

@@ -230,12 +230,12 @@ TEST(Carrying, LongItemsGoThroughASmallRate) {
 // A faulty window that passes on items repeatedly.
 struct WithoutDedup {
   explicit WithoutDedup(std::uint64_t first, std::uint64_t most_ahead) : window(first, most_ahead) {}
-  bool offer(std::uint64_t number, std::string item) {
+  bool insert(std::uint64_t number, std::string item) {
     if (number <= window.acknowledged()) {
       again.push_back(std::move(item));
       return true;
     }
-    return window.offer(number, std::move(item));
+    return window.insert(number, std::move(item));
   }
   std::optional<std::string> take() {
     if (again.empty()) return window.take();
@@ -253,7 +253,7 @@ struct WithoutDedup {
 // A faulty window that passes on each item once, but as it arrives.
 struct WithoutOrder {
   explicit WithoutOrder(std::uint64_t first, std::uint64_t) : next(first) {}
-  bool offer(std::uint64_t number, std::string item) {
+  bool insert(std::uint64_t number, std::string item) {
     if (!seen.emplace(number, true).second) return false;
     waiting.push_back(std::move(item));
     while (seen.contains(next)) ++next;

@@ -17,30 +17,30 @@ TEST(ReceiveWindow, GivesEachItemOnceInOrder) {
   ReceiveWindow<std::string> window;
   EXPECT_FALSE(window.take());
   EXPECT_EQ(window.acknowledged(), 0u);
-  EXPECT_TRUE(window.offer(2, "b"));
+  EXPECT_TRUE(window.insert(2, "b"));
   EXPECT_FALSE(window.take()) << "1 is missing";
-  EXPECT_TRUE(window.offer(1, "a"));
-  EXPECT_FALSE(window.offer(2, "other")) << "the first item with this number is kept";
+  EXPECT_TRUE(window.insert(1, "a"));
+  EXPECT_FALSE(window.insert(2, "other")) << "the first item with this number is kept";
   EXPECT_EQ(window.acknowledged(), 0u) << "nothing was taken yet";
   EXPECT_EQ(window.take(), "a");
   EXPECT_EQ(window.take(), "b");
   EXPECT_FALSE(window.take());
   EXPECT_EQ(window.acknowledged(), 2u);
-  EXPECT_FALSE(window.offer(1, "a"));
-  EXPECT_FALSE(window.offer(0, "x"));
+  EXPECT_FALSE(window.insert(1, "a"));
+  EXPECT_FALSE(window.insert(0, "x"));
   EXPECT_EQ(window.counts().repeated, 3u);
   EXPECT_EQ(window.counts().taken, 2u);
 }
 
 TEST(ReceiveWindow, DropsWhatIsTooFarAhead) {
   ReceiveWindow<int> window(10, 4);
-  EXPECT_TRUE(window.offer(13, 13));
-  EXPECT_FALSE(window.offer(14, 14));
-  EXPECT_FALSE(window.offer(~std::uint64_t{0}, 0));
+  EXPECT_TRUE(window.insert(13, 13));
+  EXPECT_FALSE(window.insert(14, 14));
+  EXPECT_FALSE(window.insert(~std::uint64_t{0}, 0));
   EXPECT_EQ(window.counts().beyond, 2u);
-  EXPECT_TRUE(window.offer(10, 10));
+  EXPECT_TRUE(window.insert(10, 10));
   EXPECT_EQ(window.take(), 10);
-  EXPECT_TRUE(window.offer(14, 14)) << "the window has moved by one";
+  EXPECT_TRUE(window.insert(14, 14)) << "the window has moved by one";
   EXPECT_EQ(window.held(), 2u);
 }
 
@@ -52,7 +52,7 @@ TEST(ReceiveWindow, ReportsWhatWasReceivedBeyondTheMissing) {
     std::set<std::uint64_t> come;
     for (int i = 0; i < 100; ++i) {
       const std::uint64_t number = 1 + random.index(150);
-      window.offer(number, 0);
+      window.insert(number, 0);
       come.insert(number);
       while (random.unit() < 0.9 && window.take()) {
       }
@@ -77,7 +77,7 @@ TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
     std::vector<std::uint64_t> taken;
     while (taken.size() < count) {
       const std::uint64_t from = first + random.index(count), length = 1 + random.index(8);
-      for (std::uint64_t n = from; n < std::min(from + length, first + count); ++n, ++offers) window.offer(n, n * 7);
+      for (std::uint64_t n = from; n < std::min(from + length, first + count); ++n, ++offers) window.insert(n, n * 7);
       ASSERT_LE(window.held(), most_ahead);
       if (random.unit() < 0.5) continue;  // these are taken later
       while (const auto item = window.take()) taken.push_back(*item);
@@ -93,20 +93,20 @@ TEST(ReceiveWindow, AnyOrderAndRepetitionGivesTheSameSequence) {
 // Items that were received over the other transport are not given out, and do not delay the items behind them.
 TEST(ReceiveWindow, WhatIsSkippedIsPassedOver) {
   ReceiveWindow<int> window(1, 8);
-  EXPECT_TRUE(window.offer(2, 2));
-  EXPECT_TRUE(window.offer(5, 5));
+  EXPECT_TRUE(window.insert(2, 2));
+  EXPECT_TRUE(window.insert(5, 5));
   window.skip(3);
   EXPECT_EQ(window.acknowledged(), 3u);
   EXPECT_EQ(window.held(), 1u);
   EXPECT_EQ(window.beyond(3), 1u);
-  EXPECT_FALSE(window.offer(3, 3));
+  EXPECT_FALSE(window.insert(3, 3));
   EXPECT_FALSE(window.take());
   window.skip(2);
-  EXPECT_TRUE(window.offer(4, 4));
+  EXPECT_TRUE(window.insert(4, 4));
   EXPECT_EQ(window.take(), 4);
   EXPECT_EQ(window.take(), 5);
   window.skip(1'000'000);
-  EXPECT_TRUE(window.offer(1'000'001, 6));
+  EXPECT_TRUE(window.insert(1'000'001, 6));
   EXPECT_EQ(window.take(), 6);
 }
 

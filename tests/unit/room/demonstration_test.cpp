@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 // Keeps every tool state that viewers are sent, of any author.
 class SeenTools final : public StateSubscriber {
  public:
-  void offer(const ShownNow& now) override {
+  void enqueue(const ShownNow& now) override {
     v1::WatchCuttingResponse told;
     EXPECT_TRUE(told.ParseFromString(*now.tools));
     const std::lock_guard lock(mutex_);
@@ -65,7 +65,7 @@ class MountedHand final : public SessionSubscriber {
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq, const Bytes&) override {}
+  void enqueue(RoomSeq, const Bytes&) override {}
   void answer(const Bytes&) override {}
   void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
   void decided() override {}

@@ -258,8 +258,8 @@ class Placed final : public SessionSubscriber {
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq seq, const Bytes&) override { seqs.push_back(seq.value); }
-  void offer(RoomSeq seq, const Bytes&, const wire::SessionEntry& fast) override {
+  void enqueue(RoomSeq seq, const Bytes&) override { seqs.push_back(seq.value); }
+  void enqueue(RoomSeq seq, const Bytes&, const wire::SessionEntry& fast) override {
     seqs.push_back(seq.value);
     if (fast.kind == wire::SessionEntryKind::supervised) told.push_back(fast.supervision);
   }

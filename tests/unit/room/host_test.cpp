@@ -33,7 +33,7 @@ class FakeSession final : public SessionSubscriber {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void offer(RoomSeq seq, const Bytes& entry) override {
+  void enqueue(RoomSeq seq, const Bytes& entry) override {
     const std::lock_guard lock(mutex_);
     ASSERT_TRUE(send_queue_.add(seq, entry));
     read();
@@ -90,8 +90,8 @@ class FakeSession final : public SessionSubscriber {
 
 class FakeMesh final : public MeshSubscriber {
  public:
-  void begin(MeshUpdate whole_surface) override { offer(whole_surface); }
-  void offer(const MeshUpdate& update) override {
+  void begin(MeshUpdate whole_surface) override { enqueue(whole_surface); }
+  void enqueue(const MeshUpdate& update) override {
     const std::lock_guard lock(mutex_);
     for (const auto& [key, bytes] : update.blocks) {
       v1::WatchMeshResponse response;

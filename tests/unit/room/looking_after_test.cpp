@@ -139,7 +139,7 @@ class Hand final : public SessionSubscriber {
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq, const Bytes&) override {}
+  void enqueue(RoomSeq, const Bytes&) override {}
   void answer(const Bytes&) override {}
   void refuse(const Error&) override {}
   void decided() override {}

@@ -19,7 +19,7 @@ class ReceivedMotion final : public SessionSubscriber {
   AuthorId author() const override { return author_; }
   void begin(RoomSeq, MessageParts, Bytes) override {}
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq, const Bytes&) override {}
+  void enqueue(RoomSeq, const Bytes&) override {}
   void answer(const Bytes&) override {}
   void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
   void decided() override {}

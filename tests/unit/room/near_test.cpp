@@ -36,10 +36,10 @@ class Reader final : public MeshSubscriber {
   explicit Reader(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
   void begin(MeshUpdate whole_surface) override {
-    offer(whole_surface);
+    enqueue(whole_surface);
     for (const auto& [key, mesh] : whole_surface.blocks) first_.insert(key.level);
   }
-  void offer(const MeshUpdate& update) override {
+  void enqueue(const MeshUpdate& update) override {
     const std::lock_guard lock(mutex_);
     for (const auto& [key, bytes] : update.blocks) {
       v1::WatchMeshResponse response;
@@ -156,7 +156,7 @@ TEST(NearDetail, FollowsTheViewsOfAllViewers) {
   CuttingState state;
   state.author = runtime.join(MemberKind::surgeon).value();
   state.pose_bone_tool = pose_along(north, {0, 0, -1});
-  runtime.offer_state(state);
+  runtime.publish_state(state);
   ASSERT_TRUE(test::wait_until([&] { return one.level_at(north) == 0; }, 20s));
   EXPECT_EQ(one.open_edges(), 0);
 

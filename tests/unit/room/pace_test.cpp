@@ -63,7 +63,7 @@ TEST(Pace, ManyThatBeginTogetherTakeTurns) {
 class SlowSubscriber final : public StateSubscriber {
  public:
   explicit SlowSubscriber(std::chrono::nanoseconds apart = {}) : apart_(apart) {}
-  void offer(const ShownNow& now) override {
+  void enqueue(const ShownNow& now) override {
     std::unique_lock lock(mutex_);
     inside_ = true;
     opened_.wait(lock, [&] { return open_; });
@@ -114,12 +114,12 @@ TEST(StatePublisher, ATickWaitsForNoStreamAndEveryStreamEndsWithTheNewest) {
   SlowSubscriber slow, prompt, seldom(20ms);
   for (SlowSubscriber* subscriber : {&slow, &prompt, &seldom}) board.watch(*subscriber);
   slow.open(false);
-  board.offer(state(1));
+  board.update(state(1));
   board.publish(RoomSeq{1});
   ASSERT_TRUE(test::wait_until([&] { return slow.inside(); }, 20s));
   // The publisher's thread blocks in the slow subscriber. A room that waited for it would block here.
   for (std::uint64_t seq = 2; seq <= 500; ++seq) {
-    board.offer(state(seq));
+    board.update(state(seq));
     board.publish(RoomSeq{seq});
   }
   EXPECT_TRUE(slow.inside());
@@ -146,7 +146,7 @@ TEST(StatePublisher, ALateSubscriberIsSentTheNewestAtOnceAndStoppingSendsTheLast
   EXPECT_EQ(late.messages(), 1);
   EXPECT_EQ(late.room_seq(), 7u);
   board.publish(RoomSeq{8});  // Nothing has changed, so there is no message.
-  board.offer(state(1));
+  board.update(state(1));
   board.publish(RoomSeq{9});
   board.stop();
   for (SlowSubscriber* subscriber : {&early, &late}) {

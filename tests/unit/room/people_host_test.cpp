@@ -31,14 +31,14 @@ class ReceivedSession final : public SessionSubscriber {
     complete_ = parsed(complete);
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void offer(RoomSeq seq, const Bytes& entry) override {
+  void enqueue(RoomSeq seq, const Bytes& entry) override {
     const std::lock_guard lock(mutex_);
     take(entry, entries_);
     seqs_.push_back(seq);
     fast_.push_back({});
   }
-  void offer(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
-    offer(seq, entry);
+  void enqueue(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
+    enqueue(seq, entry);
     const std::lock_guard lock(mutex_);
     fast_.back() = fast;
   }
@@ -348,7 +348,7 @@ TEST(PartnerSendQueue, SendsTheNewestThirtyTimesASecond) {
   int told = 0;
   std::uint64_t newest = 0;
   for (std::uint64_t ms = 0; ms < 1000; ++ms) {
-    send_queue.offer({state(1, ms + 1)}, true);
+    send_queue.enqueue({state(1, ms + 1)}, true);
     EXPECT_TRUE(send_queue.waits());
     if (const auto one = send_queue.take(start + std::chrono::milliseconds(ms))) {
       ++told;
@@ -362,23 +362,23 @@ TEST(PartnerSendQueue, SendsTheNewestThirtyTimesASecond) {
   EXPECT_NE(newest, 1000u);
   EXPECT_EQ(send_queue.take(start + 2s)->state_seq, 1000u);
   EXPECT_FALSE(send_queue.waits());
-  send_queue.offer({state(1, 1000)}, true);
+  send_queue.enqueue({state(1, 1000)}, true);
   EXPECT_FALSE(send_queue.waits()) << "the state is unchanged";
 }
 
 TEST(PartnerSendQueue, HoldsNothingOfWhatGoesAnotherWayOrOfWhoIsGone) {
   PartnerSendQueue send_queue;
-  send_queue.offer({state(1, 1), state(2, 1)}, false);
+  send_queue.enqueue({state(1, 1), state(2, 1)}, false);
   EXPECT_FALSE(send_queue.waits());
-  send_queue.offer({state(1, 2), state(2, 1)}, true);
+  send_queue.enqueue({state(1, 2), state(2, 1)}, true);
   EXPECT_EQ(send_queue.take({})->author, AuthorId{1});
   EXPECT_FALSE(send_queue.take({}));
-  send_queue.offer({state(2, 2)}, true);
-  send_queue.offer({}, true);
+  send_queue.enqueue({state(2, 2)}, true);
+  send_queue.enqueue({}, true);
   EXPECT_FALSE(send_queue.waits());
   std::vector<CuttingState> many;
   for (std::uint64_t author = 1; author <= 40; ++author) many.push_back(state(author, 1));
-  send_queue.offer(many, true);
+  send_queue.enqueue(many, true);
   std::size_t told = 0;
   while (send_queue.take({})) ++told;
   EXPECT_EQ(told, PartnerSendQueue::kMost);
@@ -432,7 +432,7 @@ TEST(PeopleHost, HapticClientsAreSentOthersTools) {
   RoomRuntime runtime(Room(test::test_block()), {.tick = 2ms, .mesh = 50ms, .pieces = 0ns}, {});
   const auto one = std::make_shared<ReceivedSession>(runtime.join(MemberKind::surgeon).value());
   ASSERT_TRUE(runtime.open_session(one));
-  runtime.offer_state(state(77, 5));
+  runtime.publish_state(state(77, 5));
   const auto told = [&] {
     return std::ranges::any_of(one->partners(), [](const CuttingState& s) { return s.state_seq == 5; });
   };

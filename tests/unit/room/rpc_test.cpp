@@ -57,7 +57,7 @@ TEST_F(RoomRpc, ADecisionAboutAllIsALogEntryOnlyForThoseWhomItChanges) {
   ASSERT_TRUE(wait_until([&] { return away->complete() && here->complete(); }, kPatience));
   const AuthorId absent = away->author();
   away.reset();
-  const auto tell = [&](std::uint64_t subject, bool stopped) {
+  const auto decide = [&](std::uint64_t subject, bool stopped) {
     v1::SuperviseRequest request;
     request.set_author(viewer.author.value);
     request.set_subject(subject);
@@ -70,15 +70,15 @@ TEST_F(RoomRpc, ADecisionAboutAllIsALogEntryOnlyForThoseWhomItChanges) {
   };
   const auto head = [&] { return runtime().room_seq().value; };
   const std::uint64_t before = head();
-  EXPECT_EQ(tell(0, false), before) << "nobody was stopped before";
+  EXPECT_EQ(decide(0, false), before) << "nobody was stopped before";
   EXPECT_EQ(head(), before);
-  EXPECT_EQ(tell(0, true), before + 2) << "also for those who are away";
-  EXPECT_EQ(tell(0, true), before + 2);
+  EXPECT_EQ(decide(0, true), before + 2) << "also for those who are away";
+  EXPECT_EQ(decide(0, true), before + 2);
   EXPECT_EQ(head(), before + 2) << "only once for each";
-  EXPECT_EQ(tell(absent.value, false), before + 3);
-  EXPECT_EQ(tell(0, true), before + 4);
+  EXPECT_EQ(decide(absent.value, false), before + 3);
+  EXPECT_EQ(decide(0, true), before + 4);
   EXPECT_EQ(head(), before + 4) << "only for the one who was let go on";
-  EXPECT_EQ(tell(here->author().value, true), before + 5) << "a decision about one is always an entry";
+  EXPECT_EQ(decide(here->author().value, true), before + 5) << "a decision about one is always an entry";
 }
 
 TEST_F(RoomRpc, AnUndoByAnotherReachesEveryReplicaAndViewer) {

@@ -191,7 +191,7 @@ TEST(SessionSendQueue, SendsLeavesThenCompleteThenOnlyTheEntriesAfterThem) {
   std::vector<FieldLeaf> leaves(2);
   for (FieldLeaf& leaf : leaves) leaf.values.assign(kLeafVoxels, 5);
   leaves[1].origin = {8, 0, 0};
-  // The publisher may still offer the entry that the leaves already contain.
+  // The publisher may still enqueue the entry that the leaves already contain.
   EXPECT_TRUE(send_queue.add(RoomSeq{4}, entry(4)));
   EXPECT_TRUE(send_queue.add(RoomSeq{5}, entry(5)));
   EXPECT_TRUE(send_queue.take().empty()) << "nothing is sent before the leaves are known";

@@ -37,7 +37,7 @@ class ReceivedAtOnce final : public SessionSubscriber {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void offer(RoomSeq seq, const Bytes& entry) override {
+  void enqueue(RoomSeq seq, const Bytes& entry) override {
     ASSERT_TRUE(send_queue_.add(seq, entry));
     read();
   }

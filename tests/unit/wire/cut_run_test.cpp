@@ -458,7 +458,7 @@ TEST(EntryRun, AnyEntriesArriveInTheSessionsOrder) {
       if (random.unit() < 0.9) flying.erase(flying.begin() + static_cast<std::ptrdiff_t>(which));
       const auto read = wire::entries_of(packet, turn < 5 ? none : numbers, &left_out);
       ASSERT_TRUE(read) << read.error().message;
-      for (const wire::IndexedEntry& entry : *read) in.offer(entry.index, entry.entry);
+      for (const wire::IndexedEntry& entry : *read) in.insert(entry.index, entry.entry);
       while (auto entry = in.take()) back.push_back(std::move(*entry));
       window.acknowledge(in.acknowledged(), in.beyond(in.acknowledged()));
     }
@@ -640,7 +640,7 @@ TEST(PacketFiller, UplinkBytesOfDrillingAndRest) {
       if (random.unit() < loss) continue;
       ++received;
       rate.acknowledge(counter, received);
-      for (const std::uint64_t number : picked.numbers) in.offer(number, 0);
+      for (const std::uint64_t number : picked.numbers) in.insert(number, 0);
       while (in.take()) {
       }
       if (in.acknowledged() > answered) answers.emplace_back(t + 80ms, answered = in.acknowledged());

@@ -53,7 +53,7 @@ class ServerEnd {
       OSTEON_CHECK(cut->author == author_);
       if (!decide) continue;
       ++entries_;
-      (void)link.tell(entries_, {.room_seq = {entries_}, .kind = wire::SessionEntryKind::committed, .cut = *cut});
+      (void)link.enqueue(entries_, {.room_seq = {entries_}, .kind = wire::SessionEntryKind::committed, .cut = *cut});
     }
     return taken;
   }

@@ -386,7 +386,7 @@ TEST(LinkEnds, CutsOfAnEarlierSessionAreLeftOut) {
   pair.run(300ms);
   pair.server.decided(2);
   pair.server.decided(1);
-  EXPECT_FALSE(pair.server.offer(pair.cut(2)));
+  EXPECT_FALSE(pair.server.insert(pair.cut(2)));
   ASSERT_TRUE(pair.client.push(pair.cut(3)));
   ASSERT_TRUE(pair.client.push(pair.cut(4)));
   pair.run(100ms);
@@ -411,17 +411,17 @@ TEST(LinkEnds, AnEntryDecidesTheOwnCutInIt) {
   };
   Cut of_another = pair.cut(2);
   of_another.author = AuthorId{pair.cut(2).author.value + 1};
-  EXPECT_TRUE(pair.server.tell(1, {.room_seq = {1}, .kind = wire::SessionEntryKind::committed, .cut = of_another}));
+  EXPECT_TRUE(pair.server.enqueue(1, {.room_seq = {1}, .kind = wire::SessionEntryKind::committed, .cut = of_another}));
   EXPECT_EQ(acknowledged(), 0u) << "another's cut";
-  EXPECT_TRUE(pair.server.tell(2, {.room_seq = {2}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(1)}));
+  EXPECT_TRUE(pair.server.enqueue(2, {.room_seq = {2}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(1)}));
   EXPECT_EQ(acknowledged(), 1u);
-  EXPECT_FALSE(pair.server.tell(0, {.room_seq = {2}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(2)}))
+  EXPECT_FALSE(pair.server.enqueue(0, {.room_seq = {2}, .kind = wire::SessionEntryKind::committed, .cut = pair.cut(2)}))
       << "it has no number";
   EXPECT_EQ(acknowledged(), 2u);
   wire::SessionEntry rejection{.room_seq = {3}, .kind = wire::SessionEntryKind::rejected};
   rejection.author_seq = 3;
   rejection.lease_epoch = 4;
-  EXPECT_TRUE(pair.server.tell(3, rejection));
+  EXPECT_TRUE(pair.server.enqueue(3, rejection));
   EXPECT_EQ(acknowledged(), 3u);
   EXPECT_EQ(pair.client.lease_epoch(), 4u);
   std::vector<std::uint64_t> received;
@@ -438,14 +438,14 @@ TEST(LinkEnds, AnInstructorsDecisionFreezesAndEndsTheLease) {
                           .lease_epoch = 6,
                           .supervision = {.taken_by = {3}},
                           .by = {AuthorId{3}, "Dr. Weber"}};
-  EXPECT_TRUE(pair.server.tell(1, word));
+  EXPECT_TRUE(pair.server.enqueue(1, word));
   pair.run(100ms);
   EXPECT_TRUE(pair.client.frozen());
   EXPECT_EQ(pair.client.lease_epoch(), 6u);
   word.lease_epoch = 8;
   word.supervision = {};
   for (std::uint8_t n = 0; n <= wire::kMostToolsInPacket; ++n) word.supervision.tools.push_back(Digest{{n}});
-  EXPECT_FALSE(pair.server.tell(2, word)) << "too long: the stream carries the entry, a packet the freeze and epoch";
+  EXPECT_FALSE(pair.server.enqueue(2, word)) << "too long: the stream carries the entry, a packet the freeze and epoch";
   pair.run(100ms);
   EXPECT_FALSE(pair.client.frozen());
   EXPECT_EQ(pair.client.lease_epoch(), 8u);
@@ -454,7 +454,7 @@ TEST(LinkEnds, AnInstructorsDecisionFreezesAndEndsTheLease) {
   EXPECT_EQ(first->entry.supervision, (Restrictions{.taken_by = {3}}));
   EXPECT_EQ(first->entry.by, (Decider{AuthorId{3}, "Dr. Weber"}));
   EXPECT_FALSE(pair.client.take_entry());
-  EXPECT_TRUE(pair.client.offer({2, word}));
+  EXPECT_TRUE(pair.client.insert({2, word}));
   const auto second = pair.client.take_entry();
   ASSERT_TRUE(second);
   EXPECT_EQ(second->entry, word);
@@ -546,7 +546,7 @@ TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
   const std::uint64_t refused = number;
   for (int i = 0; i < 50; ++i) EXPECT_FALSE(pair.client.push(pair.cut(++number, 20)));
   // The stream delivers the refused cuts. The others arrive in datagrams.
-  for (std::uint64_t n = refused; n <= number; ++n) EXPECT_TRUE(pair.server.offer(pair.cut(n, 20)));
+  for (std::uint64_t n = refused; n <= number; ++n) EXPECT_TRUE(pair.server.insert(pair.cut(n, 20)));
   std::uint64_t taken = 0;
   for (int i = 0; i < 20; ++i) {
     pair.run(100ms);
@@ -564,8 +564,8 @@ TEST(LinkEnds, AFullWindowLeavesTheRestToTheStream) {
   pair.run(100ms);
   EXPECT_EQ(pair.server.take_cut(), pair.cut(number + 1));
   EXPECT_FALSE(pair.server.take_cut());
-  EXPECT_TRUE(pair.server.offer(pair.cut(number + 2, 40)));
-  EXPECT_FALSE(pair.server.offer(pair.cut(number + 2, 40)));
+  EXPECT_TRUE(pair.server.insert(pair.cut(number + 2, 40)));
+  EXPECT_FALSE(pair.server.insert(pair.cut(number + 2, 40)));
   EXPECT_EQ(pair.server.take_cut(), pair.cut(number + 2, 40));
   EXPECT_EQ(pair.server.take_cut(), pair.cut(number + 3));
   pair.server.decided(number + 3);
@@ -653,7 +653,7 @@ TEST(LinkEnds, WhatNoCorrectPeerSendsChangesNothing) {
   marker.add_streamed()->set_index(1);
   pair.forge(marker);
   EXPECT_FALSE(pair.client.take_entry());
-  EXPECT_TRUE(pair.client.offer({1, {.room_seq = {1}}}));
+  EXPECT_TRUE(pair.client.insert({1, {.room_seq = {1}}}));
   EXPECT_EQ(pair.client.take_entry()->index, 1u);
   // The link keeps the latest partners, however many there are.
   CuttingState state;

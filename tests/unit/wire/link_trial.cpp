@@ -93,7 +93,7 @@ void Trial::make_cuts(std::size_t c) {
     client.most_waiting = std::max(client.most_waiting, client.link.half().window().bytes_unacknowledged());
     if (!client.link.push(cut)) {
       ++client.refused;
-      stream([this, c, cut] { sessions[c]->link.offer(cut); });
+      stream([this, c, cut] { sessions[c]->link.insert(cut); });
     }
   }
   CuttingState trembling = state;
@@ -142,7 +142,7 @@ void Trial::turn(std::size_t c) {
   if (!client.link.alive(now)) {
     for (std::uint64_t n = std::max(client.link.acknowledged(), client.streamed_cuts) + 1; n <= client.cuts.size();
          ++n) {
-      stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.offer(cut); });
+      stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.insert(cut); });
       client.streamed_cuts = n;
     }
     if (client.acknowledged_entries != client.link.entries_taken()) {
@@ -187,7 +187,7 @@ void Trial::send_entry(std::size_t c, wire::SessionEntry entry) {
 
 void Trial::stream_entry(std::size_t c, std::uint64_t index) {
   stream([this, c, entry = sessions[c]->entries[index - 1]] {
-    if (clients[c]->link.offer(entry)) ++clients[c]->entries_by_stream;
+    if (clients[c]->link.insert(entry)) ++clients[c]->entries_by_stream;
     turn(c);
   });
 }
