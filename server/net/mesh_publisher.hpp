@@ -26,7 +26,7 @@ class MeshSubscriber : public Subscriber {
   [[nodiscard]] virtual AuthorId author() const { return {}; }
   virtual void begin(MeshUpdate whole_surface) = 0;
   virtual void enqueue(const MeshUpdate& update) = 0;
-  virtual void send() {}  // sends what it was enqueued: it is this stream's turn
+  virtual void send() {}  // sends what is in its queue: it is this stream's turn
 };
 
 // How much of the bone is drawn: all of it in full, or in full only what viewers look at and tools work on.
@@ -88,7 +88,7 @@ class MeshPublisher {
   struct Stream {
     MeshSubscriber* subscriber;
     Pace pace;
-    bool owed = false;  // it was enqueued something that was not sent yet
+    bool owed = false;  // its queue has something that was not sent yet
   };
   void run();
   void follow_looks(Clock::time_point now);

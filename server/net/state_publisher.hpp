@@ -74,7 +74,7 @@ class StatePublisher {
   struct Stream {
     StateSubscriber* subscriber;
     Pace pace;
-    std::uint64_t enqueued = 0;  // the newest message that it was enqueued
+    std::uint64_t enqueued = 0;  // the newest message in its queue
   };
   void run();
   void send(Clock::time_point now);
