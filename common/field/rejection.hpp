@@ -1,32 +1,78 @@
 // Why a room rejects a cut. The author of the cut receives the reason, and journals store it.
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
 namespace osteon {
 
-// Stored in journals and sent, so the numbers never change.
+// Stored in journals and sent, so the numbers never change. The protocol has the same numbers (RejectionReason).
 enum class Rejection : std::uint8_t {
   none = 0,
-  body = 1,             // no such body
-  lease = 2,            // made under a lease that has ended
-  tool = 3,             // not a registered tool, or one that does not cut
-  level = 4,            // finer than the tool or the case allows
-  path = 5,             // no poses or too many
-  rotation = 6,         // a quaternion far from unit length
-  place = 7,            // too far from the bone
-  sweep = 8,            // too long a path for one cut
-  spindle = 9,          // faster than any spindle
-  time = 10,            // more tool time than has passed since the lease was granted
-  rate = 11,            // more volume swept than a room can evaluate
-  power = 12,           // more bone than any motor can remove in that time
-  frozen = 13,          // an instructor has stopped the person
-  taken = 14,           // an instructor has taken over the person's tool
-  forbidden_tool = 15,  // an instructor allows the person only other tools
-  zone = 16,            // outside the zone that an instructor allows
-  metal = 17,           // it would remove metal
+  body = 1,
+  lease = 2,
+  tool = 3,
+  level = 4,
+  path = 5,
+  rotation = 6,
+  place = 7,
+  sweep = 8,
+  spindle = 9,
+  time = 10,
+  rate = 11,
+  power = 12,
+  frozen = 13,
+  taken = 14,
+  forbidden_tool = 15,
+  zone = 16,
+  metal = 17,
 };
-inline constexpr int kRejections = 18;
-[[nodiscard]] std::string_view sentence(Rejection reason);
+
+// What programs and people read about a reason. Programs compare numbers, never sentences.
+struct RejectionText {
+  Rejection reason;
+  std::string_view name;      // label of the metric osteon_rejections_total
+  std::string_view sentence;  // for people
+};
+inline constexpr std::array<RejectionText, 18> kRejectionTexts{{
+    {Rejection::none, "none", "the cut was applied"},
+    {Rejection::body, "body", "the room has no such body"},
+    {Rejection::lease, "lease", "the cut was made under a tool lease that has ended"},
+    {Rejection::tool, "tool", "the tool is not registered in the room, or does not cut"},
+    {Rejection::level, "level", "the level is finer than the tool or the case allows"},
+    {Rejection::path, "path", "the path has no poses or more than a cut may have"},
+    {Rejection::rotation, "rotation", "a rotation on the path is not a unit quaternion"},
+    {Rejection::place, "place", "the path leaves the surroundings of the bone"},
+    {Rejection::sweep, "sweep", "the path is longer than one cut may sweep"},
+    {Rejection::spindle, "spindle", "the spindle is faster than any tool turns"},
+    {Rejection::time, "time", "the tool has worked longer than time has passed"},
+    {Rejection::rate, "rate", "the tool sweeps more than the room can follow"},
+    {Rejection::power, "power", "the tool removes more bone than any motor can"},
+    {Rejection::frozen, "frozen", "an instructor has stopped this person"},
+    {Rejection::taken, "taken", "an instructor has taken over this person's tool"},
+    {Rejection::forbidden_tool, "forbidden_tool", "an instructor allows this person only other tools"},
+    {Rejection::zone, "zone", "an instructor allows this person to cut only in another place"},
+    {Rejection::metal, "metal", "the cut would remove metal"},
+}};
+inline constexpr int kRejections = static_cast<int>(kRejectionTexts.size());
+static_assert(
+    [] {
+      for (std::size_t i = 0; i < kRejectionTexts.size(); ++i)
+        if (static_cast<std::size_t>(kRejectionTexts[i].reason) != i) return false;
+      return true;
+    }(),
+    "each reason is at its own number");
+
+// Rejection::none for a number that this version does not know.
+[[nodiscard]] constexpr Rejection rejection_of(std::uint32_t number) noexcept {
+  return number < kRejectionTexts.size() ? static_cast<Rejection>(number) : Rejection::none;
+}
+[[nodiscard]] constexpr std::string_view name(Rejection reason) noexcept {
+  return kRejectionTexts.at(static_cast<std::size_t>(reason)).name;
+}
+[[nodiscard]] constexpr std::string_view sentence(Rejection reason) noexcept {
+  return kRejectionTexts.at(static_cast<std::size_t>(reason)).sentence;
+}
 
 }  // namespace osteon

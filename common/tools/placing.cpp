@@ -3,16 +3,10 @@
 #include <cmath>
 #include <string>
 
+#include "common/core/overloaded.hpp"
+
 namespace osteon {
 namespace {
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
-// Clang before 17 does not deduce it otherwise.
-template <class... F>
-Overloaded(F...) -> Overloaded<F...>;
 
 tl::unexpected<Error> refuse(const Tool& tool, const char* why) {
   return failure(ErrorCode::invalid_input, "\"" + tool.name + "\" " + why);

@@ -61,6 +61,32 @@ std::string to_wire(const Digest& digest) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
 }
 
+// Both enums have the same reasons under the same numbers.
+static_assert(v1::RejectionReason_ARRAYSIZE == kRejections);
+constexpr bool same(Rejection reason, v1::RejectionReason sent) { return static_cast<int>(reason) == sent; }
+static_assert(same(Rejection::none, v1::REJECTION_REASON_UNSPECIFIED));
+static_assert(same(Rejection::body, v1::REJECTION_REASON_BODY));
+static_assert(same(Rejection::lease, v1::REJECTION_REASON_LEASE));
+static_assert(same(Rejection::tool, v1::REJECTION_REASON_TOOL));
+static_assert(same(Rejection::level, v1::REJECTION_REASON_LEVEL));
+static_assert(same(Rejection::path, v1::REJECTION_REASON_PATH));
+static_assert(same(Rejection::rotation, v1::REJECTION_REASON_ROTATION));
+static_assert(same(Rejection::place, v1::REJECTION_REASON_PLACE));
+static_assert(same(Rejection::sweep, v1::REJECTION_REASON_SWEEP));
+static_assert(same(Rejection::spindle, v1::REJECTION_REASON_SPINDLE));
+static_assert(same(Rejection::time, v1::REJECTION_REASON_TIME));
+static_assert(same(Rejection::rate, v1::REJECTION_REASON_RATE));
+static_assert(same(Rejection::power, v1::REJECTION_REASON_POWER));
+static_assert(same(Rejection::frozen, v1::REJECTION_REASON_FROZEN));
+static_assert(same(Rejection::taken, v1::REJECTION_REASON_TAKEN));
+static_assert(same(Rejection::forbidden_tool, v1::REJECTION_REASON_FORBIDDEN_TOOL));
+static_assert(same(Rejection::zone, v1::REJECTION_REASON_ZONE));
+static_assert(same(Rejection::metal, v1::REJECTION_REASON_METAL));
+
+v1::RejectionReason to_wire(Rejection reason) { return static_cast<v1::RejectionReason>(reason); }
+
+Rejection from_wire(v1::RejectionReason reason) { return rejection_of(static_cast<std::uint32_t>(reason)); }
+
 v1::Cut to_wire(const Cut& cut) {
   v1::Cut out;
   out.set_author(cut.author.value);

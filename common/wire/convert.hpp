@@ -33,6 +33,7 @@ namespace osteon::wire {
 [[nodiscard]] v1::Restrictions to_wire(const Restrictions& supervision);
 [[nodiscard]] v1::Annotation to_wire(const Annotation& annotation);
 [[nodiscard]] std::string to_wire(const Digest& digest);
+[[nodiscard]] v1::RejectionReason to_wire(Rejection reason);
 
 // Error invalid_input, naming the field, for anything that a correct peer never sends: wrong counts, numbers that are
 // not finite, quaternions far from unit length, unknown enums, levels out of range.
@@ -49,5 +50,7 @@ namespace osteon::wire {
 [[nodiscard]] Result<Restrictions> from_wire(const v1::Restrictions& supervision);
 [[nodiscard]] Result<Annotation> from_wire(const v1::Annotation& annotation);  // checked by check()
 [[nodiscard]] Result<Digest> digest_from_wire(const std::string& bytes);
+// Rejection::none for a reason that this version does not know.
+[[nodiscard]] Rejection from_wire(v1::RejectionReason reason);
 
 }  // namespace osteon::wire

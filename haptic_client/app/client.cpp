@@ -141,52 +141,46 @@ class Client {
   }
 
   void open_room() {
-    const auto pass = [this](FromRoom event) {
-      std::unique_lock lock(mutex_);
-      // Nothing is taken any more once the replica's thread has ended.
-      taken_.wait(lock, [this] { return from_room_.size() < kMostFromRoom || replica_over_; });
-      if (replica_over_) return;
-      from_room_.push_back(std::move(event));
-      received_ns_ = ns(Clock::now());
-      wake_.notify_one();
-    };
-    RoomCallbacks events;
-    events.leaf = [pass](const FieldLeaf& leaf) { pass(leaf); };
-    events.complete = [pass](const RoomAtJoin& room) { pass(room); };
-    events.change = [pass](BonePart&& part) { pass(std::move(part)); };
-    events.scene = [pass](RoomSeq room_seq, const std::vector<SceneItem>& items) { pass(SceneSet{room_seq, items}); };
-    events.noted = [pass](RoomSeq room_seq) { pass(Noted{room_seq}); };
-    events.committed = [pass](RoomSeq room_seq, const Cut& cut) { pass(Committed{room_seq, cut}); };
-    events.rejected = [pass](RoomSeq room_seq, std::uint64_t seq, std::uint64_t lease, const std::string& why) {
-      pass(Rejected{room_seq, seq, lease, why});
-    };
-    events.supervised = [this, pass](const HandSupervised& decided) {
-      // Passed to the loop at once: it must not wait for earlier work of the replica.
+    room_.open({
+        .message = [this](RoomMessage&& message) { receive(std::move(message)); },
+        .partner = [this](const CuttingState& state) { receive_partner(state); },
+        .stop_flag =
+            [this](std::uint64_t lease_epoch, bool frozen) {
+              stop_flag_ = packed(StopFlag{lease_epoch, frozen});
+            },
+        .bone =
+            [this](const MountPose& seen) {
+              places_of_bone_.store(MountUpdate{line_, seen});
+            },
+        .lost = [this](const Error& why) { give_up(why); },
+    });
+  }
+
+  // [session] Hands a message to the replica's thread. Waits while too many are there.
+  void receive(RoomMessage&& message) {
+    // Passed to the loop at once: it must not wait for earlier work of the replica.
+    if (const auto* decided = std::get_if<HandSupervised>(&message))
       restrictions_.store(
-          haptic_restrictions(decided.supervision, decided.seq, decided.lease_epoch, session_.plan().tools));
-      pass(decided);
-    };
-    events.stop_flag = [this](std::uint64_t lease_epoch, bool frozen) {
-      stop_flag_ = packed(StopFlag{lease_epoch, frozen});
-    };
-    events.said = [pass](const WordsSaid& said) { pass(said); };
-    events.partner = [this, pass](const CuttingState& state) {
-      receive_partner(state);
-      if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost &&
-          named_tools_.insert(state.tool_name).second)
-        pass(ToolNamed{state.tool_name});
-    };
-    events.bone = [this](const MountPose& seen) { places_of_bone_.store(MountUpdate{line_, seen}); };
-    events.interrupted = [this, pass](const Error& why) {
-      ++line_;
-      pass(Interrupted{why.message});
-    };
-    events.lost = [this](const Error& why) { give_up(why); };
-    room_.open(std::move(events));
+          haptic_restrictions(decided->supervision, decided->seq, decided->lease_epoch, session_.plan().tools));
+    if (std::holds_alternative<Interrupted>(message)) ++line_;
+    std::unique_lock lock(mutex_);
+    // Nothing is taken any more once the replica's thread has ended.
+    taken_.wait(lock, [this] { return from_room_.size() < kMostFromRoom || replica_over_; });
+    if (replica_over_) return;
+    from_room_.push_back(std::move(message));
+    received_ns_ = ns(Clock::now());
+    wake_.notify_one();
   }
 
   // Called on whichever thread the session uses for it; one at a time.
   void receive_partner(const CuttingState& state) {
+    // The replica's thread makes the solid of a tool that is new here.
+    if (!state.tool_name.empty() && named_tools_.size() < PartnerSolids::kMost &&
+        named_tools_.insert(state.tool_name).second) {
+      const std::lock_guard lock(mutex_);
+      tools_to_make_.push_back(state.tool_name);
+      wake_.notify_one();
+    }
     // The entry with the oldest state is replaced.
     Partners::Partner* place = &received_partners_.of[0];
     for (Partners::Partner& partner : received_partners_.of) {
@@ -315,22 +309,26 @@ class Client {
   }
 
   void replica_thread() {
-    std::deque<FromRoom> events;
+    std::deque<RoomMessage> messages;
+    std::vector<std::string> tools_to_make;
     MemoryReserve reserve(kCutReserve);
     std::optional<Clock::time_point> waiting_since;
     while (true) {
       {
         std::unique_lock lock(mutex_);
-        wake_.wait_for(lock, 2ms, [&] { return !from_room_.empty(); });
-        events.swap(from_room_);
+        wake_.wait_for(lock, 2ms, [&] { return !from_room_.empty() || !tools_to_make_.empty(); });
+        messages.swap(from_room_);
+        tools_to_make.swap(tools_to_make_);
         taken_.notify_all();
       }
-      const bool any_received = !events.empty();
+      const bool any_received = !messages.empty();
       // Read before the queues: what was closed up to here must still be taken.
       const bool over = touching_over_;
       take_own_cuts();
-      for (FromRoom& event : events) std::visit([this](auto& e) { take(e); }, event);
-      events.clear();
+      for (const RoomMessage& message : messages) std::visit([this](const auto& one) { take(one); }, message);
+      messages.clear();
+      for (const std::string& name : tools_to_make) make_partner_solid(name);
+      tools_to_make.clear();
       replica_.settle();
       watch_room(any_received);
       build_patch();
@@ -377,7 +375,7 @@ class Client {
     // Contact continues with the present bone. The received leaves replace it all at once, so that no bone is missing
     // in between.
     if (joined_ && !interrupted_)
-      log::warn("the connection to the server is interrupted", {{"reason", interrupted.why}});
+      log::warn("the connection to the server is interrupted", {{"reason", interrupted.why.message}});
     interrupted_ = joined_;
     renewed_.clear();
     // Before joining, the received bone may have been restored since: begin anew.
@@ -439,20 +437,20 @@ class Client {
     outcome_.words.push_back({ns(Clock::now()), said.seq.value, said.from.value, said.words});
   }
   // Others' tools are felt as solids, if the room's tools contain them.
-  void take(const ToolNamed& named) {
+  void make_partner_solid(const std::string& name) {
     for (const ToolBox::Entry* entry : room_.tools()->entries()) {
-      if (entry->tool.name != named.name) continue;
+      if (entry->tool.name != name) continue;
       std::shared_ptr<const SolidLattice>& solid = solids_[entry->hash];
       if (!solid) solid = std::make_shared<const SolidLattice>(entry->tool);
       if (known_solids_.count == PartnerSolids::kMost) return;
-      known_solids_.of[known_solids_.count++] = {std::hash<std::string>{}(named.name), solid.get()};
+      known_solids_.of[known_solids_.count++] = {std::hash<std::string>{}(name), solid.get()};
       partner_solids_.store(known_solids_);
       return;
     }
   }
-  void take(const Noted& noted) { replica_.note(noted.room_seq); }
+  void take(const EventNoted& noted) { replica_.note(noted.seq); }
   void take(const SceneSet& scene) {
-    replica_.note(scene.room_seq);
+    replica_.note(scene.seq);
     std::vector<PlacedGuide>& guides = guides_.writable();
     guides.clear();
     for (const SceneItem& item : scene.items)
@@ -464,29 +462,34 @@ class Client {
       }
     guides_.publish();
   }
-  void take(const Committed& committed) {
+  void take(const CutCommitted& committed) {
     const bool own = committed.cut.author == room_.room().author;
-    if (own) cut_log_.confirm(committed.cut.author_seq, committed.room_seq, ns(Clock::now()));
+    if (own) cut_log_.confirm(committed.cut.author_seq, committed.seq, ns(Clock::now()));
     if (own) rejected_in_a_row_ = 0;
-    replica_.commit(committed.room_seq, committed.cut, own);
+    replica_.commit(committed.seq, committed.cut, own);
   }
-  void take(const Rejected& rejected) {
+  void take(const CutRejected& rejected) {
     cut_log_.confirm(rejected.author_seq, RoomSeq{}, ns(Clock::now()));
-    const bool fell = replica_.reject(rejected.room_seq, rejected.author_seq);
+    const bool fell = replica_.reject(rejected.seq, rejected.author_seq);
     follow_lease(rejected.lease_epoch);
-    // An instructor's decision that was on its way when this was cut.
-    const auto because = [&](Rejection reason) { return rejected.reason == sentence(reason); };
-    if (because(Rejection::frozen)) return static_cast<void>(++outcome_.cuts_stopped);
-    if (because(Rejection::taken)) return static_cast<void>(++outcome_.cuts_taken);
-    if (because(Rejection::zone) || because(Rejection::forbidden_tool))
-      return static_cast<void>(++outcome_.cuts_elsewhere);
+    switch (rejected.reason) {  // an instructor's decision that was on its way when this was cut
+      case Rejection::frozen:
+        return static_cast<void>(++outcome_.cuts_stopped);
+      case Rejection::taken:
+        return static_cast<void>(++outcome_.cuts_taken);
+      case Rejection::zone:
+      case Rejection::forbidden_tool:
+        return static_cast<void>(++outcome_.cuts_elsewhere);
+      default:
+        break;
+    }
     if (!fell) return;  // it was dropped by an undo, or with an earlier cut
     // An occasional rejected cut gives its bone back. A room that rejects all cuts makes further work pointless.
     constexpr int kMostInARow = 20;
     if (rejected_in_a_row_++ == 0)
-      log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.reason}});
+      log::warn("cut rejected", {{"author_seq", rejected.author_seq}, {"reason", rejected.sentence}});
     if (rejected_in_a_row_ != kMostInARow) return;
-    give_up({ErrorCode::unsupported, "the server rejects every cut: " + rejected.reason});
+    give_up({ErrorCode::unsupported, "the server rejects every cut: " + rejected.sentence});
   }
 
   void watch_room(bool any_received) {
@@ -701,7 +704,8 @@ class Client {
 
   std::mutex mutex_;  // guards the three below; never taken by the haptic thread
   bool replica_over_ = false;
-  std::deque<FromRoom> from_room_;
+  std::deque<RoomMessage> from_room_;
+  std::vector<std::string> tools_to_make_;  // of partners; the solids are not made yet
   std::optional<Error> lost_why_;
   std::condition_variable wake_, taken_;
   std::atomic<std::int64_t> received_ns_{0};

@@ -1,4 +1,4 @@
-// What the threads of the haptic client hand to each other: messages of the room, others' tools, and the mount's pose.
+// What the threads of the haptic client hand to each other besides the messages of the room.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -13,36 +13,9 @@
 #include "common/tools/scene.hpp"
 #include "haptic_client/control/guidance_spring.hpp"
 #include "haptic_client/control/obstacle.hpp"
-#include "haptic_client/net/room_callbacks.hpp"
+#include "haptic_client/net/room_messages.hpp"
 
 namespace osteon::haptic {
-
-// Messages of the room on their way to the replica's thread.
-struct Committed {
-  RoomSeq room_seq;
-  Cut cut;
-};
-struct Rejected {
-  RoomSeq room_seq;
-  std::uint64_t author_seq;
-  std::uint64_t lease_epoch;
-  std::string reason;
-};
-struct Noted {
-  RoomSeq room_seq;  // of an event that does not change the bone
-};
-struct SceneSet {
-  RoomSeq room_seq;
-  std::vector<SceneItem> items;
-};
-struct ToolNamed {
-  std::string name;  // held by another person
-};
-struct Interrupted {
-  std::string why;  // the connection to the room is down and is being made again
-};
-using FromRoom = std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, SceneSet, HandSupervised, WordsSaid,
-                              ToolNamed, Noted, Interrupted>;
 
 // Others' tools, as last received.
 struct Partners {

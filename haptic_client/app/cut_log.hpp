@@ -5,7 +5,7 @@
 
 #include "common/core/id.hpp"
 #include "haptic_client/app/record.hpp"
-#include "haptic_client/net/room_callbacks.hpp"
+#include "haptic_client/net/room_messages.hpp"
 
 namespace osteon::haptic {
 

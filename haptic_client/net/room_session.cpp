@@ -199,7 +199,7 @@ struct RoomSession::Impl {
   Case bone;
   const RoomSessionOptions options;
   std::shared_ptr<ToolBox> tools = builtin_tool_box();  // shared with the replica's fields
-  RoomCallbacks events;
+  RoomCallbacks callbacks;
 
   std::unique_ptr<v1::CuttingService::Stub> stub;
   std::thread thread;
@@ -329,8 +329,8 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                             const std::lock_guard lock(read_mutex);
                             reader->take(partner);
                           },
-                      .bone = events.bone,
-                      .stop_flag = events.stop_flag});
+                      .bone = callbacks.bone,
+                      .stop_flag = callbacks.stop_flag});
   if (!opened) return;
   for (const auto& [number, tool] : numbered_tools) (*opened)->know_tool(number, tool);
   const std::lock_guard lock(fast_mutex);
@@ -454,7 +454,7 @@ void RoomSession::Impl::run() {
       why = Error{ErrorCode::unavailable,
                   "the server ended the session: " + said + "; see whether osteon-server still runs, then join again"};
     } else {
-      if (events.interrupted) events.interrupted({ErrorCode::unavailable, said});
+      if (callbacks.message) callbacks.message(Interrupted{{ErrorCode::unavailable, said}});
       const Result<void> again = join_again();
       if (ends()) break;
       if (!again) why = again.error();
@@ -467,7 +467,7 @@ void RoomSession::Impl::run() {
     over = true;
     wake.notify_all();
   }
-  if (why && !closed && events.lost) events.lost(*why);
+  if (why && !closed && callbacks.lost) callbacks.lost(*why);
 }
 
 RoomSession::RoomSession(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -512,17 +512,18 @@ Result<std::uint32_t> RoomSession::set_item(const SceneItem& item) {
                  "the server does not set the item: " + status.error_message());
 }
 
-void RoomSession::open(RoomCallbacks events) {
+void RoomSession::open(RoomCallbacks callbacks) {
   OSTEON_CHECK(!impl_->stub);
   Impl& impl = *impl_;
   // Called for datagrams and for the stream: one at a time.
-  if (events.bone)
-    events.bone = [this_one = std::make_shared<std::mutex>(), tell = std::move(events.bone)](const MountPose& seen) {
+  if (callbacks.bone)
+    callbacks.bone = [this_one = std::make_shared<std::mutex>(),
+                      tell = std::move(callbacks.bone)](const MountPose& seen) {
       const std::lock_guard lock(*this_one);
       tell(seen);
     };
   impl.reader.emplace(
-      impl.room.author, impl.tools, events,
+      impl.room.author, impl.tools, callbacks,
       [&impl](std::uint64_t author_seq) {
         if (const std::shared_ptr<FastPath> path = impl.fast_path()) path->decided(author_seq);
         const std::lock_guard lock(impl.mutex);
@@ -533,7 +534,7 @@ void RoomSession::open(RoomCallbacks events) {
         impl.underway.go_on(author_seq);
         impl.wake.notify_all();
       });
-  impl_->events = std::move(events);
+  impl_->callbacks = std::move(callbacks);
   impl_->stub = v1::CuttingService::NewStub(impl_->room.channel);
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }

@@ -17,7 +17,7 @@
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
 #include "common/wire/room_client.hpp"
-#include "haptic_client/net/room_callbacks.hpp"
+#include "haptic_client/net/room_messages.hpp"
 
 namespace osteon {
 
@@ -63,8 +63,8 @@ class RoomSession {
   // invalid_input, denied (the hand is stopped, or its tool taken), unavailable.
   [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item);
 
-  // Opens the stream; call it once. From now on `events` are called.
-  void open(RoomCallbacks events);
+  // Opens the stream; call it once. From now on `callbacks` are called.
+  void open(RoomCallbacks callbacks);
   // Any thread except the haptic and audio ones: these functions lock and allocate.
   // Sends cuts in the order of the calls. Returns false, and does not take the cut, when kMaxWaitingCuts are undecided
   // or the session is lost.

@@ -17,13 +17,19 @@ std::vector<BodyId> bodies_of(const google::protobuf::RepeatedField<std::uint32_
   return bodies;
 }
 
+// Datagrams carry the number alone.
+std::string sentence_of(Rejection reason) {
+  if (reason == Rejection::none) return "for a reason that this version does not know";
+  return std::string(sentence(reason));
+}
+
 }  // namespace
 
-SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
+SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks callbacks,
                              std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete)
     : own_(own),
       tools_(std::move(tools)),
-      events_(std::move(events)),
+      callbacks_(std::move(callbacks)),
       decided_(std::move(decided)),
       complete_(std::move(complete)) {}
 
@@ -71,26 +77,29 @@ void SessionReader::take(const CuttingState& partner) {
   std::uint64_t& newest = partners_[partner.author];
   if (partner.author == own_ || partner.state_seq <= newest) return;
   newest = partner.state_seq;
-  if (events_.partner) events_.partner(partner);
+  if (callbacks_.partner) callbacks_.partner(partner);
+}
+
+void SessionReader::pass(RoomMessage&& message) {
+  if (callbacks_.message) callbacks_.message(std::move(message));
 }
 
 void SessionReader::supervised(const HandSupervised& decided) {
   seq_ = std::max(seq_, decided.seq);
   supervised_ = true;
-  if (events_.supervised) events_.supervised(decided);
+  pass({decided});
 }
 
 void SessionReader::committed(RoomSeq seq, const Cut& cut) {
   seq_ = std::max(seq_, seq);
   if (cut.author == own_) decided_(cut.author_seq);
-  if (events_.committed) events_.committed(seq, cut);
+  pass({CutCommitted{seq, cut}});
 }
 
-void SessionReader::rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch,
-                             const std::string& reason) {
-  seq_ = std::max(seq_, seq);
-  decided_(author_seq);
-  if (events_.rejected) events_.rejected(seq, author_seq, lease_epoch, reason);
+void SessionReader::rejected(const CutRejected& rejected) {
+  seq_ = std::max(seq_, rejected.seq);
+  decided_(rejected.author_seq);
+  pass({rejected});
 }
 
 Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
@@ -99,17 +108,17 @@ Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
   else if (entry.kind == wire::SessionEntryKind::supervised)
     supervised({entry.room_seq, entry.supervision, entry.lease_epoch, entry.by});
   else
-    rejected(entry.room_seq, entry.author_seq, entry.lease_epoch,
-             std::string(sentence(static_cast<Rejection>(entry.reason))));
+    rejected({entry.room_seq, entry.author_seq, entry.lease_epoch, rejection_of(entry.reason),
+              sentence_of(rejection_of(entry.reason))});
   return {};
 }
 
 Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
   switch (response.message_case()) {
     case v1::SessionResponse::kLeaf: {
-      const Result<FieldLeaf> leaf = wire::from_wire(response.leaf());
+      Result<FieldLeaf> leaf = wire::from_wire(response.leaf());
       if (!leaf) return tl::unexpected(leaf.error());
-      if (events_.leaf) events_.leaf(*leaf);
+      pass({std::move(*leaf)});
       return {};
     }
     case v1::SessionResponse::kComplete: {
@@ -118,7 +127,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       RoomAtJoin room{RoomSeq{entry.room_seq()}, bodies_of(entry.bodies()), entry.lease_epoch(),
                       entry.decided_author_seq()};
       for (const std::uint64_t seq : entry.decided_room_seqs()) room.decided_seqs.push_back(RoomSeq{seq});
-      if (events_.complete) events_.complete(room);
+      pass({std::move(room)});
       seq_ = std::max(seq_, RoomSeq{entry.room_seq()});
       // Nothing was sent about this hand: the restrictions of an earlier stream are over.
       if (!supervised_) supervised({RoomSeq{}, {}, entry.lease_epoch(), {}});
@@ -129,7 +138,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       if (!tool) return tl::unexpected(tool.error());
       tools_->add(*tool);
       seq_ = std::max(seq_, RoomSeq{response.tool().room_seq()});
-      if (events_.noted && response.tool().room_seq() != 0) events_.noted(RoomSeq{response.tool().room_seq()});
+      if (response.tool().room_seq() != 0) pass({EventNoted{RoomSeq{response.tool().room_seq()}}});
       return {};
     }
     case v1::SessionResponse::kChange: {
@@ -143,7 +152,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
         part.leaves.push_back(std::move(*leaf));
       }
       seq_ = std::max(seq_, part.seq);
-      if (events_.change) events_.change(std::move(part));
+      pass({std::move(part)});
       return {};
     }
     case v1::SessionResponse::kScene: {
@@ -157,7 +166,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
       }
       // Without an index it precedes the leaves, which have not arrived.
       if (response.index() != 0) seq_ = std::max(seq_, RoomSeq{response.scene().room_seq()});
-      if (events_.scene) events_.scene(RoomSeq{response.scene().room_seq()}, items);
+      pass({SceneSet{RoomSeq{response.scene().room_seq()}, std::move(items)}});
       return {};
     }
     case v1::SessionResponse::kCommitted: {
@@ -169,7 +178,8 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     }
     case v1::SessionResponse::kRejected: {
       const v1::RejectedCut& entry = response.rejected();
-      rejected(RoomSeq{entry.room_seq()}, entry.author_seq(), entry.lease_epoch(), entry.reason());
+      rejected({RoomSeq{entry.room_seq()}, entry.author_seq(), entry.lease_epoch(), wire::from_wire(entry.code()),
+                entry.reason()});
       return {};
     }
     case v1::SessionResponse::kDurable: {
@@ -182,7 +192,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     }
     case v1::SessionResponse::kNoted:
       seq_ = std::max(seq_, RoomSeq{response.noted().room_seq()});
-      if (events_.noted) events_.noted(RoomSeq{response.noted().room_seq()});
+      pass({EventNoted{RoomSeq{response.noted().room_seq()}}});
       return {};
     case v1::SessionResponse::kSupervised: {
       const v1::Supervised& entry = response.supervised();
@@ -197,8 +207,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kSaid: {
       const v1::Said& entry = response.said();
       seq_ = std::max(seq_, RoomSeq{entry.room_seq()});
-      if (events_.said)
-        events_.said({RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()});
+      pass({WordsSaid{RoomSeq{entry.room_seq()}, AuthorId{entry.from()}, AuthorId{entry.to()}, entry.words()}});
       return {};
     }
     case v1::SessionResponse::kPartner: {
@@ -210,7 +219,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kBone: {
       const Result<MountPose> seen = wire::from_wire(response.bone());
       if (!seen) return tl::unexpected(seen.error());
-      if (events_.bone) events_.bone(*seen);
+      if (callbacks_.bone) callbacks_.bone(*seen);
       return {};
     }
     case v1::SessionResponse::kLink:

@@ -11,7 +11,7 @@
 #include "common/tools/tool_box.hpp"
 #include "common/wire/cut_run.hpp"
 #include "common/wire/room_client.hpp"
-#include "haptic_client/net/room_callbacks.hpp"
+#include "haptic_client/net/room_messages.hpp"
 #include "osteon/v1/cutting.pb.h"
 
 namespace osteon {
@@ -21,8 +21,8 @@ namespace osteon {
 class SessionReader {
  public:
   // `decided`: own cuts up to a number are decided. `complete`: the same, and cuts may be sent from here on. Both are
-  // called before the event itself.
-  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks events,
+  // called before the message itself.
+  SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomCallbacks callbacks,
                 std::function<void(std::uint64_t)> decided, std::function<void(std::uint64_t)> complete);
 
   // A stream begins. Its leaves and log entries are counted anew. place() restarts too, because the server may have
@@ -48,13 +48,14 @@ class SessionReader {
   [[nodiscard]] Result<void> deliver(const v1::SessionResponse& response);
   [[nodiscard]] Result<void> deliver(const wire::SessionEntry& entry);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
+  void pass(RoomMessage&& message);
   void committed(RoomSeq seq, const Cut& cut);
   void supervised(const HandSupervised& decided);
-  void rejected(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason);
+  void rejected(const CutRejected& rejected);
 
   const AuthorId own_;
   const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
-  const RoomCallbacks events_;
+  const RoomCallbacks callbacks_;
   const std::function<void(std::uint64_t)> decided_, complete_;
   ReceiveWindow<Entry> entries_;
   std::optional<wire::DurableSeq> kept_;

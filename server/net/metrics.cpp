@@ -33,11 +33,6 @@ namespace fs = std::filesystem;
 constexpr std::array<double, 14> kBounds_s{0.0001, 0.00025, 0.0005, 0.001, 0.0025, 0.005, 0.0085,
                                            0.0125, 0.025,   0.05,   0.1,   0.25,   0.5,   1.0};
 
-// By the number of the reason.
-constexpr std::array<const char*, 17> kReasons{"none",     "body",   "lease", "tool",           "level", "path",
-                                               "rotation", "place",  "sweep", "spindle",        "time",  "rate",
-                                               "power",    "frozen", "taken", "forbidden_tool", "zone"};
-
 double seconds(double us) { return us * 1e-6; }
 
 // The families are in the order of their first use.
@@ -132,8 +127,7 @@ void add_room(Page& page, OpenRoom& room, bool draining) {
   page.counter("osteon_cuts_total", cuts, with("outcome", "refused"), static_cast<double>(health.counts.refused));
   for (std::size_t i = 1; i < health.rejections.size(); ++i)
     page.counter("osteon_rejections_total", "Rejected cuts by reason, since the room was opened.",
-                 with("reason", i < kReasons.size() ? kReasons[i] : std::to_string(i)),
-                 static_cast<double>(health.rejections[i]));
+                 with("reason", std::string(kRejectionTexts[i].name)), static_cast<double>(health.rejections[i]));
 }
 
 std::vector<MetricFamily> metrics_of(RoomServer& server, const fs::path& certificate) {

@@ -76,8 +76,8 @@ class BareHand {
     room_.secret = secret;
     open();
   }
-  // The answer to its next cut. Empty if the room takes it, else the reason for the rejection.
-  std::string cut(std::uint64_t epoch) {
+  // The answer to its next cut: `none` if the room takes it, else the reason for the rejection.
+  Rejection cut(std::uint64_t epoch) {
     Cut cut = straight_cut(find_tool("burr-round-5").value(), {-15, -15, 0}, {-15, -15, 0}, {0, 0, -1}, ++cuts_);
     cut.author = room_.author;
     cut.lease_epoch = epoch;
@@ -88,11 +88,12 @@ class BareHand {
     while (stream_->Read(&response)) {
       if (response.has_rejected() && response.rejected().author_seq() == cuts_) {
         lease_ = response.rejected().lease_epoch();
-        return response.rejected().reason();
+        return wire::from_wire(response.rejected().code());
       }
-      if (response.has_committed() && response.committed().cut().author() == room_.author.value) return "";
+      if (response.has_committed() && response.committed().cut().author() == room_.author.value) return Rejection::none;
     }
-    return "the session ended";
+    ADD_FAILURE() << "the session ended";
+    return Rejection::none;
   }
   void say_heard() {
     v1::SessionRequest request;
@@ -175,7 +176,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
 
   // A decision about a person who is away is pending until they have come back and received it.
   BareHand away(stage.address());
-  EXPECT_EQ(away.cut(away.lease()), "");
+  EXPECT_EQ(away.cut(away.lease()), Rejection::none);
   const std::string who = "#" + std::to_string(away.author().value);
   const std::uint64_t lease_before = away.lease();
   away.leave();
@@ -191,14 +192,14 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   EXPECT_NE(away.lease(), lease_before);
   away.say_heard();
   EXPECT_TRUE(console.ask("wait acknowledged " + who + " 10").starts_with("ok"));
-  EXPECT_EQ(away.cut(lease_before), sentence(Rejection::lease)) << "its cut under the old lease";
-  EXPECT_EQ(away.cut(away.lease()), sentence(Rejection::frozen));
+  EXPECT_EQ(away.cut(lease_before), Rejection::lease) << "its cut under the old lease";
+  EXPECT_EQ(away.cut(away.lease()), Rejection::frozen);
   (void)console.decide("free " + who);
   // The rejection has ended that lease too, and so has the decision.
-  EXPECT_EQ(away.cut(away.lease()), sentence(Rejection::lease));
+  EXPECT_EQ(away.cut(away.lease()), Rejection::lease);
   away.leave();
   away.come_again();
-  EXPECT_EQ(away.cut(away.lease()), "");
+  EXPECT_EQ(away.cut(away.lease()), Rejection::none);
   away.leave();
 
   // Everybody is stopped. The bone is reset to the import, and a demonstrator repeats on it what the second hand did at

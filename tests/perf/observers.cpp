@@ -74,23 +74,21 @@ class Author {
     auto joined = RoomSession::join({.address = address, .name = "author", .patience = 20s, .cache = cache}, {});
     OSTEON_CHECK(joined.has_value());
     session_.emplace(std::move(*joined));
-    RoomCallbacks events;
-    events.leaf = [](const FieldLeaf&) {};
-    events.complete = [this](const RoomAtJoin&) { complete_ = true; };
-    events.committed = [this](RoomSeq place, const Cut& cut) {
+    RoomCallbacks callbacks;
+    callbacks.message = [this](const RoomMessage& message) {
+      OSTEON_CHECK(!std::holds_alternative<CutRejected>(message));
+      if (std::holds_alternative<RoomAtJoin>(message)) complete_ = true;
+      const auto* committed = std::get_if<CutCommitted>(&message);
+      if (committed == nullptr) return;
       const auto now = machine_time();
       const std::lock_guard lock(mutex_);
-      committed_[place] = {sent_[cut.author_seq - 1], now};
-      newest_ = place.value;
+      committed_[committed->seq] = {sent_[committed->cut.author_seq - 1], now};
+      newest_ = committed->seq.value;
     };
-    events.rejected = [](auto&&...) { OSTEON_CHECK(!"the server rejects what a hand cuts"); };
-    events.change = [](BonePart&&) {};
-    events.scene = [](RoomSeq, const std::vector<SceneItem>&) {};
-    events.noted = [](RoomSeq) {};
-    events.lost = [](const Error& why) {
+    callbacks.lost = [](const Error& why) {
       std::cerr << "osteon-observers: the author lost the room: " << why.message << "\n";
     };
-    session_->open(std::move(events));
+    session_->open(std::move(callbacks));
     OSTEON_CHECK(wait_until([&] { return complete_.load(); }, 20s));
   }
   ~Author() { close(); }

@@ -171,7 +171,7 @@ void SimClient::joined(const SimServer::Joined& room) {
   room_ = room;
   lease_epoch_ = room.lease_epoch;
   reader_.emplace(
-      room.author, tools_, events(),
+      room.author, tools_, callbacks(),
       [this](std::uint64_t author_seq) {
         ledger_.told_decided(room_->author, author_seq);
         if (fast_) fast_->decided(author_seq);
@@ -331,51 +331,35 @@ void SimClient::hear(const std::string& bytes) {
     lost("it sent what no correct server sends: " + taken.error().message);
 }
 
-RoomCallbacks SimClient::events() {
-  RoomCallbacks events;
-  events.leaf = [this](const FieldLeaf& leaf) { pass(leaf); };
-  events.complete = [this](const RoomAtJoin& room) {
-    ledger_.told_up_to(room.contained);
-    const std::size_t seqs = room.decided_seqs.size();
-    ledger_.check(seqs == std::min<std::size_t>(room.decided_author_seq, kMostUnderway), Invariant::served,
-                  "a session begins with the sequence numbers of " + std::to_string(seqs) + " cuts");
-    for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own)
-      if (const std::optional<RoomSeq> seq = room.seq_of(own)) ledger_.acknowledged_seq(*seq, room_->author, own);
-    pass(room);
-  };
-  events.committed = [this](RoomSeq seq, const Cut& cut) {
-    ledger_.told_committed(seq, cut);
-    pass(Committed{seq, cut, by_datagram_});
-  };
-  events.rejected = [this](RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string&) {
-    ledger_.told_rejected(seq, room_->author, author_seq);
-    pass(Rejected{seq, author_seq, lease_epoch});
-  };
-  events.change = [this](BonePart&& part) {
-    ledger_.told_up_to(part.seq);
-    pass(std::move(part));
-  };
-  events.scene = [this](RoomSeq seq, const std::vector<SceneItem>&) {
-    ledger_.told_up_to(seq);
-    pass(Noted{seq});
-  };
-  events.supervised = [this](const HandSupervised& decided) {
-    if (decided.seq) ledger_.told_event(decided.seq, EventKind::supervise);
-    pass(decided);
-  };
-  events.said = [this](const WordsSaid& said) {
-    ledger_.told_event(said.seq, EventKind::words);
-    pass(Noted{said.seq});
-  };
-  events.noted = [this](RoomSeq seq) {
-    ledger_.told_up_to(seq);
-    pass(Noted{seq});
-  };
-  return events;
+RoomCallbacks SimClient::callbacks() {
+  return {.message = [this](RoomMessage&& message) {
+    std::visit([this](const auto& one) { note(one); }, message);
+    pass(std::move(message));
+  }};
 }
 
-void SimClient::pass(FromRoom event) {
-  from_room_.push_back(std::move(event));
+void SimClient::note(const RoomAtJoin& room) {
+  ledger_.told_up_to(room.contained);
+  const std::size_t seqs = room.decided_seqs.size();
+  ledger_.check(seqs == std::min<std::size_t>(room.decided_author_seq, kMostUnderway), Invariant::served,
+                "a session begins with the sequence numbers of " + std::to_string(seqs) + " cuts");
+  for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own)
+    if (const std::optional<RoomSeq> seq = room.seq_of(own)) ledger_.acknowledged_seq(*seq, room_->author, own);
+}
+void SimClient::note(const CutCommitted& committed) { ledger_.told_committed(committed.seq, committed.cut); }
+void SimClient::note(const CutRejected& rejected) {
+  ledger_.told_rejected(rejected.seq, room_->author, rejected.author_seq);
+}
+void SimClient::note(const BonePart& part) { ledger_.told_up_to(part.seq); }
+void SimClient::note(const SceneSet& scene) { ledger_.told_up_to(scene.seq); }
+void SimClient::note(const HandSupervised& decided) {
+  if (decided.seq) ledger_.told_event(decided.seq, EventKind::supervise);
+}
+void SimClient::note(const WordsSaid& said) { ledger_.told_event(said.seq, EventKind::words); }
+void SimClient::note(const EventNoted& noted) { ledger_.told_up_to(noted.seq); }
+
+void SimClient::pass(RoomMessage&& message) {
+  from_room_.push_back({std::move(message), by_datagram_});
   if (!std::exchange(work_planned_, true)) later(drawn(random_, 0ns, 4ms), [this] { work(); });
 }
 
@@ -383,9 +367,10 @@ void SimClient::work() {
   work_planned_ = false;
   heard_ = !from_room_.empty();
   while (!from_room_.empty()) {
-    const FromRoom event = std::move(from_room_.front());
+    const Received received = std::move(from_room_.front());
     from_room_.pop_front();
-    std::visit([this](const auto& one) { take(one); }, event);
+    std::visit([this](const auto& one) { take(one); }, received.message);
+    if (const auto* committed = std::get_if<CutCommitted>(&received.message)) measure(*committed, received.by_datagram);
   }
   replica_->settle();
   (void)replica_->take_changes();
@@ -425,16 +410,19 @@ void SimClient::take(const RoomAtJoin& room) {
   bone_is_here_ = true;
 }
 
-void SimClient::take(const Committed& committed) {
+void SimClient::take(const CutCommitted& committed) {
   if (committed.cut.author == room_->author) felt_.erase(committed.cut.author_seq);
   replica_->commit(committed.seq, committed.cut, committed.cut.author == room_->author);
+}
+
+void SimClient::measure(const CutCommitted& committed, bool by_datagram) {
   const std::optional<Time> age = ledger_.age(committed.cut, time_.now());
   if (age && committed.cut.author != room_->author)
-    (committed.by_datagram ? felt_by_datagram_ms_ : felt_by_stream_ms_)
+    (by_datagram ? felt_by_datagram_ms_ : felt_by_stream_ms_)
         .push_back(std::chrono::duration<float, std::milli>(*age).count());
 }
 
-void SimClient::take(const Rejected& rejected) {
+void SimClient::take(const CutRejected& rejected) {
   felt_.erase(rejected.author_seq);
   replica_->reject(rejected.seq, rejected.author_seq);
   follow_lease(rejected.lease_epoch);

@@ -83,21 +83,10 @@ class SimClient {
   [[nodiscard]] const std::vector<float>& felt_by_stream_ms() const { return felt_by_stream_ms_; }
 
  private:
-  struct Committed {
-    RoomSeq seq;
-    Cut cut;
+  struct Received {
+    RoomMessage message;
     bool by_datagram;
   };
-  struct Rejected {
-    RoomSeq seq;
-    std::uint64_t author_seq, lease_epoch;
-  };
-  struct Noted {
-    RoomSeq seq;
-  };
-  struct Interrupted {};
-  using FromRoom =
-      std::variant<FieldLeaf, RoomAtJoin, Committed, Rejected, BonePart, Noted, HandSupervised, Interrupted>;
 
   template <class Answer>
   void ask(std::function<void(std::function<void(const Result<Answer>&)>)> request, Time patience,
@@ -118,18 +107,32 @@ class SimClient {
   void set_ways();  // of the present address
   void hear_entry(wire::IndexedEntry entry);
   void compare(const v1::SessionResponse& response);  // compares with what a datagram has said of the same entry
-  [[nodiscard]] RoomCallbacks events();
+  [[nodiscard]] RoomCallbacks callbacks();
 
-  void pass(FromRoom event);
+  // The ledger compares what was received with what the room has decided.
+  void note(const FieldLeaf&) {}
+  void note(const RoomAtJoin& room);
+  void note(const CutCommitted& committed);
+  void note(const CutRejected& rejected);
+  void note(const BonePart& part);
+  void note(const SceneSet& scene);
+  void note(const HandSupervised& decided);
+  void note(const WordsSaid& said);
+  void note(const EventNoted& noted);
+  void note(const Interrupted&) {}
+  void pass(RoomMessage&& message);
   void work();  // the replica's thread wakes up
   void take(const FieldLeaf& leaf);
   void take(const RoomAtJoin& room);
-  void take(const Committed& committed);
-  void take(const Rejected& rejected);
+  void take(const CutCommitted& committed);
+  void take(const CutRejected& rejected);
   void take(const BonePart& part);
   void take(const HandSupervised& decided);
-  void take(const Noted& noted) { replica_->note(noted.seq); }
+  void take(const SceneSet& scene) { replica_->note(scene.seq); }
+  void take(const WordsSaid& said) { replica_->note(said.seq); }
+  void take(const EventNoted& noted) { replica_->note(noted.seq); }
   void take(const Interrupted&);
+  void measure(const CutCommitted& committed, bool by_datagram);  // how late others' cuts are felt
   void follow_lease(std::uint64_t epoch);
   void watch();
 
@@ -168,7 +171,7 @@ class SimClient {
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools_;
   std::unique_ptr<SimFastPath> fast_;
   std::map<std::uint64_t, wire::SessionEntry> said_;  // by datagrams: entries of the present stream by index
-  bool by_datagram_ = false;                          // how the present entry arrived
+  bool by_datagram_ = false;                          // how the present message arrived
   std::uint64_t state_seq_ = 0;
   Time requests_there_{}, held_back_until_{};
   std::optional<Backoff> backoff_;
@@ -176,7 +179,7 @@ class SimClient {
   std::optional<haptic::Replica> replica_;
   haptic::ConfirmationMonitor watch_;
   haptic::RoomHealth health_{};
-  std::deque<FromRoom> from_room_;
+  std::deque<Received> from_room_;
   std::vector<FieldLeaf> renewed_;
   std::vector<Cut> own_;
   bool work_planned_ = false, bone_is_here_ = false, interrupted_ = false, heard_ = false;

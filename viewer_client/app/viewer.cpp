@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "common/core/overloaded.hpp"
 #include "common/runtime/files.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/gauges.hpp"
@@ -26,11 +27,6 @@ constexpr double kToolKeyDistance_mm = 120.0;
 constexpr std::chrono::milliseconds kMeetings{50};
 
 std::int64_t mono_ns(Clock::time_point at) { return std::chrono::nanoseconds(at.time_since_epoch()).count(); }
-
-template <class... F>
-struct Overloaded : F... {
-  using F::operator()...;
-};
 
 }  // namespace
 

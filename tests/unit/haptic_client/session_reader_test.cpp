@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/core/overloaded.hpp"
 #include "common/field/rejection.hpp"
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
@@ -62,30 +63,37 @@ struct Heard {
   SessionReader reader{
       AuthorId{7},
       builtin_tool_box(),
-      {.complete =
-           [this](const RoomAtJoin& room) { events.push_back("complete " + std::to_string(room.contained.value)); },
-       .committed =
-           [this](RoomSeq seq, const Cut& cut) {
-             events.push_back(std::to_string(seq.value) + " of " + std::to_string(cut.author.value));
-           },
-       .rejected =
-           [this](RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease, const std::string& why) {
-             events.push_back(std::to_string(seq.value) + " rejects " + std::to_string(author_seq) + " until " +
-                              std::to_string(lease) + ": " + why);
-           },
-       .scene = [this](RoomSeq seq,
-                       const std::vector<SceneItem>&) { events.push_back("scene " + std::to_string(seq.value)); },
-       .supervised =
-           [this](const HandSupervised& now) {
-             if (now.seq.value == 0 && now.supervision == Restrictions{}) return ++free;
-             events.push_back(std::to_string(now.seq.value) + (now.supervision.stopped ? " stops" : " frees") +
-                              " until " + std::to_string(now.lease_epoch) + now.supervision.words);
-             return free;
-           },
-       .said =
-           [this](const WordsSaid& said) {
-             events.push_back(std::to_string(said.seq.value) + ": " + std::to_string(said.from.value) + " says " +
-                              said.words);
+      {.message =
+           [this](const RoomMessage& message) {
+             std::visit(
+                 Overloaded{
+                     [&](const RoomAtJoin& room) {
+                       events.push_back("complete " + std::to_string(room.contained.value));
+                     },
+                     [&](const CutCommitted& committed) {
+                       events.push_back(std::to_string(committed.seq.value) + " of " +
+                                        std::to_string(committed.cut.author.value));
+                     },
+                     [&](const CutRejected& rejected) {
+                       events.push_back(std::to_string(rejected.seq.value) + " rejects " +
+                                        std::to_string(rejected.author_seq) + " until " +
+                                        std::to_string(rejected.lease_epoch) + ": " +
+                                        std::string(name(rejected.reason)) + ", " + rejected.sentence);
+                     },
+                     [&](const SceneSet& scene) { events.push_back("scene " + std::to_string(scene.seq.value)); },
+                     [&](const HandSupervised& now) {
+                       if (now.seq.value == 0 && now.supervision == Restrictions{}) return void(++free);
+                       events.push_back(std::to_string(now.seq.value) +
+                                        (now.supervision.stopped ? " stops" : " frees") + " until " +
+                                        std::to_string(now.lease_epoch) + now.supervision.words);
+                     },
+                     [&](const WordsSaid& said) {
+                       events.push_back(std::to_string(said.seq.value) + ": " + std::to_string(said.from.value) +
+                                        " says " + said.words);
+                     },
+                     [](const auto&) {},
+                 },
+                 message);
            },
        .partner = [this](const CuttingState& state) { partners.push_back(100 * state.author.value + state.state_seq); },
        .bone = [this](const MountPose& seen) { seqs.push_back(seen.seen_seq); }},
@@ -133,17 +141,56 @@ TEST(SessionReader, TakesWhicheverWayIsFirstAndKeepsTheOrder) {
   ASSERT_TRUE(heard.reader.take(scene));
   EXPECT_EQ(heard.events,
             (std::vector<std::string>{"complete 3", "10 of 2", "11 of 7", "scene 12",
-                                      "13 rejects 7 until 14: the path leaves the surroundings of the bone"}));
+                                      "13 rejects 7 until 14: place, the path leaves the surroundings of the bone"}));
   EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{5, 6, 7}));
   EXPECT_EQ(heard.reader.taken(), 4u);
+}
+
+// A program acts on the number. A reworded sentence changes nothing, and a number of a later version is no known
+// reason.
+TEST(SessionReader, KnowsAReasonByItsNumberNotByItsSentence) {
+  Heard heard;
+  heard.reader.begin();
+  v1::SessionResponse complete;
+  complete.mutable_complete()->set_room_seq(1);
+  ASSERT_TRUE(heard.reader.take(complete));
+  heard.events.clear();
+  const auto rejected = [&](std::uint64_t index, int code, const std::string& reason) {
+    v1::SessionResponse response;
+    response.set_index(index);
+    response.mutable_rejected()->set_room_seq(index + 1);
+    response.mutable_rejected()->set_author_seq(index);
+    response.mutable_rejected()->set_lease_epoch(2);
+    response.mutable_rejected()->set_code(static_cast<v1::RejectionReason>(code));
+    response.mutable_rejected()->set_reason(reason);
+    return response;
+  };
+  ASSERT_TRUE(heard.reader.take(rejected(1, v1::REJECTION_REASON_FROZEN, "please wait")));
+  ASSERT_TRUE(heard.reader.take(rejected(2, 1000, "of a later version")));
+  ASSERT_TRUE(heard.reader.take(rejected(3, v1::REJECTION_REASON_UNSPECIFIED, "of an earlier version")));
+  ASSERT_TRUE(heard.reader.take(wire::IndexedEntry{4,
+                                                   {.room_seq = RoomSeq{5},
+                                                    .kind = wire::SessionEntryKind::rejected,
+                                                    .author_seq = 4,
+                                                    .reason = 256 + static_cast<std::uint32_t>(Rejection::frozen),
+                                                    .lease_epoch = 2}}));
+  EXPECT_EQ(heard.events,
+            (std::vector<std::string>{"2 rejects 1 until 2: frozen, please wait",
+                                      "3 rejects 2 until 2: none, of a later version",
+                                      "4 rejects 3 until 2: none, of an earlier version",
+                                      "5 rejects 4 until 2: none, for a reason that this version does not know"}));
 }
 
 // Sequence numbers of the cuts that a rejoin acknowledges. A number that the room does not send stays unknown.
 TEST(SessionReader, SaysTheSequenceNumbersOfDecidedCuts) {
   std::optional<RoomAtJoin> told;
   SessionReader reader(
-      AuthorId{7}, builtin_tool_box(), {.complete = [&](const RoomAtJoin& room) { told = room; }}, [](std::uint64_t) {},
-      [](std::uint64_t) {});
+      AuthorId{7}, builtin_tool_box(),
+      {.message =
+           [&](const RoomMessage& message) {
+             if (const auto* room = std::get_if<RoomAtJoin>(&message)) told = *room;
+           }},
+      [](std::uint64_t) {}, [](std::uint64_t) {});
   v1::SessionResponse complete;
   complete.mutable_complete()->set_room_seq(30);
   complete.mutable_complete()->set_decided_author_seq(5);

@@ -50,58 +50,14 @@ class Surgeon {
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
     replica_.emplace(session_->bone(), BodyId{0}, session_->tools());
-    session_->open({.leaf =
-                        [this](const FieldLeaf& leaf) {
-                          on([&] { interrupted_ ? renewed_.push_back(leaf) : replica_->restore(leaf); });
-                        },
-                    .complete =
-                        [this](const RoomAtJoin& room) {
-                          on([&] {
-                            if (interrupted_)
-                              replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
-                            replica_->settle();
-                            renewed_.clear();
-                            interrupted_ = false;
-                            complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies;
-                            own_ = std::max(own_, room.decided_author_seq);
-                            for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own) {
-                              const RoomSeq seq = room.seq_of(own).value_or(RoomSeq{});
-                              if (!seq) continue;
-                              EXPECT_EQ(acknowledged_.emplace(own, seq).first->second, seq)
-                                  << "the cut had another sequence number before";
-                            }
-                          });
-                        },
-                    .committed =
-                        [this](RoomSeq seq, const Cut& cut) {
-                          on([&] {
-                            EXPECT_TRUE(complete_);
-                            EXPECT_GT(seq, seq_) << "committed cuts come in order";
-                            if (heard_) heard_(cut);
-                            replica_->commit(seq, cut, false);
-                            seq_ = seq;
-                            if (cut.author != session_->room().author) return;
-                            ++own_;
-                            EXPECT_TRUE(acknowledged_.emplace(cut.author_seq, seq).second) << "acknowledged twice";
-                          });
-                        },
-                    .rejected = [this](RoomSeq, std::uint64_t, std::uint64_t lease,
-                                       const std::string& reason) { on([&] { rejected_ = reason, lease_ = lease; }); },
-                    .change =
-                        [this](BonePart&& part) {
-                          on([&] {
-                            replica_->change(part.seq, part.bodies, part.leaves);
-                            if (part.last)
-                              seq_ = part.seq, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
-                          });
-                        },
-                    .scene =
-                        [this](RoomSeq seq, const std::vector<SceneItem>& items) {
-                          on([&] { items_ = items, seq_ = std::max(seq_, seq); });
-                        },
-                    .noted = [this](RoomSeq seq) { on([&] { seq_ = std::max(seq_, seq); }); },
-                    .interrupted = [this](const Error&) { on([&] { interrupted_ = complete_, ++interruptions_; }); },
-                    .lost = [this](const Error& why) { on([&] { lost_ = why.message; }); }});
+    session_->open({
+        .message =
+            [this](const RoomMessage& message) {
+              const std::lock_guard lock(mutex_);
+              std::visit([this](const auto& one) { take(one); }, message);
+            },
+        .lost = [this](const Error& why) { on([&] { lost_ = why.message; }); },
+    });
   }
   ~Surgeon() { session_->close(); }
 
@@ -129,6 +85,41 @@ class Surgeon {
   }
 
  private:
+  void take(const FieldLeaf& leaf) { interrupted_ ? renewed_.push_back(leaf) : replica_->restore(leaf); }
+  void take(const RoomAtJoin& room) {
+    if (interrupted_) replica_->renew(room.contained, room.bodies, renewed_, room.decided_author_seq);
+    replica_->settle();
+    renewed_.clear();
+    interrupted_ = false;
+    complete_ = true, seq_ = room.contained, lease_ = room.lease_epoch, bodies_ = room.bodies;
+    own_ = std::max(own_, room.decided_author_seq);
+    for (std::uint64_t own = 1; own <= room.decided_author_seq; ++own) {
+      const RoomSeq seq = room.seq_of(own).value_or(RoomSeq{});
+      if (!seq) continue;
+      EXPECT_EQ(acknowledged_.emplace(own, seq).first->second, seq) << "the cut had another sequence number before";
+    }
+  }
+  void take(const CutCommitted& committed) {
+    EXPECT_TRUE(complete_);
+    EXPECT_GT(committed.seq, seq_) << "committed cuts come in order";
+    if (heard_) heard_(committed.cut);
+    replica_->commit(committed.seq, committed.cut, false);
+    seq_ = committed.seq;
+    if (committed.cut.author != session_->room().author) return;
+    ++own_;
+    EXPECT_TRUE(acknowledged_.emplace(committed.cut.author_seq, committed.seq).second) << "acknowledged twice";
+  }
+  void take(const CutRejected& rejected) { rejected_ = rejected.sentence, lease_ = rejected.lease_epoch; }
+  void take(const BonePart& part) {
+    replica_->change(part.seq, part.bodies, part.leaves);
+    if (part.last) seq_ = part.seq, lease_ = std::max(lease_, part.lease_epoch), bodies_ = part.bodies;
+  }
+  void take(const SceneSet& scene) { items_ = scene.items, seq_ = std::max(seq_, scene.seq); }
+  void take(const HandSupervised&) {}
+  void take(const WordsSaid&) {}
+  void take(const EventNoted& noted) { seq_ = std::max(seq_, noted.seq); }
+  void take(const Interrupted&) { interrupted_ = complete_, ++interruptions_; }
+
   template <class Call>
   void on(Call call) {
     const std::lock_guard lock(mutex_);

@@ -22,19 +22,20 @@ class Pusher {
     auto joined = RoomSession::join({.address = address, .cache = cache, .fast_path = fast_path}, {});
     EXPECT_TRUE(joined.has_value()) << joined.error().message;
     session_.emplace(std::move(*joined));
-    RoomCallbacks events;
-    events.bone = [this](const MountPose& seen) {
+    RoomCallbacks callbacks;
+    callbacks.bone = [this](const MountPose& seen) {
       const std::lock_guard lock(mutex_);
       first_ = first_.value_or(seen.seen_seq);
       newest_ = seen;
       ++told_;
     };
-    events.interrupted = [this](const Error&) {
+    callbacks.message = [this](const RoomMessage& message) {
+      if (!std::holds_alternative<Interrupted>(message)) return;
       const std::lock_guard lock(mutex_);
       first_.reset();
       ++interruptions_;
     };
-    session_->open(std::move(events));
+    session_->open(std::move(callbacks));
   }
   ~Pusher() { session_->close(); }
 

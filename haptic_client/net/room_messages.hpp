@@ -4,12 +4,14 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
 #include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
+#include "common/field/rejection.hpp"
 #include "common/field/restrictions.hpp"
 #include "common/mechanics/compliant_mount.hpp"
 #include "common/mechanics/cutting_state.hpp"
@@ -58,38 +60,60 @@ struct WordsSaid {
   std::string words;
 };
 
-// Functions called with what is received, on the session's own thread, one after the other. The order is: the scene,
-// every leaf, then `complete`, then events in room_seq order. One of these events may be reported both as a change and
-// as a scene.
-//
-// When the connection breaks, `interrupted` is called. After reconnecting everything is repeated: the scene, every
-// leaf, `complete`. Cuts that were sent and are undecided are sent again. `lost` is called at most once, as the last
-// call, and never after close(). Tools are added to tools() before any event that names them.
+// A cut of the caller that the room rejected. What the caller cut on top of it is dropped too.
+struct CutRejected {
+  RoomSeq seq;  // of the rejection
+  std::uint64_t author_seq = 0;
+  std::uint64_t lease_epoch = 0;       // of the caller's lease from now on
+  Rejection reason = Rejection::none;  // none: a reason that this version does not know
+  std::string sentence;                // the reason, for people
+};
+
+// A cut of anybody, including the caller.
+struct CutCommitted {
+  RoomSeq seq;
+  Cut cut;
+};
+
+// All items of the scene from now on. `seq` as of the newest change.
+struct SceneSet {
+  RoomSeq seq;
+  std::vector<SceneItem> items;
+};
+
+// An event that changes nothing here: a tool was added, somebody joined, a mark was set.
+struct EventNoted {
+  RoomSeq seq;
+};
+
+// The connection to the room is down and is being made again.
+struct Interrupted {
+  Error why;
+};
+
+// The order is: SceneSet, every FieldLeaf, then RoomAtJoin, then events in order of their sequence numbers. One of
+// these events may be reported both as a BonePart and as a SceneSet. HandSupervised comes once with each RoomAtJoin,
+// just before or after it, and at every change of restrictions. After Interrupted everything is repeated from the
+// beginning, and cuts that were sent and are undecided are sent again.
+using RoomMessage = std::variant<FieldLeaf, RoomAtJoin, CutCommitted, CutRejected, BonePart, SceneSet, HandSupervised,
+                                 WordsSaid, EventNoted, Interrupted>;
+
+// Functions called with what is received. `message`, `partner` and `lost` are called on the session's own thread, one
+// after the other.
 struct RoomCallbacks {
-  std::function<void(const FieldLeaf& leaf)> leaf{};
-  std::function<void(const RoomAtJoin& room)> complete{};
-  std::function<void(RoomSeq room_seq, const Cut& cut)> committed{};  // of anybody, including the caller
-  // For the caller's cut. What the caller cut on top of it is dropped too. `lease_epoch` is that of the caller's lease
-  // from now on.
-  std::function<void(RoomSeq room_seq, std::uint64_t author_seq, std::uint64_t lease_epoch, const std::string& reason)>
-      rejected{};
-  std::function<void(BonePart&& part)> change{};
-  std::function<void(RoomSeq room_seq, const std::vector<SceneItem>& items)> scene{};  // all items from now on
-  // Called once with each `complete`, just before or after it, and at every change of restrictions.
-  std::function<void(const HandSupervised& decided)> supervised{};
-  std::function<void(const WordsSaid& said)> said{};
-  // Newest state of a partner's tool; outside the order of events.
+  // Everything that has an order. Tools are added to RoomSession::tools() before any message that names them.
+  std::function<void(RoomMessage&& message)> message{};
+  // Newest state of a partner's tool; outside the order of messages.
   std::function<void(const CuttingState& partner)> partner{};
   // Whether the newest datagram says that the caller's hand is stopped. Called when this has changed; its log entry may
   // arrive later. Ignore a flag that is older than the newest log entry (by its lease's epoch). Called from another
   // thread, at any time until close(); it must not wait.
   std::function<void(std::uint64_t lease_epoch, bool frozen)> stop_flag{};
-  // Pose of the bone on its mount, in a room that has one: the newest, outside the order of events. Called from another
-  // thread, one call at a time. Its numbers begin anew after `interrupted`. It must not wait.
+  // Pose of the bone on its mount, in a room that has one: the newest, outside the order of messages. Called from
+  // another thread, one call at a time. Its numbers begin anew after Interrupted. It must not wait.
   std::function<void(const MountPose& seen)> bone{};
-  std::function<void(RoomSeq room_seq)> noted{};  // a tool was added, somebody joined, a mark was set
-  std::function<void(const Error& why)> interrupted{};
-  std::function<void(const Error& why)> lost{};  // for good: the room is over, or no longer knows this client
+  // For good: the room is over, or no longer knows this client. At most once, as the last call, never after close().
+  std::function<void(const Error& why)> lost{};
 };
 
 }  // namespace osteon
