@@ -14,10 +14,9 @@
 #include <utility>
 
 #include "common/runtime/log.hpp"
-#include "osteon/v1/cutting.pb.h"
 #include "server/net/authorizer.hpp"
 #include "server/net/playback.hpp"
-#include "server/net/rooms.hpp"
+#include "server/net/room_runtime.hpp"
 
 namespace osteon {
 namespace {
@@ -77,12 +76,10 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   AuthorId author() const override { return author_; }
   // Its tool follows its path on the bone, wherever the mount has moved the bone. No force is recorded.
   bool feels_bone() const override { return false; }
-  void begin(RoomSeq, MessageParts, Bytes complete) override {
-    v1::SessionResponse said;
-    (void)said.ParseFromString(*complete);
+  void begin(SessionStart start) override {
     const std::lock_guard lock(mutex_);
-    lease_ = said.complete().lease_epoch();
-    body_ = BodyId{said.complete().bodies(0)};
+    lease_ = start.lease_epoch;
+    body_ = start.bodies.front();
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
   // Decided before its session was open.
@@ -90,8 +87,8 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     const std::lock_guard lock(mutex_);
     stopped_ = !supervised.supervision.may_cut();
   }
-  void enqueue(RoomSeq, const Bytes&) override {}
-  void enqueue(RoomSeq, const Bytes&, const wire::SessionEntry& entry) override {
+  void enqueue(const SessionMessage& message) override {
+    const wire::SessionEntry& entry = message.fast;
     const std::lock_guard lock(mutex_);
     if (entry.kind == wire::SessionEntryKind::supervised) {
       lease_ = entry.lease_epoch;
@@ -109,7 +106,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     }
     wake_.notify_one();
   }
-  void answer(const Bytes&) override {}
+  void answer(const SessionMessage&) override {}
   void refuse(const Error& why) override {
     log::error("demonstration ended", {{"author", author_.value}, {"reason", why.message}});
     const std::lock_guard lock(mutex_);
@@ -234,7 +231,7 @@ struct Recording {
 };
 
 // `over`: nobody waits for the result any more.
-Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& what, const std::atomic<bool>& over) {
+Result<Recording> read_recording(const DemonstrationPlace& in, const WhatToShow& what, const std::atomic<bool>& over) {
   std::map<RoomSeq, Recorded> cuts;
   std::set<RoomSeq> undone;
   std::map<Digest, Tool> tools;
@@ -250,11 +247,11 @@ Result<Recording> read_recording(Rooms& rooms, OpenRoom& in, const WhatToShow& w
       tools.emplace(added->tool.hash(), added->tool);
     }
     too_many = cuts.size() > Demonstrations::kMostCuts;
-    return !too_many && !over && !rooms.ending();
+    return !too_many && !over;
   };
-  const Result<RoomGenesis> genesis = rooms.read(what.room.empty() ? in.name : what.room, what.to, take);
+  const Result<RoomGenesis> genesis = in.read(what.room.empty() ? in.room : what.room, what.to, take);
   if (!genesis) return tl::unexpected(genesis.error());
-  if (genesis->case_hash != in.runtime().bone().hash())
+  if (genesis->case_hash != in.runtime.bone().hash())
     return failure(ErrorCode::invalid_input,
                    "room " + genesis->room + " is of another case; show one of the same bone");
   if (too_many)
@@ -289,17 +286,16 @@ Result<void> add_tool(RoomRuntime& runtime, AuthorId by, const Tool& tool) {
 Demonstrations::Demonstrations() = default;
 Demonstrations::~Demonstrations() { end_all(); }
 
-Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller,
+Result<Shown> Demonstrations::begin(const DemonstrationPlace& in, AuthorId by, const Caller& caller,
                                     const WhatToShow& what) {
   if (!(what.speed >= kLeastSpeed && what.speed <= kMostSpeed))
     return failure(ErrorCode::invalid_input,
                    "the speed is not from 0.001 to " + std::to_string(static_cast<int>(kMostSpeed)));
-  if (const std::optional<std::string> why = rooms.draining()) return failure(ErrorCode::unavailable, *why);
-  Result<Recording> recording = read_recording(rooms, in, what, over_);
+  Result<Recording> recording = read_recording(in, what, over_);
   if (!recording) return tl::unexpected(recording.error());
-  if (over_ || rooms.ending()) return failure(ErrorCode::unavailable, "the room is closed");
+  if (over_) return failure(ErrorCode::unavailable, "the room is closed");
   if (recording->cuts.empty()) return failure(ErrorCode::not_found, "there is no cut to show");
-  RoomRuntime& runtime = in.runtime();
+  RoomRuntime& runtime = in.runtime;
   for (const Tool& tool : recording->tools)
     if (!runtime.tools().find(tool.hash()))
       if (const Result<void> known = add_tool(runtime, by, tool); !known) return tl::unexpected(known.error());
@@ -318,8 +314,8 @@ Result<Shown> Demonstrations::begin(Rooms& rooms, OpenRoom& in, AuthorId by, con
   if (!author) return tl::unexpected(author.error());
   const Shown shown{*author, recording->cuts.size()};
   const auto one = std::make_shared<Demonstration>(runtime, *author, std::move(recording->cuts), what.speed);
-  if (rooms.authorizer)
-    if (const Result<void> may = one->stand_under(*rooms.authorizer, caller, in.name); !may)
+  if (in.authorizer)
+    if (const Result<void> may = one->stand_under(*in.authorizer, caller, in.room); !may)
       return tl::unexpected(may.error());
   if (const Result<void> started = one->start(); !started) return tl::unexpected(started.error());
   going_on_.push_back(one);

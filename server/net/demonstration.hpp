@@ -3,6 +3,7 @@
 #pragma once
 #include <atomic>
 #include <cstddef>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -10,13 +11,15 @@
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
+#include "server/net/journal_entries.hpp"
+#include "server/room/log_entry.hpp"
 
 namespace osteon {
 
+class Authorizer;
 struct Caller;
 class Demonstration;
-class OpenRoom;
-class Rooms;
+class RoomRuntime;
 
 struct WhatToShow {
   std::string room;    // room of the journal; empty: this room's own
@@ -28,6 +31,18 @@ struct WhatToShow {
 struct Shown {
   AuthorId demonstrator;
   std::size_t cuts = 0;
+};
+
+// Where demonstrations happen, and where their cuts come from.
+struct DemonstrationPlace {
+  // Reads the journal of a room from the beginning up to an event, or until `take` returns false. Errors: not_found (no
+  // such room), unavailable (it has no journal, or the server is stopping), and those of reading.
+  using ReadEntries = std::function<Result<RoomGenesis>(const std::string& room, RoomSeq to,
+                                                        const std::function<bool(const LogEntry&)>& take)>;
+  std::string room;
+  RoomRuntime& runtime;
+  ReadEntries read;
+  Authorizer* authorizer = nullptr;  // null: everybody may do everything
 };
 
 // The demonstrations of one room. Any thread may call it but those of the room. Each demonstration has a thread.
@@ -47,7 +62,7 @@ class Demonstrations {
   // rights are revoked. Errors: invalid_input (the speed; another case; more than kMostCuts); not_found (no such room,
   // or no cut in that range); unavailable (that room has no journal, kMost demonstrations are running, the room is
   // closed, or the server is stopping); denied (`caller` no longer has the right); and those of reading.
-  [[nodiscard]] Result<Shown> begin(Rooms& rooms, OpenRoom& in, AuthorId by, const Caller& caller,
+  [[nodiscard]] Result<Shown> begin(const DemonstrationPlace& in, AuthorId by, const Caller& caller,
                                     const WhatToShow& what);
   // Error not_found: that author runs no demonstration. If a demonstration ended, the error says why.
   [[nodiscard]] Result<void> end(AuthorId demonstrator);

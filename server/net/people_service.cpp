@@ -190,12 +190,12 @@ class PeopleServiceImpl final : public PeopleBase {
         return refuse(reactor, status_of(there.error()));
     // Reading a journal takes a while. Other calls do not wait for it.
     rooms_.recordings.run([this, room, reactor, request, response, caller = *caller] {
-      const Result<Shown> shown = room->demonstrations().begin(rooms_, *room, AuthorId{request->author()}, caller,
-                                                               {.room = request->room(),
-                                                                .of = AuthorId{request->of_author()},
-                                                                .from = RoomSeq{request->from_room_seq()},
-                                                                .to = RoomSeq{request->to_room_seq()},
-                                                                .speed = request->speed()});
+      const Result<Shown> shown = rooms_.demonstrate(*room, AuthorId{request->author()}, caller,
+                                                     {.room = request->room(),
+                                                      .of = AuthorId{request->of_author()},
+                                                      .from = RoomSeq{request->from_room_seq()},
+                                                      .to = RoomSeq{request->to_room_seq()},
+                                                      .speed = request->speed()});
       if (!shown) return reactor->Finish(status_of(shown.error()));
       response->set_demonstrator(shown->demonstrator.value);
       response->set_cuts(static_cast<std::uint32_t>(shown->cuts));

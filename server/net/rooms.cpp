@@ -594,6 +594,17 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
   return genesis;
 }
 
+Result<Shown> Rooms::demonstrate(OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what) {
+  if (const std::optional<std::string> why = draining()) return failure(ErrorCode::unavailable, *why);
+  const auto read_until_the_end = [this](const std::string& room, RoomSeq to,
+                                         const std::function<bool(const LogEntry&)>& take) -> Result<RoomGenesis> {
+    Result<RoomGenesis> genesis = read(room, to, [&](const LogEntry& entry) { return !ending() && take(entry); });
+    if (ending()) return failure(ErrorCode::unavailable, "the room is closed");
+    return genesis;
+  };
+  return in.demonstrations().begin({in.name, in.runtime(), read_until_the_end, authorizer}, by, caller, what);
+}
+
 Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool with_branches,
                                                const std::function<Result<void>(const std::string& room)>& may) {
   if (is_backup_name(name)) return remove_backup(name, may);

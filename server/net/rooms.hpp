@@ -166,6 +166,8 @@ class Rooms {
   // Reads the entries of a persisted room, open or closed, from its first to `to` (null: all), until `take` returns
   // false. Returns how the room began.
   Result<RoomGenesis> read(const std::string& name, RoomSeq to, const std::function<bool(const LogEntry&)>& take);
+  // Begins a demonstration in a room. Errors: those of Demonstrations::begin, and unavailable (the server drains).
+  [[nodiscard]] Result<Shown> demonstrate(OpenRoom& in, AuthorId by, const Caller& caller, const WhatToShow& what);
   // Who made a room, or a backup if the name has the ending of backups. Empty: unknown.
   [[nodiscard]] std::string owner(const std::string& name) const;
   // Deletes a room, or a backup by its file's name. Returns the names of everything that was deleted. Before anything

@@ -15,6 +15,7 @@
 #include "server/net/room_server.hpp"
 #include "server/upload_validation/case_archive.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/room/fake_session.hpp"
 #include "tests/unit/room/kept_room.hpp"
 #include "tests/unit/room/members.hpp"
 
@@ -59,18 +60,9 @@ class SeenTools final : public StateSubscriber {
 };
 
 // A haptic client at the bone on its compliant mount.
-class MountedHand final : public SessionSubscriber {
+class MountedHand final : public test::FakeSession {
  public:
-  explicit MountedHand(AuthorId author) : author_(author) {}
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts, Bytes) override {}
-  void set_leaves(std::vector<FieldLeaf>) override {}
-  void enqueue(RoomSeq, const Bytes&) override {}
-  void answer(const Bytes&) override {}
-  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
-  void decided() override {}
-  void end(const std::string&) override {}
-  std::size_t waiting() const override { return 0; }
+  using FakeSession::FakeSession;
   void show_bone(const MountPose& seen) override {
     const std::lock_guard lock(mutex_);
     seen_ = seen;
@@ -81,7 +73,6 @@ class MountedHand final : public SessionSubscriber {
   }
 
  private:
-  const AuthorId author_;
   mutable std::mutex mutex_;
   MountPose seen_;
 };
@@ -122,7 +113,7 @@ class DemonstrationTest : public ::testing::Test {
   }
   Result<Shown> show(double speed, const std::string& of = {}) {
     const WhatToShow what{.room = of, .of = {}, .from = {}, .to = {}, .speed = speed};
-    return room_->demonstrations().begin(server_->rooms(), *room_, instructor_, {}, what);
+    return server_->rooms().demonstrate(*room_, instructor_, {}, what);
   }
   void decide(AuthorId about, const Restrictions& word) {
     std::promise<Result<RoomEvent>> answer;
