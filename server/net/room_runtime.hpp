@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "common/core/result.hpp"
 #include "common/mechanics/compliant_mount.hpp"
@@ -20,24 +21,31 @@
 #include "server/net/presence.hpp"
 #include "server/net/room_store.hpp"
 #include "server/net/send_queue.hpp"
+#include "server/net/session_messages.hpp"
 #include "server/net/state_publisher.hpp"
 #include "server/net/subscriber.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
 
+// What a session begins with.
+struct SessionStart {
+  RoomSeq contained;                     // the sequence number that the leaves contain
+  std::uint64_t decided_author_seq = 0;  // the newest decided cut of the session's author
+  std::uint64_t lease_epoch = 0;         // of the session's author
+  std::vector<BodyId> bodies;
+  std::vector<SessionMessage> before;  // sent before the leaves
+  Bytes complete;                      // the message that ends the leaves; a whole SessionResponse
+};
+
 class SessionSubscriber : public Subscriber {
  public:
   [[nodiscard]] virtual AuthorId author() const = 0;
-  // Entries come after this call. `contained`: the sequence number that the leaves contain. `before`: whole
-  // SessionResponses that are sent before the leaves. `complete`: the one that ends the leaves.
-  virtual void begin(RoomSeq contained, MessageParts before, Bytes complete) = 0;
-  // Called once, after begin() and perhaps after entries. Entries apply to these leaves; applying one again that a leaf
+  virtual void begin(SessionStart start) = 0;  // messages come after this call
+  // Called once, after begin() and perhaps after messages. Events apply to these leaves; applying one again that a leaf
   // already contains changes nothing.
   virtual void set_leaves(std::vector<FieldLeaf> leaves) = 0;
-  virtual void enqueue(RoomSeq seq, const Bytes& entry) = 0;  // a whole SessionResponse
-  // The same. `fast`: the entry's short form for the fast path.
-  virtual void enqueue(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& /*fast*/) { enqueue(seq, entry); }
+  virtual void enqueue(const SessionMessage& message) = 0;  // of an event; in the room's order
   // [thread of the tools' states] The newest states of all tools. Returns true if some are still to be sent and it
   // wants to be called again soon.
   virtual bool show_partners(const std::vector<CuttingState>& /*states*/) { return false; }
@@ -51,8 +59,8 @@ class SessionSubscriber : public Subscriber {
   // A tool's number in short messages. Called after begin() for the room's tools, and before an entry that adds another
   // tool.
   virtual void know_tool(std::uint32_t /*number*/, const Digest& /*tool*/) {}
-  virtual void answer(const Bytes& entry) = 0;  // likewise, outside the room's order
-  virtual void refuse(const Error& why) = 0;    // a violation of the protocol: the stream ends
+  virtual void answer(const SessionMessage& message) = 0;  // outside the room's order
+  virtual void refuse(const Error& why) = 0;               // a violation of the protocol: the stream ends
   // Another stream of its author was opened. That stream may have been abandoned and arrived late, so the author may
   // come again.
   virtual void replaced(const std::string& why) { end(why); }

@@ -65,23 +65,23 @@ struct RoomRuntime::Impl {
   void decide(QueuedEvent& queued);
   // [tick] Calls `when_durable` when what was decided is durable.
   void later(Committer::WhenDurable when_durable) { callbacks.push_back(std::move(when_durable)); }
-  [[nodiscard]] MessageParts entries_of(const RoomEvent& event);
-  // What some sessions get in place of the entry that the others get.
+  [[nodiscard]] std::vector<SessionMessage> messages_of(const RoomEvent& event);
+  // What some sessions get in place of the messages that the others get.
   struct Personal {
     AuthorId to;  // null: all
-    Bytes entry;  // null: there is none
-    wire::SessionEntry fast;
-    [[nodiscard]] bool is_for(AuthorId author) const { return entry && (!to || to == author); }
+    std::optional<SessionMessage> message;
+    [[nodiscard]] bool is_for(AuthorId author) const { return message && (!to || to == author); }
   };
   [[nodiscard]] Personal personal_message(const RoomEvent& event);
+  // `held`: the author's restrictions, which `by` decided.
+  [[nodiscard]] SessionStart start_of_session(AuthorId author, const People::Supervised& held, const Decider& by);
   // [tick] In a room without a store; 0: no name.
   [[nodiscard]] std::uint32_t person_of(const std::string& name) {
     return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
   }
   // What sessions are sent for one event.
   struct Said {
-    RoomSeq seq;
-    MessageParts entries;
+    std::vector<SessionMessage> messages;
     Personal personal;
   };
   // Returns true if any session still lacks some of the states.
@@ -153,7 +153,7 @@ struct RoomRuntime::Impl {
 
   std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
   bool may_return = false;                // under sessions_mutex: they may come again
-  Bytes redial;                           // under sessions_mutex: sent to sessions when the process is about to stop
+  std::optional<SessionMessage> redial;   // under sessions_mutex: sent to sessions when the process is about to stop
   std::mutex copy_mutex;                  // held while the bone is copied; of a stopped runtime by every caller
   std::optional<BoneStatus> last_status;  // under copy_mutex
   std::map<std::string, std::uint32_t> persons;   // of the tick thread: numbers by name, if no journal gives them

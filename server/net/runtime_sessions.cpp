@@ -59,30 +59,21 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
   const bool newly = outcome->committed() && !outcome->repeated;
   if (newly) metrics.committed(queued.arrived, taken, done);
   if (!outcome->committed() && !outcome->repeated) metrics.rejected(outcome->rejection);
-  const Bytes entry = outcome->committed() ? cut_message(outcome->room_seq, queued.cut)
-                                           : rejection_message(outcome->room_seq, queued.cut.author_seq,
-                                                               outcome->lease_epoch, outcome->rejection);
+  SessionMessage message = outcome->committed() ? cut_message(outcome->room_seq, queued.cut)
+                                                : rejection_message(outcome->room_seq, queued.cut.author_seq,
+                                                                    outcome->lease_epoch, outcome->rejection);
   publish_durable(room.time());
-  wire::SessionEntry fast{.room_seq = outcome->room_seq, .kind = wire::SessionEntryKind::committed};
-  if (outcome->committed()) {
-    fast.cut = queued.cut;
-  } else {
-    fast.kind = wire::SessionEntryKind::rejected;
-    fast.author_seq = queued.cut.author_seq;
-    fast.reason = static_cast<std::uint32_t>(outcome->rejection);
-    fast.lease_epoch = outcome->lease_epoch;
-  }
-  later([this, subscriber = queued.subscriber, entry, fast = std::move(fast), seq = outcome->room_seq,
-         repeated = outcome->repeated, to_all = outcome->committed(), newly, done](const Result<void>& durable) {
+  later([this, subscriber = queued.subscriber, message = std::move(message), repeated = outcome->repeated,
+         to_all = outcome->committed(), newly, done](const Result<void>& durable) {
     const Clock::time_point kept = Clock::now();
     if (durable) {
       const std::lock_guard lock(sessions_mutex);
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(subscriber->author());
       if (!repeated && to_all)
-        sessions.each([&](SessionSubscriber& one) { one.enqueue(seq, entry, fast); });
+        sessions.each([&](SessionSubscriber& one) { one.enqueue(message); });
       else if (author != open_authors.end())
-        repeated ? author->second->answer(entry) : author->second->enqueue(seq, entry, fast);
+        repeated ? author->second->answer(message) : author->second->enqueue(message);
     }
     if (durable && newly) metrics.acknowledged(done, kept, Clock::now());
     if (durable && newly) people.took_cut(subscriber->author());
@@ -101,9 +92,9 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
   }();
   std::vector<Said> said;
   if (event && event->room_seq) {
-    said.push_back({event->room_seq, entries_of(*event), personal_message(*event)});
+    said.push_back({messages_of(*event), personal_message(*event)});
     event->leaves.clear();
-    for (const RoomEvent& one : event->further) said.push_back({one.room_seq, entries_of(one), personal_message(one)});
+    for (const RoomEvent& one : event->further) said.push_back({messages_of(one), personal_message(one)});
     if (event->scene || event->bone) show_scene();
     if (event->bone) note_changed(queued.arrived);
   }
@@ -121,12 +112,9 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
         sessions.each([&](SessionSubscriber& subscriber) { subscriber.know_tool(number, event->tool->hash); });
       }
       for (const Said& one : said)
-        for (const Bytes& entry : one.entries)
+        for (const SessionMessage& message : one.messages)
           sessions.each([&](SessionSubscriber& subscriber) {
-            if (one.personal.is_for(subscriber.author()))
-              subscriber.enqueue(one.seq, one.personal.entry, one.personal.fast);
-            else
-              subscriber.enqueue(one.seq, entry, {.room_seq = one.seq, .kind = wire::SessionEntryKind::streamed});
+            subscriber.enqueue(one.personal.is_for(subscriber.author()) ? *one.personal.message : message);
           });
     }
     answer(event);
@@ -139,9 +127,9 @@ void RoomRuntime::Impl::publish_durable(std::chrono::nanoseconds now) {
   next_durable = now + std::chrono::seconds(1);
   later([this](const Result<void>& durable) {
     if (!durable) return;
-    const Bytes entry = durable_message(store->witness());
+    const SessionMessage message = durable_message(store->witness());
     const std::lock_guard lock(sessions_mutex);
-    sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(entry); });
+    sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(message); });
   });
 }
 
@@ -152,29 +140,23 @@ std::uint32_t RoomRuntime::Impl::number_of(const Digest& tool) {
 }
 
 // [tick] What every session is sent for an event that is not a cut. Only this thread changes the room.
-MessageParts RoomRuntime::Impl::entries_of(const RoomEvent& event) {
-  MessageParts entries;
-  if (event.tool) entries.push_back(tool_message(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
-  if (event.bone) entries = change_entries(event);
-  if (event.scene) entries.push_back(scene_message(event.room_seq, room.items()));
+std::vector<SessionMessage> RoomRuntime::Impl::messages_of(const RoomEvent& event) {
+  std::vector<SessionMessage> messages;
+  if (event.tool) messages.push_back(tool_message(event.room_seq, event.tool->tool, number_of(event.tool->hash)));
+  if (event.bone) messages = change_messages(event);
+  if (event.scene) messages.push_back(scene_message(event.room_seq, room.items()));
   // So that there is no gap in the sequence numbers.
-  if (entries.empty()) entries.push_back(noted_entry(event.room_seq, event.mark));
-  return entries;
+  if (messages.empty()) messages.push_back(noted_message(event.room_seq, event.mark));
+  return messages;
 }
 
 RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_message(const RoomEvent& event) {
   if (const auto* decided = std::get_if<SuperviseEntry>(&event.people)) {
     const Decider by{event.author, people.name_of(event.author)};
-    return {decided->subject,
-            supervised_message(event.room_seq, decided->supervision, event.lease_epoch, by),
-            {.room_seq = event.room_seq,
-             .kind = wire::SessionEntryKind::supervised,
-             .lease_epoch = event.lease_epoch,
-             .supervision = decided->supervision,
-             .by = by}};
+    return {decided->subject, supervised_message(event.room_seq, decided->supervision, event.lease_epoch, by)};
   }
   if (const auto* said = std::get_if<WordsEntry>(&event.people))
-    return {said->to, said_message(event.room_seq, event.author, *said), {.room_seq = event.room_seq}};
+    return {said->to, said_message(event.room_seq, event.author, *said)};
   return {};
 }
 
@@ -251,10 +233,32 @@ Result<AuthorId> RoomRuntime::join(MemberKind kind, const std::string& name, con
   return answer.get_future().get();
 }
 
+// With room_mutex held.
+SessionStart RoomRuntime::Impl::start_of_session(AuthorId author, const People::Supervised& held, const Decider& by) {
+  SessionStart start;
+  start.contained = room.room_seq();
+  start.decided_author_seq = room.decided(author);
+  start.lease_epoch = room.lease_epoch(author);
+  start.bodies = room.bodies();
+  for (const ToolBox::Entry* entry : room.tools()->entries())
+    start.before.push_back(tool_message(RoomSeq{}, entry->tool, number_of(entry->hash)));
+  start.before.push_back(scene_message(start.contained, room.items()));
+  // The client is sent its restrictions before it can cut, also the message that there are none any more.
+  if (held.seq) start.before.push_back(supervised_message(RoomSeq{}, held.supervision, start.lease_epoch, by));
+  v1::SessionResponse complete;
+  complete.mutable_complete()->set_room_seq(start.contained.value);
+  complete.mutable_complete()->set_lease_epoch(start.lease_epoch);
+  complete.mutable_complete()->set_decided_author_seq(start.decided_author_seq);
+  for (const RoomSeq seq : room.decided_seqs(author, kMostRepeatedResults))
+    complete.mutable_complete()->add_decided_room_seqs(seq.value);
+  for (const BodyId body : start.bodies) complete.mutable_complete()->add_bodies(body.value);
+  start.complete = serialised(complete);
+  return start;
+}
+
 Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>& subscriber, const Digest& secret) {
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   std::vector<FieldLeaf> leaves;
-  MessageParts before;
   bool again = false;
   {
     // Held until the subscriber is in the list. So every entry after `contained` is committed, and enqueued, later.
@@ -265,21 +269,10 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     for (const BodyId body : impl_->room.bodies())
       std::ranges::move(impl_->room.find_field(body)->leaf_places(), std::back_inserter(leaves));
     const std::vector<const ToolBox::Entry*> tools = impl_->room.tools()->entries();
-    for (const ToolBox::Entry* entry : tools)
-      before.push_back(tool_message(RoomSeq{}, entry->tool, impl_->number_of(entry->hash)));
-    before.push_back(scene_message(impl_->room.room_seq(), impl_->room.items()));
-    // The client is sent its restrictions before it can cut, also the message that there are none any more.
     const People::Supervised& held = impl_->room.people().supervised(subscriber->author());
-    const std::uint64_t lease_epoch = impl_->room.lease_epoch(subscriber->author());
     const Decider by{held.by, impl_->people.name_of(held.by)};
-    if (held.seq) before.push_back(supervised_message(RoomSeq{}, held.supervision, lease_epoch, by));
-    v1::SessionResponse complete;
-    complete.mutable_complete()->set_room_seq(impl_->room.room_seq().value);
-    complete.mutable_complete()->set_lease_epoch(lease_epoch);
-    complete.mutable_complete()->set_decided_author_seq(impl_->room.decided(subscriber->author()));
-    for (const RoomSeq seq : impl_->room.decided_seqs(subscriber->author(), kMostRepeatedResults))
-      complete.mutable_complete()->add_decided_room_seqs(seq.value);
-    for (const BodyId body : impl_->room.bodies()) complete.mutable_complete()->add_bodies(body.value);
+    SessionStart start = impl_->start_of_session(subscriber->author(), held, by);
+    const std::uint64_t lease_epoch = start.lease_epoch;
     const std::lock_guard lock(impl_->sessions_mutex);
     SessionSubscriber*& open = impl_->open_authors[subscriber->author()];
     if (open && !impl_->room.proves(subscriber->author(), secret))
@@ -294,7 +287,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     impl_->sessions.add(*subscriber);
     if (!again) impl_->people.came(subscriber->author());  // before it can leave
     if (impl_->mount && subscriber->feels_bone()) impl_->mount->join(subscriber->author());
-    subscriber->begin(impl_->room.room_seq(), std::move(before), serialised(complete));
+    subscriber->begin(std::move(start));
     for (const ToolBox::Entry* entry : tools) subscriber->know_tool(impl_->number_of(entry->hash), entry->hash);
     if (held.seq)
       subscriber->hold({.room_seq = {},
@@ -302,7 +295,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
                         .lease_epoch = lease_epoch,
                         .supervision = held.supervision,
                         .by = by});
-    if (impl_->redial) subscriber->answer(impl_->redial);
+    if (impl_->redial) subscriber->answer(*impl_->redial);
     if (impl_->ended) impl_->may_return ? subscriber->replaced(*impl_->ended) : subscriber->end(*impl_->ended);
   }
   impl_->read_leaves(leaves);
@@ -364,7 +357,7 @@ void RoomRuntime::leave(SessionSubscriber& subscriber) {
 void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
   const std::lock_guard lock(impl_->sessions_mutex);
   impl_->redial = redial_message(after, why);
-  impl_->sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(impl_->redial); });
+  impl_->sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(*impl_->redial); });
 }
 
 void RoomRuntime::send_away(const std::string& why) {

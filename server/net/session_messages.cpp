@@ -2,6 +2,7 @@
 
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/version.hpp"
 
 namespace osteon {
 namespace {
@@ -25,6 +26,12 @@ v1::BoneChangeKind wire_kind(EventKind kind) {
   }
 }
 
+// Serialises the message. It gets its place in the room's order, and the right that its receiver needs.
+SessionMessage message_of(const v1::SessionResponse& response, RoomSeq seq = {},
+                          std::optional<StreamContent> content = {}) {
+  return {seq, serialised(response), content, wire::version_of(response.message_case()), {.room_seq = seq}};
+}
+
 }  // namespace
 
 Bytes block_message(const BlockKey& key, const StoredBlock& block) {
@@ -39,103 +46,118 @@ Bytes block_message(const BlockKey& key, const StoredBlock& block) {
   return serialised(response);
 }
 
-Bytes cut_message(RoomSeq seq, const Cut& cut) {
+SessionMessage cut_message(RoomSeq seq, const Cut& cut) {
   v1::SessionResponse response;
   response.mutable_committed()->set_room_seq(seq.value);
   *response.mutable_committed()->mutable_cut() = wire::to_wire(cut);
-  return serialised(response);
+  SessionMessage message = message_of(response, seq, StreamContent::field);
+  message.fast.kind = wire::SessionEntryKind::committed;
+  message.fast.cut = cut;
+  return message;
 }
 
-Bytes rejection_message(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
+SessionMessage rejection_message(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {
   v1::SessionResponse response;
   v1::RejectedCut& entry = *response.mutable_rejected();
   entry.set_room_seq(seq.value);
   entry.set_author_seq(author_seq);
   entry.set_lease_epoch(lease_epoch);
   entry.set_reason(std::string(sentence(reason)));
-  return serialised(response);
+  entry.set_code(wire::to_wire(reason));
+  SessionMessage message = message_of(response, seq);
+  message.fast.kind = wire::SessionEntryKind::rejected;
+  message.fast.author_seq = author_seq;
+  message.fast.reason = static_cast<std::uint32_t>(reason);
+  message.fast.lease_epoch = lease_epoch;
+  return message;
 }
 
-Bytes link_message(const SessionKeys& keys, std::uint16_t udp_port) {
+SessionMessage link_message(const SessionKeys& keys, std::uint16_t udp_port) {
   v1::SessionResponse response;
   v1::LinkOffer& offer = *response.mutable_link();
   offer.set_session(keys.session);
   offer.set_key_up(keys.up.bytes.data(), keys.up.bytes.size());
   offer.set_key_down(keys.down.bytes.data(), keys.down.bytes.size());
   offer.set_udp_port(udp_port);
-  return serialised(response);
+  return message_of(response);
 }
 
-Bytes durable_message(const Witness& witness) {
+SessionMessage durable_message(const Witness& witness) {
   v1::SessionResponse response;
   response.mutable_durable()->set_room_seq(witness.head.seq.value);
   response.mutable_durable()->set_chain(wire::to_wire(witness.head.chain));
   response.mutable_durable()->set_seal(wire::to_wire(witness.seal));
-  return serialised(response);
+  return message_of(response);
 }
 
-Bytes redial_message(std::chrono::milliseconds after, const std::string& why) {
+SessionMessage redial_message(std::chrono::milliseconds after, const std::string& why) {
   v1::SessionResponse response;
   response.mutable_redial()->set_after_ms(static_cast<std::uint32_t>(after.count()));
   response.mutable_redial()->set_why(why);
-  return serialised(response);
+  return message_of(response);
 }
 
-Bytes tool_message(RoomSeq seq, const Tool& tool, std::uint32_t number) {
+SessionMessage tool_message(RoomSeq seq, const Tool& tool, std::uint32_t number) {
   v1::SessionResponse response;
   response.mutable_tool()->set_room_seq(seq.value);
   *response.mutable_tool()->mutable_tool() = wire::to_wire(tool);
   response.mutable_tool()->set_tool_number(number);
-  return serialised(response);
+  return message_of(response, seq);
 }
 
-Bytes scene_message(RoomSeq seq, const std::vector<SceneItem>& items) {
+SessionMessage scene_message(RoomSeq seq, const std::vector<SceneItem>& items) {
   v1::SessionResponse response;
   response.mutable_scene()->set_room_seq(seq.value);
   for (const SceneItem& item : items) *response.mutable_scene()->add_items() = wire::to_wire(item);
-  return serialised(response);
+  return message_of(response, seq, StreamContent::scene);
 }
 
-Bytes supervised_message(RoomSeq seq, const Restrictions& supervision, std::uint64_t lease_epoch, const Decider& by) {
+SessionMessage supervised_message(RoomSeq seq, const Restrictions& supervision, std::uint64_t lease_epoch,
+                                  const Decider& by) {
   v1::SessionResponse response;
   response.mutable_supervised()->set_room_seq(seq.value);
   *response.mutable_supervised()->mutable_supervision() = wire::to_wire(supervision);
   response.mutable_supervised()->set_lease_epoch(lease_epoch);
   response.mutable_supervised()->set_decided_by(by.author.value);
   response.mutable_supervised()->set_decided_by_name(by.name);
-  return serialised(response);
+  SessionMessage message = message_of(response, seq, StreamContent::own_supervision);
+  message.fast.kind = wire::SessionEntryKind::supervised;
+  message.fast.lease_epoch = lease_epoch;
+  message.fast.supervision = supervision;
+  message.fast.by = by;
+  return message;
 }
 
-Bytes said_message(RoomSeq seq, AuthorId from, const WordsEntry& words) {
+SessionMessage said_message(RoomSeq seq, AuthorId from, const WordsEntry& words) {
   v1::SessionResponse response;
   response.mutable_said()->set_room_seq(seq.value);
   response.mutable_said()->set_from(from.value);
   response.mutable_said()->set_to(words.to.value);
   response.mutable_said()->set_words(words.words);
-  return serialised(response);
+  return message_of(response, seq, StreamContent::own_words);
 }
 
-Bytes partner_entry(const CuttingState& state) {
+SessionMessage partner_message(const CuttingState& state) {
   v1::SessionResponse response;
   *response.mutable_partner() = wire::to_wire(state);
-  return serialised(response);
+  return message_of(response);
 }
 
-Bytes bone_entry(const MountPose& seen) {
-  v1::SessionResponse entry;
-  *entry.mutable_bone() = wire::to_wire(seen);
-  return serialised(entry);
+SessionMessage bone_message(const MountPose& seen) {
+  v1::SessionResponse response;
+  *response.mutable_bone() = wire::to_wire(seen);
+  return message_of(response);
 }
 
-Bytes noted_entry(RoomSeq seq, const std::string& mark) {
+SessionMessage noted_message(RoomSeq seq, const std::string& mark) {
   v1::SessionResponse response;
   response.mutable_noted()->set_room_seq(seq.value);
   response.mutable_noted()->set_mark(mark);
-  return serialised(response);
+  return message_of(response, seq);
 }
 
-MessageParts change_entries(const RoomEvent& event) {
-  MessageParts entries;
+std::vector<SessionMessage> change_messages(const RoomEvent& event) {
+  std::vector<SessionMessage> messages;
   std::size_t next = 0;
   do {
     v1::SessionResponse response;
@@ -151,9 +173,9 @@ MessageParts change_entries(const RoomEvent& event) {
       size += leaf.values().size() + 24;
     }
     change.set_last(next == event.leaves.size());
-    entries.push_back(serialised(response));
+    messages.push_back(message_of(response, event.room_seq, StreamContent::field));
   } while (next < event.leaves.size());
-  return entries;
+  return messages;
 }
 
 }  // namespace osteon

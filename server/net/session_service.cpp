@@ -42,22 +42,20 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   }
 
   AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
-    v1::SessionResponse said;
-    (void)said.ParseFromString(*complete);
-    const std::uint64_t decided = said.complete().decided_author_seq();
+  void begin(SessionStart start) override {
+    MessageParts before;
     if (links_) {
-      std::shared_ptr<SessionLink> link = links_->add(author_, decided + 1, *this);
+      std::shared_ptr<SessionLink> link = links_->add(author_, start.decided_author_seq + 1, *this);
       const std::lock_guard lock(mutex_);
       link_ = std::move(link);
-      before.insert(before.begin(), link_message(link_->keys(), links_->port()));
+      before.push_back(link_message(link_->keys(), links_->port()).bytes);
     }
-    for (Bytes& entry : before) entry = in_its_version(entry_for_role(RoomSeq{}, entry));
-    std::erase(before, nullptr);
+    for (const SessionMessage& message : start.before)
+      if (receives(message)) before.push_back(message.bytes);
     const std::lock_guard lock(mutex_);
-    taken_ = decided;
+    taken_ = start.decided_author_seq;
     if (failing()) return;
-    send_queue_.begin(contained, std::move(before), std::move(complete));
+    send_queue_.begin(start.contained, std::move(before), std::move(start.complete));
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
@@ -67,28 +65,25 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void enqueue(RoomSeq seq, const Bytes& any) override {
-    const Bytes entry = in_its_version(entry_for_role(seq, any));
-    const std::lock_guard lock(mutex_);
-    if (entry && !closing()) send_or_give_up(send_queue_.add(seq, entry));
-  }
   // [committing thread]
-  void enqueue(RoomSeq seq, const Bytes& any, const wire::SessionEntry& fast) override {
-    const Bytes entry = in_its_version(entry_for_role(seq, any));
-    if (!entry) return;
+  void enqueue(const SessionMessage& message) override {
+    const bool whole = receives(message);
+    // Without the content that the client may not receive, the message says only that there was an event.
+    const Bytes entry = whole ? message.bytes : noted_message(message.seq, {}).bytes;
     std::uint64_t index = 0;
     {
       const std::lock_guard lock(mutex_);
       if (closing()) return;
       const std::uint64_t before = send_queue_.index();
-      send_or_give_up(send_queue_.add(seq, entry));
+      send_or_give_up(send_queue_.add(message.seq, entry));
       if (send_queue_.index() > before) index = send_queue_.index();
     }
     // Beside the stream, which carries everything.
-    const bool goes = entry == any && may_carry(content_of(fast));
+    const bool goes = whole && may_carry(content_of(message.fast));
     if (link_)
-      link_->enqueue(index,
-                     goes ? fast : wire::SessionEntry{.room_seq = seq, .kind = wire::SessionEntryKind::streamed});
+      link_->enqueue(
+          index,
+          goes ? message.fast : wire::SessionEntry{.room_seq = message.seq, .kind = wire::SessionEntryKind::streamed});
   }
   void hold(const wire::SessionEntry& supervised) override {
     if (link_ && !is_closing() && may_carry(DatagramContent::supervision)) link_->enqueue(0, supervised);
@@ -118,10 +113,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
-  void answer(const Bytes& any) override {
-    const Bytes entry = in_its_version(any);
+  void answer(const SessionMessage& message) override {
+    if (!knows(message)) return;
     const std::lock_guard lock(mutex_);
-    if (entry && !closing()) send_or_give_up(send_queue_.add_answer(entry));
+    if (!closing()) send_or_give_up(send_queue_.add_answer(message.bytes));
   }
   void refuse(const Error& why) override { close(invalid(why.message)); }
   void decided() override {
@@ -267,43 +262,10 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     return others ? DatagramContent::committed_cuts : DatagramContent::acknowledgements;
   }
 
-  // The content of an entry, if not every role may receive it.
-  [[nodiscard]] static std::optional<StreamContent> content_of(const v1::SessionResponse& entry) {
-    switch (entry.message_case()) {
-      case v1::SessionResponse::kLeaf:
-      case v1::SessionResponse::kCommitted:
-      case v1::SessionResponse::kChange:
-        return StreamContent::field;
-      case v1::SessionResponse::kScene:
-        return StreamContent::scene;
-      case v1::SessionResponse::kSupervised:
-        return StreamContent::own_supervision;
-      case v1::SessionResponse::kSaid:
-        return StreamContent::own_words;
-      default:
-        return {};
-    }
-  }
-  // An entry as the reader's role may receive it. Without the forbidden content it says only that there was an event.
-  [[nodiscard]] Bytes entry_for_role(RoomSeq seq, const Bytes& entry) const {
-    constexpr std::array kAll{StreamContent::field, StreamContent::scene, StreamContent::own_supervision,
-                              StreamContent::own_words};
-    if (std::ranges::all_of(kAll, [&](StreamContent content) { return may_receive(content); })) return entry;
-    v1::SessionResponse said;
-    (void)said.ParseFromString(*entry);
-    const std::optional<StreamContent> content = content_of(said);
-    if (!content || may_receive(*content)) return entry;
-    return seq ? noted_entry(seq, {}) : nullptr;
-  }
-  // The same in this client's version of the protocol; null if that version has no such message.
-  [[nodiscard]] Bytes in_its_version(const Bytes& entry) const {
-    if (!entry) return nullptr;
-    if (version_ == wire::kProtocolVersion) return entry;
-    v1::SessionResponse said;
-    (void)said.ParseFromString(*entry);
-    const std::optional<v1::SessionResponse> older = wire::entry_for_version(version_, said);
-    if (!older) return nullptr;
-    return older->message_case() == said.message_case() ? entry : serialised(*older);
+  // Whether this client's version of the protocol has such a message.
+  [[nodiscard]] bool knows(const SessionMessage& message) const { return version_ >= message.since_version; }
+  [[nodiscard]] bool receives(const SessionMessage& message) const {
+    return knows(message) && (!message.content || may_receive(*message.content));
   }
 
   [[nodiscard]] static Status too_many_cuts() {
@@ -345,14 +307,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   bool take(ByteBuffer& message) override {
     MessageParts parts = send_queue_.take();
     if (parts.empty() && send_queue_.begun() && bone_) {
-      if (const Bytes entry = in_its_version(bone_entry(*bone_))) parts = {entry};
+      if (const SessionMessage bone = bone_message(*bone_); knows(bone)) parts = {bone.bytes};
       bone_.reset();
     }
     // Poses of others' tools come after all entries, so that they delay no entry.
     while (parts.empty() && send_queue_.begun()) {
       const std::optional<CuttingState> partner = partners_.take(PartnerSendQueue::Clock::now());
       if (!partner) break;
-      if (const Bytes entry = in_its_version(partner_entry(*partner))) parts = {entry};
+      if (const SessionMessage tool = partner_message(*partner); knows(tool)) parts = {tool.bytes};
     }
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();

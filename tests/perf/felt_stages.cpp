@@ -101,7 +101,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
 
   // --- the room's side
   AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts, Bytes) override {
+  void begin(SessionStart) override {
     link_ = links_.add(author_, 1, *this);
     auto opened =
         FastPath::open("127.0.0.1", port_, link_->keys(), 1,
@@ -114,13 +114,13 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
     path_->know_tool(number, tool);
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
-  void enqueue(RoomSeq, const Bytes&) override { OSTEON_CHECK(!"entries come with what goes in few bytes of them"); }
-  void enqueue(RoomSeq, const Bytes&, const wire::SessionEntry& fast) override {
+  void enqueue(const SessionMessage& message) override {
+    const wire::SessionEntry& fast = message.fast;
     const bool committed = fast.kind == wire::SessionEntryKind::committed;
     if (committed && fast.cut.author == author_) times.note(told, fast.cut.author_seq);
     if (!link_->enqueue(++index_, fast)) path_->received(index_);  // the stream's copy
   }
-  void answer(const Bytes&) override {}
+  void answer(const SessionMessage&) override {}
   void refuse(const Error&) override { ++refused; }
   void decided() override {}
   void end(const std::string&) override {}

@@ -44,10 +44,10 @@ class Listener final : public SessionSubscriber {
  public:
   explicit Listener(AuthorId author) : author_(author) {}
   AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts, Bytes) override {}
+  void begin(SessionStart) override {}
   void set_leaves(std::vector<FieldLeaf>) override { open = true; }
-  void enqueue(RoomSeq, const Bytes&) override { ++told; }
-  void answer(const Bytes&) override {}
+  void enqueue(const SessionMessage&) override { ++told; }
+  void answer(const SessionMessage&) override {}
   void refuse(const Error&) override { ++refused; }
   void decided() override {}
   void end(const std::string&) override {}

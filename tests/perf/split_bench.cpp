@@ -28,7 +28,7 @@ double ms_since(std::chrono::steady_clock::time_point start) {
 std::size_t bytes_of(const RoomEvent& event, double& ms) {
   const auto start = std::chrono::steady_clock::now();
   std::size_t bytes = 0;
-  for (const Bytes& entry : change_entries(event)) bytes += entry->size();
+  for (const SessionMessage& message : change_messages(event)) bytes += message.bytes->size();
   ms = ms_since(start);
   return bytes;
 }

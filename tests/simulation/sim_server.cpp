@@ -64,40 +64,40 @@ class SimServer::Session final : public SessionSubscriber,
   [[nodiscard]] bool done() const { return done_ && queued_ == 0; }
 
   AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
-    v1::SessionResponse said;
-    if (server_.links_ && said.ParseFromString(*complete)) {
-      link_ = server_.links_->add(author_, said.complete().decided_author_seq() + 1, *this);
-      before.insert(before.begin(), link_message(link_->keys(), node(Datagrams::kServer).port));
+  void begin(SessionStart start) override {
+    MessageParts before;
+    if (server_.links_) {
+      link_ = server_.links_->add(author_, start.decided_author_seq + 1, *this);
+      before.push_back(link_message(link_->keys(), node(Datagrams::kServer).port).bytes);
     }
+    for (const SessionMessage& message : start.before) before.push_back(message.bytes);
     if (server_.condition_.breakage == Breakage::hasty && !server_.power_is_out())
       for (const Bytes& entry : std::exchange(before, {})) stream_->write(SimStream::server, *entry);
-    send_queue_.begin(contained, std::move(before), std::move(complete));
+    send_queue_.begin(start.contained, std::move(before), std::move(start.complete));
     pump();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     send_queue_.set_leaves(std::move(leaves));
     pump();
   }
-  void enqueue(RoomSeq seq, const Bytes& entry) override { enqueue(seq, entry, {.room_seq = seq}); }
-  void enqueue(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
+  void enqueue(const SessionMessage& message) override {
     if (closing_ || done_) return;
-    const auto chance = [&] { return send_queue_.takes(seq) && server_.random_.index(8) == 0; };
+    const auto chance = [&] { return send_queue_.takes(message.seq) && server_.random_.index(8) == 0; };
     if (server_.condition_.breakage == Breakage::skipping && chance()) return;
-    if (server_.condition_.breakage == Breakage::unsaid && fast.kind == wire::SessionEntryKind::supervised &&
+    if (server_.condition_.breakage == Breakage::unsaid && message.fast.kind == wire::SessionEntryKind::supervised &&
         server_.random_.index(2) == 0)
-      return send_entry(seq, noted_entry(seq, {}), {.room_seq = seq});
+      return send(noted_message(message.seq, {}));
     if (server_.condition_.breakage == Breakage::ordering) {
       if (!held_back_ && chance()) {
-        held_back_.emplace(HeldBack{seq, entry, fast});
+        held_back_ = message;
         return;
       }
-      send_entry(seq, entry, fast);
-      if (held_back_) send_entry(held_back_->seq, held_back_->entry, held_back_->fast);
+      send(message);
+      if (held_back_) send(*held_back_);
       held_back_.reset();
       return;
     }
-    send_entry(seq, entry, fast);
+    send(message);
   }
   void hold(const wire::SessionEntry& supervised) override {
     if (link_) link_->enqueue(0, supervised);
@@ -105,7 +105,7 @@ class SimServer::Session final : public SessionSubscriber,
   void know_tool(std::uint32_t number, const Digest& tool) override {
     if (link_) link_->know_tool(number, tool);
   }
-  void answer(const Bytes& entry) override { add(send_queue_.add_answer(entry)); }
+  void answer(const SessionMessage& message) override { add(send_queue_.add_answer(message.bytes)); }
   void refuse(const Error& why) override { close({true, why.message}); }
   void decided() override {
     --queued_;
@@ -180,10 +180,10 @@ class SimServer::Session final : public SessionSubscriber,
   }
   void arrived(std::uint64_t index) override { send_queue_.arrived(index); }
 
-  void send_entry(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) {
+  void send(const SessionMessage& message) {
     const std::uint64_t before = send_queue_.index();
-    const bool taken = send_queue_.add(seq, entry);
-    send_fast(fast, send_queue_.index() > before);
+    const bool taken = send_queue_.add(message.seq, message.bytes);
+    send_fast(message.fast, send_queue_.index() > before);
     add(taken);
   }
   void send_fast(const wire::SessionEntry& fast, bool numbered) {
@@ -238,12 +238,7 @@ class SimServer::Session final : public SessionSubscriber,
   AuthorId author_;
   SessionSendQueue send_queue_;
   std::shared_ptr<SimLinks::Link> link_;  // shared with the server's links
-  struct HeldBack {
-    RoomSeq seq;
-    Bytes entry;
-    wire::SessionEntry fast;
-  };
-  std::optional<HeldBack> held_back_;
+  std::optional<SessionMessage> held_back_;
   std::optional<Ending> closing_;
   int queued_ = 0;
   std::uint64_t taken_ = 0;  // newest author_seq that was queued

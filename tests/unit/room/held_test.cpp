@@ -16,6 +16,7 @@
 #include "server/room/room.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/fake_session.hpp"
 
 namespace osteon {
 namespace {
@@ -252,30 +253,18 @@ TEST(TakeBackByPerson, AtAnyOfTheirPrograms) {
 }
 
 // Keeps the sequence numbers that a session is sent.
-class Placed final : public SessionSubscriber {
+class Placed final : public test::FakeSession {
  public:
-  explicit Placed(AuthorId author) : author_(author) {}
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts, Bytes) override {}
-  void set_leaves(std::vector<FieldLeaf>) override {}
-  void enqueue(RoomSeq seq, const Bytes&) override { seqs.push_back(seq.value); }
-  void enqueue(RoomSeq seq, const Bytes&, const wire::SessionEntry& fast) override {
-    seqs.push_back(seq.value);
-    if (fast.kind == wire::SessionEntryKind::supervised) told.push_back(fast.supervision);
+  using FakeSession::FakeSession;
+  void enqueue(const SessionMessage& message) override {
+    seqs.push_back(message.seq.value);
+    if (message.fast.kind == wire::SessionEntryKind::supervised) told.push_back(message.fast.supervision);
   }
   void hold(const wire::SessionEntry& supervised) override { held = supervised.supervision; }
-  void answer(const Bytes&) override {}
-  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
-  void decided() override {}
-  void end(const std::string&) override {}
-  std::size_t waiting() const override { return 0; }
 
   std::vector<std::uint64_t> seqs;
   std::vector<Restrictions> told;
   std::optional<Restrictions> held;
-
- private:
-  const AuthorId author_;
 };
 
 struct HeldRuntime {

@@ -11,6 +11,7 @@
 #include "common/wire/convert.hpp"
 #include "haptic_client/control/replica.hpp"
 #include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/fake_session.hpp"
 
 namespace osteon {
 namespace {
@@ -19,30 +20,27 @@ using namespace std::chrono_literals;
 using test::strokes;
 
 // Maintains a replica from what the stream of a session would carry.
-class FakeSession final : public SessionSubscriber {
+class ReplicaSession final : public test::FakeSession {
  public:
-  FakeSession(AuthorId author, const Case& bone) : author_(author), replica_(bone, BodyId{0}, tools_) {}
-
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
+  ReplicaSession(AuthorId author, const Case& bone) : FakeSession(author), replica_(bone, BodyId{0}, tools_) {}
+  void begin(SessionStart start) override {
     const std::lock_guard lock(mutex_);
-    send_queue_.begin(contained, std::move(before), std::move(complete));
+    MessageParts before;
+    for (const SessionMessage& message : start.before) before.push_back(message.bytes);
+    send_queue_.begin(start.contained, std::move(before), std::move(start.complete));
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     const std::lock_guard lock(mutex_);
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void enqueue(RoomSeq seq, const Bytes& entry) override {
+  void enqueue(const SessionMessage& message) override {
     const std::lock_guard lock(mutex_);
-    ASSERT_TRUE(send_queue_.add(seq, entry));
+    ASSERT_TRUE(send_queue_.add(message.seq, message.bytes));
     read();
   }
-  void answer(const Bytes&) override {}
-  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
   void decided() override { ++decided_; }
   void end(const std::string&) override { ended_ = true; }
-  std::size_t waiting() const override { return 0; }
 
   int decided_cuts() const { return decided_; }
   bool ended() const { return ended_; }
@@ -78,7 +76,6 @@ class FakeSession final : public SessionSubscriber {
     if (change.last()) seq_ = RoomSeq{change.room_seq()};
   }
 
-  const AuthorId author_;
   mutable std::mutex mutex_;
   SessionSendQueue send_queue_;
   std::shared_ptr<ToolBox> tools_ = builtin_tool_box();
@@ -119,13 +116,13 @@ TEST(RoomRuntime, EverySubscriberEndsWithTheRoomsBoneAndSurface) {
   // Every event shall be a cut. Random strokes can separate debris, which would be an event too, so the detection is
   // off.
   RoomRuntime runtime(Room(bone), {.tick = 1ms, .mesh = 3ms, .pieces = 0ns}, {});
-  std::vector<std::shared_ptr<FakeSession>> sessions;
+  std::vector<std::shared_ptr<ReplicaSession>> sessions;
   for (int i = 0; i < 3; ++i) {
-    sessions.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
+    sessions.push_back(std::make_shared<ReplicaSession>(runtime.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(runtime.open_session(sessions.back()));
   }
   EXPECT_FALSE(runtime.open_session(sessions.front())) << "one session for each author";
-  const auto stranger = std::make_shared<FakeSession>(AuthorId{99}, bone);
+  const auto stranger = std::make_shared<ReplicaSession>(AuthorId{99}, bone);
   EXPECT_FALSE(runtime.open_session(stranger));
   FakeMesh early;
   runtime.watch_mesh(early);
@@ -140,9 +137,9 @@ TEST(RoomRuntime, EverySubscriberEndsWithTheRoomsBoneAndSurface) {
         std::this_thread::sleep_for(500us);
       }
     });
-  std::vector<std::shared_ptr<FakeSession>> late;
+  std::vector<std::shared_ptr<ReplicaSession>> late;
   for (int i = 0; i < 5; ++i) {
-    late.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
+    late.push_back(std::make_shared<ReplicaSession>(runtime.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(runtime.open_session(late.back()));
     FakeMesh visitor;
     runtime.watch_mesh(visitor);
@@ -182,7 +179,7 @@ TEST(RoomRuntime, EverySubscriberEndsWithTheRoomsBoneAndSurface) {
 TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
   const Case bone = test::test_block();
   RoomRuntime runtime(Room(bone), {.tick = 200us, .mesh = 50ms, .pieces = 0ns}, {});
-  const auto hand = std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone);
+  const auto hand = std::make_shared<ReplicaSession>(runtime.join(MemberKind::surgeon).value(), bone);
   ASSERT_TRUE(runtime.open_session(hand));
   constexpr std::uint64_t kCuts = 60;
   std::vector<Cut> cuts = strokes(hand->author(), static_cast<int>(kCuts), 21);
@@ -194,12 +191,12 @@ TEST(RoomRuntime, CopiesOfTheBoneAreRightWhileItIsCut) {
     }
   });
   std::vector<BoneStatus> said;
-  std::vector<std::shared_ptr<FakeSession>> late;
+  std::vector<std::shared_ptr<ReplicaSession>> late;
   while (runtime.health().counts.committed < kCuts) {
     if (BoneStatus status = runtime.bone_status(); said.empty() || said.back().room_seq < status.room_seq)
       said.push_back(status);
     if (late.size() >= 4) continue;
-    late.push_back(std::make_shared<FakeSession>(runtime.join(MemberKind::surgeon).value(), bone));
+    late.push_back(std::make_shared<ReplicaSession>(runtime.join(MemberKind::surgeon).value(), bone));
     ASSERT_TRUE(runtime.open_session(late.back()));
   }
   cutting.join();

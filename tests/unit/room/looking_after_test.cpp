@@ -17,6 +17,7 @@
 #include "server/net/refusals.hpp"
 #include "server/net/server_certificate.hpp"
 #include "tests/support/disk/memory_disk.hpp"
+#include "tests/unit/room/fake_session.hpp"
 #include "tests/unit/room/kept_room.hpp"
 #include "tests/unit/room/served_room.hpp"
 
@@ -133,28 +134,20 @@ TEST(HealthWatch, ARoomServesUntilItIsClosedOrItsJournalFails) {
 }
 
 // The stream of a haptic client, which keeps the reason of its end.
-class Hand final : public SessionSubscriber {
+class Hand final : public test::FakeSession {
  public:
-  explicit Hand(AuthorId author) : author_(author) {}
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts, Bytes) override {}
-  void set_leaves(std::vector<FieldLeaf>) override {}
-  void enqueue(RoomSeq, const Bytes&) override {}
-  void answer(const Bytes&) override {}
+  using FakeSession::FakeSession;
   void refuse(const Error&) override {}
-  void decided() override {}
   void end(const std::string& why) override {
     const std::lock_guard lock(mutex_);
     ended_ = why;
   }
-  std::size_t waiting() const override { return 0; }
   [[nodiscard]] std::string ended() const {
     const std::lock_guard lock(mutex_);
     return ended_;
   }
 
  private:
-  const AuthorId author_;
   mutable std::mutex mutex_;
   std::string ended_;
 };

@@ -6,6 +6,7 @@
 
 #include "server/net/room_runtime.hpp"
 #include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/fake_session.hpp"
 
 namespace osteon {
 namespace {
@@ -13,24 +14,12 @@ namespace {
 using namespace std::chrono_literals;
 
 // Keeps the positions that a session is sent.
-class ReceivedMotion final : public SessionSubscriber {
+class ReceivedMotion final : public test::FakeSession {
  public:
-  explicit ReceivedMotion(AuthorId author) : author_(author) {}
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts, Bytes) override {}
-  void set_leaves(std::vector<FieldLeaf>) override {}
-  void enqueue(RoomSeq, const Bytes&) override {}
-  void answer(const Bytes&) override {}
-  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
-  void decided() override {}
-  void end(const std::string&) override {}
-  std::size_t waiting() const override { return 0; }
+  using FakeSession::FakeSession;
   void show_bone(const MountPose& seen) override { seen_.push_back(seen); }
 
   std::vector<MountPose> seen_;
-
- private:
-  const AuthorId author_;
 };
 
 // A driven runtime with two haptic clients.

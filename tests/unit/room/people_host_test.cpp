@@ -15,6 +15,7 @@
 #include "server/net/room_store.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/fake_session.hpp"
 
 namespace osteon {
 namespace {
@@ -22,25 +23,18 @@ namespace {
 using namespace std::chrono_literals;
 
 // Keeps what a session is sent.
-class ReceivedSession final : public SessionSubscriber {
+class ReceivedSession final : public test::FakeSession {
  public:
-  explicit ReceivedSession(AuthorId author) : author_(author) {}
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq, MessageParts before, Bytes complete) override {
-    for (const Bytes& part : before) take(part, before_);
-    complete_ = parsed(complete);
+  using FakeSession::FakeSession;
+  void begin(SessionStart start) override {
+    for (const SessionMessage& message : start.before) take(message.bytes, before_);
+    complete_ = parsed(start.complete);
   }
-  void set_leaves(std::vector<FieldLeaf>) override {}
-  void enqueue(RoomSeq seq, const Bytes& entry) override {
+  void enqueue(const SessionMessage& message) override {
     const std::lock_guard lock(mutex_);
-    take(entry, entries_);
-    seqs_.push_back(seq);
-    fast_.push_back({});
-  }
-  void enqueue(RoomSeq seq, const Bytes& entry, const wire::SessionEntry& fast) override {
-    enqueue(seq, entry);
-    const std::lock_guard lock(mutex_);
-    fast_.back() = fast;
+    take(message.bytes, entries_);
+    seqs_.push_back(message.seq);
+    fast_.push_back(message.fast);
   }
   void hold(const wire::SessionEntry& supervised) override { held_ = supervised; }
   bool show_partners(const std::vector<CuttingState>& states) override {
@@ -48,11 +42,6 @@ class ReceivedSession final : public SessionSubscriber {
     partners_ = states;
     return false;
   }
-  void answer(const Bytes&) override {}
-  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
-  void decided() override {}
-  void end(const std::string&) override {}
-  std::size_t waiting() const override { return 0; }
 
   std::vector<v1::SessionResponse> before_;
   v1::SessionResponse complete_;
@@ -82,7 +71,6 @@ class ReceivedSession final : public SessionSubscriber {
   }
   static void take(const Bytes& bytes, std::vector<v1::SessionResponse>& into) { into.push_back(parsed(bytes)); }
 
-  const AuthorId author_;
   mutable std::mutex mutex_;
   std::vector<v1::SessionResponse> entries_;
   std::vector<wire::SessionEntry> fast_;

@@ -14,6 +14,7 @@
 #include "server/net/room_store.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/unit/room/cuts.hpp"
+#include "tests/unit/room/fake_session.hpp"
 
 namespace osteon {
 namespace {
@@ -25,31 +26,28 @@ using test::test_block;
 const Digest kSecret{{7}};
 
 // Keeps what its reader is sent at once, as over a connection that takes everything.
-class ReceivedAtOnce final : public SessionSubscriber {
+class ReceivedAtOnce final : public test::FakeSession {
  public:
-  explicit ReceivedAtOnce(AuthorId author) : author_(author) {}
-  AuthorId author() const override { return author_; }
-  void begin(RoomSeq contained, MessageParts before, Bytes complete) override {
-    send_queue_.begin(contained, std::move(before), std::move(complete));
+  using FakeSession::FakeSession;
+  void begin(SessionStart start) override {
+    MessageParts before;
+    for (const SessionMessage& message : start.before) before.push_back(message.bytes);
+    send_queue_.begin(start.contained, std::move(before), std::move(start.complete));
     read();
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     send_queue_.set_leaves(std::move(leaves));
     read();
   }
-  void enqueue(RoomSeq seq, const Bytes& entry) override {
-    ASSERT_TRUE(send_queue_.add(seq, entry));
+  void enqueue(const SessionMessage& message) override {
+    ASSERT_TRUE(send_queue_.add(message.seq, message.bytes));
     read();
   }
-  void answer(const Bytes& entry) override {
-    ASSERT_TRUE(send_queue_.add_answer(entry));
+  void answer(const SessionMessage& message) override {
+    ASSERT_TRUE(send_queue_.add_answer(message.bytes));
     read();
   }
-  void refuse(const Error& why) override { ADD_FAILURE() << why.message; }
   void replaced(const std::string&) override {}
-  void decided() override {}
-  void end(const std::string&) override {}
-  std::size_t waiting() const override { return 0; }
 
   std::vector<v1::SessionResponse> told;
 
@@ -61,7 +59,6 @@ class ReceivedAtOnce final : public SessionSubscriber {
       ASSERT_TRUE(told.emplace_back().ParseFromString(whole));
     }
   }
-  const AuthorId author_;
   SessionSendQueue send_queue_;
 };
 
