@@ -67,6 +67,11 @@ const CallRow* find_call(std::string_view method) {
   return row == kCalls.end() ? nullptr : &*row;
 }
 
+std::string_view call_name(std::string_view method) {
+  if (method.empty()) return "call";
+  return method.substr(method.rfind('/') + 1);
+}
+
 bool may_call(Role role, std::string_view method) {
   const CallRow* row = find_call(method);
   return row != nullptr && row->roles.has(role);

@@ -31,6 +31,8 @@ struct CallRow {
 // Null if the table does not contain the call.
 [[nodiscard]] const CallRow* find_call(std::string_view method);
 [[nodiscard]] bool may_call(Role role, std::string_view method);
+// "DeleteRoom" of "/osteon.v1.RoomsService/DeleteRoom"; "call" of nothing.
+[[nodiscard]] std::string_view call_name(std::string_view method);
 
 // Contents of a session's packets, up and down: proto/osteon/v1/link.proto.
 enum class DatagramContent : std::uint8_t {

@@ -28,7 +28,7 @@ constexpr auto kAgainTime = 1s;                    // for one attempt to reconne
 // For one attempt to connect: TCP, TLS and HTTP/2 take four round trips. gRPC calls this time a back-off.
 constexpr int kConnectMs = 3000;
 // A server that is silent for kPingMs gets a ping, and counts as lost if it does not answer in time. The server allows
-// pings from kShortestPingMs on (server/net/room_server.cpp). A haptic client waits longer than its ConfirmationMonitor
+// pings from kShortestPingMs on (server/rpc/room_server.cpp). A haptic client waits longer than its ConfirmationMonitor
 // does, because its user can still feel its own replica of the bone.
 constexpr int kPingMs = 2000, kPingAnswerMs = 3000, kHandsPingAnswerMs = 25'000;
 

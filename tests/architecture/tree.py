@@ -20,7 +20,21 @@ LAYERS = {
     "wire": {"core", "geometry", "tools", "field", "surface", "mechanics", "access", "link"},
 }
 PROGRAMS = ("server", "haptic_client", "viewer_client", "audio_client")
-# Inside a program: folders that only the program's app folder (and tests) may combine.
+# Folder of server/ -> the other folders of server/ that it may include. Requests go from rpc down to room.
+SERVER_LAYERS = {
+    "room": set(),
+    "journal": set(),
+    "upload_validation": set(),
+    "import": set(),
+    "audit": {"journal"},
+    "auth": {"audit"},
+    "publish": {"journal", "room"},
+    "storage": {"journal", "room"},
+    "rooms": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage"},
+    "rpc": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage", "rooms"},
+    "cli": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage", "rooms", "rpc"},
+}
+# Inside a client: folders that only the client's app folder (and tests) may combine.
 OUTER = {"app": set(), "net": {"app"}}
 
 # Headers that are slow to compile or impose a library's conventions. They must stay out of headers, and within the
@@ -28,17 +42,17 @@ OUTER = {"app": set(), "net": {"app"}}
 HEAVY = {
     "OpenVDB": (re.compile(r"^openvdb/"), ("common/volume",)),
     "VTK": (re.compile(r"^vtk"), ("viewer_client", "common/volume")),
-    "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net")),
+    "gRPC": (re.compile(r"^grpc(pp)?/"), ("common/wire", "*/net", "server/rpc", "server/auth", "server/cli")),
     "HDF5": (re.compile(r"^hdf5"), ("haptic_client/app", "haptic_client/device")),
     "SQLite": (re.compile(r"^sqlite3"), ("server/journal",)),
     "Asio": (re.compile(r"^asio"), ("common/link",)),
-    "Prometheus": (re.compile(r"^prometheus/"), ("*/net",)),
+    "Prometheus": (re.compile(r"^prometheus/"), ("server/rpc",)),
     "libusb": (re.compile(r"^libusb"), ("haptic_client/device",)),
     "hidapi": (re.compile(r"^hidapi/"), ("common/input",)),
     "GDCM": (re.compile(r"^gdcm"), ("common/imaging", "server/import")),
 }
 GENERATED = re.compile(r"\.pb\.h$")
-GENERATED_HOMES = ("common/wire", "*/net")
+GENERATED_HOMES = ("common/wire", "*/net", "server/rpc", "server/publish", "server/storage", "server/cli")
 
 SOURCE_ENDS = (".hpp", ".cpp", ".h", ".cc")
 MAX_HEADER_LINES = 300
@@ -83,10 +97,13 @@ def layer_faults(path: str, text: str):
         elif target[0] in PROGRAMS:
             if parts[0] != target[0]:
                 faults.append(f"{path}: belongs to {parts[0]} and must not include {include}")
+            elif target[0] == "server":
+                if target[1] != parts[1] and target[1] not in SERVER_LAYERS.get(parts[1], set()):
+                    faults.append(f"{path}: server/{parts[1]} must not include {include}")
             elif len(target) > 2 and target[1] != parts[1] and target[1] in OUTER and parts[1] not in OUTER[target[1]]:
                 faults.append(f"{path}: only {', '.join(sorted(OUTER[target[1]])) or 'tests'} may include {include}")
         if GENERATED.search(include) and not lives_in(path, GENERATED_HOMES):
-            faults.append(f"{path}: generated code ({include}) stops at common/wire and the programs' net folders")
+            faults.append(f"{path}: generated code ({include}) belongs to {', '.join(GENERATED_HOMES)}")
         for name, (pattern, homes) in HEAVY.items():
             if not pattern.search(include):
                 continue

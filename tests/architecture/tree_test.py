@@ -104,12 +104,16 @@ class TheRules(unittest.TestCase):
     def test_programs_do_not_see_each_other(self):
         self.assertTrue(self.faults("viewer_client/app/main.cpp", "server/room/room.hpp"))
         self.assertTrue(self.faults("common/wire/x.cpp", "server/room/room.hpp"))
-        self.assertFalse(self.faults("server/net/x.cpp", "server/room/room.hpp"))
+        self.assertFalse(self.faults("server/rooms/x.cpp", "server/room/room.hpp"))
 
     def test_logic_does_not_see_the_network_or_main(self):
-        self.assertTrue(self.faults("server/room/room.cpp", "server/net/service.hpp"))
+        self.assertTrue(self.faults("server/room/room.cpp", "server/rpc/services.hpp"))
+        self.assertTrue(self.faults("server/rooms/rooms.cpp", "server/rpc/services.hpp"))
+        self.assertTrue(self.faults("server/auth/authorizer.cpp", "server/rooms/rooms.hpp"))
+        self.assertTrue(self.faults("server/publish/x.cpp", "server/storage/room_store.hpp"))
+        self.assertTrue(self.faults("server/new/x.cpp", "server/room/room.hpp"))
         self.assertTrue(self.faults("haptic_client/net/x.cpp", "haptic_client/app/options.hpp"))
-        self.assertFalse(self.faults("server/app/main.cpp", "server/net/service.hpp"))
+        self.assertFalse(self.faults("server/cli/main.cpp", "server/rpc/services.hpp"))
 
     def test_imaging_is_for_the_importer(self):
         self.assertTrue(self.faults("server/room/room.cpp", "common/imaging/dicom.hpp"))
@@ -117,7 +121,7 @@ class TheRules(unittest.TestCase):
 
     def test_generated_types_stop_at_the_wire(self):
         self.assertTrue(self.faults("server/room/room.cpp", "osteon/v1/types.pb.h"))
-        self.assertFalse(self.faults("server/net/x.cpp", "osteon/v1/room.grpc.pb.h"))
+        self.assertFalse(self.faults("server/rpc/x.cpp", "osteon/v1/room.grpc.pb.h"))
 
     def test_heavy_headers_stay_in_sources(self):
         self.assertTrue(self.faults("common/volume/case.hpp", "openvdb/openvdb.h"))
@@ -139,9 +143,9 @@ class TheRules(unittest.TestCase):
     def test_an_unlisted_file_is_noticed(self):
         self.assertTrue(tree.declaration_faults("common/core/check.hpp", "SOURCES precheck.hpp check.cpp"))
         self.assertFalse(tree.declaration_faults("common/core/check.hpp", "HEADERS check.hpp)"))
-        first = '#include "server/app/x.hpp"\n#include <vector>\n'
-        self.assertFalse(tree.declaration_faults("server/app/x.hpp", "", first))
-        self.assertTrue(tree.declaration_faults("server/app/x.hpp", "", "#include <vector>\n" + first))
+        first = '#include "server/cli/x.hpp"\n#include <vector>\n'
+        self.assertFalse(tree.declaration_faults("server/cli/x.hpp", "", first))
+        self.assertTrue(tree.declaration_faults("server/cli/x.hpp", "", "#include <vector>\n" + first))
 
     def test_a_source_that_is_not_listed_is_noticed(self):
         listed = "- **Chi 2005**: X. Chi, a paper.\n| RFC 8032 | signatures |\n"

@@ -21,8 +21,8 @@
 
 #include "common/core/check.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
-#include "server/net/room_server.hpp"
-#include "server/net/services.hpp"
+#include "server/rpc/room_server.hpp"
+#include "server/rpc/services.hpp"
 #include "tests/fuzz/calls_messages.hpp"
 #include "tests/support/temp_dir.hpp"
 

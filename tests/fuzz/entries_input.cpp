@@ -6,7 +6,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "server/net/journal_entries.hpp"
+#include "server/storage/journal_entries.hpp"
 
 namespace osteon::fuzz {
 namespace {

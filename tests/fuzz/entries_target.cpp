@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/core/check.hpp"
-#include "server/net/journal_entries.hpp"
+#include "server/storage/journal_entries.hpp"
 #include "tests/fuzz/entries_input.hpp"
 #include "tests/fuzz/journal_target.hpp"
 #include "tests/support/scenes/bones.hpp"

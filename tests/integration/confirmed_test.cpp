@@ -14,7 +14,7 @@
 #include "tests/integration/stage.hpp"
 #include "tests/support/relay/impair_process.hpp"
 #include "tests/support/scenes/bones.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

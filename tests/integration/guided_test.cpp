@@ -14,7 +14,7 @@
 #include "osteon/v1/people.grpc.pb.h"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/scenes/random.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 

@@ -93,6 +93,25 @@ double apart_mm_for(double part, const std::vector<Moment>& hand, const std::vec
   return apart[static_cast<std::size_t>(part * static_cast<double>(apart.size()))];
 }
 
+// Largest distance between a hand and the places where such a tool was in the last late_ms, for a part of the moments.
+// A busy machine delays both programs. So a comparison at one time would measure the machine.
+double behind_mm_for(double part, const std::vector<Moment>& hand, const std::vector<Place>& tool, double ahead_ms,
+                     double late_ms) {
+  std::vector<double> apart;
+  for (const Moment& moment : hand) {
+    const double now_ms = moment.time_ms - ahead_ms;
+    double least_mm = 1e9;
+    for (auto place = std::ranges::lower_bound(tool, now_ms - late_ms, {}, &Place::time_ms);
+         place != tool.end() && place->time_ms < now_ms + 20.0; ++place)
+      least_mm = std::min(least_mm,
+                          std::hypot(moment.x_mm - place->x_mm, moment.y_mm - place->y_mm, moment.z_mm - place->z_mm));
+    if (least_mm < 1e9) apart.push_back(least_mm);
+  }
+  if (apart.empty()) return 1e9;
+  std::ranges::sort(apart);
+  return apart[static_cast<std::size_t>(part * static_cast<double>(apart.size()))];
+}
+
 struct Touches {
   int count = 0;
   double force_x_n = 0;  // mean

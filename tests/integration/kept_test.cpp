@@ -11,7 +11,7 @@
 #include "tests/integration/killed_servers.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

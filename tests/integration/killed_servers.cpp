@@ -4,11 +4,11 @@
 #include <thread>
 
 #include "server/journal/journal.hpp"
-#include "server/net/journal_entries.hpp"
+#include "server/storage/journal_entries.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/random.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

@@ -12,11 +12,11 @@
 
 #include "common/field/kernel.hpp"
 #include "server/journal/journal.hpp"
-#include "server/net/journal_entries.hpp"
+#include "server/storage/journal_entries.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

@@ -12,7 +12,7 @@
 #include "common/tools/tool_file.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "tests/integration/stage.hpp"
 #include "tests/unit/room/cuts.hpp"
-#include "tests/unit/room/members.hpp"
+#include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
 namespace {

@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "common/core/check.hpp"
-#include "server/net/room_runtime.hpp"
-#include "server/net/room_store.hpp"
+#include "server/rooms/room_runtime.hpp"
+#include "server/storage/room_store.hpp"
 #include "tests/perf/percentiles.hpp"
 #include "tests/perf/stroke.hpp"
 #include "tests/support/temp_dir.hpp"

@@ -12,8 +12,8 @@
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
-#include "server/net/fragment_detector.hpp"
-#include "server/net/session_messages.hpp"
+#include "server/publish/session_messages.hpp"
+#include "server/rooms/fragment_detector.hpp"
 #include "tests/support/scenes/bones.hpp"
 
 namespace osteon::test {

@@ -1,4 +1,4 @@
-// The fast path on virtual time. It does what haptic_client/net/fast_path.cpp and server/net/link_server.cpp do between
+// The fast path on virtual time. It does what haptic_client/net/fast_path.cpp and server/rpc/link_server.cpp do between
 // sockets and the two links, over a simulated network with a forger on the way.
 #pragma once
 #include <array>
@@ -13,7 +13,7 @@
 
 #include "common/wire/client_link.hpp"
 #include "common/wire/server_link.hpp"
-#include "server/net/link_server.hpp"
+#include "server/rpc/link_server.hpp"
 #include "tests/simulation/ledger.hpp"
 #include "tests/support/network/sim_network.hpp"
 

@@ -6,8 +6,8 @@
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cutting.pb.h"
 #include "server/journal/maintenance.hpp"
-#include "server/net/services.hpp"
-#include "server/net/session_messages.hpp"
+#include "server/publish/session_messages.hpp"
+#include "server/rpc/services.hpp"
 
 namespace osteon::test {
 namespace {
@@ -35,7 +35,7 @@ std::shared_ptr<ToolBox> few_tools() {
   return box;
 }
 
-// Does what SessionStream of server/net/session_service.cpp does between gRPC and the runtime.
+// Does what SessionStream of server/rpc/session_service.cpp does between gRPC and the runtime.
 class SimServer::Session final : public SessionSubscriber,
                                  public std::enable_shared_from_this<Session>,
                                  private SessionLink::Receiver {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "server/net/room_runtime.hpp"
-#include "server/net/room_store.hpp"
+#include "server/rooms/room_runtime.hpp"
+#include "server/storage/room_store.hpp"
 #include "tests/simulation/ledger.hpp"
 #include "tests/simulation/sim_link.hpp"
 #include "tests/simulation/sim_stream.hpp"

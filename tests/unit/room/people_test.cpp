@@ -6,8 +6,8 @@
 
 #include <random>
 
-#include "server/net/journal_entries.hpp"
 #include "server/room/room.hpp"
+#include "server/storage/journal_entries.hpp"
 #include "tests/unit/room/cuts.hpp"
 
 namespace osteon {

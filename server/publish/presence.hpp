@@ -1,0 +1,118 @@
+// Knows who is in a room, what was decided about whom, what is drawn, and the latest messages. WatchPeople sends this
+// to each reader, as far as the reader's role allows.
+#pragma once
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/access/role.hpp"
+#include "common/core/id.hpp"
+#include "common/surface/view_frustum.hpp"
+#include "server/publish/send_queue.hpp"
+#include "server/publish/subscriber.hpp"
+#include "server/room/room.hpp"
+
+namespace osteon {
+
+class PresenceSubscriber : public Subscriber {
+ public:
+  virtual void changed() = 0;  // there may be news(): the subscriber asks for them when it can send
+};
+
+// How much a reader has received.
+struct PresenceCursor {
+  std::uint64_t revision = 0, words = 0;
+  std::set<std::uint32_t> annotations;
+  bool begun = false;
+};
+
+// What a reader may receive. "Own" means everything about anyone of the reader's name: several joins by one name are
+// one person.
+struct PeopleRights {
+  bool people = true, drawings = true, own_supervision = true, others_supervision = true, own_words = true,
+       others_words = true;
+};
+
+// Any thread may call it. Lock order: that of the streams, then a stream's own, then that of the people.
+class Presence {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t kMostWords = 64;    // the latest ones
+  static constexpr std::size_t kMostAbsent = 256;  // people who have left; the latest ones
+  static constexpr std::chrono::milliseconds kApart{100};
+
+  // `names`: names of people by pseudonym, as far as they are known.
+  Presence(const Room& room, const std::map<std::uint32_t, std::string>& names);
+
+  void joined(AuthorId author, const std::string& name, Role role, bool hand);
+  void came(AuthorId author);  // one more session or stream of theirs; ignored if the author is unknown
+  void went(AuthorId author);
+  void take(const RoomEvent& event);  // supervise, annotation, words; other kinds are ignored
+  void took_cut(AuthorId author);
+  void acknowledged(AuthorId author, RoomSeq seq);
+  void looked(AuthorId author, const ViewFrustum& from);
+
+  // People with a tool, present or not, who may be supervised together. Instructors are not among them.
+  [[nodiscard]] std::vector<AuthorId> supervised_hands() const;
+  [[nodiscard]] RoomSeq acknowledged_by(AuthorId author) const;
+  [[nodiscard]] std::string name_of(AuthorId author) const;  // empty: unknown author, or name no longer known
+
+  // The subscriber is notified of every change until it leaves or all streams end.
+  void watch(PresenceSubscriber& subscriber);
+  void leave(PresenceSubscriber& subscriber);
+  void end_streams(const std::string& why);  // those open now and those opened later
+  [[nodiscard]] std::size_t streams() const;
+  // [tick] Notifies readers at most once every kApart.
+  void publish(RoomSeq room_seq, Clock::time_point now);
+
+  // A whole WatchPeopleResponse with what the reader lacks; null: nothing. Contains the newest state of each person and
+  // annotation, and the messages that are still stored.
+  [[nodiscard]] Bytes news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const;
+
+ private:
+  struct Entry {
+    std::uint64_t revision = 0;
+    std::string name;
+    Role role = Role::none;
+    bool hand = false;
+    int streams = 0;
+    Restrictions supervision;
+    RoomSeq decided, acknowledged;
+    AuthorId decided_by;
+    std::optional<ViewFrustum> look;
+    std::uint32_t cuts = 0;
+    std::uint64_t last_here = 0;  // revision
+  };
+  struct Drawn {
+    std::uint64_t revision = 0;
+    Annotation annotation;
+  };
+  struct Said {
+    std::uint64_t number = 0;
+    RoomSeq seq;
+    AuthorId from, to;
+    std::string words;
+  };
+  Entry* change(AuthorId author);  // under mutex_; null: unknown author
+
+  mutable std::mutex streams_mutex_;
+  std::vector<PresenceSubscriber*> subscribers_;
+  std::optional<std::string> ended_;
+  Clock::time_point next_{};  // used by the tick thread
+
+  mutable std::mutex mutex_;
+  std::uint64_t revision_ = 1, published_ = 0;
+  std::map<AuthorId, Entry> people_;
+  std::map<std::uint32_t, Drawn> annotations_;
+  std::deque<Said> words_;
+  std::uint64_t words_said_ = 0;
+  RoomSeq room_seq_;
+};
+
+}  // namespace osteon

@@ -1,0 +1,153 @@
+#include "server/publish/state_publisher.hpp"
+
+#include <algorithm>
+#include <memory>
+#include <utility>
+
+#include "common/wire/convert.hpp"
+
+namespace osteon {
+
+StatePublisher::StatePublisher() : thread_([this] { run(); }) {}
+
+void StatePublisher::stop() {
+  {
+    const std::lock_guard lock(states_mutex_);
+    end_ = true;
+    wake_.notify_one();
+  }
+  if (thread_.joinable()) thread_.join();
+}
+
+void StatePublisher::watch(StateSubscriber& subscriber) {
+  const std::lock_guard lock(streams_mutex_);
+  Stream& stream = streams_.emplace_back(Stream{&subscriber, Pace(subscriber.apart(), streams_.size())});
+  std::unique_lock states_lock(states_mutex_);
+  const ShownNow shown = newest_;
+  const std::uint64_t number = number_;
+  states_lock.unlock();
+  if (number > 0) enqueue(stream, number, shown, Clock::now());
+  if (ended_) subscriber.end(*ended_);
+}
+
+void StatePublisher::leave(StateSubscriber& subscriber) {
+  const std::lock_guard lock(streams_mutex_);
+  std::erase_if(streams_, [&](const Stream& stream) { return stream.subscriber == &subscriber; });
+}
+
+void StatePublisher::end_streams(const std::string& why) {
+  const std::lock_guard lock(streams_mutex_);
+  ended_ = why;
+  for (const Stream& stream : streams_) stream.subscriber->end(why);
+}
+
+std::size_t StatePublisher::streams() const {
+  const std::lock_guard lock(streams_mutex_);
+  return streams_.size();
+}
+
+void StatePublisher::set_session_sender(SendToSessions sender) {
+  const std::lock_guard lock(states_mutex_);
+  send_to_sessions_ = std::move(sender);
+}
+
+void StatePublisher::update(CuttingState state) {
+  const std::lock_guard lock(states_mutex_);
+  Shown& shown = states_[state.author];
+  shown = {std::move(state)};
+  changed_ = true;
+}
+
+// The tool of an ended session is shown idle, so that readers do not go on sounding and drawing its last moment.
+void StatePublisher::session_over(AuthorId author) {
+  const std::lock_guard lock(states_mutex_);
+  const auto shown = states_.find(author);
+  if (shown == states_.end()) return;
+  CuttingState& state = shown->second.state;
+  ++state.state_seq;
+  state.phase = CuttingPhase::idle;
+  state.spindle_rpm = state.feed_mm_per_s = state.engaged_fraction = state.torque_Nmm = 0;
+  state.force_physical_N = Vec3::Zero();
+  shown->second.over = true;
+  changed_ = true;
+}
+
+void StatePublisher::show(const std::vector<SceneItem>& items, const std::vector<BodyId>& bodies) {
+  v1::WatchCuttingResponse scene;
+  for (const SceneItem& item : items) *scene.add_items() = wire::to_wire(item);
+  for (const BodyId body : bodies) scene.add_bodies(body.value);
+  const std::lock_guard lock(states_mutex_);
+  scene_ = serialised(scene);
+  changed_ = true;
+}
+
+void StatePublisher::publish(RoomSeq room_seq) {
+  const std::lock_guard lock(states_mutex_);
+  for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
+  if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
+    changed_ = true;
+  if (std::exchange(changed_, false)) {
+    v1::WatchCuttingResponse response;
+    response.set_room_seq(room_seq.value);
+    for (const auto& [author, shown] : states_) *response.add_states() = wire::to_wire(shown.state);
+    newest_ = {serialised(response), scene_};
+    ++number_;
+    due_ = true;
+  }
+  due_ = due_ || owed_;
+  if (due_) wake_.notify_one();
+}
+
+void StatePublisher::run() {
+  std::unique_lock lock(states_mutex_);
+  while (true) {
+    wake_.wait(lock, [&] { return due_ || end_; });
+    if (!std::exchange(due_, false)) return;
+    lock.unlock();
+    send(Clock::now());
+    lock.lock();
+    if (!send_to_sessions_) continue;
+    const SendToSessions send = send_to_sessions_;
+    std::vector<CuttingState> states;
+    for (const auto& [author, shown] : states_) states.push_back(shown.state);
+    lock.unlock();
+    const bool owed = send(states);
+    lock.lock();
+    owed_ |= owed;
+  }
+}
+
+// If sending to everyone takes longer than a tick, the next round sends the newest state and skips those between.
+void StatePublisher::send(Clock::time_point now) {
+  const std::lock_guard lock(streams_mutex_);
+  std::unique_lock states_lock(states_mutex_);
+  const ShownNow shown = newest_;
+  const std::uint64_t number = number_;
+  states_lock.unlock();
+  bool owed = false;
+  for (Stream& stream : streams_) {
+    if (stream.enqueued == number) continue;
+    if (stream.pace.due(now))
+      enqueue(stream, number, shown, now);
+    else
+      owed = true;
+  }
+  states_lock.lock();
+  owed_ = owed;
+}
+
+void StatePublisher::enqueue(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now) {
+  stream.enqueued = number;
+  stream.pace.done(now);
+  stream.subscriber->enqueue(shown);
+}
+
+std::vector<Vec3> StatePublisher::tool_tips_mm() const {
+  const std::lock_guard lock(states_mutex_);
+  std::vector<Vec3> tips_mm;
+  for (const auto& [author, shown] : states_)
+    if (!shown.over) tips_mm.push_back(shown.state.pose_bone_tool.position_mm);
+  return tips_mm;
+}
+
+}  // namespace osteon

@@ -1,0 +1,32 @@
+#include "server/rooms/cut_metrics.hpp"
+
+namespace osteon {
+
+void CutMetrics::committed(Time arrived, Time taken, Time decided) {
+  own_.wait.record(taken - arrived);
+  own_.decide.record(decided - taken);
+}
+
+void CutMetrics::publish(bool last) {
+  std::unique_lock lock(mutex_, std::try_to_lock);
+  if (!lock && last) lock.lock();
+  if (lock) shown_ = own_;
+}
+
+void CutMetrics::acknowledged(Time decided, Time durable, Time acknowledged) {
+  const std::lock_guard lock(mutex_);
+  commit_.record(durable - decided);
+  publish_.record(acknowledged - durable);
+}
+
+StageTimes CutMetrics::stages() const {
+  const std::lock_guard lock(mutex_);
+  return {shown_.wait, shown_.decide, commit_, publish_};
+}
+
+RejectionCounts CutMetrics::rejections() const {
+  const std::lock_guard lock(mutex_);
+  return shown_.rejections;
+}
+
+}  // namespace osteon

@@ -1,0 +1,171 @@
+// The implementation of RoomRuntime, for its own source files.
+#pragma once
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <shared_mutex>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "server/publish/mesh_publisher.hpp"
+#include "server/publish/presence.hpp"
+#include "server/publish/session_messages.hpp"
+#include "server/publish/state_publisher.hpp"
+#include "server/rooms/bone_mount.hpp"
+#include "server/rooms/fragment_detector.hpp"
+#include "server/rooms/job_thread.hpp"
+#include "server/rooms/room_runtime.hpp"
+#include "server/rooms/runtime_parts.hpp"
+
+namespace osteon {
+
+[[nodiscard]] Error only_to_be_watched();
+
+// Watchers of a playback are not among its entries, so their numbers must differ from those of the shown room.
+inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
+
+// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the state publisher, then a
+// stream's own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of `metrics` are
+// never held with another.
+struct RoomRuntime::Impl {
+  using Clock = RoomRuntime::Clock;
+
+  Impl(Room r, RuntimeRates rates, Detail detail, RoomStore* k, std::optional<Playback> p)
+      : store(k),
+        room(std::move(r)),
+        rates_(rates),
+        room_began(Clock::now() - std::chrono::duration_cast<Clock::duration>(k ? reopened_time(room) : room.time())),
+        people(room, names_of(k)),
+        mesh(room, room_mutex, {rates.mesh, rates.looks}, detail, [this] { return board.tool_tips_mm(); }),
+        committer(
+            k ? [k](std::span<const LogEntry> entries) { return k->write(entries); } : Committer::Write{},
+            [this](const Error& why) { close_room(why); }, !driven()) {
+    authors = room.authors();
+    if (rates_.mount && !p) mount.emplace(MountServerParams{.mount = mount_about(room.bone().bounds().centre_mm())});
+    if (p) player.emplace(std::move(*p), room.time());
+    board.set_session_sender([this](const std::vector<CuttingState>& states) { return send_partners(states); });
+  }
+  [[nodiscard]] static std::map<std::uint32_t, std::string> names_of(RoomStore* store);
+
+  [[nodiscard]] bool driven() const { return rates_.tick.count() == 0; }
+  // In a playback, splits are among the entries.
+  [[nodiscard]] bool looks_for_pieces() const { return rates_.pieces.count() > 0 && !player; }
+  void run_ticks();
+  // Returns true if anything was decided.
+  bool tick(std::chrono::nanoseconds now, bool last);
+  bool play(std::chrono::nanoseconds now);
+  void run_pieces();
+  void decide(QueuedCut& queued);
+  void decide(QueuedEvent& queued);
+  // [tick] Calls `when_durable` when what was decided is durable.
+  void later(Committer::WhenDurable when_durable) { callbacks.push_back(std::move(when_durable)); }
+  [[nodiscard]] std::vector<SessionMessage> messages_of(const RoomEvent& event);
+  // What some sessions get in place of the messages that the others get.
+  struct Personal {
+    AuthorId to;  // null: all
+    std::optional<SessionMessage> message;
+    [[nodiscard]] bool is_for(AuthorId author) const { return message && (!to || to == author); }
+  };
+  [[nodiscard]] Personal personal_message(const RoomEvent& event);
+  // `held`: the author's restrictions, which `by` decided.
+  [[nodiscard]] SessionStart start_of_session(AuthorId author, const People::Supervised& held, const Decider& by);
+  // [tick] In a room without a store; 0: no name.
+  [[nodiscard]] std::uint32_t person_of(const std::string& name) {
+    return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
+  }
+  // What sessions are sent for one event.
+  struct Said {
+    std::vector<SessionMessage> messages;
+    Personal personal;
+  };
+  // Returns true if any session still lacks some of the states.
+  bool send_partners(const std::vector<CuttingState>& states);
+  [[nodiscard]] std::uint32_t number_of(const Digest& tool);
+  void publish_durable(std::chrono::nanoseconds now);
+  void move_bone(std::chrono::nanoseconds now);  // [tick] on its mount
+  void note_changed(Clock::time_point arrived) {
+    if (!driven()) mesh.changed(arrived);
+  }
+  void close_room(const Error& why);
+  [[nodiscard]] std::optional<Error> closed() const;
+  void end_sessions(const std::string& why, bool to_return = false);
+  void show_scene();
+  void read_leaves(std::vector<FieldLeaf>& leaves);
+
+  // All bodies at one sequence number, copied while the room went on.
+  struct BoneCopy {
+    RoomSeq room_seq;
+    RoomCounts counts;
+    std::map<BodyId, CutField> bodies;
+    std::vector<SceneItem> items;
+  };
+  enum class Bodies { that_exist, all };
+  BoneCopy copy_bone(Bodies which = Bodies::that_exist);
+  void ask_for_split(Separation found);
+
+  RoomStore* const store;        // null: nothing is stored
+  std::optional<Player> player;  // of a playback, from the beginning; used by the tick thread alone
+  std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
+  Room room;
+  std::shared_mutex room_mutex;
+  std::optional<std::vector<Cut>> cuts_during_copy;  // under room_mutex: cuts applied since copy_bone() began
+  const RuntimeRates rates_;
+  const Clock::time_point room_began;  // time 0 of the room, as if it had hardly been closed
+  std::atomic<std::uint64_t> room_seq{0}, authors{0};
+  std::atomic<bool> stopping{false};
+
+  std::mutex numbers_mutex;  // never held with another mutex that is taken within
+  std::map<Digest, std::uint32_t> tool_numbers;
+
+  std::mutex queue_mutex;
+  std::vector<Queued> queue;
+  bool queue_closed = false;  // the last tick has taken what was queued
+
+  mutable std::mutex sessions_mutex;
+  Subscribers<SessionSubscriber> sessions;
+  std::map<AuthorId, SessionSubscriber*> open_authors;
+
+  std::optional<BoneMount> mount;  // from the beginning
+  Presence people;
+  StatePublisher board;
+  MeshPublisher mesh;
+
+  std::mutex pieces_mutex;
+  std::condition_variable pieces_wake;
+  bool pieces_due = true, pieces_end = false;
+  std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
+  bool look_wanted = false;                       // somebody waits for the next search
+  FragmentDetector pieces{room, room_mutex,
+                          [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // used by the piece thread
+
+  JobThread jobs;
+
+  mutable std::mutex stats_mutex;
+  TickStats stats;
+  RoomCounts counts;
+  CutMetrics metrics;
+
+  std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
+  bool may_return = false;                // under sessions_mutex: they may come again
+  std::optional<SessionMessage> redial;   // under sessions_mutex: sent to sessions when the process is about to stop
+  std::mutex copy_mutex;                  // held while the bone is copied; of a stopped runtime by every caller
+  std::optional<BoneStatus> last_status;  // under copy_mutex
+  std::map<std::string, std::uint32_t> persons;   // of the tick thread: numbers by name, if no journal gives them
+  std::vector<Queued> batch;                      // of the tick thread
+  std::vector<Committer::WhenDurable> callbacks;  // of the tick thread
+  // Of the tick thread: sessions were informed that the journal is closed to entries.
+  bool closing_reported = false;
+  // Of the tick thread: when sessions are next informed how much is durable.
+  std::chrono::nanoseconds next_durable{};
+  Committer committer;  // the last member with a thread, since it calls the others
+
+  std::thread tick_thread, piece_thread;
+};
+
+}  // namespace osteon
