@@ -1,7 +1,7 @@
 // Drilling thrust after Chi, equation (7.3): T = 134.6 N^-0.3327 v^0.5189 rho^1.1841, with T in newtons, N in rpm, v in
 // mm/s and rho in g/cm3. Published for 0.3 to 2.0 g/cm3, about 500 to 3000 rpm and 0.5 to 3 mm/s; extrapolated outside
 // that range. The source does not state the drill's diameter, so thrust is scaled by D / 3.2 mm [A].
-// haptic_client/control/cutting_force.cpp applies the law to the bone that the drill engages.
+// haptic_client/contact/cutting_force.cpp applies the law to the bone that the drill engages.
 #pragma once
 #include "common/core/units.hpp"
 #include "common/mechanics/feed_law.hpp"

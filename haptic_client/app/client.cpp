@@ -21,13 +21,13 @@
 #include "common/runtime/spsc_queue.hpp"
 #include "common/runtime/triple_buffer.hpp"
 #include "common/runtime/watchdog.hpp"
+#include "common/volume/replica.hpp"
 #include "haptic_client/app/client_messages.hpp"
 #include "haptic_client/app/cut_log.hpp"
-#include "haptic_client/control/confirmation_monitor.hpp"
-#include "haptic_client/control/felt_mount.hpp"
-#include "haptic_client/control/guiding.hpp"
-#include "haptic_client/control/patch_builder.hpp"
-#include "haptic_client/control/replica.hpp"
+#include "haptic_client/contact/guiding.hpp"
+#include "haptic_client/contact/patch_builder.hpp"
+#include "haptic_client/prediction/confirmation_monitor.hpp"
+#include "haptic_client/rendering/felt_mount.hpp"
 
 namespace osteon::haptic {
 namespace {

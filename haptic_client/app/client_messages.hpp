@@ -11,9 +11,9 @@
 #include "common/field/cut.hpp"
 #include "common/mechanics/compliant_mount.hpp"
 #include "common/tools/scene.hpp"
-#include "haptic_client/control/guidance_spring.hpp"
-#include "haptic_client/control/obstacle.hpp"
+#include "haptic_client/contact/obstacle.hpp"
 #include "haptic_client/net/room_messages.hpp"
+#include "haptic_client/rendering/guidance_spring.hpp"
 
 namespace osteon::haptic {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
-#include "haptic_client/control/surgeon.hpp"
+#include "haptic_client/simulation/surgeon.hpp"
 
 namespace osteon::haptic {
 

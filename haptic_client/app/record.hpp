@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/core/result.hpp"
-#include "haptic_client/control/session.hpp"
+#include "haptic_client/simulation/session.hpp"
 
 namespace osteon::haptic {
 

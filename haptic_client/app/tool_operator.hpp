@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "common/tools/tool_box.hpp"
-#include "haptic_client/control/free_hand.hpp"
 #include "haptic_client/device/connection.hpp"
 #include "haptic_client/device/device_list.hpp"
 #include "haptic_client/device/recorded_device.hpp"
+#include "haptic_client/simulation/free_hand.hpp"
 
 namespace osteon::haptic {
 

@@ -34,6 +34,14 @@ SERVER_LAYERS = {
     "rpc": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage", "rooms"},
     "cli": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage", "rooms", "rpc"},
 }
+# The same for these folders of haptic_client/. The tool's motion goes from simulation or a device down to contact.
+HAPTIC_LAYERS = {
+    "device": set(),
+    "contact": set(),
+    "prediction": {"contact"},
+    "rendering": {"device", "contact", "prediction"},
+    "simulation": {"device", "contact", "prediction", "rendering"},
+}
 # Inside a client: folders that only the client's app folder (and tests) may combine.
 OUTER = {"app": set(), "net": {"app"}}
 
@@ -100,6 +108,8 @@ def layer_faults(path: str, text: str):
             elif target[0] == "server":
                 if target[1] != parts[1] and target[1] not in SERVER_LAYERS.get(parts[1], set()):
                     faults.append(f"{path}: server/{parts[1]} must not include {include}")
+            elif parts[1] in HAPTIC_LAYERS and target[1] not in HAPTIC_LAYERS[parts[1]] | {parts[1]}:
+                faults.append(f"{path}: haptic_client/{parts[1]} must not include {include}")
             elif len(target) > 2 and target[1] != parts[1] and target[1] in OUTER and parts[1] not in OUTER[target[1]]:
                 faults.append(f"{path}: only {', '.join(sorted(OUTER[target[1]])) or 'tests'} may include {include}")
         if GENERATED.search(include) and not lives_in(path, GENERATED_HOMES):

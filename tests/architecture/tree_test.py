@@ -115,6 +115,11 @@ class TheRules(unittest.TestCase):
         self.assertTrue(self.faults("haptic_client/net/x.cpp", "haptic_client/app/options.hpp"))
         self.assertFalse(self.faults("server/cli/main.cpp", "server/rpc/services.hpp"))
 
+    def test_contact_does_not_see_the_loop(self):
+        self.assertTrue(self.faults("haptic_client/contact/proxy.cpp", "haptic_client/rendering/coupling.hpp"))
+        self.assertTrue(self.faults("haptic_client/rendering/x.cpp", "haptic_client/simulation/surgeon.hpp"))
+        self.assertFalse(self.faults("haptic_client/rendering/x.cpp", "haptic_client/contact/proxy.hpp"))
+
     def test_imaging_is_for_the_importer(self):
         self.assertTrue(self.faults("server/room/room.cpp", "common/imaging/dicom.hpp"))
         self.assertFalse(self.faults("server/import/main.cpp", "common/imaging/dicom.hpp"))
@@ -128,7 +133,7 @@ class TheRules(unittest.TestCase):
         self.assertTrue(self.faults("viewer_client/render/x.hpp", "vtkActor.h"))
         self.assertTrue(self.faults("server/room/room.cpp", "grpcpp/grpcpp.h"))
         self.assertTrue(self.faults("haptic_client/app/record_file.hpp", "hdf5.h"))
-        self.assertTrue(self.faults("haptic_client/control/session.cpp", "hdf5.h"))
+        self.assertTrue(self.faults("haptic_client/simulation/session.cpp", "hdf5.h"))
         self.assertFalse(self.faults("haptic_client/app/record_file.cpp", "hdf5.h"))
         self.assertFalse(self.faults("common/volume/case.cpp", "openvdb/openvdb.h"))
 

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <thread>
 
-#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/contact/patch_builder.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/relay/impair_process.hpp"
@@ -66,7 +66,7 @@ class Felt {
   std::condition_variable wake_;
   std::vector<Cut> came_;
   bool over_ = false;
-  haptic::Replica replica_;  // of its thread, as the members below
+  Replica replica_;  // of its thread, as the members below
   const haptic::ToolModel model_;
   haptic::PatchBuilder builder_;
   haptic::Patch patch_;

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "common/field/kernel.hpp"
-#include "haptic_client/control/contact.hpp"
-#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/contact/contact.hpp"
+#include "haptic_client/contact/patch_builder.hpp"
 #include "tests/support/scenes/bones.hpp"
 
 namespace osteon::haptic::test {

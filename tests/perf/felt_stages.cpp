@@ -16,7 +16,7 @@
 #include <thread>
 
 #include "common/core/check.hpp"
-#include "haptic_client/control/replica.hpp"
+#include "common/volume/replica.hpp"
 #include "haptic_client/net/fast_path.hpp"
 #include "server/rooms/room_runtime.hpp"
 #include "server/rpc/link_server.hpp"
@@ -192,7 +192,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
   std::deque<wire::SessionEntry> entries_;
   Pose tip_;
   bool over_ = false;
-  haptic::Replica replica_;  // of its thread, as all members below
+  Replica replica_;  // of its thread, as all members below
   const haptic::ToolModel model_;
   haptic::PatchBuilder builder_;
   haptic::Patch patch_;

@@ -15,7 +15,7 @@
 #include "common/runtime/periodic.hpp"
 #include "common/runtime/realtime.hpp"
 #include "common/runtime/triple_buffer.hpp"
-#include "haptic_client/control/confirmation_monitor.hpp"
+#include "haptic_client/prediction/confirmation_monitor.hpp"
 #include "tests/unit/haptic_client/bench.hpp"
 
 namespace osteon::haptic::test {

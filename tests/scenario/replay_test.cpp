@@ -6,7 +6,7 @@
 #include <random>
 #include <thread>
 
-#include "haptic_client/control/replica.hpp"
+#include "common/volume/replica.hpp"
 #include "server/room/room.hpp"
 #include "tests/scenario/recording.hpp"
 #include "tests/support/shared_data.hpp"
@@ -56,13 +56,13 @@ TEST(Replay, TwoReplicasThatHearOfEachOtherLateComeToTheRecordedField) {
   Room room(recorded_bone());
   struct Surgeon {
     AuthorId author;
-    haptic::Replica replica;
+    Replica replica;
     std::uint64_t author_seq = 0;
     std::size_t heard = 0;
   };
   const Case bone = recorded_bone();
   std::vector<Surgeon> surgeons;
-  for (int i = 0; i < 2; ++i) surgeons.push_back({room.join(MemberKind::surgeon), haptic::Replica(bone, {})});
+  for (int i = 0; i < 2; ++i) surgeons.push_back({room.join(MemberKind::surgeon), Replica(bone, {})});
   std::vector<Cut> committed;
   const auto hear = [&](Surgeon& surgeon, std::size_t until) {
     for (; surgeon.heard < until; ++surgeon.heard)

@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "common/link/backoff.hpp"
-#include "haptic_client/control/confirmation_monitor.hpp"
-#include "haptic_client/control/replica.hpp"
+#include "common/volume/replica.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
 #include "haptic_client/net/session_reader.hpp"
+#include "haptic_client/prediction/confirmation_monitor.hpp"
 #include "tests/simulation/ledger.hpp"
 #include "tests/simulation/sim_link.hpp"
 #include "tests/simulation/sim_server.hpp"
@@ -176,7 +176,7 @@ class SimClient {
   Time requests_there_{}, held_back_until_{};
   std::optional<Backoff> backoff_;
   std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
-  std::optional<haptic::Replica> replica_;
+  std::optional<Replica> replica_;
   haptic::ConfirmationMonitor watch_;
   haptic::RoomHealth health_{};
   std::deque<Received> from_room_;

@@ -41,7 +41,7 @@ void DelayedRoom::undo(int count) {
   say(std::move(changed));
 }
 
-void DelayedRoom::tick(haptic::Replica& client) {
+void DelayedRoom::tick(Replica& client) {
   ++now_;
   for (; !to_room_.empty() && to_room_.front().first <= now_; to_room_.pop_front()) {
     const Cut& cut = to_room_.front().second;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/volume/cut_field.hpp"
-#include "haptic_client/control/replica.hpp"
+#include "common/volume/replica.hpp"
 
 namespace osteon::test {
 
@@ -21,7 +21,7 @@ class DelayedRoom {
   void commit_other(Cut cut);
   void undo(int count);
   // Advances one tick. The room decides what has arrived. The client's replica gets what has arrived there.
-  void tick(haptic::Replica& client);
+  void tick(Replica& client);
 
   [[nodiscard]] std::uint64_t lease_epoch() const { return client_epoch_; }  // as the client knows it
   [[nodiscard]] std::uint64_t undone() const { return undone_; }

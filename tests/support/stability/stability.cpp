@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "common/core/check.hpp"
-#include "haptic_client/control/haptic_loop.hpp"
-#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/contact/patch_builder.hpp"
+#include "haptic_client/rendering/haptic_loop.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/support/scenes/random.hpp"

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "common/mechanics/compliant_mount.hpp"
-#include "haptic_client/control/felt_mount.hpp"
-#include "haptic_client/control/haptic_loop.hpp"
-#include "haptic_client/control/patch_builder.hpp"
+#include "haptic_client/contact/patch_builder.hpp"
 #include "haptic_client/device/simulated_device.hpp"
+#include "haptic_client/rendering/felt_mount.hpp"
+#include "haptic_client/rendering/haptic_loop.hpp"
 #include "tests/support/stability/delayed_room.hpp"
 
 namespace osteon::test {
@@ -64,7 +64,7 @@ class OverseenHand {
 
   [[nodiscard]] const Crossed& crossed() const { return crossed_; }
   [[nodiscard]] const std::vector<Cut>& cuts() const { return cuts_; }  // closed by the loop
-  [[nodiscard]] const haptic::Replica& replica() const { return replica_; }
+  [[nodiscard]] const Replica& replica() const { return replica_; }
   [[nodiscard]] haptic::HapticLoop& loop() { return *loop_; }
   [[nodiscard]] const haptic::LoopReport& last() const { return last_; }
   [[nodiscard]] Vec3 handle_mm() const { return last_.pose_bone_device.position_mm; }
@@ -99,7 +99,7 @@ class OverseenHand {
 
   OverseenRun run_;
   Case bone_;
-  haptic::Replica replica_;
+  Replica replica_;
   DelayedRoom room_;
   std::unique_ptr<haptic::HapticLoop> loop_;
   std::unique_ptr<haptic::SimulatedDevice> device_;

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "common/volume/case.hpp"
-#include "haptic_client/control/patch_builder.hpp"
-#include "haptic_client/control/replica.hpp"
-#include "haptic_client/control/session.hpp"
+#include "common/volume/replica.hpp"
+#include "haptic_client/contact/patch_builder.hpp"
+#include "haptic_client/simulation/session.hpp"
 
 namespace osteon::haptic::test {
 

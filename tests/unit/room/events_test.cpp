@@ -6,7 +6,7 @@
 #include <random>
 
 #include "common/field/kernel.hpp"
-#include "haptic_client/control/replica.hpp"
+#include "common/volume/replica.hpp"
 #include "server/room/room.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/parts.hpp"
@@ -14,7 +14,6 @@
 namespace osteon {
 namespace {
 
-using haptic::Replica;
 using test::part;
 using test::strokes;
 using test::test_block;

@@ -12,9 +12,9 @@
 #include <thread>
 #include <vector>
 
+#include "common/volume/replica.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
-#include "haptic_client/control/replica.hpp"
 #include "haptic_client/net/room_session.hpp"
 #include "osteon/v1/cutting.grpc.pb.h"
 #include "osteon/v1/room.grpc.pb.h"
@@ -133,7 +133,7 @@ class Surgeon {
 
   std::mutex mutex_;
   std::optional<RoomSession> session_;
-  std::optional<haptic::Replica> replica_;
+  std::optional<Replica> replica_;
   bool complete_ = false, interrupted_ = false;
   int interruptions_ = 0;
   std::vector<FieldLeaf> renewed_;

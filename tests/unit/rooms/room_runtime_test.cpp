@@ -8,8 +8,8 @@
 #include <mutex>
 #include <thread>
 
+#include "common/volume/replica.hpp"
 #include "common/wire/convert.hpp"
-#include "haptic_client/control/replica.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/rooms/fake_session.hpp"
 
@@ -79,7 +79,7 @@ class ReplicaSession final : public test::FakeSession {
   mutable std::mutex mutex_;
   SessionSendQueue send_queue_;
   std::shared_ptr<ToolBox> tools_ = builtin_tool_box();
-  haptic::Replica replica_;
+  Replica replica_;
   RoomSeq seq_;
   std::atomic<int> decided_{0};
   std::atomic<bool> ended_{false};

@@ -6,8 +6,8 @@
 #include <atomic>
 #include <thread>
 
-#include "haptic_client/control/confirmation_monitor.hpp"
-#include "haptic_client/control/cut_recorder.hpp"
+#include "haptic_client/prediction/confirmation_monitor.hpp"
+#include "haptic_client/prediction/cut_recorder.hpp"
 #include "tests/support/disk/memory_disk.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/rooms/kept_room.hpp"

@@ -1,0 +1,119 @@
+// A patch feels like the bone from which it was made.
+#include "haptic_client/contact/patch_builder.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "tests/unit/haptic_client/bench.hpp"
+
+namespace osteon::haptic::test {
+namespace {
+
+Cut hole(double depth_mm) {
+  const Tool tool = *find_tool("drill-3.2");
+  Cut cut;
+  cut.author = AuthorId{1};
+  cut.author_seq = 1;
+  cut.tool = tool.hash();
+  cut.level = tool.cut_level;
+  cut.path = {quantise(pose_along({0, 0, -1}, Vec3::UnitZ())), quantise(pose_along({0, 0, depth_mm}, Vec3::UnitZ()))};
+  return cut;
+}
+
+TEST(Patch, AgreesWithTheFieldRoundTheTool) {
+  const Case bone = block_case();
+  CutField field(bone, BodyId{});
+  field.apply(hole(4.0));
+  const ToolModel model(*find_tool("drill-3.2"), bone.pitch_mm());
+  PatchBuilder builder;
+  Patch patch;
+  const Pose pose{{0, 0, 4.0}, Eigen::Quaterniond::Identity()};
+  builder.build(field, model, pose, patch);
+
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> side(-2.4, 2.4), deep(-3.0, 5.2);
+  int fine = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Vec3 p(side(random), side(random), deep(random));
+    const double expected = field.solid_mm(p);
+    double value = 0.0;
+    if (std::abs(signed_distance_mm(model.tool, pose.inverse().point(p))) > 1.0) continue;
+    ASSERT_TRUE(patch.solid(p, value));
+    double unused = 0.0;
+    fine += patch.fine.sample(p, unused);
+    // The max of trilinears and the trilinear of maxima differ by less than the pitch over a crease.
+    // Deep in bone only the sign matters: values there are clipped, in each level by its own band.
+    if (expected > -0.4) {
+      EXPECT_NEAR(value, expected, 0.13) << p.transpose();
+    } else {
+      EXPECT_LT(value, -0.25) << p.transpose();
+    }
+    EXPECT_NEAR(patch.density_at(p), bone.density_g_cm3(p), 1e-5);
+  }
+  EXPECT_GT(fine, 500);
+}
+
+TEST(Patch, FollowsCutsWithFewNewBricks) {
+  const Case bone = block_case();
+  CutField field(bone, BodyId{});
+  const ToolModel model(*find_tool("drill-3.2"), bone.pitch_mm());
+  PatchBuilder builder;
+  Patch patch;
+  const Pose pose{{0, 0, 1.0}, Eigen::Quaterniond::Identity()};
+  builder.build(field, model, pose, patch);
+  const std::size_t first = builder.bricks_made();
+
+  const Cut cut = hole(1.0);
+  const CutReport report = field.apply(cut);
+  builder.changed(bone.pitch_mm(), report.level, report.changed_leaves);
+  builder.build(field, model, pose, patch);
+  EXPECT_LT(builder.bricks_made() - first, first);
+  double value = 0.0;
+  ASSERT_TRUE(patch.solid({0, 0, 0.5}, value));
+  EXPECT_GT(value, 0.0);
+
+  // Nothing changed, so nothing is made.
+  const std::size_t second = builder.bricks_made();
+  builder.build(field, model, pose, patch);
+  EXPECT_EQ(builder.bricks_made(), second);
+}
+
+// Two bodies share the block. What is solid in either is solid. A body that goes takes its half with it.
+TEST(Patch, HoldsEveryBody) {
+  const Case bone = block_case();
+  CutField whole(bone, BodyId{}), left(bone, BodyId{}), right(bone, BodyId{1});
+  // One body has a hole and the other is whole. Together they are whole.
+  left.apply(hole(4.0));
+  const ToolModel model(*find_tool("drill-3.2"), bone.pitch_mm());
+  const Pose pose{{0, 0, 4.0}, Eigen::Quaterniond::Identity()};
+  PatchBuilder builder, other;
+  Patch patch, expected;
+  const CutField* const both[] = {&left, &right};
+  builder.build(both, model, pose, patch);
+  other.build(whole, model, pose, expected);
+  double value = 0.0, wanted = 0.0;
+  for (double z = 0.1; z < 5.0; z += 0.3)
+    for (double x = -1.5; x <= 1.5; x += 0.5) {
+      ASSERT_TRUE(patch.solid({x, 0, z}, value) && expected.solid({x, 0, z}, wanted));
+      EXPECT_NEAR(value, wanted, 1e-6);
+    }
+  builder.build(std::span(both, 1), model, pose, patch);
+  ASSERT_TRUE(patch.solid({0, 0, 2.0}, value));
+  EXPECT_GT(value, 0.0);
+}
+
+TEST(Patch, KnowsNothingOutside) {
+  const Case bone = block_case();
+  const CutField field(bone, BodyId{});
+  Patch patch;
+  double value = 0.0;
+  EXPECT_FALSE(patch.solid(Vec3::Zero(), value));
+  PatchBuilder().build(field, ToolModel(*find_tool("drill-3.2"), 0.5), {{0, 0, -1}, Eigen::Quaterniond::Identity()},
+                       patch);
+  EXPECT_TRUE(patch.solid({0, 0, 0}, value));
+  EXPECT_FALSE(patch.solid({0, 0, 29}, value));
+}
+
+}  // namespace
+}  // namespace osteon::haptic::test
