@@ -27,8 +27,8 @@
 #include "server/journal/journal_file.hpp"
 #include "server/journal/maintenance.hpp"
 #include "server/journal/signing.hpp"
-#include "server/rooms/people_erasing.hpp"
 #include "server/storage/journal_entries.hpp"
+#include "server/storage/people_erasing.hpp"
 #include "server/storage/room_files.hpp"
 
 namespace osteon {

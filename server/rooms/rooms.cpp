@@ -13,9 +13,9 @@
 #include "common/runtime/log.hpp"
 #include "common/wire/version.hpp"
 #include "server/auth/authorizer.hpp"
-#include "server/rooms/room_owners.hpp"
 #include "server/storage/journal_entries.hpp"
 #include "server/storage/room_files.hpp"
+#include "server/storage/room_owners.hpp"
 
 namespace osteon {
 namespace {

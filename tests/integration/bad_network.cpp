@@ -54,7 +54,7 @@ class Felt {
       }
       for (const Cut& cut : cuts) replica_.commit(RoomSeq{replica_.room_seq().value + 1}, cut, false);
       replica_.settle();
-      for (const haptic::ChangedLeaves& change : replica_.take_changes())
+      for (const ChangedLeaves& change : replica_.take_changes())
         builder_.changed(replica_.predicted().bone().pitch_mm(), change.level, change.origins);
       builder_.build(replica_.bodies(), model_, dequantise(cuts.back().path.back()), patch_);
       for (const Cut& cut : cuts) in_patch_(cut);

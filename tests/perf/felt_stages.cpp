@@ -169,7 +169,7 @@ class Line final : public SessionSubscriber, private SessionLink::Receiver, publ
       for (const wire::SessionEntry& entry : entries)
         replica_.commit(entry.room_seq, entry.cut, entry.cut.author == author_);
       replica_.settle();
-      for (const haptic::ChangedLeaves& change : replica_.take_changes())
+      for (const ChangedLeaves& change : replica_.take_changes())
         builder_.changed(runtime_.bone().pitch_mm(), change.level, change.origins);
       builder_.build(replica_.bodies(), model_, tip, patch_);
       for (const wire::SessionEntry& entry : entries)

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "server/cli/room_admin_client.hpp"
-#include "server/rooms/room_owners.hpp"
 #include "server/rpc/room_server.hpp"
+#include "server/storage/room_owners.hpp"
 #include "tests/support/authentication/people.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/support/wait.hpp"

@@ -9,7 +9,7 @@
 #include "common/volume/field_file.hpp"
 #include "server/journal/maintenance.hpp"
 #include "server/journal/signing.hpp"
-#include "server/rooms/room_owners.hpp"
+#include "server/storage/room_owners.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/rooms/kept_room.hpp"

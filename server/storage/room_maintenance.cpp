@@ -5,7 +5,7 @@
 
 #include "common/field/field_hash.hpp"
 #include "server/journal/journal_file.hpp"
-#include "server/rooms/people_erasing.hpp"
+#include "server/storage/people_erasing.hpp"
 #include "server/storage/room_store.hpp"
 
 namespace osteon {

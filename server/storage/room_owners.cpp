@@ -1,4 +1,4 @@
-#include "server/rooms/room_owners.hpp"
+#include "server/storage/room_owners.hpp"
 
 #include <system_error>
 

@@ -1,4 +1,4 @@
-#include "server/rooms/people_erasing.hpp"
+#include "server/storage/people_erasing.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -6,8 +6,8 @@
 #include <utility>
 #include <variant>
 
-#include "server/rooms/room_owners.hpp"
 #include "server/storage/journal_entries.hpp"
+#include "server/storage/room_owners.hpp"
 
 namespace osteon {
 namespace {

@@ -1,0 +1,172 @@
+"""Writes vectors.json: what a real server said, for vectors_test.py. OSTEON_BIN and OSTEON_SOURCE_DIR as for the tests.
+
+    OSTEON_BIN=build/dev/bin OSTEON_SOURCE_DIR=. python3 -B tests/protocol/make_vectors.py
+
+Each expected value comes from the server, from osteon-import or from libsodium, not from wire.py.
+"""
+import base64
+import ctypes
+import json
+import sqlite3
+import sys
+import tempfile
+import time
+import zlib
+from pathlib import Path
+
+import client
+import wire
+from client import Member, Session, Surface, room
+from client_test import HAPTIC, VIEWER, Server, run, stl_triangles, turned
+
+
+def in_lines(value):
+    """Long texts as lists of short ones, for a file of narrow lines."""
+    if isinstance(value, dict):
+        return {name: in_lines(one) for name, one in value.items()}
+    if isinstance(value, list):
+        return [in_lines(one) for one in value]
+    if isinstance(value, str) and len(value) > 80 and "\n" not in value:
+        return {"text": [value[i:i + 80] for i in range(0, len(value), 80)]}
+    if isinstance(value, str) and "\n" in value:
+        return {"lines": value.splitlines()}
+    return value
+
+
+def smallest(tools):
+    """The cutting tool with the smallest diameter."""
+    fields = {digest: wire.tool_fields(tool.yaml) for digest, tool in tools.items()}
+    return min((f for f in fields if fields[f]["kind"] == "round-burr"), key=lambda f: float(fields[f]["diameter_mm"]))
+
+
+def text_of(key):
+    return " ".join(map(str, key))
+
+
+def main():
+    vectors = []
+
+    def add(name, check, given, expected):
+        vectors.append(in_lines({"name": name, "check": check, "given": given, "expected": expected}))
+
+    with tempfile.TemporaryDirectory(prefix="osteon-vectors-") as name:
+        folder = Path(name)
+        server = Server(folder, "--journal", folder / "room.journal")
+        hand = Member(server.address, HAPTIC, "anna")
+        session = Session(hand)
+        watcher = Session(Member(server.address, HAPTIC, "ben"))
+        path = CapturingPath(watcher)
+        tools = {wire.tool_fields(tool.yaml)["name"]: (digest, tool.yaml) for digest, tool in session.tools.items()}
+        for tool in ("burr-round-3.2", "saw-osc-1", "guide-2"):
+            digest, definition = tools[tool] if tool in tools else next(iter(tools.values()))
+            add(f"tool {wire.tool_fields(definition)['name']}", "tool_hash", {"yaml": definition}, digest.hex())
+        burr, small = tools["burr-round-3.2"][0], smallest(session.tools)
+        session.decided(session.send_cut(session.cut(small, [(0, 0, 0)], level=0)))
+        first = Session(Member(server.address, HAPTIC, "cleo"))
+        add("field of one small cut", "field_hash",
+            {"pitch_mm": hand.joined.pitch_mm,
+             "leaves": {text_of(key): base64.b64encode(zlib.compress(values, 9)).decode()
+                        for key, values in sorted(first.leaves.items())}}, hand.status().field_hash.hex())
+        cuts = []
+        for i in range(6):
+            ends = [(i - 3, 0, -1.0), (i - 2, 0.1 * i, -1.0)]
+            cuts.append(session.send_cut(session.cut(burr, ends, level=2, us=50000, rpm=20000 + 7 * i)))
+            time.sleep(0.06)
+        decided = [session.decided(cut) for cut in cuts]
+        session.decided(session.send_cut(session.cut(burr, [(0, 0, 5)], body=77)))
+        hand.rooms.Mark(room.MarkRequest(author=hand.author, label="end"), timeout=20)
+        watcher.wait(lambda: path.packets and sum(e[0] == "cut" for e in watcher.events) == 7)
+        time.sleep(0.2)
+        surface = Surface(Member(server.address, VIEWER)).read_until(decided[-1][1])
+        path.close()
+        for one in (session, watcher, first):
+            one.close()
+        surface.close()
+        summary = server.stop()
+        keys = {key: wire.sha256(payload).hex() for key, payload in surface.blocks.items()}
+        add("surface of seven cuts", "surface_hash", {"blocks": {text_of(k): d for k, d in sorted(keys.items())}},
+            summary["mesh_hash"])
+        blocks(add, folder, server, surface, hand.joined.pitch_mm)
+        chain(add, folder / "room.journal")
+        datagrams(add, path, watcher)
+        key = bytes(range(32))
+        out = ctypes.create_string_buffer(32)
+        wire.sodium().crypto_kdf_derive_from_key(out, ctypes.c_size_t(32), ctypes.c_uint64(1), b"osteonUD", key)
+        add("key of the next generation", "next_key", {"key": key.hex()}, out.raw.hex())
+    target = Path(__file__).with_name("vectors.json")
+    target.write_text(json.dumps(vectors, indent=1) + "\n")
+    print(f"{len(vectors)} vectors, {target.stat().st_size} bytes")
+
+
+class CapturingPath(client.FastPath):
+    """Keeps what arrived."""
+
+    def __init__(self, session):
+        self.packets = []
+        super().__init__(session)
+
+    def _receive(self, datagram):
+        self.packets.append(datagram)
+        super()._receive(datagram)
+
+
+def blocks(add, folder, server, surface, pitch_mm):
+    """Blocks of different kinds, whose triangles are those that osteon-import writes."""
+    run("osteon-server", "replay", folder / "room.journal", "--case", server.case, "--fields", folder / "cut.vdb")
+    run("osteon-import", "surface", server.case, "--fields", folder / "cut.vdb", "--out", folder / "cut.stl")
+    written = {turned(triangle) for triangle in stl_triangles(folder / "cut.stl")}
+    seen = set()
+    for key, payload in sorted(surface.blocks.items(), key=lambda item: len(item[1])):
+        mesh = wire.decode_block(key[2:], payload, pitch_mm / 2 ** key[1])
+        triangles = [turned(tuple(mesh.positions[i] for i in t)) for t in mesh.triangles]
+        kind = (key[1], payload[0])
+        if kind in seen or not triangles or not set(triangles) <= written:
+            continue
+        seen.add(kind)
+        add(f"block of level {key[1]} with flags {payload[0]}", "block",
+            {"index": list(key[2:]), "level_pitch_mm": pitch_mm / 2 ** key[1], "payload": payload.hex()},
+            {"mesh_hash": wire.sha256(payload).hex(), "triangles": triangles_hash(triangles)})
+
+
+def triangles_hash(triangles):
+    return wire.sha256(repr(sorted(triangles)).encode()).hex()
+
+
+def chain(add, file):
+    with sqlite3.connect(file) as base:
+        genesis, = base.execute("SELECT value FROM registers WHERE name = 'genesis'").fetchone()
+        rows = base.execute("SELECT place, at_ns, bytes, chain FROM rows ORDER BY place").fetchall()
+    kinds, before = set(), None
+    for seq, at_ns, entry, stored in rows:
+        kind = client.journal.JournalEntry.FromString(entry).WhichOneof("what")
+        if before is None:
+            add("chain at the first entry", "first_entry",
+                {"genesis": genesis.hex(), "seq": seq, "at_ns": at_ns, "entry": entry.hex()}, stored.hex())
+        elif kind not in kinds:
+            add(f"chain at an entry of kind {kind}", "next_entry",
+                {"chain": before.hex(), "seq": seq, "at_ns": at_ns, "entry": entry.hex()}, stored.hex())
+        kinds.add(kind)
+        before = stored
+
+
+def datagrams(add, path, session):
+    """A sealed datagram of the server, and the cuts of its run of entries as the stream sent them."""
+    sent = {event[2]: event[3] for event in session.events if event[0] == "cut"}
+    key, count = bytes(session.offer.key_down), 0
+    for datagram in path.packets:
+        _, _, counter, plain = wire.open_sealed(datagram, key)
+        packet = client.link.DownPacket.FromString(plain)
+        if not packet.entries or count == 3:
+            continue
+        run_of = packet.entries[0]
+        tool = run_of.head.tool_hash or session.numbers[run_of.head.tool_number]
+        cuts = wire.read_entries(run_of.author, run_of.index, run_of.room_seq, run_of.head, tool, run_of.entries)
+        count += 1
+        add(f"datagram {counter} with {len(cuts)} cuts", "datagram",
+            {"key": key.hex(), "datagram": datagram.hex(), "tools": {str(run_of.head.tool_number): tool.hex()}},
+            [[index, seq, sent[cut.author, cut.author_seq].SerializeToString(deterministic=True).hex()]
+             for index, seq, cut in cuts])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
