@@ -165,8 +165,8 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
 // A demonstrator repeats an expert's work from the journal, and a trainee's hand is guided along it. The trainee's own
 // work is elsewhere, and an instructor has stopped them: their hand is soft, but without guidance it stays where it is.
 TEST(Hands, AreLedAlongWhatAnExpertDid) {
-  constexpr double kWithin_mm =
-      3.0;  // half a second behind, at the demonstration's speed, and what the hand's own hold costs
+  // The hand is up to half a second behind, and its own hold keeps it aside.
+  constexpr double kBehind_ms = 700.0, kWithin_mm = 1.5;
   TempDir folder;
   Stage stage(40.0, {"--journal", (folder / "room.journal").string()});
   const auto burr = [](double y_mm, double width_mm, double sweep_mm_per_s) {
@@ -239,10 +239,12 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
                 [&](const Moment& m) { return m.time_ms < began_ms || m.time_ms > shown.back().time_ms + ahead_ms; });
   ASSERT_GT(led.size(), 300u) << "three seconds";
   const auto [low, high] = std::ranges::minmax(led, {}, &Moment::y_mm);
-  const double apart_mm = apart_mm_for(0.95, led, shown, ahead_ms);
-  std::printf("95 %% of %zu moments within %.2f mm of where the demonstrator was, over %.1f mm\n", led.size(), apart_mm,
-              high.y_mm - low.y_mm);
-  EXPECT_LT(apart_mm, kWithin_mm);
+  const double apart_mm = apart_mm_for(0.95, led, shown, ahead_ms),
+               behind_mm = behind_mm_for(0.95, led, shown, ahead_ms, kBehind_ms);
+  std::printf(
+      "95 %% of %zu moments within %.2f mm of where the demonstrator was (%.2f mm at that time), over %.1f mm\n",
+      led.size(), behind_mm, apart_mm, high.y_mm - low.y_mm);
+  EXPECT_LT(behind_mm, kWithin_mm);
   EXPECT_GT(high.y_mm - low.y_mm, 10.0) << "part of the 18 mm that the expert moved to and fro";
 }
 
