@@ -69,10 +69,12 @@ static_assert(
   return number < kRejectionTexts.size() ? static_cast<Rejection>(number) : Rejection::none;
 }
 [[nodiscard]] constexpr std::string_view name(Rejection reason) noexcept {
-  return kRejectionTexts.at(static_cast<std::size_t>(reason)).name;
+  const auto number = static_cast<std::size_t>(reason);
+  return number < kRejectionTexts.size() ? kRejectionTexts[number].name : "unknown";
 }
 [[nodiscard]] constexpr std::string_view sentence(Rejection reason) noexcept {
-  return kRejectionTexts.at(static_cast<std::size_t>(reason)).sentence;
+  const auto number = static_cast<std::size_t>(reason);
+  return number < kRejectionTexts.size() ? kRejectionTexts[number].sentence : "the reason is unknown";
 }
 
 }  // namespace osteon
