@@ -34,13 +34,15 @@ SERVER_LAYERS = {
     "rpc": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage", "rooms"},
     "cli": {"room", "journal", "upload_validation", "audit", "auth", "publish", "storage", "rooms", "rpc"},
 }
-# The same for these folders of haptic_client/. The tool's motion goes from simulation or a device down to contact.
+# The same for haptic_client/. The tool's motion goes from simulation or a device down to contact.
 HAPTIC_LAYERS = {
+    "net": set(),
     "device": set(),
     "contact": set(),
     "prediction": {"contact"},
     "rendering": {"device", "contact", "prediction"},
     "simulation": {"device", "contact", "prediction", "rendering"},
+    "app": {"net", "device", "contact", "prediction", "rendering", "simulation"},
 }
 # Inside a client: folders that only the client's app folder (and tests) may combine.
 OUTER = {"app": set(), "net": {"app"}}
@@ -62,11 +64,12 @@ HEAVY = {
 GENERATED = re.compile(r"\.pb\.h$")
 GENERATED_HOMES = ("common/wire", "*/net", "server/rpc", "server/publish", "server/storage", "server/cli")
 
-SOURCE_ENDS = (".hpp", ".cpp", ".h", ".cc")
+SOURCE_ENDS = (".hpp", ".cpp", ".inl", ".h", ".cc")
 MAX_HEADER_LINES = 300
 MAX_FILE_LINES = 800
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+TARGET = re.compile(r"^osteon_(?:library|program)\(\s*([\w-]+)([^)]*)\)", re.MULTILINE)
 
 
 def source_files(root: Path):
@@ -108,8 +111,9 @@ def layer_faults(path: str, text: str):
             elif target[0] == "server":
                 if target[1] != parts[1] and target[1] not in SERVER_LAYERS.get(parts[1], set()):
                     faults.append(f"{path}: server/{parts[1]} must not include {include}")
-            elif parts[1] in HAPTIC_LAYERS and target[1] not in HAPTIC_LAYERS[parts[1]] | {parts[1]}:
-                faults.append(f"{path}: haptic_client/{parts[1]} must not include {include}")
+            elif target[0] == "haptic_client":
+                if target[1] != parts[1] and target[1] not in HAPTIC_LAYERS.get(parts[1], set()):
+                    faults.append(f"{path}: haptic_client/{parts[1]} must not include {include}")
             elif len(target) > 2 and target[1] != parts[1] and target[1] in OUTER and parts[1] not in OUTER[target[1]]:
                 faults.append(f"{path}: only {', '.join(sorted(OUTER[target[1]])) or 'tests'} may include {include}")
         if GENERATED.search(include) and not lives_in(path, GENERATED_HOMES):
@@ -123,6 +127,24 @@ def layer_faults(path: str, text: str):
                 faults.append(f"{path}: {name} is used in {', '.join(homes)} only ({include})")
     if parts[0] == "common" and len(parts) > 2 and parts[1] not in LAYERS:
         faults.append(f"{path}: common/{parts[1]} is not a layer of the design")
+    return faults
+
+
+def library_folders(cmake_texts):
+    """Name of each library -> its folder. `cmake_texts`: path -> text of the CMakeLists.txt files."""
+    return {name: path.rsplit("/", 1)[0] for path, text in cmake_texts.items() for name, _ in TARGET.findall(text)}
+
+
+def link_faults(path: str, text: str, folders):
+    """The layers again, for what the targets of a CMakeLists.txt link: a static library may be part of a circle, and
+    CMake does not complain."""
+    faults = []
+    folder = path.rsplit("/", 1)[0]
+    for name, body in TARGET.findall(text):
+        for library in re.findall(r"osteon::(\w+)", body):
+            home = folders.get(library, "")
+            if home != folder and layer_faults(path, f'#include "{home}/{library}.hpp"\n'):
+                faults.append(f"{path}: {name} must not link osteon::{library} of {home}")
     return faults
 
 
@@ -141,6 +163,8 @@ def declaration_faults(path: str, cmake_text: str, source_text=None):
     name = path.rsplit("/", 1)[-1]
     if path.startswith("tests/unit/") and name.endswith(".hpp"):
         return []  # a helper of the only test program beside it
+    if name.endswith(".inl"):
+        return []  # a part of the sources that include it
     if re.search(rf"(?<![\w/.-]){re.escape(name)}(?![\w.-])", cmake_text):
         return []
     if name.endswith(".hpp") and source_text is not None and includes(source_text)[:1] == [path]:

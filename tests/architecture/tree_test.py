@@ -26,6 +26,13 @@ class TheTree(unittest.TestCase):
     def test_includes_follow_the_layers(self):
         self.assertEqual(self.all_faults(tree.layer_faults), [])
 
+    def test_links_follow_the_layers(self):
+        files = (f for folder in ("common", *tree.PROGRAMS) for f in (ROOT / folder).rglob("CMakeLists.txt"))
+        texts = {relative(f): f.read_text(encoding="utf-8") for f in files}
+        folders = tree.library_folders(texts)
+        self.assertGreater(len(folders), 40)
+        self.assertEqual([fault for item in texts.items() for fault in tree.link_faults(*item, folders)], [])
+
     def test_files_are_short(self):
         self.assertEqual(self.all_faults(tree.size_faults), [])
 
@@ -119,6 +126,27 @@ class TheRules(unittest.TestCase):
         self.assertTrue(self.faults("haptic_client/contact/proxy.cpp", "haptic_client/rendering/coupling.hpp"))
         self.assertTrue(self.faults("haptic_client/rendering/x.cpp", "haptic_client/simulation/surgeon.hpp"))
         self.assertFalse(self.faults("haptic_client/rendering/x.cpp", "haptic_client/contact/proxy.hpp"))
+        self.assertTrue(self.faults("haptic_client/net/x.cpp", "haptic_client/rendering/coupling.hpp"))
+        self.assertTrue(self.faults("haptic_client/new/x.cpp", "haptic_client/contact/proxy.hpp"))
+        self.assertFalse(self.faults("haptic_client/app/client.cpp", "haptic_client/net/room_session.hpp"))
+
+    def test_parts_of_sources_are_read_too(self):
+        self.assertIn("server/rpc/called_room.inl", [relative(f) for f in tree.source_files(ROOT)])
+        self.assertTrue(self.faults("server/publish/x.inl", "server/rooms/rooms.hpp"))
+
+    def test_lower_libraries_do_not_link_higher_ones(self):
+        folders = tree.library_folders({
+            "server/rooms/CMakeLists.txt": "osteon_library(server_rooms\n  SOURCES x.cpp)\n",
+            "server/room/CMakeLists.txt": "osteon_library(room\n  DEPS osteon::core)\n",
+            "viewer_client/net/CMakeLists.txt": "osteon_library(viewer_net)\n"})
+
+        def faults(path, library):
+            text = f"osteon_library(some\n  DEPS osteon::core\n  PRIVATE_DEPS osteon::{library})\n"
+            return tree.link_faults(path, text, folders)
+        self.assertTrue(faults("server/storage/CMakeLists.txt", "server_rooms"))
+        self.assertTrue(faults("server/rpc/CMakeLists.txt", "viewer_net"))
+        self.assertFalse(faults("server/storage/CMakeLists.txt", "room"))
+        self.assertFalse(faults("server/rooms/CMakeLists.txt", "server_rooms"))
 
     def test_imaging_is_for_the_importer(self):
         self.assertTrue(self.faults("server/room/room.cpp", "common/imaging/dicom.hpp"))
