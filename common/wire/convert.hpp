@@ -1,5 +1,5 @@
-// Converts between the generated protocol types and ours. Beside the net/ folders of the programs, only this library
-// sees generated types.
+// Converts between the generated protocol types and ours. Beside this library, only the clients' net/
+// and the server's rpc, publish, storage and cli see generated types.
 #pragma once
 #include <optional>
 
