@@ -148,6 +148,16 @@ def link_faults(path: str, text: str, folders):
     return faults
 
 
+def mirror_faults(path: str, folders):
+    """Unit tests of a folder are in the folder of the same name. `folders`: those of the programs and libraries."""
+    if not path.startswith("tests/unit/"):
+        return []
+    mirrored = "/".join(path.split("/")[2:-1])
+    if any(home + mirrored in folders for home in ("", "common/", "server/")):
+        return []
+    return [f"{path}: there is no folder {mirrored} that it could test"]
+
+
 def size_faults(path: str, text: str):
     lines = text.count("\n")
     if path.endswith((".hpp", ".h")) and lines >= MAX_HEADER_LINES:

@@ -33,6 +33,10 @@ class TheTree(unittest.TestCase):
         self.assertGreater(len(folders), 40)
         self.assertEqual([fault for item in texts.items() for fault in tree.link_faults(*item, folders)], [])
 
+    def test_unit_tests_mirror_the_tree(self):
+        folders = {relative(f.parent) for f in tree.source_files(ROOT)} | set(tree.PROGRAMS)
+        self.assertEqual(self.all_faults(lambda path, _text: tree.mirror_faults(path, folders)), [])
+
     def test_files_are_short(self):
         self.assertEqual(self.all_faults(tree.size_faults), [])
 
@@ -133,6 +137,13 @@ class TheRules(unittest.TestCase):
     def test_parts_of_sources_are_read_too(self):
         self.assertIn("server/rpc/called_room.inl", [relative(f) for f in tree.source_files(ROOT)])
         self.assertTrue(self.faults("server/publish/x.inl", "server/rooms/rooms.hpp"))
+
+    def test_tests_of_no_folder_are_noticed(self):
+        folders = {"server/rooms", "haptic_client", "haptic_client/contact"}
+        self.assertTrue(tree.mirror_faults("tests/unit/net/x_test.cpp", folders))
+        self.assertTrue(tree.mirror_faults("tests/unit/haptic_client/control/x_test.cpp", folders))
+        self.assertFalse(tree.mirror_faults("tests/unit/rooms/x_test.cpp", folders))
+        self.assertFalse(tree.mirror_faults("tests/unit/haptic_client/contact/x_test.cpp", folders))
 
     def test_lower_libraries_do_not_link_higher_ones(self):
         folders = tree.library_folders({

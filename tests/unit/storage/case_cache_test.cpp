@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "server/rooms/rooms.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/room/cuts.hpp"
 
@@ -81,34 +80,6 @@ TEST_F(CaseCacheTest, AFolderThatHoldsAnotherCaseIsRefused) {
   wrong.folder = dir_ / to_hex(second_.hash());
   case_cache.add(wrong);
   EXPECT_EQ(case_cache.load(first_.hash()).error().code, ErrorCode::invalid_input);
-}
-
-TEST_F(CaseCacheTest, RoomsHaveTheirCasesInMemoryAndNoOthers) {
-  fs::create_directories(dir_ / "rooms");
-  const std::uint64_t given = given_.memory_bytes(), first = first_.memory_bytes();
-  ASSERT_LE(first, second_.memory_bytes());
-  const std::uint64_t most = given + second_.memory_bytes();
-  Rooms rooms({.cases = {{given_, dir_ / "given"}}, .folder = dir_ / "rooms", .case_memory_bytes = most});
-  rooms.add_case(known(first_));
-  rooms.add_case(known(second_));
-  EXPECT_EQ(rooms.cases().size(), 3u);
-  EXPECT_EQ(rooms.case_bytes(), given) << "no case is read before a room uses it";
-  const Digest of_first = first_.hash(), of_second = second_.hash();
-  ASSERT_TRUE(rooms.create("anna", &of_first));
-  ASSERT_TRUE(rooms.create("berta", &of_first));
-  EXPECT_EQ(rooms.case_bytes(), given + first);
-  const auto refused = rooms.create("carla", &of_second);
-  ASSERT_FALSE(refused);
-  EXPECT_EQ(refused.error().code, ErrorCode::exhausted) << refused.error().message;
-  ASSERT_TRUE(rooms.close("anna"));
-  EXPECT_EQ(rooms.case_bytes(), given + first) << "berta uses it";
-  ASSERT_TRUE(rooms.close("berta"));
-  EXPECT_EQ(rooms.case_bytes(), given);
-  ASSERT_TRUE(rooms.create("carla", &of_second));
-  EXPECT_EQ(rooms.resume("anna").error().code, ErrorCode::exhausted);
-  ASSERT_TRUE(rooms.close("carla"));
-  EXPECT_TRUE(rooms.resume("anna"));
-  EXPECT_EQ(rooms.case_bytes(), given + first);
 }
 
 }  // namespace
