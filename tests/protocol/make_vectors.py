@@ -17,7 +17,7 @@ from pathlib import Path
 import client
 import wire
 from client import Member, Session, Surface, room
-from client_test import HAPTIC, VIEWER, Server, run, stl_triangles, turned
+from stage import HAPTIC, VIEWER, Server, run, stl_triangles, turned
 
 
 def in_lines(value):

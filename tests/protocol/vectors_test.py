@@ -10,7 +10,7 @@ from pathlib import Path
 import client
 import wire
 from make_vectors import triangles_hash
-from client_test import turned
+from stage import turned
 
 
 
