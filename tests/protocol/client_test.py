@@ -10,8 +10,8 @@ import grpc
 import client
 import wire
 from client import CODES, cutting, people, people_grpc, room, types, watch
-from stage import (CONSOLE, VIEWER, Case, bag, full, open_edges, run, stl_triangles, until_cancelled,
-                   volume_mm3)
+from stage import (CONSOLE, VIEWER, Case, bag, full, metal_case, open_edges, run, stl_triangles,
+                   until_cancelled, volume_mm3)
 
 
 class TheSurface(Case):
@@ -79,15 +79,7 @@ class TheMetal(Case):
     """A bone whose middle layer, z from -6 to -3, is metal."""
 
     def prepare(self):
-        run("osteon-import", "phantom", "block", "--layers", "3:0.4,3:2,3:0.4", "--width", "12", "--out",
-            self.folder / "phantom", "--dicom", self.folder / "scan")
-        # No phantom has metal. A scan with twice the slope has: its middle layer is above 3000 HU then.
-        slope = bytes.fromhex("28005310") + b"DS\x02\x00"
-        for file in (self.folder / "scan").iterdir():
-            data = file.read_bytes()
-            self.assertEqual(data.count(slope + b"1 "), 1)
-            file.write_bytes(data.replace(slope + b"1 ", slope + b"2 "))
-        run("osteon-import", "ct", self.folder / "scan", "--out", self.folder / "case")
+        metal_case(self.folder)
 
     def test_is_marked_and_is_not_cut(self):
         surface = self.surface()

@@ -61,6 +61,19 @@ def run(program, *arguments):
     subprocess.run([BIN / program, *map(str, arguments)], check=True, capture_output=True, timeout=120)
 
 
+def metal_case(folder):
+    """Makes the case `folder`/case: a block of 12 x 12 x 9 mm whose middle layer, z from -6 to -3, is metal."""
+    run("osteon-import", "phantom", "block", "--layers", "3:0.4,3:2,3:0.4", "--width", "12", "--out",
+        folder / "phantom", "--dicom", folder / "scan")
+    # No phantom has metal. A scan with twice the slope has: its middle layer is above 3000 HU then.
+    slope = bytes.fromhex("28005310") + b"DS\x02\x00"
+    for file in (folder / "scan").iterdir():
+        data = file.read_bytes()
+        assert data.count(slope + b"1 ") == 1
+        file.write_bytes(data.replace(slope + b"1 ", slope + b"2 "))
+    run("osteon-import", "ct", folder / "scan", "--out", folder / "case")
+
+
 def stl_triangles(file):
     data = Path(file).read_bytes()
     count, = struct.unpack_from("<I", data, 80)
