@@ -1,4 +1,5 @@
 """A small client of Osteon's server in Python, made from deploy/docs/protocol.md and the files of proto/ alone."""
+import collections
 import contextlib
 import importlib
 import os
@@ -41,6 +42,21 @@ journal, people, people_grpc = (_MODULES[n] for n in ("journal_pb2", "people_pb2
 
 
 CODES = {name.removeprefix("REJECTION_REASON_"): number for name, number in cutting.RejectionReason.items()}
+
+
+class Credentials(grpc.AuthMetadataPlugin):
+    """What a person shows over TLS: a folder with certificate and key, and a ticket with each call."""
+
+    def __init__(self, folder, ticket):
+        self.folder, self.ticket = Path(folder), ticket
+
+    def __call__(self, _context, callback):
+        callback((("osteon-ticket", self.ticket),) if self.ticket else (), None)
+
+    def channel(self, address):
+        authority, key, chain = ((self.folder / name).read_bytes() for name in ("ca.pem", "person.key", "person.pem"))
+        return grpc.secure_channel(address, grpc.composite_channel_credentials(
+            grpc.ssl_channel_credentials(authority, key, chain), grpc.metadata_call_credentials(self)))
 
 
 class Member:
@@ -117,7 +133,8 @@ class Session:
     def __init__(self, member):
         self.member = member
         self.leaves, self.tools, self.numbers = {}, {}, {}
-        self.complete = self.durable = self.offer = self.scene = self.supervised = None
+        self.complete = self.durable = self.offer = self.scene = self.supervised = self.redial = None
+        self.partners = {}  # author -> newest CuttingState
         self.events = []  # cuts, rejections and all other messages with an index, in order; see _deliver
         self.lease = member.joined.lease_epoch
         self.author_seq = 0
@@ -214,7 +231,10 @@ class Session:
             elif kind == "tool":
                 self.tools[body.tool.tool_hash] = body.tool
                 self.numbers[body.tool_number] = body.tool.tool_hash
-            elif kind in ("complete", "durable", "scene"):
+            elif kind == "partner":
+                if body.state_seq > self.partners.get(body.author, types.CuttingState()).state_seq:
+                    self.partners[body.author] = body
+            elif kind in ("complete", "durable", "scene", "redial"):
                 setattr(self, kind, body)
                 if kind == "complete":
                     self.lease, self.author_seq = body.lease_epoch, body.decided_author_seq
@@ -250,14 +270,34 @@ def from_message(cut):
                     [wire.Pose(tuple(p.position) + tuple(p.rotation)) for p in cut.path], cut.spindle_rpm, cut.path_us)
 
 
+class KeysDown:
+    """The keys of the server's datagrams, by generation. Follows the server to later ones."""
+
+    def __init__(self, key):
+        self._keys = [key]
+
+    def open(self, datagram):
+        """(session, generation, counter, plain) as wire.open_sealed(). Raises wire.Broken."""
+        newest = len(self._keys) - 1
+        ahead = (datagram[4] - newest) % 256 if len(datagram) > 4 else 0
+        if ahead > 8 and ahead != 255:
+            raise wire.Broken("a datagram is of an impossible generation")
+        keys = list(self._keys)
+        while ahead <= 8 and len(keys) <= newest + ahead:
+            keys.append(wire.next_key(keys[-1]))
+        opened = wire.open_sealed(datagram, keys[-2] if ahead == 255 and newest else keys[-1])
+        self._keys = keys
+        return opened
+
+
 class FastPath:
     """Cuts and entries in sealed datagrams, beside a session's stream. Sends a packet every few milliseconds."""
 
     def __init__(self, session, port=None):
         self.session = session
         offer = session.offer
-        self._up, self._down = bytes(offer.key_up), bytes(offer.key_down)
-        self._session, self._counter = offer.session, 1
+        self._up, self._down = bytes(offer.key_up), KeysDown(bytes(offer.key_down))
+        self._session, self._generation, self._counter = offer.session, 0, 1
         self._to = (session.member.address.rpartition(":")[0], port or offer.udp_port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.settimeout(0.004)
@@ -265,7 +305,10 @@ class FastPath:
         self._lock = threading.Lock()
         self._echo, self._echoes = b"", 0
         self._seen, self._newest, self._packets, self._times = set(), 0, 0, (0, 0)
+        self._state, self._left = None, []
         self.frozen, self.entries, self.unknown = False, 0, 0
+        self.partners = {}  # author -> newest ToolState
+        self.heard = collections.Counter()  # datagrams by generation of their key
         self._over = False
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -275,10 +318,27 @@ class FastPath:
             self._waiting.append(cut)
         return cut
 
+    def show(self, state):
+        """The newest ToolState of the tool. Goes with all packets from now on."""
+        self._state = state
+
+    def next_key(self):
+        """Seals with the next key from now on."""
+        with self._lock:
+            self._up, self._generation = wire.next_key(self._up), self._generation + 1
+
+    def move(self):
+        """Goes on from another port of this machine."""
+        with self._lock:
+            self._left.append(self._socket)
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            self._socket.settimeout(0.004)
+
     def close(self):
         self._over = True
         self._thread.join(20)
-        self._socket.close()
+        for one in (*self._left, self._socket):
+            one.close()
 
     def _run(self):
         due = 0.0
@@ -287,7 +347,7 @@ class FastPath:
             if now >= due:
                 self._send(now)
                 due = now + 0.008
-            with contextlib.suppress(socket.timeout, ConnectionRefusedError):
+            with contextlib.suppress(OSError, wire.Broken):  # nothing came, or nothing of the server's
                 self._receive(self._socket.recv(wire.MOST_DATAGRAM))
 
     def _send(self, now):
@@ -297,23 +357,20 @@ class FastPath:
         packet.times.echo_sent_us, packet.times.echo_received_us = self._times
         if self._echoes:
             packet.path_echo, self._echoes = self._echo, self._echoes - 1
+        if self._state:
+            packet.state.CopyFrom(self._state)
         with self._lock:
-            cuts = self._waiting[:4]
-        for cut in cuts:
-            # Each cut as a run of its own: longer than needed, and as valid.
-            start = cut.path[0]
-            packet.cuts.add(author_seq=cut.author_seq, lease_epoch=cut.lease_epoch, body=cut.body, tool_hash=cut.tool,
-                            level=cut.level, spindle_rpm=cut.spindle_rpm, start=start.numbers, path_us=cut.path_us,
-                            cuts=wire.coded_cut(cut, start, cut.spindle_rpm, cut.path_us))
-        plain = packet.SerializeToString()
-        self._socket.sendto(wire.seal(self._session, 0, self._counter, self._up, plain), self._to)
-        self._counter += 1
+            packet.cuts.extend(runs_of(self._waiting[:4], self.session.numbers))
+            datagram = wire.seal(self._session, self._generation, self._counter, self._up, packet.SerializeToString())
+            self._counter += 1
+            self._socket.sendto(datagram, self._to)
 
     def _receive(self, datagram):
-        session, generation, counter, plain = wire.open_sealed(datagram, self._down)
-        if session != self._session or generation != 0 or counter in self._seen:
+        session, generation, counter, plain = self._down.open(datagram)
+        if session != self._session or counter in self._seen:
             return
         self._seen.add(counter)
+        self.heard[generation] += 1
         packet = link.DownPacket.FromString(plain)
         if packet.path_challenge:
             self._echo, self._echoes = packet.path_challenge, 8
@@ -324,6 +381,9 @@ class FastPath:
             self._times = packet.times.sent_us, int(time.monotonic() * 1e6)
         with self._lock:
             self._waiting = [cut for cut in self._waiting if cut.author_seq > packet.acknowledged]
+        for state in packet.partners:
+            if state.state_seq > self.partners.get(state.author, link.ToolState()).state_seq:
+                self.partners[state.author] = state
         for run in packet.entries:
             tool = run.head.tool_hash or self.session.numbers.get(run.head.tool_number)
             if tool is None:
@@ -339,3 +399,26 @@ class FastPath:
         for entry in packet.supervised:
             self.session.take(entry.index,
                               ("supervised", entry.room_seq, None, entry.supervision, entry.lease_epoch))
+
+
+def runs_of(cuts, numbers):
+    """The cuts as CutRuns: one for consecutive cuts that have a head in common. `numbers`: of the session's tools."""
+    tools, runs, before = {tool: number for number, tool in numbers.items()}, [], None
+    for cut in cuts:
+        start, rpm, us = cut.path[0], cut.spindle_rpm, cut.path_us
+        if before and head_of(cut) == (before.author_seq + 1, *head_of(before)[1:]):
+            start, rpm, us = before.path[-1], before.spindle_rpm, before.path_us
+        else:
+            runs.append(link.CutRun(author_seq=cut.author_seq, lease_epoch=cut.lease_epoch, body=cut.body,
+                                    level=cut.level, spindle_rpm=rpm, start=start.numbers, path_us=us))
+            if cut.tool in tools:
+                runs[-1].tool_number = tools[cut.tool]
+            else:
+                runs[-1].tool_hash = cut.tool
+        runs[-1].cuts += wire.coded_cut(cut, start, rpm, us)
+        before = cut
+    return runs
+
+
+def head_of(cut):
+    return cut.author_seq, cut.lease_epoch, cut.body, cut.tool, cut.level

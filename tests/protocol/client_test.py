@@ -1,151 +1,17 @@
-"""A client that was written from deploy/docs/protocol.md, against real servers. OSTEON_BIN: folder of the programs."""
-import collections
+"""A client that was written from deploy/docs/protocol.md, against real servers. See stage.py."""
 import contextlib
-import json
-import os
 import queue
-import random
-import socket
-import sqlite3
-import struct
-import subprocess
-import tempfile
 import threading
 import time
 import unittest
-from pathlib import Path
 
 import grpc
 
 import client
 import wire
-from client import CODES, FastPath, Member, Session, Surface, cutting, people, people_grpc, room, types, watch
-
-BIN = Path(os.environ["OSTEON_BIN"])
-HAPTIC, VIEWER, CONSOLE = (getattr(room, f"CLIENT_KIND_{name}") for name in ("HAPTIC", "VIEWER", "CONSOLE"))
-
-
-class Server:
-    """osteon-server with a phantom: a block of 20 x 20 x 10 mm whose upper face is z = 0."""
-
-    def __init__(self, folder, *options, width=20):
-        self.folder = Path(folder)
-        self.case, self.journal, self.saved = (self.folder / n for n in ("case", "room.journal", "saved.vdb"))
-        if not self.case.exists():
-            run("osteon-import", "phantom", "block", "--layers", "5:1.9,5:0.3", "--width", width, "--out", self.case)
-        self.address_file = self.folder / "address"
-        self.address_file.unlink(missing_ok=True)
-        self.options = options
-        self.start()
-
-    def start(self):
-        self.process = subprocess.Popen(
-            [BIN / "osteon-server", "--case", self.case, "--listen", "127.0.0.1:0", "--plain", "--address-file",
-             self.address_file, "--summary", self.folder / "summary.json", *map(str, self.options)],
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        until = time.monotonic() + 60
-        while not self.address_file.exists() or not self.address_file.read_text().endswith("\n"):
-            if self.process.poll() is not None or time.monotonic() > until:
-                self.process.kill()
-                raise AssertionError(f"the server does not start: {self.process.communicate()[1]}")
-            time.sleep(0.02)
-        self.address = self.address_file.read_text().strip()
-
-    def stop(self):
-        if self.process.poll() is None:
-            self.process.terminate()
-        said = self.process.communicate(timeout=60)[1]
-        assert self.process.returncode == 0, said
-        self.address_file.unlink(missing_ok=True)
-        return json.loads((self.folder / "summary.json").read_text())
-
-
-def run(program, *arguments):
-    subprocess.run([BIN / program, *map(str, arguments)], check=True, capture_output=True, timeout=120)
-
-
-def stl_triangles(file):
-    data = Path(file).read_bytes()
-    count, = struct.unpack_from("<I", data, 80)
-    assert len(data) == 84 + 50 * count
-    for i in range(count):
-        values = struct.unpack_from("<12f", data, 84 + 50 * i)
-        yield tuple(values[3:6]), tuple(values[6:9]), tuple(values[9:12])
-
-
-def turned(triangle):
-    """The triangle from its smallest corner on, so that equal triangles are equal tuples."""
-    first = triangle.index(min(triangle))
-    return triangle[first:] + triangle[:first]
-
-
-def bag(triangles):
-    return collections.Counter(map(turned, triangles))
-
-
-def open_edges(triangles):
-    """Edges that the triangles do not cross equally often in both directions: none for a closed surface."""
-    edges = collections.Counter()
-    for a, b, c in triangles:
-        for edge in ((a, b), (b, c), (c, a)):
-            edges[edge] += 1
-            edges[edge[::-1]] -= 1
-    return [edge for edge, count in edges.items() if count]
-
-
-def volume_mm3(triangles):
-    return sum(a[0] * (b[1] * c[2] - b[2] * c[1]) + a[1] * (b[2] * c[0] - b[0] * c[2]) +
-               a[2] * (b[0] * c[1] - b[1] * c[0]) for a, b, c in triangles) / 6
-
-
-class Case(unittest.TestCase):
-    """A server, a haptic client and its session, all ended after each test."""
-    WIDTH = 20  # mm
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory(prefix="osteon-protocol-")
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
-        self.server = Server(folder.name, *self.options(), width=self.WIDTH)
-        self.addCleanup(lambda: self.server.process.poll() is None and self.server.stop())
-        self.hand, self.session = self.haptic("anna")
-        self.burr = self.tool("burr-round-3.2")
-
-    def options(self):
-        return ()
-
-    def member(self, kind, name="", **options):
-        member = Member(self.server.address, kind, name, **options)
-        self.addCleanup(member.close)
-        return member
-
-    def haptic(self, name="", **options):
-        member = self.member(HAPTIC, name, **options)
-        session = Session(member)
-        self.addCleanup(session.close)
-        return member, session
-
-    def tool(self, name):
-        return next(h for h, tool in self.session.tools.items() if wire.tool_fields(tool.yaml)["name"] == name)
-
-    def surface(self, room_seq=0):
-        surface = Surface(self.member(VIEWER))
-        self.addCleanup(surface.close)
-        return surface.read_until(room_seq)
-
-    def groove(self, session, count=4, y=0.0, **options):
-        """Cuts along x that overlap, 1 mm deep. Returns the decisions."""
-        cuts = []
-        for i in range(count):
-            path = [(-2 + i, y, -1.0), (-1 + i, y, -1.0)]
-            cuts.append(session.send_cut(session.cut(self.burr, path, level=2, us=50000, **options)))
-            time.sleep(0.05)  # the room gives a hand no more tool time than has passed
-        return [session.decided(cut) for cut in cuts]
-
-    def refusal(self, call):
-        with self.assertRaises(grpc.RpcError) as caught:
-            call()
-        return caught.exception.code(), caught.exception.details()
+from client import CODES, cutting, people, people_grpc, room, types, watch
+from stage import (CONSOLE, VIEWER, Case, bag, full, metal_case, open_edges, run, stl_triangles,
+                   until_cancelled, volume_mm3)
 
 
 class TheSurface(Case):
@@ -209,11 +75,63 @@ class TheCoarseSurface(Case):
         self.assertAlmostEqual(volume_mm3(triangles), 120 * 120 * 10, delta=0.05 * 120 * 120 * 10)
 
 
+class TheMetal(Case):
+    """A bone whose middle layer, z from -6 to -3, is metal."""
+
+    def prepare(self):
+        metal_case(self.folder)
+
+    def test_is_marked_and_is_not_cut(self):
+        surface = self.surface()
+        run("osteon-import", "surface", self.server.case, "--out", self.folder / "bone.stl")
+        self.assertEqual(bag(surface.triangles()), bag(stl_triangles(self.folder / "bone.stl")))
+        depths = {0: [], 1: [], 2: []}
+        for key, payload in surface.blocks.items():
+            mesh = wire.decode_block(key[2:], payload, self.hand.joined.pitch_mm / 2 ** key[1])
+            for position, tissue in zip(mesh.positions, mesh.tissue):
+                if max(abs(position[0]), abs(position[1])) > 5 and -8 < position[2] < -1:  # the sides
+                    depths[tissue].append(position[2])
+        pitch = self.hand.joined.pitch_mm
+        self.assertGreater(len(depths[0]), 100)
+        self.assertGreater(len(depths[1]), 100)
+        self.assertTrue(all(-6 - 3 * pitch < z < -3 + 3 * pitch for z in depths[1]), "metal is in its layer")
+        self.assertFalse(any(-6 + 3 * pitch < z < -3 - 3 * pitch for z in depths[0]), "and is all of it")
+
+        into = self.session.send_cut(self.session.cut(self.burr, [(0, 0, -4)]))
+        self.assertEqual(self.session.decided(into)[3], CODES["METAL"])
+        # The tip points up, so the burr is below it.
+        above = self.session.send_cut(self.session.cut(self.burr, [(0, 0, 1.5)]))
+        self.assertEqual(self.session.decided(above)[0], "cut")
+
+
 class TheField(Case):
     def test_hashes_of_tools(self):
         self.assertGreaterEqual(len(self.session.tools), 24)
         for digest, tool in self.session.tools.items():
             self.assertEqual(wire.tool_hash(tool.yaml), digest, tool.yaml)
+
+    def test_a_tool_of_ones_own(self):
+        yaml = ('name: own\ntitle: "My burr"\nkind: round-burr\ndiameter_mm: 2.5\nshank_diameter_mm: 2\n'
+                'shank_length_mm: 40\nspindle_rpm: 30000\nteeth: 6\nfeed_mm_per_rev: 0.03\ncut_level: 0\n')
+        added = self.hand.rooms.AddTool(room.AddToolRequest(
+            author=self.hand.author, tool=types.ToolDefinition(yaml=yaml)), timeout=20)
+        self.assertEqual(added.tool_hash, wire.tool_hash(yaml))
+        self.session.wait(lambda: any(e[0] == "tool" for e in self.session.events))
+        told = next(e for e in self.session.events if e[0] == "tool")
+        self.assertEqual((told[1], told[3].tool.tool_hash), (added.room_seq, added.tool_hash))
+        self.assertNotIn(told[3].tool_number, self.session.numbers)
+        fine = self.session.send_cut(self.session.cut(added.tool_hash, [(0, 0, -0.5)], level=1))
+        self.assertEqual(self.session.decided(fine)[3], CODES["LEVEL"])
+        coarse = self.session.send_cut(self.session.cut(added.tool_hash, [(0, 0, -0.5)], level=0))
+        self.assertEqual(self.session.decided(coarse)[0], "cut")
+
+    def test_the_files_of_the_case(self):
+        files = {}
+        for part in self.hand.rooms.GetCase(room.GetCaseRequest(case_hash=self.hand.joined.case_hash), timeout=20):
+            files.setdefault(part.file, bytearray()).extend(part.data)
+        self.assertEqual(list(files), ["case.json", "bone.vdb"])
+        for name, data in files.items():
+            self.assertEqual(bytes(data), (self.server.case / name).read_bytes(), name)
 
     def test_leaves_give_the_hash_that_the_room_says(self):
         decided = self.groove(self.session)
@@ -236,15 +154,6 @@ class TheField(Case):
         leaves = {(f.body, f.level, f.origin.x, f.origin.y, f.origin.z): f.values for f in change.leaves}
         self.assertEqual(wire.field_hash(full(leaves), self.hand.joined.pitch_mm), empty)
         self.assertEqual(self.hand.status().field_hash, empty)
-
-
-def full(leaves):
-    """{key: 512 values}: a leaf of one value stands for 512."""
-    out = {}
-    for key, values in leaves.items():
-        numbers = struct.unpack(f"<{len(values) // 2}h", values)
-        out[key] = numbers * 512 if len(numbers) == 1 else numbers
-    return out
 
 
 class Cutting(Case):
@@ -326,221 +235,116 @@ class Cutting(Case):
                 self.assertEqual(session.ended.code(), grpc.StatusCode.INVALID_ARGUMENT, session.ended)
 
 
-class Joining(Case):
+class Limits(Case):
+    """A server with limits that a single client can reach."""
+
     def options(self):
-        return "--journal", self.folder / "room.journal"
+        config = self.folder / "server.yaml"
+        config.write_text("limits:\n  swept_voxels_per_s: 1.0e+6\n  power_w: 1\n  blow_j: 0\n")
+        return "--config", config
 
-    def test_versions(self):
-        code, why = self.refusal(lambda: self.member(HAPTIC, version=2))
-        self.assertEqual(code, grpc.StatusCode.FAILED_PRECONDITION)
-        self.assertIn("version", why)
-        code, _ = self.refusal(lambda: self.member(HAPTIC, kernel=client.KERNEL + 1))
-        self.assertEqual(code, grpc.StatusCode.FAILED_PRECONDITION)
-        self.member(VIEWER, kernel=0, version=3)
+    def test_more_than_a_motor_can(self):
+        hard = self.session.send_cut(self.session.cut(self.burr, [(0, 0, -1.5), (1, 0, -1.5)], us=1000))
+        self.assertEqual(self.session.decided(hard)[3], CODES["POWER"])
 
-    def test_a_client_comes_back(self):
-        decided = self.groove(self.session)
-        durable = self.durable(decided[-1][1])
-        again = self.member(HAPTIC, again=self.hand, durable=durable)
-        self.assertEqual(again.author, self.hand.author)
-        session = Session(again)
-        self.addCleanup(session.close)
-        self.assertEqual(session.complete.decided_author_seq, self.session.author_seq)
-        self.assertEqual(list(session.complete.decided_room_seqs)[:4], [d[1] for d in decided])
-        self.session.wait(lambda: self.session.ended)  # the new stream ends the old one
-        self.assertEqual(self.groove(session, 1)[0][0], "cut")
+    def test_more_than_a_room_can_evaluate(self):
+        # Above the bone, so that nothing is removed. At level 2 each cut sweeps a box of some 400000 samples.
+        cuts = [self.session.send_cut(self.session.cut(self.burr, [(0, 0, 8), (20, 0, 8)], level=2, us=1000))
+                for _ in range(20)]
+        codes = [self.session.decided(cut)[3] for cut in cuts]
+        self.assertEqual(self.session.decided(cuts[0])[0], "cut", "a burst is allowed")
+        self.assertTrue(CODES["RATE"] in codes, "and no more than that")
 
-    def test_what_a_client_says_of_durable_events_is_checked(self):
-        seq, chain, seal = self.durable(self.groove(self.session, 1)[0][1])
-        self.member(HAPTIC, again=self.hand, durable=(seq, chain, seal))
-        for said in ((seq, flipped(chain), seal), (seq, flipped(chain), flipped(seal)), (seq + 100, chain, seal)):
-            code, _ = self.refusal(lambda s=said: self.member(HAPTIC, again=self.hand, durable=s))
-            self.assertEqual(code, grpc.StatusCode.INVALID_ARGUMENT)
-        wrong = collections.namedtuple("Again", "author secret")(self.hand.author, flipped(self.hand.secret))
-        code, _ = self.refusal(lambda: self.member(HAPTIC, again=wrong))
-        self.assertEqual(code, grpc.StatusCode.INVALID_ARGUMENT)
 
-    def test_a_room_that_has_lost_events_is_refused(self):
-        self.server.stop()
-        earlier = {file.name: file.read_bytes() for file in self.folder.glob("room.journal*")}
-        self.server.start()
-        self.hand, self.session = self.haptic("anna")
-        durable = self.durable(self.groove(self.session, 1)[0][1])
-        self.server.stop()
-        for file in self.folder.glob("room.journal*"):
-            file.unlink()
-        for name, content in earlier.items():
-            (self.folder / name).write_bytes(content)
-        self.server.start()
-        code, why = self.refusal(lambda: self.member(HAPTIC, again=self.hand, durable=durable))
-        self.assertEqual(code, grpc.StatusCode.FAILED_PRECONDITION)
-        self.assertIn(str(durable[0]), why)
+class Watching(Case):
+    DRAIN_S = 5
 
-    def test_the_chain_follows_from_the_journal(self):
-        self.groove(self.session)
-        self.session.send_cut(self.session.cut(self.burr, [(0, 0, 5)], body=77))
-        self.hand.rooms.Mark(room.MarkRequest(author=self.hand.author, label="end"), timeout=20)
-        self.groove(self.session, 1)
-        told = [self.durable(self.session.events[-1][1])]
-        _, late = self.haptic("ben")
-        summary = self.server.stop()
-        heads = self.chain_of(self.folder / "room.journal")
-        for seq, chain, _ in told:
-            self.assertEqual(heads[seq], chain)
-        self.assertEqual(late.complete.room_seq, summary["room_seq"])
+    def state(self, seq, x, author=None):
+        pose = types.Pose(position_mm=types.Vector3(x=x, y=0, z=5), rotation=[0, 0, 0, 1])
+        return types.CuttingState(author=author or self.hand.author, state_seq=seq, pose_bone_tool=pose,
+                                  pose_bone_device=pose, tool_name="burr-round-3.2", spindle_rpm=20000,
+                                  force_physical_n=types.Vector3(x=1, y=-2, z=0.5),
+                                  phase=types.CUTTING_PHASE_FREE)
 
-    def chain_of(self, file):
-        """{sequence number: chain}, computed from the genesis and the entries."""
-        with sqlite3.connect(file) as base:
-            genesis, = base.execute("SELECT value FROM registers WHERE name = 'genesis'").fetchone()
-            rows = base.execute("SELECT place, at_ns, bytes, chain FROM rows ORDER BY place").fetchall()
-        read = client.journal.JournalGenesis.FromString(genesis)
-        self.assertEqual(read.case_hash, self.hand.joined.case_hash)
-        chain, heads, kinds = wire.first_chain(genesis), {}, []
-        for seq, at_ns, entry, stored in rows:
-            chain = wire.next_chain(chain, seq, at_ns, entry)
-            self.assertEqual(chain, stored)
-            heads[seq] = chain
-            kinds.append(client.journal.JournalEntry.FromString(entry).WhichOneof("what"))
-        self.assertEqual(kinds[:2], ["join", "cut"])
-        self.assertIn("rejection", kinds)
-        self.assertIn("mark", kinds)
-        self.assertEqual([row[0] for row in rows], list(range(1, len(rows) + 1)))
-        return heads
+    def messages_of(self, stream):
+        """A queue of the stream's messages. The stream ends after the test."""
+        self.addCleanup(stream.cancel)
+        messages = queue.Queue()
+        threading.Thread(target=lambda: [messages.put(m) for m in until_cancelled(stream)], daemon=True).start()
+        return messages
 
-    def durable(self, seq):
-        """What the server said to be durable, with that event in it. It says so with decided cuts."""
+    def until(self, messages, holds):
         until = time.monotonic() + 30
-        while self.session.durable is None or self.session.durable.room_seq < seq:
-            if time.monotonic() > until:
-                raise AssertionError("nothing is durable")
-            self.groove(self.session, 1, y=3.0)
-        said = self.session.durable
-        return said.room_seq, said.chain, said.seal
+        while time.monotonic() < until:
+            message = messages.get(timeout=30)
+            if holds(message):
+                return message
+        raise AssertionError("no such message came")
 
-
-def until_cancelled(stream):
-    with contextlib.suppress(grpc.RpcError):
-        yield from stream
-
-
-def flipped(data):
-    return bytes([data[0] ^ 1]) + data[1:]
-
-
-class Relay:
-    """Passes datagrams on both ways, and loses, repeats and reorders them by a fixed seed."""
-
-    def __init__(self, port, seed, loss=0.25):
-        self._random, self._loss, self._to = random.Random(seed), loss, ("127.0.0.1", port)
-        self._front = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._front.bind(("127.0.0.1", 0))
-        self._back = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._back.bind(("127.0.0.1", 0))
-        self.port, self._client, self._over = self._front.getsockname()[1], None, False
-        self.lost = self.repeated = self.passed = 0
-        self._held, self._lock = {}, threading.Lock()
-        self._threads = [threading.Thread(target=self._pass, args=(way,), daemon=True) for way in ("up", "down")]
-        for thread in self._threads:
-            thread.start()
-
-    def _pass(self, way):
-        source = self._front if way == "up" else self._back
-        source.settimeout(0.05)
-        while not self._over:
-            try:
-                data, sender = source.recvfrom(2048)
-            except (socket.timeout, ConnectionRefusedError):
-                continue
-            if way == "up":
-                self._client = sender
-            with self._lock:
-                chance = self._random.random()
-                if chance < self._loss:
-                    self.lost += 1
-                    continue
-                out = [data]
-                if chance > 0.9:
-                    self.repeated += 1
-                    out.append(data)
-                if way in self._held:
-                    out.append(self._held.pop(way))
-                elif chance > 0.8:
-                    self._held[way] = out.pop()
-                self.passed += len(out)
-            for one in out:
-                if way == "up":
-                    self._back.sendto(one, self._to)
-                elif self._client:
-                    self._front.sendto(one, self._client)
-
-    def close(self):
-        self._over = True
-        for thread in self._threads:
-            thread.join(10)
-        self._front.close()
-        self._back.close()
-
-
-class Datagrams(Case):
-    def open(self, session, port=None):
-        path = FastPath(session, port)
-        self.addCleanup(path.close)
-        return path
-
-    def cut_by(self, path, session, count, y=0.0):
-        cuts = []
-        for i in range(count):
-            at = -4 + 8 * i / count
-            cuts.append(path.send_cut(session.cut(self.burr, [(at, y, -0.5), (at + 0.3, y, -0.5)], us=20000)))
-            time.sleep(0.025)
-        return cuts
-
-    def test_cuts_are_decided_without_the_stream(self):
-        cuts = self.cut_by(self.open(self.session), self.session, 5)
-        decided = [self.session.decided(cut) for cut in cuts]
-        self.assertEqual([d[0] for d in decided], ["cut"] * 5)
-
-    def test_others_read_the_cuts_from_datagrams(self):
+    def test_the_tools_of_others(self):
+        viewer = self.member(VIEWER)
+        stub = client.watch_grpc.WatchServiceStub(viewer.channel)
+        messages = self.messages_of(stub.WatchCutting(watch.WatchCuttingRequest(author=viewer.author), timeout=60))
+        first = messages.get(timeout=30)
+        self.assertEqual((list(first.states), list(first.bodies)), ([], [0]))
         _, other = self.haptic("ben")
-        path = self.open(other)
-        cuts = self.cut_by(self.open(self.session), self.session, 20)
-        self.session.decided(cuts[-1])
-        other.wait(lambda: sum(e[0] == "cut" for e in other.events) == 20)
-        self.assertEqual([client.from_message(e[3]) for e in other.events if e[0] == "cut"], cuts)
-        self.assertGreater(path.entries, 10, "read from datagrams, not from the stream")
+        sent = self.state(7, 1.5)
+        self.session.send(cutting.SessionRequest(state=sent))
+        seen = self.until(messages, lambda m: m.states)
+        self.assertEqual(list(seen.states), [sent])
+        # Without datagrams a partner's state comes over the stream.
+        other.wait(lambda: self.hand.author in other.partners)
+        self.assertEqual(other.partners[self.hand.author], sent)
+        self.assertEqual(self.session.partners, {}, "nobody is sent their own state")
 
-    def test_a_bad_network_changes_nothing(self):
-        relay = Relay(self.session.offer.udp_port, seed=20)
-        self.addCleanup(relay.close)
-        _, other = self.haptic("ben")
-        path = self.open(other, relay.port)
-        cuts = self.cut_by(self.open(self.session, relay_of(self, self.session, 21)), self.session, 40)
-        decided = [self.session.decided(cut) for cut in cuts]
-        self.assertEqual([d[0] for d in decided], ["cut"] * 40)
-        other.wait(lambda: sum(e[0] == "cut" for e in other.events) == 40)
-        self.assertEqual([client.from_message(e[3]) for e in other.events if e[0] == "cut"], cuts)
-        self.assertGreater(relay.lost, 10)
-        self.assertGreater(relay.repeated, 2)
-        self.assertGreater(path.entries, 10)
-        _, late = self.haptic()
-        self.assertEqual(wire.field_hash(full(late.leaves), self.hand.joined.pitch_mm), self.hand.status().field_hash)
+    def test_a_state_of_somebody_else_ends_the_stream(self):
+        self.session.send(cutting.SessionRequest(state=self.state(1, 0, author=999)))
+        self.session.wait(lambda: self.session.ended)
+        self.assertEqual(self.session.ended.code(), grpc.StatusCode.INVALID_ARGUMENT)
 
-    def test_a_changed_bit_is_not_opened(self):
-        offer = self.session.offer
-        datagram = wire.seal(offer.session, 0, 1, bytes(offer.key_up), b"osteon")
-        self.assertEqual(wire.open_sealed(datagram, bytes(offer.key_up)), (offer.session, 0, 1, b"osteon"))
-        for bit in range(8 * len(datagram)):
-            broken = bytearray(datagram)
-            broken[bit // 8] ^= 1 << bit % 8
-            with self.assertRaises(wire.Broken):
-                wire.open_sealed(bytes(broken), bytes(offer.key_up))
+    def test_the_surface_while_another_cuts(self):
+        watcher = self.surface()
+        before, volume = watcher.hash(), volume_mm3(watcher.triangles())
+        decided = self.groove(self.session, 6)
+        watcher.read_until(decided[-1][1])
+        self.assertNotEqual(watcher.hash(), before)
+        self.assertEqual(watcher.hash(), self.surface(decided[-1][1]).hash(), "as who comes now sees it")
+        self.assertLess(volume_mm3(watcher.triangles()), volume - 5)
+        undone = self.hand.rooms.Undo(room.UndoRequest(author=self.hand.author, all=True), timeout=20)
+        whole = watcher.read_until(undone.room_seq).triangles()
+        # The blocks stay as fine as the cuts were, so only their shape is as before.
+        self.assertEqual(open_edges(whole), [])
+        self.assertAlmostEqual(volume_mm3(whole), volume, delta=0.5)
 
+    def test_who_has_heard_of_what(self):
+        console = self.member(CONSOLE, "ada")
+        stub = people_grpc.PeopleServiceStub(console.channel)
+        messages = self.messages_of(stub.WatchPeople(people.WatchPeopleRequest(author=console.author), timeout=60))
+        first = messages.get(timeout=30)
+        self.assertTrue(first.complete)
+        self.assertEqual({(p.name, p.hand) for p in first.people}, {("anna", True), ("ada", False)})
+        stop = types.Restrictions(stopped=True, words="wait")
+        decided = stub.Supervise(people.SuperviseRequest(author=console.author, subject=self.hand.author,
+                                                         supervision=stop), timeout=20)
+        pending = self.until(messages, lambda m: any(p.decided_room_seq == decided.room_seq for p in m.people))
+        self.assertLess(pending.people[0].acknowledged_room_seq, decided.room_seq)
+        self.session.wait(lambda: self.session.supervised == stop)
+        self.session.send(cutting.SessionRequest(acknowledged=cutting.Acknowledgement(room_seq=decided.room_seq)))
+        self.until(messages, lambda m: any(p.acknowledged_room_seq >= decided.room_seq for p in m.people))
 
-def relay_of(case, session, seed):
-    relay = Relay(session.offer.udp_port, seed)
-    case.addCleanup(relay.close)
-    return relay.port
+    def test_version_3_gets_nothing_that_it_does_not_know(self):
+        _, old = self.haptic("ben", version=3)
+        stub = people_grpc.PeopleServiceStub(self.hand.channel)
+        said = stub.Say(people.SayRequest(author=self.hand.author, words="hello"), timeout=20).room_seq
+        decided = self.groove(self.session, 1)[0]
+        for session, kind in ((self.session, "said"), (old, "noted")):
+            session.wait(lambda s=session: any(e[1] == decided[1] for e in s.events))
+            self.assertEqual([e[0] for e in session.events if e[1] == said], [kind])
+
+    def test_a_server_says_that_it_stops(self):
+        self.server.process.terminate()
+        self.session.wait(lambda: self.session.redial)
+        self.assertTrue(self.session.redial.why)
 
 
 if __name__ == "__main__":

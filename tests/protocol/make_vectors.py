@@ -5,9 +5,12 @@
 Each expected value comes from the server, from osteon-import or from libsodium, not from wire.py.
 """
 import base64
+import contextlib
 import ctypes
 import json
 import sqlite3
+import struct
+import subprocess
 import sys
 import tempfile
 import time
@@ -17,7 +20,7 @@ from pathlib import Path
 import client
 import wire
 from client import Member, Session, Surface, room
-from client_test import HAPTIC, VIEWER, Server, run, stl_triangles, turned
+from stage import BIN, HAPTIC, VIEWER, Server, metal_case, run, stl_triangles, turned
 
 
 def in_lines(value):
@@ -57,9 +60,9 @@ def main():
         watcher = Session(Member(server.address, HAPTIC, "ben"))
         path = CapturingPath(watcher)
         tools = {wire.tool_fields(tool.yaml)["name"]: (digest, tool.yaml) for digest, tool in session.tools.items()}
-        for tool in ("burr-round-3.2", "saw-osc-1", "guide-2"):
-            digest, definition = tools[tool] if tool in tools else next(iter(tools.values()))
-            add(f"tool {wire.tool_fields(definition)['name']}", "tool_hash", {"yaml": definition}, digest.hex())
+        for tool in ("burr-round-3.2", "saw-oscillating-1", "drill-3.2", "pin-3", "guide-2"):
+            digest, definition = tools[tool]
+            add(f"tool {tool}", "tool_hash", {"yaml": definition}, digest.hex())
         burr, small = tools["burr-round-3.2"][0], smallest(session.tools)
         session.decided(session.send_cut(session.cut(small, [(0, 0, 0)], level=0)))
         first = Session(Member(server.address, HAPTIC, "cleo"))
@@ -68,14 +71,15 @@ def main():
              "leaves": {text_of(key): base64.b64encode(zlib.compress(values, 9)).decode()
                         for key, values in sorted(first.leaves.items())}}, hand.status().field_hash.hex())
         cuts = []
-        for i in range(6):
-            ends = [(i - 3, 0, -1.0), (i - 2, 0.1 * i, -1.0)]
-            cuts.append(session.send_cut(session.cut(burr, ends, level=2, us=50000, rpm=20000 + 7 * i)))
-            time.sleep(0.06)
+        for i in range(12):
+            ends = [((i - 6) / 2, 0.1 * i, -1.0), ((i - 5) / 2, 0.1 * (i + 1), -1.0)]
+            cut = session.cut(burr, ends, level=2, us=9000 + i // 4, rpm=20000 + 7 * (i // 2))
+            cuts.append(session.send_cut(cut))
+            time.sleep(0.01)
         decided = [session.decided(cut) for cut in cuts]
         session.decided(session.send_cut(session.cut(burr, [(0, 0, 5)], body=77)))
         hand.rooms.Mark(room.MarkRequest(author=hand.author, label="end"), timeout=20)
-        watcher.wait(lambda: path.packets and sum(e[0] == "cut" for e in watcher.events) == 7)
+        watcher.wait(lambda: path.packets and sum(e[0] == "cut" for e in watcher.events) == 1 + len(cuts))
         time.sleep(0.2)
         surface = Surface(Member(server.address, VIEWER)).read_until(decided[-1][1])
         path.close()
@@ -84,10 +88,13 @@ def main():
         surface.close()
         summary = server.stop()
         keys = {key: wire.sha256(payload).hex() for key, payload in surface.blocks.items()}
-        add("surface of seven cuts", "surface_hash", {"blocks": {text_of(k): d for k, d in sorted(keys.items())}},
+        add(f"surface of {1 + len(cuts)} cuts", "surface_hash",
+            {"blocks": {text_of(k): d for k, d in sorted(keys.items())}},
             summary["mesh_hash"])
         blocks(add, folder, server, surface, hand.joined.pitch_mm)
+        metal(add, folder / "metal")
         chain(add, folder / "room.journal")
+        signatures(add, folder, watcher.durable)
         datagrams(add, path, watcher)
         key = bytes(range(32))
         out = ctypes.create_string_buffer(32)
@@ -114,8 +121,26 @@ def blocks(add, folder, server, surface, pitch_mm):
     """Blocks of different kinds, whose triangles are those that osteon-import writes."""
     run("osteon-server", "replay", folder / "room.journal", "--case", server.case, "--fields", folder / "cut.vdb")
     run("osteon-import", "surface", server.case, "--fields", folder / "cut.vdb", "--out", folder / "cut.stl")
-    written = {turned(triangle) for triangle in stl_triangles(folder / "cut.stl")}
-    seen = set()
+    add_blocks(add, surface, pitch_mm, folder / "cut.stl", set())
+
+
+def metal(add, folder):
+    """The same of a bone with metal."""
+    folder.mkdir()
+    metal_case(folder)
+    run("osteon-import", "surface", folder / "case", "--out", folder / "bone.stl")
+    server = Server(folder)
+    viewer = Member(server.address, VIEWER)
+    surface = Surface(viewer).read_until(0)
+    surface.close()
+    server.stop()
+    # A block with metal: its kinds without metal are there already.
+    surface.blocks = {key: payload for key, payload in surface.blocks.items() if payload[0] & wire.TISSUE}
+    add_blocks(add, surface, viewer.joined.pitch_mm, folder / "bone.stl", set())
+
+
+def add_blocks(add, surface, pitch_mm, stl, seen):
+    written = {turned(triangle) for triangle in stl_triangles(stl)}
     for key, payload in sorted(surface.blocks.items(), key=lambda item: len(item[1])):
         mesh = wire.decode_block(key[2:], payload, pitch_mm / 2 ** key[1])
         triangles = [turned(tuple(mesh.positions[i] for i in t)) for t in mesh.triangles]
@@ -129,11 +154,12 @@ def blocks(add, folder, server, surface, pitch_mm):
 
 
 def triangles_hash(triangles):
-    return wire.sha256(repr(sorted(triangles)).encode()).hex()
+    """SHA-256 over the sorted triangles, each from its smallest corner on, as nine floats of 32 bits."""
+    return wire.sha256(b"".join(struct.pack("<9f", *a, *b, *c) for a, b, c in sorted(triangles))).hex()
 
 
 def chain(add, file):
-    with sqlite3.connect(file) as base:
+    with contextlib.closing(sqlite3.connect(file)) as base:
         genesis, = base.execute("SELECT value FROM registers WHERE name = 'genesis'").fetchone()
         rows = base.execute("SELECT place, at_ns, bytes, chain FROM rows ORDER BY place").fetchall()
     kinds, before = set(), None
@@ -149,19 +175,40 @@ def chain(add, file):
         before = stored
 
 
+def signatures(add, folder, durable):
+    """What the server sealed and signed. Its public key is that which osteon-server prints."""
+    with contextlib.closing(sqlite3.connect(folder / "room.journal")) as base:
+        rows = base.execute("SELECT name, value, seal FROM registers").fetchall()
+        since, seq, chain_then, signature = base.execute(
+            "SELECT since, place, chain, signature FROM signatures ORDER BY place DESC").fetchone()
+    registers = {name: (value, seal) for name, value, seal in rows}
+    shown = subprocess.run([BIN / "osteon-server", "key", "show", folder / "signing.key"], check=True,
+                           capture_output=True, text=True).stdout.split()[0]
+    value, seal = registers["witness key"]
+    add(f"seal of event {durable.room_seq}", "witness_seal",
+        {"witness_key": value.hex(), "seq": durable.room_seq, "chain": durable.chain.hex()}, durable.seal.hex())
+    add(f"signature of events {since} to {seq}", "signed_entries",
+        {"public_key": shown, "since": since, "seq": seq, "chain": chain_then.hex(), "signature": signature.hex()},
+        "signed")
+    add("signature of a register", "signed_register",
+        {"public_key": shown, "genesis": registers["genesis"][0].hex(), "name": b"witness key".hex(),
+         "value": value.hex(), "signature": seal[32:].hex()}, "signed")
+
+
 def datagrams(add, path, session):
     """A sealed datagram of the server, and the cuts of its run of entries as the stream sent them."""
     sent = {event[2]: event[3] for event in session.events if event[0] == "cut"}
-    key, count = bytes(session.offer.key_down), 0
+    key, found = bytes(session.offer.key_down), []
     for datagram in path.packets:
         _, _, counter, plain = wire.open_sealed(datagram, key)
         packet = client.link.DownPacket.FromString(plain)
-        if not packet.entries or count == 3:
-            continue
-        run_of = packet.entries[0]
+        if packet.entries:
+            found.append((len(packet.entries[0].entries), counter, datagram, packet.entries[0]))
+    # The shortest run and the two longest.
+    found.sort(key=lambda one: one[:2])
+    for _, counter, datagram, run_of in (found[0], *found[-2:]):
         tool = run_of.head.tool_hash or session.numbers[run_of.head.tool_number]
         cuts = wire.read_entries(run_of.author, run_of.index, run_of.room_seq, run_of.head, tool, run_of.entries)
-        count += 1
         add(f"datagram {counter} with {len(cuts)} cuts", "datagram",
             {"key": key.hex(), "datagram": datagram.hex(), "tools": {str(run_of.head.tool_number): tool.hex()}},
             [[index, seq, sent[cut.author, cut.author_seq].SerializeToString(deterministic=True).hex()]

@@ -71,6 +71,53 @@ def next_chain(chain, seq, at_ns, entry):
     return hasher.digest()
 
 
+def witness_seal(key, seq, chain):
+    """The seal of DurableSeq. `key`: the journal's register "witness key"."""
+    hasher = Hasher()
+    hasher.text("osteon witness")
+    hasher.text(key)
+    hasher.integer(seq)
+    hasher.bytes(chain)
+    return hasher.digest()
+
+
+def signed_entries(since, seq, chain):
+    """What a server signs for the log entries from `since` to `seq`."""
+    hasher = Hasher()
+    hasher.text("osteon journal rows")
+    hasher.integer(since)
+    hasher.integer(seq)
+    hasher.text(chain)
+    return hasher.digest()
+
+
+def signed_register(name, value, genesis):
+    """What a server signs for a register of the journal with that genesis."""
+    register = Hasher()
+    for text in ("register", name, value):
+        register.text(text)
+    hasher = Hasher()
+    for text in ("osteon journal entry", first_chain(genesis), register.digest()):
+        hasher.text(text)
+    return hasher.digest()
+
+
+def signed_succession(before, after):
+    """What both keys sign when one public key takes over from another."""
+    hasher = Hasher()
+    for text in ("osteon signing key follows", before, after):
+        hasher.text(text)
+    return hasher.digest()
+
+
+def check_signature(public_key, message, signature):
+    """Ed25519."""
+    if len(public_key) != 32 or len(signature) != 64:
+        raise Broken("a key or signature has an impossible length")
+    if sodium().crypto_sign_verify_detached(signature, message, ctypes.c_ulonglong(len(message)), public_key):
+        raise Broken("a signature is not of this key")
+
+
 def surface_hash(blocks):
     """`blocks`: {(body, level, x, y, z): SHA-256 of the payload} of all blocks that have a surface."""
     hasher = Hasher()
