@@ -134,6 +134,21 @@ TEST_F(AuthorizerTest, GoesByTheClock) {
               HasSubstr("certificate: the certificate has expired"));
 }
 
+// OpenSSL's check of the chain and the authorizer's own check of every call end at the same second.
+TEST_F(AuthorizerTest, ACertificateEndsInTheSecondInWhichTheHandshakeRefusesIt) {
+  const std::string pem = certificate("anna");
+  const Authorities authorities{.certificates = content(people_->server() / "ca.pem"), .revocation_lists = {}};
+  const auto ends = read_person_certificate(pem)->ends;
+  for (const std::chrono::seconds after : {-1s, 0s, 1s}) {
+    now_ = (ends + after).time_since_epoch().count();
+    const bool holds = check_client_chain(pem, authorities, ends + after).has_value();
+    EXPECT_EQ(holds, after < 0s);
+    const std::string why = refused("anna", ticket("anna", "ward", Role::trainee), "ward", kUndo, holds);
+    EXPECT_EQ(why.empty(), holds) << after.count() << " s: " << why;
+    EXPECT_EQ(why.find("the certificate has expired") != std::string::npos, !holds) << why;
+  }
+}
+
 TEST_F(AuthorizerTest, TakesNoTicketThatIsValidForTooLong) {
   const std::string day = ticket("anna", "ward", Role::trainee, 24h), more = ticket("anna", "ward", Role::trainee, 26h);
   EXPECT_EQ(refused("anna", more, "ward", kUndo, true), "") << "the option allows it";

@@ -49,6 +49,38 @@ TEST(DicomSeries, BrightPaddingIsAir) {
   EXPECT_EQ(scan->volume.values[4], volume.values[4]);
 }
 
+// HU = slope · stored + intercept, in DICOM PS3.3 C.11.1.1.2. Also where the intercept is 0.
+TEST(DicomSeries, ScalesByTheSlope) {
+  const test::TempDir folder;
+  const auto volume = numbered_volume(7, 5, 4);
+  ASSERT_TRUE(write_dicom_series(volume, folder / "series", keep_going));
+  for (const fs::path& file : files_of(folder / "series")) {
+    set_tag(file, 0x0028, 0x1052, "0");
+    set_tag(file, 0x0028, 0x1053, "2");
+  }
+  const auto scan = read_dicom_series(folder / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  for (std::size_t i = 0; i < volume.values.size(); ++i)
+    ASSERT_EQ(scan->volume.values[i], 2 * (volume.values[i] + 1024)) << i;  // stored with the writer's intercept
+}
+
+// Signed pixels of 12 stored bits, whose upper four bits are zero in the file. In 12 bits of two's complement, 0xfe8 is
+// -24 and 0x800 is -2048.
+TEST(DicomSeries, ExtendsTheSignOfFewerThan16Bits) {
+  const test::TempDir folder;
+  ASSERT_TRUE(write_dicom_series(numbered_volume(2, 2, 4), folder / "series", keep_going));
+  for (const fs::path& file : files_of(folder / "series")) {
+    set_tag(file, 0x0028, 0x0101, std::string("\x0c\x00", 2));
+    set_tag(file, 0x0028, 0x0102, std::string("\x0b\x00", 2));
+    set_tag(file, 0x0028, 0x1052, "0");
+    set_tag(file, 0x7fe0, 0x0010, std::string("\xe8\x0f\x00\x08\x17\x00\xff\x07", 8));
+  }
+  const auto scan = read_dicom_series(folder / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  const std::vector<std::int16_t> slice(scan->volume.values.begin(), scan->volume.values.begin() + 4);
+  EXPECT_EQ(slice, (std::vector<std::int16_t>{-24, -2048, 23, 2047}));
+}
+
 TEST(DicomSeries, OrderOfFileNamesDoesNotMatter) {
   const test::TempDir folder;
   const auto volume = numbered_volume(7, 5, 4);

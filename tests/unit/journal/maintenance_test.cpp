@@ -199,6 +199,20 @@ TEST_F(JournalMaintenanceTest, WhatClientsKnowCountsAsLost) {
   EXPECT_EQ(recovered->lost(), 4u);
 }
 
+// After a salvage, a client that knows more has lost it. One that knows another history of the entries that are there
+// has a different bone, salvaged or not.
+TEST_F(JournalMaintenanceTest, ASalvagedJournalRefusesAnotherHistory) {
+  make(true);
+  ASSERT_TRUE(salvage_journal(kFile, kTo, &disk_));
+  Journal journal = open(kTo);
+  ASSERT_TRUE(journal.recovered_to());
+  EXPECT_TRUE(journal.check_witness(plain_head("bone", {entries_.begin(), entries_.begin() + 3})));
+  const Result<void> other = journal.check_witness(plain_head("other bone", {entries_.begin(), entries_.begin() + 3}));
+  ASSERT_FALSE(other);
+  EXPECT_EQ(other.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(other.error().message, HasSubstr("different histories up to event 3"));
+}
+
 TEST(Migration, TakesAFirstVersionIntoACopyWithTheSameChain) {
   const test::TempDir folder;
   const std::filesystem::path old = folder / "old", now = folder / "new";

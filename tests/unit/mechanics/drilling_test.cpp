@@ -41,6 +41,21 @@ TEST(Drilling, ABluntAndAThickDrillNeedMoreThrust) {
   EXPECT_NEAR(thrust(1000, 1, 1.9, {.diameter_mm = 4.8}), 1.5 * thrust(1000, 1, 1.9), 1e-9);
 }
 
+// A drill that needs twice the thrust at every feed also rubs up to twice the force. The force below which a sharp
+// drill of 3.2 mm rubs at 1.9 g/cm3 is a parameter.
+TEST(Drilling, ABluntDrillRubsUpToMoreForce) {
+  constexpr double kStiffness = 10.0;
+  const double sharp_n = DrillingParams{}.threshold_n;
+  const auto rubs = [&](double wear, double force_n) {
+    const FeedLaw law = drilling_law({.wear = wear}, RevolutionsPerMinute{1000}, GramsPerCm3{1.9}, 1.0);
+    return solve_feed(law, kStiffness, force_n / kStiffness, 1e-3).rubbing;
+  };
+  for (const double wear : {1.0, 1.5, 2.0}) {
+    EXPECT_TRUE(rubs(wear, 0.95 * wear * sharp_n)) << wear;
+    EXPECT_FALSE(rubs(wear, 1.05 * wear * sharp_n)) << wear;
+  }
+}
+
 TEST(Drilling, TorqueAtTheCorticalPoint) {
   const Newtons t{thrust(1000, 1, 1.9)};
   EXPECT_NEAR(drilling_torque({}, t).value(), 27.0, 0.1);

@@ -104,6 +104,23 @@ TEST(RoomUndo, EndsTheLeasesUnderWhichOthersCut) {
   commit(room, cuts[2]);
 }
 
+// A redo changes bone under everyone, as the undo did. So no cut of an earlier epoch is taken after it.
+TEST(RoomUndo, ARedoEndsTheLeasesToo) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon), partner = room.join(MemberKind::surgeon);
+  commit(room, strokes(surgeon, 1, 34)[0]);
+  ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
+  const std::uint64_t of_surgeon = room.lease_epoch(surgeon), of_partner = room.lease_epoch(partner);
+  ASSERT_TRUE(room.redo_last(surgeon, 1));
+  EXPECT_GT(room.lease_epoch(surgeon), of_surgeon);
+  EXPECT_GT(room.lease_epoch(partner), of_partner);
+  auto cuts = strokes(partner, 2, 35);
+  cuts[0].lease_epoch = of_partner;
+  EXPECT_EQ(room.submit(cuts[0])->rejection, Rejection::lease);
+  cuts[1].lease_epoch = room.lease_epoch(partner);
+  commit(room, cuts[1]);
+}
+
 TEST(RoomUndo, RefusesWhatCannotBeUndoneWithoutASequenceNumber) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
@@ -306,6 +323,27 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   ASSERT_TRUE(one) << one.error().message;
   EXPECT_EQ(one->seqs, std::vector<RoomSeq>{second->room_seq});
   EXPECT_EQ(room.bodies().size(), 2u);
+}
+
+// Only a later split that stands keeps an earlier one of the same body undone. One that was undone itself does not:
+// both come back, when both undos are taken back together.
+TEST(RoomSplit, AnUndoneLaterSplitKeepsNoEarlierOneUndone) {
+  Room room(test_block());
+  const AuthorId surgeon = room.join(MemberKind::surgeon);
+  const auto undo = [&](RoomSeq seq) {
+    const RoomSeq seqs[] = {seq};
+    return room.undo(surgeon, seqs).has_value();
+  };
+  const auto first = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x >= 6; })}, room.bone_epoch());
+  ASSERT_TRUE(first && undo(first->room_seq));
+  const auto second = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x < -6; })}, room.bone_epoch());
+  ASSERT_TRUE(second && undo(second->room_seq));
+  ASSERT_EQ(room.bodies().size(), 1u);
+
+  const auto redone = room.redo_last(surgeon, 2);
+  ASSERT_TRUE(redone) << redone.error().message;
+  EXPECT_EQ(redone->seqs, (std::vector<RoomSeq>{first->room_seq, second->room_seq}));
+  EXPECT_EQ(room.bodies().size(), 3u);
 }
 
 TEST(RoomSplit, UndoneItBringsBackTheBodyThatWasTakenAwayFromItsPiece) {

@@ -109,6 +109,22 @@ TEST(Room, RefusesWhatBreaksTheOrderOfAnAuthor) {
   EXPECT_EQ(commit(room, cuts[1]).room_seq.value, 4u) << "the author can go on";
 }
 
+// A rejection decides a number as finally as a commit. Another cut under it is a breach, and not the answer's
+// repetition.
+TEST(Room, RefusesAnotherCutUnderTheNumberOfARejectedOne) {
+  Room room(test_block());
+  auto cuts = strokes(room.join(MemberKind::surgeon), 2, 13);
+  Cut rejected = cuts[0];
+  rejected.level = kLevels;
+  ASSERT_EQ(room.submit(rejected)->rejection, Rejection::level);
+  Cut other = cuts[0];
+  other.lease_epoch = room.lease_epoch(other.author);
+  EXPECT_FALSE(room.submit(other)) << "its level is fine, but its number is used";
+  EXPECT_EQ(room.counts().refused, 1u);
+  EXPECT_EQ(room.counts().repeated, 0u);
+  EXPECT_TRUE(room.submit(rejected)->repeated) << "the same bytes are answered again";
+}
+
 struct Breach {
   const char* name;
   Rejection expected;

@@ -399,6 +399,58 @@ TEST(RoomLimits, BoundTheEnergyOfACutByTheMotor) {
   EXPECT_EQ(rejection_of("burr-round-5", deep, 0.0, 0.0, 0), Rejection::none) << "there is no bound";
 }
 
+// What the first cut took and the motor has not given yet counts against the second. Each takes 8.5 J.
+// - Without power between them, a second cut exceeds 9.5 J and the tolerance of 1.1 J.
+// - 100 W give 4 J in the 40 ms of a cut. The first cut owes 8.5 J, so the second brings the debt to 8.5 - 4 + 8.5 = 13
+//   J. The second may owe what a blow gives, 5.5 J, and 4 J of its own time, and the tolerance: 10.6 J.
+// - After 90 ms in air, the motor has given all of the first.
+TEST(RoomLimits, CarryTheEnergyThatTheMotorHasNotGivenYet) {
+  struct Way {
+    double power_w, blow_j;
+    std::uint32_t path_us, air_us;
+    Rejection second;
+  };
+  const Way ways[] = {{1e-9, 9.5, 8000, 0, Rejection::power},
+                      {100.0, 5.5, 40'000, 0, Rejection::power},
+                      {100.0, 5.5, 40'000, 90'000, Rejection::none}};
+  for (const Way& way : ways) {
+    Room room(test_block(), {.power_w = way.power_w, .blow_j = way.blow_j});
+    const AuthorId hand = room.join(MemberKind::surgeon);
+    std::uint64_t number = 0;
+    const auto cut_at = [&](const Vec3& at, std::uint32_t path_us) {
+      Cut cut = test::straight_cut(tool_named("burr-round-5"), at, at, {0, 0, -1}, ++number);
+      cut.author = hand;
+      cut.path_us = path_us;
+      return room.submit(cut)->rejection;
+    };
+    EXPECT_EQ(cut_at({-6, 0, -6}, way.path_us), Rejection::none);
+    if (way.air_us > 0) {
+      EXPECT_EQ(cut_at({0, 0, 6}, way.air_us), Rejection::none);
+    }
+    EXPECT_EQ(cut_at({6, 0, -6}, way.path_us), way.second) << way.power_w << " W, " << way.air_us << " us in air";
+  }
+}
+
+// The bound holds at any time. A burst is as large after a hundred seconds of the room as at its start, and one that
+// has just begun gives what 3 s allow.
+TEST(RoomLimits, BoundWhatIsSweptAtAnyTime) {
+  const auto taken_at = [](std::chrono::nanoseconds time) {
+    Room room(test_block(), {.swept_voxels_per_s = 1e5});
+    const AuthorId hand = room.join(MemberKind::surgeon);
+    room.set_time(time);
+    std::size_t taken = 0;
+    for (std::uint64_t i = 1; i <= 100; ++i) {
+      Cut cut = test::straight_cut(tool_named("burr-round-5"), {0, 0, 0}, {1, 0, 0}, {0, 0, -1}, i);
+      cut.author = hand;
+      cut.lease_epoch = room.lease_epoch(hand);
+      if (room.submit(cut)->committed()) ++taken;
+    }
+    return taken;
+  };
+  EXPECT_GT(taken_at(0s), 0u);
+  EXPECT_EQ(taken_at(100s), taken_at(0s));
+}
+
 // Bone that is removed already takes no energy.
 TEST(RoomLimits, ATurnInItsOwnHoleTakesNoEnergy) {
   Room room(test_block(), {.power_w = 1e-9, .blow_j = 9.5});

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <random>
 #include <set>
+#include <span>
 
 #include "common/surface/block_source.hpp"
 #include "common/surface/weld.hpp"
@@ -237,6 +238,24 @@ TEST(SurfaceBlocks, NameEveryBlockThatACutChanges) {
                                          << key.index.z;
       }
     }
+  }
+}
+
+// A block of 8 mm in full ends at x = 0, where blocks at 2 h begin. Its seam has the normals of the coarser side:
+// central differences of samples that are 2 h apart. So it uses the sample at x = 2 h, one beyond those of its own
+// cells. A cut changes the leaf that begins with that sample. Where nothing is coarser, the block uses no sample beyond
+// x = h.
+TEST(SurfaceBlocks, ACutChangesTheSeamsThatUseItsSamples) {
+  const BlockKey beside{BodyId{0}, 0, {-1, 0, 0}};
+  const Coord leaf{8, 24, 24};  // of h/4: from x = 2 h on
+  for (const bool coarse : {true, false}) {
+    SurfaceBlocks blocks(BodyId{0});
+    const Focus focus{.position_mm = {-16, 8, 8}, .full_mm = 8.0, .half_mm = 40.0};
+    if (coarse) (void)blocks.focus(std::span(&focus, 1), {{-64, -64, -64}, {63, 63, 63}}, 0.5);
+    ASSERT_TRUE(blocks.drawn(beside));
+    ASSERT_EQ(blocks.drawn({BodyId{0}, -1, {0, 0, 0}}), coarse);
+    const std::vector<BlockKey> stale = blocks.touch(2, {leaf});
+    EXPECT_EQ(std::ranges::count(stale, beside), coarse ? 1 : 0);
   }
 }
 

@@ -338,6 +338,7 @@ bits = [t.decode() for t in f["metadata/range_bits"][:]]
 assert bits == ["speed", "feed", "density", "diameter", "depth of cut", "speed of the teeth"], bits
 assert f["burr_change/row"][:].tolist() == [0, 700] and f["burr_change/scale"][0] == 1.5
 assert f["metadata/voxel_volume"][()] == 0.125 and f["metadata"].attrs["force_scale"] == 0.0466
+assert f["metadata"].attrs["pitch_mm"] == 0.5
 assert b"bone" in f["metadata/README"][()]
 assert f["metadata/field_hash"][()].decode() == 64 * "f"
 assert f["metadata/room_seq"][()] == 321 and f["metadata/finished"][()] == 1

@@ -326,6 +326,24 @@ TEST(Torque, IsTheArmTimesTheForce) {
   EXPECT_GT(step.turn_rad.dot(-step.contact_torque_nmm), 0.0);
 }
 
+// A drill turns clockwise for its holder, about its own axis +z. Bone turns it back with the law's torque. The faces of
+// its point are symmetric about the axis and have no moment about it, and neither has a turn that the walls prevent.
+TEST(Torque, BoneTurnsTheSpindleBack) {
+  Stage stage(half_space(), "drill-3.2");
+  stage.place(straight(0.1, -0.2, -1));
+  int cutting = 0;
+  for (int i = 0; i < 600; ++i) {
+    stage.device_.position_mm.z() = std::min(2.0, -1.0 + 0.01 * i);
+    const ProxyStep step = stage.tick(1000.0);
+    if (!step.cutting || step.torque_nmm < 5.0) continue;
+    ++cutting;
+    const double arm_mm = Proxy::kTurnArm_mm;
+    const Vec3 prevented_nmm = step.contact ? Vec3(kStiffness * arm_mm * arm_mm * step.turn_rad) : Vec3(Vec3::Zero());
+    EXPECT_NEAR((step.contact_torque_nmm + prevented_nmm).z(), -step.torque_nmm, 0.02 * step.torque_nmm) << i;
+  }
+  EXPECT_GT(cutting, 20);
+}
+
 // ---- items on the bone
 
 Tool test_pin() {

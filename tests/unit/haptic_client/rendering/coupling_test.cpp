@@ -147,6 +147,40 @@ TEST(EnergyLedger, CuttingIsPaidByTheHand) {
   EXPECT_EQ(ledger.report().tank_mj, 0.0);  // nothing was damped
 }
 
+// A hand presses in by d per tick. A damper of k·T takes k·d² per tick, and sampling gives half of it back. So after n
+// ticks the tank holds k·d²·(n/2 − 1): the first tick has no force yet, and half a tick of the spring is not paid yet.
+// What the spring loses in another way is lost: the tank does not take it, neither at once nor by later damping.
+TEST(EnergyLedger, TheTankHoldsWhatDampingTookAndNoMore) {
+  const double k = 50.0, d = 0.01, share_mj = k * d * d;
+  EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});
+  double e = 0.0;
+  const auto press = [&](double moved, double stretched, double damping_n) {
+    ledger.observe({moved, 0, 0});
+    e += stretched;
+    ledger.settle(0.0, 0.5 * k * e * e);
+    static_cast<void>(ledger.limited({{-(k * e + damping_n), 0, 0}}, {{-damping_n, 0, 0}}, true));
+  };
+  for (int i = 0; i < 50; ++i) press(d, d, k * d);
+  EXPECT_NEAR(ledger.report().tank_mj, share_mj * (50 / 2 - 1), 1e-9);
+  // The spring is let go from 0.5 mm to 0.2 mm while the hand stands still.
+  const double before_mj = ledger.report().tank_mj;
+  press(0.0, -0.3, 0.0);
+  EXPECT_NEAR(ledger.report().tank_mj, before_mj, 1e-9);
+  for (int i = 0; i < 20; ++i) press(d, d, k * d);
+  EXPECT_NEAR(ledger.report().tank_mj, before_mj + share_mj * (20 / 2 - 1), 1e-9);
+  // The hand goes on, and the spring slips at the same force: nothing is damped. The first of these ticks still has the
+  // damping of the tick before.
+  press(d, 0.0, 0.0);
+  const double slipping_mj = ledger.report().tank_mj;
+  for (int i = 0; i < 10; ++i) press(d, 0.0, 0.0);
+  EXPECT_NEAR(ledger.report().tank_mj, slipping_mj, 1e-9);
+  // It gives what it holds, once.
+  const double stored_mj = ledger.report().stored_mj;
+  EXPECT_NEAR(ledger.draw(1.0), slipping_mj, 1e-12);
+  EXPECT_NEAR(ledger.report().stored_mj, stored_mj + slipping_mj, 1e-12);
+  EXPECT_EQ(ledger.draw(1.0), 0.0);
+}
+
 class CouplingAtWall : public ::testing::Test {
  protected:
   CouplingAtWall() {
@@ -244,6 +278,25 @@ TEST_F(CouplingAtWall, ReturnedBoneStoresNothing) {
   }
   EXPECT_LT(coupling_.offset_mm().norm(), 0.3);
   EXPECT_GT(coupling_.offset_mm().norm(), 0.0);
+}
+
+// The frame of the bone turns by a quarter about x, so what pointed along -z now points along y. Both parts of the
+// offset are the hand's and are the same vectors in the new axes: what bone pushed out, and what the device cannot
+// show.
+TEST_F(CouplingAtWall, TheOffsetIsGivenInTheNewAxesWhenTheBoneTurns) {
+  const Eigen::Quaterniond quarter(Eigen::AngleAxisd(std::numbers::pi / 2.0, Vec3::UnitX()));
+  for (int i = 1; i <= 20; ++i) to({0, 0, 0.01 * i}, Vec3::Zero());
+  ASSERT_TRUE(to({0, 0, 0.2}, {0, 0, -0.3}).returned);
+  coupling_.turn(quarter);
+  EXPECT_NEAR((coupling_.offset_mm() - Vec3(0, 0.3, 0)).norm(), 0.0, 1e-9);
+
+  coupling_.reset(Vec3::Zero(), Vec3::Zero());
+  ledger_.reset();
+  moment_.proxy_mm.setZero();
+  handle_mm_.setZero();
+  for (int i = 1; i <= 200; ++i) to({0, 0, 0.01 * i}, Vec3::Zero());
+  coupling_.turn(quarter);
+  EXPECT_NEAR((coupling_.offset_mm() - Vec3(0, 2.0 - 60.0 / 50.0, 0)).norm(), 0.0, 1e-9);
 }
 
 // The end of a shank 80 mm from the tip meets a wall while the hand turns and does not move. With both springs in
