@@ -1,5 +1,6 @@
 """A client that was written from deploy/docs/protocol.md, against real servers. See stage.py."""
 import contextlib
+import math
 import queue
 import threading
 import time
@@ -35,11 +36,32 @@ class TheSurface(Case):
         run("osteon-import", "surface", self.server.case, "--fields", self.folder / "saved.vdb", "--out",
             self.folder / "cut.stl")
         self.assertEqual(bag(after.triangles()), bag(stl_triangles(self.folder / "cut.stl")))
-        cut = [any(wire.decode_block(key[2:], payload, 1).cut) for key, payload in after.blocks.items()]
-        self.assertIn(True, cut, "some vertices are on a cut face")
-        self.assertIn(False, cut)
+        self.check_vertices(after)
         summary = self.server.stop()
         self.assertEqual(after.hash().hex(), summary["mesh_hash"])
+
+
+    def check_vertices(self, surface):
+        """Flags and normals of a block 20 x 20 x 10 mm, in which a ball of 3.2 mm went along x, 1 to 4.2 mm deep."""
+        seen = {True: 0, False: 0}
+        for key, payload in surface.blocks.items():
+            mesh = wire.decode_block(key[2:], payload, self.hand.joined.pitch_mm / 2 ** key[1])
+            for at, normal, is_cut in zip(mesh.positions, mesh.normals, mesh.cut):
+                self.assertAlmostEqual(math.hypot(*normal), 1, places=6)
+                centre = (min(max(at[0], -2), 2), 0, -2.6)  # of the ball when it was nearest
+                self.assertEqual(is_cut, math.dist(at, centre) < 2, at)
+                if is_cut:
+                    expected = [(c - a) / math.dist(at, centre) for a, c in zip(at, centre)]  # out of the bone
+                else:
+                    faces = (abs(at[0]), abs(at[1]), at[2] if at[2] > -5 else -10 - at[2])
+                    if sorted(abs(f - (0 if i == 2 else 10)) for i, f in enumerate(faces))[1] < 1:
+                        continue  # an edge of the block has no single normal
+                    axis = min(range(3), key=lambda i: abs(faces[i] - (0 if i == 2 else 10)))
+                    middle = (0, 0, -5)
+                    expected = [math.copysign(1, at[i] - middle[i]) if i == axis else 0 for i in range(3)]
+                self.assertGreater(sum(n * e for n, e in zip(normal, expected)), 0.97, (at, normal, expected))
+                seen[is_cut] += 1
+        self.assertGreater(min(seen.values()), 500)
 
 
 class TheCoarseSurface(Case):
@@ -124,6 +146,27 @@ class TheField(Case):
         self.assertEqual(self.session.decided(fine)[3], CODES["LEVEL"])
         coarse = self.session.send_cut(self.session.cut(added.tool_hash, [(0, 0, -0.5)], level=0))
         self.assertEqual(self.session.decided(coarse)[0], "cut")
+
+    def test_leaves_are_the_distance_to_the_tool(self):
+        """The part of a round burr that cuts is a ball below its tip."""
+        pitch, radius, half = self.hand.joined.pitch_mm, 1.6, math.sqrt(0.5)
+        for tip, rotation, axis in (((0.3, -0.2, 0.5), (0, 0, 0, 1), (0, 0, 1)),
+                                    ((0.3, -0.2, 0.5), (half, 0, 0, half), (0, -1, 0))):
+            with self.subTest(axis):
+                cut = self.session.send_cut(self.session.cut(self.burr, [wire.Pose.at(tip, rotation)]))
+                self.assertEqual(self.session.decided(cut)[0], "cut")
+                _, late = self.haptic()
+                centre = tuple(t - radius * a for t, a in zip(tip, axis))
+                band = int(4 * pitch * 1024)
+                for (_, level, *origin), values in full(late.leaves).items():
+                    self.assertEqual((level, [o % 8 for o in origin]), (0, [0, 0, 0]))
+                    for i, value in enumerate(values):
+                        at = [(origin[0] + i // 64) * pitch, (origin[1] + i // 8 % 8) * pitch,
+                              (origin[2] + i % 8) * pitch]
+                        steps = (math.dist(at, centre) - radius) * 1024
+                        self.assertAlmostEqual(value, max(-band, min(band, steps)), delta=2)
+                undone = self.hand.rooms.Undo(room.UndoRequest(author=self.hand.author, count=1), timeout=20)
+                self.session.wait(lambda u=undone: any(e[1] == u.room_seq for e in self.session.events))
 
     def test_the_files_of_the_case(self):
         files = {}
