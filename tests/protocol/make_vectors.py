@@ -2,7 +2,8 @@
 
     OSTEON_BIN=build/dev/bin OSTEON_SOURCE_DIR=. python3 -B tests/protocol/make_vectors.py
 
-Each expected value comes from the server, from osteon-import or from libsodium, not from wire.py.
+Each expected value comes from the server, from osteon-import or from libsodium, not from wire.py. Only a
+block's normals, cut faces and tissue are as wire.py reads them; client_test.py compares these with closed forms.
 """
 import base64
 import contextlib
@@ -73,7 +74,8 @@ def main():
         cuts = []
         for i in range(12):
             ends = [((i - 6) / 2, 0.1 * i, -1.0), ((i - 5) / 2, 0.1 * (i + 1), -1.0)]
-            cut = session.cut(burr, ends, level=2, us=9000 + i // 4, rpm=20000 + 7 * (i // 2))
+            middle = [tuple(a + (b - a) * k / 4 for a, b in zip(*ends)) for k in (1, 2, 3)]
+            cut = session.cut(burr, [ends[0], *middle, ends[1]], level=2, us=9000 + i // 4, rpm=20000 + 7 * (i // 2))
             cuts.append(session.send_cut(cut))
             time.sleep(0.01)
         decided = [session.decided(cut) for cut in cuts]
@@ -150,7 +152,17 @@ def add_blocks(add, surface, pitch_mm, stl, seen):
         seen.add(kind)
         add(f"block of level {key[1]} with flags {payload[0]}", "block",
             {"index": list(key[2:]), "level_pitch_mm": pitch_mm / 2 ** key[1], "payload": payload.hex()},
-            {"mesh_hash": wire.sha256(payload).hex(), "triangles": triangles_hash(triangles)})
+            block_result(payload, mesh))
+
+
+def block_result(payload, mesh):
+    """What a vector says of a block: digests of its bytes, of its triangles and of what belongs to its vertices."""
+    triangles = [turned(tuple(mesh.positions[i] for i in t)) for t in mesh.triangles]
+    # In steps of 1/20, so that the last bits of a square root do not count.
+    normals = b"".join(struct.pack("<3b", *(round(20 * n) for n in normal)) for normal in mesh.normals)
+    return {"mesh_hash": wire.sha256(payload).hex(), "triangles": triangles_hash(triangles),
+            "normals": wire.sha256(normals).hex(), "cut": wire.sha256(bytes(mesh.cut)).hex(),
+            "tissue": wire.sha256(bytes(mesh.tissue)).hex()}
 
 
 def triangles_hash(triangles):

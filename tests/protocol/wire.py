@@ -236,10 +236,6 @@ def read_rows(data):
     same = 0
     for x in range(SAMPLES):
         for y in range(SAMPLES):
-            a = rows[x][y - 1] if y > 0 else 0
-            b = rows[x - 1][y] if x > 0 else 0
-            c = rows[x - 1][y - 1] if x > 0 and y > 0 else 0
-            expected = (a & b) | (~c & (a ^ b))
             difference = 0
             if same > 0:
                 same -= 1
@@ -256,10 +252,17 @@ def read_rows(data):
                     raise Broken("a row has an unknown code")
             if difference >= 1 << SAMPLES:
                 raise Broken("a row has more than 17 samples")
-            rows[x][y] = (difference ^ expected) & (1 << SAMPLES) - 1
+            rows[x][y] = difference ^ expected_row(rows, x, y)
     if same:
         raise Broken("a run of rows goes beyond the block")
     return rows
+
+
+def expected_row(rows, x, y):
+    a = rows[x][y - 1] if y > 0 else 0
+    b = rows[x - 1][y] if x > 0 else 0
+    c = rows[x - 1][y - 1] if x > 0 and y > 0 else 0
+    return ((a & b) | (~c & (a ^ b))) & (1 << SAMPLES) - 1
 
 
 def read_seams(data):
@@ -269,11 +272,14 @@ def read_seams(data):
     coarser = [0] * 64
     for n, i in enumerate(places):
         coarser[i] = packed[n // 2] >> (n % 2 * 4) & 15
-        x, y, z = i // 16, i // 4 % 4, i % 4
-        inner = all(k in (1, 2) for k in (x, y, z))
-        if inner or not 1 <= coarser[i] <= 4:
+        if is_inner(i) or not 1 <= coarser[i] <= 4:
             raise Broken("a seam is where none can be")
     return coarser
+
+
+def is_inner(half_block):
+    """Whether one of the 4³ half blocks belongs to the block itself."""
+    return all(k in (1, 2) for k in (half_block // 16, half_block // 4 % 4, half_block % 4))
 
 
 class SeamRule:
@@ -550,16 +556,22 @@ def coded_cut(cut, start, before_rpm, before_us):
         out += varint(cut.path_us)
     if own_speed:
         out += varint(zigzag(cut.spindle_rpm - before_rpm))
-    last = start.numbers
+    last, step = start.numbers, (0,) * 7
     for knot in knots:
-        flag, rest = 0, b""
-        for i in range(7):
-            if knot.numbers[i] != last[i]:
-                flag |= 1 << i
-                rest += varint(zigzag(wrapped(knot.numbers[i] - last[i], i)))
-        out += bytes([flag]) + rest
+        moved = tuple(wrapped(last[i] + step[i], i) for i in range(7))
+        out += min(coded_pose(knot.numbers, last, 0), coded_pose(knot.numbers, moved, 128), key=len)
+        step = tuple(wrapped(knot.numbers[i] - last[i], i) for i in range(7))
         last = knot.numbers
     return out
+
+
+def coded_pose(numbers, expected, flag):
+    rest = b""
+    for i in range(7):
+        if numbers[i] != expected[i]:
+            flag |= 1 << i
+            rest += varint(zigzag(wrapped(numbers[i] - expected[i], i)))
+    return bytes([flag]) + rest
 
 
 def read_cut(data, start, rpm, us):
