@@ -3,12 +3,14 @@
     OSTEON_BIN=build/dev/bin OSTEON_SOURCE_DIR=. python3 -B tests/protocol/make_vectors.py
 
 Each expected value comes from the server, from osteon-import or from libsodium, not from wire.py. Only a
-block's normals, cut faces and tissue are as wire.py reads them; client_test.py compares these with closed forms.
+block's normals, cut faces and tissue are as wire.py reads them, and so is all of the two vectors of noise, which no
+server sends. The programs' code confirms them (vectors_test.cpp).
 """
 import base64
 import contextlib
 import ctypes
 import json
+import random
 import sqlite3
 import struct
 import subprocess
@@ -98,6 +100,8 @@ def main():
         chain(add, folder / "room.journal")
         signatures(add, folder, watcher.durable)
         datagrams(add, path, watcher)
+        add("block of noise", "block", *noise_block())
+        add("datagram of noise", "datagram", *noise_datagram())
         key = bytes(range(32))
         out = ctypes.create_string_buffer(32)
         wire.sodium().crypto_kdf_derive_from_key(out, ctypes.c_size_t(32), ctypes.c_uint64(1), b"osteonUD", key)
@@ -163,6 +167,77 @@ def block_result(payload, mesh):
     return {"mesh_hash": wire.sha256(payload).hex(), "triangles": triangles_hash(triangles),
             "normals": wire.sha256(normals).hex(), "cut": wire.sha256(bytes(mesh.cut)).hex(),
             "tissue": wire.sha256(bytes(mesh.tissue)).hex()}
+
+
+def noise_block():
+    """A block of random samples, where lines cross seams of all kinds. Most of its cells are covered."""
+    chance = random.Random(20)
+    rows = [[chance.getrandbits(wire.SAMPLES) for _ in range(wire.SAMPLES)] for _ in range(wire.SAMPLES)]
+    covered = sum(1 << i for i in range(64) if chance.random() < 0.8)
+    coarser = [0 if wire.is_inner(i) else chance.randrange(4) for i in range(64)]
+    for i in (5, 6, 9, 10):  # the face towards −x: one neighbour as large as four such blocks
+        coarser[i] = 4
+    known = [i for i in range(64) if coarser[i]]
+    steps = [coarser[i] for i in known] + [0] * (len(known) % 2)
+    payload = bytes([wire.COVERED | wire.SEAMS | wire.SOME_CUT | wire.TISSUE]) + struct.pack("<Q", covered)
+    payload += struct.pack("<Q", sum(1 << i for i in known))
+    payload += bytes(low | high << 4 for low, high in zip(steps[::2], steps[1::2])) + wire.coded_rows(rows)
+    count = len(wire.Contour(rows, covered, wire.SeamRule(coarser)).edges)
+    payload += bytes(chance.randrange(wire.PLACES + 1) for _ in range(count)) + chance.randbytes(2 * count)
+    payload += packed([chance.randrange(2) for _ in range(count)], 1)
+    payload += packed([chance.randrange(3) for _ in range(count)], 2)
+    index, level_pitch_mm = [3, -2, -7], 0.4
+    mesh = wire.decode_block(index, payload, level_pitch_mm)
+    return ({"index": index, "level_pitch_mm": level_pitch_mm, "payload": payload.hex()}, block_result(payload, mesh))
+
+
+def packed(values, bits):
+    """The values in so many bits each, the lowest bits of a byte first."""
+    each = 8 // bits
+    values = values + [0] * (-len(values) % each)
+    return bytes(sum(value << bits * i for i, value in enumerate(values[at:at + each]))
+                 for at in range(0, len(values), each))
+
+
+def noise_datagram():
+    """A run of cuts with all options of the code: gaps, own first poses, steps that wrap around."""
+    chance = random.Random(21)
+    key, tool, author = chance.randbytes(32), chance.randbytes(32), 7
+    pose = wire.Pose(tuple(chance.randrange(-2 ** 31, 2 ** 31) for _ in range(3)) +
+                     tuple(chance.randrange(-2 ** 15, 2 ** 15) for _ in range(4)))
+    rpm, us, at, entries, expected = 20000, 8000, [40, 90, 11], b"", []
+    head = client.link.CutRun(author_seq=at[2], lease_epoch=3, body=2, tool_number=5, level=1, spindle_rpm=rpm,
+                              start=pose.numbers, path_us=us)
+    for n in range(12):
+        steps = (1, 1, 1) if n == 0 else (1 + chance.randrange(3), 1 + chance.randrange(4), 1 + chance.randrange(2))
+        at = [a + s for a, s in zip(at, steps)] if n else at
+        cut = noise_cut(chance, pose, author, at[2], tool, rpm if n % 3 else rpm + chance.randrange(-99, 99),
+                        us if n % 4 else us + 5)
+        more = steps[1] != steps[0] or steps[2] != 1
+        entries += wire.varint((steps[0] - 1) << 1 | more)
+        if more:
+            entries += wire.varint(wire.zigzag(steps[1] - steps[0])) + wire.varint(steps[2] - 1)
+        entries += wire.coded_cut(cut, pose, rpm, us)
+        pose, rpm, us = cut.path[-1], cut.spindle_rpm, cut.path_us
+        expected.append([at[0], at[1], client.to_message(cut).SerializeToString(deterministic=True).hex()])
+    run_of = client.link.EntryRun(author=author, index=40, room_seq=90, head=head, entries=entries)
+    plain = client.link.DownPacket(entries=[run_of]).SerializeToString()
+    return ({"key": key.hex(), "datagram": wire.seal(9, 0, 77, key, plain).hex(), "tools": {"5": tool.hex()}}, expected)
+
+
+def noise_cut(chance, start, author, author_seq, tool, rpm, us):
+    """A cut from `start`, or sometimes from elsewhere, on with equal steps, so that some poses are where expected."""
+    step = [chance.randrange(-2 ** 28, 2 ** 28) for _ in range(3)] + [chance.randrange(-2 ** 12, 2 ** 12)] * 4
+    path = [start]
+    if chance.random() < 0.3:
+        path = [wire.Pose(tuple(wrapped_sum(start.numbers, [7] * 7)))]
+    for _ in range(1 + chance.randrange(4)):
+        path.append(wire.Pose(tuple(wrapped_sum(path[-1].numbers, step))))
+    return wire.Cut(author, author_seq, 3, 2, tool, 1, path, rpm, us)
+
+
+def wrapped_sum(numbers, step):
+    return (wire.wrapped(number + by, i) for i, (number, by) in enumerate(zip(numbers, step)))
 
 
 def triangles_hash(triangles):

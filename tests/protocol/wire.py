@@ -258,6 +258,30 @@ def read_rows(data):
     return rows
 
 
+def coded_rows(rows):
+    """What read_rows() reads."""
+    out, same = b"", 0
+    for x in range(SAMPLES):
+        for y in range(SAMPLES):
+            difference = rows[x][y] ^ expected_row(rows, x, y)
+            if difference == 0:
+                same += 1
+                continue
+            out += coded_same(same)
+            same = 0
+            start = (difference & -difference).bit_length() - 1
+            length = (difference >> start).bit_length()
+            if difference >> start == (1 << length) - 1 and length <= 11:
+                out += bytes([64 + (length - 1) * SAMPLES + start])
+            else:
+                out += b"\xff" + difference.to_bytes(3, "little")
+    return out + coded_same(same)
+
+
+def coded_same(rows):
+    return b"\x3f" * (rows // 64) + (bytes([rows % 64 - 1]) if rows % 64 else b"")
+
+
 def expected_row(rows, x, y):
     a = rows[x][y - 1] if y > 0 else 0
     b = rows[x - 1][y] if x > 0 else 0
