@@ -112,7 +112,7 @@ Json block(const Json& given) {
   const std::string bytes = from_hex(given["payload"]);
   const BlockPayload payload{{bytes.begin(), bytes.end()}};
   const Json& at = given["index"];
-  const BlockKey key{.index = {at[0].get<int>(), at[1].get<int>(), at[2].get<int>()}};
+  const BlockKey key{.body = {}, .level = 0, .index = {at[0].get<int>(), at[1].get<int>(), at[2].get<int>()}};
   const Result<Mesh> mesh = decode_block(key, payload, given["level_pitch_mm"].get<double>());
   if (!mesh) return mesh.error().message;
   using Corner = std::array<float, 3>;
