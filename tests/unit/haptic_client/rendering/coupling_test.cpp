@@ -101,7 +101,8 @@ TEST(EnergyLedger, ForceAndTorqueAreHeldBackTogether) {
   EXPECT_NEAR(ledger.limited(wanted, {}, true).torque_nmm.norm(), 0.0, 1e-9);
 }
 
-// Pressing in and out at constant speed costs the hand what a damper of k·T costs, twice k·T·v·way, and a tick's worth.
+// Pressing in and out at constant speed costs the hand what a damper of k·T costs, twice k·T·v·way, and a tick's
+// worth.
 TEST(EnergyLedger, CountsWhatTheDamperTook) {
   const double k = 50.0, d = 0.01;
   const int n = 50;
@@ -147,9 +148,9 @@ TEST(EnergyLedger, CuttingIsPaidByTheHand) {
   EXPECT_EQ(ledger.report().tank_mj, 0.0);  // nothing was damped
 }
 
-// A hand presses in by d per tick. A damper of k·T takes k·d² per tick, and sampling gives half of it back. So after n
-// ticks the tank holds k·d²·(n/2 − 1): the first tick has no force yet, and half a tick of the spring is not paid yet.
-// What the spring loses in another way is lost: the tank does not take it, neither at once nor by later damping.
+// A hand presses in by d per tick. A damper of k·T takes k·d² per tick, and sampling gives half of it back. So after
+// n ticks the tank holds k·d²·(n/2 − 1): the first tick has no force yet, and half a tick of the spring is not
+// paid yet. What the spring loses in another way is lost: the tank takes it neither at once nor by later damping.
 TEST(EnergyLedger, TheTankHoldsWhatDampingTookAndNoMore) {
   const double k = 50.0, d = 0.01, share_mj = k * d * d;
   EnergyLedger ledger(EnergyParams{.surprise_mm_per_s2 = 0.0});
