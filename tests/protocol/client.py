@@ -44,6 +44,11 @@ journal, people, people_grpc = (_MODULES[n] for n in ("journal_pb2", "people_pb2
 CODES = {name.removeprefix("REJECTION_REASON_"): number for name, number in cutting.RejectionReason.items()}
 
 
+# gRPC lets channels of one process to one address share a connection, and one that has just broken ends the next call.
+# Each member stands for a program of its own, so it has a connection of its own.
+OWN_CONNECTION = (("grpc.use_local_subchannel_pool", 1),)
+
+
 class Credentials(grpc.AuthMetadataPlugin):
     """What a person shows over TLS: a folder with certificate and key, and a ticket with each call."""
 
@@ -56,7 +61,7 @@ class Credentials(grpc.AuthMetadataPlugin):
     def channel(self, address):
         authority, key, chain = ((self.folder / name).read_bytes() for name in ("ca.pem", "person.key", "person.pem"))
         return grpc.secure_channel(address, grpc.composite_channel_credentials(
-            grpc.ssl_channel_credentials(authority, key, chain), grpc.metadata_call_credentials(self)))
+            grpc.ssl_channel_credentials(authority, key, chain), grpc.metadata_call_credentials(self)), OWN_CONNECTION)
 
 
 class Member:
@@ -65,7 +70,7 @@ class Member:
     def __init__(self, address, kind, name="", *, again=None, durable=None, kernel=KERNEL, version=PROTOCOL,
                  channel=None):
         self.address = address
-        self.channel = channel or grpc.insecure_channel(address)
+        self.channel = channel or grpc.insecure_channel(address, OWN_CONNECTION)
         self.rooms = room_grpc.RoomServiceStub(self.channel)
         request = room.JoinRequest(protocol_version=version, kernel_version=kernel, kind=kind, name=name, user=name)
         if again:
