@@ -1,11 +1,13 @@
 """The part of deploy/demo after installation and build: imports the case, runs a session, writes its report."""
 import argparse
+import fcntl
 import hashlib
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import plans
@@ -16,11 +18,11 @@ import together
 from processes import Failure
 from session import ROOT, Session, case_info, save
 
+MARK = ".osteon-session"  # a file that only folders of demos have
 EXAMPLE = "usr/share/doc/invesalius-examples/examples/Cranium.inv3"
 
 # A desktop device that can hold 3.3 N. The rendered force is what such a device would show.
 DEVICE = "simulated-3.3N"
-
 
 def say(line):
     print(line, flush=True)
@@ -44,6 +46,28 @@ def fingerprint(source: Path, importer: Path):
     return digest.hexdigest()[:16]
 
 
+@contextmanager
+def own_folder(out: Path):
+    """Keeps other demos out of the folder. None of them changes a file of one that still runs."""
+    out.mkdir(parents=True, exist_ok=True)
+    with open(out / MARK, "a", encoding="utf-8") as mark:
+        try:
+            fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise Failure(f"another demo writes into {out}; wait until it has ended, "
+                          "or name another folder with --out") from None
+        yield
+
+
+def empty(out: Path):
+    """Removes what an earlier demo left."""
+    for entry in out.iterdir():
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.rmtree(entry)
+        elif entry.name != MARK:
+            entry.unlink()
+
+
 def prepare_case(source: Path, programs: Path, title):
     """The case to work on. A case is used as it is. Anything else is imported once and then reused."""
     if (source / "case.json").exists():
@@ -54,6 +78,15 @@ def prepare_case(source: Path, programs: Path, title):
     if (case / "case.json").exists():
         return case
     case.parent.mkdir(parents=True, exist_ok=True)
+    # Another demo may be importing the same files. Then this one waits and takes its case.
+    with open(case.with_name(f"{case.name}.lock"), "a", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not (case / "case.json").exists():
+            import_case(source, importer, case, title)
+    return case
+
+
+def import_case(source: Path, importer: Path, case: Path, title):
     say(f"Importing {source}")
     started = time.monotonic()
     # In its own process session, so that Ctrl-C reaches it only once, through this process.
@@ -69,7 +102,6 @@ def prepare_case(source: Path, programs: Path, title):
         words = (errors or "").strip().splitlines()
         raise Failure(words[-1] if words else f"osteon-import could not read {source}")
     say(f"Imported in {time.monotonic() - started:.0f} s; the next run finds the case in build/cases.")
-    return case
 
 
 def run_on_some_side(programs, case, directions, out):
@@ -88,6 +120,28 @@ def case_title(programs, case):
     return case_info(programs, case).get("title") or case.name
 
 
+def run(options, programs, out):
+    """The demo, in a folder of its own. Exit code 1: somebody held another bone at the end."""
+    started = time.monotonic()
+    source = options.case or example_skull()
+    title = [] if options.case else ["--title", "Human skull"]
+    case = prepare_case(source.resolve(), programs, title)
+    empty(out)
+    if options.together:
+        sides = plans.ANY_SIDE[1:3] if options.case else [plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL]
+        return together.run(programs, case, sides, out, say, DEVICE, case_title(programs, case))
+    directions = plans.ANY_SIDE if options.case else [plans.LEFT_PARIETAL]
+    numbers = run_on_some_side(programs, case, directions, out)
+    say("Writing the report")
+    session = record.read_table(out / "session.csv")
+    plots.force_and_depth(session, out / "force_depth.png")
+    numbers["sound"] = plots.spectrogram(out / "sound.wav", out / "spectrogram.png")
+    save(numbers, out)
+    report.write(out, numbers, numbers["case"].get("title") or case.name)
+    summarise(numbers, out, time.monotonic() - started)
+    return 0 if same_bone(numbers) else 1
+
+
 def end_politely(*_):
     raise KeyboardInterrupt
 
@@ -102,34 +156,18 @@ def main():
     signal.signal(signal.SIGTERM, end_politely)
     programs = options.build / "bin"
     out = options.out.resolve()
-    started = time.monotonic()
     try:
-        source = options.case or example_skull()
-        title = [] if options.case else ["--title", "Human skull"]
-        case = prepare_case(source.resolve(), programs, title)
-        if out.exists():
-            shutil.rmtree(out)
-        out.mkdir(parents=True)
-        (out / ".osteon-session").touch()
-        if options.together:
-            sides = plans.ANY_SIDE[1:3] if options.case else [plans.LEFT_PARIETAL, plans.RIGHT_PARIETAL]
-            return together.run(programs, case, sides, out, say, DEVICE, case_title(programs, case))
-        directions = plans.ANY_SIDE if options.case else [plans.LEFT_PARIETAL]
-        numbers = run_on_some_side(programs, case, directions, out)
-        say("Writing the report")
-        session = record.read_table(out / "session.csv")
-        plots.force_and_depth(session, out / "force_depth.png")
-        numbers["sound"] = plots.spectrogram(out / "sound.wav", out / "spectrogram.png")
-        save(numbers, out)
-        report.write(out, numbers, numbers["case"].get("title") or case.name)
+        with own_folder(out):
+            return run(options, programs, out)
     except Failure as failure:
         print(f"deploy/demo: {failure}", *([failure.detail] if failure.detail else []), sep="\n", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"deploy/demo: {error.filename or out}: {error.strerror}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("deploy/demo: stopped; every program has been ended", file=sys.stderr)
         return 130
-    summarise(numbers, out, time.monotonic() - started)
-    return 0 if same_bone(numbers) else 1
 
 
 def same_bone(numbers):

@@ -215,7 +215,8 @@ class Together:
         self._wait("that the instructor's hand has drilled", lambda: hands["berg"].exit_code is not None, 120.0)
         console.do("unguide anna")
         self.cuts_while_frozen = self._cuts(console, "anna") - frozen
-        console.do("undo 5 s")
+        shown = console.hands()[INSTRUCTOR]
+        console.do(f"undo {shown.cuts} of {shown.number}")
         time.sleep(1.0)
         console.do("give-back anna")
         console.do("free anna")
@@ -419,7 +420,7 @@ def write_report(out: Path, numbers, title):
 <title>{html.escape(title)} – together</title><style>{report.STYLE}</style></head><body><main>
 <h1>{html.escape(title)}: two surgeons and their instructor</h1>
 <p class=lead>Anna and Ben, trainees, work on one bone. Dr. Berg watches, stops Anna, takes her tool, and guides
-her hand along his own. He undoes the last five seconds and gives everything back. Every program is a process of its
+her hand along his own. He undoes what his hand has cut and gives everything back. Every program is a process of its
 own; they prove who they are by certificates and tickets.</p>
 <span class=badge>simulated devices: no person and no haptic hardware took part</span>
 <div class=facts>{''.join(facts)}</div>

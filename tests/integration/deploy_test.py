@@ -1,0 +1,132 @@
+"""The scripts under deploy/ where they were not made for: a moved checkout, another user's, two at a time."""
+import fcntl
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import unittest
+from pathlib import Path
+
+ROOT = Path(os.environ["OSTEON_SOURCE_DIR"])
+sys.path.insert(0, str(ROOT / "deploy/session"))
+
+import demo  # noqa: E402  (found through the path above)
+
+PRESETS = """{
+  "version": 5,
+  "configurePresets": [
+    { "name": "dev", "generator": "Ninja", "binaryDir": "${sourceDir}/build/dev" }
+  ],
+  "buildPresets": [
+    { "name": "dev", "configurePreset": "dev" }
+  ]
+}
+"""
+PROJECT = """cmake_minimum_required(VERSION 3.25)
+project(nothing LANGUAGES NONE)
+add_custom_target(built ALL COMMAND ${CMAKE_COMMAND} -E touch ${CMAKE_SOURCE_DIR}/built)
+"""
+NOBODY = 65534
+
+
+def ended(command, **options):
+    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, **options)
+
+
+class Checkout(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.parent = Path(folder.name)
+        self.parent.chmod(0o755)
+        self.checkout = self.parent / "osteon"
+        (self.checkout / "deploy").mkdir(parents=True)
+        for name in ("build", "environment.sh"):
+            shutil.copy(ROOT / "deploy" / name, self.checkout / "deploy")
+        (self.checkout / "CMakePresets.json").write_text(PRESETS, encoding="utf-8")
+        (self.checkout / "CMakeLists.txt").write_text(PROJECT, encoding="utf-8")
+
+    def test_one_that_was_moved_is_built_anew(self):
+        first = ended([self.checkout / "deploy/build"])
+        self.assertEqual(first.returncode, 0, first.stderr)
+        self.assertNotIn("moved", first.stdout)
+        moved = self.checkout.rename(self.parent / "elsewhere")
+        (moved / "built").unlink()
+        second = ended([moved / "deploy/build"])
+        self.assertEqual(second.returncode, 0, second.stderr)
+        self.assertIn("was moved", second.stdout)
+        self.assertTrue((moved / "built").exists())
+        self.assertNotIn("moved", ended([moved / "deploy/build"]).stdout)
+
+    def test_one_of_another_user_says_so_in_one_line(self):
+        if os.geteuid() != 0:
+            self.skipTest("only root can run a script as another user")
+        tried = ended([self.checkout / "deploy/build"], user=NOBODY, group=NOBODY, extra_groups=[])
+        self.assertEqual(tried.returncode, 1)
+        self.assertEqual(tried.stdout, "")
+        self.assertRegex(tried.stderr, r"\Adeploy/build: nobody cannot write into .*make your own clone\n\Z")
+        self.assertFalse((self.checkout / "build").exists())
+
+
+class Secrets(unittest.TestCase):
+    def test_git_ignores_those_of_the_security_chapter(self):
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run(["git", "init", "-q", folder], check=True)
+            shutil.copy(ROOT / ".gitignore", folder)
+            for name in ("certs/authority/tickets.key", "certs/people/anna/person.key", "anna.ticket"):
+                ignored = ended(["git", "-C", folder, "check-ignore", "-q", name])
+                self.assertEqual(ignored.returncode, 0, name)
+            kept = ended(["git", "-C", folder, "check-ignore", "-q", "deploy/certs"])
+            self.assertEqual(kept.returncode, 1, "the script of that name belongs to the project")
+
+
+class TwoDemos(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+
+    def test_the_second_leaves_the_folder_of_the_first_alone(self):
+        out = self.folder / "out"
+        out.mkdir()
+        (out / "report.html").write_text("of the first", encoding="utf-8")
+        command = [sys.executable, "-EB", ROOT / "deploy/session/demo.py", "--out", out, "--build", self.folder,
+                   "--case", self.folder]
+        with open(out / ".osteon-session", "w", encoding="utf-8") as first:
+            fcntl.flock(first, fcntl.LOCK_EX)
+            second = ended(command)
+        self.assertEqual(second.returncode, 1)
+        self.assertRegex(second.stderr, r"\Adeploy/demo: another demo writes into .*--out\n\Z")
+        self.assertEqual((out / "report.html").read_text(encoding="utf-8"), "of the first")
+
+    def test_a_folder_that_cannot_be_made_is_named(self):
+        (self.folder / "file").touch()
+        tried = ended([sys.executable, "-EB", ROOT / "deploy/session/demo.py", "--out", self.folder / "file/out",
+                       "--build", self.folder])
+        self.assertEqual(tried.returncode, 1)
+        self.assertRegex(tried.stderr, r"\Adeploy/demo: .*file.*: Not a directory\n\Z")
+
+    def test_both_import_the_same_files_once(self):
+        (self.folder / "bin").mkdir()
+        (self.folder / "ct").mkdir()
+        importer = self.folder / "bin/osteon-import"
+        importer.write_text("#!/bin/sh\necho run >>\"$0.runs\"\nsleep 0.3\nmkdir \"$4\"\n: >\"$4/case.json\"\n",
+                            encoding="utf-8")
+        importer.chmod(0o755)
+        root, demo.ROOT, found = demo.ROOT, self.folder, []
+        self.addCleanup(setattr, demo, "ROOT", root)
+        threads = [threading.Thread(target=lambda: found.append(
+            demo.prepare_case(self.folder / "ct", self.folder / "bin", []))) for _ in range(2)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(len(set(found)), 1)
+        self.assertTrue((found[0] / "case.json").exists())
+        self.assertEqual((self.folder / "bin/osteon-import.runs").read_text(encoding="utf-8"), "run\n")
+
+
+if __name__ == "__main__":
+    unittest.main()
