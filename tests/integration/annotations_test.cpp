@@ -81,8 +81,8 @@ class Annotations : public testing::Test {
 };
 
 TEST_F(Annotations, WhatOneDrawsTheOtherSeesUntilItIsWiped) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}),
-      ada(stage_.address(), *screen_, {"--name", "Ada"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--plain", "--name", "Dr. Berg"}),
+      ada(stage_.address(), *screen_, {"--plain", "--name", "Ada"});
   for (ScriptedViewer* viewer : {&berg, &ada}) ASSERT_TRUE(viewer->tell("wait surface"));
   ASSERT_TRUE(ada.tell(kFromAbove));
   const Photo bare = photo(ada, "bare.png");
@@ -110,7 +110,7 @@ TEST_F(Annotations, WhatOneDrawsTheOtherSeesUntilItIsWiped) {
 }
 
 TEST_F(Annotations, WhoComesLaterSeesWhatIsThere) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--plain", "--name", "Dr. Berg"});
   ASSERT_TRUE(berg.tell("wait surface"));
   ASSERT_TRUE(berg.tell("label 1 2 0 a nerve"));
   ASSERT_TRUE(berg.tell("point 3 4 0 look here"));
@@ -121,8 +121,8 @@ TEST_F(Annotations, WhoComesLaterSeesWhatIsThere) {
 }
 
 TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}),
-      ada(stage_.address(), *screen_, {"--name", "Ada"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--plain", "--name", "Dr. Berg"}),
+      ada(stage_.address(), *screen_, {"--plain", "--name", "Ada"});
   for (ScriptedViewer* viewer : {&berg, &ada}) ASSERT_TRUE(viewer->tell("wait surface"));
   const auto looks_from = [](double x, double y, double z) {
     return [=](const json& status) {
@@ -145,7 +145,7 @@ TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
   // moved.
   ASSERT_TRUE(ada.tell("follow off"));
   ASSERT_TRUE(berg.tell("look overview"));
-  ScriptedViewer other(stage_.address(), *screen_, {"--name", "other"});
+  ScriptedViewer other(stage_.address(), *screen_, {"--plain", "--name", "other"});
   ASSERT_TRUE(other.tell("wait surface"));
   EXPECT_TRUE(becomes(other, [&](const json&) {
     EXPECT_TRUE(other.tell("look as Dr. Berg"));
@@ -155,8 +155,8 @@ TEST_F(Annotations, OneFollowsWhereAnotherLooks) {
 }
 
 TEST_F(Annotations, WordsReachWhomTheyAreFor) {
-  ScriptedViewer berg(stage_.address(), *screen_, {"--name", "Dr. Berg"}),
-      ada(stage_.address(), *screen_, {"--name", "Ada"});
+  ScriptedViewer berg(stage_.address(), *screen_, {"--plain", "--name", "Dr. Berg"}),
+      ada(stage_.address(), *screen_, {"--plain", "--name", "Ada"});
   for (ScriptedViewer* viewer : {&berg, &ada}) ASSERT_TRUE(viewer->tell("wait surface"));
   const auto says = [](const std::string& text) {
     return [text](const json& status) { return status["said"].dump().find(text) != std::string::npos; };

@@ -40,10 +40,9 @@ class AuthenticatedPrograms : public ::testing::Test {
     return {"--certificates", people_.person(user), "--ticket", with};
   }
   // Starts an audio client that is refused. It must end with one sentence that gives the reason, and an exit code.
-  std::string turned_away(const std::vector<std::string>& by, ProcessOptions options = {}) {
-    const RunResult result =
-        run(program("osteon-audio"), plus({"--server", stage_.address(), "--output", "none", "--timeout", "1"}, by),
-            30s, std::move(options));
+  std::string turned_away(const std::vector<std::string>& by) {
+    const RunResult result = run(program("osteon-audio"),
+                                 plus({"--server", stage_.address(), "--output", "none", "--timeout", "1"}, by), 30s);
     EXPECT_NE(result.exit_code, 0) << result.out << result.err;
     EXPECT_FALSE(result.timed_out);
     const std::size_t last = result.err.rfind("osteon-audio: ");
@@ -84,8 +83,7 @@ TEST_F(AuthenticatedPrograms, AdmitWhoMayEnterAndKeepOthersFromDisturbingThem) {
                                                   credentials("ben", ticket("ben", "observer"))));
 
   // Without credentials, with plain text, and with the certificates of another authority.
-  EXPECT_THAT(turned_away({}, {.environment = {}, .without = {}, .folder = {}, .as_given = true}),
-              HasSubstr("--certificates DIR with --ticket FILE"));
+  EXPECT_THAT(turned_away({}), HasSubstr("--certificates DIR with --ticket FILE"));
   EXPECT_THAT(turned_away({"--plain"}), HasSubstr("asks for a certificate"));
   People strangers;
   EXPECT_THAT(turned_away({"--certificates", strangers.person("sue"), "--ticket", ticket("sue", "trainee")}),

@@ -91,7 +91,7 @@ std::string udp_port_of(Process& server) {
 BadNetworkRun run_on(const BadNetwork& network, std::uint64_t seed) {
   BadNetworkRun run;
   TempDir folder;
-  Stage stage(12.0, {"--journal", (folder / "room.journal").string()});
+  Stage stage(12.0, {"--plain", "--journal", (folder / "room.journal").string()});
   std::optional<ImpairProcess> relay;
   std::string address = stage.address(), fast_path = network.fast_path;
   if (!network.impairment.empty()) {

@@ -131,20 +131,21 @@ struct Breaker::Parts {
 
   // Each command that takes a journal. `to`: a path that does not exist.
   [[nodiscard]] std::vector<std::vector<std::string>> commands(const std::string& file, const std::string& to) const {
-    return {{"verify", file},
-            {"verify", file, "--case", stage.bone()},
-            {"salvage", file, to},
-            {"backup", file, to},
-            {"migrate", file, to},
-            {"branch", file, to},
-            {"replay", file, "--case", stage.bone()},
-            {"export", file, to},
-            {"people", file},
-            {"erase-person", file, "--older-than", "1"},
-            {"rename-room", file, "other"},
-            {"delete", file, "--alone"},
-            {"delete", file, "--branches"},
-            {"--case", stage.bone(), "--journal", file, "--signing-key", stage.key(), "--audit", stage.audit()}};
+    return {
+        {"verify", file},
+        {"verify", file, "--case", stage.bone()},
+        {"salvage", file, to},
+        {"backup", file, to},
+        {"migrate", file, to},
+        {"branch", file, to},
+        {"replay", file, "--case", stage.bone()},
+        {"export", file, to},
+        {"people", file},
+        {"erase-person", file, "--older-than", "1"},
+        {"rename-room", file, "other"},
+        {"delete", file, "--alone"},
+        {"delete", file, "--branches"},
+        {"--case", stage.bone(), "--plain", "--journal", file, "--signing-key", stage.key(), "--audit", stage.audit()}};
   }
 
   // A command of osteon-server that this test does not know. Empty: there is none.
@@ -438,7 +439,7 @@ bool Breaker::read_only(std::uint64_t seed) {
     if (verdict.fault.empty())
       verdict.fault = parts_->stage.check_export((to / "copy").string(), life.oracle, life.entries);
     const RunResult served =
-        parts_->stage.command({"--case", parts_->stage.bone(), "--journal", trial.file(), "--signing-key",
+        parts_->stage.command({"--case", parts_->stage.bone(), "--plain", "--journal", trial.file(), "--signing-key",
                                parts_->stage.key(), "--audit", parts_->stage.audit()},
                               10s);
     if (verdict.fault.empty() && (served.exit_code == 0 || served.timed_out))

@@ -110,7 +110,6 @@ fs::path BreakerStage::new_folder() const {
 }
 
 std::vector<std::string> BreakerStage::with_prefix(std::vector<std::string> arguments) const {
-  arguments = with_plain(program("osteon-server"), std::move(arguments));
   if (prefix_.empty()) return arguments;
   arguments.insert(arguments.begin(), program("osteon-server"));
   arguments.insert(arguments.begin(), prefix_.begin() + 1, prefix_.end());
@@ -128,8 +127,8 @@ Server BreakerStage::start(const fs::path& folder, const std::string& name, Proc
   Server server;
   server.process = std::make_unique<Process>(
       first(),
-      with_prefix({"--case", bone_, "--journal", (folder / (name + ".journal")).string(), "--signing-key", key(),
-                   "--audit", audit(), "--address-file", address.string(), "--drain-seconds", "0"}),
+      with_prefix({"--case", bone_, "--plain", "--journal", (folder / (name + ".journal")).string(), "--signing-key",
+                   key(), "--audit", audit(), "--address-file", address.string(), "--drain-seconds", "0"}),
       std::move(options));
   std::optional<std::string> line;
   (void)wait_until([&] { return (line = wait_for_address(address, 1ms)) || !server.process->running(); }, kPatience);

@@ -37,11 +37,17 @@ class Confirmed : public ::testing::Test {
   }
   Process drill(const std::string& name, const std::string& address, std::vector<std::string> more = {}) {
     std::ofstream(stage_ / (name + "-plan.json")) << json{{"steps", json::array({drill_at(0, 0, "rig")})}};
-    std::vector<std::string> arguments{"--server",  address,
-                                       "--plan",    stage_ / (name + "-plan.json"),
-                                       "--cut-log", stage_ / (name + "-cuts.csv"),
-                                       "--summary", stage_ / (name + ".json"),
-                                       "--cache",   stage_ / "cache"};
+    std::vector<std::string> arguments{"--server",
+                                       address,
+                                       "--plain",
+                                       "--plan",
+                                       stage_ / (name + "-plan.json"),
+                                       "--cut-log",
+                                       stage_ / (name + "-cuts.csv"),
+                                       "--summary",
+                                       stage_ / (name + ".json"),
+                                       "--cache",
+                                       stage_ / "cache"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return stage_.start("osteon-haptic", arguments);
   }
@@ -55,7 +61,7 @@ class Confirmed : public ::testing::Test {
     stage_.server().signal(SIGKILL);
     ASSERT_TRUE(stage_.server().wait(10s).has_value());
   }
-  void start_again() { stage_.start_server({"--journal", journal(), "--listen", stage_.address()}); }
+  void start_again() { stage_.start_server({"--plain", "--journal", journal(), "--listen", stage_.address()}); }
   // Sequence numbers of the hand's cuts, by their author sequence numbers. Only one hand has cut.
   std::map<std::uint64_t, std::uint64_t> seqs() {
     const fs::path lines = stage_ / "events.jsonl";
@@ -79,7 +85,7 @@ class Confirmed : public ::testing::Test {
   }
 
   TempDir folder_;
-  Stage stage_{16.0, {"--journal", journal()}};
+  Stage stage_{16.0, {"--plain", "--journal", journal()}};
 };
 
 // The room takes cuts whose acknowledgements are lost with the connection. It sends their sequence numbers when the

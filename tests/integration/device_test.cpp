@@ -25,6 +25,7 @@ class PhantomInRoom : public ::testing::Test {
   Process start(const Stage& stage, std::vector<std::string> more = {}) const {
     std::vector<std::string> all{"--server",
                                  stage.address(),
+                                 "--plain",
                                  "--device",
                                  "phantom",
                                  "--libhd",
@@ -160,8 +161,9 @@ TEST_F(PhantomInRoom, WaitsForItsUserWhereItMustBeCalibrated) {
 // Only the room knows which tools it has.
 TEST_F(PhantomInRoom, AToolThatTheRoomHasNotIsNamed) {
   const Stage stage(16.0);
-  Process haptic = stage.start("osteon-haptic", {"--server", stage.address(), "--device", "phantom", "--libhd",
-                                                 OSTEON_STAND_IN_HD, "--tool", "drill-99", "--cache", stage / "cache"});
+  Process haptic =
+      stage.start("osteon-haptic", {"--server", stage.address(), "--plain", "--device", "phantom", "--libhd",
+                                    OSTEON_STAND_IN_HD, "--tool", "drill-99", "--cache", stage / "cache"});
   ASSERT_EQ(haptic.wait(kPatience), 1) << haptic.err();
   EXPECT_THAT(haptic.err(), testing::HasSubstr("the room has no tool \"drill-99\"; choose one of"));
   EXPECT_EQ(arm_->is_open, 0);
@@ -179,8 +181,8 @@ TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
 
   const std::string recording = "recorded:" + (stage / "hand.h5").string();
   Process again = stage.start(
-      "osteon-haptic", {"--server", stage.address(), "--device", recording, "--tool", "drill-3.2", "--view", "top",
-                        "--at", "2,-3,0", "--summary", stage / "again.json", "--cache", stage / "cache"});
+      "osteon-haptic", {"--server", stage.address(), "--plain", "--device", recording, "--tool", "drill-3.2", "--view",
+                        "top", "--at", "2,-3,0", "--summary", stage / "again.json", "--cache", stage / "cache"});
   ASSERT_EQ(again.wait(kPatience), 0) << again.err();
   const auto summary = read_json(stage / "again.json");
   EXPECT_EQ(summary["device"], recording);
@@ -191,7 +193,7 @@ TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
 
 TEST_F(PhantomInRoom, WhatIsWrongIsSaidBeforeAServerIsLookedFor) {
   const auto said = [&](std::vector<std::string> more) {
-    std::vector<std::string> all{"--server", "127.0.0.1:1", "--timeout", "0"};
+    std::vector<std::string> all{"--server", "127.0.0.1:1", "--plain", "--timeout", "0"};
     all.insert(all.end(), more.begin(), more.end());
     const RunResult result = run(program("osteon-haptic"), all, 20s);
     EXPECT_EQ(result.exit_code, 1);

@@ -230,7 +230,6 @@ TEST_P(Pages, RunFromAnEmptyFolder) {
   options.environment.insert(options.environment.end(), {{"OSTEON_LIBHD", OSTEON_STAND_IN_HD},
                                                          {"OSTEON_PYTHON", OSTEON_PYTHON_PROGRAM},
                                                          {"XDG_CACHE_HOME", folder / "cache"}});
-  options.as_given = true;
   const RunResult done = run("bash", {folder / "commands.sh"}, 240s, options);
   EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
 }

@@ -53,10 +53,10 @@ class DrillingRoom : public testing::Test {
     auto screen = Xvfb::start("640x480");
     ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
     Stage stage;
-    ScriptedViewer viewer(stage.address(), *screen, {"--summary", stage / "viewer.json"});
-    Process audio =
-        stage.start("osteon-audio", {"--server", stage.address(), "--output", "none", "--wav", stage / "sound.wav",
-                                     "--state-log", stage / "states.csv", "--summary", stage / "audio.json"});
+    ScriptedViewer viewer(stage.address(), *screen, {"--plain", "--summary", stage / "viewer.json"});
+    Process audio = stage.start(
+        "osteon-audio", {"--server", stage.address(), "--plain", "--output", "none", "--wav", stage / "sound.wav",
+                         "--state-log", stage / "states.csv", "--summary", stage / "audio.json"});
     ASSERT_TRUE(viewer.tell("wait surface"));
     ASSERT_TRUE(viewer.tell("tool off"));
     const std::string look = "look at 0 0 -10 from 30 -40 60 up 0 0 1";
@@ -65,7 +65,7 @@ class DrillingRoom : public testing::Test {
 
     // A viewer and an audio client that are killed during the work.
     ScriptedViewer doomed_viewer(stage.address(), *screen);
-    Process doomed_audio = stage.start("osteon-audio", {"--server", stage.address(), "--output", "none"});
+    Process doomed_audio = stage.start("osteon-audio", {"--server", stage.address(), "--plain", "--output", "none"});
     ASSERT_TRUE(doomed_viewer.tell("wait surface"));
 
     const std::map<std::string, double> places{{"rig", -12.0}, {"expert", 0.0}, {"novice", 12.0}};
@@ -87,7 +87,7 @@ class DrillingRoom : public testing::Test {
     const auto seq = std::to_string(r.holes["novice"].summary.at("room_seq").get<std::uint64_t>());
     ASSERT_TRUE(viewer.tell("wait seq " + seq));
     ASSERT_TRUE(viewer.tell("screenshot " + (stage / "after.png").string()));
-    ScriptedViewer late(stage.address(), *screen, {"--summary", stage / "late.json"});
+    ScriptedViewer late(stage.address(), *screen, {"--plain", "--summary", stage / "late.json"});
     r.late_viewer_came = late.tell("wait surface") && late.tell("wait seq " + seq) && late.tell("tool off") &&
                          late.tell(look) && late.tell("screenshot " + (stage / "late.png").string());
     r.pictures_equal = bytes_of(stage / "after.png") == bytes_of(stage / "late.png");

@@ -36,8 +36,8 @@ TEST(Guided, ATremblingHandDrillsWhereTheGuideSays) {
   const TempDir kept;
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
-  Stage stage(30.0, {"--save", kept / "bone.vdb"});
-  ScriptedViewer viewer(stage.address(), *screen, {"--summary", stage / "viewer.json"});
+  Stage stage(30.0, {"--plain", "--save", kept / "bone.vdb"});
+  ScriptedViewer viewer(stage.address(), *screen, {"--plain", "--summary", stage / "viewer.json"});
   ASSERT_TRUE(viewer.tell("wait surface"));
   const json drill{{"action", "drill"}, {"tool", "drill-3.2"}, {"guide", true},        {"tremor_mm", 1.2},
                    {"hand", "expert"},  {"spindle_rpm", 1000}, {"feed_mm_per_s", 2.0}, {"beyond_mm", 3.0}};
@@ -110,7 +110,7 @@ Answer standing_of(const std::string& line) {
 // A demonstration is a session of the server's own, so nobody could ask it to leave.
 TEST(Demonstration, IsOverWhenTheServerIsToStop) {
   const TempDir kept;
-  Stage stage(16.0, {"--journal", kept / "room.journal", "--drain-seconds", "300"});
+  Stage stage(16.0, {"--plain", "--journal", kept / "room.journal", "--drain-seconds", "300"});
   constexpr std::uint64_t kCuts = 10;
   {
     Surgeon hand(stage.address(), stage / "cache");
@@ -147,7 +147,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
   }
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
-  Stage stage(70.0, {"--tools", tools / ""});
+  Stage stage(70.0, {"--plain", "--tools", tools / ""});
   ScriptedViewer viewer(stage.address(), *screen);
   ASSERT_TRUE(viewer.tell("wait surface"));
   const Vec3 into(0, 0, -1);
@@ -241,7 +241,7 @@ TEST(Scene, IsArrangedFromAViewersScript) {
 TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   const TempDir tools, kept;
   constexpr double kRadius_mm = 2.5;
-  Stage stage(16.0, {});
+  Stage stage(16.0, {"--plain"});
   ASSERT_EQ(stage.server().terminate(), 0);
   TriangleMesh ball;
   constexpr int kAround = 96, kRows = 48;
@@ -269,7 +269,7 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   std::ofstream(tools / "ball.yaml")
       << "name: ball-of-the-folder\ntitle: Ball\nkind: mesh\nmesh: ball.stl\nmesh_pitch_mm: 0.25\n"
          "spindle_rpm: 1000\nteeth: 4\nfeed_mm_per_rev: 1\ncut_level: 2\n";
-  stage.start_server({"--tools", tools / "", "--save", kept / "bone.vdb"});
+  stage.start_server({"--plain", "--tools", tools / "", "--save", kept / "bone.vdb"});
   {
     Surgeon hand(stage.address(), stage / "cache");
     ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
@@ -289,7 +289,7 @@ TEST(ToolFolder, ABallOfTrianglesCutsAsABallDoes) {
   EXPECT_NEAR(read_json(stage / "server.json").at("removed_mm3").get<double>(), whole, 0.02 * whole);
 
   // The file contains the tool. Without the tool's folder the bone is still usable, and the tool can cut it.
-  stage.start_server({"--resume", kept / "bone.vdb"});
+  stage.start_server({"--plain", "--resume", kept / "bone.vdb"});
   Surgeon resumed(stage.address(), stage / "cache");
   ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));
   EXPECT_TRUE(std::ranges::any_of(resumed.session().tools()->entries(),

@@ -22,9 +22,9 @@ using nlohmann::json;
 
 Process start_hand(const Stage& stage, const std::string& name, const json& steps) {
   std::ofstream(stage / (name + "-plan.json")) << json{{"steps", steps}};
-  return stage.start("osteon-haptic",
-                     {"--server", stage.address(), "--name", name, "--plan", stage / (name + "-plan.json"), "--summary",
-                      stage / (name + ".json"), "--record", stage / (name + ".h5"), "--cache", stage / "cache"});
+  return stage.start("osteon-haptic", {"--server", stage.address(), "--plain", "--name", name, "--plan",
+                                       stage / (name + "-plan.json"), "--summary", stage / (name + ".json"), "--record",
+                                       stage / (name + ".h5"), "--cache", stage / "cache"});
 }
 
 // Every 10th millisecond of a recording.
@@ -66,8 +66,7 @@ struct Place {
 };
 std::vector<Place> cuts_of(const std::filesystem::path& journal, const std::string& author) {
   const std::filesystem::path lines = journal.string() + "-" + author + ".jsonl";
-  const ProcessOptions as_given{.environment = {}, .without = {}, .folder = {}, .as_given = true};
-  EXPECT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s, as_given).exit_code, 0);
+  EXPECT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s).exit_code, 0);
   std::ifstream in(lines);
   std::vector<Place> places;
   for (std::string line; std::getline(in, line);) {
@@ -168,7 +167,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   // The hand is up to half a second behind, and its own hold keeps it aside.
   constexpr double kBehind_ms = 700.0, kWithin_mm = 1.5;
   TempDir folder;
-  Stage stage(40.0, {"--journal", (folder / "room.journal").string()});
+  Stage stage(40.0, {"--plain", "--journal", (folder / "room.journal").string()});
   const auto burr = [](double y_mm, double width_mm, double sweep_mm_per_s) {
     return json{{"action", "burr"},
                 {"tool", "burr-round-5"},
@@ -182,7 +181,8 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
   Process expert = start_hand(stage, "expert", json::array({burr(0.0, 24.0, 10.0)}));
   ASSERT_EQ(expert.wait(120s), 0) << expert.err();
 
-  Process console = stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"});
+  Process console =
+      stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--plain", "--name", "Ada"});
   const auto ask = [&](const std::string& command) {
     console.write(command + "\n");
     return console.read_line(60s).value_or("");
@@ -252,7 +252,8 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
 // next. For a named person they do.
 TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   Stage stage(24.0);
-  Process console = stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"});
+  Process console =
+      stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--plain", "--name", "Ada"});
   const auto ask = [&](const std::string& command) {
     console.write(command + "\n");
     return console.read_line(60s).value_or("");

@@ -16,7 +16,8 @@ using nlohmann::json;
 class Instructor {
  public:
   explicit Instructor(const Stage& stage)
-      : process_(stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", "Ada"})) {}
+      : process_(stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--plain", "--name", "Ada"})) {
+  }
   std::string ask(const std::string& command) {
     process_.write(command + "\n");
     return process_.read_line(60s).value_or("");
@@ -70,7 +71,7 @@ TEST(Held, AHandThatIsStartedAgain) {
 
 TEST(Held, AHandThatIsStartedAgainInAPersistedRoom) {
   const TempDir folder;
-  Stage stage(24.0, {"--journal", (folder / "room.journal").string()});
+  Stage stage(24.0, {"--plain", "--journal", (folder / "room.journal").string()});
   expect_held(stage);
 }
 

@@ -38,7 +38,7 @@ TEST(PersistedRooms, AHundredKilledServersLoseNothingTheyAcknowledged) {
 TEST(PersistedRooms, ARoomGoesOnWithAllThatCanBeUndone) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
-  Stage stage(12.0, {"--journal", file});
+  Stage stage(12.0, {"--plain", "--journal", file});
   std::string hash, uncut;
   {
     Surgeon hand(stage.address(), folder / "cache");
@@ -55,7 +55,7 @@ TEST(PersistedRooms, ARoomGoesOnWithAllThatCanBeUndone) {
     ASSERT_NE(hash, uncut);
   }
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
-  stage.start_server({"--journal", file});
+  stage.start_server({"--plain", "--journal", file});
   Surgeon late(stage.address(), folder / "cache");
   ASSERT_TRUE(wait_until([&] { return late.complete(); }, kPatience));
   EXPECT_EQ(wire::to_wire(late.hash()), hash);
@@ -73,7 +73,7 @@ TEST(PersistedRooms, ARoomGoesOnWithAllThatCanBeUndone) {
 // Output of `osteon-server rooms`. Empty if it fails.
 std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
   arguments.insert(arguments.begin(), "rooms");
-  arguments.insert(arguments.end(), {"--server", stage.address()});
+  arguments.insert(arguments.end(), {"--server", stage.address(), "--plain"});
   const RunResult result = run(program("osteon-server"), arguments, 60s);
   return result.exit_code == 0 ? result.out : "";
 }
@@ -82,7 +82,7 @@ std::string rooms(const Stage& stage, std::vector<std::string> arguments) {
 TEST(PersistedRooms, TheRoomsOfAKilledServerAreOpenAgain) {
   TempDir folder;
   const std::string kept = (folder / "rooms").string();
-  Stage stage(12.0, {"--rooms", kept});
+  Stage stage(12.0, {"--plain", "--rooms", kept});
   EXPECT_NE(rooms(stage, {"list"}).find("no rooms"), std::string::npos);
   for (const char* name : {"anna", "berta", "closed"})
     ASSERT_NE(rooms(stage, {"create", name}).find(name), std::string::npos);
@@ -104,7 +104,7 @@ TEST(PersistedRooms, TheRoomsOfAKilledServerAreOpenAgain) {
   ASSERT_NE(hashes["anna"], hashes["berta"]);
   stage.server().signal(SIGKILL);
   ASSERT_TRUE(stage.server().wait(10s).has_value());
-  stage.start_server({"--rooms", kept});
+  stage.start_server({"--plain", "--rooms", kept});
   const std::string list = rooms(stage, {"list"});
   for (const std::string name : {"anna", "berta"}) {
     EXPECT_NE(list.find(name + std::string(20 - name.size(), ' ') + " open, at event"), std::string::npos) << list;
@@ -121,7 +121,7 @@ TEST(PersistedRooms, TheRoomsOfAKilledServerAreOpenAgain) {
 TEST(PersistedRooms, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
   TempDir folder;
   const std::string file = (folder / "bone.vdb").string();
-  Stage stage(12.0, {"--save", file});
+  Stage stage(12.0, {"--plain", "--save", file});
   {
     Surgeon hand(stage.address(), folder / "cache");
     ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
@@ -141,10 +141,10 @@ TEST(PersistedRooms, TheServersOwnRoomIsSavedWhateverIsMadeBesideIt) {
 TEST(PersistedRooms, ARoomOfAFileOfItsOwnIsNotForOthersToDelete) {
   TempDir folder;
   const std::filesystem::path file = folder / "my room.2026.journal";
-  Stage stage(12.0, {"--journal", file.string()});
+  Stage stage(12.0, {"--plain", "--journal", file.string()});
   for (const char* what : {"delete", "close"}) {
     const RunResult refused =
-        run(program("osteon-server"), {"rooms", what, "my room.2026", "--server", stage.address()}, 30s);
+        run(program("osteon-server"), {"rooms", what, "my room.2026", "--server", stage.address(), "--plain"}, 30s);
     EXPECT_NE(refused.exit_code, 0);
     EXPECT_NE(refused.err.find("my room.2026.journal"), std::string::npos) << refused.err;
   }
@@ -180,7 +180,7 @@ TEST(PersistedRooms, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
   TempDir folder;
   const std::filesystem::path kept = folder / "kept", file = kept / "room.journal", to = folder / "new";
   std::filesystem::create_directory(kept);
-  Stage stage(12.0, {"--journal", file.string()});
+  Stage stage(12.0, {"--plain", "--journal", file.string()});
   Surgeon hand(stage.address(), folder / "cache");
   ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
   const auto cut = [&](std::uint64_t number) {
@@ -205,7 +205,7 @@ TEST(PersistedRooms, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
                                              {"erase-person", file, "--older-than", "1"},
                                              {"rename-room", file, "other"},
                                              {"delete", file, "--alone"},
-                                             {"--case", bone, "--journal", file}}) {
+                                             {"--case", bone, "--plain", "--journal", file}}) {
     const RunResult other = run(program("osteon-server"), command, 30s);
     EXPECT_NE(other.exit_code, 0) << command.front();
     EXPECT_NE(other.err.find("room.journal is in use by another process"), std::string::npos) << other.err;
@@ -228,7 +228,7 @@ TEST(PersistedRooms, AnotherProgramOnTheJournalOfARunningServerIsRefused) {
 TEST(PersistedRooms, ARoomIsServedOnlyUnderItsOwnName) {
   TempDir folder;
   const std::filesystem::path kept = folder / "rooms", a = kept / "anna.journal", b = kept / "berta.journal";
-  Stage stage(12.0, {"--rooms", kept.string()});
+  Stage stage(12.0, {"--plain", "--rooms", kept.string()});
   for (const char* name : {"anna", "berta"}) ASSERT_NE(rooms(stage, {"create", name}).find(name), std::string::npos);
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   std::filesystem::rename(a, folder / "aside");
@@ -236,16 +236,17 @@ TEST(PersistedRooms, ARoomIsServedOnlyUnderItsOwnName) {
   std::filesystem::rename(folder / "aside", b);
 
   const std::string bone = (stage / "case").string();
-  expect_refused({"--case", bone, "--journal", a.string()},
+  expect_refused({"--case", bone, "--plain", "--journal", a.string()},
                  {a.string() + " holds the room berta, not anna", "osteon-server rename-room " + a.string() + " anna"});
-  stage.start_server({"--rooms", kept.string()});
-  const RunResult opened = run(program("osteon-server"), {"rooms", "open", "anna", "--server", stage.address()}, 30s);
+  stage.start_server({"--plain", "--rooms", kept.string()});
+  const RunResult opened =
+      run(program("osteon-server"), {"rooms", "open", "anna", "--server", stage.address(), "--plain"}, 30s);
   EXPECT_NE(opened.exit_code, 0);
   EXPECT_NE((opened.err + stage.server().err()).find("holds the room berta, not anna"), std::string::npos)
       << opened.err;
   ASSERT_EQ(stage.server().terminate(), 0);
   EXPECT_EQ(run(program("osteon-server"), {"rename-room", a.string(), "anna"}, 30s).exit_code, 0);
-  stage.start_server({"--rooms", kept.string()});
+  stage.start_server({"--plain", "--rooms", kept.string()});
   const std::string list = rooms(stage, {"list"});
   EXPECT_NE(list.find("anna                 open"), std::string::npos) << list;
   EXPECT_NE(list.find("berta                closed"), std::string::npos) << list;
@@ -256,7 +257,7 @@ TEST(PersistedRooms, ARoomIsServedOnlyUnderItsOwnName) {
 TEST(PersistedRooms, InventedEventsAreSignedByNobody) {
   TempDir folder;
   const std::filesystem::path file = folder / "room.journal", key_file = folder / "signing.key";
-  Stage stage(12.0, {"--journal", file.string()});
+  Stage stage(12.0, {"--plain", "--journal", file.string()});
   {
     Surgeon hand(stage.address(), folder / "cache");
     ASSERT_TRUE(wait_until([&] { return hand.complete(); }, kPatience));
@@ -320,20 +321,21 @@ TEST(PersistedRooms, InventedEventsAreSignedByNobody) {
 TEST(PersistedRooms, SaysWhatIsWrongWithAJournal) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
-  Stage stage(12.0, {"--journal", file}), other(14.0);
+  Stage stage(12.0, {"--plain", "--journal", file}), other(14.0);
   const std::string bone = (stage / "case").string();
-  expect_refused({"--case", bone, "--journal", file}, {"room.journal", "in use"});
-  expect_refused({"--case", bone, "--journal", file, "--resume", "x.vdb"}, {"--journal", "--resume"});
-  expect_refused({"--case", bone, "--journal", file, "--rooms", "y"}, {"--journal", "--rooms"});
-  expect_refused({"--case", bone, "--case", bone}, {"--case", "--rooms"});
-  expect_refused({"--case", bone, "--rooms", (stage / "case" / "case.json").string()}, {"--rooms", "case.json"});
+  expect_refused({"--case", bone, "--plain", "--journal", file}, {"room.journal", "in use"});
+  expect_refused({"--case", bone, "--plain", "--journal", file, "--resume", "x.vdb"}, {"--journal", "--resume"});
+  expect_refused({"--case", bone, "--plain", "--journal", file, "--rooms", "y"}, {"--journal", "--rooms"});
+  expect_refused({"--case", bone, "--case", bone, "--plain"}, {"--case", "--rooms"});
+  expect_refused({"--case", bone, "--plain", "--rooms", (stage / "case" / "case.json").string()},
+                 {"--rooms", "case.json"});
   ASSERT_EQ(stage.server().terminate(), 0);
-  expect_refused({"--case", (other / "case").string(), "--journal", file},
+  expect_refused({"--case", (other / "case").string(), "--plain", "--journal", file},
                  {"room.journal", "case", "start the server with that case"});
   const std::string text = (folder / "notes.txt").string();
   std::ofstream(text) << "not a journal";
-  expect_refused({"--case", bone, "--journal", text}, {"notes.txt"});
-  expect_refused({"--case", bone, "--journal", (folder / "nowhere" / "room.journal").string()}, {"nowhere"});
+  expect_refused({"--case", bone, "--plain", "--journal", text}, {"notes.txt"});
+  expect_refused({"--case", bone, "--plain", "--journal", (folder / "nowhere" / "room.journal").string()}, {"nowhere"});
 }
 
 }  // namespace

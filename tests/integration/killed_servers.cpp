@@ -45,8 +45,8 @@ KilledServers kill_servers(int kills, std::uint64_t seed) {
   Random random(seed);
   TempDir folder;
   const std::filesystem::path file = folder / "room.journal";
-  Stage stage(kWidth_mm, {"--journal", file.string()});
-  const std::vector<std::string> again{"--journal", file.string(), "--listen", stage.address()};
+  Stage stage(kWidth_mm, {"--plain", "--journal", file.string()});
+  const std::vector<std::string> again{"--plain", "--journal", file.string(), "--listen", stage.address()};
   std::vector<std::unique_ptr<Hand>> hands;
   for (std::uint64_t i = 0; i < 2; ++i)
     hands.push_back(std::make_unique<Hand>(stage.address(), folder / "cache", seed * 2 + i));

@@ -31,8 +31,8 @@ TEST(Metal, IsLeftByRigAndServer) {
   const nlohmann::json plan{{"steps", nlohmann::json::array({step})}};
   std::ofstream(stage / "plan.json") << plan.dump(2);
   Process haptic = stage.start(
-      "osteon-haptic", {"--server", stage.address(), "--plan", stage / "plan.json", "--session-log", stage / "rig.csv",
-                        "--summary", stage / "rig.json", "--cache", stage / "cache", "--status"});
+      "osteon-haptic", {"--server", stage.address(), "--plain", "--plan", stage / "plan.json", "--session-log",
+                        stage / "rig.csv", "--summary", stage / "rig.json", "--cache", stage / "cache", "--status"});
   const auto code = haptic.wait(120s);
   ASSERT_TRUE(code);
   EXPECT_NE(*code, 0);

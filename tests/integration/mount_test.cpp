@@ -18,16 +18,21 @@ using nlohmann::json;
 Process start_hand(const Stage& stage, const std::string& name, const json& step, const std::string& address,
                    std::vector<std::string> more) {
   std::ofstream(stage / (name + "-plan.json")) << json{{"steps", json::array({step})}};
-  std::vector<std::string> arguments{"--server",  address,
-                                     "--plan",    stage / (name + "-plan.json"),
-                                     "--summary", stage / (name + ".json"),
-                                     "--cache",   stage / (name + "-cache")};
+  std::vector<std::string> arguments{"--server",
+                                     address,
+                                     "--plain",
+                                     "--plan",
+                                     stage / (name + "-plan.json"),
+                                     "--summary",
+                                     stage / (name + ".json"),
+                                     "--cache",
+                                     stage / (name + "-cache")};
   arguments.insert(arguments.end(), more.begin(), more.end());
   return stage.start("osteon-haptic", arguments);
 }
 
 TEST(Mount, TwoHandsPressOneBone) {
-  Stage stage(40.0, {"--compliant-mount"});
+  Stage stage(40.0, {"--plain", "--compliant-mount"});
   ImpairProcess line({"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
   ASSERT_FALSE(line.tcp().empty()) << line.process().err();
   ASSERT_EQ(line.command("delay 150 10"), "ok");

@@ -65,7 +65,8 @@ TEST(Operators, TheCommandLineWinsOverTheFile) {
   ASSERT_EQ(stage.server().terminate(), 0);
   write(stage / "server.yaml", "cases: nowhere\nsummary: of-the-file.json\naddress_file: here\nretention_days: 3\n");
   std::filesystem::remove(stage / "server.json");
-  stage.start_server({"--config", (stage / "server.yaml").string()});  // with --case, --summary and --address-file
+  // The stage gives --case, --summary and --address-file too.
+  stage.start_server({"--plain", "--config", (stage / "server.yaml").string()});
   ASSERT_EQ(stage.server().terminate(), 0) << stage.server().err();
   EXPECT_TRUE(std::filesystem::exists(stage / "server.json"));
   EXPECT_FALSE(std::filesystem::exists(stage / "of-the-file.json"));
@@ -75,10 +76,12 @@ TEST(Operators, TheCommandLineWinsOverTheFile) {
 TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
   TempDir temp;
   const std::string folder = (temp / "rooms").string();
-  Stage stage(12.0, {"--rooms", folder});
-  ASSERT_EQ(run(program("osteon-server"), {"rooms", "create", "anna", "--server", stage.address()}, 60s).exit_code, 0);
-  const std::vector<std::string> second{"--case", (stage / "case").string(), "--rooms",
-                                        folder,   "--address-file",          (stage / "address").string()};
+  Stage stage(12.0, {"--plain", "--rooms", folder});
+  ASSERT_EQ(
+      run(program("osteon-server"), {"rooms", "create", "anna", "--server", stage.address(), "--plain"}, 60s).exit_code,
+      0);
+  const std::vector<std::string> second{"--case",         (stage / "case").string(),   "--plain", "--rooms", folder,
+                                        "--address-file", (stage / "address").string()};
   const RunResult refused = run(program("osteon-server"), second, 60s);
   EXPECT_FALSE(refused.timed_out);
   EXPECT_NE(refused.exit_code, 0);
@@ -88,12 +91,14 @@ TEST(Operators, AFolderOfRoomsIsOneServersAndTheNextOnesOnceThatHasEnded) {
   // Commands on journals depend only on each journal, as before.
   const auto verify = [&] { return run(program("osteon-server"), {"verify", folder + "/anna.journal"}, 60s); };
   EXPECT_NE(verify().err.find("is in use by another process"), std::string::npos);
-  ASSERT_EQ(run(program("osteon-server"), {"rooms", "close", "anna", "--server", stage.address()}, 60s).exit_code, 0);
+  ASSERT_EQ(
+      run(program("osteon-server"), {"rooms", "close", "anna", "--server", stage.address(), "--plain"}, 60s).exit_code,
+      0);
   EXPECT_EQ(verify().exit_code, 0);
   // This also works after a server that could not report its end.
   stage.server().signal(SIGKILL);
   ASSERT_TRUE(stage.server().wait(60s).has_value());
-  stage.start_server({"--rooms", folder});
+  stage.start_server({"--plain", "--rooms", folder});
   EXPECT_EQ(stage.server().terminate(), 0);
 }
 
@@ -156,7 +161,7 @@ double value_of(const std::string& text, const std::string& line) {
 
 TEST(Operators, TheFiguresOfARoomAreThereForPrometheus) {
   TempDir folder;
-  Stage stage(12.0, {"--journal", (folder / "anna.journal").string(), "--metrics", "0"});
+  Stage stage(12.0, {"--plain", "--journal", (folder / "anna.journal").string(), "--metrics", "0"});
   ASSERT_TRUE(wait_until([&] { return !logged(stage.server(), "metrics", "address").empty(); }, kPatience));
   const std::string address = logged(stage.server(), "metrics", "address");
   EXPECT_EQ(address.find("127.0.0.1:"), 0u);
@@ -271,15 +276,19 @@ class OlderSession {
 
 TEST(Operators, HealthSaysWhatServesAndADrainLetsNobodyIn) {
   TempDir folder;
-  Stage stage(12.0, {"--rooms", (folder / "rooms").string(), "--drain-seconds", "300"});
+  Stage stage(12.0, {"--plain", "--rooms", (folder / "rooms").string(), "--drain-seconds", "300"});
   for (const char* name : {"anna", "berta"})
-    ASSERT_EQ(run(program("osteon-server"), {"rooms", "create", name, "--server", stage.address()}, 60s).exit_code, 0);
+    ASSERT_EQ(
+        run(program("osteon-server"), {"rooms", "create", name, "--server", stage.address(), "--plain"}, 60s).exit_code,
+        0);
   const auto channel = grpc::CreateChannel(stage.address(), grpc::InsecureChannelCredentials());
   EXPECT_EQ(health_of(channel, ""), 1);
   for (const char* name : {"anna", "berta"})
     EXPECT_TRUE(wait_until([&] { return health_of(channel, name) == 1; }, kPatience)) << name;
   EXPECT_EQ(health_of(channel, "nobody"), 0) << "a name that does not exist";
-  ASSERT_EQ(run(program("osteon-server"), {"rooms", "close", "berta", "--server", stage.address()}, 60s).exit_code, 0);
+  ASSERT_EQ(
+      run(program("osteon-server"), {"rooms", "close", "berta", "--server", stage.address(), "--plain"}, 60s).exit_code,
+      0);
   EXPECT_TRUE(wait_until([&] { return health_of(channel, "berta") == 2; }, kPatience));
   EXPECT_EQ(health_of(channel, "anna"), 1);
 
@@ -322,7 +331,7 @@ std::map<std::uint64_t, RoomSeq> kept_cuts(const std::filesystem::path& file, Au
 TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
   TempDir folder;
   const std::string file = (folder / "room.journal").string();
-  Stage stage(12.0, {"--journal", file});
+  Stage stage(12.0, {"--plain", "--journal", file});
   Hand hand(stage.address(), folder / "cache", 5);
   Surgeon& surgeon = hand.surgeon();
   ASSERT_TRUE(wait_until([&] { return surgeon.own() >= 30; }, kPatience));
@@ -342,7 +351,7 @@ TEST(Operators, AServerThatIsStoppedLosesNothingAndItsHandsComeBack) {
     EXPECT_EQ(entry->second, seq);
   }
 
-  stage.start_server({"--journal", file, "--listen", stage.address()});
+  stage.start_server({"--plain", "--journal", file, "--listen", stage.address()});
   ASSERT_TRUE(wait_until([&] { return surgeon.stands(); }, 60s)) << surgeon.lost();
   hand.rest();
   EXPECT_TRUE(wait_until([&] { return surgeon.own() >= hand.sent(); }, 60s));
@@ -402,7 +411,7 @@ TEST(Operators, AnOlderServersRefusalEndsTheClientWithBothVersions) {
   std::ofstream(folder / "plan.json")
       << nlohmann::json{{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}}.dump();
   const RunResult client =
-      run(program("osteon-haptic"), {"--server", server.address(), "--plan", folder / "plan.json"}, 60s);
+      run(program("osteon-haptic"), {"--server", server.address(), "--plain", "--plan", folder / "plan.json"}, 60s);
   EXPECT_EQ(client.exit_code, 1);
   EXPECT_NE(client.err.find("the client speaks protocol version 4 and the server protocol version 3; install"),
             std::string::npos)

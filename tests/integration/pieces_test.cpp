@@ -79,7 +79,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   const TempDir kept;
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen) << "Xvfb is needed; deploy/install installs it";
-  Stage stage(kWidth_mm, {"--tools", tools / "", "--save", kept / "bone.vdb"});
+  Stage stage(kWidth_mm, {"--plain", "--tools", tools / "", "--save", kept / "bone.vdb"});
   ScriptedViewer viewer(stage.address(), *screen);
   ASSERT_TRUE(viewer.tell("wait surface"));
   ASSERT_TRUE(viewer.tell("look at 0 0 0 from 60 -80 60 up 0 0 1"));
@@ -188,7 +188,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   EXPECT_EQ(first_run.at("field_hash"), to_hex(at_the_end));
   EXPECT_EQ(first_run.at("mesh_hash"), parted_hash);
   for (const char* file : {"bone.vdb", "asked-for.vdb"}) {
-    stage.start_server({"--tools", tools / "", "--resume", kept / file});
+    stage.start_server({"--plain", "--tools", tools / "", "--resume", kept / file});
     Surgeon resumed(stage.address(), stage / "cache");
     ASSERT_TRUE(wait_until([&] { return resumed.complete(); }, kPatience));
     EXPECT_EQ(resumed.hash(), at_the_end) << file;
@@ -204,11 +204,12 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
                 {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", stage / "other"})
                 .exit_code,
             0);
-  const RunResult refused = run(program("osteon-server"), {"--case", stage / "other", "--resume", kept / "bone.vdb"});
+  const RunResult refused =
+      run(program("osteon-server"), {"--case", stage / "other", "--plain", "--resume", kept / "bone.vdb"});
   EXPECT_GT(refused.exit_code, 0);
   EXPECT_NE(refused.err.find("bone.vdb"), std::string::npos) << refused.err;
   std::ofstream(tools / "broken.yaml") << "name: broken\n";
-  const RunResult broken = run(program("osteon-server"), {"--case", stage / "case", "--tools", tools / ""});
+  const RunResult broken = run(program("osteon-server"), {"--case", stage / "case", "--plain", "--tools", tools / ""});
   EXPECT_GT(broken.exit_code, 0);
   EXPECT_NE(broken.err.find("broken.yaml"), std::string::npos) << broken.err;
   // A folder is also refused if a tool names a force law that does not exist, or does not fit the tool.
@@ -217,7 +218,8 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   lawless.name = "lawless";
   lawless.law = "saw";
   std::ofstream(tools / "lawless.yaml") << to_yaml(lawless);
-  const RunResult unlawful = run(program("osteon-server"), {"--case", stage / "case", "--tools", tools / ""});
+  const RunResult unlawful =
+      run(program("osteon-server"), {"--case", stage / "case", "--plain", "--tools", tools / ""});
   EXPECT_GT(unlawful.exit_code, 0);
   for (const char* part : {"lawless.yaml", "\"law\"", "\"saw\" is not for a drill", "choose one of chi"})
     EXPECT_NE(unlawful.err.find(part), std::string::npos) << unlawful.err;

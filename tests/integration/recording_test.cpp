@@ -25,9 +25,17 @@ class RecordedRoom : public testing::Test {
     step["feed_mm_per_s"] = 4.0;
     const auto plan = stage / (name + "-plan.json");
     std::ofstream(plan) << json{{"steps", json::array({step})}};
-    return {"--server",  stage.address(),          "--plan",  plan,
-            "--summary", stage / (name + ".json"), "--cache", stage / "cache",
-            "--record",  stage / (name + ".h5")};
+    return {"--server",
+            stage.address(),
+            "--plain",
+            "--plan",
+            plan,
+            "--summary",
+            stage / (name + ".json"),
+            "--cache",
+            stage / "cache",
+            "--record",
+            stage / (name + ".h5")};
   }
   // Result of a Python expression on a recording `f`, as JSON.
   static json ask(const std::filesystem::path& file, const std::string& expression) {
@@ -66,7 +74,7 @@ TEST_F(RecordedRoom, HoldsEveryTickAndIsPlayedAgainInAnotherRoom) {
               thrust_n, 0.06 * thrust_n);
   EXPECT_EQ(stage.server().terminate(), 0);
 
-  stage.start_server({});
+  stage.start_server({"--plain"});
   std::vector<std::string> again = arguments(stage, "again", 0.0);
   again.insert(again.end(), {"--device", "recorded:" + file.string()});
   Process replay = stage.start("osteon-haptic", again);
@@ -108,7 +116,7 @@ TEST_F(RecordedRoom, OfAKilledClientCanBeReadAndPlayedToWhereItEnds) {
             1);
   EXPECT_EQ(stage.server().terminate(), 0);
 
-  stage.start_server({});
+  stage.start_server({"--plain"});
   std::vector<std::string> again = arguments(stage, "again", 0.0);
   again.insert(again.end(), {"--device", "recorded:" + file.string()});
   Process replay = stage.start("osteon-haptic", again);
@@ -143,8 +151,8 @@ TEST_F(RecordedRoom, OnAFullDiskTheSessionGoesOn) {
   const Stage stage(24.0);
   // The case is fetched first, while files may still be large.
   std::ofstream(stage / "wait.json") << json{{"steps", json::array({{{"action", "wait"}, {"seconds", 0.1}}})}};
-  Process first = stage.start("osteon-haptic",
-                              {"--server", stage.address(), "--plan", stage / "wait.json", "--cache", stage / "cache"});
+  Process first = stage.start("osteon-haptic", {"--server", stage.address(), "--plain", "--plan", stage / "wait.json",
+                                                "--cache", stage / "cache"});
   ASSERT_EQ(first.wait(60s), 0) << first.err();
   // Files may not grow beyond 400 kB. The signal of this limit is ignored, so writing fails as on a full disk.
   const std::string command = "trap '' XFSZ; ulimit -f 800; exec \"$@\"";
@@ -166,7 +174,7 @@ TEST_F(RecordedRoom, APlaceThatCannotBeWrittenOrReadIsSaidAtOnce) {
   const TempDir temp;
   std::ofstream(temp / "plan.json") << json{{"steps", json::array({{{"action", "wait"}, {"seconds", 0.1}}})}};
   const auto said = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> all{"--server", "127.0.0.1:1", "--plan", temp / "plan.json"};
+    std::vector<std::string> all{"--server", "127.0.0.1:1", "--plain", "--plan", temp / "plan.json"};
     all.insert(all.end(), more.begin(), more.end());
     const RunResult result = run(program("osteon-haptic"), all, 20s);
     EXPECT_EQ(result.exit_code, 1);

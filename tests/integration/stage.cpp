@@ -92,9 +92,9 @@ Process Stage::start(const std::string& name, std::vector<std::string> arguments
 Process Stage::start_haptic(const std::string& name, const nlohmann::json& plan, const std::string& person) const {
   const auto plan_file = temp_ / (name + "-plan.json");
   std::ofstream(plan_file) << plan.dump(2);
-  return start("osteon-haptic", {"--server", address_, "--name", person, "--plan", plan_file, "--session-log",
-                                 temp_ / (name + ".csv"), "--cut-log", temp_ / (name + "-cuts.csv"), "--summary",
-                                 temp_ / (name + ".json"), "--cache", temp_ / "cache"});
+  return start("osteon-haptic", {"--server", address_, "--plain", "--name", person, "--plan", plan_file,
+                                 "--session-log", temp_ / (name + ".csv"), "--cut-log", temp_ / (name + "-cuts.csv"),
+                                 "--summary", temp_ / (name + ".json"), "--cache", temp_ / "cache"});
 }
 
 nlohmann::json drill_at(double x_mm, double y_mm, const std::string& hand) {

@@ -27,7 +27,8 @@ struct Table {
 // A viewer that is controlled by lines of commands.
 class ScriptedViewer {
  public:
-  ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {});
+  // Runs `osteon-viewer --server ADDRESS --size 640x480 --script - MORE`.
+  ScriptedViewer(const std::string& address, const Xvfb& screen, std::vector<std::string> more = {"--plain"});
   // Sends a command and waits for the answering line. Empty if none comes.
   [[nodiscard]] std::string ask(const std::string& command,
                                 std::chrono::milliseconds patience = std::chrono::seconds{60});
@@ -39,23 +40,27 @@ class ScriptedViewer {
   Process process_;
 };
 
+// A folder with a case, and a server of that case.
 class Stage {
  public:
-  // Imports the layered block (5, 20, 5 mm) and starts a server on it.
-  explicit Stage(double width_mm = 40.0, std::vector<std::string> server_arguments = {});
+  // Runs `osteon-import phantom block --layers 5:1.9,20:0.3,5:1.9 --width WIDTH --pitch 0.5 --out case`, then
+  // start_server().
+  explicit Stage(double width_mm = 40.0, std::vector<std::string> server_arguments = {"--plain"});
   // Does the same with a case that `make_case` writes to the given folder.
   explicit Stage(const std::function<void(const std::filesystem::path&)>& make_case,
-                 std::vector<std::string> server_arguments = {});
+                 std::vector<std::string> server_arguments = {"--plain"});
 
   [[nodiscard]] const std::string& address() const { return address_; }
   [[nodiscard]] std::filesystem::path operator/(const std::string& name) const { return temp_ / name; }
   [[nodiscard]] Process& server() { return *server_; }
-  // Starts another server on the same case after the first has ended. The stage's address changes to the new server's.
+  // Runs `osteon-server --case case --address-file address --summary server.json MORE` in the stage's folder, once the
+  // server before has ended. The stage's address changes to the new server's.
   void start_server(std::vector<std::string> more);
   [[nodiscard]] Process start(const std::string& name, std::vector<std::string> arguments,
                               ProcessOptions options = {}) const;
-  // Starts a haptic client that carries out a plan and leaves NAME.csv, NAME-cuts.csv and NAME.json. It runs for a
-  // named person or for an unknown one.
+  // Writes the plan to NAME-plan.json, then runs `osteon-haptic --server ADDRESS --plain --name PERSON --plan
+  // NAME-plan.json --session-log NAME.csv --cut-log NAME-cuts.csv --summary NAME.json --cache cache` in the stage's
+  // folder. An empty `person` is an unknown one.
   [[nodiscard]] Process start_haptic(const std::string& name, const nlohmann::json& plan,
                                      const std::string& person = {}) const;
 

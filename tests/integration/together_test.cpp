@@ -18,7 +18,7 @@ using nlohmann::json;
 class ConsoleProcess {
  public:
   ConsoleProcess(const Stage& stage, const std::string& name)
-      : process_(stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--name", name})) {}
+      : process_(stage.start("osteon-viewer", {"--console", "--server", stage.address(), "--plain", "--name", name})) {}
   std::string ask(const std::string& command) {
     process_.write(command + "\n");
     return process_.read_line(60s).value_or("");
@@ -137,7 +137,7 @@ json plan_at(double x_mm) {
 TEST(Together, AnInstructorsWordHoldsForEveryHand) {
   TempDir folder;
   const std::string journal = (folder / "room.journal").string();
-  Stage stage(40.0, {"--journal", journal});
+  Stage stage(40.0, {"--plain", "--journal", journal});
   ConsoleProcess console(stage, "Ada Instructor");
   ASSERT_TRUE(console.ask("people").starts_with("ok 1 people")) << console.process().err();
 
@@ -249,10 +249,7 @@ TEST(Together, AnInstructorsWordHoldsForEveryHand) {
 
   // The journal agrees: no cut of the hand while it was stopped, or without its tool.
   const std::string lines = (folder / "room.jsonl").string();
-  ASSERT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s,
-                {.environment = {}, .without = {}, .folder = {}, .as_given = true})
-                .exit_code,
-            0);
+  ASSERT_EQ(run(program("osteon-server"), {"export", journal, lines}, 60s).exit_code, 0);
   std::ifstream in(lines);
   std::size_t others = 0, decisions = 0;
   for (std::string line; std::getline(in, line);) {

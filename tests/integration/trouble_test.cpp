@@ -72,21 +72,23 @@ TEST(Trouble, WithoutAServerEveryClientSaysSo) {
   const std::string nobody = deserted_address();
   write_plan(temp / "plan.json");
   expect_one_sentence(
-      run(program("osteon-haptic"), {"--server", nobody, "--plan", temp / "plan.json", "--timeout", "1"}),
+      run(program("osteon-haptic"), {"--server", nobody, "--plain", "--plan", temp / "plan.json", "--timeout", "1"}),
       "osteon-haptic", {nobody, "osteon-server"});
-  expect_one_sentence(run(program("osteon-audio"), {"--server", nobody, "--output", "none", "--timeout", "1"}),
-                      "osteon-audio", {nobody, "osteon-server"});
+  expect_one_sentence(
+      run(program("osteon-audio"), {"--server", nobody, "--plain", "--output", "none", "--timeout", "1"}),
+      "osteon-audio", {nobody, "osteon-server"});
   const auto screen = Xvfb::start();
   ASSERT_TRUE(screen);
-  expect_one_sentence(run(program("osteon-viewer"), {"--server", nobody, "--timeout", "1"}, 60s, screen->options()),
-                      "osteon-viewer", {nobody, "osteon-server"});
+  expect_one_sentence(
+      run(program("osteon-viewer"), {"--server", nobody, "--plain", "--timeout", "1"}, 60s, screen->options()),
+      "osteon-viewer", {nobody, "osteon-server"});
 }
 
 TEST(Trouble, AViewerWithoutADisplaySaysHowToGetOne) {
   ProcessOptions blind;
   blind.without = {"DISPLAY", "WAYLAND_DISPLAY"};
-  expect_one_sentence(run(program("osteon-viewer"), {"--server", deserted_address()}, 60s, blind), "osteon-viewer",
-                      {"DISPLAY"});
+  expect_one_sentence(run(program("osteon-viewer"), {"--server", deserted_address(), "--plain"}, 60s, blind),
+                      "osteon-viewer", {"DISPLAY"});
 }
 
 TEST(Trouble, AServerNamesThePortThatIsInUse) {
@@ -96,7 +98,7 @@ TEST(Trouble, AServerNamesThePortThatIsInUse) {
                 .exit_code,
             0);
   const ListeningSocket taken;
-  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--listen", taken.address()}),
+  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--plain", "--listen", taken.address()}),
                       "osteon-server", {taken.address()});
 }
 
@@ -106,14 +108,14 @@ TEST(Trouble, AServerListensToThisMachineOnly) {
                 {"phantom", "block", "--layers", "5:1.9", "--width", "8", "--pitch", "1", "--out", temp / "case"})
                 .exit_code,
             0);
-  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--listen", "0.0.0.0:0"}),
+  expect_one_sentence(run(program("osteon-server"), {"--case", temp / "case", "--plain", "--listen", "0.0.0.0:0"}),
                       "osteon-server", {"0.0.0.0"});
 }
 
 TEST(Trouble, AServerRefusesWhatIsNotACase) {
   const TempDir temp;
   const auto serve = [&](const std::string& folder) {
-    return run(program("osteon-server"), {"--case", temp / folder});
+    return run(program("osteon-server"), {"--case", temp / folder, "--plain"});
   };
   expect_one_sentence(serve("nothing"), "osteon-server", {"nothing", "osteon-import"});
   std::filesystem::create_directory(temp / "empty");
@@ -136,10 +138,11 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   const auto with_plan = [&](const std::string& text) {
     std::ofstream(temp / "plan.json") << text;
     return run(program("osteon-haptic"),
-               {"--server", deserted_address(), "--plan", temp / "plan.json", "--timeout", "1"});
+               {"--server", deserted_address(), "--plain", "--plan", temp / "plan.json", "--timeout", "1"});
   };
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}),
-                      "osteon-haptic", {"missing.json"});
+  expect_one_sentence(
+      run(program("osteon-haptic"), {"--server", deserted_address(), "--plain", "--plan", temp / "missing.json"}),
+      "osteon-haptic", {"missing.json"});
   expect_one_sentence(with_plan("{"), "osteon-haptic", {"plan.json"});
   expect_one_sentence(with_plan(R"({"steps":[{"action":"saw"}]})"), "osteon-haptic", {"plan.json", "action"});
   // For a misspelt word the message gives the word that could be meant.
@@ -155,14 +158,15 @@ TEST(Trouble, AHapticClientNamesWhatIsWrongWithItsPlan) {
   const RunResult far = drill("", R"({"toward":[1e300,0,1]})");
   expect_one_sentence(far, "osteon-haptic", {"toward", "from -100000 to 100000"});
   EXPECT_LT(far.err.size(), 300u);
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plan", temp / "missing.json"}),
-                      "osteon-haptic", {"--plan: "});
+  expect_one_sentence(
+      run(program("osteon-haptic"), {"--server", deserted_address(), "--plain", "--plan", temp / "missing.json"}),
+      "osteon-haptic", {"--plan: "});
 }
 
 TEST(Trouble, AnAddressThatIsNoneIsSaidWithOneThatIs) {
   const TempDir temp;
   write_plan(temp / "plan.json");
-  expect_one_sentence(run(program("osteon-haptic"), {"--server", "nonsense", "--plan", temp / "plan.json"}),
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", "nonsense", "--plain", "--plan", temp / "plan.json"}),
                       "osteon-haptic", {"nonsense is not HOST:PORT", "osteon-server prints"});
 }
 
@@ -171,8 +175,8 @@ TEST(Trouble, WhatAPlanSaysItselfIsRefusedBesideIt) {
   const TempDir temp;
   write_plan(temp / "plan.json");
   const auto beside = [&](const std::string& option, const std::string& value) {
-    return run(program("osteon-haptic"),
-               {"--server", deserted_address(), "--timeout", "0", "--plan", temp / "plan.json", option, value});
+    return run(program("osteon-haptic"), {"--server", deserted_address(), "--plain", "--timeout", "0", "--plan",
+                                          temp / "plan.json", option, value});
   };
   for (const auto& [option, value] : {std::pair<std::string, std::string>{"--wear", "1"},
                                       {"--view", "front"},
@@ -197,15 +201,16 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
       << "name: my-drill\ntitle: My drill\nkind: drill\ndiameter_mm: 4\ncutting_length_mm: 40\n"
          "point_angle_deg: 118\nshank_diameter_mm: 4\nshank_length_mm: 40\nspindle_rpm: 1000\n"
          "teeth: 2\nfeed_mm_per_rev: 0.05\ncut_level: 2\nlaw: allotta\n";
-  Stage stage(16.0, {"--tools", tools.path()});
+  Stage stage(16.0, {"--plain", "--tools", tools.path()});
   nlohmann::json step = drill_at(0, 0, "rig");
   step["tool"] = "my-drill";
   step["feed_mm_per_s"] = 4.0;
   step["to_mm"] = 5.0;
   const auto plan = stage / "own.json";
   std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
-  Process own = stage.start("osteon-haptic", {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache",
-                                              "--summary", stage / "own-summary.json", "--record", stage / "own.h5"});
+  Process own =
+      stage.start("osteon-haptic", {"--server", stage.address(), "--plain", "--plan", plan, "--cache", stage / "cache",
+                                    "--summary", stage / "own-summary.json", "--record", stage / "own.h5"});
   ASSERT_EQ(own.wait(60s), 0) << own.err();
   auto summary = read_json(stage / "own-summary.json");
   EXPECT_EQ(summary["steps"][0]["tool"], "my-drill");
@@ -217,7 +222,8 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
 
   const auto refused = [&](const nlohmann::json& wrong) {
     std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({wrong})}}.dump();
-    return run(program("osteon-haptic"), {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache"});
+    return run(program("osteon-haptic"),
+               {"--server", stage.address(), "--plain", "--plan", plan, "--cache", stage / "cache"});
   };
   step["tool"] = "drill-99";
   expect_one_sentence(refused(step), "osteon-haptic", {"own.json", "step 1", "drill-99", "my-drill"});
@@ -230,8 +236,8 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
   step.erase("law");
   const auto played = [&](const nlohmann::json& with) {
     std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({with})}}.dump();
-    return run(program("osteon-haptic"),
-               {"--server", stage.address(), "--plan", plan, "--cache", stage / "cache", "--device", recorded});
+    return run(program("osteon-haptic"), {"--server", stage.address(), "--plain", "--plan", plan, "--cache",
+                                          stage / "cache", "--device", recorded});
   };
   step["tool"] = "drill-3.2";
   expect_one_sentence(played(step), "osteon-haptic", {"my-drill, not with drill-3.2"});
@@ -243,13 +249,13 @@ TEST(Trouble, AToolOfTheRoomsOwnIsTakenIntoTheHandAndAnUnknownOneNamed) {
                                            "--title", "Other", "--out", stage / "other"})
                 .exit_code,
             0);
-  Process other = stage.start(
-      "osteon-server", {"--case", stage / "other", "--tools", tools.path(), "--address-file", stage / "other-address"});
+  Process other = stage.start("osteon-server", {"--case", stage / "other", "--plain", "--tools", tools.path(),
+                                                "--address-file", stage / "other-address"});
   const auto address = wait_for_address(stage / "other-address", 60s);
   ASSERT_TRUE(address) << other.err();
   std::ofstream(plan) << nlohmann::json{{"steps", nlohmann::json::array({step})}}.dump();
-  expect_one_sentence(run(program("osteon-haptic"),
-                          {"--server", *address, "--plan", plan, "--cache", stage / "cache", "--device", recorded}),
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", *address, "--plain", "--plan", plan, "--cache",
+                                                     stage / "cache", "--device", recorded}),
                       "osteon-haptic", {"another bone"});
 }
 
@@ -283,8 +289,9 @@ TEST(Trouble, AHandWithoutRealTimePriorityIsWarned) {
   // Root always may, unless the limit is taken from it.
   std::vector<std::string> line{"--rtprio=0"};
   if (::geteuid() == 0) line.insert(line.end(), {"setpriv", "--bounding-set", "-sys_nice"});
-  line.insert(line.end(), {program("osteon-haptic"), "--server", stage.address(), "--plan", stage / "plan.json",
-                           "--cache", stage / "cache", "--summary", stage / "summary.json", "--plain"});
+  line.insert(line.end(),
+              {program("osteon-haptic"), "--server", stage.address(), "--plain", "--plan", stage / "plan.json",
+               "--cache", stage / "cache", "--summary", stage / "summary.json", "--plain"});
   Process haptic("/usr/bin/prlimit", line);
   ASSERT_EQ(haptic.wait(60s), 0) << haptic.err();
   EXPECT_EQ(read_json(stage / "summary.json")["loop"]["realtime"], false);
@@ -308,8 +315,8 @@ TEST(Trouble, ACheckThatMissedTicksDoesNotSayThatNothingIsLacking) {
 TEST(Trouble, ADeviceThatIsNotThereIsNamed) {
   const TempDir temp;
   write_plan(temp / "plan.json");
-  expect_one_sentence(run(program("osteon-haptic"),
-                          {"--server", deserted_address(), "--plan", temp / "plan.json", "--device", "phantom"}),
+  expect_one_sentence(run(program("osteon-haptic"), {"--server", deserted_address(), "--plain", "--plan",
+                                                     temp / "plan.json", "--device", "phantom"}),
                       "osteon-haptic", {"phantom", "simulated"});
 }
 
@@ -318,8 +325,8 @@ void expect_all_notice(int signal) {
   Stage stage(16.0);
   const auto screen = Xvfb::start("640x480");
   ASSERT_TRUE(screen);
-  Process audio =
-      stage.start("osteon-audio", {"--server", stage.address(), "--output", "none", "--summary", stage / "audio.json"});
+  Process audio = stage.start(
+      "osteon-audio", {"--server", stage.address(), "--plain", "--output", "none", "--summary", stage / "audio.json"});
   ScriptedViewer viewer(stage.address(), *screen);
   ASSERT_TRUE(viewer.tell("wait surface"));
   Process haptic = stage.start_haptic("work", {{"steps", nlohmann::json::array({drill_at(0, 0, "rig")})}});

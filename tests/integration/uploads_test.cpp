@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 
 class Uploads : public ::testing::Test {
  protected:
-  Uploads() : stage_(16.0, {"--rooms", rooms_.path(), "--uploads", uploads_.path()}) {
+  Uploads() : stage_(16.0, {"--plain", "--rooms", rooms_.path(), "--uploads", uploads_.path()}) {
     const RunResult imported = run(program("osteon-import"),
                                    {"phantom", "block", "--layers", "6:1.2", "--width", "10", "--pitch", "0.5",
                                     "--title", "A block from elsewhere", "--out", stage_ / "other"},
@@ -45,7 +45,7 @@ TEST_F(Uploads, ACaseIsSentAndGetsARoomAndIsThereAfterARestart) {
   EXPECT_NE(ask("rooms", {"list"}).out.find("elsewhere"), std::string::npos);
 
   EXPECT_EQ(stage_.server().terminate(), 0) << stage_.server().err();
-  stage_.start_server({"--rooms", rooms_.path(), "--uploads", uploads_.path()});
+  stage_.start_server({"--plain", "--rooms", rooms_.path(), "--uploads", uploads_.path()});
   const RunResult again = ask("rooms", {"list"});
   EXPECT_NE(again.out.find("elsewhere"), std::string::npos) << again.out << stage_.server().err();
 }

@@ -235,7 +235,7 @@ struct Setting {
 
 json measure(const Setting& setting, int count, int stalled) {
   const TempDir temp;
-  Process server(setting.server_program, {"--case", setting.case_folder, "--address-file", temp / "address",
+  Process server(setting.server_program, {"--case", setting.case_folder, "--plain", "--address-file", temp / "address",
                                           "--summary", temp / "summary.json"});
   const auto address = wait_for_address(temp / "address", 120s);
   OSTEON_CHECK(address.has_value());

@@ -75,7 +75,7 @@ class Instructor {
 
 json run_line(const Line& line, int times) {
   TempDir folder;
-  Stage stage(40.0, {"--journal", (folder / "room.journal").string()});
+  Stage stage(40.0, {"--plain", "--journal", (folder / "room.journal").string()});
   ImpairProcess relay({"--tcp", stage.address(), "--udp", "127.0.0.1:" + udp_port_of(stage.server())});
   RoomSessionOptions options;
   options.address = relay.tcp();

@@ -106,7 +106,7 @@ std::map<std::string, std::uint64_t> journal_bytes(const fs::path& folder) {
 json run_tool(const BadNetwork& network, double seconds) {
   TempDir folder;
   fs::create_directories(folder / "kept");
-  Stage stage(40.0, {"--journal", (folder / "kept" / "room.journal").string()});
+  Stage stage(40.0, {"--plain", "--journal", (folder / "kept" / "room.journal").string()});
   std::optional<ImpairProcess> relay;
   RoomSessionOptions options;
   options.address = stage.address();

@@ -5,7 +5,6 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <csignal>
@@ -109,19 +108,9 @@ struct Process::State {
   }
 };
 
-std::vector<std::string> with_plain(const std::filesystem::path& program, std::vector<std::string> arguments) {
-  const auto has = [&](std::string_view option) { return std::ranges::find(arguments, option) != arguments.end(); };
-  const std::string name = program.filename();
-  if (!name.starts_with("osteon-") || has("--plain") || has("--certificates") || has("--check")) return arguments;
-  const bool serves =
-      name == "osteon-server" && !arguments.empty() && (arguments[0] == "--case" || arguments[0] == "--config");
-  if (serves || has("--server")) arguments.emplace_back("--plain");
-  return arguments;
-}
-
-Process::Process(const std::filesystem::path& program, const std::vector<std::string>& given, ProcessOptions options)
+Process::Process(const std::filesystem::path& program, const std::vector<std::string>& arguments,
+                 ProcessOptions options)
     : state_(std::make_unique<State>()) {
-  const std::vector<std::string> arguments = options.as_given ? given : with_plain(program, given);
   std::vector<std::string> argument_texts{program.string()};
   argument_texts.insert(argument_texts.end(), arguments.begin(), arguments.end());
   std::vector<std::string> environment_texts = child_environment(options);

@@ -16,13 +16,7 @@ struct ProcessOptions {
   std::vector<std::pair<std::string, std::string>> environment;  // set on top of the test's own
   std::vector<std::string> without;                              // variables that the child must not see
   std::filesystem::path folder;                                  // working folder; empty: the test's own
-  bool as_given = false;                                         // do not add --plain as with_plain() does
 };
-
-// Appends --plain to the arguments if the program is one of Osteon that serves rooms or connects to a server, and the
-// arguments do not say how.
-[[nodiscard]] std::vector<std::string> with_plain(const std::filesystem::path& program,
-                                                  std::vector<std::string> arguments);
 
 class Process {
  public:

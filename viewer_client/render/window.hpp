@@ -1,8 +1,6 @@
 // One window with the bone, the tools and a line of gauges. It hides VTK from the rest of the program. All functions:
 // [render], the thread that opened the window.
 #pragma once
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -15,6 +13,8 @@
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/annotation.hpp"
 #include "common/tools/scene_item.hpp"
+#include "viewer_client/render/image.hpp"
+#include "viewer_client/render/window_input.hpp"
 #include "viewer_client/scene/camera_view.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
 
@@ -24,27 +24,6 @@ struct WindowOptions {
   int width_px = 1280;
   int height_px = 720;
   std::string title = "Osteon";
-};
-
-// Pixels as they are seen; rows from the top.
-struct Image {
-  int width_px = 0;
-  int height_px = 0;
-  std::vector<std::array<std::uint8_t, 3>> rgb;
-  [[nodiscard]] const std::array<std::uint8_t, 3>& at(int x, int y) const {
-    return rgb[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_px) + static_cast<std::size_t>(x)];
-  }
-};
-
-// The user's actions in the window since the last call of events().
-struct WindowEvents {
-  bool closed = false;
-  bool redraw = false;          // the camera moved, or the window was uncovered or resized
-  bool wants_overview = false;  // key O
-  bool wants_tool = false;      // key T
-  bool wants_wipe = false;      // key X
-  std::optional<Vec3> pointed;  // key P, then a click on the surface; bone frame, mm
-  std::vector<Vec3> drawn;      // key L, then a line drawn on the surface with the left button; empty: none
 };
 
 class BoneWindow {

@@ -80,7 +80,6 @@ Proxy::Proxy(const std::filesystem::path& certificates, const std::filesystem::p
                            {"OSTEON_CERTIFICATES", certificates.string()},
                            {"OSTEON_PROXY_SOCKET", socket.string()},
                            {"OSTEON_ADMIN_SOCKET", admin.string()}};
-    options.as_given = true;
     process_.emplace(haproxy(), std::vector<std::string>{"-db", "-f", configuration}, options);
     if (!wait_until([&] { return !process_->running() || answers(port); }, 20s) || !process_->running()) continue;
     options.environment.clear();

@@ -68,9 +68,9 @@ class AudioProcess : public testing::Test {
         test::run(test::program("osteon-import"), {"phantom", "block", "--layers", "4:1.9", "--width", "8", "--pitch",
                                                    "0.5", "--out", (temp_ / "case").string()});
     ASSERT_EQ(made.exit_code, 0) << made.err;
-    server_.emplace(
-        test::program("osteon-server"),
-        std::vector<std::string>{"--case", (temp_ / "case").string(), "--address-file", (temp_ / "address").string()});
+    server_.emplace(test::program("osteon-server"),
+                    std::vector<std::string>{"--case", (temp_ / "case").string(), "--plain", "--address-file",
+                                             (temp_ / "address").string()});
     const auto address = test::wait_for_address(temp_ / "address", 30s);
     ASSERT_TRUE(address) << server_->err();
     address_ = *address;
@@ -79,11 +79,17 @@ class AudioProcess : public testing::Test {
   std::vector<std::string> arguments() const {
     // If deploy/with-null-sink runs the test with this variable, the sound goes through RtAudio and PulseAudio.
     const char* output = std::getenv("OSTEON_TEST_OUTPUT");
-    return {"--server",    address_,
-            "--output",    output ? output : "none",
-            "--wav",       (temp_ / "a.wav").string(),
-            "--state-log", (temp_ / "a.csv").string(),
-            "--summary",   (temp_ / "a.json").string()};
+    return {"--server",
+            address_,
+            "--plain",
+            "--output",
+            output ? output : "none",
+            "--wav",
+            (temp_ / "a.wav").string(),
+            "--state-log",
+            (temp_ / "a.csv").string(),
+            "--summary",
+            (temp_ / "a.json").string()};
   }
 
   // Sends the states at 120 Hz as a haptic client does.
@@ -201,12 +207,12 @@ TEST(AudioProgram, WrongInputsAreOneSentenceEach) {
     std::string says;
   };
   const std::vector<Case> cases = {
-      {{"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0.2"}, "127.0.0.1:1"},
-      {{"--server", "nowhere", "--output", "none"}, "nowhere"},
-      {{"--server", "127.0.0.1:1", "--output", "tape"}, "--output none"},
-      {{"--server", "127.0.0.1:1", "--output", "none", "--wav", "/nowhere/a.wav"}, "/nowhere/a.wav"},
-      {{"--server", "127.0.0.1:1", "--output", "none", "--state-log", "/nowhere/a.csv"}, "/nowhere/a.csv"},
-      {{"--server", "127.0.0.1:1", "--output", "pulse"}, "--output none"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--timeout", "0.2"}, "127.0.0.1:1"},
+      {{"--server", "nowhere", "--plain", "--output", "none"}, "nowhere"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "tape"}, "--output none"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--wav", "/nowhere/a.wav"}, "/nowhere/a.wav"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "none", "--state-log", "/nowhere/a.csv"}, "/nowhere/a.csv"},
+      {{"--server", "127.0.0.1:1", "--plain", "--output", "pulse"}, "--output none"},
       {{"--output", "none"}, "--server"},
   };
   for (const Case& wrong : cases) {
@@ -225,9 +231,9 @@ TEST(AudioProgram, WithoutAServerAnEarlierRecordingStays) {
   const test::TempDir temp;
   ASSERT_TRUE(write_file(temp / "a.wav", "earlier sound"));
   ASSERT_TRUE(write_file(temp / "a.csv", "earlier rows"));
-  const test::RunResult result = test::run(test::program("osteon-audio"),
-                                           {"--server", "127.0.0.1:1", "--output", "none", "--timeout", "0.2", "--wav",
-                                            (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string()});
+  const test::RunResult result = test::run(
+      test::program("osteon-audio"), {"--server", "127.0.0.1:1", "--plain", "--output", "none", "--timeout", "0.2",
+                                      "--wav", (temp / "a.wav").string(), "--state-log", (temp / "a.csv").string()});
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_EQ(*read_file(temp / "a.wav"), "earlier sound");
   EXPECT_EQ(*read_file(temp / "a.csv"), "earlier rows");

@@ -137,8 +137,7 @@ TEST_F(ConfineTest, TheProcessThatLooksCasesThroughIsConfined) {
                             R"("ratio_free_bytes":1000000})";
   const auto looked = [&](const fs::path& archive) {
     fs::remove_all(own_ / "sent");
-    return test::run(test::program("osteon-server"), {"check-case", archive, own_, quota}, std::chrono::seconds(60),
-                     {.environment = {}, .without = {}, .folder = {}, .as_given = true});
+    return test::run(test::program("osteon-server"), {"check-case", archive, own_, quota}, std::chrono::seconds(60));
   };
   const auto sound = looked(own_ / "upload.zip");
   EXPECT_EQ(sound.exit_code, 0) << sound.out << sound.err;

@@ -6,7 +6,9 @@
 #include <cstdlib>
 #include <memory>
 #include <optional>
+#include <utility>
 
+#include "synthetic.hpp"
 #include "tests/support/xvfb.hpp"
 #include "viewer_client/render/window.hpp"
 
@@ -66,6 +68,37 @@ class Picture : public testing::Test {
 
   std::optional<Xvfb> screen_;
   std::unique_ptr<BoneWindow> window_;
+};
+
+// A sphere of bone about the origin, seen from the front.
+inline constexpr double kRadius_mm = 15.0, kFrom_mm = 100.0;
+
+// A point on the sphere's front, at these angles to the right and up.
+inline Vec3 on_front(double right_rad, double up_rad) {
+  return kRadius_mm *
+         Vec3(std::sin(right_rad) * std::cos(up_rad), -std::cos(right_rad) * std::cos(up_rad), std::sin(up_rad));
+}
+
+class SpherePicture : public Picture {
+ protected:
+  void SetUp() override {
+    Picture::SetUp();
+    if (!window_) return;
+    window_->show_region({BodyId{0}, 0, {0, 0, 0}}, sphere_mesh(Vec3::Zero(), kRadius_mm, 0));
+    bare_ = drawn();
+  }
+  // Where a point of the bone appears from the front: column and row.
+  static std::pair<int, int> seen(const Vec3& p) {
+    const double px_per_mm = focal_px(from_front(kFrom_mm)) / (kFrom_mm + p.y());
+    const auto x = std::lround(0.5 * kWidth + px_per_mm * p.x()), y = std::lround(0.5 * kHeight - px_per_mm * p.z());
+    return {static_cast<int>(x), static_cast<int>(y)};
+  }
+  static Vec3 at(const Image& image, const Vec3& p) {
+    const auto [x, y] = seen(p);
+    return colour(image, x, y);
+  }
+
+  Image bare_;  // the sphere alone
 };
 
 }  // namespace osteon::test

@@ -1,0 +1,156 @@
+// Checks in the pixels how the surface of the bone is drawn.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <numbers>
+#include <span>
+#include <string>
+
+#include "common/surface/block_source.hpp"
+#include "common/volume/cut_field.hpp"
+#include "picture.hpp"
+#include "synthetic.hpp"
+#include "tests/support/scenes/bones.hpp"
+
+namespace osteon {
+namespace {
+
+using test::differing_pixels;
+using test::focal_px;
+using test::from_front;
+using test::kHeight;
+using test::kRadius_mm;
+using test::kWidth;
+using test::on_front;
+using test::sphere_mesh;
+
+constexpr RegionKey kHere{BodyId{0}, 0, {0, 0, 0}}, kThere{BodyId{0}, 0, {1, 0, 0}};
+
+class BonePicture : public test::Picture {};
+
+TEST_F(BonePicture, ASphereCoversItsOutline) {
+  const Image empty = drawn();
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  const Image image = drawn();
+  ASSERT_EQ(image.width_px, kWidth);
+  ASSERT_EQ(image.height_px, kHeight);
+
+  // Seen from distance d a sphere's outline is a circle of angle asin(r / d).
+  const double radius_px = focal_px(from_front(100.0)) * std::tan(std::asin(15.0 / 100.0));
+  const double expected = std::numbers::pi * radius_px * radius_px;
+  EXPECT_NEAR(differing_pixels(image, empty), expected, 0.03 * expected);
+  for (const auto& [x, y] : {std::pair{2, 2}, {kWidth - 3, 2}, {2, kHeight - 3}, {kWidth - 3, kHeight - 3}}) {
+    EXPECT_EQ(image.at(x, y), empty.at(x, y));
+  }
+  // Bone is bright against the background, and of a warm colour: red over blue.
+  const Vec3 middle = colour(image, kWidth / 2, kHeight / 2);
+  EXPECT_GT(middle.sum(), colour(empty, kWidth / 2, kHeight / 2).sum() + 200.0);
+  EXPECT_GT(middle.x(), middle.z() + 10.0);
+}
+
+TEST_F(BonePicture, WhatIsRemovedLeavesBackground) {
+  const Image empty = drawn();
+  window_->show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 8.0, 0));
+  const Image one = drawn();
+  window_->show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 8.0, 0));
+  EXPECT_GT(differing_pixels(drawn(), one), 500);
+  window_->show_region(kThere, {});
+  EXPECT_EQ(differing_pixels(drawn(), one), 0);
+  window_->show_region(kHere, {});
+  EXPECT_EQ(differing_pixels(drawn(), empty), 0);
+}
+
+TEST_F(BonePicture, CutFacesAreRedder) {
+  window_->show_region(kHere, sphere_mesh(Vec3(-15, 0, 0), 10.0, 0));
+  window_->show_region(kThere, sphere_mesh(Vec3(15, 0, 0), 10.0, 1));
+  const Image image = drawn();
+  const int offset = static_cast<int>(focal_px(from_front(100.0)) * 15.0 / 100.0);
+  const Vec3 imported = colour(image, kWidth / 2 - offset, kHeight / 2);
+  const Vec3 cut = colour(image, kWidth / 2 + offset, kHeight / 2);
+  EXPECT_GT(cut.x() / cut.y(), 1.25 * imported.x() / imported.y());
+}
+
+// A block of bone with a rod of metal and a cap of enamel, and a groove through all of the bone between them. It is
+// encoded, decoded and drawn.
+TEST_F(BonePicture, MetalAndEnamelHaveColoursOfTheirOwn) {
+  const auto tissue = [](const Vec3& p) {
+    if (std::hypot(p.x() - 8.0, p.z() + 6.0) < 3.0) return Tissue::metal;
+    return p.x() < -6.0 ? Tissue::enamel : Tissue::none;
+  };
+  CutField field(test::marked_block(28.0, 12.0, 0.5, tissue), BodyId{});
+  SurfaceBlocks blocks{BodyId{}};
+  // Along the front face, into the enamel and the bone, short of the rod.
+  const Cut groove = test::straight_cut(*find_tool("burr-round-5"), {-12, -15.5, -8.5}, {-1, -15.5, -8.5}, {0, 0, -1});
+  (void)blocks.touch(groove.level, field.apply(groove).changed_leaves);
+  std::vector<BlockKey> keys = blocks.fine_blocks();
+  const CoordBox b = field.bone().bounds_samples();
+  for (int x = (b.min.x - 1) >> 4; x <= b.max.x >> 4; ++x)
+    for (int y = (b.min.y - 1) >> 4; y <= b.max.y >> 4; ++y)
+      for (int z = (b.min.z - 1) >> 4; z <= b.max.z >> 4; ++z) keys.push_back({{}, 0, {x, y, z}});
+  int region = 0;
+  for (const BlockKey& key : keys) {
+    BlockSamples samples;
+    gather_block(field, blocks, key, 0.5, samples);
+    const auto mesh = decode_block(key, encode_block(samples), level_pitch_mm(0.5, key.level));
+    ASSERT_TRUE(mesh);
+    window_->show_region({BodyId{0}, 0, {region++, 0, 0}}, *mesh);
+  }
+  CameraView view = from_front(90.0);
+  view.target_mm = Vec3(0, -14, -6);
+  view.eye_mm = Vec3(0, -90, -6);
+  window_->look(view);
+  const Image image = drawn();
+  if (const char* folder = std::getenv("OSTEON_PICTURES")) {
+    ASSERT_TRUE(window_->save_png(std::string(folder) + "/metal.png"));
+  }
+  const double px_per_mm = focal_px(view) / 76.0;
+  const auto seen = [&](double x_mm, double z_mm) {
+    return colour(image, kWidth / 2 + static_cast<int>(std::lround(px_per_mm * x_mm)),
+                  kHeight / 2 - static_cast<int>(std::lround(px_per_mm * (z_mm + 6.0))));
+  };
+  const Vec3 bone = seen(2.0, -2.0), metal = seen(8.0, -6.0), enamel = seen(-10.0, -2.0), cut_bone = seen(-3.0, -6.0),
+             cut_enamel = seen(-10.0, -6.0);
+  EXPECT_GT(bone.x(), bone.z() + 10.0) << "warm";
+  EXPECT_GT(metal.z(), metal.x() + 10.0) << "cold";
+  EXPECT_NEAR(enamel.x(), enamel.z(), 20.0) << "white";
+  EXPECT_GT(enamel.minCoeff(), bone.z() + 10.0);
+  EXPECT_GT(cut_bone.x() / cut_bone.y(), 1.25 * bone.x() / bone.y());
+  EXPECT_GT((cut_enamel - cut_bone).norm(), 40.0);
+  EXPECT_GT((cut_enamel - enamel).norm(), 12.0);
+}
+
+TEST_F(BonePicture, DoesNotDependOnTheOrderOfArrival) {
+  // Two spheres of different colour at one position: the depth test cannot decide between them.
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
+  const Image forwards = drawn();
+  window_->show_region(kHere, {});
+  window_->show_region(kThere, {});
+  window_->show_region(kThere, sphere_mesh(Vec3::Zero(), 15.0, 1));
+  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  EXPECT_EQ(differing_pixels(drawn(), forwards), 0);
+}
+
+class SpherePicture : public test::SpherePicture {};
+
+TEST_F(SpherePicture, TheSurfaceUnderAPixelIsTheBonesNotTheTools) {
+  CuttingState state;
+  state.author = AuthorId{7};
+  state.tool_name = "burr-round-5";
+  state.pose_bone_tool = state.pose_bone_device = pose_along(Vec3(0, -20, 0), -Vec3::UnitZ());
+  window_->show_tools(std::span(&state, 1));
+  (void)drawn();
+  for (const Vec3& point : {on_front(0.0, 0.0), on_front(0.5, 0.4), on_front(-0.6, -0.3)}) {
+    const auto [x, y] = seen(point);
+    const auto at = window_->surface_at(x, y);
+    ASSERT_TRUE(at);
+    // A pixel is 0.2 mm here. Facets lie up to 0.1 mm inside the sphere, more where the view is along the surface.
+    EXPECT_LT((*at - point).norm(), 0.6) << at->transpose();
+    EXPECT_NEAR(at->norm(), kRadius_mm, 0.1);
+  }
+  EXPECT_FALSE(window_->surface_at(3, 3));
+}
+
+}  // namespace
+}  // namespace osteon

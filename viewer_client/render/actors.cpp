@@ -1,0 +1,75 @@
+#include "viewer_client/render/actors.hpp"
+
+#include <vtkActor.h>
+#include <vtkCellArray.h>
+#include <vtkFloatArray.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPolyData.h>
+#include <vtkPolyDataMapper.h>
+#include <vtkSmartPointer.h>
+#include <vtkTypeInt32Array.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <cstring>
+
+namespace osteon {
+
+namespace {
+
+vtkSmartPointer<vtkFloatArray> vectors(std::span<const std::array<float, 3>> from) {
+  auto to = vtkSmartPointer<vtkFloatArray>::New();
+  to->SetNumberOfComponents(3);
+  to->SetNumberOfTuples(static_cast<vtkIdType>(from.size()));
+  if (!from.empty()) std::memcpy(to->GetPointer(0), from.data(), from.size_bytes());
+  return to;
+}
+
+vtkSmartPointer<vtkCellArray> cells_of(std::span<const std::array<std::uint32_t, 3>> triangles) {
+  // 32-bit connectivity is a copy of our own array. Offsets of triangles are multiples of three.
+  vtkNew<vtkTypeInt32Array> corners, offsets;
+  corners->SetNumberOfValues(static_cast<vtkIdType>(3 * triangles.size()));
+  if (!triangles.empty()) std::memcpy(corners->GetPointer(0), triangles.data(), triangles.size_bytes());
+  offsets->SetNumberOfValues(static_cast<vtkIdType>(triangles.size() + 1));
+  for (std::size_t i = 0; i <= triangles.size(); ++i) {
+    offsets->SetValue(static_cast<vtkIdType>(i), static_cast<vtkTypeInt32>(3 * i));
+  }
+  auto cells = vtkSmartPointer<vtkCellArray>::New();
+  cells->SetData(offsets, corners);
+  return cells;
+}
+
+}  // namespace
+
+vtkSmartPointer<vtkPolyData> poly_data(std::span<const std::array<float, 3>> positions_mm,
+                                       std::span<const std::array<float, 3>> normals,
+                                       std::span<const std::uint8_t> marked,
+                                       std::span<const std::array<std::uint32_t, 3>> triangles,
+                                       std::span<const Colour> palette) {
+  vtkNew<vtkPoints> points;
+  points->SetData(vectors(positions_mm));
+
+  vtkNew<vtkUnsignedCharArray> colours;
+  colours->SetNumberOfComponents(3);
+  colours->SetNumberOfTuples(static_cast<vtkIdType>(marked.size()));
+  for (std::size_t i = 0; i < marked.size(); ++i) {
+    std::memcpy(colours->GetPointer(static_cast<vtkIdType>(3 * i)), palette[marked[i]].data(), 3);
+  }
+
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(cells_of(triangles));
+  data->GetPointData()->SetNormals(vectors(normals));
+  data->GetPointData()->SetScalars(colours);
+  return data;
+}
+
+vtkSmartPointer<vtkActor> actor_of(vtkPolyData* data) {
+  vtkNew<vtkPolyDataMapper> mapper;
+  mapper->SetInputData(data);
+  auto actor = vtkSmartPointer<vtkActor>::New();
+  actor->SetMapper(mapper);
+  return actor;
+}
+
+}  // namespace osteon
