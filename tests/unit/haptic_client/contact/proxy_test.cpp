@@ -458,6 +458,49 @@ TEST_F(ReturnedBone, IsNotCutUntilTheToolHasLeftIt) {
   EXPECT_TRUE(cut);
 }
 
+// ---- bone that went since the patch was built
+
+// A bur goes into the side of a block and then across. Where it came from, the old patch still shows bone. The sweeps
+// of the proxy say that it is gone. So forces and moments are those with a patch in which that bone is cut away.
+TEST(GoneSinceThePatch, CountsForNothing) {
+  constexpr double kDepth_mm = 3.0, kRpm = 20000.0, kPush_mm = 0.2, kRadius_mm = 2.5;
+  constexpr const char* kTool = "burr-round-5";
+  const Case block = osteon::test::make_bone(
+      {Vec3(-6, -8, -6), Vec3(12, 8, 6)}, 0.5, [](const Vec3& p) { return std::max(-p.x(), -3.5 - p.z()); }, dense);
+  Stage old(block, kTool), fresh(block, kTool);  // nothing cuts the field of `old`, so its patches are those of before
+  old.place(straight(-3, 0, 0));
+  ASSERT_TRUE(old.proxy_.begin_sweep(old.model_));
+  for (int i = 0; i < 20000 && old.proxy_.pose().position_mm.x() < kDepth_mm; ++i) {
+    old.device_ = old.proxy_.pose();
+    old.device_.position_mm.x() += kPush_mm;
+    old.tick(kRpm);
+    ASSERT_TRUE(old.last_.covered);
+  }
+  const Pose there = old.proxy_.pose();
+  ASSERT_GE(there.position_mm.x(), kDepth_mm);
+
+  fresh.field_.apply(osteon::test::straight_cut(*find_tool(kTool), {-3, 0, 0}, there.position_mm, Vec3::UnitZ(), 1));
+  fresh.place(there);
+  for (Stage* stage : {&old, &fresh}) {
+    stage->device_ = there;
+    stage->device_.position_mm.y() += kPush_mm;
+    stage->tick(kRpm);
+    ASSERT_TRUE(stage->last_.cutting);
+  }
+  const ProxyStep &with_old = old.last_, &with_fresh = fresh.last_;
+  std::printf("  old patch: %.3f mm2, torque %.3f N mm, moment %.2f %.2f %.2f\n", with_old.engaged_area_mm2,
+              with_old.torque_nmm, with_old.contact_torque_nmm.x(), with_old.contact_torque_nmm.y(),
+              with_old.contact_torque_nmm.z());
+  std::printf("  fresh    : %.3f mm2, torque %.3f N mm, moment %.2f %.2f %.2f\n", with_fresh.engaged_area_mm2,
+              with_fresh.torque_nmm, with_fresh.contact_torque_nmm.x(), with_fresh.contact_torque_nmm.y(),
+              with_fresh.contact_torque_nmm.z());
+  const double force_n = with_fresh.cutting_force_n.norm();
+  EXPECT_NEAR((with_old.cutting_force_n - with_fresh.cutting_force_n).norm(), 0.0, 0.05 * force_n);
+  EXPECT_NEAR(with_old.engaged_area_mm2, with_fresh.engaged_area_mm2, 0.1 * with_fresh.engaged_area_mm2);
+  EXPECT_NEAR(with_old.torque_nmm, with_fresh.torque_nmm, 0.1 * with_fresh.torque_nmm);
+  EXPECT_NEAR((with_old.contact_torque_nmm - with_fresh.contact_torque_nmm).norm(), 0.0, 0.1 * kRadius_mm * force_n);
+}
+
 // ---- skiving
 
 // On a slope the point slides down until it bites. On a gentle slope it bites at once.
