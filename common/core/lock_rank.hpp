@@ -25,6 +25,7 @@
   RANK(handshakes)              \
   RANK(received)                \
   RANK(mount_pose)              \
+  RANK(haptic_session)          \
   RANK(leaf) /* of every lock under which no other is taken */
 
 namespace osteon {

@@ -14,7 +14,8 @@
 
 namespace osteon {
 
-// The locks that one thread holds. A violation of the order prints the names of both ranks and aborts.
+// The ranks of the locks that one thread holds. Used by that thread alone. A violation of the order prints the names of
+// both ranks and aborts.
 class HeldLocks {
  public:
   static constexpr std::size_t kMost = 16;  // the deepest nesting
@@ -41,7 +42,7 @@ inline constexpr bool kCheckLockOrder = false;
 // The rank of a lock, and its check.
 class Ranked {
  public:
-  explicit Ranked(LockRank rank) : rank_(rank) {}
+  constexpr explicit Ranked(LockRank rank) : rank_(rank) {}
   Ranked(const Ranked&) = delete;
   Ranked& operator=(const Ranked&) = delete;
 

@@ -204,7 +204,7 @@ Result<void> RoomStore::write(std::span<const LogEntry> entries) {
   out.reserve(entries.size());
   for (const LogEntry& entry : entries) out.push_back({entry.seq, entry.at.count(), to_bytes(entry)});
   return with_journal([&](Journal& journal) OSTEON_REQUIRES(turn_) {
-    const Result<void> kept = journal.append(out);
+    Result<void> kept = journal.append(out);
     for (const LogEntry& entry : entries)
       if (kept && changes_bone(entry)) changes_.push_back(entry.seq);
     return kept;
@@ -344,7 +344,7 @@ Result<void> RoomStore::checkpoint(RoomSeq seq, std::span<const FieldLeaf> leave
   }
   if (Result<void> finished = file->finish(); !finished) return finished;
   return with_journal([&](Journal& journal) OSTEON_REQUIRES(turn_) {
-    const Result<void> added = journal.add_checkpoint(std::move(*file));
+    Result<void> added = journal.add_checkpoint(std::move(*file));
     if (added) std::erase_if(changes_, [&](RoomSeq change) { return change <= seq; });
     return added;
   });
@@ -360,7 +360,7 @@ Result<void> RoomStore::close() {
   const MutexLock no_checkpoint(checkpointing_);
   return with_journal([&](Journal& journal) OSTEON_REQUIRES(turn_) {
     last_ = journal.head();
-    const Result<void> done = journal.close();
+    Result<void> done = journal.close();
     journal_.reset();
     return done;
   });
