@@ -6,7 +6,6 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -16,6 +15,7 @@
 #include "audio_client/output/sound_engine.hpp"
 #include "audio_client/output/wav_recorder.hpp"
 #include "audio_client/synth/sound_scene.hpp"
+#include "common/core/mutex.hpp"
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/files.hpp"
 #include "common/runtime/log.hpp"
@@ -157,14 +157,15 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   if (Result<void> started = (*output)->start(); !started) return started;
   log::info("joined", {{"server", options.server}, {"case", room->case_title}, {"output", options.output}});
 
-  // The reader and this thread deliver one at a time.
-  std::mutex delivering;
-  // Guarded: when the last message was received; none while everything is at rest.
+  // The reader and this thread deliver one at a time. Guards the engine's input and `received_at`; clang checks no
+  // locals.
+  Mutex delivering{LockRank::leaf};
+  // When the last message was received; none while everything is at rest.
   std::optional<Clock::time_point> received_at;
   auto watch = StateSubscription::start(
       std::move(*room), [&](const std::vector<CuttingState>& tools, Clock::time_point received) {
         const audio::SoundScene scene = audio::sound_scene(tools, received.time_since_epoch().count());
-        const std::lock_guard lock(delivering);
+        const MutexLock lock(delivering);
         engine.deliver(scene);
         received_at = received;
       });
@@ -172,7 +173,7 @@ Result<void> run(const Options& options, const StopSignal& stop) {
   std::optional<Error> broken;
   while (!broken && !stop.wait_for(kPoll)) {
     states.drain(engine, **output);
-    if (const std::lock_guard lock(delivering); received_at && Clock::now() - *received_at > kStale) {
+    if (const MutexLock lock(delivering); received_at && Clock::now() - *received_at > kStale) {
       engine.deliver(audio::SoundScene{});
       received_at.reset();
     }

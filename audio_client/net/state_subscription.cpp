@@ -2,10 +2,10 @@
 
 #include <grpcpp/grpcpp.h>
 
-#include <mutex>
 #include <thread>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/watch.grpc.pb.h"
 
@@ -15,8 +15,8 @@ struct StateSubscription::Impl {
   wire::JoinedRoom room;
   OnStates on_states;
   grpc::ClientContext context;
-  mutable std::mutex mutex;
-  std::optional<Error> ended;  // guarded by mutex
+  mutable Mutex mutex{LockRank::leaf};
+  std::optional<Error> ended OSTEON_GUARDED_BY(mutex);
   std::thread reader;
 
   void run();
@@ -25,7 +25,7 @@ struct StateSubscription::Impl {
 
 void StateSubscription::Impl::run() {
   Error why = read();
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   ended = std::move(why);
 }
 
@@ -77,7 +77,7 @@ StateSubscription::~StateSubscription() {
 }
 
 std::optional<Error> StateSubscription::ended() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->ended;
 }
 

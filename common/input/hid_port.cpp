@@ -16,9 +16,9 @@ namespace {
 
 constexpr std::size_t kLargestReport = 64;
 
-// hidapi's enumeration and initialisation are not thread safe.
-std::mutex& library() {
-  static std::mutex mutex;
+// Guards hidapi, whose enumeration and initialisation are not thread safe.
+Mutex& library() {
+  static Mutex mutex{LockRank::leaf};
   return mutex;
 }
 
@@ -42,7 +42,7 @@ struct HidPort::Handle {
 };
 
 std::vector<HidFound> list_hid_devices() {
-  const std::lock_guard lock(library());
+  const MutexLock lock(library());
   std::vector<HidFound> found;
   hid_device_info* const list = hid_enumerate(0, 0);
   for (const hid_device_info* info = list; info != nullptr; info = info->next) {
@@ -80,7 +80,7 @@ HidPort& HidPort::operator=(HidPort&&) noexcept = default;
 HidPort::~HidPort() = default;
 
 Result<HidPort> HidPort::open(const HidFound& found, std::string what) {
-  const std::lock_guard lock(library());
+  const MutexLock lock(library());
   auto handle = std::make_unique<Handle>();
   handle->path = found.path;
   handle->what = std::move(what);
@@ -125,7 +125,7 @@ void HidReader::stop() noexcept {
 
 Result<void> HidReader::health() const {
   if (!ended_) return {};
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return tl::unexpected(why_ended_);
 }
 
@@ -135,7 +135,7 @@ void HidReader::run(std::chrono::milliseconds pause) {
     const Result<std::size_t> size = port_->read(report, pause);
     if (!size) {
       {
-        const std::lock_guard lock(mutex_);
+        const MutexLock lock(mutex_);
         why_ended_ = size.error();
       }
       if (calls_.at_end) calls_.at_end();

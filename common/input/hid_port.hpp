@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon {
@@ -75,8 +75,8 @@ class HidReader {
   Calls calls_;
   std::thread thread_;
   std::atomic<bool> stopping_{false}, ended_{false};
-  mutable std::mutex mutex_;
-  Error why_ended_;
+  mutable Mutex mutex_{LockRank::leaf};
+  Error why_ended_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace osteon

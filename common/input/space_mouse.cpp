@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/triple_buffer.hpp"
 
 namespace osteon {
@@ -76,14 +75,14 @@ struct SpaceMouseWatch::State {
   std::function<void(const std::string&)> say;
   TripleBuffer<SpaceMouseState> states;
   SpaceMousePort port;
-  std::mutex mutex;  // guards the members below
-  std::condition_variable wake;
-  bool stopping = false;
+  Mutex mutex{LockRank::leaf};
+  CondVar wake;
+  bool stopping OSTEON_GUARDED_BY(mutex) = false;
   std::thread thread;
 
   bool stopped_within(std::chrono::milliseconds time) {
-    std::unique_lock lock(mutex);
-    return wake.wait_for(lock, time, [this] { return stopping; });
+    MutexLock lock(mutex);
+    return wake.wait_for(lock, time, [this]() OSTEON_REQUIRES(mutex) { return stopping; });
   }
   void run() {
     do {
@@ -107,7 +106,7 @@ SpaceMouseWatch::SpaceMouseWatch(std::function<void(const std::string&)> say) : 
 
 SpaceMouseWatch::~SpaceMouseWatch() {
   {
-    const std::lock_guard lock(state_->mutex);
+    const MutexLock lock(state_->mutex);
     state_->stopping = true;
   }
   state_->wake.notify_all();

@@ -6,14 +6,14 @@ namespace osteon {
 
 const ToolBox::Entry& ToolBox::add(const Tool& tool) {
   const Digest hash = tool.hash();
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   auto& entry = entries_[hash];
   if (!entry) entry = std::make_unique<const Entry>(Entry{hash, tool, tool.cut_body()});
   return *entry;
 }
 
 const ToolBox::Entry* ToolBox::find(const Digest& hash) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = entries_.find(hash);
   return found == entries_.end() ? nullptr : found->second.get();
 }
@@ -35,7 +35,7 @@ Result<Tool> ToolBox::find(std::string_view name) const {
 }
 
 std::vector<const ToolBox::Entry*> ToolBox::entries() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<const Entry*> all;
   for (const auto& [hash, entry] : entries_) all.push_back(entry.get());
   return all;

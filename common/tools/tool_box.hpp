@@ -3,9 +3,9 @@
 #pragma once
 #include <map>
 #include <memory>
-#include <mutex>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/tools/tool.hpp"
 
 namespace osteon {
@@ -27,8 +27,8 @@ class ToolBox {
   [[nodiscard]] std::vector<const Entry*> entries() const;  // sorted by hash
 
  private:
-  mutable std::mutex mutex_;
-  std::map<Digest, std::unique_ptr<const Entry>> entries_;
+  mutable Mutex mutex_{LockRank::leaf};
+  std::map<Digest, std::unique_ptr<const Entry>> entries_ OSTEON_GUARDED_BY(mutex_);
 };
 
 // A box with all builtin tools. Owners: every holder of a bone; in one process they share the box.

@@ -5,16 +5,15 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstdint>
 #include <exception>
 #include <limits>
-#include <mutex>
 #include <stdexcept>
 #include <string>
 #include <thread>
 
 #include "common/core/check.hpp"
+#include "common/core/mutex.hpp"
 #include "common/geometry/triangle_distance.hpp"
 
 // The surface is meshed by dual contouring in its simplest form. Every cell with a crossing has one point, the mean of
@@ -339,8 +338,8 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   std::atomic<int> next{0};
   std::atomic<int> finished{0};
   std::atomic<bool> stopped{false};
-  std::mutex mutex;  // guards `failed` and the wait for `finished`
-  std::condition_variable progressed;
+  Mutex mutex{LockRank::leaf};  // of `failed` and of the wait for `finished`; clang checks no locals
+  CondVar progressed;
   std::string failed;
   const auto work = [&] {
     Slab part(field, iso, stopped);
@@ -348,12 +347,12 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
       try {
         part.measure(slab * kSlab, std::min((slab + 1) * kSlab, width), pitch_mm, out);
       } catch (const std::exception& error) {
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         failed = error.what();
         stopped = true;
       }
       {
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         ++finished;
       }
       progressed.notify_one();
@@ -366,7 +365,7 @@ Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, f
   bool cancelled = false;
   while (finished < slabs && !stopped) {
     if (!keep_going(static_cast<double>(finished) / slabs)) cancelled = stopped = true;
-    std::unique_lock lock(mutex);
+    MutexLock lock(mutex);
     progressed.wait_for(lock, std::chrono::milliseconds(10), [&] { return finished >= slabs || stopped; });
   }
   for (std::thread& helper : helpers) helper.join();

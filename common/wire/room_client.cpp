@@ -4,12 +4,12 @@
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>
-#include <mutex>
 #include <optional>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/field/kernel.hpp"
 #include "common/wire/connection_fault.hpp"
 #include "common/wire/convert.hpp"
@@ -37,17 +37,17 @@ class RoomName {
  public:
   explicit RoomName(std::string name) : name_(std::move(name)) {}
   void set(const std::string& name) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     name_ = name;
   }
   [[nodiscard]] std::string get() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return name_;
   }
 
  private:
-  mutable std::mutex mutex_;
-  std::string name_;
+  mutable Mutex mutex_{LockRank::leaf};
+  std::string name_ OSTEON_GUARDED_BY(mutex_);
 };
 
 // Adds the room's name and the ticket to every call of a channel.

@@ -13,11 +13,19 @@ set(CMAKE_VERIFY_INTERFACE_HEADER_SETS ON)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/bin)
 
 set(OSTEON_SANITIZE "" CACHE STRING "Sanitizers to build with, as given to -fsanitize=")
+option(OSTEON_CHECK_LOCK_ORDER "Abort when a thread takes locks in another order than LockRank's" OFF)
 
 add_library(osteon_flags INTERFACE)
 # Contraction is off everywhere: the same source gives the same numbers on every compiler and processor.
 target_compile_options(osteon_flags INTERFACE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -ffp-contract=off)
 target_include_directories(osteon_flags INTERFACE ${PROJECT_SOURCE_DIR})
+# A guarded member that is used without its lock is an error. Only clang can tell.
+if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+  target_compile_options(osteon_flags INTERFACE -Wthread-safety -Werror=thread-safety)
+endif()
+if(OSTEON_CHECK_LOCK_ORDER)
+  target_compile_definitions(osteon_flags INTERFACE OSTEON_CHECK_LOCK_ORDER)
+endif()
 if(OSTEON_SANITIZE)
   target_compile_options(osteon_flags INTERFACE -fsanitize=${OSTEON_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(osteon_flags INTERFACE -fsanitize=${OSTEON_SANITIZE})

@@ -17,14 +17,14 @@ Result<void> Recorder::open(const std::filesystem::path& file, const RecordingIn
 
 void Recorder::begin_on(const std::string& field_hash) {
   if (!recording()) return;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   start_hash_ = field_hash;
   wake_.notify_one();
 }
 
 void Recorder::push(const TickRow& row) {
   if (!recording()) return;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (waiting_.size() >= kMostWaiting) {
     ++dropped_;
     return;
@@ -39,9 +39,8 @@ void Recorder::run() {
   bool over = false;
   while (!over) {
     {
-      std::unique_lock lock(mutex_);
-      wake_.wait(lock,
-                 [this] { return over_ || !start_hash_.empty() || waiting_.size() >= RecordFile::kChunkRows / 2; });
+      MutexLock lock(mutex_);
+      while (!over_ && start_hash_.empty() && waiting_.size() < RecordFile::kChunkRows / 2) wake_.wait(lock);
       over = over_;
       start_hash = std::exchange(start_hash_, {});
       rows.swap(waiting_);
@@ -63,15 +62,18 @@ void Recorder::run() {
 Recorder::Outcome Recorder::finish(const RecordingEnd& end) {
   if (!recording()) return outcome_;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     over_ = true;
     wake_.notify_one();
   }
   thread_.join();
-  outcome_.dropped = dropped_;
+  {
+    const MutexLock lock(mutex_);
+    outcome_.dropped = dropped_;
+  }
   if (!file_) return outcome_;
   RecordingEnd all = end;
-  all.rows_dropped += dropped_;
+  all.rows_dropped += outcome_.dropped;
   if (Result<void> written = file_->finish(all); !written) {
     outcome_.trouble = written.error().message;
     log::warn("the recording is incomplete", {{"because", outcome_.trouble}});

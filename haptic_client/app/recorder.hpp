@@ -1,12 +1,11 @@
 // Writes the rows of a session on a thread of its own. So a slow disk delays neither the haptic thread nor the
 // reporting thread.
 #pragma once
-#include <condition_variable>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "haptic_client/app/record_file.hpp"
 
 namespace osteon::haptic {
@@ -48,12 +47,12 @@ class Recorder {
   std::thread thread_;
   Outcome outcome_;
 
-  std::mutex mutex_;  // guards the rest
-  std::condition_variable wake_;
-  std::string start_hash_;  // to be written
-  std::vector<TickRow> waiting_;
-  std::uint64_t dropped_ = 0;
-  bool over_ = false;
+  Mutex mutex_{LockRank::leaf};
+  CondVar wake_;
+  std::string start_hash_ OSTEON_GUARDED_BY(mutex_);  // to be written
+  std::vector<TickRow> waiting_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t dropped_ OSTEON_GUARDED_BY(mutex_) = 0;
+  bool over_ OSTEON_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace osteon::haptic

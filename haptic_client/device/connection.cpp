@@ -11,7 +11,10 @@ Result<void> DeviceConnection::start() {
   stop();
   if (Result<void> opened = device_.open(); !opened) return opened;
   connected_ = true;
-  stopping_ = false;
+  {
+    const MutexLock lock(mutex_);
+    stopping_ = false;
+  }
   tell_advice();
   thread_ = std::thread([this] { keep(); });
   return {};
@@ -19,7 +22,7 @@ Result<void> DeviceConnection::start() {
 
 void DeviceConnection::stop() noexcept {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopping_ = true;
   }
   wake_.notify_all();
@@ -41,8 +44,10 @@ void DeviceConnection::keep() {
   std::string last_error;  // why it could not be reopened, so that the reason is reported once
   while (true) {
     {
-      std::unique_lock lock(mutex_);
-      if (wake_.wait_for(lock, connected_ ? pace_.tend : pace_.again, [this] { return stopping_; })) return;
+      MutexLock lock(mutex_);
+      if (wake_.wait_for(lock, connected_ ? pace_.tend : pace_.again,
+                         [this]() OSTEON_REQUIRES(mutex_) { return stopping_; }))
+        return;
     }
     if (connected_) {
       const Result<void> well = device_.tend();

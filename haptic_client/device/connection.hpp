@@ -4,12 +4,11 @@
 #pragma once
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <string>
 #include <thread>
 
+#include "common/core/mutex.hpp"
 #include "haptic_client/device/haptic_device.hpp"
 
 namespace osteon::haptic {
@@ -46,9 +45,9 @@ class DeviceConnection {
   DeviceNotice notice_;
   ConnectionPace pace_;
   std::thread thread_;
-  std::mutex mutex_;  // guards stopping_
-  std::condition_variable wake_;
-  bool stopping_ = false;
+  Mutex mutex_{LockRank::leaf};
+  CondVar wake_;
+  bool stopping_ OSTEON_GUARDED_BY(mutex_) = false;
   std::atomic<bool> connected_{false};
   std::atomic<int> losses_{0};
   std::string advice_;  // reported last

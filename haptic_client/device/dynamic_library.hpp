@@ -2,10 +2,10 @@
 #pragma once
 #include <filesystem>
 #include <map>
-#include <mutex>
 #include <span>
 #include <string>
 
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 
 namespace osteon::haptic {
@@ -51,9 +51,9 @@ struct VendorLibrary {
 template <class Api, class Bind>
 [[nodiscard]] Result<const VendorLibrary<Api>*> load_vendor(const LibraryWanted& wanted, const std::string& is_not,
                                                             Bind bind) {
-  static std::mutex mutex;
+  static Mutex mutex{LockRank::leaf};                                 // of `loaded`; clang checks no locals
   static std::map<std::filesystem::path, VendorLibrary<Api>> loaded;  // nodes keep their addresses
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   if (const auto known = loaded.find(wanted.file); known != loaded.end()) return &known->second;
   Result<DynamicLibrary> library = DynamicLibrary::load(wanted);
   if (!library) return tl::unexpected(library.error());

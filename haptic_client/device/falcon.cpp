@@ -3,10 +3,10 @@
 #include <atomic>
 #include <chrono>
 #include <fstream>
-#include <mutex>
 #include <optional>
 #include <thread>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/periodic.hpp"
 #include "haptic_client/device/device_exchange.hpp"
 #include "haptic_client/device/emergency_stop.hpp"
@@ -83,7 +83,7 @@ class Falcon final : public HapticDevice {
 
   Result<void> tend() override {
     if (!lost_) return {};
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return tl::unexpected(why_lost_);
   }
 
@@ -153,7 +153,7 @@ class Falcon final : public HapticDevice {
 
   void lose(Error why) {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       why_lost_ = std::move(why);
     }
     exchange_.go(DeviceStatus::fault);
@@ -170,8 +170,8 @@ class Falcon final : public HapticDevice {
   Eigen::Vector3d place_m_ = kMiddle_m;  // I/O thread
   DeviceExchange exchange_;
   std::atomic<bool> stopping_{false}, homed_{false}, lost_{false};
-  std::mutex mutex_;  // never taken by the haptic thread
-  Error why_lost_;
+  Mutex mutex_{LockRank::leaf};  // never taken by the haptic thread
+  Error why_lost_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace

@@ -47,7 +47,7 @@ FastPath::~FastPath() { stop(); }
 
 void FastPath::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = true;
   }
   port_->wake();
@@ -57,7 +57,7 @@ void FastPath::stop() {
 bool FastPath::send(const Cut& cut) {
   bool goes = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     // A cut that was sent before and is sent again was not acknowledged: now the stream sends it.
     if (cut.author_seq > pushed_) {
       pushed_ = cut.author_seq;
@@ -69,7 +69,7 @@ bool FastPath::send(const Cut& cut) {
 }
 
 bool FastPath::send(const CuttingState& state) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   link_.set_state(state, 0);
   return link_.alive(now_of_links());
 }
@@ -77,7 +77,7 @@ bool FastPath::send(const CuttingState& state) {
 bool FastPath::send(const MountLoad& push) {
   bool goes = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     link_.set_push(push);
     goes = link_.alive(now_of_links());
   }
@@ -86,22 +86,22 @@ bool FastPath::send(const MountLoad& push) {
 }
 
 void FastPath::received(std::uint64_t index) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   link_.received(index);
 }
 
 void FastPath::decided(std::uint64_t author_seq) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   link_.acknowledge(author_seq);
 }
 
 void FastPath::know_tool(std::uint32_t number, const Digest& tool) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   link_.tools().add(number, tool);
 }
 
 FastPathHealth FastPath::health() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const Time now = now_of_links();
   const wire::LinkCounts& counts = link_.half().counts();
   FastPathHealth health{.offered = true,
@@ -137,7 +137,7 @@ void FastPath::run() {
     std::uint64_t epoch = 0;
     std::optional<MountPose> bone;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (end_) return;
       for (int i = 0; i < kMostInARow; ++i) {
         const std::optional<Datagram> datagram = port_->receive(buffer);

@@ -5,12 +5,12 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "common/link/sealed.hpp"
 #include "common/link/udp_port.hpp"
@@ -58,17 +58,17 @@ class FastPath {
            std::uint64_t first_author_seq, FastPathEvents events);
   void run();
   // Collects states of partners' tools that are newer than those already passed on.
-  void take_partners(wire::ClientLink::Time now, std::vector<CuttingState>& newer);
+  void take_partners(wire::ClientLink::Time now, std::vector<CuttingState>& newer) OSTEON_REQUIRES(mutex_);
 
   const std::unique_ptr<UdpPort> port_;
   const Endpoint server_;
   const FastPathEvents events_;
-  mutable std::mutex mutex_;
-  wire::ClientLink link_;
-  std::uint64_t pushed_;  // newest cut that the link was given
+  mutable Mutex mutex_{LockRank::leaf};
+  wire::ClientLink link_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t pushed_ OSTEON_GUARDED_BY(mutex_);  // newest cut that the link was given
   // state_seq of each partner's last state passed on; used by the thread only.
   std::map<AuthorId, std::uint64_t> partners_;
-  bool end_ = false;
+  bool end_ OSTEON_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

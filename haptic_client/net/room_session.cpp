@@ -5,17 +5,16 @@
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
 #include <cstdlib>
 #include <deque>
 #include <fstream>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <thread>
 #include <utility>
 
 #include "common/core/check.hpp"
+#include "common/core/mutex.hpp"
 #include "common/link/backoff.hpp"
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
@@ -180,18 +179,18 @@ struct RoomSession::Impl {
   // Reads until the stream ends; returns the reason.
   grpc::Status serve(Line& line, std::optional<Error>& broken);
   void write(Line& line);
-  // Handles what a stream sends for the session itself; under read_mutex.
-  void follow(const v1::SessionResponse& response);
+  // Handles what a stream sends for the session itself.
+  void follow(const v1::SessionResponse& response) OSTEON_REQUIRES(read_mutex);
   void open_fast_path(std::uint64_t decided);
   void close_fast_path();
   // Tries until it succeeds or the session is closed. Error: the server answers and refuses.
   Result<void> join_again();
   [[nodiscard]] std::shared_ptr<FastPath> fast_path() const {
-    const std::lock_guard lock(fast_mutex);
+    const MutexLock lock(fast_mutex);
     return fast;
   }
   [[nodiscard]] bool ends() const {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     return over || closing;
   }
 
@@ -209,24 +208,24 @@ struct RoomSession::Impl {
   std::string redial_why;              // the reason that a draining server gives
   std::vector<std::pair<std::uint32_t, Digest>> numbered_tools;
 
-  // Order: read_mutex, then mutex, then fast_mutex.
-  std::mutex read_mutex;  // received messages are passed on by one thread at a time
-  std::optional<SessionReader> reader;
-  mutable std::mutex fast_mutex;
-  std::shared_ptr<FastPath> fast;  // of the present stream; held by those who use it at the moment
+  Mutex read_mutex{LockRank::received};  // received messages are passed on by one thread at a time
+  std::optional<SessionReader> reader OSTEON_GUARDED_BY(read_mutex);
+  mutable Mutex fast_mutex{LockRank::leaf};
+  std::shared_ptr<FastPath> fast
+      OSTEON_GUARDED_BY(fast_mutex);  // of the present stream; held by those who use it at the moment
 
   // Sequence number of the newest event that was passed on, over the present stream.
   std::atomic<std::uint64_t> passed_on{0};
   std::atomic<bool> received_leaves{false};  // no datagram acknowledges the leaves
 
-  mutable std::mutex mutex;
-  std::condition_variable wake;
-  Line* line = nullptr;  // the open one
-  CutsUnderway underway{kMaxWaitingCuts};
-  std::optional<MountLoad> push;  // to be sent over the stream
-  std::chrono::steady_clock::time_point next_push{};
-  std::optional<std::chrono::milliseconds> redial;  // the server drains: when to connect again
-  bool closing = false, over = false;
+  mutable Mutex mutex{LockRank::haptic_session};
+  CondVar wake;
+  Line* line OSTEON_GUARDED_BY(mutex) = nullptr;  // the open one
+  CutsUnderway underway OSTEON_GUARDED_BY(mutex){kMaxWaitingCuts};
+  std::optional<MountLoad> push OSTEON_GUARDED_BY(mutex);  // to be sent over the stream
+  std::chrono::steady_clock::time_point next_push OSTEON_GUARDED_BY(mutex){};
+  std::optional<std::chrono::milliseconds> redial OSTEON_GUARDED_BY(mutex);  // the server drains: when to connect again
+  bool closing OSTEON_GUARDED_BY(mutex) = false, over OSTEON_GUARDED_BY(mutex) = false;
 };
 
 // On the line's writer thread.
@@ -243,8 +242,8 @@ void RoomSession::Impl::write(Line& open) {
   auto acknowledge_at = std::chrono::steady_clock::now();
   while (written) {
     {
-      std::unique_lock lock(mutex);
-      wake.wait_until(lock, acknowledge_at, [&] {
+      MutexLock lock(mutex);
+      wake.wait_until(lock, acknowledge_at, [&]() OSTEON_REQUIRES(mutex) {
         return underway.something_to_send() || push || closing || over || line != &open || redial;
       });
       // A draining server decides what it has received and no more. The rest is sent when the session continues.
@@ -284,7 +283,7 @@ void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (response.has_link()) offer = response.link();
   if (response.has_redial()) {
     redial_why = response.redial().why();
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     redial =
         std::min<std::chrono::milliseconds>(std::chrono::milliseconds(response.redial().after_ms()), kLongestRedial);
     wake.notify_all();
@@ -314,33 +313,33 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
       FastPath::open(host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
                      {.entry =
                           [this](wire::IndexedEntry entry) {
-                            const std::lock_guard lock(read_mutex);
+                            const MutexLock lock(read_mutex);
                             (void)reader->take(std::move(entry));
                             passed_on = reader->seq().value;
                           },
                       .dead =
                           [this] {
-                            const std::lock_guard lock(mutex);
+                            const MutexLock lock(mutex);
                             underway.again();
                             wake.notify_all();
                           },
                       .partner =
                           [this](const CuttingState& partner) {
-                            const std::lock_guard lock(read_mutex);
+                            const MutexLock lock(read_mutex);
                             reader->take(partner);
                           },
                       .bone = callbacks.bone,
                       .stop_flag = callbacks.stop_flag});
   if (!opened) return;
   for (const auto& [number, tool] : numbered_tools) (*opened)->know_tool(number, tool);
-  const std::lock_guard lock(fast_mutex);
+  const MutexLock lock(fast_mutex);
   fast = std::move(*opened);
 }
 
 void RoomSession::Impl::close_fast_path() {
   std::shared_ptr<FastPath> closing_path;
   {
-    const std::lock_guard lock(fast_mutex);
+    const MutexLock lock(fast_mutex);
     closing_path = std::move(fast);
   }
   // Stop it before it is released: another owner at this moment may be its own thread.
@@ -349,7 +348,7 @@ void RoomSession::Impl::close_fast_path() {
 
 grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) {
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     if (closing || over) return grpc::Status::CANCELLED;
     open.stream = stub->Session(&open.context);
     line = &open;
@@ -357,7 +356,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     underway.stop();
   }
   {
-    const std::lock_guard lock(read_mutex);
+    const MutexLock lock(read_mutex);
     reader->begin();
     passed_on = 0;
     received_leaves = false;
@@ -369,13 +368,13 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   v1::SessionResponse response;
   while (!broken && open.stream->Read(&response)) {
     {
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       if (over) break;
     }
     const Result<void> delivered = [&] {
       // Under one lock, so that no log entry of a datagram comes between. Such an entry may name a tool that only the
       // fast path knows yet, or follow leaves that are not complete.
-      const std::lock_guard lock(read_mutex);
+      const MutexLock lock(read_mutex);
       follow(response);
       const bool complete = response.has_complete();
       Result<void> taken = reader->take(std::move(response));
@@ -389,7 +388,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     }
   }
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     line = nullptr;
     wake.notify_all();
   }
@@ -425,12 +424,16 @@ Result<void> RoomSession::Impl::join_again() {
       {.least = 20ms, .most = 2s});
   while (true) {
     {
-      std::unique_lock lock(mutex);
+      MutexLock lock(mutex);
       const std::chrono::nanoseconds asked = std::exchange(redial, std::nullopt).value_or(0ms);
-      wake.wait_for(lock, asked + backoff.next(), [&] { return closing || over; });
+      wake.wait_for(lock, asked + backoff.next(), [&]() OSTEON_REQUIRES(mutex) { return closing || over; });
       if (closing || over) return {};
     }
-    Result<wire::JoinedRoom> again = wire::join_again(joined, wire::ClientKind::haptic, reader->kept());
+    const auto kept = [&] {
+      const MutexLock lock(read_mutex);
+      return reader->kept();
+    }();
+    Result<wire::JoinedRoom> again = wire::join_again(joined, wire::ClientKind::haptic, kept);
     if (again) {
       joined = std::move(*again);
       return {};
@@ -462,7 +465,7 @@ void RoomSession::Impl::run() {
   }
   bool closed = false;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     closed = closing;
     over = true;
     wake.notify_all();
@@ -517,37 +520,40 @@ void RoomSession::open(RoomCallbacks callbacks) {
   Impl& impl = *impl_;
   // Called for datagrams and for the stream: one at a time.
   if (callbacks.bone)
-    callbacks.bone = [this_one = std::make_shared<std::mutex>(),
+    callbacks.bone = [this_one = std::make_shared<Mutex>(LockRank::mount_pose),
                       tell = std::move(callbacks.bone)](const MountPose& seen) {
-      const std::lock_guard lock(*this_one);
+      const MutexLock lock(*this_one);
       tell(seen);
     };
-  impl.reader.emplace(
-      impl.room.author, impl.tools, callbacks,
-      [&impl](std::uint64_t author_seq) {
-        if (const std::shared_ptr<FastPath> path = impl.fast_path()) path->decided(author_seq);
-        const std::lock_guard lock(impl.mutex);
-        impl.underway.decided(author_seq);
-      },
-      [&impl](std::uint64_t author_seq) {
-        const std::lock_guard lock(impl.mutex);
-        impl.underway.go_on(author_seq);
-        impl.wake.notify_all();
-      });
+  {
+    const MutexLock reading(impl.read_mutex);
+    impl.reader.emplace(
+        impl.room.author, impl.tools, callbacks,
+        [&impl](std::uint64_t author_seq) {
+          if (const std::shared_ptr<FastPath> path = impl.fast_path()) path->decided(author_seq);
+          const MutexLock lock(impl.mutex);
+          impl.underway.decided(author_seq);
+        },
+        [&impl](std::uint64_t author_seq) {
+          const MutexLock lock(impl.mutex);
+          impl.underway.go_on(author_seq);
+          impl.wake.notify_all();
+        });
+  }
   impl_->callbacks = std::move(callbacks);
   impl_->stub = v1::CuttingService::NewStub(impl_->room.channel);
   impl_->thread = std::thread([impl = impl_.get()] { impl->run(); });
 }
 
 bool RoomSession::send(const Cut& cut) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   if (impl_->closing || impl_->over || !impl_->underway.push(cut)) return false;
   impl_->wake.notify_all();
   return true;
 }
 
 void RoomSession::send(const CuttingState& state) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   impl_->underway.push(state);
   impl_->wake.notify_all();
 }
@@ -555,7 +561,7 @@ void RoomSession::send(const CuttingState& state) {
 void RoomSession::send(const MountLoad& push) {
   if (const std::shared_ptr<FastPath> path = impl_->fast_path(); path && path->send(push)) return;
   const auto now = std::chrono::steady_clock::now();
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   if (now < impl_->next_push || !impl_->underway.may_go()) return;
   impl_->next_push = now + kPushesApart;
   impl_->push = push;
@@ -570,12 +576,12 @@ FastPathHealth RoomSession::fast_path() const {
 void RoomSession::close() {
   if (!impl_ || !impl_->thread.joinable()) return;
   {
-    std::unique_lock lock(impl_->mutex);
+    MutexLock lock(impl_->mutex);
     impl_->closing = true;
     impl_->underway.again();  // including what was sent only in datagrams
     impl_->wake.notify_all();
     // The server ends the stream when it has decided what was sent. A server that does not is not waited for.
-    impl_->wake.wait_for(lock, kCloseTime, [&] { return impl_->over; });
+    impl_->wake.wait_for(lock, kCloseTime, [&]() OSTEON_REQUIRES(impl_->mutex) { return impl_->over; });
     impl_->over = true;
     impl_->wake.notify_all();
     if (impl_->line) impl_->line->context.TryCancel();

@@ -44,7 +44,7 @@ Result<std::unique_ptr<AuditTrail>> AuditTrail::open(AuditOptions options, Disk*
 AuditTrail::~AuditTrail() {
   if (!thread_.joinable()) return;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_window();
     put({.action = "stop", .result = kOk}, options_.most_waiting + 1);
     end_ = true;
@@ -54,7 +54,7 @@ AuditTrail::~AuditTrail() {
 }
 
 AuditCounts AuditTrail::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return counts_;
 }
 
@@ -64,7 +64,7 @@ void AuditTrail::record(AuditEvent event) {
     shorten(*text);
   const bool is_refusal = event.result == kRefused;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (end_ || (is_refusal && is_counted(event))) return;
     put(std::move(event), is_refusal ? options_.most_waiting / 2 : options_.most_waiting);
   }
@@ -115,12 +115,14 @@ void AuditTrail::end_window() {
 }
 
 void AuditTrail::run() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   for (;;) {
     const auto until = batch_.empty() ? window_ends_ : Clock::now() + options_.retry;
-    wake_.wait_until(lock, until, [&] { return end_ || (batch_.empty() && (!waiting_.empty() || lost_ > 0)); });
+    wake_.wait_until(lock, until, [&]() OSTEON_REQUIRES(mutex_) {
+      return end_ || (batch_.empty() && (!waiting_.empty() || lost_ > 0));
+    });
     if (!end_ && Clock::now() >= window_ends_) end_window();
-    write(lock);
+    write();
     if (end_ && (counts_.failing || (waiting_.empty() && lost_ == 0))) break;
     lock.unlock();
     maintain();
@@ -130,7 +132,7 @@ void AuditTrail::run() {
     log::error("audit records are lost because the disk does not accept them", {{"records", left}});
 }
 
-void AuditTrail::write(std::unique_lock<std::mutex>& lock) {
+void AuditTrail::write() {
   while (batch_.size() < kMostAtOnce && !waiting_.empty()) {
     batch_.push_back(std::move(waiting_.front()));
     waiting_.pop_front();
@@ -143,14 +145,14 @@ void AuditTrail::write(std::unique_lock<std::mutex>& lock) {
                       .detail = std::to_string(lost) + " events for which the queue had no space"});
   if (batch_.empty()) return;
   const bool was_failing = counts_.failing;
-  lock.unlock();
+  mutex_.unlock();
   const auto written = log_.append(batch_);
   if (!written && !was_failing)
     log::error("the audit log cannot be written; the server goes on, and records wait in memory",
                {{"reason", written.error().message}});
   if (written && was_failing) log::warn("the audit log is written again");
   if (written) send_to_syslog(*written);
-  lock.lock();
+  mutex_.lock();
   counts_.failing = !written;
   if (written) counts_.written += written->size();
 }

@@ -2,19 +2,18 @@
 // another thread writes them to the audit log and sends them to the system's log.
 #pragma once
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <thread>
 #include <tuple>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "server/audit/audit_log.hpp"
 #include "server/audit/syslog.hpp"
 
@@ -66,12 +65,12 @@ class AuditTrail {
     std::map<std::tuple<AuditIdentity, std::string, std::string, std::string>, Repeated> seen;
     std::uint64_t omitted = 0;
   };
-  // Called under mutex_. True: it repeats an earlier refusal and is only counted.
-  [[nodiscard]] bool is_counted(const AuditEvent& event);
-  void put(AuditEvent event, std::size_t most);
-  void end_window();
+  // True: it repeats an earlier refusal and is only counted.
+  [[nodiscard]] bool is_counted(const AuditEvent& event) OSTEON_REQUIRES(mutex_);
+  void put(AuditEvent event, std::size_t most) OSTEON_REQUIRES(mutex_);
+  void end_window() OSTEON_REQUIRES(mutex_);
   void run();
-  void write(std::unique_lock<std::mutex>& lock);  // writes what is waiting; releases the lock while it does so
+  void write() OSTEON_REQUIRES(mutex_);  // writes what is waiting; releases mutex_ while it does so
   void send_to_syslog(const std::vector<AuditLog::Written>& written);  // [writer] the batch is on the disk
   void maintain();                                                     // [writer] retention
 
@@ -80,14 +79,14 @@ class AuditTrail {
   SyslogSocket syslog_;
   std::vector<AuditEvent> batch_;  // events that the disk has not accepted yet
   Clock::time_point maintained_at_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::deque<AuditEvent> waiting_;
-  std::map<std::string, Refusals> refusals_;  // by person; "": unauthenticated
-  Clock::time_point window_ends_;
-  std::uint64_t lost_ = 0;  // not yet recorded
-  AuditCounts counts_;
-  bool end_ = false;
+  mutable Mutex mutex_{LockRank::leaf};
+  CondVar wake_;
+  std::deque<AuditEvent> waiting_ OSTEON_GUARDED_BY(mutex_);
+  std::map<std::string, Refusals> refusals_ OSTEON_GUARDED_BY(mutex_);  // by person; "": unauthenticated
+  Clock::time_point window_ends_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t lost_ OSTEON_GUARDED_BY(mutex_) = 0;  // not yet recorded
+  AuditCounts counts_ OSTEON_GUARDED_BY(mutex_);
+  bool end_ OSTEON_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -96,7 +96,7 @@ class Authorizer::Watched final : public OpenStream {
         end_(std::move(when)),
         role_(caller.role) {}
   ~Watched() override {
-    const std::lock_guard lock(authorizer_.mutex_);
+    const MutexLock lock(authorizer_.mutex_);
     authorizer_.streams_.remove_if([](const std::weak_ptr<Watched>& stream) { return stream.expired(); });
   }
   Role role() const override { return role_; }
@@ -129,7 +129,7 @@ Authorizer::Authorizer(std::filesystem::path folder, RefusalCounts& counts, Now 
 Authorizer::~Authorizer() {
   if (!thread_.joinable()) return;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = true;
   }
   wake_.notify_all();
@@ -147,11 +147,15 @@ Result<std::unique_ptr<Authorizer>> Authorizer::open(const std::filesystem::path
                                                  pair.error().message + "; make both anew with deploy/certs server");
   warn_of_readable_secrets(folder);
   std::unique_ptr<Authorizer> authorizer(new Authorizer(folder, counts, std::move(now)));
-  if (const Result<bool> read = authorizer->read_ticket_keys(); !read) return tl::unexpected(read.error());
-  // A wrong list at the start would admit people whom it should keep out.
-  if (const Result<bool> read = authorizer->access_.refresh(); !read) return tl::unexpected(read.error());
-  authorizer->access_list_ = authorizer->access_.list();
-  if (const Result<bool> read = authorizer->read_authorities(); !read) return tl::unexpected(read.error());
+  {
+    const MutexLock reading(authorizer->reading_);
+    if (const Result<bool> read = authorizer->read_ticket_keys(); !read) return tl::unexpected(read.error());
+    // A wrong list at the start would admit people whom it should keep out.
+    if (const Result<bool> read = authorizer->access_.refresh(); !read) return tl::unexpected(read.error());
+    if (const Result<bool> read = authorizer->read_authorities(); !read) return tl::unexpected(read.error());
+    const MutexLock lock(authorizer->mutex_);
+    authorizer->access_list_ = authorizer->access_.list();
+  }
   authorizer->thread_ = std::thread([raw = authorizer.get()] { raw->run(); });
   return authorizer;
 }
@@ -173,7 +177,7 @@ std::shared_ptr<grpc::ServerCredentials> Authorizer::credentials() {
 std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
   std::shared_ptr<const Authorities> authorities;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     authorities = authorities_;
   }
   std::optional<Refusal> refusal;
@@ -185,7 +189,7 @@ std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
   } else if (!certificate) {
     refusal = Refusal{"certificate", false, certificate.error().message};
   } else {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const auto why = revoked(certificate->serial, certificate->user, {}))
       refusal = Refusal{"revoked", false, *why};
     else if (is_paused(certificate->user))
@@ -213,7 +217,7 @@ std::optional<Refusal> Authorizer::judge_handshake(std::string_view chain_pem) {
 
 Authorizer::CallTrace Authorizer::trace_of(const CallClaims& call) {
   CallTrace trace{.who = {.address = call.peer.address}, .room = std::string(call.room)};
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem)) {
     trace.who.person = check_shown(call.peer) ? certificate->user : std::string(kClaimed) + certificate->user;
     trace.who.certificate = certificate->serial;
@@ -299,7 +303,7 @@ bool Authorizer::is_paused(const std::string& user) const {
 }
 
 tl::expected<Caller, Refusal> Authorizer::judge(const CallClaims& call) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto refused = [](std::string_view reason, bool is_known, std::string sentence) {
     return tl::unexpected(Refusal{reason, is_known, std::move(sentence)});
   };
@@ -344,7 +348,7 @@ tl::expected<Caller, Refusal> Authorizer::admit(const CallClaims& call) {
   auto caller = judge(call);
   std::string who = "a certificate without a name";
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const Result<PersonCertificate> certificate = certificate_of(call.peer.certificate_pem)) {
       who = certificate->user;
       if (connections_ && !call.peer.by_proxy)
@@ -364,7 +368,7 @@ tl::expected<Caller, Refusal> Authorizer::admit(const CallClaims& call) {
 
 void Authorizer::note_refused(std::string_view reason, std::string_view sentence, const CallClaims& call) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ++counts_.refused;
   }
   refusals_.note(reason, "an unauthenticated client", sentence, call.peer.address);
@@ -375,7 +379,7 @@ void Authorizer::note_flood(const PeerClaims& peer) {
   const bool is_open = !connections_ || peer.by_proxy || connections_->is_open(peer.peer);
   std::string who = "an unauthenticated client";
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (const Result<PersonCertificate> certificate = certificate_of(peer.certificate_pem)) {
       who = certificate->user;
       const auto now = std::chrono::steady_clock::now();
@@ -392,7 +396,7 @@ void Authorizer::note_flood(const PeerClaims& peer) {
 }
 
 Result<void> Authorizer::check_resume(const Caller& caller, const std::string& room, int kind, AuthorId author) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return check_resume_locked(caller, room, kind, author);
 }
 
@@ -414,7 +418,7 @@ Result<void> Authorizer::joined(const Caller& caller, const std::string& room, i
                                 Coming coming) {
   std::vector<std::shared_ptr<Watched>> held, displaced;  // destroyed without the lock, since their destructors take it
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (coming == Coming::again)
       if (Result<void> may = check_resume_locked(caller, room, kind, author); !may) return may;
     const Seat seat{room, caller.user, kind};
@@ -447,14 +451,14 @@ std::optional<Refusal> Authorizer::judge_author(const Caller& caller, const std:
 }
 
 Result<void> Authorizer::check_author(const Caller& caller, const std::string& room, AuthorId author) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (const std::optional<Refusal> why = judge_author(caller, room, author))
     return failure(ErrorCode::denied, why->sentence);
   return {};
 }
 
 void Authorizer::forget_room(const std::string& room) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(seats_, [&](const auto& seat) { return std::get<0>(seat.first) == room; });
   std::erase_if(authors_, [&](const auto& author) { return author.first.first == room; });
 }
@@ -464,7 +468,7 @@ Authorizer::Entered Authorizer::enter(const Caller& caller, const std::string& r
   auto stream = std::make_shared<Watched>(*this, caller, room, author, method,
                                           // Shared with look() while that ends it.
                                           std::move(end));
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::optional<Refusal> refusal = judge_again(stream->caller, room, method);
   if (!refusal && stream->caller.role != caller.role)
     refusal = Refusal{"role", true, changed_role(stream->caller.role)};
@@ -475,12 +479,12 @@ Authorizer::Entered Authorizer::enter(const Caller& caller, const std::string& r
 }
 
 Role Authorizer::role_in(const Caller& caller, const std::string& room) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return access_list_.role(caller.user, room, caller.ticket_role);
 }
 
 AuthorizerCounts Authorizer::counts() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   AuthorizerCounts counts = counts_;
   counts.streams = streams_.size();
   return counts;
@@ -489,20 +493,24 @@ AuthorizerCounts Authorizer::counts() const {
 Result<bool> Authorizer::read_authorities() {
   Result<std::string> certificates = read_all(folder_ / "ca.pem");
   if (!certificates) return tl::unexpected(certificates.error());
+  const auto known = [&] {
+    const MutexLock lock(mutex_);
+    return authorities_;
+  }();
   Authorities now{.certificates = std::move(*certificates), .revocation_lists = {}};
   if (std::filesystem::exists(folder_ / "crl.pem")) {
     Result<std::string> lists = read_all(folder_ / "crl.pem");
     if (!lists) return tl::unexpected(lists.error());
     now.revocation_lists = std::move(*lists);
-  } else if (authorities_ && !authorities_->revocation_lists.empty()) {
+  } else if (known && !known->revocation_lists.empty()) {
     return failure(ErrorCode::not_found, (folder_ / "crl.pem").string() + " is gone; its last content holds on");
   }
-  if (authorities_ && *authorities_ == now) return false;
+  if (known && *known == now) return false;
   const Result<std::set<std::string>> serials = listed_serials(now);
   if (!serials)
     return failure(ErrorCode::invalid_input, (folder_ / "ca.pem").string() + " and crl.pem: " +
                                                  serials.error().message + "; make them with deploy/certs");
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   authorities_ = std::make_shared<const Authorities>(std::move(now));  // shared with handshakes in progress
   listed_serials_ = *serials;
   checked_.clear();
@@ -515,8 +523,8 @@ Result<bool> Authorizer::read_ticket_keys() {
   if (!text) return tl::unexpected(text.error());
   Result<std::vector<TicketCheckKey>> keys = parse_check_keys(*text);
   if (!keys) return failure(ErrorCode::invalid_input, file.string() + ": " + keys.error().message);
+  const MutexLock lock(mutex_);
   if (*keys == ticket_keys_) return false;
-  const std::lock_guard lock(mutex_);
   ticket_keys_ = std::move(*keys);
   tickets_.clear();
   return true;
@@ -524,7 +532,7 @@ Result<bool> Authorizer::read_ticket_keys() {
 
 // A slow disk delays no call: files are read first, and only the result is stored under the lock that calls take.
 void Authorizer::refresh() {
-  const std::lock_guard reading(reading_);
+  const MutexLock reading(reading_);
   const auto report = [](std::string_view what, const Result<bool>& read, std::string& logged) {
     const std::string fault = read ? std::string() : read.error().message;
     if (!fault.empty() && fault != logged) log::error(what, {{"fault", fault}});
@@ -534,30 +542,36 @@ void Authorizer::refresh() {
   bool is_revocation = false;
   if (list && *list) {
     log::info("access list", {{"entries", access_.list().size()}});
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     is_revocation = !access_.list().revokes_as(access_list_);
     access_list_ = access_.list();
   }
   report("access list", list, access_fault_);
   const Result<bool> authorities = read_authorities();
-  if (authorities && *authorities) log::info("authorities", {{"revoked_certificates", listed_serials_.size()}});
+  if (authorities && *authorities) {
+    const MutexLock lock(mutex_);
+    log::info("authorities", {{"revoked_certificates", listed_serials_.size()}});
+  }
   report("authorities", authorities, authorities_fault_);
   const Result<bool> keys = read_ticket_keys();
-  if (keys && *keys) log::info("ticket keys", {{"keys", ticket_keys_.size()}});
+  if (keys && *keys) {
+    const MutexLock lock(mutex_);
+    log::info("ticket keys", {{"keys", ticket_keys_.size()}});
+  }
   report("ticket keys were not read, and those before count on", keys, keys_fault_);
   // A changed role alone closes no connection, since this would also close connections before their first call.
   if (!is_revocation && !(authorities && *authorities)) return;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   revoked_at_ = std::chrono::steady_clock::now();
 }
 
 void Authorizer::close_revoked() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (!connections_ || !revoked_at_) return;
   // A connection without a call may use a certificate that is revoked now. A new one gets time for its first call. One
   // that came after the revocation was judged by the new list.
   const bool is_over = std::chrono::steady_clock::now() - *revoked_at_ >= kFirstCall;
-  const std::size_t closed = connections_->close_if([&](const Connection& one) {
+  const std::size_t closed = connections_->close_if([&](const Connection& one) OSTEON_REQUIRES(mutex_) {
     return one.serial.empty() ? is_over && one.accepted <= *revoked_at_ : revoked(one.serial, one.user, {}).has_value();
   });
   if (is_over) revoked_at_.reset();
@@ -572,7 +586,7 @@ void Authorizer::look() {
   close_revoked();
   refresh();
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (const std::weak_ptr<Watched>& weak : streams_) {
       std::shared_ptr<Watched> stream = weak.lock();
       if (!stream || stream->ended()) {
@@ -606,12 +620,12 @@ void Authorizer::look() {
 }
 
 void Authorizer::run() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (!end_) {
     lock.unlock();
     look();
     lock.lock();
-    wake_.wait_for(lock, kLookEvery, [this] { return end_; });
+    wake_.wait_for(lock, kLookEvery, [this]() OSTEON_REQUIRES(mutex_) { return end_; });
   }
 }
 

@@ -3,14 +3,12 @@
 // stream. This is the only place where a connection or a call is refused because of who makes it.
 #pragma once
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <list>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,6 +22,7 @@
 #include "common/access/role_table.hpp"
 #include "common/access/ticket.hpp"
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "server/audit/audit_record.hpp"
 #include "server/auth/call_rates.hpp"
 #include "server/auth/connections.hpp"
@@ -164,30 +163,29 @@ class Authorizer {
  private:
   class Watched;
   Authorizer(std::filesystem::path folder, RefusalCounts& counts, Now now);
-  // Reads ca.pem and crl.pem. Returns true if they have changed. Under reading_.
-  [[nodiscard]] Result<bool> read_authorities();
-  // Reads tickets.pub. Returns true if its keys have changed. Under reading_.
-  [[nodiscard]] Result<bool> read_ticket_keys();
+  // Reads ca.pem and crl.pem. Returns true if they have changed.
+  [[nodiscard]] Result<bool> read_authorities() OSTEON_REQUIRES(reading_);
+  // Reads tickets.pub. Returns true if its keys have changed.
+  [[nodiscard]] Result<bool> read_ticket_keys() OSTEON_REQUIRES(reading_);
   // Closes the connections whose certificate is revoked, and the connections that are not yet identified.
   void close_revoked();
   [[nodiscard]] std::optional<std::string> revoked(const std::string& serial, const std::string& user,
-                                                   const std::string& ticket_id) const;  // under mutex_
-  [[nodiscard]] bool is_paused(const std::string& user) const;                           // under mutex_
-  // Under mutex_. Checks what can change while somebody is connected: revocations, expiry and roles. Sets the role that
-  // is valid now.
+                                                   const std::string& ticket_id) const OSTEON_REQUIRES(mutex_);
+  [[nodiscard]] bool is_paused(const std::string& user) const OSTEON_REQUIRES(mutex_);
+  // Checks what can change while somebody is connected: revocations, expiry and roles. Sets the role that is valid now.
   [[nodiscard]] std::optional<Refusal> judge_again(Caller& caller, const std::string& room,
-                                                   std::string_view method) const;
+                                                   std::string_view method) const OSTEON_REQUIRES(mutex_);
   [[nodiscard]] std::optional<Refusal> judge_author(const Caller& caller, const std::string& room,
-                                                    AuthorId author) const;
+                                                    AuthorId author) const OSTEON_REQUIRES(mutex_);
   [[nodiscard]] Result<void> check_resume_locked(const Caller& caller, const std::string& room, int kind,
-                                                 AuthorId author) const;
-  [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem);  // under mutex_, as the next three
-  [[nodiscard]] Result<void> check_shown(const PeerClaims& peer);
+                                                 AuthorId author) const OSTEON_REQUIRES(mutex_);
+  [[nodiscard]] Result<PersonCertificate> certificate_of(std::string_view pem) OSTEON_REQUIRES(mutex_);
+  [[nodiscard]] Result<void> check_shown(const PeerClaims& peer) OSTEON_REQUIRES(mutex_);
   struct CheckedTicket {
     Ticket ticket;
     TicketCheckKey key;
   };
-  [[nodiscard]] Result<CheckedTicket> ticket_of(std::string_view text);
+  [[nodiscard]] Result<CheckedTicket> ticket_of(std::string_view text) OSTEON_REQUIRES(mutex_);
   void refresh();
   void run();
   void audit_refusal(std::string_view reason, const CallClaims& call);
@@ -197,35 +195,38 @@ class Authorizer {
   const Now now_;
   std::function<std::string()> only_room_;
   std::chrono::hours most_ticket_life_{0};
-  Connections* connections_ = nullptr;                         // null: an authorizer without a server
-  AuditTrail* trail_ = nullptr;                                // null: nothing is recorded
-  std::mutex reading_;                                         // taken before mutex_, never within it
-  AccessFile access_;                                          // under reading_, as are the next three
-  std::string access_fault_, authorities_fault_, keys_fault_;  // the fault that was logged last
-  mutable std::mutex mutex_;
-  AccessList access_list_;
-  std::vector<TicketCheckKey> ticket_keys_;
-  std::shared_ptr<const Authorities> authorities_;  // shared with handshakes in progress
-  std::set<std::string> listed_serials_;            // serial numbers on the revocation lists
+  Connections* connections_ = nullptr;  // null: an authorizer without a server
+  AuditTrail* trail_ = nullptr;         // null: nothing is recorded
+  Mutex reading_{LockRank::access_reading};
+  AccessFile access_ OSTEON_GUARDED_BY(reading_);
+  // The fault that was logged last.
+  std::string access_fault_ OSTEON_GUARDED_BY(reading_), authorities_fault_ OSTEON_GUARDED_BY(reading_),
+      keys_fault_ OSTEON_GUARDED_BY(reading_);
+  mutable Mutex mutex_{LockRank::authorizer};
+  AccessList access_list_ OSTEON_GUARDED_BY(mutex_);
+  std::vector<TicketCheckKey> ticket_keys_ OSTEON_GUARDED_BY(mutex_);
+  std::shared_ptr<const Authorities> authorities_ OSTEON_GUARDED_BY(mutex_);  // shared with handshakes in progress
+  std::set<std::string> listed_serials_ OSTEON_GUARDED_BY(mutex_);            // serial numbers on the revocation lists
   // Certificates in PEM that a proxy sent and that these authorities signed.
-  std::set<std::string> checked_;
-  std::map<std::string, std::chrono::steady_clock::time_point> paused_;  // until when, by user
+  std::set<std::string> checked_ OSTEON_GUARDED_BY(mutex_);
+  // Until when, by user.
+  std::map<std::string, std::chrono::steady_clock::time_point> paused_ OSTEON_GUARDED_BY(mutex_);
   // Time of the newest revocation, until all connections that were open then were checked.
-  std::optional<std::chrono::steady_clock::time_point> revoked_at_;
-  std::unordered_map<std::string, PersonCertificate> certificates_;  // recently seen, by PEM
-  CallRates rates_;
-  std::unordered_map<std::string, CheckedTicket> tickets_;  // recently seen, by text
-  using Seat = std::tuple<std::string, std::string, int>;   // room, user, kind
-  std::map<Seat, AuthorId> seats_;
+  std::optional<std::chrono::steady_clock::time_point> revoked_at_ OSTEON_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, PersonCertificate> certificates_ OSTEON_GUARDED_BY(mutex_);  // recently seen, by PEM
+  CallRates rates_ OSTEON_GUARDED_BY(mutex_);
+  std::unordered_map<std::string, CheckedTicket> tickets_ OSTEON_GUARDED_BY(mutex_);  // recently seen, by text
+  using Seat = std::tuple<std::string, std::string, int>;                             // room, user, kind
+  std::map<Seat, AuthorId> seats_ OSTEON_GUARDED_BY(mutex_);
   struct Member {
     Seat seat;
     Role role = Role::none;  // the role that the room knows, from joining
   };
-  std::map<std::pair<std::string, AuthorId>, Member> authors_;
-  std::list<std::weak_ptr<Watched>> streams_;
-  AuthorizerCounts counts_;
-  std::condition_variable wake_;
-  bool end_ = false;
+  std::map<std::pair<std::string, AuthorId>, Member> authors_ OSTEON_GUARDED_BY(mutex_);
+  std::list<std::weak_ptr<Watched>> streams_ OSTEON_GUARDED_BY(mutex_);
+  AuthorizerCounts counts_ OSTEON_GUARDED_BY(mutex_);
+  CondVar wake_;
+  bool end_ OSTEON_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -47,7 +47,7 @@ bool Connections::add(int descriptor) {
   const std::optional<std::uint64_t> inode = inode_of(descriptor);
   const std::string peer = inode ? peer_of(descriptor, *inode) : "";
   if (peer.empty()) return false;
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   open_[peer] = {descriptor,
                  *inode,
                  {.peer = peer,
@@ -63,20 +63,20 @@ void Connections::drop_closed() {
 }
 
 std::size_t Connections::count() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   drop_closed();
   return open_.size();
 }
 
 bool Connections::has_room(std::size_t most) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   // Looks which connections are still open only if it matters.
   if (open_.size() >= most) drop_closed();
   return open_.size() < most;
 }
 
 void Connections::identify(const std::string& peer, const std::string& user, const std::string& serial) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto known = open_.find(peer);
   if (known == open_.end() || known->second.connection.serial == serial) return;
   known->second.connection.user = user;
@@ -84,7 +84,7 @@ void Connections::identify(const std::string& peer, const std::string& user, con
 }
 
 std::vector<std::string> Connections::unidentified(std::size_t most) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   drop_closed();
   std::vector<std::string> addresses;
   for (const auto& [peer, entry] : open_) {
@@ -97,7 +97,7 @@ std::vector<std::string> Connections::unidentified(std::size_t most) {
 }
 
 std::size_t Connections::close_if(const std::function<bool(const Connection&)>& which) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   drop_closed();
   std::size_t closed = 0;
   for (auto& [peer, entry] : open_) {
@@ -115,7 +115,7 @@ std::size_t Connections::close_if(const std::function<bool(const Connection&)>& 
 }
 
 bool Connections::is_open(const std::string& peer) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto known = open_.find(peer);
   return known != open_.end() && !known->second.is_cut_off;
 }

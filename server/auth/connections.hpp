@@ -6,9 +6,10 @@
 #include <cstdint>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <string>
 #include <vector>
+
+#include "common/core/mutex.hpp"
 
 namespace osteon {
 
@@ -45,10 +46,10 @@ class Connections {
     Connection connection;
     bool is_cut_off = false;
   };
-  void drop_closed();  // under mutex_
+  void drop_closed() OSTEON_REQUIRES(mutex_);
 
-  std::mutex mutex_;
-  std::map<std::string, Entry> open_;  // by peer
+  Mutex mutex_{LockRank::leaf};
+  std::map<std::string, Entry> open_ OSTEON_GUARDED_BY(mutex_);  // by peer
 };
 
 // The addresses of unidentified() as one text for a log line; "" if there are none.

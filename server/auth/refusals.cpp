@@ -10,7 +10,7 @@ void RefusalCounts::note(std::string_view reason, std::string_view who, std::str
   count(reason);
   std::uint64_t left_out = 0;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!log_.is_new(std::string(who) + " " + std::string(from), reason)) return;
     left_out = log_.take_left_out();
   }

@@ -2,10 +2,10 @@
 #pragma once
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <string>
 #include <string_view>
 
+#include "common/core/mutex.hpp"
 #include "server/auth/refusal_log.hpp"
 
 namespace osteon {
@@ -16,7 +16,7 @@ class RefusalCounts {
  public:
   static constexpr std::size_t kMost = 32;
   void count(std::string_view reason) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto known = counts_.find(reason);
     if (known != counts_.end())
       ++known->second;
@@ -28,14 +28,14 @@ class RefusalCounts {
   // is an address.
   void note(std::string_view reason, std::string_view who, std::string_view said, std::string_view from = {});
   [[nodiscard]] std::map<std::string, std::uint64_t, std::less<>> counts() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return counts_;
   }
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, std::uint64_t, std::less<>> counts_;
-  RefusalLog log_;
+  mutable Mutex mutex_{LockRank::leaf};
+  std::map<std::string, std::uint64_t, std::less<>> counts_ OSTEON_GUARDED_BY(mutex_);
+  RefusalLog log_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace osteon

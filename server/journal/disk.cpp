@@ -9,10 +9,11 @@
 
 #include <cerrno>
 #include <cstdlib>
-#include <mutex>
 #include <set>
 #include <system_error>
 #include <utility>
+
+#include "common/core/mutex.hpp"
 
 namespace osteon {
 namespace {
@@ -246,7 +247,7 @@ class SystemDisk final : public Disk {
  private:
   // Once for each file system in the life of the process.
   Result<void> prove_lock(const fs::path& file, dev_t device) {
-    const std::lock_guard one_at_a_time(proving_);
+    const MutexLock one_at_a_time(proving_);
     if (proved_.contains(device)) return {};
     const Result<bool> held = keeps_others_out(file);
     if (!held) return tl::unexpected(held.error());
@@ -257,8 +258,8 @@ class SystemDisk final : public Disk {
     proved_.insert(device);
     return {};
   }
-  std::mutex proving_;
-  std::set<dev_t> proved_;
+  Mutex proving_{LockRank::leaf};
+  std::set<dev_t> proved_ OSTEON_GUARDED_BY(proving_);
 };
 
 fs::path partial_of(const fs::path& file) {

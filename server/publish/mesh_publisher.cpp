@@ -13,8 +13,7 @@ constexpr Coord kFirstCoord{INT32_MIN, INT32_MIN, INT32_MIN};  // before every b
 
 }  // namespace
 
-MeshPublisher::MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail,
-                             ToolTips tool_tips_mm)
+MeshPublisher::MeshPublisher(Room& room, SharedMutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm)
     : room_(room),
       room_mutex_(room_mutex),
       rates_(rates),
@@ -40,6 +39,7 @@ void MeshPublisher::make_whole_surface(const std::function<void(double)>& progre
     for (unsigned i = 1; i < std::max(1u, std::thread::hardware_concurrency()); ++i) helpers.emplace_back(work, false);
     work(true);
   }
+  const MutexLock lock(surface_mutex_);
   for (std::size_t i = 0; i < keys.size(); ++i)
     if (const StoredBlock* block = store_.put(keys[i], std::move(payloads[i])))
       surface_.blocks[keys[i]] = block_message(keys[i], *block);
@@ -53,7 +53,7 @@ void MeshPublisher::start() {
 
 void MeshPublisher::stop() {
   {
-    const std::lock_guard lock(wake_mutex_);
+    const MutexLock lock(wake_mutex_);
     end_ = true;
     wake_.notify_all();
   }
@@ -66,19 +66,19 @@ void MeshPublisher::run() {
   bool due = false;
   while (true) {
     {
-      std::unique_lock lock(wake_mutex_);
-      const auto called = [&] { return due_ || end_; };
+      MutexLock lock(wake_mutex_);
+      const auto called = [&]() OSTEON_REQUIRES(wake_mutex_) { return due_ || end_; };
       if (near_ && !owed_)  // tools move without waking this thread
         wake_.wait_for(lock, rates_.looks, called);
       else if (!owed_)
-        wake_.wait(lock, called);
+        while (!due_ && !end_) wake_.wait(lock);
       if (!due_ && end_) return;
       // The first of several cuts is shown at once, later ones at the mesh rate. The update waits for the tick near
       // that time, so that the cuts of that tick are sent at once.
       if (Clock::now() < next) {
-        wake_.wait_until(lock, next - about, [&] { return end_; });
+        wake_.wait_until(lock, next - about, [&]() OSTEON_REQUIRES(wake_mutex_) { return end_; });
         fresh_ = false;
-        wake_.wait_until(lock, next + about, [&] { return fresh_ || end_; });
+        wake_.wait_until(lock, next + about, [&]() OSTEON_REQUIRES(wake_mutex_) { return fresh_ || end_; });
       }
       due = std::exchange(due_, false);
     }
@@ -88,12 +88,12 @@ void MeshPublisher::run() {
 }
 
 void MeshPublisher::changed(Clock::time_point arrived) {
-  const std::lock_guard lock(wake_mutex_);
+  const MutexLock lock(wake_mutex_);
   unmeshed_.push_back(arrived);
 }
 
 void MeshPublisher::wake() {
-  const std::lock_guard lock(wake_mutex_);
+  const MutexLock lock(wake_mutex_);
   due_ = fresh_ = true;
   wake_.notify_one();
 }
@@ -104,7 +104,7 @@ void MeshPublisher::follow_looks(Clock::time_point now) {
   next_look_ = now + rates_.looks;
   auto focuses = view_interest_.focuses(room_.bone().pitch_mm(), tool_tips_mm_());
   if (!focuses) return;
-  const std::unique_lock lock(room_mutex_);
+  const WriterLock lock(room_mutex_);
   room_.focus(std::move(*focuses));
 }
 
@@ -123,11 +123,11 @@ void MeshPublisher::make_stale_blocks(bool due) {
   {
     // Takes the arrivals first. A cut that comes between is then measured with the next blocks, never before its own
     // are made.
-    const std::lock_guard lock(wake_mutex_);
+    const MutexLock lock(wake_mutex_);
     std::swap(arrivals, unmeshed_);
   }
   {
-    const std::unique_lock lock(room_mutex_);
+    const WriterLock lock(room_mutex_);
     keys = room_.take_stale_blocks();
     update.room_seq = room_.room_seq();
     bodies_now = room_.bodies();
@@ -139,14 +139,14 @@ void MeshPublisher::make_stale_blocks(bool due) {
   payloads.reserve(keys.size());
   for (const BlockKey& key : keys) {
     const std::optional<BlockSamples> samples = [&] {
-      const std::shared_lock lock(room_mutex_);
+      const ReaderLock lock(room_mutex_);
       return room_.find_field(key.body) ? std::optional(room_.gather_block(key)) : std::nullopt;
     }();
     payloads.push_back(samples ? make_block(*samples) : BlockPayload{});
   }
 
   {
-    const std::lock_guard lock(surface_mutex_);
+    const MutexLock lock(surface_mutex_);
     for (std::size_t i = 0; i < keys.size(); ++i) {
       const StoredBlock* block = store_.put(keys[i], std::move(payloads[i]));
       if (!block) continue;
@@ -178,13 +178,13 @@ void MeshPublisher::make_stale_blocks(bool due) {
     owed_ = !streams_.empty();
   }
   const auto ready = Clock::now();
-  const std::lock_guard lock(stats_mutex_);
+  const MutexLock lock(stats_mutex_);
   for (const Clock::time_point arrived : arrivals) update_.record(ready - arrived);
 }
 
 void MeshPublisher::send_owed(Clock::time_point now) {
   if (!std::exchange(owed_, false)) return;
-  const std::lock_guard lock(surface_mutex_);
+  const MutexLock lock(surface_mutex_);
   turns_ = std::min(Pace::kTurns, 1 + static_cast<int>(streams_.size() / kTurnViewers));
   for (Stream& stream : streams_) {
     if (!stream.owed) continue;
@@ -200,7 +200,7 @@ void MeshPublisher::send_owed(Clock::time_point now) {
 
 void MeshPublisher::watch(MeshSubscriber& subscriber, const std::optional<ViewFrustum>& look) {
   {
-    const std::lock_guard lock(surface_mutex_);
+    const MutexLock lock(surface_mutex_);
     streams_.push_back({&subscriber, Pace(rates_.mesh, streams_.size())});
     view_interest_.open(subscriber.author(), look);
     // Sends the blocks that exist. The finer blocks that this viewer's view needs follow.
@@ -211,7 +211,7 @@ void MeshPublisher::watch(MeshSubscriber& subscriber, const std::optional<ViewFr
 }
 
 void MeshPublisher::leave(MeshSubscriber& subscriber) {
-  const std::lock_guard lock(surface_mutex_);
+  const MutexLock lock(surface_mutex_);
   if (std::erase_if(streams_, [&](const Stream& stream) { return stream.subscriber == &subscriber; }) > 0)
     view_interest_.close(subscriber.author());
 }
@@ -221,7 +221,7 @@ void MeshPublisher::look(AuthorId viewer, const ViewFrustum& from) {
 }
 
 void MeshPublisher::end_streams(const std::string& why) {
-  const std::lock_guard lock(surface_mutex_);
+  const MutexLock lock(surface_mutex_);
   ended_ = why;
   for (const Stream& stream : streams_) stream.subscriber->end(why);
 }
@@ -229,20 +229,20 @@ void MeshPublisher::end_streams(const std::string& why) {
 MeshHealth MeshPublisher::health() const {
   MeshHealth health;
   {
-    const std::lock_guard lock(surface_mutex_);
+    const MutexLock lock(surface_mutex_);
     health.streams = streams_.size();
     health.blocks = surface_.blocks.size();
     for (const auto& [key, message] : surface_.blocks) health.surface_bytes += message->size();
     for (const Stream& stream : streams_)
       health.furthest_behind = std::max(health.furthest_behind, stream.subscriber->waiting());
   }
-  const std::lock_guard lock(stats_mutex_);
+  const MutexLock lock(stats_mutex_);
   health.update = update_;
   return health;
 }
 
 Digest MeshPublisher::surface_hash() const {
-  const std::lock_guard lock(surface_mutex_);
+  const MutexLock lock(surface_mutex_);
   return store_.hash();
 }
 

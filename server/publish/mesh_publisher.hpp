@@ -2,16 +2,14 @@
 // them to every open stream. Viewers take turns, so that no message waits behind those to all other viewers.
 #pragma once
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
 #include <optional>
-#include <shared_mutex>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "common/core/digest.hpp"
+#include "common/core/mutex.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "server/publish/send_queue.hpp"
@@ -47,7 +45,6 @@ struct MeshHealth {
   std::size_t furthest_behind = 0;  // blocks that wait for the slowest reader
 };
 
-// Lock order: the room's, then the surface's, then a stream's own. No other lock is ever held with another.
 class MeshPublisher {
  public:
   using Clock = std::chrono::steady_clock;
@@ -56,7 +53,7 @@ class MeshPublisher {
   // Pace::kTurns times between two messages to one viewer.
   static constexpr std::size_t kTurnViewers = 16;
 
-  MeshPublisher(Room& room, std::shared_mutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm);
+  MeshPublisher(Room& room, SharedMutex& room_mutex, MeshRates rates, Detail detail, ToolTips tool_tips_mm);
   ~MeshPublisher() { stop(); }
   MeshPublisher(const MeshPublisher&) = delete;
   MeshPublisher& operator=(const MeshPublisher&) = delete;
@@ -96,29 +93,30 @@ class MeshPublisher {
   void send_owed(Clock::time_point now);
 
   Room& room_;
-  std::shared_mutex& room_mutex_;
+  SharedMutex& room_mutex_;
   const MeshRates rates_;
   const bool near_;  // draws in full only near viewers and tools
   const ToolTips tool_tips_mm_;
 
-  mutable std::mutex surface_mutex_;
-  std::vector<Stream> streams_;
-  BlockStore store_;
-  MeshUpdate surface_;  // every block with a surface, serialised
-  std::optional<std::string> ended_;
+  mutable Mutex surface_mutex_{LockRank::surface};
+  std::vector<Stream> streams_ OSTEON_GUARDED_BY(surface_mutex_);
+  BlockStore store_ OSTEON_GUARDED_BY(surface_mutex_);
+  MeshUpdate surface_ OSTEON_GUARDED_BY(surface_mutex_);  // every block with a surface, serialised
+  std::optional<std::string> ended_ OSTEON_GUARDED_BY(surface_mutex_);
   ViewInterest view_interest_;     // has a lock of its own
   Clock::time_point next_look_{};  // used by the mesh thread, as is the next
   bool owed_ = false;              // something is owed to some stream
   int turns_ = 1;
 
-  std::mutex wake_mutex_;
-  std::condition_variable wake_;
-  std::vector<Clock::time_point> unmeshed_;  // arrivals of events whose blocks are not made yet
-  bool due_ = false, end_ = false;
-  bool fresh_ = false;  // woken since it was last set to false
+  Mutex wake_mutex_{LockRank::leaf};
+  CondVar wake_;
+  // Arrivals of events whose blocks are not made yet.
+  std::vector<Clock::time_point> unmeshed_ OSTEON_GUARDED_BY(wake_mutex_);
+  bool due_ OSTEON_GUARDED_BY(wake_mutex_) = false, end_ OSTEON_GUARDED_BY(wake_mutex_) = false;
+  bool fresh_ OSTEON_GUARDED_BY(wake_mutex_) = false;  // woken since it was last set to false
 
-  mutable std::mutex stats_mutex_;
-  DurationHistogram update_;
+  mutable Mutex stats_mutex_{LockRank::leaf};
+  DurationHistogram update_ OSTEON_GUARDED_BY(stats_mutex_);
 
   std::thread thread_;
 };

@@ -35,7 +35,7 @@ Presence::Entry* Presence::change(AuthorId author) {
 }
 
 void Presence::joined(AuthorId author, const std::string& name, Role role, bool hand) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Entry& entry = people_[author];
   entry.revision = entry.last_here = ++revision_;
   entry.name = name;
@@ -44,12 +44,12 @@ void Presence::joined(AuthorId author, const std::string& name, Role role, bool 
 }
 
 void Presence::came(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (Entry* entry = change(author)) ++entry->streams;
 }
 
 void Presence::went(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Entry* entry = change(author);
   if (entry == nullptr || entry->streams == 0 || --entry->streams > 0) return;
   entry->look.reset();
@@ -57,7 +57,7 @@ void Presence::went(AuthorId author) {
 }
 
 void Presence::take(const RoomEvent& event) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (const auto* decided = std::get_if<SuperviseEntry>(&event.people)) {
     if (Entry* entry = change(decided->subject)) {
       entry->supervision = decided->supervision;
@@ -78,23 +78,23 @@ void Presence::take(const RoomEvent& event) {
 }
 
 void Presence::took_cut(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (Entry* entry = change(author)) ++entry->cuts;
 }
 
 void Presence::acknowledged(AuthorId author, RoomSeq seq) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = people_.find(author);
   if (found != people_.end() && seq > found->second.acknowledged) change(author)->acknowledged = seq;
 }
 
 void Presence::looked(AuthorId author, const ViewFrustum& from) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (Entry* entry = change(author)) entry->look = from;
 }
 
 std::vector<AuthorId> Presence::supervised_hands() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<AuthorId> hands;
   for (const auto& [author, entry] : people_)
     if (entry.hand && entry.role != Role::instructor) hands.push_back(author);
@@ -102,54 +102,54 @@ std::vector<AuthorId> Presence::supervised_hands() const {
 }
 
 RoomSeq Presence::acknowledged_by(AuthorId author) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = people_.find(author);
   return found == people_.end() ? RoomSeq{} : found->second.acknowledged;
 }
 
 std::string Presence::name_of(AuthorId author) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = people_.find(author);
   return found == people_.end() ? std::string() : found->second.name;
 }
 
 void Presence::watch(PresenceSubscriber& subscriber) {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   subscribers_.push_back(&subscriber);
   subscriber.changed();
   if (ended_) subscriber.end(*ended_);
 }
 
 void Presence::leave(PresenceSubscriber& subscriber) {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   std::erase(subscribers_, &subscriber);
 }
 
 void Presence::end_streams(const std::string& why) {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   ended_ = why;
   for (PresenceSubscriber* subscriber : subscribers_) subscriber->end(why);
 }
 
 std::size_t Presence::streams() const {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   return subscribers_.size();
 }
 
 void Presence::publish(RoomSeq room_seq, Clock::time_point now) {
   if (now < next_) return;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     room_seq_ = room_seq;
     if (std::exchange(published_, revision_) == revision_) return;
   }
   next_ = now + kApart;
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   for (PresenceSubscriber* subscriber : subscribers_) subscriber->changed();
 }
 
 Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights& rights) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (cursor.begun && cursor.revision == revision_) return nullptr;
   // Of the people who have left, the latest.
   std::vector<std::uint64_t> absent;
@@ -164,7 +164,7 @@ Bytes Presence::news(PresenceCursor& cursor, AuthorId reader, const PeopleRights
   // A person's tool and window are separate authors. Events about one of them concern the other as well.
   const auto self = people_.find(reader);
   const std::string name = self == people_.end() ? std::string() : self->second.name;
-  const auto is_readers = [&](AuthorId author) {
+  const auto is_readers = [&](AuthorId author) OSTEON_REQUIRES(mutex_) {
     const auto one = people_.find(author);
     return author == reader || (!name.empty() && one != people_.end() && one->second.name == name);
   };

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -13,6 +12,7 @@
 
 #include "common/access/role.hpp"
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/surface/view_frustum.hpp"
 #include "server/publish/send_queue.hpp"
 #include "server/publish/subscriber.hpp"
@@ -39,7 +39,7 @@ struct PeopleRights {
        others_words = true;
 };
 
-// Any thread may call it. Lock order: that of the streams, then a stream's own, then that of the people.
+// Any thread may call it.
 class Presence {
  public:
   using Clock = std::chrono::steady_clock;
@@ -99,20 +99,20 @@ class Presence {
     AuthorId from, to;
     std::string words;
   };
-  Entry* change(AuthorId author);  // under mutex_; null: unknown author
+  Entry* change(AuthorId author) OSTEON_REQUIRES(mutex_);  // null: unknown author
 
-  mutable std::mutex streams_mutex_;
-  std::vector<PresenceSubscriber*> subscribers_;
-  std::optional<std::string> ended_;
+  mutable Mutex streams_mutex_{LockRank::people_streams};
+  std::vector<PresenceSubscriber*> subscribers_ OSTEON_GUARDED_BY(streams_mutex_);
+  std::optional<std::string> ended_ OSTEON_GUARDED_BY(streams_mutex_);
   Clock::time_point next_{};  // used by the tick thread
 
-  mutable std::mutex mutex_;
-  std::uint64_t revision_ = 1, published_ = 0;
-  std::map<AuthorId, Entry> people_;
-  std::map<std::uint32_t, Drawn> annotations_;
-  std::deque<Said> words_;
-  std::uint64_t words_said_ = 0;
-  RoomSeq room_seq_;
+  mutable Mutex mutex_{LockRank::leaf};
+  std::uint64_t revision_ OSTEON_GUARDED_BY(mutex_) = 1, published_ OSTEON_GUARDED_BY(mutex_) = 0;
+  std::map<AuthorId, Entry> people_ OSTEON_GUARDED_BY(mutex_);
+  std::map<std::uint32_t, Drawn> annotations_ OSTEON_GUARDED_BY(mutex_);
+  std::deque<Said> words_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t words_said_ OSTEON_GUARDED_BY(mutex_) = 0;
+  RoomSeq room_seq_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace osteon

@@ -12,7 +12,7 @@ StatePublisher::StatePublisher() : thread_([this] { run(); }) {}
 
 void StatePublisher::stop() {
   {
-    const std::lock_guard lock(states_mutex_);
+    const MutexLock lock(states_mutex_);
     end_ = true;
     wake_.notify_one();
   }
@@ -20,9 +20,9 @@ void StatePublisher::stop() {
 }
 
 void StatePublisher::watch(StateSubscriber& subscriber) {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   Stream& stream = streams_.emplace_back(Stream{&subscriber, Pace(subscriber.apart(), streams_.size())});
-  std::unique_lock states_lock(states_mutex_);
+  MutexLock states_lock(states_mutex_);
   const ShownNow shown = newest_;
   const std::uint64_t number = number_;
   states_lock.unlock();
@@ -31,28 +31,28 @@ void StatePublisher::watch(StateSubscriber& subscriber) {
 }
 
 void StatePublisher::leave(StateSubscriber& subscriber) {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   std::erase_if(streams_, [&](const Stream& stream) { return stream.subscriber == &subscriber; });
 }
 
 void StatePublisher::end_streams(const std::string& why) {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   ended_ = why;
   for (const Stream& stream : streams_) stream.subscriber->end(why);
 }
 
 std::size_t StatePublisher::streams() const {
-  const std::lock_guard lock(streams_mutex_);
+  const MutexLock lock(streams_mutex_);
   return streams_.size();
 }
 
 void StatePublisher::set_session_sender(SendToSessions sender) {
-  const std::lock_guard lock(states_mutex_);
+  const MutexLock lock(states_mutex_);
   send_to_sessions_ = std::move(sender);
 }
 
 void StatePublisher::update(CuttingState state) {
-  const std::lock_guard lock(states_mutex_);
+  const MutexLock lock(states_mutex_);
   Shown& shown = states_[state.author];
   shown = {std::move(state)};
   changed_ = true;
@@ -60,7 +60,7 @@ void StatePublisher::update(CuttingState state) {
 
 // The tool of an ended session is shown idle, so that readers do not go on sounding and drawing its last moment.
 void StatePublisher::session_over(AuthorId author) {
-  const std::lock_guard lock(states_mutex_);
+  const MutexLock lock(states_mutex_);
   const auto shown = states_.find(author);
   if (shown == states_.end()) return;
   CuttingState& state = shown->second.state;
@@ -76,13 +76,13 @@ void StatePublisher::show(const std::vector<SceneItem>& items, const std::vector
   v1::WatchCuttingResponse scene;
   for (const SceneItem& item : items) *scene.add_items() = wire::to_wire(item);
   for (const BodyId body : bodies) scene.add_bodies(body.value);
-  const std::lock_guard lock(states_mutex_);
+  const MutexLock lock(states_mutex_);
   scene_ = serialised(scene);
   changed_ = true;
 }
 
 void StatePublisher::publish(RoomSeq room_seq) {
-  const std::lock_guard lock(states_mutex_);
+  const MutexLock lock(states_mutex_);
   for (auto& [author, shown] : states_) shown.ticks_over += shown.over ? 1 : 0;
   if (std::erase_if(states_, [](const auto& entry) { return entry.second.ticks_over > kShowIdleTicks; }) > 0)
     changed_ = true;
@@ -99,9 +99,9 @@ void StatePublisher::publish(RoomSeq room_seq) {
 }
 
 void StatePublisher::run() {
-  std::unique_lock lock(states_mutex_);
+  MutexLock lock(states_mutex_);
   while (true) {
-    wake_.wait(lock, [&] { return due_ || end_; });
+    while (!due_ && !end_) wake_.wait(lock);
     if (!std::exchange(due_, false)) return;
     lock.unlock();
     send(Clock::now());
@@ -119,8 +119,8 @@ void StatePublisher::run() {
 
 // If sending to everyone takes longer than a tick, the next round sends the newest state and skips those between.
 void StatePublisher::send(Clock::time_point now) {
-  const std::lock_guard lock(streams_mutex_);
-  std::unique_lock states_lock(states_mutex_);
+  const MutexLock lock(streams_mutex_);
+  MutexLock states_lock(states_mutex_);
   const ShownNow shown = newest_;
   const std::uint64_t number = number_;
   states_lock.unlock();
@@ -143,7 +143,7 @@ void StatePublisher::enqueue(Stream& stream, std::uint64_t number, const ShownNo
 }
 
 std::vector<Vec3> StatePublisher::tool_tips_mm() const {
-  const std::lock_guard lock(states_mutex_);
+  const MutexLock lock(states_mutex_);
   std::vector<Vec3> tips_mm;
   for (const auto& [author, shown] : states_)
     if (!shown.over) tips_mm.push_back(shown.state.pose_bone_tool.position_mm);

@@ -2,16 +2,15 @@
 // bodies. Sends it on its own thread, so that the room's tick does not depend on the number of readers.
 #pragma once
 #include <chrono>
-#include <condition_variable>
 #include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/geometry/pose.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
@@ -35,7 +34,6 @@ class StateSubscriber : public Subscriber {
   [[nodiscard]] virtual std::chrono::nanoseconds apart() const { return {}; }
 };
 
-// Lock order: the room's, then that of the streams, then a stream's own or that of the states.
 class StatePublisher {
  public:
   using Clock = std::chrono::steady_clock;
@@ -80,21 +78,21 @@ class StatePublisher {
   void send(Clock::time_point now);
   static void enqueue(Stream& stream, std::uint64_t number, const ShownNow& shown, Clock::time_point now);
 
-  mutable std::mutex streams_mutex_;
-  std::vector<Stream> streams_;
-  std::optional<std::string> ended_;
+  mutable Mutex streams_mutex_{LockRank::state_streams};
+  std::vector<Stream> streams_ OSTEON_GUARDED_BY(streams_mutex_);
+  std::optional<std::string> ended_ OSTEON_GUARDED_BY(streams_mutex_);
 
-  mutable std::mutex states_mutex_;
-  std::condition_variable wake_;
-  std::map<AuthorId, Shown> states_;
-  Bytes scene_ = std::make_shared<const std::string>();
-  ShownNow newest_;           // nothing before the first message
-  std::uint64_t number_ = 0;  // of the newest message, from 1
-  bool changed_ = false;      // since the newest message was made
-  bool due_ = false;          // to be sent
-  bool owed_ = false;         // a reader lacks the newest message and wants it later
-  SendToSessions send_to_sessions_;
-  bool end_ = false;
+  mutable Mutex states_mutex_{LockRank::leaf};
+  CondVar wake_;
+  std::map<AuthorId, Shown> states_ OSTEON_GUARDED_BY(states_mutex_);
+  Bytes scene_ OSTEON_GUARDED_BY(states_mutex_) = std::make_shared<const std::string>();
+  ShownNow newest_ OSTEON_GUARDED_BY(states_mutex_);           // nothing before the first message
+  std::uint64_t number_ OSTEON_GUARDED_BY(states_mutex_) = 0;  // of the newest message, from 1
+  bool changed_ OSTEON_GUARDED_BY(states_mutex_) = false;      // since the newest message was made
+  bool due_ OSTEON_GUARDED_BY(states_mutex_) = false;          // to be sent
+  bool owed_ OSTEON_GUARDED_BY(states_mutex_) = false;         // a reader lacks the newest message and wants it later
+  SendToSessions send_to_sessions_ OSTEON_GUARDED_BY(states_mutex_);
+  bool end_ OSTEON_GUARDED_BY(states_mutex_) = false;
 
   std::thread thread_;
 };

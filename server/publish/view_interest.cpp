@@ -5,20 +5,20 @@
 namespace osteon {
 
 void ViewInterest::open(AuthorId viewer, const std::optional<ViewFrustum>& look) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   Viewer& entry = viewers_[viewer];
   ++entry.streams;
   entry.look = look;
 }
 
 void ViewInterest::close(AuthorId viewer) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto entry = viewers_.find(viewer);
   if (entry != viewers_.end() && --entry->second.streams == 0) viewers_.erase(entry);
 }
 
 bool ViewInterest::look(AuthorId viewer, const ViewFrustum& from) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto entry = viewers_.find(viewer);
   if (entry == viewers_.end()) return false;
   entry->second.look = from;
@@ -28,7 +28,7 @@ bool ViewInterest::look(AuthorId viewer, const ViewFrustum& from) {
 std::optional<std::vector<Focus>> ViewInterest::focuses(double pitch_mm, std::span<const Vec3> tool_tips_mm) {
   std::vector<Focus> wanted{focus_on_nothing()};
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (viewers_.empty()) return std::nullopt;
     for (const auto& [author, viewer] : viewers_)
       if (viewer.look) wanted.push_back(focus_of(*viewer.look, pitch_mm));

@@ -2,12 +2,12 @@
 // It is in full wherever any of them wants that.
 #pragma once
 #include <map>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/surface/view_frustum.hpp"
 
 namespace osteon {
@@ -30,9 +30,9 @@ class ViewInterest {
     int streams = 0;
     std::optional<ViewFrustum> look;
   };
-  std::mutex mutex_;
-  std::map<AuthorId, Viewer> viewers_;
-  std::vector<Focus> followed_{focus_on_nothing()};
+  Mutex mutex_{LockRank::leaf};
+  std::map<AuthorId, Viewer> viewers_ OSTEON_GUARDED_BY(mutex_);
+  std::vector<Focus> followed_{focus_on_nothing()};  // used by the mesh thread
 };
 
 }  // namespace osteon

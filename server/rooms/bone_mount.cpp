@@ -14,22 +14,22 @@ constexpr double kRest_mj = 1e-6;     // less than a thousandth of a millimetre
 }  // namespace
 
 void BoneMount::join(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   bone_.join(author.value);
 }
 
 void BoneMount::leave(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   bone_.leave(author.value);
 }
 
 void BoneMount::push(AuthorId author, const MountLoad& push) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   (void)bone_.receive(author.value, push);
 }
 
 bool BoneMount::step(std::chrono::nanoseconds now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto since = stepped_.count() < 0 ? 0ns : std::min<std::chrono::nanoseconds>(now - stepped_, kLongestStep);
   stepped_ = now;
   bone_.step(1e-9 * static_cast<double>(since.count()));
@@ -39,7 +39,7 @@ bool BoneMount::step(std::chrono::nanoseconds now) {
 }
 
 MountPose BoneMount::seen(AuthorId author) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return bone_.seen(author.value);
 }
 

@@ -2,9 +2,9 @@
 // lasts as long as the room is open. It is neither an event of the room nor part of its bone.
 #pragma once
 #include <chrono>
-#include <mutex>
 
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/mechanics/compliant_mount.hpp"
 
 namespace osteon {
@@ -27,9 +27,9 @@ class BoneMount {
   [[nodiscard]] MountPose seen(AuthorId author);
 
  private:
-  std::mutex mutex_;  // never held with another mutex that is taken within
-  MountServer bone_;
-  std::chrono::nanoseconds stepped_{-1}, sent_{};
+  Mutex mutex_{LockRank::leaf};
+  MountServer bone_ OSTEON_GUARDED_BY(mutex_);
+  std::chrono::nanoseconds stepped_ OSTEON_GUARDED_BY(mutex_){-1}, sent_ OSTEON_GUARDED_BY(mutex_){};
 };
 
 }  // namespace osteon

@@ -13,7 +13,7 @@ Committer::Committer(Write write, std::function<void(const Error&)> failed, bool
 
 Committer::~Committer() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = true;
     wake_.notify_all();
   }
@@ -23,30 +23,35 @@ Committer::~Committer() {
 void Committer::commit(std::vector<LogEntry> entries, std::vector<WhenDurable> callbacks) {
   if (entries.empty() && callbacks.empty()) return;
   if (!write_) return keep(entries, callbacks);
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::ranges::move(entries, std::back_inserter(entries_));
   std::ranges::move(callbacks, std::back_inserter(callbacks_));
   wake_.notify_all();
 }
 
 void Committer::drain() {
-  if (!thread_.joinable()) return keep(std::exchange(entries_, {}), std::exchange(callbacks_, {}));
-  std::unique_lock lock(mutex_);
-  wake_.wait(lock, [&] { return !busy_ && entries_.empty() && callbacks_.empty(); });
+  MutexLock lock(mutex_);
+  if (!thread_.joinable()) {
+    const std::vector<LogEntry> entries = std::exchange(entries_, {});
+    const std::vector<WhenDurable> callbacks = std::exchange(callbacks_, {});
+    lock.unlock();
+    return keep(entries, callbacks);
+  }
+  while (busy_ || !entries_.empty() || !callbacks_.empty()) wake_.wait(lock);
 }
 
 std::size_t Committer::waiting() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return entries_.size() + writing_;
 }
 
 DurationHistogram Committer::commit_times() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return times_;
 }
 
 std::optional<Error> Committer::failure() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return failure_;
 }
 
@@ -57,7 +62,7 @@ void Committer::keep(const std::vector<LogEntry>& entries, const std::vector<Whe
     const auto begun = std::chrono::steady_clock::now();
     durable = write_(entries);
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       times_.record(std::chrono::steady_clock::now() - begun);
       if (!durable) failure_ = durable.error();
     }
@@ -67,9 +72,9 @@ void Committer::keep(const std::vector<LogEntry>& entries, const std::vector<Whe
 }
 
 void Committer::run() {
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   while (true) {
-    wake_.wait(lock, [&] { return end_ || !entries_.empty() || !callbacks_.empty(); });
+    while (!end_ && entries_.empty() && callbacks_.empty()) wake_.wait(lock);
     if (entries_.empty() && callbacks_.empty()) return;
     const std::vector<LogEntry> entries = std::exchange(entries_, {});
     const std::vector<WhenDurable> callbacks = std::exchange(callbacks_, {});

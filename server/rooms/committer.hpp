@@ -1,15 +1,14 @@
 // Makes the decisions of a room durable before they are sent to anybody. Writes all entries of a tick in one
 // transaction, on its own thread, while the room goes on.
 #pragma once
-#include <condition_variable>
 #include <cstddef>
 #include <functional>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <thread>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "common/runtime/tick_stats.hpp"
 #include "server/room/log_entry.hpp"
@@ -47,14 +46,14 @@ class Committer {
 
   const Write write_;
   const std::function<void(const Error&)> failed_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::vector<LogEntry> entries_;
-  std::vector<WhenDurable> callbacks_;
-  std::size_t writing_ = 0;  // entries in the current transaction
-  bool busy_ = false, end_ = false;
-  DurationHistogram times_;
-  std::optional<Error> failure_;
+  mutable Mutex mutex_{LockRank::leaf};
+  CondVar wake_;
+  std::vector<LogEntry> entries_ OSTEON_GUARDED_BY(mutex_);
+  std::vector<WhenDurable> callbacks_ OSTEON_GUARDED_BY(mutex_);
+  std::size_t writing_ OSTEON_GUARDED_BY(mutex_) = 0;  // entries in the current transaction
+  bool busy_ OSTEON_GUARDED_BY(mutex_) = false, end_ OSTEON_GUARDED_BY(mutex_) = false;
+  DurationHistogram times_ OSTEON_GUARDED_BY(mutex_);
+  std::optional<Error> failure_ OSTEON_GUARDED_BY(mutex_);
   std::thread thread_;
 };
 

@@ -8,24 +8,27 @@ void CutMetrics::committed(Time arrived, Time taken, Time decided) {
 }
 
 void CutMetrics::publish(bool last) {
-  std::unique_lock lock(mutex_, std::try_to_lock);
-  if (!lock && last) lock.lock();
-  if (lock) shown_ = own_;
+  if (last)
+    mutex_.lock();
+  else if (!mutex_.try_lock())
+    return;
+  const MutexLock lock(mutex_, std::adopt_lock);
+  shown_ = own_;
 }
 
 void CutMetrics::acknowledged(Time decided, Time durable, Time acknowledged) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   commit_.record(durable - decided);
   publish_.record(acknowledged - durable);
 }
 
 StageTimes CutMetrics::stages() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return {shown_.wait, shown_.decide, commit_, publish_};
 }
 
 RejectionCounts CutMetrics::rejections() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return shown_.rejections;
 }
 

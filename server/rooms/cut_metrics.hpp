@@ -3,8 +3,8 @@
 #include <array>
 #include <chrono>
 #include <cstdint>
-#include <mutex>
 
+#include "common/core/mutex.hpp"
 #include "common/field/rejection.hpp"
 #include "common/runtime/tick_stats.hpp"
 
@@ -39,9 +39,9 @@ class CutMetrics {
     RejectionCounts rejections{};
   };
   OfTick own_;  // of the tick thread
-  mutable std::mutex mutex_;
-  OfTick shown_;
-  DurationHistogram commit_, publish_;
+  mutable Mutex mutex_{LockRank::leaf};
+  OfTick shown_ OSTEON_GUARDED_BY(mutex_);
+  DurationHistogram commit_ OSTEON_GUARDED_BY(mutex_), publish_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace osteon

@@ -4,7 +4,6 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <deque>
 #include <future>
 #include <map>
@@ -13,6 +12,7 @@
 #include <thread>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "server/auth/authorizer.hpp"
 #include "server/rooms/playback.hpp"
@@ -49,6 +49,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     };
     auto entered = authorizer.enter(by, room, {}, "/osteon.v1.PeopleService/Demonstrate", end);
     if (!entered) return failure(ErrorCode::denied, entered.error().sentence);
+    const MutexLock lock(mutex_);
     watched_ = std::move(*entered);
     return {};
   }
@@ -63,13 +64,13 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     if (thread_.joinable()) thread_.join();
   }
   [[nodiscard]] bool over() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return over_;
   }
 
   // Empty: it ran to its end, or somebody ended it.
   [[nodiscard]] std::string why() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return why_;
   }
 
@@ -77,19 +78,19 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   // Its tool follows its path on the bone, wherever the mount has moved the bone. No force is recorded.
   bool feels_bone() const override { return false; }
   void begin(SessionStart start) override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     lease_ = start.lease_epoch;
     body_ = start.bodies.front();
   }
   void set_leaves(std::vector<FieldLeaf>) override {}
   // Decided before its session was open.
   void hold(const wire::SessionEntry& supervised) override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     stopped_ = !supervised.supervision.may_cut();
   }
   void enqueue(const SessionMessage& message) override {
     const wire::SessionEntry& entry = message.fast;
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (entry.kind == wire::SessionEntryKind::supervised) {
       lease_ = entry.lease_epoch;
       stopped_ = !entry.supervision.may_cut();
@@ -109,7 +110,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   void answer(const SessionMessage&) override {}
   void refuse(const Error& why) override {
     log::error("demonstration ended", {{"author", author_.value}, {"reason", why.message}});
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     why_ = why.message;
     over_ = true;
     wake_.notify_one();
@@ -120,7 +121,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
 
  private:
   void finish() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     over_ = true;
     wake_.notify_one();
   }
@@ -133,7 +134,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   // at rest at once; any other tool at `seen_at_work`, the time until which it is shown at work. Null: it is at rest
   // already.
   Step next(const std::optional<Clock::time_point>& seen_at_work) {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     while (!over_) {
       const bool may_go_on = !stopped_ && undecided_.size() < kMostUndecided;
       const bool all_made = again_.empty() && made_ == cuts_.size();
@@ -149,8 +150,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     }
     return {Step::What::end};
   }
-  // Under mutex_.
-  Recorded next_cut() {
+  Recorded next_cut() OSTEON_REQUIRES(mutex_) {
     if (!again_.empty()) {
       const std::size_t which = again_.front();
       again_.pop_front();
@@ -171,8 +171,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   [[nodiscard]] Clock::duration at_speed(Clock::duration time) const {
     return std::chrono::duration_cast<Clock::duration>(time / speed_);
   }
-  // Under mutex_.
-  Recorded stamped(std::size_t which) {
+  Recorded stamped(std::size_t which) OSTEON_REQUIRES(mutex_) {
     Recorded out = cuts_[which];
     out.cut.author = author_;
     out.cut.author_seq = ++author_seq_;
@@ -200,7 +199,7 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
     }
     runtime_.leave(*this);
     std::shared_ptr<OpenStream> watched;  // destroyed without the lock, since its destructor takes it
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     over_ = true;
     watched = std::move(watched_);
   }
@@ -209,16 +208,16 @@ class Demonstration final : public SessionSubscriber, public std::enable_shared_
   const AuthorId author_;
   const std::vector<Recorded> cuts_;
   const double speed_;
-  mutable std::mutex mutex_;
-  std::condition_variable wake_;
-  std::uint64_t lease_ = 0, author_seq_ = 0;
-  BodyId body_;
-  std::size_t made_ = 0;                       // number of cuts_ that were made
-  std::deque<std::size_t> undecided_, again_;  // indices into cuts_
-  Clock::time_point due_{};
-  bool stopped_ = false, over_ = false;
-  std::string why_;
-  std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends this
+  mutable Mutex mutex_{LockRank::leaf};
+  CondVar wake_;
+  std::uint64_t lease_ OSTEON_GUARDED_BY(mutex_) = 0, author_seq_ OSTEON_GUARDED_BY(mutex_) = 0;
+  BodyId body_ OSTEON_GUARDED_BY(mutex_);
+  std::size_t made_ OSTEON_GUARDED_BY(mutex_) = 0;  // number of cuts_ that were made
+  std::deque<std::size_t> undecided_ OSTEON_GUARDED_BY(mutex_), again_ OSTEON_GUARDED_BY(mutex_);  // indices into cuts_
+  Clock::time_point due_ OSTEON_GUARDED_BY(mutex_){};
+  bool stopped_ OSTEON_GUARDED_BY(mutex_) = false, over_ OSTEON_GUARDED_BY(mutex_) = false;
+  std::string why_ OSTEON_GUARDED_BY(mutex_);
+  std::shared_ptr<OpenStream> watched_ OSTEON_GUARDED_BY(mutex_);  // shared with the authorizer while it ends this
   std::thread thread_;
 };
 
@@ -300,7 +299,7 @@ Result<Shown> Demonstrations::begin(const DemonstrationPlace& in, AuthorId by, c
     if (!runtime.tools().find(tool.hash()))
       if (const Result<void> known = add_tool(runtime, by, tool); !known) return tl::unexpected(known.error());
 
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::erase_if(going_on_, [](const auto& one) {
     if (!one->over()) return false;
     one->stop();
@@ -323,7 +322,7 @@ Result<Shown> Demonstrations::begin(const DemonstrationPlace& in, AuthorId by, c
 }
 
 Result<void> Demonstrations::end(AuthorId demonstrator) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto one = std::ranges::find(going_on_, demonstrator, [](const auto& d) { return d->author(); });
   if (one == going_on_.end() || (*one)->over()) {
     const std::string why = one == going_on_.end() ? std::string() : (*one)->why();
@@ -336,7 +335,7 @@ Result<void> Demonstrations::end(AuthorId demonstrator) {
 }
 
 void Demonstrations::end_all() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   over_ = true;
   for (const auto& one : going_on_) one->stop();
   going_on_.clear();

@@ -5,11 +5,11 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "server/room/log_entry.hpp"
 #include "server/storage/journal_entries.hpp"
@@ -71,8 +71,9 @@ class Demonstrations {
   void end_all();
 
  private:
-  std::mutex mutex_;  // taken before those of the room, the authorizer and a demonstration; never within one of them
-  std::vector<std::shared_ptr<Demonstration>> going_on_;  // shared with the cuts that they have queued
+  Mutex mutex_{LockRank::demonstrations};
+  // Shared with the cuts that they have queued.
+  std::vector<std::shared_ptr<Demonstration>> going_on_ OSTEON_GUARDED_BY(mutex_);
   std::atomic<bool> over_{false};
 };
 

@@ -1,16 +1,17 @@
 #include "server/rooms/fragment_detector.hpp"
 
 #include <algorithm>
-#include <mutex>
 #include <set>
 #include <utility>
+
+#include "common/core/mutex.hpp"
 
 namespace osteon {
 
 void FragmentDetector::begin(BodyId body) {
   std::vector<FieldLeaf> leaves;
   {
-    const std::shared_lock lock(mutex_);
+    const ReaderLock lock(mutex_);
     if (const CutField* field = room_.find_field(body)) leaves = field->leaf_places();
   }
   read_(leaves);
@@ -26,7 +27,7 @@ std::vector<Separation> FragmentDetector::look() {
   std::uint64_t seen = 0;
   std::uint32_t next_body = 0;
   {
-    const std::unique_lock lock(mutex_);
+    const WriterLock lock(mutex_);
     changes = room_.take_changes();
     present = room_.bodies();
     seen = room_.bone_epoch();

@@ -3,9 +3,9 @@
 #pragma once
 #include <functional>
 #include <map>
-#include <shared_mutex>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "server/room/room.hpp"
 
 namespace osteon {
@@ -15,7 +15,7 @@ class FragmentDetector {
  public:
   // Fills the values of leaves in batches, under the room's lock. Removes the leaves of bodies that no longer exist.
   using ReadLeaves = std::function<void(std::vector<FieldLeaf>& leaves)>;
-  FragmentDetector(Room& room, std::shared_mutex& room_mutex, ReadLeaves read)
+  FragmentDetector(Room& room, SharedMutex& room_mutex, ReadLeaves read)
       : room_(room), mutex_(room_mutex), read_(std::move(read)) {}
 
   // Brings the copies up to date and returns the fragments that have come apart. The room must decide about all of them
@@ -34,7 +34,7 @@ class FragmentDetector {
                                       std::uint32_t& next_body) const;
 
   Room& room_;
-  std::shared_mutex& mutex_;
+  SharedMutex& mutex_;
   ReadLeaves read_;
   std::map<BodyId, Watched> bodies_;
 };

@@ -5,13 +5,16 @@
 namespace osteon {
 
 void JobThread::start() {
-  running_ = true;
+  {
+    const MutexLock lock(mutex_);
+    running_ = true;
+  }
   thread_ = std::thread([this] { work(); });
 }
 
 void JobThread::run(Job job) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (running_) {
       jobs_.push_back(std::move(job));
       wake_.notify_one();
@@ -23,7 +26,7 @@ void JobThread::run(Job job) {
 
 void JobThread::stop() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     running_ = false;
     wake_.notify_one();
   }
@@ -34,8 +37,8 @@ void JobThread::work() {
   while (true) {
     Job job;
     {
-      std::unique_lock lock(mutex_);
-      wake_.wait(lock, [&] { return !jobs_.empty() || !running_; });
+      MutexLock lock(mutex_);
+      while (jobs_.empty() && running_) wake_.wait(lock);
       if (jobs_.empty()) return;
       job = std::move(jobs_.front());
       jobs_.pop_front();

@@ -1,10 +1,10 @@
 // A thread for slow jobs. They run one after another, in the order in which they came.
 #pragma once
-#include <condition_variable>
 #include <deque>
 #include <functional>
-#include <mutex>
 #include <thread>
+
+#include "common/core/mutex.hpp"
 
 namespace osteon {
 
@@ -25,10 +25,10 @@ class JobThread {
  private:
   void work();
 
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::deque<Job> jobs_;
-  bool running_ = false;
+  Mutex mutex_{LockRank::leaf};
+  CondVar wake_;
+  std::deque<Job> jobs_ OSTEON_GUARDED_BY(mutex_);
+  bool running_ OSTEON_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

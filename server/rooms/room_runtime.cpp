@@ -23,7 +23,7 @@ constexpr int kEntriesPlayedPerTick = 256;
 
 bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
   {
-    const std::lock_guard lock(queue_mutex);
+    const MutexLock lock(queue_mutex);
     std::swap(batch, queue);
     queue_closed = last;
   }
@@ -49,9 +49,9 @@ bool RoomRuntime::Impl::tick(std::chrono::nanoseconds now, bool last) {
 void RoomRuntime::Impl::move_bone(std::chrono::nanoseconds now) {
   if (!mount->step(now)) return;
   // A tick does not wait for clients that join, leave or are sent entries: the next pose will do as well.
-  const std::unique_lock lock(sessions_mutex, std::try_to_lock);
-  if (lock)
-    sessions.each([this](SessionSubscriber& subscriber) { subscriber.show_bone(mount->seen(subscriber.author())); });
+  if (!sessions_mutex.try_lock()) return;
+  const MutexLock lock(sessions_mutex, std::adopt_lock);
+  sessions.each([this](SessionSubscriber& subscriber) { subscriber.show_bone(mount->seen(subscriber.author())); });
 }
 
 // Returns true if anything happened.
@@ -62,7 +62,7 @@ bool RoomRuntime::Impl::play(std::chrono::nanoseconds now) {
     if (!entry) break;
     const CutEntry* cut = std::get_if<CutEntry>(&entry->what);
     {
-      const std::unique_lock lock(room_mutex);
+      const WriterLock lock(room_mutex);
       if (const Result<void> happened = room.replay(*entry); !happened) {
         log::error("playback ended", {{"room_seq", entry->seq.value}, {"reason", happened.error().message}});
         player->stop();
@@ -92,7 +92,7 @@ void RoomRuntime::Impl::run_ticks() {
     const bool decided = tick(Clock::now() - room_began, last);
     if (decided) {
       mesh.wake();
-      const std::lock_guard lock(pieces_mutex);
+      const MutexLock lock(pieces_mutex);
       pieces_due = true;
       pieces_wake.notify_one();
     }
@@ -100,9 +100,11 @@ void RoomRuntime::Impl::run_ticks() {
     timer.done(own);
     metrics.publish(last);
     // Others read a copy, so that a tick never waits for a reader of its metrics. Only the last tick waits, to be sure.
-    std::unique_lock lock(stats_mutex, std::try_to_lock);
-    if (!lock && last) lock.lock();
-    if (!lock) continue;
+    if (last)
+      stats_mutex.lock();
+    else if (!stats_mutex.try_lock())
+      continue;
+    const MutexLock lock(stats_mutex, std::adopt_lock);
     stats = own;
     counts = room.counts();  // no other thread changes them
   }
@@ -143,16 +145,16 @@ RoomRuntime::~RoomRuntime() { stop(); }
 const Case& RoomRuntime::bone() const { return impl_->room.bone(); }
 RoomSeq RoomRuntime::room_seq() const { return RoomSeq{impl_->room_seq}; }
 std::uint64_t RoomRuntime::lease_epoch(AuthorId holder) const {
-  const std::shared_lock lock(impl_->room_mutex);
+  const ReaderLock lock(impl_->room_mutex);
   return impl_->room.lease_epoch(holder);
 }
 const ToolBox& RoomRuntime::tools() const { return *impl_->room.tools(); }
 std::vector<SceneItem> RoomRuntime::items() const {
-  const std::shared_lock lock(impl_->room_mutex);
+  const ReaderLock lock(impl_->room_mutex);
   return impl_->room.items();
 }
 std::vector<std::pair<RoomSeq, std::string>> RoomRuntime::marks() const {
-  const std::shared_lock lock(impl_->room_mutex);
+  const ReaderLock lock(impl_->room_mutex);
   return impl_->room.marks();
 }
 bool RoomRuntime::knows(AuthorId author) const {
@@ -167,7 +169,7 @@ RuntimeHealth RoomRuntime::health() const {
     health.furthest_behind = std::max(health.furthest_behind, subscriber.waiting());
   };
   {
-    const std::lock_guard lock(impl_->sessions_mutex);
+    const MutexLock lock(impl_->sessions_mutex);
     health.sessions = impl_->sessions.size();
     impl_->sessions.each(look);
   }
@@ -181,17 +183,17 @@ RuntimeHealth RoomRuntime::health() const {
   health.waiting_entries = impl_->committer.waiting();
   health.commit = impl_->committer.commit_times();
   {
-    const std::shared_lock lock(impl_->room_mutex);
+    const ReaderLock lock(impl_->room_mutex);
     health.stale_blocks = impl_->room.stale_blocks();
   }
   {
-    const std::lock_guard lock(impl_->queue_mutex);
+    const MutexLock lock(impl_->queue_mutex);
     health.queued_cuts = impl_->queue.size();
   }
   health.stages = impl_->metrics.stages();
   health.rejections = impl_->metrics.rejections();
   health.serving = !stopped();
-  const std::lock_guard lock(impl_->stats_mutex);
+  const MutexLock lock(impl_->stats_mutex);
   health.tick = impl_->stats;
   health.counts = impl_->counts;
   return health;
@@ -210,7 +212,7 @@ void RoomRuntime::run_slowly(std::function<void()> job) { impl_->jobs.run(std::m
 
 void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut cut, Clock::time_point arrived) {
   {
-    const std::lock_guard lock(impl_->queue_mutex);
+    const MutexLock lock(impl_->queue_mutex);
     if (!impl_->queue_closed) {
       impl_->queue.emplace_back(std::in_place_type<QueuedCut>,
                                 QueuedCut{std::move(subscriber), std::move(cut), arrived});
@@ -223,7 +225,7 @@ void RoomRuntime::queue_cut(std::shared_ptr<SessionSubscriber> subscriber, Cut c
 void RoomRuntime::queue_event(std::function<Result<RoomEvent>(Room&)> change,
                               std::function<void(const Result<RoomEvent>&)> answer) {
   {
-    const std::lock_guard lock(impl_->queue_mutex);
+    const MutexLock lock(impl_->queue_mutex);
     if (!impl_->queue_closed) {
       impl_->queue.emplace_back(std::in_place_type<QueuedEvent>,
                                 QueuedEvent{std::move(change), std::move(answer), Clock::now()});
@@ -245,7 +247,7 @@ void RoomRuntime::stop() {
   impl_->board.stop();
   impl_->mesh.stop();
   {
-    const std::lock_guard lock(impl_->pieces_mutex);
+    const MutexLock lock(impl_->pieces_mutex);
     impl_->pieces_end = true;
     impl_->pieces_wake.notify_all();
   }
@@ -254,7 +256,7 @@ void RoomRuntime::stop() {
     // Splits off what the last cuts separated, so that the bone ends, and is saved, with its fragments as bodies.
     if (impl_->looks_for_pieces())
       for (Separation& found : impl_->pieces.look()) {
-        const std::unique_lock lock(impl_->room_mutex);
+        const WriterLock lock(impl_->room_mutex);
         (void)impl_->room.split(std::move(found));
       }
     impl_->room_seq = impl_->room.room_seq().value;

@@ -133,7 +133,7 @@ OpenRoom::OpenRoom(std::string n, LoadedCase loaded, Room room, const RoomsOptio
 }
 
 void OpenRoom::note_version(AuthorId author, std::uint32_t version) {
-  const std::lock_guard lock(versions_mutex_);
+  const MutexLock lock(versions_mutex_);
   if (version == wire::kProtocolVersion)
     older_versions_.erase(author);
   else
@@ -141,7 +141,7 @@ void OpenRoom::note_version(AuthorId author, std::uint32_t version) {
 }
 
 std::uint32_t OpenRoom::version_of(AuthorId author) const {
-  const std::lock_guard lock(versions_mutex_);
+  const MutexLock lock(versions_mutex_);
   const auto older = older_versions_.find(author);
   return older == older_versions_.end() ? wire::kProtocolVersion : older->second;
 }
@@ -222,7 +222,7 @@ void Rooms::run_maintenance() {
     }
     for (const std::shared_ptr<OpenRoom>& room : open_rooms()) room->maintain(until_the_end().stop);
   };
-  std::unique_lock lock(mutex_);
+  MutexLock lock(mutex_);
   do {
     lock.unlock();
     maintain();
@@ -236,7 +236,7 @@ MaintenanceCalls Rooms::until_the_end() const {
 
 void Rooms::begin_drain(std::chrono::milliseconds again, const std::string& why) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     draining_ = why;
   }
   const std::vector<std::shared_ptr<OpenRoom>> rooms = open_rooms();
@@ -246,13 +246,13 @@ void Rooms::begin_drain(std::chrono::milliseconds again, const std::string& why)
 }
 
 std::optional<std::string> Rooms::draining() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return draining_;
 }
 
 void Rooms::begin_end() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     ending_ = true;
     maintenance_wake_.notify_all();
   }
@@ -260,7 +260,7 @@ void Rooms::begin_end() {
 }
 
 Result<std::shared_ptr<OpenRoom>> Rooms::find(const std::string& name) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (const auto found = open_.find(name); found != open_.end()) return found->second;
   if (!name.empty()) return stored_file(name) ? tl::unexpected(not_open(name)) : tl::unexpected(no_such_room(name));
   if (open_.size() == 1) return open_.begin()->second;
@@ -272,7 +272,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::find(const std::string& name) const {
 }
 
 std::vector<std::shared_ptr<OpenRoom>> Rooms::open_rooms() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<std::shared_ptr<OpenRoom>> rooms;
   for (const auto& [name, room] : open_) rooms.push_back(room);
   return rooms;
@@ -371,7 +371,7 @@ Result<void> Rooms::check_new(const std::string& name, const Requester& by) cons
 }
 
 Result<void> Rooms::check_free(const std::string& name) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (open_.contains(name) || stored_file(name))
     return failure(ErrorCode::exists, "there is a room " + name + "; choose another name");
   return {};
@@ -379,7 +379,7 @@ Result<void> Rooms::check_free(const std::string& name) const {
 
 std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     open_[room->name] = room;
     to_open_.erase(room->name);
   }
@@ -392,7 +392,7 @@ std::shared_ptr<OpenRoom> Rooms::take_in(std::shared_ptr<OpenRoom> room) {
 }
 
 std::shared_ptr<OpenRoom> Rooms::take_out(const std::string& name) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = open_.find(name);
   if (found == open_.end()) return nullptr;
   std::shared_ptr<OpenRoom> room = std::move(found->second);
@@ -404,7 +404,7 @@ void Rooms::note_open() const {
   if (options_.folder.empty()) return;
   std::set<std::string> all;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     all = to_open_;
   }
   for (const std::shared_ptr<OpenRoom>& room : open_rooms())
@@ -417,7 +417,7 @@ void Rooms::note_open() const {
 
 Result<std::shared_ptr<OpenRoom>> Rooms::add(const std::string& name, Room room, std::unique_ptr<RoomStore> store,
                                              fs::path save, const std::function<void(double)>& progress) {
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   if (Result<void> may = check_free(name); !may) return tl::unexpected(may.error());
   const Result<LoadedCase> of = cases_.load(room.bone().hash());
   if (!of) return tl::unexpected(of.error());
@@ -431,7 +431,7 @@ void Rooms::resume_all(const std::function<void(double)>& progress) {
   if (!noted) return;
   const std::vector<std::string> names = lines_of(*noted);
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     to_open_ = {names.begin(), names.end()};
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -444,13 +444,17 @@ void Rooms::resume_all(const std::function<void(double)>& progress) {
 }
 
 Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const Digest* case_hash, const Requester& by) {
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   if (Result<void> may = check_new(name, by); !may) return tl::unexpected(may.error());
   if (!case_hash && cases().size() > 1)
     return failure(ErrorCode::invalid_input, "the server has several cases; say which with --case-hash");
   const Result<LoadedCase> of = cases_.load(case_hash ? *case_hash : cases().front().hash);
   if (!of) return tl::unexpected(of.error());
-  if (!options_.folder.empty()) return make_owned(journal_of(name), by.user, [&] { return open(name, *of, true, {}); });
+  if (!options_.folder.empty())
+    return make_owned(journal_of(name), by.user, [&] {
+      changing_.assert_held();
+      return open(name, *of, true, {});
+    });
   auto made = std::make_shared<OpenRoom>(name, *of, Room(*of->bone, options_.limits, options_.tools()), options_,
                                          std::function<void(double)>{}, nullptr);
   made->owner = by.user;
@@ -458,7 +462,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::create(const std::string& name, const D
 }
 
 Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const std::function<void(double)>& progress) {
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   if (Result<std::shared_ptr<OpenRoom>> already = find(name); already && !name.empty()) {
     const RoomStore* store = (*already)->store();
     if (const Error* why = store ? store->closed_to_entries() : nullptr)
@@ -477,7 +481,6 @@ Result<std::shared_ptr<OpenRoom>> Rooms::resume(const std::string& name, const s
   return open(name, *of, false, progress);
 }
 
-// [with changing_]
 Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const LoadedCase& of, bool is_new,
                                               const std::function<void(double)>& progress) {
   RoomStore::Options keeping{
@@ -498,7 +501,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::open(const std::string& name, const Loa
 }
 
 Result<RoomSummary> Rooms::close(const std::string& name) {
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   if (const auto kept = find(name); kept && (*kept)->store() && !stored_file((*kept)->name))
     return tl::unexpected(stored_elsewhere(**kept));
   const std::shared_ptr<OpenRoom> room = take_out(name);
@@ -515,7 +518,7 @@ Result<RoomSummary> Rooms::close(const std::string& name) {
 Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const std::string& new_name, RoomSeq to,
                                                 const Requester& by) {
   {
-    const std::lock_guard changing(changing_);
+    const MutexLock changing(changing_);
     if (Result<void> may = check_new(new_name, by); !may) return tl::unexpected(may.error());
     const Result<std::shared_ptr<OpenRoom>> from = find(name);
     if (from && !(*from)->store()) return tl::unexpected(not_persisted(name));
@@ -534,7 +537,7 @@ Result<std::shared_ptr<OpenRoom>> Rooms::branch(const std::string& name, const s
 
 Result<std::shared_ptr<OpenRoom>> Rooms::replay(const std::string& name, const std::string& new_name, RoomSeq from,
                                                 RoomSeq to, double speed, const Requester& by) {
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   if (Result<void> may = check_new(new_name, by); !may) return tl::unexpected(may.error());
   if (!(speed >= 0 && speed <= 1e6)) return failure(ErrorCode::invalid_input, "the speed is not between 0 and 1000000");
   const Result<std::shared_ptr<OpenRoom>> source = find(name);
@@ -576,7 +579,7 @@ Result<RoomGenesis> Rooms::read(const std::string& name, RoomSeq to, const std::
     return store->genesis();
   }
   // Nobody can open it meanwhile.
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   const Result<fs::path> file = stored_file(name);
   if (!file) return tl::unexpected(file.error());
   Result<Journal> journal = Journal::open_to_read(*file);
@@ -638,7 +641,7 @@ Result<std::vector<std::string>> Rooms::remove(const std::string& name, bool wit
   for (auto one = names.rbegin(); one != names.rend(); ++one) {
     if (find(*one))
       if (const Result<RoomSummary> closed = close(*one); !closed) return tl::unexpected(closed.error());
-    const std::lock_guard changing(changing_);
+    const MutexLock changing(changing_);
     if (const Result<fs::path> file = stored_file(*one))
       if (const auto gone = delete_room(*file, false); !gone) return tl::unexpected(gone.error());
     deleted.push_back(*one);
@@ -701,7 +704,7 @@ Result<JournalHead> Rooms::back_up(const std::string& name, const std::string& f
 }
 
 std::map<std::string, RoomSummary> Rooms::close_all() {
-  const std::lock_guard changing(changing_);
+  const MutexLock changing(changing_);
   std::map<std::string, RoomSummary> summaries;
   for (const std::shared_ptr<OpenRoom>& room : open_rooms()) {
     (void)take_out(room->name);

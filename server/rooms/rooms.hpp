@@ -2,13 +2,11 @@
 #pragma once
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "common/tools/tool_box.hpp"
 #include "server/audit/audit_trail.hpp"
@@ -105,9 +104,10 @@ class OpenRoom {
 
  private:
   using Clock = std::chrono::steady_clock;
-  mutable std::mutex versions_mutex_;                 // never held with another mutex
-  std::map<AuthorId, std::uint32_t> older_versions_;  // only those that differ from this server's own
-  std::unique_ptr<RoomStore> store_;                  // outlives the runtime, which writes to it
+  mutable Mutex versions_mutex_{LockRank::leaf};
+  // Only those that differ from this server's own.
+  std::map<AuthorId, std::uint32_t> older_versions_ OSTEON_GUARDED_BY(versions_mutex_);
+  std::unique_ptr<RoomStore> store_;  // outlives the runtime, which writes to it
   std::unique_ptr<RoomRuntime> runtime_;
   Demonstrations demonstrations_;                                                  // run in the runtime
   Clock::time_point newest_checkpoint_ = Clock::now(), forgotten_ = Clock::now();  // used by maintenance
@@ -204,7 +204,7 @@ class Rooms {
 
  private:
   [[nodiscard]] std::filesystem::path journal_of(const std::string& name) const;
-  [[nodiscard]] Result<void> check_new(const std::string& name, const Requester& by) const;  // with changing_ held
+  [[nodiscard]] Result<void> check_new(const std::string& name, const Requester& by) const OSTEON_REQUIRES(changing_);
   [[nodiscard]] Result<void> check_share(const Requester& by) const;
   [[nodiscard]] Result<void> check_free(const std::string& name) const;
   [[nodiscard]] std::size_t count() const;  // of open and persisted rooms
@@ -212,21 +212,23 @@ class Rooms {
   Result<std::vector<std::string>> remove_backup(const std::string& name,
                                                  const std::function<Result<void>(const std::string&)>& may);
   Result<std::shared_ptr<OpenRoom>> open(const std::string& name, const LoadedCase& of, bool is_new,
-                                         const std::function<void(double)>& progress);
-  std::shared_ptr<OpenRoom> take_in(std::shared_ptr<OpenRoom> room);
-  [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name);
+                                         const std::function<void(double)>& progress) OSTEON_REQUIRES(changing_);
+  std::shared_ptr<OpenRoom> take_in(std::shared_ptr<OpenRoom> room) OSTEON_REQUIRES(changing_);
+  [[nodiscard]] std::shared_ptr<OpenRoom> take_out(const std::string& name) OSTEON_REQUIRES(changing_);
   void note_open() const;  // writes the list of open rooms
   void run_maintenance();
   [[nodiscard]] MaintenanceCalls until_the_end() const;
 
   const RoomsOptions options_;
   CaseCache cases_;
-  mutable std::mutex changing_;  // held by everything that changes the rooms; taken before mutex_, never within it
-  mutable std::mutex mutex_;
-  std::map<std::string, std::shared_ptr<OpenRoom>> open_;
-  std::optional<std::string> draining_;  // under mutex_
-  std::set<std::string> to_open_;        // open when the folder was last left, and not yet open again
-  std::condition_variable maintenance_wake_;
+  // Held by everything that changes the rooms and the folder: one change at a time.
+  mutable Mutex changing_{LockRank::rooms_changing};
+  mutable Mutex mutex_{LockRank::leaf};
+  std::map<std::string, std::shared_ptr<OpenRoom>> open_ OSTEON_GUARDED_BY(mutex_);
+  std::optional<std::string> draining_ OSTEON_GUARDED_BY(mutex_);
+  // Open when the folder was last left, and not yet open again.
+  std::set<std::string> to_open_ OSTEON_GUARDED_BY(mutex_);
+  CondVar maintenance_wake_;
   std::atomic<bool> ending_{false};
   std::thread maintenance_;
 };

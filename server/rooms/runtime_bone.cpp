@@ -22,7 +22,7 @@ Digest RoomRuntime::surface_hash() const { return impl_->mesh.surface_hash(); }
 // disappears meanwhile, its leaves stay without values.
 void RoomRuntime::Impl::read_leaves(std::vector<FieldLeaf>& leaves) {
   for (std::size_t i = 0; i < leaves.size();) {
-    const std::shared_lock lock(room_mutex);
+    const ReaderLock lock(room_mutex);
     for (const std::size_t end = std::min(leaves.size(), i + kLeafBatch); i < end; ++i)
       if (const CutField* field = room.any_field(leaves[i].body)) field->read(leaves[i]);
   }
@@ -44,14 +44,14 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
     std::uint64_t changes = 0;
     {
       // Only this thread uses `cuts_during_copy`, and the tick thread, which holds the lock exclusively.
-      const std::shared_lock lock(room_mutex);
+      const ReaderLock lock(room_mutex);
       changes = room.bone_changes();
       leaves = origins();
       cuts_during_copy.emplace();
     }
     read_leaves(leaves);
     {
-      const std::shared_lock lock(room_mutex);
+      const ReaderLock lock(room_mutex);
       copy.room_seq = room.room_seq();
       copy.counts = room.counts();
       copy.items = room.items();
@@ -77,9 +77,9 @@ RoomRuntime::Impl::BoneCopy RoomRuntime::Impl::copy_bone(Bodies which) {
 }
 
 BoneStatus RoomRuntime::bone_status() {
-  const std::lock_guard copying(impl_->copy_mutex);
+  const MutexLock copying(impl_->copy_mutex);
   {
-    const std::shared_lock lock(impl_->room_mutex);
+    const ReaderLock lock(impl_->room_mutex);
     if (impl_->last_status && impl_->last_status->room_seq == impl_->room.room_seq()) return *impl_->last_status;
   }
   // Measured on a copy, so that the room can go on cutting.
@@ -101,7 +101,7 @@ BoneStatus RoomRuntime::bone_status() {
 }
 
 RoomRuntime::Leaves RoomRuntime::leaves_now() {
-  const std::lock_guard copying(impl_->copy_mutex);
+  const MutexLock copying(impl_->copy_mutex);
   const Impl::BoneCopy copy = impl_->copy_bone(Impl::Bodies::all);
   Leaves all{copy.room_seq, {}};
   for (const auto& [id, field] : copy.bodies) std::ranges::move(field.leaves(), std::back_inserter(all.leaves));
@@ -109,7 +109,7 @@ RoomRuntime::Leaves RoomRuntime::leaves_now() {
 }
 
 SavedFields RoomRuntime::saved_fields() {
-  const std::lock_guard copying(impl_->copy_mutex);
+  const MutexLock copying(impl_->copy_mutex);
   const Impl::BoneCopy copy = impl_->copy_bone();
   SavedFields saved;
   saved.case_hash = bone().hash();
@@ -131,8 +131,8 @@ SavedFields RoomRuntime::saved_fields() {
 void RoomRuntime::Impl::run_pieces() {
   while (true) {
     {
-      std::unique_lock lock(pieces_mutex);
-      pieces_wake.wait(lock, [&] { return pieces_due || pieces_end; });
+      MutexLock lock(pieces_mutex);
+      while (!pieces_due && !pieces_end) pieces_wake.wait(lock);
       if (pieces_end) return;
       pieces_due = look_wanted = false;
       ++looks_begun;
@@ -140,13 +140,14 @@ void RoomRuntime::Impl::run_pieces() {
     if (looks_for_pieces()) {
       for (Separation& found : pieces.look()) ask_for_split(std::move(found));
     } else {
-      const std::unique_lock room_lock(room_mutex);
+      const WriterLock room_lock(room_mutex);
       (void)room.take_changes();  // nobody else does
     }
-    std::unique_lock lock(pieces_mutex);
+    MutexLock lock(pieces_mutex);
     looks_done = looks_begun;
     pieces_wake.notify_all();
-    pieces_wake.wait_for(lock, rates_.pieces, [&] { return pieces_end || look_wanted; });
+    pieces_wake.wait_for(lock, rates_.pieces,
+                         [&]() OSTEON_REQUIRES(pieces_mutex) { return pieces_end || look_wanted; });
   }
 }
 
@@ -155,12 +156,12 @@ void RoomRuntime::Impl::ask_for_split(Separation found) {
   const auto shared = std::make_shared<Separation>(std::move(found));  // shared by the queued event and this thread
   bool decided = false;
   {
-    const std::lock_guard lock(queue_mutex);
+    const MutexLock lock(queue_mutex);
     if (queue_closed) return pieces.lose(shared->parent);  // stop() searches once more, in the whole body
     queue.emplace_back(std::in_place_type<QueuedEvent>,
                        QueuedEvent{[shared](Room& r) { return r.split(std::move(*shared)); },
                                    [this, shared, &decided](const Result<RoomEvent>& split) {
-                                     const std::lock_guard answered(pieces_mutex);
+                                     const MutexLock answered(pieces_mutex);
                                      if (!split && split.error().code == ErrorCode::unavailable) {
                                        pieces.lose(shared->parent);
                                        pieces_due = true;
@@ -170,17 +171,17 @@ void RoomRuntime::Impl::ask_for_split(Separation found) {
                                    },
                                    Clock::now()});
   }
-  std::unique_lock lock(pieces_mutex);
-  pieces_wake.wait(lock, [&] { return decided; });
+  MutexLock lock(pieces_mutex);
+  while (!decided) pieces_wake.wait(lock);
 }
 
 void RoomRuntime::find_pieces() {
-  std::unique_lock lock(impl_->pieces_mutex);
+  MutexLock lock(impl_->pieces_mutex);
   // A search that has already begun may have missed the newest cuts.
   const std::uint64_t wanted = impl_->looks_begun + 1;
   impl_->pieces_due = impl_->look_wanted = true;
   impl_->pieces_wake.notify_all();
-  impl_->pieces_wake.wait(lock, [&] { return impl_->looks_done >= wanted || impl_->pieces_end; });
+  while (impl_->looks_done < wanted && !impl_->pieces_end) impl_->pieces_wake.wait(lock);
 }
 
 }  // namespace osteon

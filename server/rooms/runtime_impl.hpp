@@ -3,16 +3,14 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <map>
-#include <mutex>
 #include <optional>
-#include <shared_mutex>
 #include <string>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "server/publish/mesh_publisher.hpp"
 #include "server/publish/presence.hpp"
 #include "server/publish/session_messages.hpp"
@@ -30,9 +28,6 @@ namespace osteon {
 // Watchers of a playback are not among its entries, so their numbers must differ from those of the shown room.
 inline constexpr std::uint64_t kFirstWatcherOfPlayback = 1ull << 40;
 
-// Lock order: copy_mutex, then room_mutex, then sessions_mutex or that of the surface or the state publisher, then a
-// stream's own, then that of the people or the jobs. queue_mutex, pieces_mutex, stats_mutex and that of `metrics` are
-// never held with another.
 struct RoomRuntime::Impl {
   using Clock = RoomRuntime::Clock;
 
@@ -74,7 +69,8 @@ struct RoomRuntime::Impl {
   };
   [[nodiscard]] Personal personal_message(const RoomEvent& event);
   // `held`: the author's restrictions, which `by` decided.
-  [[nodiscard]] SessionStart start_of_session(AuthorId author, const People::Supervised& held, const Decider& by);
+  [[nodiscard]] SessionStart start_of_session(AuthorId author, const People::Supervised& held, const Decider& by)
+      OSTEON_REQUIRES_SHARED(room_mutex);
   // [tick] In a room without a store; 0: no name.
   [[nodiscard]] std::uint32_t person_of(const std::string& name) {
     return name.empty() ? 0 : persons.emplace(name, static_cast<std::uint32_t>(persons.size() + 1)).first->second;
@@ -106,56 +102,61 @@ struct RoomRuntime::Impl {
     std::vector<SceneItem> items;
   };
   enum class Bodies { that_exist, all };
-  BoneCopy copy_bone(Bodies which = Bodies::that_exist);
+  BoneCopy copy_bone(Bodies which = Bodies::that_exist) OSTEON_REQUIRES(copy_mutex);
   void ask_for_split(Separation found);
 
   RoomStore* const store;        // null: nothing is stored
   std::optional<Player> player;  // of a playback, from the beginning; used by the tick thread alone
   std::atomic<std::uint64_t> next_watcher{kFirstWatcherOfPlayback};  // of a playback
+  // The tick thread alone changes it, under room_mutex, and therefore reads it without. All others read it under
+  // room_mutex. So clang cannot check it.
   Room room;
-  std::shared_mutex room_mutex;
-  std::optional<std::vector<Cut>> cuts_during_copy;  // under room_mutex: cuts applied since copy_bone() began
+  SharedMutex room_mutex{LockRank::room};
+  // Cuts applied since copy_bone() began. copy_bone() sets it under a shared lock, the tick thread under an exclusive
+  // one. So clang cannot check it.
+  std::optional<std::vector<Cut>> cuts_during_copy;
   const RuntimeRates rates_;
   const Clock::time_point room_began;  // time 0 of the room, as if it had hardly been closed
   std::atomic<std::uint64_t> room_seq{0}, authors{0};
   std::atomic<bool> stopping{false};
 
-  std::mutex numbers_mutex;  // never held with another mutex that is taken within
-  std::map<Digest, std::uint32_t> tool_numbers;
+  Mutex numbers_mutex{LockRank::leaf};
+  std::map<Digest, std::uint32_t> tool_numbers OSTEON_GUARDED_BY(numbers_mutex);
 
-  std::mutex queue_mutex;
-  std::vector<Queued> queue;
-  bool queue_closed = false;  // the last tick has taken what was queued
+  Mutex queue_mutex{LockRank::leaf};
+  std::vector<Queued> queue OSTEON_GUARDED_BY(queue_mutex);
+  bool queue_closed OSTEON_GUARDED_BY(queue_mutex) = false;  // the last tick has taken what was queued
 
-  mutable std::mutex sessions_mutex;
-  Subscribers<SessionSubscriber> sessions;
-  std::map<AuthorId, SessionSubscriber*> open_authors;
+  mutable Mutex sessions_mutex{LockRank::sessions};
+  Subscribers<SessionSubscriber> sessions OSTEON_GUARDED_BY(sessions_mutex);
+  std::map<AuthorId, SessionSubscriber*> open_authors OSTEON_GUARDED_BY(sessions_mutex);
 
   std::optional<BoneMount> mount;  // from the beginning
   Presence people;
   StatePublisher board;
   MeshPublisher mesh;
 
-  std::mutex pieces_mutex;
-  std::condition_variable pieces_wake;
-  bool pieces_due = true, pieces_end = false;
-  std::uint64_t looks_begun = 0, looks_done = 0;  // under pieces_mutex
-  bool look_wanted = false;                       // somebody waits for the next search
+  Mutex pieces_mutex{LockRank::leaf};
+  CondVar pieces_wake;
+  bool pieces_due OSTEON_GUARDED_BY(pieces_mutex) = true, pieces_end OSTEON_GUARDED_BY(pieces_mutex) = false;
+  std::uint64_t looks_begun OSTEON_GUARDED_BY(pieces_mutex) = 0, looks_done OSTEON_GUARDED_BY(pieces_mutex) = 0;
+  bool look_wanted OSTEON_GUARDED_BY(pieces_mutex) = false;  // somebody waits for the next search
   FragmentDetector pieces{room, room_mutex,
                           [this](std::vector<FieldLeaf>& leaves) { read_leaves(leaves); }};  // used by the piece thread
 
   JobThread jobs;
 
-  mutable std::mutex stats_mutex;
-  TickStats stats;
-  RoomCounts counts;
+  mutable Mutex stats_mutex{LockRank::leaf};
+  TickStats stats OSTEON_GUARDED_BY(stats_mutex);
+  RoomCounts counts OSTEON_GUARDED_BY(stats_mutex);
   CutMetrics metrics;
 
-  std::optional<std::string> ended;       // under sessions_mutex: why new sessions end at once
-  bool may_return = false;                // under sessions_mutex: they may come again
-  std::optional<SessionMessage> redial;   // under sessions_mutex: sent to sessions when the process is about to stop
-  std::mutex copy_mutex;                  // held while the bone is copied; of a stopped runtime by every caller
-  std::optional<BoneStatus> last_status;  // under copy_mutex
+  std::optional<std::string> ended OSTEON_GUARDED_BY(sessions_mutex);  // why new sessions end at once
+  bool may_return OSTEON_GUARDED_BY(sessions_mutex) = false;           // they may come again
+  // Sent to sessions when the process is about to stop.
+  std::optional<SessionMessage> redial OSTEON_GUARDED_BY(sessions_mutex);
+  Mutex copy_mutex{LockRank::bone_copy};  // held while the bone is copied; of a stopped runtime by every caller
+  std::optional<BoneStatus> last_status OSTEON_GUARDED_BY(copy_mutex);
   std::map<std::string, std::uint32_t> persons;   // of the tick thread: numbers by name, if no journal gives them
   std::vector<Queued> batch;                      // of the tick thread
   std::vector<Committer::WhenDurable> callbacks;  // of the tick thread

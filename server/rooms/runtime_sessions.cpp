@@ -41,7 +41,7 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
     return later([subscriber = queued.subscriber](const Result<void>&) { subscriber->decided(); });
   const Clock::time_point taken = Clock::now();
   Result<Outcome> outcome = [&] {
-    const std::unique_lock lock(room_mutex);
+    const WriterLock lock(room_mutex);
     Result<Outcome> decision = room.submit(queued.cut);
     room_seq = room.room_seq().value;
     if (cuts_during_copy && decision && decision->committed() && !decision->repeated)
@@ -66,7 +66,7 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
          to_all = outcome->committed(), newly, done](const Result<void>& durable) {
     const Clock::time_point kept = Clock::now();
     if (durable) {
-      const std::lock_guard lock(sessions_mutex);
+      const MutexLock lock(sessions_mutex);
       // The author may have come back on another stream meanwhile.
       const auto author = open_authors.find(subscriber->author());
       if (!repeated && to_all)
@@ -84,7 +84,7 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
   Result<RoomEvent> event = [&]() -> Result<RoomEvent> {
     if (const std::optional<Error> why = closed()) return tl::unexpected(*why);
     if (player) return tl::unexpected(only_to_be_watched());
-    const std::unique_lock lock(room_mutex);
+    const WriterLock lock(room_mutex);
     Result<RoomEvent> decision = queued.change(room);
     room_seq = room.room_seq().value;
     return decision;
@@ -105,7 +105,7 @@ void RoomRuntime::Impl::decide(QueuedEvent& queued) {
       for (const RoomEvent& one : event->further) people.take(one);
     }
     {
-      const std::lock_guard lock(sessions_mutex);
+      const MutexLock lock(sessions_mutex);
       if (event && event->tool && event->room_seq) {
         const std::uint32_t number = number_of(event->tool->hash);
         sessions.each([&](SessionSubscriber& subscriber) { subscriber.know_tool(number, event->tool->hash); });
@@ -127,14 +127,14 @@ void RoomRuntime::Impl::publish_durable(std::chrono::nanoseconds now) {
   later([this](const Result<void>& durable) {
     if (!durable) return;
     const SessionMessage message = durable_message(store->witness());
-    const std::lock_guard lock(sessions_mutex);
+    const MutexLock lock(sessions_mutex);
     sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(message); });
   });
 }
 
 // [any thread] Tools get numbers when they are first sent, the same for all sessions.
 std::uint32_t RoomRuntime::Impl::number_of(const Digest& tool) {
-  const std::lock_guard lock(numbers_mutex);
+  const MutexLock lock(numbers_mutex);
   return tool_numbers.emplace(tool, static_cast<std::uint32_t>(tool_numbers.size() + 1)).first->second;
 }
 
@@ -162,13 +162,13 @@ RoomRuntime::Impl::Personal RoomRuntime::Impl::personal_message(const RoomEvent&
 // [thread of the state publisher]
 bool RoomRuntime::Impl::send_partners(const std::vector<CuttingState>& states) {
   bool owed = false;
-  const std::lock_guard lock(sessions_mutex);
+  const MutexLock lock(sessions_mutex);
   sessions.each([&](SessionSubscriber& subscriber) { owed |= subscriber.show_partners(states); });
   return owed;
 }
 
 void RoomRuntime::Impl::end_sessions(const std::string& why, bool to_return) {
-  const std::lock_guard lock(sessions_mutex);
+  const MutexLock lock(sessions_mutex);
   ended = why;
   may_return = to_return;
   sessions.each([&](SessionSubscriber& subscriber) { to_return ? subscriber.replaced(why) : subscriber.end(why); });
@@ -187,7 +187,7 @@ Result<void> RoomRuntime::resume(AuthorId author, const Digest& secret, const st
   if (impl_->player) return tl::unexpected(only_to_be_watched());
   if (kept)
     if (Result<void> has = check_witness(*kept); !has) return has;
-  const std::shared_lock lock(impl_->room_mutex);
+  const ReaderLock lock(impl_->room_mutex);
   if (!impl_->room.proves(author, secret))
     return failure(ErrorCode::invalid_input, "the room does not know author " + std::to_string(author.value) +
                                                  " of an earlier connection: " +
@@ -232,7 +232,6 @@ Result<AuthorId> RoomRuntime::join(MemberKind kind, const std::string& name, con
   return answer.get_future().get();
 }
 
-// With room_mutex held.
 SessionStart RoomRuntime::Impl::start_of_session(AuthorId author, const People::Supervised& held, const Decider& by) {
   SessionStart start;
   start.contained = room.room_seq();
@@ -254,7 +253,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
   bool again = false;
   {
     // Held until the subscriber is in the list. So every entry after `contained` is committed, and enqueued, later.
-    const std::shared_lock room_lock(impl_->room_mutex);
+    const ReaderLock room_lock(impl_->room_mutex);
     if (!impl_->room.may_cut(subscriber->author()))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
                                                    " has not joined this room as a haptic client; call Join first");
@@ -265,7 +264,7 @@ Result<void> RoomRuntime::open_session(const std::shared_ptr<SessionSubscriber>&
     const Decider by{held.by, impl_->people.name_of(held.by)};
     SessionStart start = impl_->start_of_session(subscriber->author(), held, by);
     const std::uint64_t lease_epoch = start.lease_epoch;
-    const std::lock_guard lock(impl_->sessions_mutex);
+    const MutexLock lock(impl_->sessions_mutex);
     SessionSubscriber*& open = impl_->open_authors[subscriber->author()];
     if (open && !impl_->room.proves(subscriber->author(), secret))
       return failure(ErrorCode::invalid_input, "open.author " + std::to_string(subscriber->author().value) +
@@ -336,7 +335,7 @@ void RoomRuntime::push_bone(AuthorId author, const MountLoad& push) {
 void RoomRuntime::leave(SessionSubscriber& subscriber) {
   bool was_open = false;
   {
-    const std::lock_guard lock(impl_->sessions_mutex);
+    const MutexLock lock(impl_->sessions_mutex);
     was_open = impl_->sessions.remove(subscriber);
     if (was_open) impl_->open_authors.erase(subscriber.author());
     if (was_open && impl_->mount) impl_->mount->leave(subscriber.author());
@@ -347,9 +346,10 @@ void RoomRuntime::leave(SessionSubscriber& subscriber) {
 }
 
 void RoomRuntime::ask_to_redial(std::chrono::milliseconds after, const std::string& why) {
-  const std::lock_guard lock(impl_->sessions_mutex);
-  impl_->redial = redial_message(after, why);
-  impl_->sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(*impl_->redial); });
+  const SessionMessage message = redial_message(after, why);
+  const MutexLock lock(impl_->sessions_mutex);
+  impl_->redial = message;
+  impl_->sessions.each([&](SessionSubscriber& subscriber) { subscriber.answer(message); });
 }
 
 void RoomRuntime::send_away(const std::string& why) {

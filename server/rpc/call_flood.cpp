@@ -45,7 +45,7 @@ class FloodWatchMaker final : public grpc::experimental::ServerInterceptorFactor
 }  // namespace
 
 bool CallFlood::take(const std::string& whose, Time now) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto left_at = [&](const Bucket& bucket) {
     const double waited = std::chrono::duration<double>(now - bucket.when).count();
     return std::min(limit_.at_once, bucket.left + limit_.per_second * std::max(waited, 0.0));

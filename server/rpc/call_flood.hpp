@@ -5,10 +5,10 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <unordered_map>
 
+#include "common/core/mutex.hpp"
 #include "server/auth/peer_claims.hpp"
 
 namespace grpc::experimental {
@@ -38,8 +38,8 @@ class CallFlood {
     Time when{};
   };
   const FloodLimit limit_;
-  std::mutex mutex_;
-  std::unordered_map<std::string, Bucket> buckets_;  // by `whose`
+  Mutex mutex_{LockRank::leaf};
+  std::unordered_map<std::string, Bucket> buckets_ OSTEON_GUARDED_BY(mutex_);  // by `whose`
 };
 
 // Called for each call that begins beyond the limit, before its handler runs.

@@ -6,11 +6,11 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <system_error>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/cases.grpc.pb.h"
@@ -64,7 +64,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   }
 
   void OnReadDone(bool ok) override {
-    std::unique_lock lock(mutex_);
+    MutexLock lock(mutex_);
     if (finished_ || !upload_) return;
     if (!ok) {
       // The validation thread unpacks and checks it.
@@ -83,7 +83,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   void OnCancel() override { cancelled_ = true; }
   void OnDone() override {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       finished_ = true;  // the alarm is not set any more
       alarm_.reset();
       if (!whole_) upload_.reset();
@@ -96,7 +96,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   using Clock = std::chrono::steady_clock;
 
   void start(const Result<Caller>& caller) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!caller) return finish(status_of(caller.error()));
     if (!store_)
       return finish({StatusCode::FAILED_PRECONDITION, "this server takes no cases; start it with --uploads FOLDER"});
@@ -118,22 +118,21 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
 
   void end(Status why) {
     cancelled_ = true;  // also for a case that is being validated
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     finish(std::move(why));
   }
-  // Under mutex_. Only the first call has an effect.
-  void finish(Status status) {
+  // Only the first call has an effect.
+  void finish(Status status) OSTEON_REQUIRES(mutex_) {
     if (std::exchange(finished_, true)) return;
     if (!status.ok()) log::warn("upload refused", {{"reason", status.error_message()}});
     if (!whole_) upload_.reset();
     Finish(std::move(status));
   }
 
-  // Under mutex_.
-  [[nodiscard]] Clock::time_point due() const {
+  [[nodiscard]] Clock::time_point due() const OSTEON_REQUIRES(mutex_) {
     return std::min(newest_ + store_->quota().idle, began_ + store_->quota().sending);
   }
-  void set_alarm() {
+  void set_alarm() OSTEON_REQUIRES(mutex_) {
     const Clock::duration until = std::max<Clock::duration>(due() - Clock::now(), Clock::duration(0));
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until);
     alarm_ = std::make_unique<grpc::Alarm>();
@@ -143,7 +142,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   }
   // Once all data has come, the validation has its own time limit.
   void look_at_the_clock() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (finished_ || whole_) return;
     if (Clock::now() < due()) return set_alarm();
     const bool idle = due() < began_ + store_->quota().sending;
@@ -166,7 +165,7 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
       rooms_.add_case({stored->hash, stored->title, stored->folder, stored->memory_bytes});
       log::info("case uploaded", {{"hash", to_hex(stored->hash)}, {"title", stored->title}, {"bytes", stored->bytes}});
     }
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!stored)
       return finish(stop() ? Status{StatusCode::CANCELLED, "the upload was given up"} : status_of(stored.error()));
     if (!finished_) {
@@ -182,12 +181,12 @@ class UploadStream final : public grpc::ServerReadReactor<v1::UploadCaseRequest>
   v1::UploadCaseRequest request_;
   std::atomic<bool> cancelled_{false};
   std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream
-  std::mutex mutex_;
+  Mutex mutex_{LockRank::upload};
   std::shared_ptr<UploadStream> self_;
-  std::unique_ptr<Upload> upload_;  // once all data has come, used by the validation thread
-  std::unique_ptr<grpc::Alarm> alarm_;
-  Clock::time_point began_, newest_;
-  bool whole_ = false, finished_ = false;
+  std::unique_ptr<Upload> upload_;  // under mutex_; once all data has come, used by the validation thread alone
+  std::unique_ptr<grpc::Alarm> alarm_ OSTEON_GUARDED_BY(mutex_);
+  Clock::time_point began_ OSTEON_GUARDED_BY(mutex_), newest_ OSTEON_GUARDED_BY(mutex_);
+  bool whole_ OSTEON_GUARDED_BY(mutex_) = false, finished_ OSTEON_GUARDED_BY(mutex_) = false;
 };
 
 class CaseServiceImpl final : public v1::CaseService::CallbackService {

@@ -17,8 +17,8 @@ HealthWatch::HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& 
     : rooms_(rooms), service_(service), of_(of) {
   look();
   thread_ = std::thread([this] {
-    std::unique_lock lock(mutex_);
-    while (!wake_.wait_for(lock, kLookEvery, [this] { return end_; })) {
+    MutexLock lock(mutex_);
+    while (!wake_.wait_for(lock, kLookEvery, [this]() OSTEON_REQUIRES(mutex_) { return end_; })) {
       lock.unlock();
       look();
       lock.lock();
@@ -28,7 +28,7 @@ HealthWatch::HealthWatch(const Rooms& rooms, grpc::HealthCheckServiceInterface& 
 
 HealthWatch::~HealthWatch() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = true;
     wake_.notify_all();
   }
@@ -36,7 +36,7 @@ HealthWatch::~HealthWatch() {
 }
 
 void HealthWatch::look() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const bool open = !rooms_.draining();
   std::map<std::string, bool> now;
   // A removed name is reported as not serving. The service does not know names that never existed.

@@ -1,11 +1,11 @@
 // Reports the state of the server and of each room to grpc.health.v1. The name "" is the server; the other names are
 // those of the rooms.
 #pragma once
-#include <condition_variable>
 #include <map>
-#include <mutex>
 #include <string>
 #include <thread>
+
+#include "common/core/mutex.hpp"
 
 namespace grpc {
 class HealthCheckServiceInterface;
@@ -34,10 +34,10 @@ class HealthWatch {
   const Rooms& rooms_;
   grpc::HealthCheckServiceInterface& service_;
   const Of of_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  std::map<std::string, bool> published_;  // whether serving, by name
-  bool end_ = false;
+  Mutex mutex_{LockRank::health};
+  CondVar wake_;
+  std::map<std::string, bool> published_ OSTEON_GUARDED_BY(mutex_);  // whether serving, by name
+  bool end_ OSTEON_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

@@ -46,10 +46,10 @@ void SessionLink::say(News news) {
 }
 
 void SessionLink::insert(const Cut& cut) {
-  const std::lock_guard delivery(delivery_mutex_);
+  const MutexLock delivery(delivery_mutex_);
   News next;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     link_.insert(cut);
     next = news();
   }
@@ -59,7 +59,7 @@ void SessionLink::insert(const Cut& cut) {
 bool SessionLink::enqueue(std::uint64_t index, const wire::SessionEntry& entry) {
   bool goes = false;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     goes = link_.enqueue(index, entry);
   }
   if (server_) server_->wake();
@@ -67,13 +67,13 @@ bool SessionLink::enqueue(std::uint64_t index, const wire::SessionEntry& entry) 
 }
 
 void SessionLink::know_tool(std::uint32_t number, const Digest& tool) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   link_.tools().add(number, tool);
 }
 
 bool SessionLink::set_partners(std::span<const CuttingState> partners) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!link_.alive(now_of_links())) return false;
     std::vector<wire::KnownToolState> states;
     for (const CuttingState& state : partners) states.push_back({state, 0});
@@ -85,7 +85,7 @@ bool SessionLink::set_partners(std::span<const CuttingState> partners) {
 
 bool SessionLink::set_bone(const MountPose& seen) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!link_.alive(now_of_links())) return false;
     link_.set_bone(seen);
   }
@@ -94,7 +94,7 @@ bool SessionLink::set_bone(const MountPose& seen) {
 }
 
 void SessionLink::close() {
-  const std::lock_guard delivery(delivery_mutex_);
+  const MutexLock delivery(delivery_mutex_);
   receiver_ = nullptr;
 }
 
@@ -110,7 +110,7 @@ LinkServer::LinkServer(std::unique_ptr<UdpPort> port) : port_(std::move(port)) {
 
 LinkServer::~LinkServer() {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     end_ = true;
   }
   port_->wake();
@@ -121,7 +121,7 @@ std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t firs
                                              SessionLink::Receiver& receiver) {
   std::shared_ptr<SessionLink> link;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     std::uint32_t session = 0;
     while (session == 0 || links_.contains(session)) {
       std::array<std::uint8_t, 4> bytes{};
@@ -139,14 +139,14 @@ std::shared_ptr<SessionLink> LinkServer::add(AuthorId author, std::uint64_t firs
 
 void LinkServer::remove(const std::shared_ptr<SessionLink>& link) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     links_.erase(link->keys().session);
   }
   link->close();
 }
 
 std::vector<std::shared_ptr<SessionLink>> LinkServer::links() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<std::shared_ptr<SessionLink>> all;
   for (const auto& [session, link] : links_) all.push_back(link);
   return all;
@@ -156,11 +156,11 @@ LinkServerHealth LinkServer::health() const {
   LinkServerHealth health;
   health.port = port_->counts();
   for (const auto& link : links()) {
-    const std::lock_guard lock(link->mutex_);
+    const MutexLock lock(link->mutex_);
     ++health.links;
     health.alive += link->link_.alive(now_of_links());
   }
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   health.unauthenticated = unauthenticated_;
   return health;
 }
@@ -173,7 +173,7 @@ void LinkServer::receive_some(Time now) {
     const std::optional<std::uint32_t> session = session_of(datagram->bytes);
     std::shared_ptr<SessionLink> link;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       const auto found = session ? links_.find(*session) : links_.end();
       if (found == links_.end())
         ++unauthenticated_;
@@ -181,10 +181,10 @@ void LinkServer::receive_some(Time now) {
         link = found->second;
     }
     if (!link) continue;
-    const std::lock_guard delivery(link->delivery_mutex_);
+    const MutexLock delivery(link->delivery_mutex_);
     SessionLink::News news;
     {
-      const std::lock_guard lock(link->mutex_);
+      const MutexLock lock(link->mutex_);
       link->link_.receive(datagram->from, datagram->bytes, now);
       news = link->news();
     }
@@ -196,7 +196,7 @@ Time LinkServer::send_due(Time now) {
   DatagramBuffer buffer;
   Time next = now + kLongestWait;
   for (const auto& link : links()) {
-    const std::lock_guard lock(link->mutex_);
+    const MutexLock lock(link->mutex_);
     while (const std::optional<wire::ServerLink::Out> out = link->link_.send(now, buffer))
       port_->send(out->to, out->bytes);
     next = std::min(next, link->link_.next(now));
@@ -207,7 +207,7 @@ Time LinkServer::send_due(Time now) {
 void LinkServer::run() {
   while (true) {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (end_) return;
     }
     receive_some(now_of_links());

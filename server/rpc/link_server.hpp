@@ -1,16 +1,15 @@
 // The room's end of all fast paths: one UDP socket and one thread for all sessions. Data that gets through here arrives
 // sooner; the session's stream carries all of it too.
 #pragma once
-#include <condition_variable>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "common/link/sealed.hpp"
 #include "common/link/udp_port.hpp"
@@ -59,17 +58,17 @@ class SessionLink {
     std::optional<MountLoad> push;
     std::uint64_t arrived = 0;
   };
-  [[nodiscard]] News news();  // under mutex_
-  void say(News news);
+  [[nodiscard]] News news() OSTEON_REQUIRES(mutex_);
+  void say(News news) OSTEON_REQUIRES(delivery_mutex_);
 
   const SessionKeys keys_;
   const AuthorId author_;
-  // Order: delivery_mutex_, then mutex_.
-  std::mutex delivery_mutex_;  // held while the receiver is called, so that its calls keep their order
-  Receiver* receiver_;
-  std::mutex mutex_;
-  wire::ServerLink link_;
-  std::uint64_t arrived_ = 0;
+  // Held while the receiver is called, so that its calls keep their order.
+  Mutex delivery_mutex_{LockRank::link_delivery};
+  Receiver* receiver_ OSTEON_GUARDED_BY(delivery_mutex_);
+  Mutex mutex_{LockRank::leaf};
+  wire::ServerLink link_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t arrived_ OSTEON_GUARDED_BY(mutex_) = 0;
   class LinkServer* server_ = nullptr;  // to wake its thread
 };
 
@@ -105,10 +104,10 @@ class LinkServer {
 
   const std::unique_ptr<UdpPort> port_;
   const FillRandom random_ = system_random();
-  mutable std::mutex mutex_;
-  std::map<std::uint32_t, std::shared_ptr<SessionLink>> links_;
-  std::uint64_t unauthenticated_ = 0;
-  bool end_ = false;
+  mutable Mutex mutex_{LockRank::leaf};
+  std::map<std::uint32_t, std::shared_ptr<SessionLink>> links_ OSTEON_GUARDED_BY(mutex_);
+  std::uint64_t unauthenticated_ OSTEON_GUARDED_BY(mutex_) = 0;
+  bool end_ OSTEON_GUARDED_BY(mutex_) = false;
   std::thread thread_;
 };
 

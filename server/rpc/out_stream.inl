@@ -4,13 +4,13 @@
 
 #include <chrono>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "common/core/bounded_text.hpp"
+#include "common/core/mutex.hpp"
 #include "server/auth/authorizer.hpp"
 #include "server/publish/send_queue.hpp"
 
@@ -71,7 +71,10 @@ class OutStream : public Reactor {
   template <class Stream>
   static Stream* launch(std::shared_ptr<Stream> stream, grpc::CallbackServerContext* context = nullptr) {
     Stream* raw = stream.get();
-    raw->context_ = context;
+    {
+      const MutexLock lock(raw->context_mutex_);
+      raw->context_ = context;
+    }
     raw->can_let_go_ = context != nullptr;
     raw->self_ = std::move(stream);
     return raw;
@@ -95,12 +98,12 @@ class OutStream : public Reactor {
   }
 
   void close(const Status& status) {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     close_locked(status);
   }
 
   void OnWriteDone(bool ok) final {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     writing_ = false;
     message_.Clear();
     if (!ok) close_locked({StatusCode::CANCELLED, "the reader is gone"});
@@ -109,12 +112,12 @@ class OutStream : public Reactor {
   void OnCancel() final { close({StatusCode::CANCELLED, "the reader is gone"}); }
   void OnDone() final {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       done_ = true;
       alarm_.reset();
     }
     {
-      const std::lock_guard lock(context_mutex_);
+      const MutexLock lock(context_mutex_);
       context_ = nullptr;  // invalid after this
     }
     leave();
@@ -123,15 +126,14 @@ class OutStream : public Reactor {
   }
 
  protected:
-  // The functions below are called under mutex_, except leave().
   // Fills the next message. Returns false when nothing waits.
-  virtual bool take(ByteBuffer& message) = 0;
+  virtual bool take(ByteBuffer& message) OSTEON_REQUIRES(mutex_) = 0;
   virtual void leave() = 0;
   // What waits will not be sent.
-  virtual void drop_waiting() {}
+  virtual void drop_waiting() OSTEON_REQUIRES(mutex_) {}
 
   // Ends the stream after the message in flight. An OK end sends what waits first, unless an error comes before that.
-  void close_locked(const Status& status) {
+  void close_locked(const Status& status) OSTEON_REQUIRES(mutex_) {
     const bool cuts_off = !status.ok() && !finished_ && !failing();
     if (!closing_ || cuts_off) closing_ = Status(status.error_code(), short_words(status.error_message()));
     if (cuts_off) {
@@ -140,7 +142,7 @@ class OutStream : public Reactor {
     }
     pump();
   }
-  void pump() {
+  void pump() OSTEON_REQUIRES(mutex_) {
     if (writing_ || finished_) return;
     if ((!closing_ || closing_->ok()) && take(message_)) {
       writing_ = true;
@@ -158,16 +160,18 @@ class OutStream : public Reactor {
   [[nodiscard]] bool may_receive(StreamContent content) const {
     return !watched_ || osteon::may_receive(watched_->role(), content);
   }
-  [[nodiscard]] bool closing() const { return closing_.has_value(); }
-  [[nodiscard]] bool failing() const { return closing_ && !closing_->ok(); }  // nothing more is sent
-  [[nodiscard]] bool done() const { return done_; }                           // gRPC has let go of the stream
+  [[nodiscard]] bool closing() const OSTEON_REQUIRES(mutex_) { return closing_.has_value(); }
+  [[nodiscard]] bool failing() const OSTEON_REQUIRES(mutex_) {  // nothing more is sent
+    return closing_ && !closing_->ok();
+  }
+  [[nodiscard]] bool done() const OSTEON_REQUIRES(mutex_) { return done_; }  // gRPC has let go of the stream
   [[nodiscard]] std::shared_ptr<void> self() const { return self_; }
 
-  mutable std::mutex mutex_;
+  mutable Mutex mutex_{LockRank::stream};
 
  private:
-  // Under mutex_. The message in flight, and the end itself, wait for the reader for a short time only.
-  void let_go_later() {
+  // The message in flight, and the end itself, wait for the reader for a short time only.
+  void let_go_later() OSTEON_REQUIRES(mutex_) {
     if (done_ || !can_let_go_) return;
     alarm_ = std::make_unique<grpc::Alarm>();
     alarm_->Set(std::chrono::system_clock::now() + kLetGoAfter, [this, weak = std::weak_ptr<void>(self_)](bool rang) {
@@ -175,19 +179,20 @@ class OutStream : public Reactor {
     });
   }
   void let_go() {
-    const std::lock_guard lock(context_mutex_);
+    const MutexLock lock(context_mutex_);
     if (context_) context_->TryCancel();
   }
 
-  std::mutex context_mutex_;  // never held with another mutex
-  grpc::CallbackServerContext* context_ = nullptr;
+  Mutex context_mutex_{LockRank::leaf};
+  grpc::CallbackServerContext* context_ OSTEON_GUARDED_BY(context_mutex_) = nullptr;
   bool can_let_go_ = false;  // set before anybody else has the stream
-  std::unique_ptr<grpc::Alarm> alarm_;
+  std::unique_ptr<grpc::Alarm> alarm_ OSTEON_GUARDED_BY(mutex_);
   std::shared_ptr<void> self_;
   std::shared_ptr<OpenStream> watched_;  // shared with the authorizer while it ends the stream
-  std::optional<Status> closing_;
-  bool writing_ = false, finished_ = false, done_ = false;
-  ByteBuffer message_;
+  std::optional<Status> closing_ OSTEON_GUARDED_BY(mutex_);
+  bool writing_ OSTEON_GUARDED_BY(mutex_) = false, finished_ OSTEON_GUARDED_BY(mutex_) = false,
+                done_ OSTEON_GUARDED_BY(mutex_) = false;
+  ByteBuffer message_ OSTEON_GUARDED_BY(mutex_);
 };
 
 using WriteReactor = grpc::ServerWriteReactor<ByteBuffer>;
@@ -196,7 +201,7 @@ using BidiReactor = grpc::ServerBidiReactor<ByteBuffer, ByteBuffer>;
 // A stream that is refused at once.
 template <class Reactor>
 class RefusedStream final : public OutStream<Reactor> {
-  bool take(ByteBuffer&) override { return false; }
+  bool take(ByteBuffer&) override OSTEON_REQUIRES(this->mutex_) { return false; }
   void leave() override {}
 };
 

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/people.grpc.pb.h"
 #include "server/rooms/demonstration.hpp"
@@ -28,14 +28,14 @@ class PeopleStream final : public OutStream<WriteReactor>, public PresenceSubscr
   }
 
   void changed() override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     pump();
   }
   void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override { return 0; }
 
  private:
-  bool take(ByteBuffer& message) override {
+  bool take(ByteBuffer& message) override OSTEON_REQUIRES(mutex_) {
     const PeopleRights rights{.people = may_receive(StreamContent::people),
                               .drawings = may_receive(StreamContent::scene),
                               .own_supervision = may_receive(StreamContent::own_supervision),
@@ -55,7 +55,7 @@ class PeopleStream final : public OutStream<WriteReactor>, public PresenceSubscr
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
   bool begun_ = false;
-  PresenceCursor cursor_;
+  PresenceCursor cursor_ OSTEON_GUARDED_BY(mutex_);
 };
 
 using PeopleBase = v1::PeopleService::WithRawCallbackMethod_WatchPeople<
@@ -102,13 +102,13 @@ class PeopleServiceImpl final : public PeopleBase {
     // people are skipped for whom nothing changes, since most who ever had a tool here have left for good. A room that
     // closes meanwhile answers the rest on this thread.
     struct Answer {
-      std::mutex mutex;
-      std::size_t left = 0;
-      RoomSeq seq;  // of the newest event that makes it valid, also of earlier ones
-      std::optional<Error> failed;
+      explicit Answer(std::size_t subjects) : left(subjects) {}
+      Mutex mutex{LockRank::leaf};
+      std::size_t left OSTEON_GUARDED_BY(mutex);
+      RoomSeq seq OSTEON_GUARDED_BY(mutex);  // of the newest event that makes it valid, also of earlier ones
+      std::optional<Error> failed OSTEON_GUARDED_BY(mutex);
     };
-    const auto answer = std::make_shared<Answer>();  // shared by the queued events
-    answer->left = subjects.size();
+    const auto answer = std::make_shared<Answer>(subjects.size());  // shared by the queued events
     const bool all = request->subject() == 0;
     for (const AuthorId subject : subjects)
       room->runtime().queue_event(
@@ -116,12 +116,12 @@ class PeopleServiceImpl final : public PeopleBase {
             const People::Supervised& now = r.people().supervised(subject);
             const bool holds = all && now.supervision == word && r.people().supervises(by);
             if (!holds) return r.supervise(by, subject, word);
-            const std::lock_guard lock(answer->mutex);
+            const MutexLock lock(answer->mutex);
             answer->seq = std::max(answer->seq, now.seq);
             return RoomEvent{};
           },
           [answer, room, reactor, response](const Result<RoomEvent>& decided) {
-            std::unique_lock lock(answer->mutex);
+            MutexLock lock(answer->mutex);
             if (decided)
               answer->seq = std::max(answer->seq, decided->room_seq);
             else if (!answer->failed)
@@ -129,8 +129,9 @@ class PeopleServiceImpl final : public PeopleBase {
             if (--answer->left > 0) return;
             // For people about whom nothing was ever decided, it holds from the beginning.
             response->set_room_seq(answer->seq ? answer->seq.value : room->runtime().room_seq().value);
+            const Status status = answer->failed ? status_of(*answer->failed) : Status::OK;
             lock.unlock();
-            reactor->Finish(answer->failed ? status_of(*answer->failed) : Status::OK);
+            reactor->Finish(status);
           });
     return reactor;
   }

@@ -5,10 +5,10 @@
 #include <grpcpp/support/server_interceptor.h>
 
 #include <algorithm>
-#include <mutex>
 #include <string>
 #include <string_view>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "server/audit/audit_trail.hpp"
 #include "server/auth/connections.hpp"
@@ -21,8 +21,8 @@ using grpc::StatusCode;
 using grpc::experimental::InterceptionHookPoints;
 
 // gRPC's log has one function for the whole process, which takes no object. So the watches are global.
-std::mutex watches_mutex;
-std::vector<HandshakeWatch*> watches;
+Mutex watches_mutex{LockRank::handshakes};
+std::vector<HandshakeWatch*> watches OSTEON_GUARDED_BY(watches_mutex);
 
 // What OpenSSL reports for a failed handshake, and what it means here.
 struct HandshakeFault {
@@ -56,7 +56,7 @@ void read_log_line(gpr_log_func_args* line) {
       kind = known.kind;
       sentence = known.sentence;
     }
-  const std::lock_guard lock(watches_mutex);
+  const MutexLock lock(watches_mutex);
   for (HandshakeWatch* watch : watches) watch->note("an unauthenticated client: " + std::string(kind), sentence);
 }
 
@@ -110,10 +110,10 @@ class CallNotesMaker final : public grpc::experimental::ServerInterceptorFactory
 }  // namespace
 
 void log_failed_call(std::string_view why) {
-  static std::mutex mutex;
+  static Mutex mutex{LockRank::leaf};  // of `log`; clang checks no locals
   static RefusalLog log;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     if (!log.is_new("", why)) return;
   }
   log::warn("a call failed", {{"reason", why}});
@@ -122,14 +122,14 @@ void log_failed_call(std::string_view why) {
 HandshakeWatch::HandshakeWatch(RefusalCounts& refusals, Connections& connections)
     : refusals_(refusals), connections_(connections) {
   {
-    const std::lock_guard lock(watches_mutex);
+    const MutexLock lock(watches_mutex);
     watches.push_back(this);
   }
   gpr_set_log_function(read_log_line);
 }
 
 HandshakeWatch::~HandshakeWatch() {
-  const std::lock_guard lock(watches_mutex);
+  const MutexLock lock(watches_mutex);
   watches.erase(std::ranges::find(watches, this));
 }
 

@@ -1,3 +1,4 @@
+#include "common/core/mutex.hpp"
 #include "server/rpc/services.hpp"
 
 #include <grpcpp/grpcpp.h>
@@ -6,7 +7,6 @@
 #include <array>
 #include <chrono>
 #include <fstream>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -59,12 +59,12 @@ class CaseStream final : public OutStream<WriteReactor> {
       ++file_index_;
     }
     Bytes piece = serialised(response);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     waiting_ = std::move(piece);
     pump();
     if (file_index_ == kFiles.size()) close_locked(Status::OK);
   }
-  bool take(ByteBuffer& message) override {
+  bool take(ByteBuffer& message) override OSTEON_REQUIRES(mutex_) {
     if (!waiting_) return false;
     message = buffer_of({std::exchange(waiting_, nullptr)});
     if (file_index_ < kFiles.size()) read_next_later();
@@ -74,7 +74,7 @@ class CaseStream final : public OutStream<WriteReactor> {
 
   JobThread& files_;
   const std::filesystem::path folder_;
-  Bytes waiting_;
+  Bytes waiting_ OSTEON_GUARDED_BY(mutex_);
   // Used by the reading job. The next job is queued only after this one has handed over its part.
   std::size_t file_index_ = 0;
   std::ifstream file_;

@@ -4,11 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <iterator>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
@@ -46,13 +46,13 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     MessageParts before;
     if (links_) {
       std::shared_ptr<SessionLink> link = links_->add(author_, start.decided_author_seq + 1, *this);
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       link_ = std::move(link);
       before.push_back(link_message(link_->keys(), links_->port()).bytes);
     }
     for (const SessionMessage& message : start.before)
       if (receives(message)) before.push_back(message.bytes);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     taken_ = start.decided_author_seq;
     if (failing()) return;
     send_queue_.begin(start.contained, std::move(before), std::move(start.complete));
@@ -60,7 +60,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   }
   void set_leaves(std::vector<FieldLeaf> leaves) override {
     if (!may_receive(StreamContent::field)) leaves.clear();
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (failing()) return;
     send_queue_.set_leaves(std::move(leaves));
     pump();
@@ -72,7 +72,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     const Bytes entry = whole ? message.bytes : noted_message(message.seq, {}).bytes;
     std::uint64_t index = 0;
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (closing()) return;
       const std::uint64_t before = send_queue_.index();
       send_or_give_up(send_queue_.add(message.seq, entry));
@@ -94,7 +94,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     std::ranges::copy_if(states, std::back_inserter(others),
                          [&](const CuttingState& state) { return state.author != author_; });
     const bool by_link = link_ && may_carry(DatagramContent::partners) && link_->set_partners(others);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (closing() || !may_receive(StreamContent::tool_states)) return false;
     partners_.enqueue(others, !by_link);
     pump();
@@ -103,7 +103,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   void show_bone(const MountPose& seen) override {
     if (is_closing() || !may_carry(DatagramContent::bone_seen)) return;
     const bool by_link = link_ && link_->set_bone(seen);
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto now = PartnerSendQueue::Clock::now();
     if (by_link || closing() || now < next_bone_) return;
     next_bone_ = now + PartnerSendQueue::kApart;
@@ -115,12 +115,12 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   }
   void answer(const SessionMessage& message) override {
     if (!knows(message)) return;
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (!closing()) send_or_give_up(send_queue_.add_answer(message.bytes));
   }
   void refuse(const Error& why) override { close(invalid(why.message)); }
   void decided() override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     --queued_;
     if (closing()) return;
     if (reading_ended_ && queued_ == 0) {
@@ -134,14 +134,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   void end(const std::string& why) override { close({StatusCode::ABORTED, why}); }
   void replaced(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return send_queue_.waiting();
   }
 
   void OnReadDone(bool ok) override {
     if (!ok) {
       // The client will send no more. What it queued is still decided and published.
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       reading_ended_ = true;
       if (queued_ == 0) close_locked(Status::OK);
       return;
@@ -194,7 +194,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     // A cut that was taken before is answered with its first result. A cut ahead of its turn may follow others that
     // come in datagrams.
     const bool again = [&] {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       return cut->author_seq <= taken_;
     }();
     if (link_ && !again)
@@ -207,7 +207,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   // Cuts in order of their author_seq, from the stream or from datagrams.
   void take(Cut cut) override {
     {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       if (closing()) return;
       if (!may_carry(DatagramContent::cuts)) return close_locked(not_allowed());
       // Besides the new cuts, after a broken connection as many again may be read from the stream.
@@ -225,7 +225,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   }
   void arrived(std::uint64_t index) override {
     const RoomSeq newest = [&] {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       return send_queue_.arrived(index);
     }();
     if (newest) runtime_.people().acknowledged(author_, newest);
@@ -280,14 +280,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
 
   // Reads the next request, or waits for decided() to do so. Returns false when gRPC has released the stream.
   bool read_on() {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (done()) return false;
     paused_ = queued_ >= kMaxQueuedCuts;
     if (!closing() && !paused_) StartRead(&request_);
     return true;
   }
 
-  void send_or_give_up(bool taken) {
+  void send_or_give_up(bool taken) OSTEON_REQUIRES(mutex_) {
     if (taken)
       pump();
     else
@@ -296,15 +296,15 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
                                                         " events behind the room; join again"});
   }
   [[nodiscard]] bool is_closing() const {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return closing();
   }
-  void drop_waiting() override {
+  void drop_waiting() override OSTEON_REQUIRES(mutex_) {
     send_queue_ = {};
     partners_ = {};
     bone_.reset();
   }
-  bool take(ByteBuffer& message) override {
+  bool take(ByteBuffer& message) override OSTEON_REQUIRES(mutex_) {
     MessageParts parts = send_queue_.take();
     if (parts.empty() && send_queue_.begun() && bone_) {
       if (const SessionMessage bone = bone_message(*bone_); knows(bone)) parts = {bone.bytes};
@@ -324,7 +324,7 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
     if (opened_) log::info("session over", {{"room", room_->name}, {"author", author_.value}});
     // The reader may leave while the session is being opened.
     const auto link = [&] {
-      const std::lock_guard lock(mutex_);
+      const MutexLock lock(mutex_);
       return link_;
     }();
     if (link) links_->remove(link);
@@ -340,13 +340,14 @@ class SessionStream final : public OutStream<BidiReactor>, public SessionSubscri
   AuthorId author_;  // set before the runtime knows the stream, as is the next
   std::uint32_t version_ = wire::kProtocolVersion;
   bool opened_ = false;  // used only by reactions to reads, which come one by one
-  SessionSendQueue send_queue_;
-  PartnerSendQueue partners_;
-  std::optional<MountPose> bone_;  // newest pose of the bone that the stream shall send
-  PartnerSendQueue::Clock::time_point next_bone_{};
-  int queued_ = 0;           // cuts between reading and decision
-  std::uint64_t taken_ = 0;  // newest author_seq that was queued, here or in an earlier session
-  bool paused_ = false, reading_ended_ = false;
+  SessionSendQueue send_queue_ OSTEON_GUARDED_BY(mutex_);
+  PartnerSendQueue partners_ OSTEON_GUARDED_BY(mutex_);
+  std::optional<MountPose> bone_ OSTEON_GUARDED_BY(mutex_);  // newest pose of the bone that the stream shall send
+  PartnerSendQueue::Clock::time_point next_bone_ OSTEON_GUARDED_BY(mutex_){};
+  int queued_ OSTEON_GUARDED_BY(mutex_) = 0;  // cuts between reading and decision
+  std::uint64_t taken_ OSTEON_GUARDED_BY(mutex_) =
+      0;  // newest author_seq that was queued, here or in an earlier session
+  bool paused_ OSTEON_GUARDED_BY(mutex_) = false, reading_ended_ OSTEON_GUARDED_BY(mutex_) = false;
 };
 
 class CuttingServiceImpl final : public v1::CuttingService::WithRawCallbackMethod_Session<v1::CuttingService::Service> {

@@ -2,11 +2,11 @@
 #include <grpcpp/grpcpp.h>
 
 #include <chrono>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/wire/convert.hpp"
 #include "osteon/v1/watch.grpc.pb.h"
 #include "server/rpc/called_room.inl"
@@ -21,39 +21,39 @@ class MeshStream final : public OutStream<WriteReactor>, public MeshSubscriber {
 
   AuthorId author() const override { return author_; }
   void begin(MeshUpdate whole_surface) override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (failing()) return;
     send_queue_.emplace(std::move(whole_surface));
     pump();
   }
   void enqueue(const MeshUpdate& update) override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (closing()) return;
     send_queue_->add(update);
   }
   void send() override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     pump();
   }
   void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return send_queue_ ? send_queue_->waiting() : 0;
   }
 
  private:
-  bool take(ByteBuffer& message) override {
+  bool take(ByteBuffer& message) override OSTEON_REQUIRES(mutex_) {
     if (!send_queue_ || !may_receive(StreamContent::surface)) return false;
     const MessageParts parts = send_queue_->take();
     if (!parts.empty()) message = buffer_of(parts);
     return !parts.empty();
   }
-  void drop_waiting() override { send_queue_.reset(); }
+  void drop_waiting() override OSTEON_REQUIRES(mutex_) { send_queue_.reset(); }
   void leave() override { room_->runtime().leave(*this); }
 
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
-  std::optional<MeshSendQueue> send_queue_;
+  std::optional<MeshSendQueue> send_queue_ OSTEON_GUARDED_BY(mutex_);
 };
 
 class CuttingStream final : public OutStream<WriteReactor>, public StateSubscriber {
@@ -64,19 +64,19 @@ class CuttingStream final : public OutStream<WriteReactor>, public StateSubscrib
 
   std::chrono::nanoseconds apart() const override { return apart_; }
   void enqueue(const ShownNow& now) override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     if (closing()) return;
     waiting_ = now;
     pump();
   }
   void end(const std::string& why) override { close({StatusCode::UNAVAILABLE, why}); }
   std::size_t waiting() const override {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     return waiting_ ? 1 : 0;
   }
 
  private:
-  bool take(ByteBuffer& message) override {
+  bool take(ByteBuffer& message) override OSTEON_REQUIRES(mutex_) {
     if (!waiting_) return false;
     // Two messages of one kind, one after the other, are one message with the fields of both.
     MessageParts parts;
@@ -91,7 +91,7 @@ class CuttingStream final : public OutStream<WriteReactor>, public StateSubscrib
   const std::shared_ptr<OpenRoom> room_;  // shared with the rooms and the other streams
   const AuthorId author_;
   const std::chrono::nanoseconds apart_;
-  std::optional<ShownNow> waiting_;
+  std::optional<ShownNow> waiting_ OSTEON_GUARDED_BY(mutex_);
 };
 
 using WatchBase =

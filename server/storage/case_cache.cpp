@@ -7,32 +7,32 @@ namespace osteon {
 
 void CaseCache::keep(ServedCase served) {
   const auto bone = std::make_shared<const Case>(std::move(served.bone));  // shared with its rooms
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   entries_[bone->hash()] = {
       {bone->hash(), bone->info().title, std::move(served.folder), bone->memory_bytes()}, bone, bone};
 }
 
 void CaseCache::add(KnownCase known) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const Digest hash = known.hash;
   entries_.try_emplace(hash, Entry{std::move(known), nullptr, {}});
 }
 
 std::optional<KnownCase> CaseCache::find(const Digest& hash) const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   const auto found = entries_.find(hash);
   return found == entries_.end() ? std::nullopt : std::optional(found->second.known);
 }
 
 std::vector<KnownCase> CaseCache::all() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   std::vector<KnownCase> all;
   for (const auto& [hash, entry] : entries_) all.push_back(entry.known);
   return all;
 }
 
 std::uint64_t CaseCache::loaded_bytes() const {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   return loaded_locked();
 }
 
@@ -55,10 +55,10 @@ Result<void> CaseCache::check_space(const KnownCase& known, std::uint64_t bytes)
 }
 
 Result<LoadedCase> CaseCache::load(const Digest& hash) {
-  const std::lock_guard loading(loading_);
+  const MutexLock loading(loading_);
   KnownCase known;
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     const auto found = entries_.find(hash);
     if (found == entries_.end()) return failure(ErrorCode::not_found, "the server has no case " + to_hex(hash));
     known = found->second.known;
@@ -76,7 +76,7 @@ Result<LoadedCase> CaseCache::load(const Digest& hash) {
     return failure(ErrorCode::invalid_input,
                    known.folder.string() + " holds another case than " + to_hex(hash) + "; upload that case again");
   const auto bone = std::make_shared<const Case>(std::move(*read));  // shared by its rooms
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   if (Result<void> fits = check_space(known, bone->memory_bytes()); !fits) return tl::unexpected(fits.error());
   Entry& entry = entries_.at(hash);
   entry.known.memory_bytes = bone->memory_bytes();

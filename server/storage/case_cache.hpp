@@ -5,12 +5,12 @@
 #include <filesystem>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "common/core/digest.hpp"
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "common/volume/case.hpp"
 
@@ -58,13 +58,13 @@ class CaseCache {
     std::shared_ptr<const Case> kept;  // shared with its rooms; null: only its rooms hold it
     std::weak_ptr<const Case> loaded;
   };
-  [[nodiscard]] std::uint64_t loaded_locked() const;                                          // under mutex_
-  [[nodiscard]] Result<void> check_space(const KnownCase& known, std::uint64_t bytes) const;  // likewise
+  [[nodiscard]] std::uint64_t loaded_locked() const OSTEON_REQUIRES(mutex_);
+  [[nodiscard]] Result<void> check_space(const KnownCase& known, std::uint64_t bytes) const OSTEON_REQUIRES(mutex_);
 
   const std::uint64_t most_bytes_;
-  std::mutex loading_;  // taken before mutex_, never within it
-  mutable std::mutex mutex_;
-  std::map<Digest, Entry> entries_;
+  Mutex loading_{LockRank::case_loading};  // held while a case is read, so that one is read at a time
+  mutable Mutex mutex_{LockRank::leaf};
+  std::map<Digest, Entry> entries_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace osteon

@@ -67,13 +67,18 @@ std::optional<std::vector<FieldLeaf>> leaves_of(std::string_view bytes) {
 }  // namespace
 
 void InTurn::lock() {
-  std::unique_lock lock(mutex_);
-  const std::uint64_t mine = asked_++;
-  next_.wait(lock, [&] { return served_ == mine; });
+  expect();
+  {
+    MutexLock lock(mutex_);
+    const std::uint64_t mine = asked_++;
+    while (served_ != mine) next_.wait(lock);
+  }
+  note_taken();
 }
 
 void InTurn::unlock() {
-  const std::lock_guard lock(mutex_);
+  note_released();
+  const MutexLock lock(mutex_);
   ++served_;
   next_.notify_all();
 }
@@ -117,26 +122,38 @@ Result<PersistedRoom> RoomStore::open(const std::filesystem::path& file, const C
   std::unique_ptr<RoomStore> store(
       new RoomStore(file, std::move(*journal), std::move(*genesis), bone.pitch_mm(),
                     options.journal.disk != nullptr ? *options.journal.disk : system_disk()));
-  for (const std::string& note : store->journal_->notes())
-    log::warn("journal", {{"file", file.string()}, {"note", note}});
-  if (const Error* closed = store->journal_->closed_because())
-    log::warn("journal takes no entries", {{"file", file.string()}, {"reason", closed->message}});
-  else if (Result<std::uint64_t> epoch = store->journal_->next_server_epoch(); epoch)
-    store->server_epoch_ = *epoch;
-  else
-    return tl::unexpected(epoch.error());
-  if (Result<void> key = store->find_witness_key(options); !key) return tl::unexpected(key.error());
+  if (Result<void> begun = store->begin(options); !begun) return tl::unexpected(begun.error());
   store->retention_days_ = options.retention_days;
   store->today_ = options.today ? options.today : computers_day;
   if (const auto erased = store->erase_old_people(); !erased)
     log::warn("people whose retention time is over were not erased",
               {{"file", file.string()}, {"reason", erased.error().message}});
-  const Fields fields = store->newest_fields();
-  Result<Room> room = store->replay(bone, options.limits, fields, progress);
+  Result<Room> room = store->evaluate(bone, options.limits, progress);
   if (!room) return failure(room.error().code, file.string() + ": " + room.error().message);
-  store->evaluated_ = store->journal_->head().seq.value - fields.seq.value;
-  store->note_closing();
   return PersistedRoom{std::move(*room), std::move(store), made};
+}
+
+Result<void> RoomStore::begin(const Options& options) {
+  const TurnLock in_turn(turn_);
+  for (const std::string& note : journal_->notes()) log::warn("journal", {{"file", file_.string()}, {"note", note}});
+  if (const Error* closed = journal_->closed_because())
+    log::warn("journal takes no entries", {{"file", file_.string()}, {"reason", closed->message}});
+  else if (Result<std::uint64_t> epoch = journal_->next_server_epoch(); epoch)
+    server_epoch_ = *epoch;
+  else
+    return tl::unexpected(epoch.error());
+  return find_witness_key(options);
+}
+
+Result<Room> RoomStore::evaluate(const Case& bone, const CutLimits& limits,
+                                 const std::function<void(double)>& progress) {
+  const TurnLock in_turn(turn_);
+  const Fields fields = newest_fields();
+  Result<Room> room = replay(bone, limits, fields, progress);
+  if (!room) return room;
+  evaluated_ = journal_->head().seq.value - fields.seq.value;
+  note_closing();
+  return room;
 }
 
 RoomStore::Fields RoomStore::newest_fields() {
@@ -165,7 +182,7 @@ Result<Room> RoomStore::replay(const Case& bone, const CutLimits& limits, const 
   if (!room) return room;
   const std::uint64_t entries = journal_->head().seq.value;
   Result<void> replayed;
-  const auto take = [&](const JournalEntry& one) {
+  const auto take = [&](const JournalEntry& one) OSTEON_REQUIRES(turn_) {
     Result<LogEntry> entry = entry_from_bytes(one.seq, std::chrono::nanoseconds(one.at_ns), one.bytes);
     replayed = entry ? room->replay(*entry, one.seq <= fields.seq ? Room::Fields::leave : Room::Fields::evaluate)
                      : Result<void>(tl::unexpected(entry.error()));
@@ -186,8 +203,8 @@ Result<void> RoomStore::write(std::span<const LogEntry> entries) {
   std::vector<JournalEntry> out;
   out.reserve(entries.size());
   for (const LogEntry& entry : entries) out.push_back({entry.seq, entry.at.count(), to_bytes(entry)});
-  return with_journal([&](Journal& journal) {
-    const Result<void> kept = journal.append(out);
+  return with_journal([&](Journal& journal) OSTEON_REQUIRES(turn_) {
+    Result<void> kept = journal.append(out);
     for (const LogEntry& entry : entries)
       if (kept && changes_bone(entry)) changes_.push_back(entry.seq);
     return kept;
@@ -195,7 +212,7 @@ Result<void> RoomStore::write(std::span<const LogEntry> entries) {
 }
 
 JournalHead RoomStore::head() const {
-  const std::lock_guard in_turn(turn_);
+  const TurnLock in_turn(turn_);
   return journal_ ? journal_->head() : last_;
 }
 
@@ -295,7 +312,7 @@ std::chrono::nanoseconds reopened_time(const Room& room) {
 }
 
 Result<void> RoomStore::checkpoint(RoomSeq seq, std::span<const FieldLeaf> leaves, const MaintenanceCalls& calls) {
-  const std::lock_guard one_at_a_time(checkpointing_);
+  const MutexLock one_at_a_time(checkpointing_);
   const auto needed = with_journal([&](Journal& journal) -> Result<std::optional<JournalHead>> {
     if (!seq || seq > journal.head().seq) return std::nullopt;
     const auto known = journal.checkpoints();
@@ -326,24 +343,24 @@ Result<void> RoomStore::checkpoint(RoomSeq seq, std::span<const FieldLeaf> leave
     if (calls.progress) calls.progress(static_cast<double>(next) / static_cast<double>(leaves.size()));
   }
   if (Result<void> finished = file->finish(); !finished) return finished;
-  return with_journal([&](Journal& journal) {
-    const Result<void> added = journal.add_checkpoint(std::move(*file));
+  return with_journal([&](Journal& journal) OSTEON_REQUIRES(turn_) {
+    Result<void> added = journal.add_checkpoint(std::move(*file));
     if (added) std::erase_if(changes_, [&](RoomSeq change) { return change <= seq; });
     return added;
   });
 }
 
 std::uint64_t RoomStore::changes_since_checkpoint() const {
-  const std::lock_guard in_turn(turn_);
+  const TurnLock in_turn(turn_);
   return changes_.size();
 }
 
 Result<void> RoomStore::close() {
   closing_ = true;
-  const std::lock_guard no_checkpoint(checkpointing_);
-  return with_journal([&](Journal& journal) {
+  const MutexLock no_checkpoint(checkpointing_);
+  return with_journal([&](Journal& journal) OSTEON_REQUIRES(turn_) {
     last_ = journal.head();
-    const Result<void> done = journal.close();
+    Result<void> done = journal.close();
     journal_.reset();
     return done;
   });

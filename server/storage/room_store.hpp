@@ -3,13 +3,11 @@
 #pragma once
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "common/link/random_bytes.hpp"
 #include "server/journal/journal.hpp"
 #include "server/journal/maintenance.hpp"
@@ -30,15 +29,28 @@ struct PersistedRoom;
 
 // A mutex that is given in the order of requests. Maintenance takes it again and again, and lets a commit through after
 // every slice. Commits let maintenance through in the same way.
-class InTurn {
+class OSTEON_CAPABILITY("mutex") InTurn : core::Ranked {
  public:
-  void lock();
-  void unlock();
+  InTurn() : Ranked(LockRank::journal) {}
+  void lock() OSTEON_ACQUIRE();
+  void unlock() OSTEON_RELEASE();
 
  private:
-  std::mutex mutex_;
-  std::condition_variable next_;
-  std::uint64_t asked_ = 0, served_ = 0;
+  Mutex mutex_{LockRank::leaf};
+  CondVar next_;
+  std::uint64_t asked_ OSTEON_GUARDED_BY(mutex_) = 0, served_ OSTEON_GUARDED_BY(mutex_) = 0;
+};
+
+// Holds a turn while it lives.
+class OSTEON_SCOPED_CAPABILITY TurnLock {
+ public:
+  explicit TurnLock(InTurn& turn) OSTEON_ACQUIRE(turn) : turn_(turn) { turn_.lock(); }
+  ~TurnLock() OSTEON_RELEASE() { turn_.unlock(); }
+  TurnLock(const TurnLock&) = delete;
+  TurnLock& operator=(const TurnLock&) = delete;
+
+ private:
+  InTurn& turn_;
 };
 
 // The bone after this many entries were applied to it: Room::room_seq() and Room::field_hash().
@@ -172,22 +184,27 @@ class RoomStore {
   };
   // Reads leaves and their hash from a checkpoint's bytes. Error invalid_input.
   [[nodiscard]] Result<std::vector<FieldLeaf>> fields_of(const Checkpoint& one, std::string_view bytes) const;
-  [[nodiscard]] Fields newest_fields();
+  // Numbers this opening of the journal.
+  [[nodiscard]] Result<void> begin(const Options& options);
+  // The room at the journal's head.
+  [[nodiscard]] Result<Room> evaluate(const Case& bone, const CutLimits& limits,
+                                      const std::function<void(double)>& progress);
+  [[nodiscard]] Fields newest_fields() OSTEON_REQUIRES(turn_);
   [[nodiscard]] Result<Room> replay(const Case& bone, const CutLimits& limits, const Fields& fields,
-                                    const std::function<void(double)>& progress);
+                                    const std::function<void(double)>& progress) OSTEON_REQUIRES(turn_);
   // Uses the journal in turn. Error unavailable: the journal is closed.
   template <class Do>
   auto with_journal(const Do& what) -> decltype(what(std::declval<Journal&>())) {
-    const std::lock_guard in_turn(turn_);
+    const TurnLock in_turn(turn_);
     if (!journal_) return is_closed();
     auto done = what(*journal_);
     note_closing();
     return done;
   }
-  void note_closing();  // [in turn]
+  void note_closing() OSTEON_REQUIRES(turn_);
   [[nodiscard]] tl::unexpected<Error> is_closed() const;
   // The first opening that finds no such register makes it.
-  [[nodiscard]] Result<void> find_witness_key(const Options& options);
+  [[nodiscard]] Result<void> find_witness_key(const Options& options) OSTEON_REQUIRES(turn_);
   [[nodiscard]] Digest seal_of(const JournalHead& head) const;
   // Entries after `at` up to `last`; `at` moves on with them. Error invalid_input: the entry after `at` does not fit
   // the chain.
@@ -197,12 +214,12 @@ class RoomStore {
   // Checks a checkpoint's bytes. Finds nothing wrong if a newer checkpoint has replaced it in the meantime.
   [[nodiscard]] Result<void> check_bytes(const Checkpoint& one, RoomReport& report);
 
-  std::mutex checkpointing_;  // held while a checkpoint is written; taken before turn_
+  Mutex checkpointing_{LockRank::checkpoint};  // held while a checkpoint is written; guards its file
   std::atomic<bool> closing_ = false;
   mutable InTurn turn_;
-  std::optional<Journal> journal_;              // nothing: closed
-  JournalHead last_;                            // the head at closing
-  std::optional<Error> why_closed_to_entries_;  // set once, before the pointer below to it
+  std::optional<Journal> journal_ OSTEON_GUARDED_BY(turn_);  // nothing: closed
+  JournalHead last_ OSTEON_GUARDED_BY(turn_);                // the head at closing
+  std::optional<Error> why_closed_to_entries_;               // set once in turn, before the pointer below to it
   std::atomic<const Error*> closed_to_entries_ = nullptr;
   const std::filesystem::path file_;
   const RoomGenesis genesis_;
@@ -211,8 +228,8 @@ class RoomStore {
   int retention_days_ = 0;
   std::function<std::int32_t()> today_;
   std::string witness_key_;
-  std::vector<RoomSeq> changes_;    // since the newest checkpoint
-  std::optional<RoomSeq> idle_at_;  // the head at the last call of tidy_if_idle()
+  std::vector<RoomSeq> changes_ OSTEON_GUARDED_BY(turn_);  // since the newest checkpoint
+  std::optional<RoomSeq> idle_at_;                         // the head at the last call of tidy_if_idle()
   std::uint64_t server_epoch_ = 0, evaluated_ = 0;
 };
 

@@ -109,7 +109,7 @@ Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const st
 
   std::ofstream(sound / kNote) << nlohmann::json{{"memory_bytes", checked->memory_bytes}} << "\n";
 
-  const std::lock_guard lock(keeping_);
+  const MutexLock lock(keeping_);
   StoredCase stored{checked->hash,   checked->title, folder_ / to_hex(checked->hash),
                     bytes_in(sound), false,          checked->memory_bytes};
   if (fs::exists(stored.folder, error)) {

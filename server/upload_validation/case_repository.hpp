@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "common/core/digest.hpp"
+#include "common/core/mutex.hpp"
 #include "common/core/result.hpp"
 #include "server/upload_validation/case_archive.hpp"
 
@@ -74,7 +74,7 @@ class CaseRepository {
 
   const std::filesystem::path folder_, program_;
   const UploadQuota quota_;
-  std::mutex keeping_;  // one case at a time is moved to its final folder
+  Mutex keeping_{LockRank::leaf};  // guards the folder: one case at a time is moved to it
   std::atomic<int> open_{0};
   std::atomic<std::uint64_t> next_{0};
 };

@@ -64,6 +64,14 @@ HEAVY = {
 GENERATED = re.compile(r"\.pb\.h$")
 GENERATED_HOMES = ("common/wire", "*/net", "server/rpc", "server/publish", "server/storage", "server/cli")
 
+# Locks that clang does not check. Programs use those of common/core/mutex.hpp.
+UNCHECKED_LOCK = re.compile(
+    r"std::((recursive_|timed_|recursive_timed_|shared_|shared_timed_)?mutex|condition_variable(_any)?"
+    r"|lock_guard|unique_lock|scoped_lock|shared_lock)\b")
+LOCKS = "common/core/mutex.hpp"
+MAY_USE_THEM = (LOCKS, "haptic_client/app/client.cpp", "haptic_client/app/client.hpp")  # the client: until it is split
+LOCK_RANKS = "common/core/lock_rank.hpp"
+
 SOURCE_ENDS = (".hpp", ".cpp", ".inl", ".h", ".cc")
 MAX_HEADER_LINES = 300
 MAX_FILE_LINES = 800
@@ -156,6 +164,26 @@ def mirror_faults(path: str, folders):
     if any(home + mirrored in folders for home in ("", "common/", "server/")):
         return []
     return [f"{path}: there is no folder {mirrored} that it could test"]
+
+
+def lock_faults(path: str, text: str):
+    """One sentence for each line of a program that uses a lock which clang does not check."""
+    if path.startswith("tests/") or path in MAY_USE_THEM:
+        return []
+    return [f"{path}:{number}: {found[0]} is not checked by clang; use {LOCKS}"
+            for number, line in enumerate(text.splitlines(), 1)
+            if (found := UNCHECKED_LOCK.search(line.partition("//")[0]))]
+
+
+def lock_ranks(text: str):
+    """The ranks of LOCK_RANKS, in their order."""
+    return re.findall(r"\bRANK\((\w+)\)", text.partition("OSTEON_LOCK_RANKS(RANK)")[2])
+
+
+def rank_rows(page: str):
+    """The first column of the table of ranks in the page about the architecture."""
+    table = page.partition("| rank |")[2].partition("\n\n")[0]
+    return re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
 
 
 def size_faults(path: str, text: str):

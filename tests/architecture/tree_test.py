@@ -37,6 +37,15 @@ class TheTree(unittest.TestCase):
         folders = {relative(f.parent) for f in tree.source_files(ROOT)} | set(tree.PROGRAMS)
         self.assertEqual(self.all_faults(lambda path, _text: tree.mirror_faults(path, folders)), [])
 
+    def test_locks_are_checked(self):
+        self.assertEqual(self.all_faults(tree.lock_faults), [])
+
+    def test_ranks_of_locks_are_described(self):
+        ranks = tree.lock_ranks((ROOT / tree.LOCK_RANKS).read_text(encoding="utf-8"))
+        self.assertGreater(len(ranks), 10)
+        page = (ROOT / "deploy/docs/architecture.md").read_text(encoding="utf-8")
+        self.assertEqual(tree.rank_rows(page), ranks)
+
     def test_files_are_short(self):
         self.assertEqual(self.all_faults(tree.size_faults), [])
 
@@ -178,6 +187,19 @@ class TheRules(unittest.TestCase):
 
     def test_product_code_does_not_see_tests(self):
         self.assertTrue(self.faults("server/room/room.cpp", "tests/support/process.hpp"))
+
+    def test_unchecked_locks_are_noticed(self):
+        for line in ("  std::mutex mutex_;", "  const std::lock_guard lock(mutex_);", "std::shared_mutex& room_mutex",
+                     "  std::condition_variable_any wake_;", "std::unique_lock<std::mutex>& lock"):
+            self.assertTrue(tree.lock_faults("server/rooms/x.hpp", line + "\n"), line)
+        self.assertFalse(tree.lock_faults("server/rooms/x.hpp", "  Mutex mutex_{LockRank::leaf};  // no std::mutex\n"))
+        self.assertFalse(tree.lock_faults("common/core/mutex.hpp", "  std::mutex native_;\n"))
+        self.assertFalse(tree.lock_faults("tests/unit/x_test.cpp", "  std::mutex mutex;\n"))
+
+    def test_ranks_without_a_row_are_noticed(self):
+        ranks = tree.lock_ranks("#define OSTEON_LOCK_RANKS(RANK) \\\n  RANK(room) \\\n  RANK(leaf)\n")
+        self.assertEqual(ranks, ["room", "leaf"])
+        self.assertEqual(tree.rank_rows("| rank | what |\n|---|---|\n| `room` | x |\n\n| `leaf` | y |\n"), ["room"])
 
     def test_sizes(self):
         self.assertTrue(tree.size_faults("common/core/x.hpp", "\n" * 300))

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <shared_mutex>
 #include <vector>
 
 #include "common/core/check.hpp"
+#include "common/core/mutex.hpp"
 #include "common/field/kernel.hpp"
 #include "server/publish/session_messages.hpp"
 #include "server/rooms/fragment_detector.hpp"
@@ -43,7 +43,7 @@ int run(int samples) {
   const double radius_mm = 0.5 * samples * kPitch_mm;
   const Case built = large_ball(radius_mm, kPitch_mm);
   Room room(built);
-  std::shared_mutex mutex;
+  SharedMutex mutex{LockRank::room};
   FragmentDetector watch(room, mutex, [&](std::vector<FieldLeaf>& leaves) {
     for (FieldLeaf& leaf : leaves) room.find_field(leaf.body)->read(leaf);
   });

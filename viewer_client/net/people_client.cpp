@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <map>
-#include <mutex>
 #include <thread>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
@@ -79,27 +78,28 @@ struct PeopleClient::Impl {
   std::function<bool()> stop;
   std::atomic<bool> ending{false};
 
-  mutable std::mutex mutex;
-  mutable std::condition_variable changed;
-  wire::JoinedRoom joined;
-  std::map<AuthorId, PersonSeen> people;
-  std::map<std::uint32_t, Annotation> annotations;
-  std::deque<WordsSeen> words;
-  bool complete = false;
-  std::optional<Error> failure;
-  std::shared_ptr<grpc::ClientContext> stream;  // shared with the reader thread, so that it can be cancelled
+  mutable Mutex mutex{LockRank::leaf};
+  mutable CondVar changed;
+  wire::JoinedRoom joined OSTEON_GUARDED_BY(mutex);
+  std::map<AuthorId, PersonSeen> people OSTEON_GUARDED_BY(mutex);
+  std::map<std::uint32_t, Annotation> annotations OSTEON_GUARDED_BY(mutex);
+  std::deque<WordsSeen> words OSTEON_GUARDED_BY(mutex);
+  bool complete OSTEON_GUARDED_BY(mutex) = false;
+  std::optional<Error> failure OSTEON_GUARDED_BY(mutex);
+  std::shared_ptr<grpc::ClientContext> stream
+      OSTEON_GUARDED_BY(mutex);  // shared with the reader thread, so that it can be cancelled
 
   std::thread reader;
 
   [[nodiscard]] bool stopping() const { return ending || (stop && stop()); }
   [[nodiscard]] wire::JoinedRoom room() const {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     return joined;
   }
   [[nodiscard]] std::uint64_t author() const { return room().author.value; }
 
   void fail(const Error& why) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     failure = why;
     changed.notify_all();
   }
@@ -135,7 +135,7 @@ Result<void> PeopleClient::Impl::take(const v1::WatchPeopleResponse& news) {
     if (!one) return tl::unexpected(one.error());
     drawn.push_back(std::move(*one));
   }
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   if (news.complete()) {
     people.clear();
     annotations.clear();
@@ -158,7 +158,7 @@ grpc::Status PeopleClient::Impl::read_stream() {
   const auto context = std::make_shared<grpc::ClientContext>();
   wire::JoinedRoom in;
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     if (ending) return grpc::Status::CANCELLED;
     stream = context;
     in = joined;
@@ -181,7 +181,7 @@ void PeopleClient::Impl::read_beside_window() {
   while (!stopping()) {
     {
       const wire::JoinedRoom now = options.window();
-      const std::lock_guard lock(mutex);
+      const MutexLock lock(mutex);
       joined = now;
     }
     const grpc::Status ended = read_stream();
@@ -205,7 +205,7 @@ void PeopleClient::Impl::read() {
       std::this_thread::sleep_for(kRetryPause);
       Result<wire::JoinedRoom> again = wire::join_again(room(), wire::ClientKind::console, {});
       if (again) {
-        const std::lock_guard lock(mutex);
+        const MutexLock lock(mutex);
         joined = std::move(*again);
         break;
       }
@@ -226,11 +226,14 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
                      : wire::join_room(options.address, wire::ClientKind::console, options.name, options.patience,
                                        impl->stop, options.room, options.credentials);
   if (!joined) return tl::unexpected(console_refused(joined.error(), options));
-  impl->joined = std::move(*joined);
+  {
+    const MutexLock lock(impl->mutex);
+    impl->joined = std::move(*joined);
+  }
   std::unique_ptr<PeopleClient> client(new PeopleClient(std::move(impl)));
   client->impl_->reader = std::thread([inside = client->impl_.get()] { inside->read(); });
   const auto received = [&] {
-    const std::lock_guard lock(client->impl_->mutex);
+    const MutexLock lock(client->impl_->mutex);
     return client->impl_->complete || client->impl_->failure;
   };
   const bool in_time = client->wait(received, options.patience);
@@ -242,7 +245,7 @@ Result<std::unique_ptr<PeopleClient>> PeopleClient::start(const PeopleClientOpti
 
 PeopleClient::~PeopleClient() {
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     impl_->ending = true;
     if (impl_->stream) impl_->stream->TryCancel();
   }
@@ -250,28 +253,28 @@ PeopleClient::~PeopleClient() {
 }
 
 std::optional<Error> PeopleClient::failure_seen() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->failure;
 }
 
 AuthorId PeopleClient::self() const { return impl_->room().author; }
 
 std::vector<PersonSeen> PeopleClient::people() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   std::vector<PersonSeen> all;
   for (const auto& [author, person] : impl_->people) all.push_back(person);
   return all;
 }
 
 std::vector<Annotation> PeopleClient::annotations() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   std::vector<Annotation> all;
   for (const auto& [id, drawn] : impl_->annotations) all.push_back(drawn);
   return all;
 }
 
 std::vector<WordsSeen> PeopleClient::words() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return {impl_->words.begin(), impl_->words.end()};
 }
 
@@ -280,7 +283,7 @@ bool PeopleClient::wait(const std::function<bool()>& done, std::chrono::millisec
   while (true) {
     if (done()) return true;
     if (Clock::now() >= until || impl_->stopping()) return false;
-    std::unique_lock lock(impl_->mutex);
+    MutexLock lock(impl_->mutex);
     impl_->changed.wait_for(lock, std::min<Clock::duration>(kRetryPause, until - Clock::now()));
   }
 }

@@ -3,13 +3,12 @@
 #include <grpcpp/grpcpp.h>
 
 #include <atomic>
-#include <condition_variable>
 #include <cstdio>
-#include <mutex>
 #include <set>
 #include <thread>
 #include <utility>
 
+#include "common/core/mutex.hpp"
 #include "common/runtime/log.hpp"
 #include "common/wire/convert.hpp"
 #include "common/wire/room_client.hpp"
@@ -157,15 +156,16 @@ struct RoomSubscription::Impl {
   std::atomic<bool> interrupted{false};
 
   // Guards what both readers and the owner use. Never held during a call to the server.
-  mutable std::mutex mutex;
-  std::condition_variable changed;
-  wire::JoinedRoom joined;
-  std::uint64_t joins = 0;  // rises with every join; shows the second reader that the first has rejoined
-  grpc::ClientContext* mesh_context = nullptr;
-  grpc::ClientContext* cutting_context = nullptr;
-  grpc::ClientContext* look_context = nullptr;
-  std::optional<Error> failed;
-  std::optional<ViewFrustum> newest_look, said_look;
+  mutable Mutex mutex{LockRank::leaf};
+  CondVar changed;
+  wire::JoinedRoom joined OSTEON_GUARDED_BY(mutex);
+  std::uint64_t joins OSTEON_GUARDED_BY(mutex) =
+      0;  // rises with every join; shows the second reader that the first has rejoined
+  grpc::ClientContext* mesh_context OSTEON_GUARDED_BY(mutex) = nullptr;
+  grpc::ClientContext* cutting_context OSTEON_GUARDED_BY(mutex) = nullptr;
+  grpc::ClientContext* look_context OSTEON_GUARDED_BY(mutex) = nullptr;
+  std::optional<Error> failed OSTEON_GUARDED_BY(mutex);
+  std::optional<ViewFrustum> newest_look OSTEON_GUARDED_BY(mutex), said_look OSTEON_GUARDED_BY(mutex);
 
   std::thread mesh_thread, cutting_thread, look_thread;
 
@@ -191,11 +191,17 @@ struct RoomSubscription::Impl {
   }
   // Channel and author of the newest join.
   std::pair<std::shared_ptr<grpc::Channel>, std::uint64_t> line() const {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     return {joined.channel, joined.author.value};
   }
-  bool enter(grpc::ClientContext*& slot, grpc::ClientContext& context);
-  void leave(grpc::ClientContext*& slot);
+  [[nodiscard]] wire::JoinedRoom newest_join() const {
+    const MutexLock lock(mutex);
+    return joined;
+  }
+  // The member that holds the context of one stream.
+  using Slot = grpc::ClientContext* Impl::*;
+  bool enter(Slot slot, grpc::ClientContext& context);
+  void leave(Slot slot);
 };
 
 Result<void> RoomSubscription::Impl::join(std::chrono::milliseconds patience) {
@@ -203,7 +209,7 @@ Result<void> RoomSubscription::Impl::join(std::chrono::milliseconds patience) {
       options.address, wire::ClientKind::viewer, options.name, patience, [this] { return stopping(); }, options.room,
       options.credentials);
   if (!answer) return tl::unexpected(answer.error());
-  const std::lock_guard lock(mutex);
+  const MutexLock lock(mutex);
   joined = std::move(*answer);
   ++joins;
   changed.notify_all();
@@ -212,11 +218,11 @@ Result<void> RoomSubscription::Impl::join(std::chrono::milliseconds patience) {
 
 // Joins anew after the connection was lost, because a restarted server does not know the authors of the old one.
 Result<void> RoomSubscription::Impl::rejoin() {
-  const Digest case_before = joined.case_hash;
+  const Digest case_before = newest_join().case_hash;
   do {
     auto again = join(options.patience);
     if (again) {
-      if (joined.case_hash == case_before) return {};
+      if (newest_join().case_hash == case_before) return {};
       return failure(ErrorCode::unsupported,
                      "the server at " + options.address + " now has another case: start the viewer anew to see it");
     }
@@ -226,30 +232,31 @@ Result<void> RoomSubscription::Impl::rejoin() {
 }
 
 // Gives the stream's context to the destructor, which cancels it. False: the destructor has already begun.
-bool RoomSubscription::Impl::enter(grpc::ClientContext*& slot, grpc::ClientContext& context) {
-  const std::lock_guard lock(mutex);
+bool RoomSubscription::Impl::enter(Slot slot, grpc::ClientContext& context) {
+  const MutexLock lock(mutex);
   if (ending) return false;
-  slot = &context;
+  this->*slot = &context;
   return true;
 }
 
-void RoomSubscription::Impl::leave(grpc::ClientContext*& slot) {
-  const std::lock_guard lock(mutex);
-  slot = nullptr;
+void RoomSubscription::Impl::leave(Slot slot) {
+  const MutexLock lock(mutex);
+  this->*slot = nullptr;
 }
 
 // Returns when the stream ends. No error: the server ended it or is gone. Error: the server sent invalid data.
 Result<void> RoomSubscription::Impl::read_mesh_stream() {
   grpc::ClientContext context;
-  if (!enter(mesh_context, context)) return {};
+  if (!enter(&Impl::mesh_context, context)) return {};
+  const auto [channel, author] = line();
   v1::WatchMeshRequest request;
-  request.set_author(joined.author.value);
+  request.set_author(author);
   {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     if (newest_look) *request.mutable_look() = wire::to_wire(*newest_look);
     said_look = newest_look;
   }
-  const auto stub = v1::WatchService::NewStub(joined.channel);
+  const auto stub = v1::WatchService::NewStub(channel);
   const auto reader = stub->WatchMesh(&context, request);
 
   Result<void> outcome;
@@ -275,7 +282,7 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
     }
   }
   const grpc::Status ended = reader->Finish();
-  leave(mesh_context);
+  leave(&Impl::mesh_context);
   if (outcome && !stopping()) {
     log::warn("mesh stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
     // A retry would push out whoever replaced this viewer, or be refused forever.
@@ -289,7 +296,7 @@ Result<void> RoomSubscription::Impl::read_mesh_stream() {
 // [mesh thread] Only this thread rejoins; the other follows.
 void RoomSubscription::Impl::read_mesh() {
   const auto give_up = [this](Error error) {
-    const std::lock_guard lock(mutex);
+    const MutexLock lock(mutex);
     failed = std::move(error);
     changed.notify_all();
   };
@@ -342,9 +349,9 @@ void RoomSubscription::Impl::read_cutting() {
     v1::WatchCuttingRequest request;
     {
       // A stream that ended is reopened with the same join after a pause, and with a new join at once.
-      std::unique_lock lock(mutex);
+      MutexLock lock(mutex);
       changed.wait_for(lock, of_join == 0 ? std::chrono::milliseconds(0) : kRetryPause,
-                       [&] { return ending.load() || joins != of_join; });
+                       [&]() OSTEON_REQUIRES(mutex) { return ending.load() || joins != of_join; });
       if (failed) return;
       of_join = joins;
       channel = joined.channel;
@@ -353,7 +360,7 @@ void RoomSubscription::Impl::read_cutting() {
     }
     if (interrupted) continue;
     grpc::ClientContext context;
-    if (!enter(cutting_context, context)) return;
+    if (!enter(&Impl::cutting_context, context)) return;
     const auto stub = v1::WatchService::NewStub(channel);
     const auto reader = stub->WatchCutting(&context, request);
     v1::WatchCuttingResponse message;
@@ -375,7 +382,7 @@ void RoomSubscription::Impl::read_cutting() {
       render_queue.put_states(std::move(states), std::move(items), std::move(bodies));
     }
     reader->Finish();
-    leave(cutting_context);
+    leave(&Impl::cutting_context);
   }
 }
 
@@ -385,9 +392,8 @@ void RoomSubscription::Impl::say_looks() {
     v1::LookFromRequest request;
     std::shared_ptr<grpc::Channel> channel;  // shared with the stub, which may outlive a rejoin
     {
-      std::unique_lock lock(mutex);
-      changed.wait(
-          lock, [&] { return ending.load() || (newest_look && said_look && !nearly_equal(*said_look, *newest_look)); });
+      MutexLock lock(mutex);
+      while (!ending && !(newest_look && said_look && !nearly_equal(*said_look, *newest_look))) changed.wait(lock);
       if (ending) return;
       said_look = newest_look;
       channel = joined.channel;
@@ -396,11 +402,11 @@ void RoomSubscription::Impl::say_looks() {
     }
     grpc::ClientContext context;
     context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
-    if (!enter(look_context, context)) return;
+    if (!enter(&Impl::look_context, context)) return;
     v1::LookFromResponse response;
     (void)v1::WatchService::NewStub(channel)->LookFrom(&context, request, &response);
-    leave(look_context);
-    std::unique_lock lock(mutex);
+    leave(&Impl::look_context);
+    MutexLock lock(mutex);
     changed.wait_for(lock, kLookPause, [&] { return ending.load(); });
   }
 }
@@ -411,9 +417,13 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
                                                                   RenderQueue& render_queue,
                                                                   std::function<bool()> stop) {
   auto impl = std::make_unique<Impl>(options, render_queue, std::move(stop));
-  if (auto joined = impl->join(options.patience); !joined) return tl::unexpected(joined.error());
-  impl->room = {impl->joined.case_title, impl->joined.pitch_mm, impl->joined.bounds};
-  if (options.first_look) impl->newest_look = options.first_look(impl->room.bounds);
+  if (Result<void> first = impl->join(options.patience); !first) return tl::unexpected(first.error());
+  const wire::JoinedRoom joined = impl->newest_join();
+  impl->room = {joined.case_title, joined.pitch_mm, joined.bounds};
+  if (options.first_look) {
+    const MutexLock lock(impl->mutex);
+    impl->newest_look = options.first_look(impl->room.bounds);
+  }
   impl->mesh_thread = std::thread([&at = *impl] { at.read_mesh(); });
   impl->cutting_thread = std::thread([&at = *impl] { at.read_cutting(); });
   impl->look_thread = std::thread([&at = *impl] { at.say_looks(); });
@@ -422,7 +432,7 @@ Result<std::unique_ptr<RoomSubscription>> RoomSubscription::start(const RoomSubs
 
 RoomSubscription::~RoomSubscription() {
   {
-    const std::lock_guard lock(impl_->mutex);
+    const MutexLock lock(impl_->mutex);
     impl_->ending = true;
     if (impl_->mesh_context != nullptr) impl_->mesh_context->TryCancel();
     if (impl_->cutting_context != nullptr) impl_->cutting_context->TryCancel();
@@ -437,17 +447,17 @@ RoomSubscription::~RoomSubscription() {
 const WatchedRoom& RoomSubscription::room() const { return impl_->room; }
 
 wire::JoinedRoom RoomSubscription::joined() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->joined;
 }
 
 std::optional<Error> RoomSubscription::failure_seen() const {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   return impl_->failed;
 }
 
 void RoomSubscription::look(const ViewFrustum& from) {
-  const std::lock_guard lock(impl_->mutex);
+  const MutexLock lock(impl_->mutex);
   impl_->newest_look = from;
   impl_->changed.notify_all();
 }

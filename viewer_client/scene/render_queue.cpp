@@ -10,7 +10,7 @@ constexpr std::size_t kMostArrivals = 1024;
 }  // namespace
 
 void RenderQueue::begin_stream() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   next_.snapshot_begun = true;
   next_.snapshot_complete = false;
   next_.blocks.clear();
@@ -20,7 +20,7 @@ void RenderQueue::begin_stream() {
 void RenderQueue::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, bool snapshot_complete,
                            std::uint32_t snapshot_blocks, std::int64_t received_mono_ns) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     for (ReceivedBlock& block : blocks) {
       auto [place, fresh] = next_.blocks.try_emplace(block.key);
       if (fresh || block.version > place->second.version) place->second = std::move(block);
@@ -37,14 +37,14 @@ void RenderQueue::put_mesh(RoomSeq room_seq, std::vector<ReceivedBlock> blocks, 
 }
 
 void RenderQueue::put_tool(Tool tool) {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   next_.tools.push_back(std::move(tool));
 }
 
 void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<SceneItem> items,
                              std::vector<BodyId> bodies) {
   {
-    const std::lock_guard lock(mutex_);
+    const MutexLock lock(mutex_);
     next_.states = std::move(states);
     next_.items = std::move(items);
     next_.bodies = std::move(bodies);
@@ -55,14 +55,14 @@ void RenderQueue::put_states(std::vector<CuttingState> states, std::vector<Scene
 }
 
 Delivery RenderQueue::take() {
-  const std::lock_guard lock(mutex_);
+  const MutexLock lock(mutex_);
   waiting_ = false;
   return std::exchange(next_, Delivery{});
 }
 
 void RenderQueue::wait_for(std::chrono::milliseconds time) {
-  std::unique_lock lock(mutex_);
-  arrived_.wait_for(lock, time, [this] { return waiting_; });
+  MutexLock lock(mutex_);
+  arrived_.wait_for(lock, time, [this]() OSTEON_REQUIRES(mutex_) { return waiting_; });
 }
 
 }  // namespace osteon

@@ -2,13 +2,12 @@
 // each block waits.
 #pragma once
 #include <chrono>
-#include <condition_variable>
 #include <cstdint>
 #include <map>
-#include <mutex>
 #include <vector>
 
 #include "common/core/id.hpp"
+#include "common/core/mutex.hpp"
 #include "common/mechanics/cutting_state.hpp"
 #include "common/tools/scene_item.hpp"
 #include "viewer_client/scene/surface_scene.hpp"
@@ -52,10 +51,10 @@ class RenderQueue {
   void wait_for(std::chrono::milliseconds time);
 
  private:
-  std::mutex mutex_;
-  std::condition_variable arrived_;
-  bool waiting_ = false;
-  Delivery next_;
+  Mutex mutex_{LockRank::leaf};
+  CondVar arrived_;
+  bool waiting_ OSTEON_GUARDED_BY(mutex_) = false;
+  Delivery next_ OSTEON_GUARDED_BY(mutex_);
 };
 
 }  // namespace osteon
