@@ -110,10 +110,10 @@ void HapticWorker::fill_row(const SessionTick& now, bool idle, std::int64_t woke
     row_.depth_mm = (now.report.pose_bone_proxy.position_mm - site_->entry_mm).dot(site_->axis);
     row_.device_depth_mm = (now.report.pose_bone_device.position_mm - site_->entry_mm).dot(site_->axis);
   }
-  row_.force_rendered_n = now.report.force_device_n.norm();
+  row_.force_rendered_n = now.report.device.force_n.norm();
   row_.reading = now.reading;
   row_.commanded_rpm = now.commanded_rpm;
-  row_.rendered = {now.report.force_device_n, now.report.torque_device_nmm};
+  row_.rendered = {now.report.device.force_n, now.report.device.torque_nmm};
   row_.take_up = now.order.take_up;
   if (!row_.take_up) return;
   row_.taken_up_at = {now.order.hand.target_mm, now.order.rotation};

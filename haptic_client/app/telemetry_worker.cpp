@@ -88,7 +88,7 @@ void TelemetryWorker::set_items() {
 }
 
 void TelemetryWorker::note_range(const TickRow& row) {
-  if (row.report.out_of_range == 0 && !(row.report.events & kOnMetal)) return;
+  if (row.report.cutting.out_of_range == 0 && !(row.report.events & kOnMetal)) return;
   const ToolModel& model = session_.plan().tools[static_cast<std::size_t>(row.report.tool)];
   const std::string outside = ranges_.note(model, row.report), metal = metal_.note(model, row.report);
   if (!outside.empty()) log::warn("force law outside its range", {{"tool", model.tool.name}, {"because", outside}});
@@ -107,8 +107,8 @@ void TelemetryWorker::note_restrictions(const TickRow& row) {
     outcome_.supervised_step_n = std::max(outcome_.supervised_step_n, row.force_rendered_n - force_before_n_);
   force_before_n_ = row.force_rendered_n;
   if (!led) return;
-  outcome_.guide_mm = r.guide_distance_mm;
-  outcome_.guide_most_mm = std::max(outcome_.guide_most_mm, r.guide_distance_mm);
+  outcome_.guide_mm = r.guidance.distance_mm;
+  outcome_.guide_most_mm = std::max(outcome_.guide_most_mm, r.guidance.distance_mm);
 }
 
 CuttingState TelemetryWorker::state_of(const TickRow& row) const {
@@ -120,13 +120,13 @@ CuttingState TelemetryWorker::state_of(const TickRow& row) const {
   state.pose_bone_device = r.pose_bone_device;
   state.tool_name = tool_name(row);
   state.spindle_rpm = r.spindle_rpm;
-  state.feed_mm_per_s = r.feed_mm_per_s;
-  state.density_g_cm3 = r.density_g_cm3;
-  state.engaged_fraction = r.engaged;
-  state.force_physical_N = r.force_physical_n;
-  state.torque_Nmm = r.torque_nmm;
+  state.feed_mm_per_s = r.cutting.feed_mm_per_s;
+  state.density_g_cm3 = r.cutting.density_g_cm3;
+  state.engaged_fraction = r.cutting.engaged;
+  state.force_physical_N = r.coupling.force_n;
+  state.torque_Nmm = r.cutting.torque_nmm;
   state.depth_mm = row.depth_mm;
-  state.phase = r.phase;
+  state.phase = r.cutting.phase;
   state.on_metal = (r.events & kOnMetal) != 0;
   return state;
 }
@@ -134,15 +134,16 @@ CuttingState TelemetryWorker::state_of(const TickRow& row) const {
 void TelemetryWorker::print_status(const TickRow& row) {
   const LoopReport& r = row.report;
   std::printf("%s %s: depth %.1f mm, force %.1f N, feed %.2f mm/s, %.0f rpm (%s)", tool_name(row).c_str(),
-              name(row.phase), row.depth_mm, r.force_physical_n.norm(), r.feed_mm_per_s, r.spindle_rpm, name(r.phase));
-  if (r.out_of_range != 0)
-    std::printf(", outside the range of its law: %s", out_of_range_words(r.out_of_range).c_str());
+              name(row.phase), row.depth_mm, r.coupling.force_n.norm(), r.cutting.feed_mm_per_s, r.spindle_rpm,
+              name(r.cutting.phase));
+  if (r.cutting.out_of_range != 0)
+    std::printf(", outside the range of its law: %s", out_of_range_words(r.cutting.out_of_range).c_str());
   const RoomHealth health = exchange_.room_health;
   if (r.events & kOnMetal) std::printf(", on metal, which it does not cut");
   exchange_.restricted_by.refresh();
   const std::string& by = exchange_.restricted_by.value();
   if (r.events & kForbidden) std::printf(", stopped by %s", by.empty() ? "an instructor" : by.c_str());
-  if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guide_distance_mm);
+  if (r.events & kHandGuided) std::printf(", led, %.1f mm off", r.guidance.distance_mm);
   if (health != RoomHealth::follows)
     std::printf(", held: %s, %zu cuts unconfirmed", name(health), exchange_.unconfirmed.load());
   if (exchange_.tick_stats.refresh()) {

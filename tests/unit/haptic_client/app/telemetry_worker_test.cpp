@@ -46,7 +46,7 @@ class TelemetryWorkerTest : public testing::Test {
     row.mono_ns = static_cast<std::int64_t>(1'000'000 * seq);
     row.report.state_seq = seq;
     row.report.events = events;
-    row.report.guide_distance_mm = guide_mm;
+    row.report.guidance.distance_mm = guide_mm;
     row.force_rendered_n = force_n;
     ASSERT_TRUE(exchange_.rows.try_push(row));
   }
