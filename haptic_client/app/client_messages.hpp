@@ -1,6 +1,7 @@
 // What the threads of the haptic client hand to each other besides the messages of the room.
 #pragma once
 #include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -16,6 +17,12 @@
 #include "haptic_client/rendering/guidance_spring.hpp"
 
 namespace osteon::haptic {
+
+// A time of the monotonic clock, as every log of the session counts it.
+[[nodiscard]] inline std::int64_t mono_ns(std::chrono::steady_clock::time_point at) noexcept {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(at.time_since_epoch()).count();
+}
+[[nodiscard]] inline std::int64_t mono_ns() noexcept { return mono_ns(std::chrono::steady_clock::now()); }
 
 // Others' tools, as last received.
 struct Partners {

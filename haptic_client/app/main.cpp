@@ -99,99 +99,102 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
 
 // An instructor's decisions about the hand, and their effects. Times: since the loop's first tick.
 json haptic_restrictions(const ClientOutcome& outcome) {
-  const auto seconds = [&](std::int64_t mono_ns) { return 1e-9 * static_cast<double>(mono_ns - outcome.began_ns); };
+  const auto seconds = [&](std::int64_t mono_ns) {
+    return 1e-9 * static_cast<double>(mono_ns - outcome.haptic.began_ns);
+  };
   json notes = json::array(), words = json::array();
   for (const RestrictionNote& note : outcome.restrictions) {
     notes.push_back({{"at_s", seconds(note.mono_ns)}, {"what", note.what}});
     if (!note.by.empty()) notes.back()["by"] = note.by;
     if (note.room_seq != 0) notes.back()["room_seq"] = note.room_seq;
   }
-  for (const WordsNote& note : outcome.words)
+  for (const WordsNote& note : outcome.replica.words)
     words.push_back(
         {{"at_s", seconds(note.mono_ns)}, {"room_seq", note.room_seq}, {"from", note.from}, {"words", note.words}});
   return {{"restrictions", notes},
           {"words", words},
           {"supervised",
-           {{"forbidden_s", 1e-3 * static_cast<double>(outcome.forbidden_ticks)},
-            {"cuts_stopped", outcome.cuts_stopped},
-            {"cuts_taken", outcome.cuts_taken},
-            {"cuts_elsewhere", outcome.cuts_elsewhere},
-            {"force_step_n", outcome.supervised_step_n},
-            {"guide_mm", outcome.guide_mm},
-            {"guide_most_mm", outcome.guide_most_mm}}}};
+           {{"forbidden_s", 1e-3 * static_cast<double>(outcome.telemetry.forbidden_ticks)},
+            {"cuts_stopped", outcome.replica.cuts_stopped},
+            {"cuts_taken", outcome.replica.cuts_taken},
+            {"cuts_elsewhere", outcome.replica.cuts_elsewhere},
+            {"force_step_n", outcome.telemetry.supervised_step_n},
+            {"guide_mm", outcome.telemetry.guide_mm},
+            {"guide_most_mm", outcome.telemetry.guide_most_mm}}}};
 }
 
 json summary_of(const ClientOutcome& outcome, const ReadyPlan& plan, std::string_view device, int losses) {
-  const TickStats& ticks = outcome.ticks;
+  const TickStats& ticks = outcome.haptic.ticks;
   json outside = json::object();
-  for (const RangeWatch::Use& use : outcome.outside_range)
+  for (const RangeWatch::Use& use : outcome.telemetry.outside_range)
     outside[std::string(use.law->name)] = {{"ticks", use.ticks}, {"what", out_of_range_words(use.bits)}};
   json steps = json::array();
   for (std::size_t i = 0; i < plan.steps.size(); ++i)
-    steps.push_back(step_summary(plan.steps[i], plan.tools, outcome.steps[i], outcome.removed_mm3[i]));
-  json summary = {{"device", device},
-                  {"device_losses", losses},
-                  {"device_limits",
-                   {{"peak_n", outcome.limits.peak_n},
-                    {"continuous_n", outcome.limits.continuous_n},
-                    {"stiffness_n_per_mm", outcome.limits.stiffness_n_per_mm},
-                    {"workspace_radius_mm", outcome.limits.workspace_radius_mm}}},
-                  {"force_scale", outcome.loop.force_scale},
-                  {"coupling_n_per_mm", outcome.coupling_n_per_mm},
-                  {"workspace_scale", outcome.workspace_scale},
-                  {"loop",
-                   {{"ticks", ticks.work.count()},
-                    {"missed", ticks.missed},
-                    {"stalls", outcome.stalls},
-                    {"longest_stall_ms", outcome.longest_stall_ms},
-                    {"realtime", outcome.realtime},
-                    {"late_p50_us", ticks.lateness.percentile_us(50)},
-                    {"late_p99_us", ticks.lateness.percentile_us(99)},
-                    {"late_p999_us", ticks.lateness.percentile_us(99.9)},
-                    {"late_max_us", ticks.lateness.max_us()},
-                    {"work_p50_us", ticks.work.percentile_us(50)},
-                    {"work_p99_us", ticks.work.percentile_us(99)},
-                    {"work_p999_us", ticks.work.percentile_us(99.9)},
-                    {"work_max_us", ticks.work.max_us()}}},
-                  {"patches",
-                   {{"built", outcome.patches},
-                    {"p50_us", outcome.patch_p50_us},
-                    {"p99_us", outcome.patch_p99_us},
-                    {"uncovered_ticks", outcome.uncovered_ticks},
-                    {"cuts_waiting_ticks", outcome.cuts_waiting_ticks}}},
-                  {"held_for_room_ticks", outcome.held_for_room_ticks},
-                  {"interruptions", outcome.interruptions},
-                  {"fast_path",
-                   {{"alive", outcome.fast_path.alive},
-                    {"round_trip_ms", outcome.fast_path.round_trip_ms},
-                    {"loss", outcome.fast_path.loss},
-                    {"packets_sent", outcome.fast_path.packets_sent},
-                    {"bytes_sent", outcome.fast_path.bytes_sent},
-                    {"packets_received", outcome.fast_path.packets_received}}},
-                  {"mount",
-                   {{"there", outcome.mount.there},
-                    {"most_mm", outcome.mount.most_mm},
-                    {"most_rad", outcome.mount.most_rad},
-                    {"put_in_mj", outcome.mount.put_in_mj},
-                    {"released_mj", outcome.mount.released_mj},
-                    {"given_mj", outcome.mount.given_mj},
-                    {"granted_mj", outcome.mount.granted_mj},
-                    {"low_pass_s", outcome.mount.low_pass_s}}},
-                  {"rows_dropped", outcome.rows_dropped},
-                  {"recording",
-                   {{"rows", outcome.recording.rows},
-                    {"dropped", outcome.recording.dropped},
-                    {"trouble", outcome.recording.trouble}}},
-                  {"cuts", outcome.cuts.size()},
-                  {"rejected", outcome.rejected},
-                  {"laws_outside_range", outside},
-                  {"steps", steps},
-                  {"removed_mm3", outcome.removed_total_mm3},
-                  {"field_hash", outcome.field_hash ? json(to_hex(*outcome.field_hash)) : json(nullptr)},
-                  {"unconfirmed", outcome.unconfirmed},
-                  {"room_seq", outcome.room_seq.value},
-                  {"stopped", outcome.stopped},
-                  {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
+    steps.push_back(step_summary(plan.steps[i], plan.tools, outcome.steps[i], outcome.replica.removed_mm3[i]));
+  json summary = {
+      {"device", device},
+      {"device_losses", losses},
+      {"device_limits",
+       {{"peak_n", outcome.limits.peak_n},
+        {"continuous_n", outcome.limits.continuous_n},
+        {"stiffness_n_per_mm", outcome.limits.stiffness_n_per_mm},
+        {"workspace_radius_mm", outcome.limits.workspace_radius_mm}}},
+      {"force_scale", outcome.loop.force_scale},
+      {"coupling_n_per_mm", outcome.coupling_n_per_mm},
+      {"workspace_scale", outcome.workspace_scale},
+      {"loop",
+       {{"ticks", ticks.work.count()},
+        {"missed", ticks.missed},
+        {"stalls", outcome.haptic.stalls},
+        {"longest_stall_ms", outcome.haptic.longest_stall_ms},
+        {"realtime", outcome.haptic.realtime},
+        {"late_p50_us", ticks.lateness.percentile_us(50)},
+        {"late_p99_us", ticks.lateness.percentile_us(99)},
+        {"late_p999_us", ticks.lateness.percentile_us(99.9)},
+        {"late_max_us", ticks.lateness.max_us()},
+        {"work_p50_us", ticks.work.percentile_us(50)},
+        {"work_p99_us", ticks.work.percentile_us(99)},
+        {"work_p999_us", ticks.work.percentile_us(99.9)},
+        {"work_max_us", ticks.work.max_us()}}},
+      {"patches",
+       {{"built", outcome.replica.patches},
+        {"p50_us", outcome.replica.patch_p50_us},
+        {"p99_us", outcome.replica.patch_p99_us},
+        {"uncovered_ticks", outcome.haptic.uncovered_ticks},
+        {"cuts_waiting_ticks", outcome.haptic.cuts_waiting_ticks}}},
+      {"held_for_room_ticks", outcome.haptic.held_for_room_ticks},
+      {"interruptions", outcome.replica.interruptions},
+      {"fast_path",
+       {{"alive", outcome.fast_path.alive},
+        {"round_trip_ms", outcome.fast_path.round_trip_ms},
+        {"loss", outcome.fast_path.loss},
+        {"packets_sent", outcome.fast_path.packets_sent},
+        {"bytes_sent", outcome.fast_path.bytes_sent},
+        {"packets_received", outcome.fast_path.packets_received}}},
+      {"mount",
+       {{"there", outcome.haptic.mount.there},
+        {"most_mm", outcome.haptic.mount.most_mm},
+        {"most_rad", outcome.haptic.mount.most_rad},
+        {"put_in_mj", outcome.haptic.mount.put_in_mj},
+        {"released_mj", outcome.haptic.mount.released_mj},
+        {"given_mj", outcome.haptic.mount.given_mj},
+        {"granted_mj", outcome.haptic.mount.granted_mj},
+        {"low_pass_s", outcome.haptic.mount.low_pass_s}}},
+      {"rows_dropped", outcome.haptic.rows_dropped},
+      {"recording",
+       {{"rows", outcome.recording.rows},
+        {"dropped", outcome.recording.dropped},
+        {"trouble", outcome.recording.trouble}}},
+      {"cuts", outcome.replica.cuts.size()},
+      {"rejected", outcome.replica.rejected},
+      {"laws_outside_range", outside},
+      {"steps", steps},
+      {"removed_mm3", outcome.replica.removed_total_mm3},
+      {"field_hash", outcome.replica.field_hash ? json(to_hex(*outcome.replica.field_hash)) : json(nullptr)},
+      {"unconfirmed", outcome.replica.unconfirmed},
+      {"room_seq", outcome.replica.room_seq.value},
+      {"stopped", outcome.stopped},
+      {"lost", outcome.lost ? json(outcome.lost->message) : json(nullptr)}};
   summary.update(haptic_restrictions(outcome));
   return summary;
 }
@@ -275,17 +278,18 @@ Result<void> run(Options& options, const StopSignal& stop) {
   if (!outcome) return tl::unexpected(outcome.error());
   const ReadyPlan& plan = (*session)->plan();
   // Both files are written, whatever the result of the other and of the session.
-  const Result<void> cut_log = write_cut_log(options.cut_log, outcome->cuts);
+  const Result<void> cut_log = write_cut_log(options.cut_log, outcome->replica.cuts);
   const Result<void> summary =
       options.summary.empty()
           ? Result<void>()
           : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");
   const auto finished = std::ranges::count_if(outcome->steps, &StepResult::completed);
-  const std::string field = outcome->field_hash ? to_hex(*outcome->field_hash).substr(0, 12) : "unknown";
+  const std::string field =
+      outcome->replica.field_hash ? to_hex(*outcome->replica.field_hash).substr(0, 12) : "unknown";
   std::string unconfirmed;
-  if (outcome->unconfirmed > 0)
-    unconfirmed =
-        " (" + std::to_string(outcome->unconfirmed) + " of them not confirmed, and not in the following figures)";
+  if (outcome->replica.unconfirmed > 0)
+    unconfirmed = " (" + std::to_string(outcome->replica.unconfirmed) +
+                  " of them not confirmed, and not in the following figures)";
   std::printf(
       "%s: %s, %lld of %zu steps done, %zu cuts of its own%s, %.1f mm3 gone from the bone in all, "
       "field %s at %llu; %llu of %llu ms missed\n",
@@ -293,10 +297,11 @@ Result<void> run(Options& options, const StopSignal& stop) {
       outcome->lost      ? "broken off"
       : outcome->stopped ? "stopped"
                          : "ended",
-      static_cast<long long>(finished), plan.steps.size(), outcome->cuts.size(), unconfirmed.c_str(),
-      outcome->removed_total_mm3, field.c_str(), static_cast<unsigned long long>(outcome->room_seq.value),
-      static_cast<unsigned long long>(outcome->ticks.missed),
-      static_cast<unsigned long long>(outcome->ticks.missed + outcome->ticks.work.count()));
+      static_cast<long long>(finished), plan.steps.size(), outcome->replica.cuts.size(), unconfirmed.c_str(),
+      outcome->replica.removed_total_mm3, field.c_str(),
+      static_cast<unsigned long long>(outcome->replica.room_seq.value),
+      static_cast<unsigned long long>(outcome->haptic.ticks.missed),
+      static_cast<unsigned long long>(outcome->haptic.ticks.missed + outcome->haptic.ticks.work.count()));
   if (outcome->lost) return tl::unexpected(*outcome->lost);
   if (!cut_log) return cut_log;
   if (!summary) return summary;

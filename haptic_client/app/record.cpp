@@ -47,14 +47,14 @@ std::string MetalWatch::note(const ToolModel& model, const LoopReport& report) {
 }
 
 std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
-  if (report.out_of_range == 0) return {};
+  if (report.cutting.out_of_range == 0) return {};
   const auto found = std::ranges::find(uses_, model.law, &Use::law);
   const auto at = static_cast<std::size_t>(found - uses_.begin());
   if (found == uses_.end()) {
     uses_.push_back({model.law, 0, 0});
     stays_.push_back({report.state_seq - 1});
   }
-  uses_[at].bits |= report.out_of_range;
+  uses_[at].bits |= report.cutting.out_of_range;
   ++uses_[at].ticks;
   Stay& stay = stays_[at];
   const auto since = static_cast<std::int64_t>(report.state_seq - stay.last_seq);
@@ -62,7 +62,7 @@ std::string RangeWatch::note(const ToolModel& model, const LoopReport& report) {
   stay.last_seq = report.state_seq;
   if (stay.reported || stay.ticks < kLasting_ticks) return {};
   stay.reported = true;
-  return out_of_range_sentence(*model.law, report.out_of_range);
+  return out_of_range_sentence(*model.law, report.cutting.out_of_range);
 }
 
 Result<void> SessionLog::open(const std::filesystem::path& file, const DeviceInfo& device) {
@@ -87,9 +87,9 @@ void SessionLog::write(const TickRow& row, const std::string& tool) {
   const int size = std::snprintf(
       line, sizeof line, "%.3f,%lld,%llu,%s,%s,%.5f,%.5f,%.5f,%.5f,%.5f,%.4f,%.4f,%.5f,%.4f,%.4f,%.2f,%.3f,%u\n",
       1e-9 * static_cast<double>(row.mono_ns - first_mono_ns_), static_cast<long long>(row.mono_ns),
-      static_cast<unsigned long long>(r.state_seq), name(r.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
-      row.depth_mm, row.device_depth_mm, r.force_physical_n.norm(), rendered_n, r.feed_mm_per_s, r.density_g_cm3,
-      r.engaged, r.spindle_rpm, r.torque_nmm, r.out_of_range);
+      static_cast<unsigned long long>(r.state_seq), name(r.cutting.phase), tool.c_str(), tip.x(), tip.y(), tip.z(),
+      row.depth_mm, row.device_depth_mm, r.coupling.force_n.norm(), rendered_n, r.cutting.feed_mm_per_s,
+      r.cutting.density_g_cm3, r.cutting.engaged, r.spindle_rpm, r.cutting.torque_nmm, r.cutting.out_of_range);
   file_.write(line, size);
 }
 

@@ -40,7 +40,7 @@ struct RecordedCut {
 [[nodiscard]] std::string law_name(const ToolModel& model);
 // Names of the bits of LoopReport::events, the lowest first.
 [[nodiscard]] std::vector<std::string> event_names();
-// Names of the bits of LoopReport::out_of_range, the lowest first.
+// Names of the bits of LoopReport::Cutting::out_of_range, the lowest first.
 [[nodiscard]] std::vector<std::string> range_names();
 
 // Reports each contact with metal once. One thread.

@@ -317,13 +317,13 @@ void RecordFile::Impl::make_columns() {
                        }));
   add(column<float, R>(
       "drill_force_feedback/motor_force", "N, N, N", kDevice, "the motor's part of the force: drag, kick, vibration",
-      [forces](const R& r) { return numbers(forces ? r.report.motor_device_n : Vec3(Vec3::Zero())); }));
+      [forces](const R& r) { return numbers(forces ? r.report.motor.device_n : Vec3(Vec3::Zero())); }));
   add(column<float, R>("drill_force_physical/wrench", "N, N, N, N.mm, N.mm, N.mm", kBone,
                        "of the bone on the tool, not scaled",
-                       [](const R& r) { return wrench(r.report.force_physical_n, r.report.torque_physical_nmm); }));
+                       [](const R& r) { return wrench(r.report.coupling.force_n, r.report.coupling.torque_nmm); }));
   add(column<float, R>("drill_force_physical/cutting_force", "N, N, N", kBone,
                        "of the tool on the bone, by the law alone",
-                       [](const R& r) { return numbers(r.report.cutting_force_n); }));
+                       [](const R& r) { return numbers(r.report.cutting.force_n); }));
   add(column<std::int64_t, R>("data/mono_ns", "ns", "", "the machine's monotonic clock, as in every log of the session",
                               [](const R& r) { return r.mono_ns; }));
   add(column<std::uint64_t, R>(recording::kTick, "1", "", "number of the tick and of its cutting state",
@@ -333,21 +333,21 @@ void RecordFile::Impl::make_columns() {
   add(column<double, R>("data/commanded_rpm", "1/min", "", "speed that the pedal commands",
                         [](const R& r) { return r.commanded_rpm; }));
   add(column<float, R>("data/feed", "mm/s", "", "into bone, along the direction of cutting",
-                       [](const R& r) { return r.report.feed_mm_per_s; }));
+                       [](const R& r) { return r.report.cutting.feed_mm_per_s; }));
   add(column<float, R>("data/density", "g/cm3", "", "of the bone being cut, weighted by engaged area",
-                       [](const R& r) { return r.report.density_g_cm3; }));
+                       [](const R& r) { return r.report.cutting.density_g_cm3; }));
   add(column<float, R>("data/engaged", "1", "", "share of the leading area that is in bone",
-                       [](const R& r) { return r.report.engaged; }));
+                       [](const R& r) { return r.report.cutting.engaged; }));
   add(column<float, R>("data/torque", "N.mm", "", "torque of the bone on the spindle",
-                       [](const R& r) { return r.report.torque_nmm; }));
+                       [](const R& r) { return r.report.cutting.torque_nmm; }));
   add(column<float, R>("data/cutting_work", "mJ", "", "work of the law's force over the path cut in the tick",
-                       [](const R& r) { return r.report.cutting_work_mj; }));
+                       [](const R& r) { return r.report.cutting.work_mj; }));
   add(column<float, R>("data/coupling_energy", "mJ", "",
                        "energy that the coupling gave in this contact, minus what the hand put in",
-                       [](const R& r) { return r.report.energy.episode_mj; }));
+                       [](const R& r) { return r.report.coupling.energy.episode_mj; }));
   add(column<float, R>("data/offset", "mm, mm, mm", kBone,
                        "of the hand's position: slack, and the extension that pushing the tool away would have caused",
-                       [](const R& r) { return numbers(r.report.offset_mm); }));
+                       [](const R& r) { return numbers(r.report.coupling.offset_mm); }));
   add(column<float, R>("data/depth", "mm", "", "of the tip below the entry of the current step",
                        [](const R& r) { return r.depth_mm; }));
   add(column<float, R>("data/device_depth", "mm", "", "the same of the hand",
@@ -355,10 +355,10 @@ void RecordFile::Impl::make_columns() {
   add(column<float, R>("data/force_scale", "1", "", "s: rendered over physical force", [s](const R&) { return s; }));
   add(column<float, R>("data/guide_play", "mm", "",
                        "while in a guide: permitted distance of the tip from the opening's middle",
-                       [](const R& r) { return r.report.guide_play_mm; }));
+                       [](const R& r) { return r.report.contact.guide_play_mm; }));
   add(enumeration<R>("data/state", "what the tool does to the bone",
                      {{{"idle", 1}, {"free", 2}, {"cutting", 3}, {"rubbing", 4}}},
-                     [](const R& r) { return static_cast<int>(r.report.phase); }));
+                     [](const R& r) { return static_cast<int>(r.report.cutting.phase); }));
   Names phases;
   for (int i = 0; i <= static_cast<int>(SurgeonPhase::free_hand); ++i)
     phases.values.emplace_back(name(static_cast<SurgeonPhase>(i)), i);
@@ -374,7 +374,7 @@ void RecordFile::Impl::make_columns() {
                               }));
   add(column<std::uint8_t, R>("data/law_out_of_range", "1", "",
                               "bits: exceeded limits of the law, named in metadata/range_bits",
-                              [](const R& r) { return r.report.out_of_range; }));
+                              [](const R& r) { return r.report.cutting.out_of_range; }));
   add(column<std::uint32_t, R>("data/events", "1", "",
                                "bits: events of the loop in the tick, named in metadata/event_bits",
                                [](const R& r) { return r.report.events; }));

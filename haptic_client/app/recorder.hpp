@@ -1,5 +1,5 @@
 // Writes the rows of a session on a thread of its own. So a slow disk delays neither the haptic thread nor the
-// reporting thread.
+// telemetry thread.
 #pragma once
 #include <optional>
 #include <thread>

@@ -10,14 +10,12 @@
 
 #include "common/core/id.hpp"
 #include "common/core/result.hpp"
-#include "common/field/cut.hpp"
 #include "common/field/field_hash.hpp"
-#include "common/mechanics/cutting_state.hpp"
-#include "common/tools/scene_item.hpp"
 #include "common/tools/tool_box.hpp"
 #include "common/volume/case.hpp"
 #include "common/wire/room_client.hpp"
 #include "haptic_client/net/room_messages.hpp"
+#include "haptic_client/net/room_port.hpp"
 
 namespace osteon {
 
@@ -35,14 +33,7 @@ struct RoomSessionOptions {
   std::string fast_path{};
 };
 
-// State of the fast path.
-struct FastPathHealth {
-  bool offered = false, alive = false;
-  double round_trip_ms = 0, loss = 0;  // loss: from client to server
-  std::uint64_t packets_sent = 0, bytes_sent = 0, packets_received = 0, bytes_received = 0;
-};
-
-class RoomSession {
+class RoomSession final : public RoomPort {
  public:
   // Number of undecided cuts from which send() refuses more.
   static constexpr std::size_t kMaxWaitingCuts = 1024;
@@ -51,7 +42,7 @@ class RoomSession {
   // not. Errors: those of wire::join_room; those of Case::load for a fetched case; internal (the cache cannot be
   // written).
   [[nodiscard]] static Result<RoomSession> join(const RoomSessionOptions& options, const std::function<bool()>& stop);
-  ~RoomSession();  // closes
+  ~RoomSession() override;  // closes
   RoomSession(RoomSession&&) noexcept;
   RoomSession& operator=(RoomSession&&) noexcept;
 
@@ -59,21 +50,16 @@ class RoomSession {
   [[nodiscard]] const wire::JoinedRoom& room() const;
   [[nodiscard]] const Case& bone() const;
   [[nodiscard]] const std::shared_ptr<ToolBox>& tools() const;  // known to the room; grows with its events
-  // Sets an item of the room's scene, id 0 for a new one, and returns its id. Waits for the answer. Errors:
-  // invalid_input, denied (the hand is stopped, or its tool taken), unavailable.
-  [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item);
+  [[nodiscard]] Result<std::uint32_t> set_item(const SceneItem& item) override;
 
   // Opens the stream; call it once. From now on `callbacks` are called.
   void open(RoomCallbacks callbacks);
-  // Any thread except the haptic and audio ones: these functions lock and allocate.
-  // Sends cuts in the order of the calls. Returns false, and does not take the cut, when kMaxWaitingCuts are undecided
-  // or the session is lost.
-  [[nodiscard]] bool send(const Cut& cut);
-  // Newest wins: a waiting state is replaced. Waiting cuts are sent first.
-  void send(const CuttingState& state);
-  // Newest wins; has no effect in a room without a mount. Where datagrams do not get through, 30 a second are sent.
-  void send(const MountLoad& push);
-  [[nodiscard]] FastPathHealth fast_path() const;
+  // Refuses a cut when kMaxWaitingCuts are undecided or the session is lost.
+  [[nodiscard]] bool send(const Cut& cut) override;
+  void send(const CuttingState& state) override;
+  // Where datagrams do not get through, 30 a second are sent.
+  void send(const MountLoad& push) override;
+  [[nodiscard]] FastPathHealth fast_path() const override;
   // Sends what is waiting, for at most a second, ends the stream, and joins the thread. A second call does nothing.
   void close();
 

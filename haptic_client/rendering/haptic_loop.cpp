@@ -114,7 +114,7 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (const auto guided = guiding_.step(guides, model.tool, pose_bone_wanted, proxy_.pose())) {
     pose_bone_wanted = guided->pose_bone_tool;
     held_back = guided->correction_mm > 0.0;
-    report.guide_play_mm = guided->play_mm;
+    report.contact.guide_play_mm = guided->play_mm;
     report.events |= kGuided;
   }
 
@@ -161,21 +161,21 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
 
   report.pose_bone_proxy = proxy_.pose();
   report.pose_bone_device = pose_bone_device;
-  report.cutting_force_n = step.cutting_force_n;
-  report.cutting_work_mj = step.cutting_work_mj;
-  report.pushed_back_mj = step.pushed_back_mj;
-  report.moved_mm = step.moved_mm;
+  report.cutting.force_n = step.cutting_force_n;
+  report.cutting.work_mj = step.cutting_work_mj;
+  report.cutting.pushed_back_mj = step.pushed_back_mj;
+  report.contact.moved_mm = step.moved_mm;
   report.spindle_rpm = spindle_.rpm;
-  report.feed_mm_per_s = step.feed_mm_per_s;
-  report.density_g_cm3 = step.density_g_cm3;
-  report.engaged = step.engaged;
-  report.torque_nmm = step.torque_nmm;
-  report.across_n = step.across_n;
-  report.out_of_range = step.out_of_range;
-  report.phase = step.cutting         ? CuttingPhase::cutting
-                 : step.contact       ? CuttingPhase::rubbing
-                 : spindle_.rpm > 1.0 ? CuttingPhase::free
-                                      : CuttingPhase::idle;
+  report.cutting.feed_mm_per_s = step.feed_mm_per_s;
+  report.cutting.density_g_cm3 = step.density_g_cm3;
+  report.cutting.engaged = step.engaged;
+  report.cutting.torque_nmm = step.torque_nmm;
+  report.cutting.across_n = step.across_n;
+  report.cutting.out_of_range = step.out_of_range;
+  report.cutting.phase = step.cutting         ? CuttingPhase::cutting
+                         : step.contact       ? CuttingPhase::rubbing
+                         : spindle_.rpm > 1.0 ? CuttingPhase::free
+                                              : CuttingPhase::idle;
 
   // The coupling's spring, as far as the device could show it.
   CouplingMoment moment;
@@ -200,11 +200,11 @@ LoopReport HapticLoop::tick(const LoopInput& input, const Patch& patch, std::spa
   if (coupling.limited) report.events |= kForceLimited;
   if (coupling.breakthrough) report.events |= kBreakthrough;
   if (coupling.returned) report.events |= kPushedAway;
-  report.force_physical_n = coupling.spring_n;
-  report.offset_mm = coupling_.offset_mm();
+  report.coupling.force_n = coupling.spring_n;
+  report.coupling.offset_mm = coupling_.offset_mm();
   torque_nmm_ = load_nmm(step, moment.touching ? coupling.spring_n.norm() : 0.0);
   wear_and_clog(model, step, moment.touching ? coupling.spring_n : Vec3(Vec3::Zero()));
-  if (moment.touching) report.torque_physical_nmm = step.contact_torque_nmm;
+  if (moment.touching) report.coupling.torque_nmm = step.contact_torque_nmm;
 
   // The spring of the rotation belongs to the coupling. The moment of the cut does not: the bone turns a spindle back
   // and presses on faces beside the tip. Whoever yields to this moment gets the motor's work, not what the hand has put
@@ -277,16 +277,16 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
       share(wanted.force_n, s * (coupling.spring_n + coupling.damping_n).norm()) * s * coupling.damping_n,
       share(wanted.torque_nmm, turn_nmm.norm()) * moment.energy_scale * coupling.turn_damping_nmm};
   shown_ = ledger_.limited(wanted, damping, moment.touching);
-  report.energy = ledger_.report();
+  report.coupling.energy = ledger_.report();
   // Begins with a missed tick, the ramp or the monitor, and lasts until the shown force has come up again. It does not
   // begin where the spring grows faster than force may, as on a point that skates: a hand that presses there would
   // sink.
   constexpr double kClearly = 0.9;  // the filter's lag is less
-  fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.energy.held_back) &&
+  fell_short_ = moment.touching && (fell_short_ || !safe || ramp_ < 1.0 || report.coupling.energy.held_back) &&
                 shown_.force_n.norm() < kClearly * s * coupling.spring_n.norm();
-  if (report.energy.held_back) report.events |= kEnergyLimited;
-  report.coupling_device_n = to_device(shown_.force_n);
-  report.coupling_device_nmm = to_device(shown_.torque_nmm);
+  if (report.coupling.energy.held_back) report.events |= kEnergyLimited;
+  report.coupling.device_n = to_device(shown_.force_n);
+  report.coupling.device_nmm = to_device(shown_.torque_nmm);
 
   // The motor port, outside the ledger, within what the limit leaves.
   MotorMoment motor;
@@ -295,20 +295,20 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   motor.teeth = model.tool.teeth;
   motor.normal_n = shown_.force_n / s;
   motor.axis = report.pose_bone_proxy.direction(Vec3::UnitZ());
-  motor.cutting = report.phase == CuttingPhase::cutting;
-  motor.across_n = report.across_n;
+  motor.cutting = report.cutting.phase == CuttingPhase::cutting;
+  motor.across_n = report.cutting.across_n;
   motor.stroke = report.pose_bone_proxy.direction(model.stroke);
   if (params_.tool_effects) motor.pull_n = effects_[static_cast<std::size_t>(tool_)].pull_n();
   Vec3 motor_n = s * motor_.step(motor, params_.dt_s);
   if (!params_.motor_effects || !safe) motor_n.setZero();
   motor_n = clamped(motor_n, std::max(0.0, limit_n - shown_.force_n.norm()));
-  report.motor_device_n = to_device(motor_n);
+  report.motor.device_n = to_device(motor_n);
   // The contact leaves part of the growth that no hand causes. The guidance spring gets that part.
   const double grown_n = growth(shown_.force_n, before_n).norm() - by_hand_n;
   const double room_n = std::max(0.0, limit_n - shown_.force_n.norm() - motor_n.norm());
   lead(input, meet(input, {room_n, std::clamp(slow - grown_n, 0.0, slow), by_hand_n + slow}, report), report);
-  together_n_ = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
-  report.force_device_n = together_n_ + report.motor_device_n;
+  together_n_ = report.coupling.device_n + report.guidance.device_n + report.partners.device_n;
+  report.device.force_n = together_n_ + report.motor.device_n;
 
   // The same for the moment of the cut, never a force. It is at most what the shown force would be at the arm of a
   // rotation. It grows no faster than force grows that the hand did not cause.
@@ -317,8 +317,8 @@ void HapticLoop::show(const LoopInput& input, const ToolModel& model, const Coup
   Vec3 motor_nmm = Vec3::Zero();
   if (params_.motor_effects && safe) motor_nmm = ramp_ * motor_.open() * moment.energy_scale * cut_nmm;
   motor_nmm_ = clamped(clamped(motor_nmm, motor_nmm_.norm() + turn_arm_mm_ * slow), most_nmm);
-  report.motor_device_nmm = to_device(motor_nmm_);
-  report.torque_device_nmm = report.coupling_device_nmm + report.motor_device_nmm;
+  report.motor.device_nmm = to_device(motor_nmm_);
+  report.device.torque_nmm = report.coupling.device_nmm + report.motor.device_nmm;
 }
 
 void HapticLoop::feel_partners() {
@@ -347,7 +347,7 @@ HapticLoop::Left HapticLoop::meet(const LoopInput& input, const Left& left, Loop
   Vec3 wanted_n = to_device(clamped(params_.force_scale * felt.force_n, left.room_n));
   const Vec3 grown_n = growth(wanted_n, partner_n_);
   wanted_n += clamped(grown_n, left.slew_n) - grown_n;
-  report.partner_device_n = partner_n_ = wanted_n;
+  report.partners.device_n = partner_n_ = wanted_n;
   return {std::max(0.0, left.room_n - wanted_n.norm()), std::max(0.0, left.slew_n - grown_n.norm()), left.together_n};
 }
 
@@ -363,14 +363,14 @@ void HapticLoop::lead(const LoopInput& input, const Left& left, LoopReport& repo
   moment.share = input.room == RoomLink::over ? 0.0 : restrictions.guide_share;
   moment.room_n = left.room_n;
   moment.slew_n = left.slew_n;
-  moment.rest_n = report.coupling_device_n + report.partner_device_n;
+  moment.rest_n = report.coupling.device_n + report.partners.device_n;
   moment.together_n = together_n_;
   moment.together_slew_n = left.together_n;
   moment.safe = placed_ && input.device_ok && input.periods <= 3 && !input.clutch;
-  report.guide_device_n = guide_pull_.step(moment);
+  report.guidance.device_n = guide_pull_.step(moment);
   if (!guide_pull_.pulls()) return;
   report.events |= kHandGuided;
-  report.guide_distance_mm = (guide_mm - report.pose_bone_device.position_mm).norm();
+  report.guidance.distance_mm = (guide_mm - report.pose_bone_device.position_mm).norm();
 }
 
 double HapticLoop::slow_n(const LoopInput& input) const noexcept {

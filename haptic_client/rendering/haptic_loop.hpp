@@ -87,37 +87,66 @@ enum LoopEvent : std::uint32_t {
 // Number of bits up to the last one.
 inline constexpr std::size_t kLoopEvents = std::bit_width(std::uint32_t{kOnMetal});
 
+// What one tick came to, grouped by the stage that computes it. The stages are in their order.
+// Device forces are scaled, in the device's frame. All else is physical, in the bone's frame.
 struct LoopReport {
-  Vec3 force_device_n = Vec3::Zero();     // to write to the device, device frame
-  Vec3 force_physical_n = Vec3::Zero();   // of the bone on the tool, bone frame; not scaled, within the device's limit
-  Vec3 cutting_force_n = Vec3::Zero();    // of the tool on the bone, the law's part, bone frame
-  double cutting_work_mj = 0;             // work of that force over the path cut in this tick, physical
-  double pushed_back_mj = 0;              // work of a cut's force that rotation undid in the same tick; not shown
-  Vec3 coupling_device_n = Vec3::Zero();  // the coupling's part of force_device_n: passive
-  Vec3 motor_device_n = Vec3::Zero();     // the motor's part: active, within s · mu · normal force
-  Vec3 guide_device_n = Vec3::Zero();     // the guidance spring's part: paid for by the guiding handle's motion
-  Vec3 partner_device_n = Vec3::Zero();   // the rest: others' tools that touch this one
-  Vec3 torque_physical_nmm = Vec3::Zero();  // of the bone on the tool about its tip, bone frame; not scaled
-  // To write to a device that shows torque, device frame: the sum of the two below.
-  Vec3 torque_device_nmm = Vec3::Zero();
-  Vec3 coupling_device_nmm = Vec3::Zero();  // of the rotation's spring: passive, in the ledger
-  // Moment of the cut: active, within the coupling's force at the arm of a rotation.
-  Vec3 motor_device_nmm = Vec3::Zero();
-  Vec3 moved_mm = Vec3::Zero();  // of the proxy in this tick
+  std::uint64_t state_seq = 0;  // counts ticks
+  int tool = 0;
+  std::uint32_t events = 0;  // bits of LoopEvent
   Pose pose_bone_proxy, pose_bone_device;
   Pose pose_rest_bone;  // the bone on its mount, relative to its rest pose
-  // Of the handle's position, bone frame: slack, and the extension that returned bone would have caused.
-  Vec3 offset_mm = Vec3::Zero();
-  EnergyReport energy;           // of the coupling, at the handle
-  double guide_distance_mm = 0;  // while led: from this handle's position to the guiding handle's, bone frame
-  double guide_play_mm = 0;      // while in a guide: permitted distance of the tip from the opening's middle
-  double spindle_rpm = 0, feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
-  double across_n = 0;        // of the law, across the feed; the hand feels it through the motor port
-  unsigned out_of_range = 0;  // bits of OutOfRange: where the law is used outside its range
-  CuttingPhase phase = CuttingPhase::idle;
-  int tool = 0;
-  std::uint64_t state_seq = 0;  // counts ticks
-  std::uint32_t events = 0;
+  double spindle_rpm = 0;
+
+  // Where bone and guides let the tool go.
+  struct Contact {
+    Vec3 moved_mm = Vec3::Zero();  // of the proxy in this tick
+    double guide_play_mm = 0;      // while in a guide: permitted distance of the tip from the opening's middle
+  } contact;
+
+  // What the tool does to the bone, by its force law.
+  struct Cutting {
+    CuttingPhase phase = CuttingPhase::idle;
+    Vec3 force_n = Vec3::Zero();  // of the tool on the bone
+    double work_mj = 0;           // of that force over the path cut in this tick
+    double pushed_back_mj = 0;    // work of a cut's force that rotation undid in the same tick; not shown
+    double feed_mm_per_s = 0, density_g_cm3 = 0, engaged = 0, torque_nmm = 0;
+    double across_n = 0;        // across the feed; the hand feels it through the motor port
+    unsigned out_of_range = 0;  // bits of OutOfRange: where the law is used outside its range
+  } cutting;
+
+  // The spring between handle and proxy: passive, in the energy ledger.
+  struct Coupling {
+    Vec3 force_n = Vec3::Zero();     // of the bone on the tool, within the device's limit
+    Vec3 torque_nmm = Vec3::Zero();  // of the bone on the tool about its tip
+    // Of the handle's position: slack, and the extension that returned bone would have caused.
+    Vec3 offset_mm = Vec3::Zero();
+    Vec3 device_n = Vec3::Zero();    // its part of device.force_n
+    Vec3 device_nmm = Vec3::Zero();  // its part of device.torque_nmm, of the rotation's spring
+    EnergyReport energy;             // at the handle
+  } coupling;
+
+  // What the motor adds: active, outside the energy ledger.
+  struct Motor {
+    Vec3 device_n = Vec3::Zero();    // within s · mu · normal force
+    Vec3 device_nmm = Vec3::Zero();  // moment of the cut, within the coupling's force at the arm of a rotation
+  } motor;
+
+  // Others' tools that touch this one.
+  struct Partners {
+    Vec3 device_n = Vec3::Zero();
+  } partners;
+
+  // The guidance spring, while another's handle leads this one.
+  struct Guidance {
+    Vec3 device_n = Vec3::Zero();  // paid for by the guiding handle's motion
+    double distance_mm = 0;        // from this handle's position to the guiding handle's, bone frame
+  } guidance;
+
+  // To write to the device: the sum of the parts above.
+  struct Device {
+    Vec3 force_n = Vec3::Zero();
+    Vec3 torque_nmm = Vec3::Zero();  // for a device that shows torque
+  } device;
 };
 
 class HapticLoop {

@@ -158,11 +158,11 @@ SessionTick FreeHandSession::tick(const Patch& patch, RoomLink room, int periods
   result.reading = reading;
   result.commanded_rpm = result.order.spindle_rpm = input.spindle_rpm;
   result.report = loop_.tick(input, patch, guides);
-  device_.write({result.report.force_device_n, result.report.torque_device_nmm});
+  device_.write({result.report.device.force_n, result.report.device.torque_nmm});
   results_[0].duration_s += loop_.params().dt_s;
   results_[0].completed = taken_up_;
   if (result.report.events & kOnMetal) results_[0].on_metal_s += loop_.params().dt_s;
-  results_[0].peak_force_n = std::max(results_[0].peak_force_n, result.report.force_physical_n.norm());
+  results_[0].peak_force_n = std::max(results_[0].peak_force_n, result.report.coupling.force_n.norm());
   return result;
 }
 

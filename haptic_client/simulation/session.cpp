@@ -66,7 +66,7 @@ SessionTick SimulatedSession::tick(const Patch& patch, RoomLink room, int period
   result.reading = reading;
   result.commanded_rpm = input.spindle_rpm;
   result.report = last_ = loop_.tick(input, patch, guides);
-  const DeviceOutput output{result.report.force_device_n, result.report.torque_device_nmm};
+  const DeviceOutput output{result.report.device.force_n, result.report.device.torque_nmm};
   if (played_)
     played_->write(output);
   else

@@ -371,24 +371,25 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
   StepResult& result = results_[step_];
   result.duration_s += dt_s;
   if (report.events & kOnMetal) result.on_metal_s += dt_s;
-  const double force_n = std::max(0.0, -report.force_physical_n.dot(step.site.axis));
+  const double force_n = std::max(0.0, -report.coupling.force_n.dot(step.site.axis));
   const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
-  result.peak_force_n = std::max(result.peak_force_n, report.force_physical_n.norm());
+  result.peak_force_n = std::max(result.peak_force_n, report.coupling.force_n.norm());
   result.deepest_mm = std::max(result.deepest_mm, depth);
 
-  if (report.phase == CuttingPhase::cutting) {
-    result.all.add(report.force_physical_n.norm(), report.feed_mm_per_s, report.density_g_cm3);
-    if (step.feeds() && report.engaged > 0.97 && (phase_ == SurgeonPhase::push || phase_ == SurgeonPhase::feed)) {
-      LayerMeans& layer = report.density_g_cm3 < kCorticalDensity ? result.medulla
-                          : depth < 0.5 * step.site.thickness_mm  ? result.near_cortex
-                                                                  : result.far_cortex;
-      layer.add(force_n, report.feed_mm_per_s, report.density_g_cm3);
+  if (report.cutting.phase == CuttingPhase::cutting) {
+    result.all.add(report.coupling.force_n.norm(), report.cutting.feed_mm_per_s, report.cutting.density_g_cm3);
+    if (step.feeds() && report.cutting.engaged > 0.97 &&
+        (phase_ == SurgeonPhase::push || phase_ == SurgeonPhase::feed)) {
+      LayerMeans& layer = report.cutting.density_g_cm3 < kCorticalDensity ? result.medulla
+                          : depth < 0.5 * step.site.thickness_mm          ? result.near_cortex
+                                                                          : result.far_cortex;
+      layer.add(force_n, report.cutting.feed_mm_per_s, report.cutting.density_g_cm3);
     }
   }
   if (!step.feeds()) return;
   // The cone has left the far surface where it was last engaged. From there on the tip only plunges.
   if (depth <= step.site.thickness_mm || phase_ == SurgeonPhase::retract) return;
-  if (report.engaged > 0.0) {
+  if (report.cutting.engaged > 0.0) {
     last_engaged_mm_ = depth;
   } else if (last_engaged_mm_ >= 0.0) {
     result.broke_through = true;
@@ -398,7 +399,7 @@ void Surgeon::observe(const ReadyStep& step, const LoopReport& report, double dt
 }
 
 void Surgeon::drill(const ReadyStep& step, const LoopReport& report, double dt_s) noexcept {
-  const double force_n = -report.force_physical_n.dot(step.site.axis);
+  const double force_n = -report.coupling.force_n.dot(step.site.axis);
   const double depth = depth_mm(step, report.pose_bone_proxy.position_mm);
   const bool rig = step.plan.hand == HandKind::rig;
   const double to_mm = step.plan.to_mm;

@@ -75,9 +75,9 @@ Hole drill(const PlanStep& step, double dt_s = 1e-3, double pitch_mm = 0.5, bool
   const int every = std::max(1, ticks(0.005));
   bench.run([&](const SessionTick& tick) {
     time_s += dt_s;
-    const double tip = tick.report.pose_bone_proxy.position_mm.z(), force_n = -tick.report.force_physical_n.z();
+    const double tip = tick.report.pose_bone_proxy.position_mm.z(), force_n = -tick.report.coupling.force_n.z();
     const bool in = tick.order.phase == SurgeonPhase::push || tick.order.phase == SurgeonPhase::feed;
-    if (in && tip < 2.0) ramp.see(tip, tick.report.engaged);
+    if (in && tip < 2.0) ramp.see(tip, tick.report.cutting.engaged);
     if (tip > 30.0 + kCone_mm + 0.3) hole.after_exit_n = std::max(hole.after_exit_n, std::abs(force_n));
     if (in && tip > deepest_mm)
       for (int i = 0; i < 3; ++i)
@@ -87,7 +87,7 @@ Hole drill(const PlanStep& step, double dt_s = 1e-3, double pitch_mm = 0.5, bool
     hole.curve["time_s"].push_back(rounded(time_s));
     hole.curve["depth_mm"].push_back(rounded(tip));
     hole.curve["force_n"].push_back(rounded(force_n));
-    hole.curve["engaged"].push_back(rounded(tick.report.engaged));
+    hole.curve["engaged"].push_back(rounded(tick.report.cutting.engaged));
   });
   for (int i = 0; i < 3; ++i) {
     hole.force_n[i] /= std::max(1, count[i]);
@@ -189,7 +189,7 @@ json profile(const PlanStep& step) {
     const auto turned = [&](const Vec3& v) {
       return Vec3(v.dot(site.across_u), v.dot(site.across_v), v.dot(site.axis));
     };
-    const Vec3 f = turned(tick.report.force_physical_n),
+    const Vec3 f = turned(tick.report.coupling.force_n),
                tip = turned(tick.report.pose_bone_proxy.position_mm - site.entry_mm);
     out["time_s"].push_back(rounded(time_s));
     out["x_n"].push_back(rounded(f.x()));
@@ -198,7 +198,7 @@ json profile(const PlanStep& step) {
     out["total_n"].push_back(rounded(f.norm()));
     out["tip_x_mm"].push_back(rounded(tip.x()));
     out["tip_z_mm"].push_back(rounded(tip.z()));
-    out["density_g_cm3"].push_back(rounded(tick.report.density_g_cm3));
+    out["density_g_cm3"].push_back(rounded(tick.report.cutting.density_g_cm3));
   });
   out["removed_mm3"] = rounded(bench.replica().removed_mm3());
   out["completed"] = bench.session().done() && bench.session().surgeon().results()[0].completed;

@@ -48,7 +48,7 @@ void measure(const char* name, const PlanStep& step, double width_mm, int rounds
       const SessionTick tick = bench.tick();
       const auto took = Clock::now() - start;
       cost->all.record(took);
-      if (tick.report.phase == CuttingPhase::cutting) cost->cutting.record(took);
+      if (tick.report.cutting.phase == CuttingPhase::cutting) cost->cutting.record(took);
       bench.follow();
     }
   }
@@ -156,7 +156,7 @@ class Blackout {
         patches_.refresh();
         const bool follows = follows_.load(std::memory_order_relaxed);
         const SessionTick tick = session_.tick(patches_.value(), follows ? RoomLink::follows : RoomLink::held, periods);
-        cutting_[part] += tick.report.phase == CuttingPhase::cutting;
+        cutting_[part] += tick.report.cutting.phase == CuttingPhase::cutting;
         held_[part] += !follows;
         places_.store({tick.report.pose_bone_proxy, tick.report.tool});
         timer.done(stats_[part]);

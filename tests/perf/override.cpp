@@ -129,10 +129,10 @@ json run_line(const Line& line, int times) {
           {"stopped", after_answer.size()},
           {"after_answer", spread(after_answer)},
           {"after_asking", spread(after_asking)},
-          {"cuts", done.cuts.size()},
-          {"cuts_stopped", done.cuts_stopped},
-          {"force_step_n", rounded(done.supervised_step_n)},
-          {"loop_late_p99_ms", rounded(1e-3 * done.ticks.lateness.percentile_us(99))},
+          {"cuts", done.replica.cuts.size()},
+          {"cuts_stopped", done.replica.cuts_stopped},
+          {"force_step_n", rounded(done.telemetry.supervised_step_n)},
+          {"loop_late_p99_ms", rounded(1e-3 * done.haptic.ticks.lateness.percentile_us(99))},
           {"round_trip_ms", rounded(path.round_trip_ms)},
           {"lost", done.lost ? json(done.lost->message) : json()}};
 }

@@ -140,14 +140,15 @@ json run_tool(const BadNetwork& network, double seconds) {
   // By bins of samples: what was sent, and how many cuts were closed.
   std::vector<Sent> cutting, idle;
   Clock::time_point last_cut{};
-  for (const haptic::RecordedCut& cut : done.cuts)
+  for (const haptic::RecordedCut& cut : done.replica.cuts)
     last_cut = std::max(last_cut, Clock::time_point(std::chrono::nanoseconds(cut.closed_mono_ns)));
   const std::chrono::duration<double> resting(kIdle_s - 1.5);
   const auto idle_from = samples.back().at - std::chrono::duration_cast<Clock::duration>(resting);
-  auto cut = done.cuts.begin();
+  auto cut = done.replica.cuts.begin();
   for (std::size_t i = 1; i < samples.size(); ++i) {
     std::uint64_t closed = 0;
-    for (; cut != done.cuts.end() && cut->closed_mono_ns < samples[i].at.time_since_epoch().count(); ++cut) ++closed;
+    for (; cut != done.replica.cuts.end() && cut->closed_mono_ns < samples[i].at.time_since_epoch().count(); ++cut)
+      ++closed;
     // The fast path's connection ends with the session.
     const Sent &before = samples[i - 1].sent, &after = samples[i].sent;
     if (after.datagrams < before.datagrams || after.stream < before.stream) continue;
@@ -155,16 +156,16 @@ json run_tool(const BadNetwork& network, double seconds) {
     if (closed >= kCutsInBin) cutting.push_back(sent);
     if (samples[i - 1].at >= std::max(idle_from, last_cut + 500ms)) idle.push_back(sent);
   }
-  const double cutting_s = 1e-3 * 7.0 * static_cast<double>(done.cuts.size());
+  const double cutting_s = 1e-3 * 7.0 * static_cast<double>(done.replica.cuts.size());
   json kept;
   for (const auto& [what, bytes] : at_last) kept[what] = {{"at_first", at_first.at(what)}, {"at_last", bytes}};
   kept["log_most"] = log_bytes;
   return {
-      {"cuts", done.cuts.size()},
+      {"cuts", done.replica.cuts.size()},
       {"cutting_s", rounded(cutting_s)},
-      {"rejected", done.rejected},
-      {"interruptions", done.interruptions},
-      {"held_for_room_ticks", done.held_for_room_ticks},
+      {"rejected", done.replica.rejected},
+      {"interruptions", done.replica.interruptions},
+      {"held_for_room_ticks", done.haptic.held_for_room_ticks},
       {"lost", done.lost ? json(done.lost->message) : json()},
       {"fast_path", {{"loss", rounded(done.fast_path.loss)}, {"round_trip_ms", rounded(done.fast_path.round_trip_ms)}}},
       {"cutting", rates(cutting)},

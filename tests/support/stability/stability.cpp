@@ -114,16 +114,18 @@ class Observer {
     const double turned_mj = torque_nmm_.dot(turned_rad);
     result_.turned_mj -= turned_mj;
     const double s = params_.force_scale;
-    const double cut_mj = s / scale_ * report.cutting_work_mj;
+    const double cut_mj = s / scale_ * report.cutting.work_mj;
     episode_mj_ += force_n_.dot(moved_mm) + turned_mj + cut_mj;
     result_.cutting_mj += cut_mj;
-    result_.least_cutting_n_mm = std::min(result_.least_cutting_n_mm, report.cutting_force_n.dot(report.moved_mm));
-    result_.pushed_back_most_mj = std::max(result_.pushed_back_most_mj, report.pushed_back_mj);
-    result_.pushed_back += report.pushed_back_mj > 0.0;
+    result_.least_cutting_n_mm =
+        std::min(result_.least_cutting_n_mm, report.cutting.force_n.dot(report.contact.moved_mm));
+    result_.pushed_back_most_mj = std::max(result_.pushed_back_most_mj, report.cutting.pushed_back_mj);
+    result_.pushed_back += report.cutting.pushed_back_mj > 0.0;
 
-    const Vec3& force_n = report.coupling_device_n;
-    const Vec3& torque_nmm = report.coupling_device_nmm;
-    const bool touching = report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
+    const Vec3& force_n = report.coupling.device_n;
+    const Vec3& torque_nmm = report.coupling.device_nmm;
+    const bool touching =
+        report.cutting.phase == CuttingPhase::rubbing || report.cutting.phase == CuttingPhase::cutting;
     if (!touching && force_n.isZero() && torque_nmm.isZero())
       finish();
     else
@@ -144,7 +146,7 @@ class Observer {
     result_.step_over_n = std::max(result_.step_over_n, step_n - slew_n - by_hand_n);
     constexpr std::uint32_t kLetGo = kBreakthrough | kUncovered | kMissedTicks | kPushedAway;
     if (touching && !(report.events & kLetGo)) {
-      const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.moved_mm.norm();
+      const double explained_n = slew_n + by_hand_n + 2.0 * s * coupling_n_per_mm_ * report.contact.moved_mm.norm();
       result_.fall_n = std::max(result_.fall_n, force_n_.norm() - force_n.norm() - explained_n);
     }
     if (moved_by_mm < 1e-12 && moved_before_mm_ < 1e-12) result_.still_step_n = std::max(result_.still_step_n, step_n);
@@ -152,14 +154,14 @@ class Observer {
     const double turn_step_nmm = grown(torque_nmm, torque_nmm_);
     result_.turn_step_over_n =
         std::max(result_.turn_step_over_n, (turn_step_nmm - at_arm_mm * by_hand_n) / Proxy::kTurnArm_mm - slew_n);
-    const double cut_nmm = report.motor_device_nmm.norm();
+    const double cut_nmm = report.motor.device_nmm.norm();
     result_.cut_step_over_n = std::max(result_.cut_step_over_n, (cut_nmm - cut_nmm_) / Proxy::kTurnArm_mm - slew_n);
     result_.cut_over_nmm = std::max(result_.cut_over_nmm, cut_nmm - at_arm_mm * force_n.norm());
     result_.cut_most_nmm = std::max(result_.cut_most_nmm, cut_nmm);
-    result_.torque_most_nmm = std::max(result_.torque_most_nmm, report.torque_device_nmm.norm());
-    result_.torque_over_nmm = std::max(result_.torque_over_nmm, report.torque_device_nmm.norm() - params_.peak_nmm);
+    result_.torque_most_nmm = std::max(result_.torque_most_nmm, report.device.torque_nmm.norm());
+    result_.torque_over_nmm = std::max(result_.torque_over_nmm, report.device.torque_nmm.norm() - params_.peak_nmm);
 
-    const double motor_n = report.motor_device_n.norm();
+    const double motor_n = report.motor.device_n.norm();
     result_.motor_over_n = std::max(result_.motor_over_n, motor_n - MotorPortParams{}.friction * force_n.norm());
     result_.motor_most_n = std::max(result_.motor_most_n, motor_n);
     off_s_ = pedal ? 0.0 : off_s_ + params_.dt_s;
@@ -167,12 +169,12 @@ class Observer {
       result_.motor_late_n = std::max(result_.motor_late_n, motor_n);
       result_.cut_late_nmm = std::max(result_.cut_late_nmm, cut_nmm);
     }
-    result_.force_most_n = std::max(result_.force_most_n, report.force_device_n.norm());
+    result_.force_most_n = std::max(result_.force_most_n, report.device.force_n.norm());
 
     ++result_.ticks;
     result_.late += (report.events & kMissedTicks) != 0;
     result_.touching += touching;
-    result_.cutting += report.phase == CuttingPhase::cutting;
+    result_.cutting += report.cutting.phase == CuttingPhase::cutting;
     result_.uncovered += (report.events & kUncovered) != 0;
     result_.held_back += (report.events & kEnergyLimited) != 0;
     result_.returned += (report.events & kPushedAway) != 0;
@@ -289,8 +291,8 @@ class Round {
     const AllocationCounter heap;
     const LoopReport report = loop_->tick(input, patch_);
     result_.allocations += heap.count();
-    device_->write(DeviceOutput(report.force_device_n));
-    torque_nmm_ = report.torque_device_nmm;
+    device_->write(DeviceOutput(report.device.force_n));
+    torque_nmm_ = report.device.torque_nmm;
     observer_->see(report, reading.pose_device_tool, pedal);
     const double below_mm = report.pose_bone_proxy.position_mm.z();
     if (run_.scene == StabilityScene::thin_wall &&

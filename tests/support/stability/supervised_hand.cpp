@@ -24,7 +24,7 @@ Case block() {
 }
 
 bool touches(const LoopReport& report) {
-  return report.phase == CuttingPhase::rubbing || report.phase == CuttingPhase::cutting;
+  return report.cutting.phase == CuttingPhase::rubbing || report.cutting.phase == CuttingPhase::cutting;
 }
 
 Vec3 growth(const Vec3& now, const Vec3& before) {
@@ -152,7 +152,7 @@ LoopReport OverseenHand::tick() {
     last_ = loop_->tick(input, patch_);
     crossed_.allocations += heap.count();
   }
-  device_->write(DeviceOutput{last_.force_device_n, last_.torque_device_nmm});
+  device_->write(DeviceOutput{last_.device.force_n, last_.device.torque_nmm});
   see(last_, reading.pose_device_tool.position_mm);
   follow();
   return last_;
@@ -172,28 +172,28 @@ void OverseenHand::see(const LoopReport& report, const Vec3& handle_mm) {
   // falls at once, another force that it held back would rise at once.
   const double k = params.force_scale * loop_->coupling_n_per_mm() * loop_->mapping().scale();
   const double by_hand_n = k * (2.0 * moved_mm.norm() + moved_before_mm_);
-  const Vec3 together_n = report.coupling_device_n + report.guide_device_n + report.partner_device_n;
+  const Vec3 together_n = report.coupling.device_n + report.guidance.device_n + report.partners.device_n;
   const double grown_n =
-      std::max(growth(report.coupling_device_n, coupling_n_).norm(), growth(together_n, together_n_).norm());
+      std::max(growth(report.coupling.device_n, coupling_n_).norm(), growth(together_n, together_n_).norm());
   // Against the intended limit, whatever limit the loop was given.
   constexpr double kSlew_n = 0.5;
   crossed_.step_over_slew = std::max(crossed_.step_over_slew, (grown_n - by_hand_n) / kSlew_n);
-  crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.force_device_n.norm());
+  crossed_.fall_n = std::max(crossed_.fall_n, force_n_.norm() - report.device.force_n.norm());
 
-  const double to_bone_mj = report.cutting_work_mj + (yielding_ ? yielding_->by_hand_mj : 0.0);
+  const double to_bone_mj = report.cutting.work_mj + (yielding_ ? yielding_->by_hand_mj : 0.0);
   episode_mj_ += coupling_n_.dot(moved_mm) + params.force_scale / loop_->mapping().scale() * to_bone_mj;
   const bool touching = touches(report);
   crossed_.touching += touching;
-  crossed_.cutting += report.phase == CuttingPhase::cutting;
-  if (!touching && report.coupling_device_n.isZero()) {
+  crossed_.cutting += report.cutting.phase == CuttingPhase::cutting;
+  if (!touching && report.coupling.device_n.isZero()) {
     crossed_.worst_mj = std::max(crossed_.worst_mj, episode_mj_);
     episode_mj_ = 0.0;
   }
   crossed_.led_mj = std::max(crossed_.led_mj, loop_->guide_energy().worst_mj);
 
-  coupling_n_ = report.coupling_device_n;
+  coupling_n_ = report.coupling.device_n;
   together_n_ = together_n;
-  force_n_ = report.force_device_n;
+  force_n_ = report.device.force_n;
   handle_mm_ = handle_mm;
   moved_before_mm_ = moved_mm.norm();
   seen_ = true;

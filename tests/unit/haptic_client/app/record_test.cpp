@@ -63,14 +63,14 @@ TickRow row(std::uint64_t i) {
   row.report.state_seq = i + 1;
   row.report.pose_bone_proxy = pose(random);
   row.report.pose_bone_device = pose(random);
-  row.report.force_physical_n = vector(random, 30.0);
-  row.report.torque_nmm = random.between(0, 40);
-  row.report.torque_physical_nmm = {1.0 + static_cast<double>(i), 2.0, 3.0};
+  row.report.coupling.force_n = vector(random, 30.0);
+  row.report.cutting.torque_nmm = random.between(0, 40);
+  row.report.coupling.torque_nmm = {1.0 + static_cast<double>(i), 2.0, 3.0};
   row.report.spindle_rpm = random.between(0, 1000);
-  row.report.density_g_cm3 = random.between(0, 2);
-  row.report.feed_mm_per_s = random.between(0, 20);
-  row.report.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::free;
-  row.report.out_of_range = static_cast<unsigned>(i % 64);
+  row.report.cutting.density_g_cm3 = random.between(0, 2);
+  row.report.cutting.feed_mm_per_s = random.between(0, 20);
+  row.report.cutting.phase = i % 2 ? CuttingPhase::cutting : CuttingPhase::free;
+  row.report.cutting.out_of_range = static_cast<unsigned>(i % 64);
   row.report.tool = static_cast<int>(i / 700 % 2);
   row.reading.pose_device_tool = pose(random);
   row.reading.buttons = static_cast<std::uint32_t>(i % 4);
@@ -301,8 +301,8 @@ TEST(Recording, IsLaidOutAsItSays) {
   const TickRow some = row(1234);
   char expected[256];
   std::snprintf(expected, sizeof expected, "%.6f,%.6f,%.6f,%.6f,%.6f", some.report.pose_bone_proxy.position_mm.x(),
-                some.report.pose_bone_proxy.rotation.w(), some.report.force_physical_n.z(), some.rendered.force_n.y(),
-                some.report.density_g_cm3);
+                some.report.pose_bone_proxy.rotation.w(), some.report.coupling.force_n.z(), some.rendered.force_n.y(),
+                some.report.cutting.density_g_cm3);
   const auto read = python(R"(
 import sys, h5py, numpy as np
 f = h5py.File(sys.argv[1], "r")
@@ -371,7 +371,7 @@ TEST(Recording, ADeviceWithoutMotorsShowsNothing) {
     TickRow one = row(0);
     one.rendered = {Vec3(1, 2, 2), Vec3(4, 5, 6)};
     one.force_rendered_n = 3.0;
-    one.report.motor_device_n = {0.5, 0, 0};
+    one.report.motor.device_n = {0.5, 0, 0};
     const auto file = temp / (std::string(device.name) + ".h5"), log = temp / (std::string(device.name) + ".csv");
     Result<RecordFile> recording = RecordFile::create(file, info);
     ASSERT_TRUE(recording);
@@ -445,7 +445,7 @@ struct RangeTicks {
     for (int i = 0; i < ticks; ++i) {
       LoopReport report;
       report.state_seq = ++seq;
-      report.out_of_range = static_cast<unsigned>(what);
+      report.cutting.out_of_range = static_cast<unsigned>(what);
       told += watch.note(model, report);
     }
     return told;

@@ -43,7 +43,7 @@ TickRow row_of(Bench& bench, const SessionTick& tick) {
   row.report = tick.report;
   row.reading = tick.reading;
   row.commanded_rpm = tick.commanded_rpm;
-  row.rendered = {tick.report.force_device_n, tick.report.torque_device_nmm};
+  row.rendered = {tick.report.device.force_n, tick.report.device.torque_nmm};
   row.take_up = tick.order.take_up;
   row.taken_up_at = {tick.order.hand.target_mm, tick.order.rotation};
   row.mapping = bench.session().loop().mapping();
@@ -76,7 +76,7 @@ Session record(const Case& bone, const std::vector<PlanStep>& plan, const Simula
   bench.run([&](const SessionTick& tick) {
     const TickRow row = row_of(bench, tick);
     EXPECT_TRUE(recording->append({&row, 1}));
-    session.forces.push_back(tick.report.force_physical_n);
+    session.forces.push_back(tick.report.coupling.force_n);
     if (mount) bench.session().loop().see_bone(mount(tick.report.state_seq));
   });
   EXPECT_TRUE(bench.session().done());
@@ -94,7 +94,7 @@ Session replay(const Case& bone, const std::vector<PlanStep>& plan, const std::f
   Bench bench(bone, plan, {std::string(recorded.name()), recorded.limits()}, recorded.session().force_scale);
   bench.session().play(recorded);
   Session session;
-  bench.run([&](const SessionTick& tick) { session.forces.push_back(tick.report.force_physical_n); });
+  bench.run([&](const SessionTick& tick) { session.forces.push_back(tick.report.coupling.force_n); });
   EXPECT_TRUE(recorded.over());
   session.field_hash = to_hex(bench.replica().committed().hash());
   session.cuts = bench.cuts();

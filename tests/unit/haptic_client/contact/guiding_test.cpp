@@ -134,17 +134,17 @@ TEST(GuidedDrilling, TheSleevePushesBackSideways) {
   EXPECT_EQ(allocations, 0);
   EXPECT_TRUE(report.events & kGuided);
   EXPECT_NEAR(report.pose_bone_proxy.position_mm.x(), kPlay_mm, 1e-6);
-  EXPECT_NEAR(report.force_physical_n.x(), -50.0 * (0.4 - kPlay_mm), 1e-6);
-  EXPECT_NEAR(report.force_physical_n.z(), 0.0, 1e-9);
+  EXPECT_NEAR(report.coupling.force_n.x(), -50.0 * (0.4 - kPlay_mm), 1e-6);
+  EXPECT_NEAR(report.coupling.force_n.z(), 0.0, 1e-9);
   // Within the play, or without the guide, it feels nothing.
   for (int i = 0; i < 200; ++i) {
     input.pose_device_tool.position_mm.x() = std::max(0.1, 0.4 - 0.002 * i);
     report = loop.tick(input, patch, std::span(&guide, 1));
   }
-  EXPECT_EQ(report.force_physical_n.norm(), 0.0);
+  EXPECT_EQ(report.coupling.force_n.norm(), 0.0);
   input.pose_device_tool.position_mm.x() = 0.4;
   for (int i = 0; i < 5; ++i) report = loop.tick(input, patch);
-  EXPECT_EQ(report.force_physical_n.norm(), 0.0);
+  EXPECT_EQ(report.coupling.force_n.norm(), 0.0);
   EXPECT_FALSE(report.events & kGuided);
 }
 
@@ -170,9 +170,9 @@ class AtASleeve : public ::testing::Test {
       builder_.build(field_, loop_.tool(0), input_.pose_device_tool, patch_);
       const LoopReport now = loop_.tick(input_, patch_, std::span(&guide_, 1));
       // What the hand's own step and the slew limit allow. Nothing may grow faster.
-      const double grown_n = now.force_device_n.norm() - report_.force_device_n.norm();
+      const double grown_n = now.device.force_n.norm() - report_.device.force_n.norm();
       worst_n_ = std::max(worst_n_, grown_n - 2.0 * loop_.coupling_n_per_mm() * step_mm);
-      fastest_mm_ = std::max(fastest_mm_, now.moved_mm.norm() - step_mm);
+      fastest_mm_ = std::max(fastest_mm_, now.contact.moved_mm.norm() - step_mm);
       guided_ |= (now.events & kGuided) != 0;
       report_ = now;
     }
@@ -196,15 +196,15 @@ class AtASleeve : public ::testing::Test {
 TEST_F(AtASleeve, IsNotPulledInThroughItsWall) {
   take_up({-12, 0, -15});
   lead({-6.5, 0, -15}, 20.0);
-  EXPECT_EQ(report_.force_physical_n.norm(), 0.0);
+  EXPECT_EQ(report_.coupling.force_n.norm(), 0.0);
   lead({0, 0, -15}, 20.0);
   EXPECT_NEAR(tip_mm().x(), -4.0 - 1.6, 0.3);  // radius of the sleeve and of the drill
-  EXPECT_NEAR(report_.force_physical_n.x(), 50.0 * tip_mm().x(), 1e-6);
+  EXPECT_NEAR(report_.coupling.force_n.x(), 50.0 * tip_mm().x(), 1e-6);
   lead({1, 0, -15}, 20.0);
   EXPECT_LT(tip_mm().x(), -5.0);
   EXPECT_FALSE(guided_);
   lead({-12, 0, -15}, 20.0);
-  EXPECT_EQ(report_.force_physical_n.norm(), 0.0);
+  EXPECT_EQ(report_.coupling.force_n.norm(), 0.0);
   EXPECT_LE(worst_n_, LoopParams{}.slew_n_per_ms + 1e-6);
   EXPECT_LT(fastest_mm_, 0.1);
 }
@@ -215,13 +215,13 @@ TEST_F(AtASleeve, IsEnteredFromItsRimThroughTheMouth) {
   take_up({2.8, 0, -33});
   lead({2.8, 0, -29.6}, 10.0);
   EXPECT_NEAR(tip_mm().z(), -30.0, 0.3);
-  EXPECT_LT(report_.force_physical_n.z(), -10.0);
+  EXPECT_LT(report_.coupling.force_n.z(), -10.0);
   EXPECT_FALSE(guided_);
   lead({0, 0, -29.6}, 5.0);
   EXPECT_TRUE(guided_);
   lead({0, 0, -20}, 20.0);
   EXPECT_NEAR((tip_mm() - Vec3(0, 0, -20)).norm(), 0.0, kPlay_mm);
-  EXPECT_LT(report_.force_physical_n.norm(), 1e-6);
+  EXPECT_LT(report_.coupling.force_n.norm(), 1e-6);
   EXPECT_LE(worst_n_, LoopParams{}.slew_n_per_ms + 1e-6);
 }
 

@@ -59,20 +59,21 @@ TEST(Metal, HoldsADrillAsSteelWould) {
   bench.run([&](const SessionTick& tick) {
     const LoopReport& r = tick.report;
     deepest_mm = std::max(deepest_mm, r.pose_bone_proxy.position_mm.z());
-    densest = std::max(densest, r.density_g_cm3);
+    densest = std::max(densest, r.cutting.density_g_cm3);
     if (!(r.events & kOnMetal)) return;
-    EXPECT_NE(r.phase, CuttingPhase::idle);
+    EXPECT_NE(r.cutting.phase, CuttingPhase::idle);
     // A tick may reach the metal by a last cut. The cuts that were open then are closed in the ticks after it.
-    if (r.phase == CuttingPhase::cutting) return;
+    if (r.cutting.phase == CuttingPhase::cutting) return;
     if (++stands == 100) cuts_then = bench.cuts().size();
     if (stands >= 100) cuts_last = bench.cuts().size();
-    EXPECT_EQ(r.feed_mm_per_s, 0.0);
-    EXPECT_TRUE(r.cutting_force_n.isZero());
-    EXPECT_EQ(r.torque_nmm, 0.0);
-    const double stretch_mm = (r.pose_bone_device.position_mm + r.offset_mm - r.pose_bone_proxy.position_mm).norm();
+    EXPECT_EQ(r.cutting.feed_mm_per_s, 0.0);
+    EXPECT_TRUE(r.cutting.force_n.isZero());
+    EXPECT_EQ(r.cutting.torque_nmm, 0.0);
+    const double stretch_mm =
+        (r.pose_bone_device.position_mm + r.coupling.offset_mm - r.pose_bone_proxy.position_mm).norm();
     const double pull_n = bench.session().loop().coupling_n_per_mm() * stretch_mm;
-    strongest_n = std::max(strongest_n, r.force_physical_n.norm());
-    if (!(r.events & kForceLimited)) off += std::abs(r.force_physical_n.norm() - pull_n) > 0.05 * pull_n;
+    strongest_n = std::max(strongest_n, r.coupling.force_n.norm());
+    if (!(r.events & kForceLimited)) off += std::abs(r.coupling.force_n.norm() - pull_n) > 0.05 * pull_n;
   });
   const StepResult& result = bench.session().results()[0];
   std::printf("  stood %d ms at %.2f mm, up to %.1f N\n", stands, deepest_mm, strongest_n);
@@ -111,7 +112,7 @@ TEST(Metal, BearsThePushOfAHand) {
   bench.run([&](const SessionTick& tick) {
     if (!(tick.report.events & kOnMetal) || tick.order.phase != SurgeonPhase::push) return;
     if (++stands < 2000) return;
-    sum_n += tick.report.force_physical_n.norm();
+    sum_n += tick.report.coupling.force_n.norm();
     ++counted;
   });
   ASSERT_GT(counted, 10000);
@@ -140,7 +141,7 @@ TEST(Metal, DoesNothingBesideIt) {
     double most_n = 0;
     bench.run([&](const SessionTick& tick) {
       events |= tick.report.events;
-      most_n = std::max(most_n, tick.report.force_physical_n.norm());
+      most_n = std::max(most_n, tick.report.coupling.force_n.norm());
     });
     EXPECT_TRUE(bench.session().results()[0].completed);
     EXPECT_EQ(events & kOnMetal, 0u);

@@ -522,9 +522,9 @@ TEST(Skiving, ThePointSlidesDownASlopeUntilItBites) {
     double drifted = 0.0, at_end = 0.0, sunk_mm = 0.0;
     bench.run([&](const SessionTick& tick) {
       const LoopReport& r = tick.report;
-      if (r.phase != CuttingPhase::free && r.phase != CuttingPhase::idle)
+      if (r.cutting.phase != CuttingPhase::free && r.cutting.phase != CuttingPhase::idle)
         sunk_mm = std::max(sunk_mm, r.pose_bone_device.position_mm.z() - r.pose_bone_proxy.position_mm.z());
-      if (tick.report.phase != CuttingPhase::cutting) return;
+      if (tick.report.cutting.phase != CuttingPhase::cutting) return;
       drifted = std::max(drifted, tick.report.pose_bone_proxy.position_mm.x());
       at_end = tick.report.pose_bone_proxy.position_mm.x();
     });

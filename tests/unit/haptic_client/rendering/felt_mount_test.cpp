@@ -103,15 +103,15 @@ struct User {
       last = loop->tick(input, patch);
       allocations += heap.count();
     }
-    device.write({last.force_device_n, last.torque_device_nmm});
+    device.write({last.device.force_n, last.device.torque_nmm});
     // Growth of the force beyond what the handle's own way explains: spring and damping of the coupling.
     const Vec3 handle_mm = input.pose_device_tool.position_mm;
     const double by_hand_n =
         loop->coupling_n_per_mm() * (2.0 * (handle_mm - handle_before_mm).norm() + moved_before_mm);
-    if (ticks > 1) step_n = std::max(step_n, last.force_device_n.norm() - force_n() - by_hand_n);
+    if (ticks > 1) step_n = std::max(step_n, last.device.force_n.norm() - force_n() - by_hand_n);
     moved_before_mm = (handle_mm - handle_before_mm).norm();
     handle_before_mm = handle_mm;
-    shown_n = last.force_device_n.norm();
+    shown_n = last.device.force_n.norm();
     // Work of the hand on the displayed bone, computed from outside: force times way of the contact point.
     const Vec3 tip_mm = last.pose_bone_proxy.position_mm;
     put_in_mj += mounted.load().force_n.dot(mounted.pose_rest_bone().point(tip_mm) - before.point(tip_mm));
@@ -120,7 +120,7 @@ struct User {
       build(last.pose_bone_proxy);
   }
   double force_n() const { return shown_n; }
-  double shown_along_n() const { return -loop->mapping().to_bone(last.coupling_device_n).dot(into); }
+  double shown_along_n() const { return -loop->mapping().to_bone(last.coupling.device_n).dot(into); }
   // Force on the bone, along the hand's push.
   double pressed_n() const { return mounted.load().force_n.dot(into); }
 
@@ -245,7 +245,7 @@ TEST(FeltMount, TurnsForcesWithTheBone) {
     }
     ASSERT_GT(user.force_n(), 2.0);
     // The face's normal in the bone's present pose.
-    const Vec3 shown = user.loop->mapping().to_bone(user.last.coupling_device_n).normalized();
+    const Vec3 shown = user.loop->mapping().to_bone(user.last.coupling.device_n).normalized();
     const Vec3 normal = bone.direction(Vec3::UnitZ());
     EXPECT_GT(shown.dot(normal), angle == 0.0 ? 0.999 : 0.9);
     EXPECT_GT(shown.dot(normal), shown.dot(Vec3::UnitZ()) - 1e-9);
@@ -267,7 +267,7 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
     bone.rotation = Eigen::AngleAxisd(angle, Vec3::UnitX());
     for (int i = 0; i < ticks; ++i) {
       // Work on the bone as it turns, under what pressed on it until then. Work on the hand as it moves.
-      const Vec3 held_n = user.last.coupling_device_n, tip_mm = user.last.pose_bone_proxy.position_mm;
+      const Vec3 held_n = user.last.coupling.device_n, tip_mm = user.last.pose_bone_proxy.position_mm;
       if (i == 0) given_mj -= user.loop->mapping().to_bone(held_n).dot(bone.point(tip_mm) - before.point(tip_mm));
       const Vec3 handle_mm = user.handle_before_mm;
       user.loop->see_bone(bone);
@@ -277,20 +277,21 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
     return bone.point(user.last.pose_bone_proxy.position_mm);
   };
   const Vec3 tip_mm = run(0.0, 3000);
-  ASSERT_GT(user.last.offset_mm.norm(), 10.0);
-  const double before_n = user.force_n(), before_mj = user.last.energy.episode_mj;
+  ASSERT_GT(user.last.coupling.offset_mm.norm(), 10.0);
+  const double before_n = user.force_n(), before_mj = user.last.coupling.energy.episode_mj;
   given_mj = 0.0;
   for (int i = 1; i <= 100; ++i) {
     const double angle = 1e-3 * i;
     const Vec3 moved_mm = run(angle, 20) - tip_mm;
     // It slides a little on a tilting face, and the hand yields. Otherwise the slack would carry it by its whole
     // length.
-    if (angle > 0.01) ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.offset_mm.norm()) << angle;
+    if (angle > 0.01) ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.coupling.offset_mm.norm()) << angle;
   }
   EXPECT_GT(user.force_n(), 0.9 * before_n);
   EXPECT_GT(std::abs(given_mj), 1.0);
-  std::printf("  given %.4f mJ outside, %.4f mJ by the ledger\n", given_mj, user.last.energy.episode_mj - before_mj);
-  EXPECT_NEAR(user.last.energy.episode_mj - before_mj, given_mj, 0.02 * std::abs(given_mj));
+  std::printf("  given %.4f mJ outside, %.4f mJ by the ledger\n", given_mj,
+              user.last.coupling.energy.episode_mj - before_mj);
+  EXPECT_NEAR(user.last.coupling.energy.episode_mj - before_mj, given_mj, 0.02 * std::abs(given_mj));
 }
 
 // A bone comes at the hand as fast as a bone is ever shown, 60 mm/s. A force that would rise by 3 N every millisecond

@@ -272,12 +272,12 @@ TEST_P(LedAtTheBone, PullAndContactTogetherStayWithinTheLimits) {
     hand.guide = line.tick(Vec3(-5.0 + 3.0 * std::cos(2e-3 * i), 3.0, 2.5));
     const LoopReport now = hand.tick();
     led += (now.events & kHandGuided) != 0;
-    ASSERT_LE(now.force_device_n.norm(), hand.loop().params().peak_n + 1e-9);
+    ASSERT_LE(now.device.force_n.norm(), hand.loop().params().peak_n + 1e-9);
     if (i > 7200 + delay_ms && i < 11'000) {
-      ASSERT_LE(now.force_device_n.norm(), 10.0 * s + 1e-9) << i;
+      ASSERT_LE(now.device.force_n.norm(), 10.0 * s + 1e-9) << i;
     }
     if (i > 11'600 + delay_ms) {
-      ASSERT_EQ(now.guide_device_n.norm(), 0.0) << i;
+      ASSERT_EQ(now.guidance.device_n.norm(), 0.0) << i;
     }
   }
   const osteon::test::Crossed& crossed = hand.crossed();
@@ -310,17 +310,18 @@ TEST(LimitOfForce, LetsNeitherContactNorPullGoAtOnce) {
   hand.command.target_mm = Vec3(0, 0, 1.0);
   hand.guide = {true, 1, Vec3(0, 0, 6.0)};
   run(4000);
-  const Vec3 contact_n = now.coupling_device_n, pull_n = now.guide_device_n;
+  const Vec3 contact_n = now.coupling.device_n, pull_n = now.guidance.device_n;
   ASSERT_GT(pull_n.norm(), 5.0);
   ASSERT_GT(contact_n.norm(), pull_n.norm());
   ASSERT_LT(contact_n.dot(pull_n), 0.0);
   led.force_limit = 400;
   hand.decide(led);
   run(1);
-  EXPECT_GT(now.guide_device_n.norm(), pull_n.norm() - 2.0 * kSlew_n);
-  EXPECT_GT(now.coupling_device_n.norm(), contact_n.norm() - 2.0 * kSlew_n);
+  EXPECT_GT(now.guidance.device_n.norm(), pull_n.norm() - 2.0 * kSlew_n);
+  EXPECT_GT(now.coupling.device_n.norm(), contact_n.norm() - 2.0 * kSlew_n);
   run(2000);
-  EXPECT_LE((now.coupling_device_n.norm() + now.guide_device_n.norm()) / hand.loop().params().force_scale, 4.0 + 1e-9);
+  EXPECT_LE((now.coupling.device_n.norm() + now.guidance.device_n.norm()) / hand.loop().params().force_scale,
+            4.0 + 1e-9);
   EXPECT_LE(hand.crossed().step_over_slew, 1.0 + 1e-6);
   EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
 }
@@ -345,9 +346,9 @@ TEST(PartnersTool, PushesTheHandUnlessItLeadsIt) {
       if (i == 6000) hand.decide(led);
       if (i == 7500) hand.decide({.taken_by = AuthorId{77}});  // a console of the person whose hand is 2
       const LoopReport now = hand.tick();
-      most_n = std::max(most_n, now.partner_device_n.norm());
+      most_n = std::max(most_n, now.partners.device_n.norm());
       if (i > 6001) {
-        ASSERT_EQ(now.partner_device_n.norm(), 0.0) << i;
+        ASSERT_EQ(now.partners.device_n.norm(), 0.0) << i;
       }
     }
     std::printf("  %s: %.2f N of the partner's tool, step over slew %.3f\n", weak ? "weak" : "strong", most_n,

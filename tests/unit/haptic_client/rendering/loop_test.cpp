@@ -45,7 +45,7 @@ class LoopOnBlock : public ::testing::Test {
     loop_->take_up(0, {{0, 0, -1}, Eigen::Quaterniond::Identity()}, WorkspaceMapping{});
     for (int i = 0; i < 300; ++i) tick();
     move_to({0, 0, 0.3});
-    return tick().force_device_n.norm();
+    return tick().device.force_n.norm();
   }
 
   Case bone_ = block_case();
@@ -58,9 +58,9 @@ class LoopOnBlock : public ::testing::Test {
 
 TEST_F(LoopOnBlock, FreeAirHasNoForce) {
   const LoopReport report = move_to({0, 0, -0.2});
-  EXPECT_EQ(report.force_device_n.norm(), 0.0);
+  EXPECT_EQ(report.device.force_n.norm(), 0.0);
   EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), -0.2, 1e-9);
-  EXPECT_EQ(report.phase, CuttingPhase::idle);
+  EXPECT_EQ(report.cutting.phase, CuttingPhase::idle);
 }
 
 // A tool was held far from bone while its hand went on, as by a stopped room. At the hand's target nothing is known of
@@ -74,7 +74,7 @@ TEST_F(LoopOnBlock, AToolFarBehindItsHandInTheAirComesUp) {
     for (int i = 0; i < 400; ++i) {
       if (i % 10 == 0) builder_.build(field_, loop_->tool(0), {at_mm, Eigen::Quaterniond::Identity()}, patch_);
       const LoopReport report = tick();
-      EXPECT_EQ(report.force_device_n.norm(), 0.0);
+      EXPECT_EQ(report.device.force_n.norm(), 0.0);
       at_mm = report.pose_bone_proxy.position_mm;
     }
     EXPECT_LT((at_mm - hand_mm).norm(), 1e-6) << height_mm;
@@ -87,19 +87,19 @@ TEST_F(LoopOnBlock, ASpringWallWhereNothingTurns) {
   for (int i = 0; i < 20; ++i) report = tick();
   EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), 0.0, 0.125);  // a pitch of the tool's cuts
   const double extension = 0.3 - report.pose_bone_proxy.position_mm.z();
-  EXPECT_NEAR(-report.force_physical_n.z(), 50.0 * extension, 1e-3);
-  EXPECT_NEAR(report.force_device_n.z(), report.force_physical_n.z(), 1e-3);  // s = 1, nothing moves
-  EXPECT_EQ(report.phase, CuttingPhase::rubbing);
+  EXPECT_NEAR(-report.coupling.force_n.z(), 50.0 * extension, 1e-3);
+  EXPECT_NEAR(report.device.force_n.z(), report.coupling.force_n.z(), 1e-3);  // s = 1, nothing moves
+  EXPECT_EQ(report.cutting.phase, CuttingPhase::rubbing);
   EXPECT_EQ(loop_->cuts_closed(), 0u);
 }
 
 TEST_F(LoopOnBlock, ForceIsClampedToTheDevice) {
   LoopReport report = move_to({0, 0, 5.0}, 400);
-  EXPECT_NEAR(report.force_device_n.norm(), 60.0, 1e-9);
+  EXPECT_NEAR(report.device.force_n.norm(), 60.0, 1e-9);
   EXPECT_TRUE(report.events & kForceLimited);
   input_.device_warm = true;
   report = tick();
-  EXPECT_NEAR(report.force_device_n.norm(), 30.0, 1e-9);
+  EXPECT_NEAR(report.device.force_n.norm(), 30.0, 1e-9);
 }
 
 TEST_F(LoopOnBlock, TheClutchIsForcelessAndMovesNothing) {
@@ -109,7 +109,7 @@ TEST_F(LoopOnBlock, TheClutchIsForcelessAndMovesNothing) {
   for (int i = 0; i < 50; ++i) {
     input_.pose_device_tool.position_mm += Vec3(0.5, -0.3, 0.4);
     const LoopReport report = tick();
-    EXPECT_EQ(report.force_device_n.norm(), 0.0);
+    EXPECT_EQ(report.device.force_n.norm(), 0.0);
     EXPECT_EQ(report.pose_bone_proxy.position_mm, held);
   }
   // When the clutch is released elsewhere in the workspace, motion goes on from where the tool is, without a jump in
@@ -117,7 +117,7 @@ TEST_F(LoopOnBlock, TheClutchIsForcelessAndMovesNothing) {
   input_.clutch = false;
   const LoopReport report = tick();
   EXPECT_NEAR((report.pose_bone_proxy.position_mm - held).norm(), 0.0, 1e-6);
-  EXPECT_NEAR(report.force_device_n.norm(), 0.0, 1e-4);
+  EXPECT_NEAR(report.device.force_n.norm(), 0.0, 1e-4);
 }
 
 TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
@@ -126,12 +126,12 @@ TEST_F(LoopOnBlock, SafetyZerosComeAtOnce) {
     input_ = {};
     input_.pose_device_tool.position_mm = {0, 0, -1};
     move_to({0, 0, 0.3});
-    ASSERT_GT(tick().force_device_n.norm(), 8.0);
+    ASSERT_GT(tick().device.force_n.norm(), 8.0);
     if (fault == 0) input_.device_ok = false;
     if (fault == 1) input_.periods = 4;
     Patch nothing;
     const LoopReport report = fault == 2 ? loop_->tick(input_, nothing) : tick();
-    EXPECT_EQ(report.force_device_n.norm(), 0.0) << fault;
+    EXPECT_EQ(report.device.force_n.norm(), 0.0) << fault;
   }
 }
 
@@ -144,38 +144,38 @@ TEST_F(LoopOnBlock, ADeviceThatComesBackIsTakenUpWithoutForce) {
   input_.pose_device_tool.position_mm.z() = 20.0;  // pushed while nothing held it
   input_.device_ok = true;
   LoopReport report = tick();
-  EXPECT_EQ(report.force_device_n.norm(), 0.0);
+  EXPECT_EQ(report.device.force_n.norm(), 0.0);
   EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), held_mm, 1e-6);
   EXPECT_TRUE(report.events & kRamping);
   for (int i = 1; i <= 300; ++i) {
     input_.pose_device_tool.position_mm.z() = 20.0 + 1e-3 * i;
     report = tick();
     // Spring and damping, of 2 ms, of what was pressed since, times the ramp's share.
-    EXPECT_LE(report.force_device_n.norm(), 50.0 * (1e-3 * i + 2e-3) * std::min(1.0, (i + 1) / 200.0) + 1e-9) << i;
+    EXPECT_LE(report.device.force_n.norm(), 50.0 * (1e-3 * i + 2e-3) * std::min(1.0, (i + 1) / 200.0) + 1e-9) << i;
   }
   EXPECT_FALSE(report.events & kRamping);
   // While less force was shown, the hand's advance was not paid for. That stretch was let go.
-  const double ramped_n = report.force_device_n.norm();
+  const double ramped_n = report.device.force_n.norm();
   EXPECT_GT(ramped_n, 5.0);
   EXPECT_LT(ramped_n, 50.0 * 0.301);
   for (int i = 1; i <= 100; ++i) {
     input_.pose_device_tool.position_mm.z() = 20.3 + 1e-3 * i;
     report = tick();
   }
-  EXPECT_NEAR(report.force_device_n.norm(), ramped_n + 50.0 * 0.1, 0.1);  // from then on the whole spring
+  EXPECT_NEAR(report.device.force_n.norm(), ramped_n + 50.0 * 0.1, 0.1);  // from then on the whole spring
 }
 
 // A force that the hand did not cause may only grow by 0.5 N a millisecond.
 TEST_F(LoopOnBlock, ForceReturnsGradually) {
   move_to({0, 0, 0.5});
-  const double full = tick().force_device_n.norm();
+  const double full = tick().device.force_n.norm();
   ASSERT_GT(full, 15.0);
   input_.periods = 4;
-  ASSERT_EQ(tick().force_device_n.norm(), 0.0);
+  ASSERT_EQ(tick().device.force_n.norm(), 0.0);
   input_.periods = 1;
   double before = 0.0;
   for (int i = 0; i < 100; ++i) {
-    const double now = tick().force_device_n.norm();
+    const double now = tick().device.force_n.norm();
     EXPECT_LE(now, before + 0.5 + 1e-9);
     before = now;
   }
@@ -192,10 +192,10 @@ TEST_F(LoopOnBlock, WhileTheRoomIsSilentTheSpindleRunsDownAndBoneStaysHard) {
   for (int i = 0; i < 2000; ++i) {
     const LoopReport report = tick();
     ASSERT_EQ(report.spindle_rpm, 0.0);
-    ASSERT_NE(report.phase, CuttingPhase::cutting);
+    ASSERT_NE(report.cutting.phase, CuttingPhase::cutting);
     ASSERT_TRUE(report.events & kRoomHeld);
     // The spring of the hand's depth in the bone. Its contact point is slightly before it.
-    ASSERT_NEAR(report.force_device_n.norm(), 50.0 * 0.3, 50.0 * 0.1) << i;
+    ASSERT_NEAR(report.device.force_n.norm(), 50.0 * 0.3, 50.0 * 0.1) << i;
   }
 }
 
@@ -206,13 +206,13 @@ TEST_F(LoopOnBlock, AtTheEndTheHandIsLetGoOverTheRamp) {
   input_.room = RoomLink::over;
   for (int i = 1; i <= 200; ++i) {
     const LoopReport report = tick();
-    EXPECT_LE(report.force_device_n.norm(), full_n * (1.0 - i / 200.0) + 1e-9) << i;
+    EXPECT_LE(report.device.force_n.norm(), full_n * (1.0 - i / 200.0) + 1e-9) << i;
     EXPECT_TRUE(report.events & kRamping);
     if (i == 100) {
-      EXPECT_GT(report.force_device_n.norm(), 0.2 * full_n);
+      EXPECT_GT(report.device.force_n.norm(), 0.2 * full_n);
     }
   }
-  EXPECT_EQ(tick().force_device_n.norm(), 0.0);
+  EXPECT_EQ(tick().device.force_n.norm(), 0.0);
 }
 
 // k of the device is never exceeded, however far the tool moves for each millimetre of the handle.
@@ -225,7 +225,7 @@ TEST_F(LoopOnBlock, TheDeviceFeelsNoMoreThanItsStiffness) {
     const auto force_at = [&](double bone_mm) {
       move_to({0, 0, -1.0 + (bone_mm + 1.0) / scale});
       tick();
-      return tick().force_device_n.norm();
+      return tick().device.force_n.norm();
     };
     const double low_n = force_at(0.3), shown = (force_at(0.5) - low_n) / (0.2 / scale);
     EXPECT_NEAR(shown, std::min(50.0 * scale, 60.0), 0.02 * 60.0) << scale;

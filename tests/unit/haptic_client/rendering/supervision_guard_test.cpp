@@ -121,7 +121,7 @@ class Pressed {
         ++down_;
       }
       const LoopReport now = hand.tick();
-      force_n = now.force_device_n.norm();
+      force_n = now.device.force_n.norm();
     }
     return hand.crossed().cutting > before;
   }
@@ -133,7 +133,7 @@ class Pressed {
       hand.command.target_mm = Vec3(from_mm.x(), from_mm.y(), std::max(-8.0, from_mm.z() - 0.02 * i));
       hand.tick();
     }
-    EXPECT_EQ(hand.last().force_device_n.norm(), 0.0);
+    EXPECT_EQ(hand.last().device.force_n.norm(), 0.0);
     down_ = 0;
   }
   OverseenHand hand;
@@ -220,7 +220,7 @@ TEST_P(Overseen, FeelsAndCutsWithNoMoreThanItsLimit) {
   double free_n = 0.0;
   for (int i = 0; i < 500; ++i) {
     pressed.work(1);
-    free_n = std::max(free_n, hand.last().force_physical_n.norm());
+    free_n = std::max(free_n, hand.last().coupling.force_n.norm());
   }
   ASSERT_GT(free_n, 0.4);
   Restrictions limited;
@@ -232,16 +232,16 @@ TEST_P(Overseen, FeelsAndCutsWithNoMoreThanItsLimit) {
   double shown_n = 0.0;
   for (int i = 0; i < 1000; ++i) {
     pressed.work(1);
-    ASSERT_LE(hand.last().force_device_n.norm(), s * limit_n + 1e-9);
-    ASSERT_LE(hand.last().cutting_force_n.norm(), limit_n + 1e-9);
-    shown_n = std::max(shown_n, hand.last().force_device_n.norm());
+    ASSERT_LE(hand.last().device.force_n.norm(), s * limit_n + 1e-9);
+    ASSERT_LE(hand.last().cutting.force_n.norm(), limit_n + 1e-9);
+    shown_n = std::max(shown_n, hand.last().device.force_n.norm());
   }
   EXPECT_GT(shown_n, 0.9 * s * limit_n);
   hand.decide({});
   double again_n = 0.0;
   for (int i = 0; i < 3000; ++i) {
     pressed.work(1);
-    again_n = std::max(again_n, hand.last().force_physical_n.norm());
+    again_n = std::max(again_n, hand.last().coupling.force_n.norm());
   }
   EXPECT_GT(again_n, 1.2 * limit_n);
   check("limited", hand.crossed());
@@ -346,7 +346,7 @@ TEST(Zone, NothingIsCutBeyondItsEdge) {
     const double out_mm = now.pose_bone_proxy.position_mm.norm();
     if (i > 1000 && out_mm > 8.0) least_rpm = std::min(least_rpm, now.spindle_rpm);
     if (out_mm < 2.5) most_rpm = std::max(most_rpm, now.spindle_rpm);
-    if (now.phase == CuttingPhase::cutting) {
+    if (now.cutting.phase == CuttingPhase::cutting) {
       EXPECT_LT(out_mm, 4.0);
     }
   }
@@ -372,7 +372,7 @@ TEST(Zone, AToolThatIsNotAllowedNeverTurns) {
   }
   EXPECT_EQ(hand.crossed().cutting, 0);
   EXPECT_TRUE(hand.cuts().empty());
-  EXPECT_GT(hand.last().force_physical_n.norm(), 1.0);
+  EXPECT_GT(hand.last().coupling.force_n.norm(), 1.0);
 }
 
 }  // namespace

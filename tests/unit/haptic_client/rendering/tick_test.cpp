@@ -44,7 +44,7 @@ TEST(Ticks, AStallIsOverWhenItIsOver) {
   while (!bench.session().done() && ticks < 60'000) {
     const bool stalled = ticks > 2000 && ticks % 500 < 8;
     stalls += stalled && ticks % 500 == 0;
-    EXPECT_TRUE(!stalled || bench.tick(4).report.force_device_n.isZero());
+    EXPECT_TRUE(!stalled || bench.tick(4).report.device.force_n.isZero());
     if (!stalled) bench.tick();
     bench.follow();
     ++ticks;
@@ -77,13 +77,13 @@ TEST(Ticks, ASpindleStallsInBoneAndTurnsAgain) {
     const LoopReport& r = tick.report;
     if (tick.order.phase == SurgeonPhase::push && (r.events & kStalled)) {
       if (stood++ > 100) advanced_mm += std::abs(r.pose_bone_proxy.position_mm.z() - last_mm);
-      pushed_n = std::max(pushed_n, r.force_physical_n.norm());
+      pushed_n = std::max(pushed_n, r.coupling.force_n.norm());
       EXPECT_LT(r.spindle_rpm, 1.0);
     }
     if (tick.order.phase == SurgeonPhase::push) {
       ++pushing;
       least_rpm = std::min(least_rpm, r.spindle_rpm);
-      torque_nmm = std::max(torque_nmm, r.torque_nmm);
+      torque_nmm = std::max(torque_nmm, r.cutting.torque_nmm);
     }
     last_mm = r.pose_bone_proxy.position_mm.z();
     if (tick.order.phase == SurgeonPhase::retract) again_rpm = std::max(again_rpm, r.spindle_rpm);

@@ -28,8 +28,8 @@ TEST_P(AxialTool, MakesItsOwnHoleAndComesOut) {
   bench.run([&](const SessionTick& tick) {
     const double z = tick.report.pose_bone_proxy.position_mm.z();
     deepest = std::max(deepest, z);
-    work_min = std::min(work_min, tick.report.cutting_force_n.dot(tick.report.moved_mm));
-    if (tick.order.phase == SurgeonPhase::lift) out_n = std::max(out_n, tick.report.force_physical_n.norm());
+    work_min = std::min(work_min, tick.report.cutting.force_n.dot(tick.report.contact.moved_mm));
+    if (tick.order.phase == SurgeonPhase::lift) out_n = std::max(out_n, tick.report.coupling.force_n.norm());
   });
   ASSERT_TRUE(bench.session().done());
   EXPECT_TRUE(bench.session().surgeon().results()[0].completed);
@@ -82,7 +82,7 @@ TEST(AxialFeed, IsThatOfTheForceThatTheDeviceShows) {
     if (tick.order.phase != SurgeonPhase::feed || z < 1.0 || z > 2.5) return;
     if (from_mm < 0.0) from_mm = z, from_s = time_s;
     to_mm = z, to_s = time_s;
-    force_n = tick.report.force_physical_n.norm();
+    force_n = tick.report.coupling.force_n.norm();
     rpm = tick.report.spindle_rpm;
   });
   EXPECT_TRUE(bench.session().surgeon().results()[0].completed);

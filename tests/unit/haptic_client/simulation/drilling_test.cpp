@@ -30,9 +30,9 @@ struct Layers {
   void see(const SessionTick& tick) {
     const LoopReport& report = tick.report;
     const double tip = report.pose_bone_proxy.position_mm.z();
-    const double force_n = -report.force_physical_n.z();
-    work_min = std::min(work_min, report.cutting_force_n.dot(report.moved_mm));
-    if (tip < 1.3) torque_max = std::max(torque_max, report.torque_nmm);  // later the flutes fill up
+    const double force_n = -report.coupling.force_n.z();
+    work_min = std::min(work_min, report.cutting.force_n.dot(report.contact.moved_mm));
+    if (tip < 1.3) torque_max = std::max(torque_max, report.cutting.torque_nmm);  // later the flutes fill up
     if (tip > 31.2) force_after = std::max(force_after, std::abs(force_n));
     if (tick.order.phase != SurgeonPhase::push && tick.order.phase != SurgeonPhase::feed) return;
     const double kTip = 0.961, kEdge = 0.3;
@@ -74,7 +74,7 @@ TEST(DrillingBlock, FeedRigRampsOverTheConesHeight) {
     if (tick.order.phase != SurgeonPhase::feed || tip < 0.2 || tip > 0.9) return;
     ++seen;
     // As a depth: contact points look half a pitch ahead, and stand in rings 0.1 mm apart.
-    EXPECT_NEAR(0.961 * std::sqrt(tick.report.engaged), tip, 0.0625 + 0.1) << tip;
+    EXPECT_NEAR(0.961 * std::sqrt(tick.report.cutting.engaged), tip, 0.0625 + 0.1) << tip;
   });
   EXPECT_GT(seen, 300);
 }
@@ -151,7 +151,7 @@ TEST(DrillingBlock, AWeakDeviceShowsTheSameBoneLighter) {
   double rendered_max = 0;
   bench.run([&](const SessionTick& tick) {
     layers.see(tick);
-    rendered_max = std::max(rendered_max, tick.report.force_device_n.norm());
+    rendered_max = std::max(rendered_max, tick.report.device.force_n.norm());
   });
   EXPECT_LE(rendered_max, 3.3);
   EXPECT_NEAR(layers.force[0].value(), 27, 2.7);
@@ -171,7 +171,7 @@ TEST(DrillingBlock, TheWorkspaceScaleDoesNotChangeTheBone) {
     double rendered_max = 0;
     bench.run([&](const SessionTick& tick) {
       layers.see(tick);
-      rendered_max = std::max(rendered_max, tick.report.force_device_n.norm());
+      rendered_max = std::max(rendered_max, tick.report.device.force_n.norm());
     });
     const double m = bench.session().loop().mapping().scale(), s = bench.session().loop().params().force_scale;
     const double coupling = bench.session().loop().coupling_n_per_mm();
@@ -211,7 +211,7 @@ TEST(Surgeon, NoStepGoesOnForEver) {
         Surgeon surgeon(*make_ready({drill_step(hand)}, block_case()));
         LoopReport report;
         report.spindle_rpm = rpm;
-        report.force_physical_n = {0, 0, -force_n};
+        report.coupling.force_n = {0, 0, -force_n};
         double time_s = 0;
         for (; time_s < 300.0 && !surgeon.done(); time_s += 1e-3) surgeon.act(report, 1e-3);
         EXPECT_TRUE(surgeon.done()) << rpm << " rpm, " << force_n << " N";
@@ -274,7 +274,7 @@ TEST(HapticLoop, DoesNotAllocate) {
     const osteon::test::AllocationCounter heap;
     const SessionTick tick = bench.tick();
     allocations += heap.count();
-    cutting += tick.report.phase == CuttingPhase::cutting;
+    cutting += tick.report.cutting.phase == CuttingPhase::cutting;
     bench.follow();
   }
   EXPECT_EQ(allocations, 0);

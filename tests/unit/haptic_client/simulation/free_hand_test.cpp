@@ -171,8 +171,8 @@ TEST_F(FreeHand, ADeviceWithoutForceIsShownNone) {
   tick();
   move_by({0, 0, -10.5 / scale()}, 300);
   for (int i = 0; i < 300; ++i) tick();
-  EXPECT_GT(last_.report.force_physical_n.norm(), 5.0);  // what gauges and recordings show
-  EXPECT_TRUE(last_.report.force_physical_n.allFinite());
+  EXPECT_GT(last_.report.coupling.force_n.norm(), 5.0);  // what gauges and recordings show
+  EXPECT_TRUE(last_.report.coupling.force_n.allFinite());
   EXPECT_NEAR(tip().z(), 0.0, 0.1);
 }
 

@@ -32,19 +32,19 @@ class HandStage {
     const osteon::test::AllocationCounter heap;
     const LoopReport report = loop_.tick(input_, patch_);
     allocations_ += heap.count();
-    force_n_ = std::max(force_n_, report.force_physical_n.norm());
-    torque_nmm_ = std::max(torque_nmm_, report.torque_nmm);
-    work_min_ = std::min(work_min_, report.cutting_force_n.dot(report.moved_mm));
-    const bool cuts = report.phase == CuttingPhase::cutting;
+    force_n_ = std::max(force_n_, report.coupling.force_n.norm());
+    torque_nmm_ = std::max(torque_nmm_, report.cutting.torque_nmm);
+    work_min_ = std::min(work_min_, report.cutting.force_n.dot(report.contact.moved_mm));
+    const bool cuts = report.cutting.phase == CuttingPhase::cutting;
     cutting_ += cuts;
     // Contact of a cutting tool has a force. A cut has work, torque and feed, all or none, even in a tick whose turning
     // pushed the tool back by more. A broach is driven by its blows, not by a force.
-    const bool worked = report.cutting_work_mj > 0.0;
+    const bool worked = report.cutting.work_mj > 0.0;
     pushed_ += worked && !cuts;
     if (loop_.tool(0).tool.kind != ToolKind::broach)
-      disagree_ += cuts != (report.cutting_force_n.norm() > 0.0) || (cuts && !worked) ||
-                   worked != (report.feed_mm_per_s > 0.0) || worked != (report.torque_nmm > 0.0);
-    touching_ += report.phase == CuttingPhase::rubbing;
+      disagree_ += cuts != (report.cutting.force_n.norm() > 0.0) || (cuts && !worked) ||
+                   worked != (report.cutting.feed_mm_per_s > 0.0) || worked != (report.cutting.torque_nmm > 0.0);
+    touching_ += report.cutting.phase == CuttingPhase::rubbing;
     CutPiece piece;
     while (loop_.take_piece(piece)) {
       const Cut cut = cut_of(piece, loop_.tool(0), AuthorId{1}, 0);
@@ -146,7 +146,7 @@ TEST(HandTools, EveryToolThatCutsTakesBone) {
     EXPECT_LE(stage.pushed_, (lies ? 1.0 : 0.1) * stage.cutting_) << tool.name;
     EXPECT_EQ(stage.allocations_, 0) << tool.name;
     // When drawn back it is free: nothing jams in the hole or kerf.
-    EXPECT_EQ(back.force_physical_n.norm(), 0.0) << tool.name;
+    EXPECT_EQ(back.coupling.force_n.norm(), 0.0) << tool.name;
     EXPECT_NEAR((back.pose_bone_proxy.position_mm - stage.input_.pose_device_tool.position_mm).norm(), 0.0, 1e-5)
         << tool.name;
     ++tried;
@@ -221,7 +221,7 @@ TEST(HandTools, ABurDraggedOverMetalSendsNothing) {
   const Vec3 from = stage.tick().pose_bone_proxy.position_mm;
   const LoopReport dragged = stage.lead({4, 2, 0}, 0.5);
   EXPECT_GT((dragged.pose_bone_proxy.position_mm - from).norm(), 3.0);
-  EXPECT_GT(-dragged.force_physical_n.z(), 20.0);
+  EXPECT_GT(-dragged.coupling.force_n.z(), 20.0);
   EXPECT_EQ(stage.cuts_.size(), before);
   EXPECT_EQ(stage.cutting_, 0);
   EXPECT_EQ(stage.replica_.removed_mm3(), 0.0);
@@ -296,7 +296,7 @@ TEST(HandTools, WhatDoesNotCutOnlyTouches) {
     EXPECT_EQ(stage.cutting_, 0) << name;
     EXPECT_GT(stage.touching_, 100) << name;
     EXPECT_LT(report.pose_bone_proxy.position_mm.z(), 0.6) << name;
-    EXPECT_GT(-report.force_physical_n.z(), 10.0) << name;
+    EXPECT_GT(-report.coupling.force_n.z(), 10.0) << name;
     EXPECT_EQ(stage.replica_.removed_mm3(), 0.0) << name;
   }
 }
@@ -312,11 +312,11 @@ TEST(Saw, GoesInItsPlaneOnly) {
   const double y = in.pose_bone_proxy.position_mm.y(), z = in.pose_bone_proxy.position_mm.z();
   const LoopReport aside = stage.lead({0, 1.0, 0}, 0.3);
   EXPECT_NEAR(aside.pose_bone_proxy.position_mm.y(), y, 0.5 * saw.set_mm + 0.15);
-  EXPECT_LT(aside.force_physical_n.y(), -20.0);
+  EXPECT_LT(aside.coupling.force_n.y(), -20.0);
   EXPECT_GT(aside.pose_bone_proxy.position_mm.z(), z - 0.2);
   stage.lead({0, -1.0, 0}, 0.3);
   const LoopReport out = stage.lead({0, 0, -5.0}, 0.5);
-  EXPECT_EQ(out.force_physical_n.norm(), 0.0);
+  EXPECT_EQ(out.coupling.force_n.norm(), 0.0);
 }
 
 // In its own hole, drilled at an angle through a face, a drill neither jams nor is held on its way out.
@@ -338,9 +338,9 @@ TEST(OwnHole, DoesNotJamAtAnyAngle) {
           (tick.report.pose_bone_proxy.position_mm - Vec3(0.1, -0.2, 0)).dot(step.entry.axis->normalized());
       deepest = std::max(deepest, depth);
       if (tick.order.phase != SurgeonPhase::retract || depth >= deepest - 1.0) return;
-      out_n = std::max(out_n, tick.report.force_physical_n.norm());
-      spindle_nmm = std::max(spindle_nmm, tick.report.torque_nmm);
-      turning_nmm = std::max(turning_nmm, tick.report.torque_physical_nmm.norm());
+      out_n = std::max(out_n, tick.report.coupling.force_n.norm());
+      spindle_nmm = std::max(spindle_nmm, tick.report.cutting.torque_nmm);
+      turning_nmm = std::max(turning_nmm, tick.report.coupling.torque_nmm.norm());
     });
     std::printf("  own hole at %2.0f degrees: %.2f mm deep, at most %.3f N and %.3f N mm on the way out\n", degrees,
                 deepest, out_n, turning_nmm);

@@ -26,7 +26,7 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
   bench.run([&](const SessionTick& tick) {
     deepest = std::max(deepest, tick.report.pose_bone_proxy.position_mm.z());
     if (tick.order.phase == SurgeonPhase::retract && tick.report.pose_bone_proxy.position_mm.z() < deepest - 1.0)
-      force_on_the_way_out = std::max(force_on_the_way_out, tick.report.force_physical_n.norm());
+      force_on_the_way_out = std::max(force_on_the_way_out, tick.report.coupling.force_n.norm());
   });
   EXPECT_NEAR(deepest, 10.0, 0.3);  // the rig turns back while the coupling is still stretched
   EXPECT_EQ(force_on_the_way_out, 0.0);
@@ -46,14 +46,14 @@ TEST(DrillInItsHole, IsHeldSidewaysAndFreeAlongTheAxis) {
     report = loop.tick(input, patch);
   }
   EXPECT_LT(report.pose_bone_proxy.position_mm.x(), 0.13);
-  EXPECT_LT(report.force_physical_n.x(), -5.0);
+  EXPECT_LT(report.coupling.force_n.x(), -5.0);
   input.pose_device_tool.position_mm = {0, 0, 6};
   for (int i = 0; i < 100; ++i) {
     input.pose_device_tool.position_mm.z() = 6 + 0.03 * i;
     report = loop.tick(input, patch);
   }
   EXPECT_NEAR(report.pose_bone_proxy.position_mm.z(), 8.97, 0.1);
-  EXPECT_EQ(report.force_physical_n.norm(), 0.0);
+  EXPECT_EQ(report.coupling.force_n.norm(), 0.0);
 }
 
 // A hand at the loop whose cuts go through a replica, as late as a real client's. Device and bone frames are alike.
@@ -71,7 +71,7 @@ class HandOnBlock {
     constexpr double kStep_mm = 0.005;
     ahead_mm_ += std::clamp(ahead_mm - ahead_mm_, -kStep_mm, kStep_mm);
     x_mm_ += std::clamp(x_mm - x_mm_, -kStep_mm, kStep_mm);
-    lead(Vec3(x_mm_, 0, tip_mm().z() + ahead_mm_) - (ticks_ ? report_.offset_mm : Vec3(Vec3::Zero())));
+    lead(Vec3(x_mm_, 0, tip_mm().z() + ahead_mm_) - (ticks_ ? report_.coupling.offset_mm : Vec3(Vec3::Zero())));
     return tick();
   }
   LoopReport tick() {
@@ -116,7 +116,7 @@ TEST(DrillInItsHole, TakesNothingWhileItStands) {
   for (int i = 0; i < 100; ++i) hand.push(-0.01);  // closes the last cut
   const double removed_mm3 = hand.replica_.removed_mm3();
   for (int i = 0; i < 1000; ++i) hand.push(0.58);  // 29 N
-  EXPECT_NEAR(hand.report_.force_physical_n.z(), -29.0, 0.1);
+  EXPECT_NEAR(hand.report_.coupling.force_n.z(), -29.0, 0.1);
   EXPECT_LT(hand.tip_mm().z(), from_mm + hand.loop_.tool(0).inset);
   EXPECT_EQ(hand.replica_.removed_mm3(), removed_mm3);
 }
@@ -132,7 +132,7 @@ TEST(DrillInItsHole, DoesNotCreepAsideWhileItTurns) {
   const double drilled_mm = hand.tip_mm().z() - kDeep_mm;
   EXPECT_GT(drilled_mm, 0.5);
   EXPECT_LT(hand.tip_mm().x(), play_mm * (3.0 + 2.0 * drilled_mm / kDeep_mm));
-  EXPECT_LT(hand.report_.force_physical_n.x(), -15.0);
+  EXPECT_LT(hand.report_.coupling.force_n.x(), -15.0);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ TEST(ScannedBlock, TheFeedRigFeelsTheLawsThrustInEachLayer) {
   double sum[3] = {}, after_n = 0.0;
   int count[3] = {};
   bench.run([&](const SessionTick& tick) {
-    const double tip = tick.report.pose_bone_proxy.position_mm.z(), force_n = -tick.report.force_physical_n.z();
+    const double tip = tick.report.pose_bone_proxy.position_mm.z(), force_n = -tick.report.coupling.force_n.z();
     if (tip > 31.5) after_n = std::max(after_n, std::abs(force_n));
     if (tick.order.phase != SurgeonPhase::push && tick.order.phase != SurgeonPhase::feed) return;
     for (int i = 0; i < 3; ++i)

@@ -24,10 +24,10 @@ TEST(Session, LateTicksReachTheLoop) {
     bench.tick();
     bench.follow();
   }
-  ASSERT_GT(bench.tick().report.force_device_n.norm(), 5.0);
-  EXPECT_GT(bench.session().tick(bench.patch(), RoomLink::follows, 3).report.force_device_n.norm(), 5.0);
+  ASSERT_GT(bench.tick().report.device.force_n.norm(), 5.0);
+  EXPECT_GT(bench.session().tick(bench.patch(), RoomLink::follows, 3).report.device.force_n.norm(), 5.0);
   const LoopReport late = bench.session().tick(bench.patch(), RoomLink::follows, 4).report;
-  EXPECT_EQ(late.force_device_n.norm(), 0.0);
+  EXPECT_EQ(late.device.force_n.norm(), 0.0);
   EXPECT_TRUE(late.events & kMissedTicks);
 }
 
@@ -54,9 +54,9 @@ TEST(Burr, TakesAWindowToItsDepth) {
   double force_max = 0, work_min = 0;
   bool cutting = false;
   bench.run([&](const SessionTick& tick) {
-    force_max = std::max(force_max, tick.report.force_physical_n.norm());
-    work_min = std::min(work_min, tick.report.cutting_force_n.dot(tick.report.moved_mm));
-    cutting |= tick.report.phase == CuttingPhase::cutting;
+    force_max = std::max(force_max, tick.report.coupling.force_n.norm());
+    work_min = std::min(work_min, tick.report.cutting.force_n.dot(tick.report.contact.moved_mm));
+    cutting |= tick.report.cutting.phase == CuttingPhase::cutting;
   });
   ASSERT_TRUE(bench.session().done());
   EXPECT_TRUE(cutting);

@@ -32,7 +32,7 @@ TEST(Surgeon, AStepUnderWayIsNotCompleted) {
   Bench bench(block_case(), {drill_down()});
   int cutting = 0;
   bench.run([&](const SessionTick& tick) {
-    cutting += tick.report.phase == CuttingPhase::cutting;
+    cutting += tick.report.cutting.phase == CuttingPhase::cutting;
     if (!bench.session().done()) {
       EXPECT_FALSE(bench.session().results()[0].completed) << name(tick.order.phase);
     }
@@ -60,7 +60,7 @@ TEST(Surgeon, SaysInWhichPhaseItGaveUp) {
     Surgeon surgeon(*make_ready({c.step}, block_case()));
     LoopReport report;
     report.spindle_rpm = c.rpm;
-    report.force_physical_n = {0, 0, -c.force_n};
+    report.coupling.force_n = {0, 0, -c.force_n};
     report.events = c.events;
     for (int tick = 0; tick < 300'000 && !surgeon.done(); ++tick) surgeon.act(report, 1e-3);
     ASSERT_TRUE(surgeon.done());

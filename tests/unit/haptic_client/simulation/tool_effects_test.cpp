@@ -111,9 +111,9 @@ Mean between(const std::vector<LoopReport>& reports, double low_mm, double high_
   Mean mean;
   for (const LoopReport& r : reports) {
     const double z = r.pose_bone_proxy.position_mm.z();
-    if (r.phase != CuttingPhase::cutting || z < low_mm || z > high_mm) continue;
-    mean.force_n += r.cutting_force_n.norm();
-    mean.torque_nmm += r.torque_nmm;
+    if (r.cutting.phase != CuttingPhase::cutting || z < low_mm || z > high_mm) continue;
+    mean.force_n += r.cutting.force_n.norm();
+    mean.torque_nmm += r.cutting.torque_nmm;
     ++mean.ticks;
   }
   if (mean.ticks > 0) {
@@ -158,11 +158,12 @@ TEST(ToolEffects, ALawSaysWhereItIsOutsideItsRange) {
     int cutting = 0;
     for (const LoopReport& r : rig.move({0, 0, 9.0}, 9.0 / moment.feed)) {
       const double z = r.pose_bone_proxy.position_mm.z();
-      if (r.phase != CuttingPhase::cutting)
-        EXPECT_EQ(r.out_of_range, 0u);
+      if (r.cutting.phase != CuttingPhase::cutting)
+        EXPECT_EQ(r.cutting.out_of_range, 0u);
       else if (z > 5.0 && z < 7.0) {
         ++cutting;
-        EXPECT_EQ(r.out_of_range, moment.outside) << moment.density << " g/cm3, " << r.feed_mm_per_s << " mm/s";
+        EXPECT_EQ(r.cutting.out_of_range, moment.outside)
+            << moment.density << " g/cm3, " << r.cutting.feed_mm_per_s << " mm/s";
       }
     }
     EXPECT_GT(cutting, 200);
@@ -196,10 +197,10 @@ TEST(ToolEffects, ASawsForceIsOfTheTeethOverTheBar) {
   int ticks = 0;
   for (const LoopReport& r : reports) {
     const double z = r.pose_bone_proxy.position_mm.z();
-    if (r.phase != CuttingPhase::cutting || z < 1.5 || z > 3.0) continue;
-    sum_n += r.motor_device_n.x();
-    square += r.motor_device_n.x() * r.motor_device_n.x();
-    aside = std::max(aside, r.motor_device_n.tail<2>().norm());
+    if (r.cutting.phase != CuttingPhase::cutting || z < 1.5 || z > 3.0) continue;
+    sum_n += r.motor.device_n.x();
+    square += r.motor.device_n.x() * r.motor.device_n.x();
+    aside = std::max(aside, r.motor.device_n.tail<2>().norm());
     ++ticks;
   }
   const double most_n = std::min(bearing * 4.0, 0.6 * 0.3 * thrust_n);
@@ -265,8 +266,8 @@ TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   double least_rpm = 1e9, torque_nmm = 0.0, pressed_n = 0.0;
   for (const LoopReport& r : rig.move({0, 0, 5.5}, 1.5)) {
     least_rpm = std::min(least_rpm, r.spindle_rpm);
-    torque_nmm = std::max(torque_nmm, r.torque_nmm);
-    pressed_n = std::max(pressed_n, r.force_physical_n.norm());
+    torque_nmm = std::max(torque_nmm, r.cutting.torque_nmm);
+    pressed_n = std::max(pressed_n, r.coupling.force_n.norm());
     EXPECT_FALSE(r.events & kStalled);
   }
   std::printf("  bur pressed with %.1f N: %.1f N mm, down to %.0f rpm\n", pressed_n, torque_nmm, least_rpm);
@@ -280,8 +281,8 @@ TEST(ToolEffects, ABurThatIsPressedTooHardStalls) {
   for (const LoopReport& r : rig.move(Vec3::Zero(), 0.5)) {
     EXPECT_TRUE(r.events & kStalled);
     EXPECT_LT(r.spindle_rpm, 1.0);
-    way_mm += r.moved_mm.norm();
-    least_n = std::min(least_n, r.force_physical_n.norm());
+    way_mm += r.contact.moved_mm.norm();
+    least_n = std::min(least_n, r.coupling.force_n.norm());
   }
   std::printf("  and with %.1f N it stands\n", least_n);
   EXPECT_GT(least_n, most_nmm / arm_mm);
@@ -299,7 +300,7 @@ TEST(ToolEffects, ADrillGrabsWhenItBreaksThrough) {
   double in_mm = 1e9, out_mm = -1e9, largest = 0.0;
   for (const LoopReport& r : rig.move({0, 0, 7.5}, 7.5)) {
     // The vibration has no mean and is small beside a lasting pull.
-    const double pull = r.motor_device_n.z();
+    const double pull = r.motor.device_n.z();
     if (pull < 2.0) continue;
     in_mm = std::min(in_mm, r.pose_bone_proxy.position_mm.z());
     out_mm = std::max(out_mm, r.pose_bone_proxy.position_mm.z());
@@ -320,7 +321,7 @@ TEST(ToolEffects, ASawThatIsPressedAsideBinds) {
   const auto cutting = rig.move({0, 0, 1.0}, 0.5);
   const auto feed = [](const std::vector<LoopReport>& reports) {
     double way = 0.0;
-    for (const LoopReport& r : reports) way += r.moved_mm.z();
+    for (const LoopReport& r : reports) way += r.contact.moved_mm.z();
     return way;
   };
   EXPECT_GT(feed(cutting), 0.5);
@@ -339,13 +340,13 @@ TEST(ToolEffects, ASawThatIsTurnedInItsKerfStands) {
   constexpr double kTurn_rad = 0.02;
   const auto feed = [](const std::vector<LoopReport>& reports) {
     double way = 0.0;
-    for (const LoopReport& r : reports) way += r.moved_mm.z();
+    for (const LoopReport& r : reports) way += r.contact.moved_mm.z();
     return way;
   };
   for (const Vec3& axis : {Vec3(Vec3::UnitX()), Vec3(Vec3::UnitZ())}) {
     Rig rig(slab(12.0, 0.6, 0.5, 30.0), saw);
     rig.move({0, 0, 6.0}, 3.0);
-    const double torque_nmm = -rig.turn(kTurn_rad * axis, 0.2).back().torque_physical_nmm.dot(axis);
+    const double torque_nmm = -rig.turn(kTurn_rad * axis, 0.2).back().coupling.torque_nmm.dot(axis);
     const double turned = feed(rig.move({0, 0, 0.5}, 0.5));
     rig.turn(-kTurn_rad * axis, 0.2);
     const double straight = feed(rig.move({0, 0, 0.5}, 0.5));
@@ -368,10 +369,10 @@ std::vector<Stretch> runs_of(const std::vector<LoopReport>& reports) {
   std::vector<Stretch> runs;
   bool moved = false;
   for (const LoopReport& r : reports) {
-    const bool moves = r.moved_mm.z() > 1e-6;
-    if (moves && !moved) runs.push_back({r.pose_bone_proxy.position_mm.z() - r.moved_mm.z()});
+    const bool moves = r.contact.moved_mm.z() > 1e-6;
+    if (moves && !moved) runs.push_back({r.pose_bone_proxy.position_mm.z() - r.contact.moved_mm.z()});
     if (moves) {
-      runs.back().way_mm += r.moved_mm.z();
+      runs.back().way_mm += r.contact.moved_mm.z();
       ++runs.back().ticks;
     }
     moved = moves;
@@ -408,7 +409,7 @@ TEST(ToolEffects, ABroachGoesByBlows) {
   rig.spindle(0.0);
   rig.move(Vec3::Zero(), 1.0);  // it runs down, and its points, slightly within its faces, come to rest
   double way = 0.0;
-  for (const LoopReport& r : rig.move({0, 0, 1.0}, 3.0)) way += r.moved_mm.z();
+  for (const LoopReport& r : rig.move({0, 0, 1.0}, 3.0)) way += r.contact.moved_mm.z();
   EXPECT_NEAR(way, 0.0, 0.01);  // a hundredth of the hand's way: remaining settling
   rig.spindle(60.0);
   EXPECT_GE(runs_of(rig.move({0, 0, 1.0}, 2.0)).size(), 1u);
@@ -425,15 +426,15 @@ TEST(ToolEffects, ABroachStopsWhenSeated) {
   double way = 0.0;
   LoopReport last;
   for (const LoopReport& r : rig.move({0, 0, 1.0}, 3.0)) {
-    way += r.moved_mm.z();
+    way += r.contact.moved_mm.z();
     last = r;
   }
   EXPECT_EQ(way, 0.0);
   const double deep_mm = last.pose_bone_proxy.position_mm.z(), seat_mm2 = 39200.0 / (6.0 * 130.0 / (1.9 * 1.9));
   std::printf("  seated %.2f mm deep after %zu blows, its section %.1f mm2, by hand %.1f mm2; %.1f N of push\n",
-              deep_mm, runs.size(), section_mm2(deep_mm), seat_mm2, last.force_physical_n.norm());
+              deep_mm, runs.size(), section_mm2(deep_mm), seat_mm2, last.coupling.force_n.norm());
   EXPECT_NEAR(section_mm2(deep_mm), seat_mm2, 0.08 * seat_mm2);  // as above
-  EXPECT_GT(last.force_physical_n.norm(), 20.0);
+  EXPECT_GT(last.coupling.force_n.norm(), 20.0);
 }
 
 // With the effects off, a tool follows its law alone.

@@ -61,13 +61,14 @@ class Before {
   [[nodiscard]] double beyond_mm() const {
     const Pose& pose = report().pose_bone_device;
     const double lean = std::asin(pose.direction(Vec3::UnitZ()).x());
-    return kReach_mm * std::sin(lean) + kRadius_mm * std::cos(lean) - pose.position_mm.x() - report().offset_mm.x();
+    return kReach_mm * std::sin(lean) + kRadius_mm * std::cos(lean) - pose.position_mm.x() -
+           report().coupling.offset_mm.x();
   }
   // The wall's push times its arm from the tip. It acts on the rim of the shank's end, at right angles to the wall.
   [[nodiscard]] Vec3 arm_times_force() const {
     const Vec3 axis = report().pose_bone_proxy.direction(Vec3::UnitZ());
     const Vec3 to_rim = (axis.x() * axis - Vec3::UnitX()).normalized();
-    return (kRadius_mm * to_rim - kReach_mm * axis).cross(report().force_physical_n);
+    return (kRadius_mm * to_rim - kReach_mm * axis).cross(report().coupling.force_n);
   }
 
  private:
@@ -133,7 +134,7 @@ TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
     press(side, handle, 0.06, beyond_mm);
     EXPECT_NEAR(side.beyond_mm(), beyond_mm, 1e-9);
     const LoopReport& report = side.report();
-    const Vec3 &force_n = report.force_physical_n, &torque_nmm = report.torque_physical_nmm;
+    const Vec3 &force_n = report.coupling.force_n, &torque_nmm = report.coupling.torque_nmm;
     std::printf(
         "  simulated: %.2f N (closed form %.2f) at the end of %.0f mm, torque %.1f N mm (%.1f), on the device %.1f\n",
         force_n.norm(), push_n(side), kReach_mm, torque_nmm.norm(), side.arm_times_force().norm(),
@@ -164,7 +165,7 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
     if (!six_axes) handle.limits_are.peak_nmm = handle.limits_are.continuous_nmm = 0.0;
     Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
     press(side, handle, kFrom_rad, kBeyond_mm);
-    const double before_n = side.report().force_physical_n.norm(), before_nmm = handle.written.torque_nmm.norm();
+    const double before_n = side.report().coupling.force_n.norm(), before_nmm = handle.written.torque_nmm.norm();
     const auto turn = [&](double from_rad, double to_rad) {
       constexpr int kTicks = 600;
       for (int i = 1; i <= kTicks; ++i) {
@@ -175,7 +176,7 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
     };
     turn(kFrom_rad, kTo_rad);
     const LoopReport& report = side.report();
-    const double force_n = report.force_physical_n.norm(), torque_nmm = handle.written.torque_nmm.norm();
+    const double force_n = report.coupling.force_n.norm(), torque_nmm = handle.written.torque_nmm.norm();
     if (!six_axes) {
       EXPECT_LE(force_n, before_n + 0.05);
       continue;
@@ -189,17 +190,17 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
         force_n, expected_n, before_n, torque_nmm, kShown * kReach_mm * expected_n, before_nmm);
     EXPECT_NEAR(force_n, expected_n, expected_n * (0.02 + 0.07 / to_mm));
     EXPECT_NEAR(torque_nmm, kShown * kReach_mm * expected_n, kShown * kReach_mm * expected_n * (0.02 + 0.07 / to_mm));
-    EXPECT_NEAR((report.torque_physical_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n);
+    EXPECT_NEAR((report.coupling.torque_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n);
     EXPECT_GT(force_n, 5.0 * before_n);
 
     Handle other;
     Before pressed(wall(), {0, 0, 0}, {-1, 0, 0}, other);
     press(pressed, other, kTo_rad, to_mm);
-    EXPECT_NEAR(pressed.report().force_physical_n.norm(), force_n, 0.02 * force_n);
+    EXPECT_NEAR(pressed.report().coupling.force_n.norm(), force_n, 0.02 * force_n);
     EXPECT_NEAR(other.written.torque_nmm.norm(), torque_nmm, 0.02 * torque_nmm);
 
     turn(kTo_rad, kFrom_rad);
-    EXPECT_NEAR(side.report().force_physical_n.norm(), before_n, 0.02 * force_n);
+    EXPECT_NEAR(side.report().coupling.force_n.norm(), before_n, 0.02 * force_n);
     EXPECT_NEAR(handle.written.torque_nmm.norm(), before_nmm, 0.02 * torque_nmm);
   }
 }
@@ -208,7 +209,7 @@ TEST(TorqueOnTheHand, IsWithinTheDevicesLimit) {
   Handle handle;
   Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
   press(side, handle, 0.1, 7.5);
-  EXPECT_GT(kShown * side.report().torque_physical_nmm.norm(), 220.0);
+  EXPECT_GT(kShown * side.report().coupling.torque_nmm.norm(), 220.0);
   EXPECT_NEAR(handle.written.torque_nmm.norm(), 200.0, 1e-9);
   EXPECT_LT(handle.written.torque_nmm.x(), -199.0);
   // Warm motors bear a third.
@@ -293,7 +294,7 @@ class Sigma : public WithArm {
   static Vec3 shown() { return {arm()->torque_nmm[0], arm()->torque_nmm[1], arm()->torque_nmm[2]}; }
   void tick(Before& side) {
     side.tick();
-    const DeviceOutput written{side.report().force_device_n, side.report().torque_device_nmm};
+    const DeviceOutput written{side.report().device.force_n, side.report().device.torque_nmm};
     ++arm()->until;
     const auto began = std::chrono::steady_clock::now();
     do {
@@ -326,8 +327,8 @@ class Sigma : public WithArm {
     lead(side, 0.0, -14.0, 250);
     const Vec3 before = shown();
     tick(side);
-    return (shown() - before).norm() < 1e-2 && (shown() - side.report().torque_device_nmm).norm() < 1e-2 &&
-           side.report().offset_mm.norm() < 0.1;
+    return (shown() - before).norm() < 1e-2 && (shown() - side.report().device.torque_nmm).norm() < 1e-2 &&
+           side.report().coupling.offset_mm.norm() < 0.1;
   }
   std::unique_ptr<HapticDevice> device_;
   std::uint64_t sample_ = 0;
@@ -353,7 +354,7 @@ TEST_F(Sigma, AWallsTorqueReachesItsMotors) {
   EXPECT_LT(shown().x(), -0.99 * shown().norm());
   const Vec3 arm_nmm = shown_by * side->arm_times_force();
   EXPECT_NEAR((shown() - Vec3(arm_nmm.y(), arm_nmm.z(), arm_nmm.x())).norm(), 0.0,
-              shown_by * kRing_mm * side->report().force_physical_n.norm());
+              shown_by * kRing_mm * side->report().coupling.force_n.norm());
   EXPECT_EQ(arm()->unsafe_forces, 0u);
   EXPECT_EQ(arm()->misuse, 0u);
 }
