@@ -29,7 +29,7 @@ bool has_news(const KnownToolState& said, const KnownToolState& now, const PoseD
 ClientLink::ClientLink(const SessionKeys& keys, std::uint64_t first_author_seq, std::uint64_t first_index,
                        const LinkOptions& options)
     : endpoint_(keys.session, keys.up, keys.down, first_author_seq, options),
-      entries_(first_index, options.most_ahead) {}
+      arrived_(first_index, options.most_ahead) {}
 
 bool ClientLink::push(const Cut& cut) {
   if (endpoint_.begin(cut.author_seq) && fits_a_packet(cut)) {
@@ -97,13 +97,20 @@ void ClientLink::receive(std::span<const std::uint8_t> datagram, Time now) {
     frozen_ = packet.frozen();
   }
   for (const IndexedEntry& entry : *entries)
-    if (entry.entry.kind != SessionEntryKind::streamed) entries_.insert(entry.index, entry.entry);
+    if (entry.entry.kind != SessionEntryKind::streamed && note_arrival(entry.index)) entries_.push_back(entry);
   if (!entries->empty() || left_out > 0) endpoint_.answer();
   for (KnownToolState& state : states) keep_partner(std::move(state), now);
   if (bone && bone->seen_seq > bone_seq_) {
     bone_ = bone;
     bone_seq_ = bone->seen_seq;
   }
+}
+
+bool ClientLink::note_arrival(std::uint64_t index) {
+  const bool is_new = arrived_.insert(index, {});
+  while (arrived_.take()) {
+  }
+  return is_new;
 }
 
 void ClientLink::keep_partner(KnownToolState state, Time now) {
@@ -122,9 +129,10 @@ std::vector<KnownToolState> ClientLink::partners(Time now) const {
 }
 
 std::optional<IndexedEntry> ClientLink::take_entry() {
-  auto entry = entries_.take();
-  if (!entry) return {};
-  return IndexedEntry{entries_.acknowledged(), std::move(*entry)};
+  if (entries_.empty()) return {};
+  IndexedEntry entry = std::move(entries_.front());
+  entries_.pop_front();
+  return entry;
 }
 
 // When the state itself needs a packet.
@@ -157,8 +165,8 @@ Time ClientLink::next(Time now) const { return endpoint_.next(now, std::min(stat
 std::span<const std::uint8_t> ClientLink::send(Time now, std::span<std::uint8_t> into) {
   if (next(now) > now) return {};
   PacketFiller<v1::UpPacket> filler(endpoint_.room(now));
-  const std::uint64_t taken = entries_.acknowledged();
-  auto head = endpoint_.head<v1::UpPacket>(now, taken, entries_.beyond(taken));
+  const std::uint64_t arrived = arrived_.acknowledged();
+  auto head = endpoint_.head<v1::UpPacket>(now, arrived, arrived_.beyond(arrived));
   if (echoes_left_ > 0) {
     --echoes_left_;
     head.set_path_echo(echo_.data(), echo_.size());

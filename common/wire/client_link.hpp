@@ -5,10 +5,12 @@
 // does not matter which copy arrives first.
 #pragma once
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <span>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "common/link/receive_window.hpp"
@@ -47,12 +49,12 @@ class ClientLink {
 
   // Accepts any bytes.
   void receive(std::span<const std::uint8_t> datagram, Time now);
-  // The stream's copy of an entry. False: it arrived before, or is too far ahead of what was taken.
-  bool insert(const IndexedEntry& entry) { return entries_.insert(entry.index, entry.entry); }
-  // The stream has delivered this entry and all entries before it that were not taken here. None of them comes out any
-  // more.
-  void received(std::uint64_t index) { entries_.skip(index); }
-  // Entries in order of their index, each once. An entry of kind streamed comes out only after its copy was offered.
+  // The stream has delivered this entry. False: it arrived before, or is too far ahead of those that have arrived.
+  bool received_one(std::uint64_t index) { return note_arrival(index); }
+  // The stream has delivered this entry and all entries before it that did not arrive here.
+  void received(std::uint64_t index) { arrived_.skip(index); }
+  // Entries in the order of their arrival, each once, and none that the stream delivered before. The caller restores
+  // the room's order, together with what the stream delivers. Take all of them after each receive().
   [[nodiscard]] std::optional<IndexedEntry> take_entry();
 
   // When send() has something to send, at `now` or later. Ask again after any other call.
@@ -67,8 +69,8 @@ class ClientLink {
   }
   // Cuts up to this one are decided and durable.
   [[nodiscard]] std::uint64_t acknowledged() const { return endpoint_.acknowledged(); }
-  // Entries up to this one have arrived and were taken.
-  [[nodiscard]] std::uint64_t entries_taken() const { return entries_.acknowledged(); }
+  // Entries up to this one have arrived, here or over the stream.
+  [[nodiscard]] std::uint64_t entries_arrived() const { return arrived_.acknowledged(); }
   // As of the newest packet. 0 before the first.
   [[nodiscard]] std::uint64_t lease_epoch() const { return lease_epoch_; }
   [[nodiscard]] bool frozen() const { return frozen_; }
@@ -86,6 +88,7 @@ class ClientLink {
     KnownToolState state;
     Time received_at{};
   };
+  bool note_arrival(std::uint64_t index);
   void keep_partner(KnownToolState state, Time now);
   [[nodiscard]] Time state_due() const;
   [[nodiscard]] Time push_due() const;
@@ -97,7 +100,8 @@ class ClientLink {
   std::optional<CutSender>
       sender_;               // codes each cut against the one before it; a new one if that cut is not in the window
   std::uint64_t coded_ = 0;  // the last cut that it coded
-  ReceiveWindow<SessionEntry> entries_;
+  ReceiveWindow<std::monostate> arrived_;      // the numbers alone: it says what to acknowledge, and what is repeated
+  std::deque<IndexedEntry> entries_;           // that were not taken yet
   std::map<std::uint64_t, Partner> partners_;  // by author
   std::uint64_t lease_epoch_ = 0;
   bool frozen_ = false;

@@ -1,13 +1,12 @@
 // The room's messages on their way to the replica's thread. Where too many wait, the reader of the network waits too.
 #pragma once
 #include <chrono>
-#include <condition_variable>
 #include <cstddef>
 #include <deque>
-#include <mutex>
 #include <string>
 #include <vector>
 
+#include "common/core/mutex.hpp"
 #include "haptic_client/net/room_messages.hpp"
 
 namespace osteon::haptic {
@@ -31,10 +30,10 @@ class RoomQueue {
   void close();
 
  private:
-  std::mutex mutex_;  // guards the rest
-  std::condition_variable filled_, taken_;
-  Batch waiting_;
-  bool closed_ = false;
+  Mutex mutex_{LockRank::leaf};
+  CondVar filled_, taken_;
+  Batch waiting_ OSTEON_GUARDED_BY(mutex_);
+  bool closed_ OSTEON_GUARDED_BY(mutex_) = false;
 };
 
 }  // namespace osteon::haptic

@@ -21,7 +21,7 @@ namespace osteon {
 
 // Functions that a fast path calls, on its own thread.
 struct FastPathEvents {
-  std::function<void(wire::IndexedEntry)> entry;  // a log entry of the session, in order
+  std::function<void(wire::IndexedEntry)> entry;  // a log entry of the session, in the order of arrival
   // Datagrams no longer get through. What was sent only in them has to be sent over the stream.
   std::function<void()> dead;
   std::function<void(const CuttingState&)> partner{};  // a newer state of a partner's tool

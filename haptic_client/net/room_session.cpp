@@ -181,6 +181,8 @@ struct RoomSession::Impl {
   void write(Line& line);
   // Handles what a stream sends for the session itself.
   void follow(const v1::SessionResponse& response) OSTEON_REQUIRES(read_mutex);
+  // [fast path] A log entry of a datagram.
+  void take(wire::IndexedEntry entry);
   void open_fast_path(std::uint64_t decided);
   void close_fast_path();
   // Tries until it succeeds or the session is closed. Error: the server answers and refuses.
@@ -210,6 +212,8 @@ struct RoomSession::Impl {
 
   Mutex read_mutex{LockRank::received};  // received messages are passed on by one thread at a time
   std::optional<SessionReader> reader OSTEON_GUARDED_BY(read_mutex);
+  // A datagram's log entry of the present stream was wrong.
+  std::optional<Error> invalid OSTEON_GUARDED_BY(read_mutex);
   mutable Mutex fast_mutex{LockRank::leaf};
   std::shared_ptr<FastPath> fast
       OSTEON_GUARDED_BY(fast_mutex);  // of the present stream; held by those who use it at the moment
@@ -279,6 +283,17 @@ void RoomSession::Impl::write(Line& open) {
   open.stream->WritesDone();
 }
 
+void RoomSession::Impl::take(wire::IndexedEntry entry) {
+  const MutexLock lock(read_mutex);
+  if (invalid) return;
+  if (const Result<void> taken = reader->take(std::move(entry)); !taken) {
+    invalid = taken.error();
+    const MutexLock of_line(mutex);
+    if (line) line->context.TryCancel();
+  }
+  passed_on = reader->seq().value;
+}
+
 void RoomSession::Impl::follow(const v1::SessionResponse& response) {
   if (response.has_link()) offer = response.link();
   if (response.has_redial()) {
@@ -311,12 +326,7 @@ void RoomSession::Impl::open_fast_path(std::uint64_t decided) {
                                 : static_cast<std::uint32_t>(std::strtoul(at.c_str() + at.rfind(':') + 1, nullptr, 10));
   Result<std::unique_ptr<FastPath>> opened =
       FastPath::open(host, static_cast<std::uint16_t>(port), {offer->session(), *up, *down}, decided + 1,
-                     {.entry =
-                          [this](wire::IndexedEntry entry) {
-                            const MutexLock lock(read_mutex);
-                            (void)reader->take(std::move(entry));
-                            passed_on = reader->seq().value;
-                          },
+                     {.entry = [this](wire::IndexedEntry entry) { take(std::move(entry)); },
                       .dead =
                           [this] {
                             const MutexLock lock(mutex);
@@ -358,6 +368,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   {
     const MutexLock lock(read_mutex);
     reader->begin();
+    invalid.reset();
     passed_on = 0;
     received_leaves = false;
   }
@@ -383,7 +394,7 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
       return taken;
     }();
     if (!delivered) {
-      broken = Error{delivered.error().code, "the server sent an invalid message: " + delivered.error().message};
+      broken = delivered.error();
       open.context.TryCancel();
     }
   }
@@ -393,6 +404,8 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     wake.notify_all();
   }
   close_fast_path();
+  if (const MutexLock lock(read_mutex); !broken) broken = invalid;
+  if (broken) broken->message = "the server sent an invalid message: " + broken->message;
   // Finish waits for the status, which is received once the writer has stopped.
   writer.join();
   return open.stream->Finish();

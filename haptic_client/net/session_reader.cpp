@@ -53,9 +53,8 @@ Result<void> SessionReader::take(v1::SessionResponse response) {
 }
 
 Result<void> SessionReader::take(wire::IndexedEntry entry) {
-  // The stream sends what such an entry stands for. It also sends a cut whose tool is not known yet.
+  // The stream sends what such an entry stands for.
   if (entry.entry.kind == wire::SessionEntryKind::streamed) return {};
-  if (entry.entry.kind == wire::SessionEntryKind::committed && !cuts(entry.entry.cut)) return {};
   entries_.insert(entry.index, std::move(entry.entry));
   return pass_on();
 }
@@ -90,10 +89,13 @@ void SessionReader::supervised(const HandSupervised& decided) {
   pass({decided});
 }
 
-void SessionReader::committed(RoomSeq seq, const Cut& cut) {
+Result<void> SessionReader::committed(RoomSeq seq, const Cut& cut) {
+  // The room sends a tool before the first cut with it.
+  if (!cuts(cut)) return failure(ErrorCode::invalid_input, "committed.cut names a tool that was not sent");
   seq_ = std::max(seq_, seq);
   if (cut.author == own_) decided_(cut.author_seq);
   pass({CutCommitted{seq, cut}});
+  return {};
 }
 
 void SessionReader::rejected(const CutRejected& rejected) {
@@ -103,9 +105,8 @@ void SessionReader::rejected(const CutRejected& rejected) {
 }
 
 Result<void> SessionReader::deliver(const wire::SessionEntry& entry) {
-  if (entry.kind == wire::SessionEntryKind::committed)
-    committed(entry.room_seq, entry.cut);
-  else if (entry.kind == wire::SessionEntryKind::supervised)
+  if (entry.kind == wire::SessionEntryKind::committed) return committed(entry.room_seq, entry.cut);
+  if (entry.kind == wire::SessionEntryKind::supervised)
     supervised({entry.room_seq, entry.supervision, entry.lease_epoch, entry.by});
   else
     rejected({entry.room_seq, entry.author_seq, entry.lease_epoch, rejection_of(entry.reason),
@@ -172,9 +173,7 @@ Result<void> SessionReader::deliver(const v1::SessionResponse& response) {
     case v1::SessionResponse::kCommitted: {
       const Result<Cut> cut = wire::from_wire(response.committed().cut());
       if (!cut) return tl::unexpected(cut.error());
-      if (!cuts(*cut)) return failure(ErrorCode::invalid_input, "committed.cut names a tool that was not sent");
-      committed(RoomSeq{response.committed().room_seq()}, *cut);
-      return {};
+      return committed(RoomSeq{response.committed().room_seq()}, *cut);
     }
     case v1::SessionResponse::kRejected: {
       const v1::RejectedCut& entry = response.rejected();

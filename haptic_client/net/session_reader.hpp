@@ -30,7 +30,7 @@ class SessionReader {
   void begin();
   // Error: the server sent what no correct server sends; take nothing more from this stream.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
-  // A log entry of the fast path that belongs to the present stream.
+  // A log entry of the fast path that belongs to the present stream, in any order. Error: as above.
   [[nodiscard]] Result<void> take(wire::IndexedEntry entry);
   // Every log entry up to this one was passed on.
   [[nodiscard]] std::uint64_t taken() const { return entries_.acknowledged(); }
@@ -49,7 +49,7 @@ class SessionReader {
   [[nodiscard]] Result<void> deliver(const wire::SessionEntry& entry);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
   void pass(RoomMessage&& message);
-  void committed(RoomSeq seq, const Cut& cut);
+  [[nodiscard]] Result<void> committed(RoomSeq seq, const Cut& cut);
   void supervised(const HandSupervised& decided);
   void rejected(const CutRejected& rejected);
 

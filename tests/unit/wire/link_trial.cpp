@@ -129,15 +129,15 @@ void Trial::turn(std::size_t c) {
   const Time now = time.now();
   DatagramBuffer buffer;
   while (const auto got = client.port->receive(buffer)) client.link.receive(got->bytes, now);
-  while (auto entry = client.link.take_entry()) {
-    const bool of_other =
-        entry->entry.kind == wire::SessionEntryKind::committed && entry->entry.cut.author != client.author;
+  while (auto entry = client.link.take_entry()) client.in_order.insert(entry->index, std::move(entry->entry));
+  while (auto entry = client.in_order.take()) {
+    const bool of_other = entry->kind == wire::SessionEntryKind::committed && entry->cut.author != client.author;
     if (of_other) {
-      const Client& other = *clients[entry->entry.cut.author.value - 10];
-      const Time since = other.made_at.at(entry->entry.cut.author_seq - 1);
+      const Client& other = *clients[entry->cut.author.value - 10];
+      const Time since = other.made_at.at(entry->cut.author_seq - 1);
       client.felt_ms.push_back(std::chrono::duration<double, std::milli>(now - since).count());
     }
-    client.entries.push_back(std::move(*entry));
+    client.entries.push_back({client.in_order.acknowledged(), std::move(*entry)});
   }
   if (!client.link.alive(now)) {
     for (std::uint64_t n = std::max(client.link.acknowledged(), client.streamed_cuts) + 1; n <= client.cuts.size();
@@ -145,8 +145,8 @@ void Trial::turn(std::size_t c) {
       stream([this, c, cut = client.cuts[n - 1]] { sessions[c]->link.insert(cut); });
       client.streamed_cuts = n;
     }
-    if (client.acknowledged_entries != client.link.entries_taken()) {
-      client.acknowledged_entries = client.link.entries_taken();
+    if (client.acknowledged_entries != client.link.entries_arrived()) {
+      client.acknowledged_entries = client.link.entries_arrived();
       stream([this, c, upto = client.acknowledged_entries] { sessions[c]->link.acknowledge(upto); });
     }
   }
@@ -187,7 +187,10 @@ void Trial::send_entry(std::size_t c, wire::SessionEntry entry) {
 
 void Trial::stream_entry(std::size_t c, std::uint64_t index) {
   stream([this, c, entry = sessions[c]->entries[index - 1]] {
-    if (clients[c]->link.insert(entry)) ++clients[c]->entries_by_stream;
+    if (clients[c]->link.received_one(entry.index)) {
+      ++clients[c]->entries_by_stream;
+      clients[c]->in_order.insert(entry.index, entry.entry);
+    }
     turn(c);
   });
 }

@@ -51,11 +51,12 @@ class Trial {
     std::unique_ptr<SimPort> port;
     std::vector<Cut> cuts;  // all that the client made, by author_seq - 1
     std::vector<Time> made_at;
-    std::uint64_t streamed_cuts = 0;          // the stream has carried these
-    std::vector<wire::IndexedEntry> entries;  // all that the client took
-    std::vector<double> felt_ms;              // from a partner's cut until its log entry arrived
-    std::uint64_t acknowledged_entries = 0;   // over the stream
-    std::uint64_t uplink_bytes = 0;           // with 28 bytes of headers each
+    std::uint64_t streamed_cuts = 0;             // the stream has carried these
+    ReceiveWindow<wire::SessionEntry> in_order;  // of datagrams and stream, as in SessionReader
+    std::vector<wire::IndexedEntry> entries;     // all that the client took, in order
+    std::vector<double> felt_ms;                 // from a partner's cut until its log entry arrived
+    std::uint64_t acknowledged_entries = 0;      // over the stream
+    std::uint64_t uplink_bytes = 0;              // with 28 bytes of headers each
     std::uint64_t entries_by_stream = 0, refused = 0;
     std::size_t most_waiting = 0;  // bytes unacknowledged
     std::optional<Time> wakes_at;

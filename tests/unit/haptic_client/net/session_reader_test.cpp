@@ -348,16 +348,36 @@ TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
   EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{3, 4}));
 }
 
-TEST(SessionReader, RefusesWhatNoCorrectServerSendsAndWaitsForToolsThatItDoesNotKnow) {
+// Datagrams overtake the stream. A cut waits for the message that brings its tool.
+TEST(SessionReader, ACutThatOvertakesItsToolWaitsForIt) {
+  Heard heard;
+  heard.reader.begin();
+  Tool wide = find_tool("burr-round-5").value();
+  wide.name = "burr-wide";
+  wide.diameter_mm = 6.0;
+  wire::IndexedEntry cut = fast(2, 11, 2, 1);
+  cut.entry.cut.tool = wide.hash();
+  ASSERT_TRUE(heard.reader.take(cut));
+  EXPECT_TRUE(heard.events.empty());
+  v1::SessionResponse tool;
+  tool.set_index(1);
+  tool.mutable_tool()->set_room_seq(10);
+  *tool.mutable_tool()->mutable_tool() = wire::to_wire(wide);
+  ASSERT_TRUE(heard.reader.take(tool));
+  EXPECT_EQ(heard.events, std::vector<std::string>{"11 of 2"});
+}
+
+TEST(SessionReader, RefusesWhatNoCorrectServerSends) {
   Heard heard;
   heard.reader.begin();
   v1::SessionResponse strange = entry(1, 10, 2, 1);
   strange.mutable_committed()->mutable_cut()->set_tool_hash(std::string(32, 'x'));
   EXPECT_FALSE(heard.reader.take(strange));
   EXPECT_FALSE(heard.reader.take(v1::SessionResponse{}));
-  wire::IndexedEntry unknown = fast(2, 11, 2, 2);
+  heard.reader.begin();
+  wire::IndexedEntry unknown = fast(1, 11, 2, 2);
   unknown.entry.cut.tool.bytes[0] ^= 1;
-  EXPECT_TRUE(heard.reader.take(unknown)) << "the stream brings the tool, and then the entry";
+  EXPECT_FALSE(heard.reader.take(unknown)) << "its turn has come, but not its tool";
   EXPECT_TRUE(heard.events.empty());
 }
 
