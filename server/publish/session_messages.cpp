@@ -2,6 +2,7 @@
 
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/encoded_cut.hpp"
 #include "common/wire/version.hpp"
 
 namespace osteon {
@@ -57,14 +58,17 @@ Bytes complete_message(const SessionStart& start, const std::vector<RoomSeq>& de
   return serialised(response);
 }
 
-SessionMessage cut_message(RoomSeq seq, const Cut& cut) {
-  v1::SessionResponse response;
-  response.mutable_committed()->set_room_seq(seq.value);
-  *response.mutable_committed()->mutable_cut() = wire::to_wire(cut);
-  SessionMessage message = message_of(response, seq, StreamContent::field);
-  message.fast.kind = wire::SessionEntryKind::committed;
-  message.fast.cut = cut;
-  return message;
+SessionMessage cut_message(RoomSeq seq, const Cut& cut, std::string_view encoded) {
+  v1::CommittedCut head;
+  head.set_room_seq(seq.value);
+  std::string committed = head.SerializeAsString(), response;
+  wire::append_field(committed, v1::CommittedCut::kCutFieldNumber, encoded);
+  wire::append_field(response, v1::SessionResponse::kCommittedFieldNumber, committed);
+  return {seq,
+          std::make_shared<const std::string>(std::move(response)),
+          StreamContent::field,
+          wire::version_of(v1::SessionResponse::kCommitted),
+          {.room_seq = seq, .kind = wire::SessionEntryKind::committed, .cut = cut}};
 }
 
 SessionMessage rejection_message(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch, Rejection reason) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/access/role_table.hpp"
@@ -42,7 +43,8 @@ struct SessionStart {
 // The message that ends the leaves. `decided`: sequence numbers of the author's newest decided cuts; null: rejected.
 [[nodiscard]] Bytes complete_message(const SessionStart& start, const std::vector<RoomSeq>& decided);
 
-[[nodiscard]] SessionMessage cut_message(RoomSeq seq, const Cut& cut);
+// `encoded`: the bytes of the cut, as wire::encoded makes them.
+[[nodiscard]] SessionMessage cut_message(RoomSeq seq, const Cut& cut, std::string_view encoded);
 [[nodiscard]] SessionMessage rejection_message(RoomSeq seq, std::uint64_t author_seq, std::uint64_t lease_epoch,
                                                Rejection reason);
 [[nodiscard]] SessionMessage link_message(const SessionKeys& keys, std::uint16_t udp_port);

@@ -32,6 +32,8 @@ struct JoinEntry {
 };
 struct CutEntry {
   Cut cut;
+  // The cut as the log and clients get it, if it was encoded already (wire::encoded). Null: whoever needs it encodes.
+  std::shared_ptr<const std::string> encoded{};
 };
 // It has a sequence number, so that its author receives it in order and only once.
 struct RejectionEntry {

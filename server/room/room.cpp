@@ -119,7 +119,7 @@ std::vector<RoomSeq> Room::decided_seqs(AuthorId author, std::size_t most) const
   return seqs;
 }
 
-Result<Outcome> Room::submit(const Cut& cut) {
+Result<Outcome> Room::submit(const Cut& cut, std::shared_ptr<const std::string> encoded) {
   const auto refuse = [&](std::string why) -> Result<Outcome> {
     ++counts_.refused;
     return failure(ErrorCode::invalid_input, std::move(why));
@@ -144,7 +144,7 @@ Result<Outcome> Room::submit(const Cut& cut) {
 
   const Rejection rejection = judge(cut);
   RoomEvent event = rejection == Rejection::none
-                        ? decide(cut.author, CutEntry{cut})
+                        ? decide(cut.author, CutEntry{cut, std::move(encoded)})
                         : decide(cut.author, RejectionEntry{cut.author, cut.author_seq, cut_digest(cut), rejection});
   return Outcome{event.room_seq, rejection, false, surgeon->second.epoch, std::move(event.cut)};
 }

@@ -89,8 +89,8 @@ class Room {
   [[nodiscard]] std::uint64_t bone_epoch() const { return bone_epoch_; }
 
   // Gives the cut its sequence number and applies it to every body. Error invalid_input, without a sequence number: the
-  // author may not cut, author_seq has a gap, or author_seq was decided with other bytes.
-  Result<Outcome> submit(const Cut& cut);
+  // author may not cut, author_seq has a gap, or author_seq was decided with other bytes. `encoded`: see CutEntry.
+  Result<Outcome> submit(const Cut& cut, std::shared_ptr<const std::string> encoded = {});
 
   // The other events. Errors, without a sequence number: invalid_input (an author who has not joined; an unknown body,
   // item, tool or event), unavailable (nothing to undo or redo, or the bone has changed since).

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <memory>
 
+#include "common/wire/encoded_cut.hpp"
 #include "server/rooms/runtime_impl.hpp"
 
 namespace osteon {
@@ -40,9 +41,10 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
   if (closed() || player)
     return later([subscriber = queued.subscriber](const Result<void>&) { subscriber->decided(); });
   const Clock::time_point taken = Clock::now();
+  const auto encoded = wire::encoded(queued.cut);  // once: log entry and messages contain these bytes
   Result<Outcome> outcome = [&] {
     const WriterLock lock(room_mutex);
-    Result<Outcome> decision = room.submit(queued.cut);
+    Result<Outcome> decision = room.submit(queued.cut, encoded);
     room_seq = room.room_seq().value;
     if (cuts_during_copy && decision && decision->committed() && !decision->repeated)
       cuts_during_copy->push_back(queued.cut);
@@ -58,7 +60,7 @@ void RoomRuntime::Impl::decide(QueuedCut& queued) {
   const bool newly = outcome->committed() && !outcome->repeated;
   if (newly) metrics.committed(queued.arrived, taken, done);
   if (!outcome->committed() && !outcome->repeated) metrics.rejected(outcome->rejection);
-  SessionMessage message = outcome->committed() ? cut_message(outcome->room_seq, queued.cut)
+  SessionMessage message = outcome->committed() ? cut_message(outcome->room_seq, queued.cut, *encoded)
                                                 : rejection_message(outcome->room_seq, queued.cut.author_seq,
                                                                     outcome->lease_epoch, outcome->rejection);
   publish_durable(room.time());

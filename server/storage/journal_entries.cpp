@@ -9,6 +9,7 @@
 
 #include "common/field/kernel.hpp"
 #include "common/wire/convert.hpp"
+#include "common/wire/encoded_cut.hpp"
 #include "osteon/v1/journal.pb.h"
 
 namespace osteon {
@@ -309,6 +310,11 @@ Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutL
 std::string to_bytes(const LogEntry& entry) {
   v1::JournalEntry out;
   out.set_author(entry.author.value);
+  if (const auto* cut = std::get_if<CutEntry>(&entry.what); cut && cut->encoded) {
+    std::string bytes = out.SerializeAsString();
+    wire::append_field(bytes, v1::JournalEntry::kCutFieldNumber, *cut->encoded);
+    return bytes;
+  }
   std::visit(Writer{out}, entry.what);
   return out.SerializeAsString();
 }

@@ -6,6 +6,7 @@
 #include <limits>
 #include <random>
 
+#include "common/wire/encoded_cut.hpp"
 #include "server/storage/journal_entries.hpp"
 #include "tests/unit/room/cuts.hpp"
 #include "tests/unit/room/parts.hpp"
@@ -167,6 +168,18 @@ TEST_P(LogEntries, GoOnFromACheckpoint) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, LogEntries, ::testing::Range(1u, 9u));
+
+// A cut that was encoded before has the same bytes in the journal.
+TEST(LogEntryBytes, ContainACutAsItWasEncoded) {
+  for (const std::uint64_t number : {1ull, 200ull, 1ull << 33}) {
+    const Cut cut = test::straight_cut(find_tool("burr-round-5").value(), {0, 0, 0}, {1, 2, 3}, {0, 0, -1}, number);
+    for (const AuthorId author : {AuthorId{}, AuthorId{number}}) {
+      const LogEntry plain{RoomSeq{number}, 1s, author, CutEntry{cut}};
+      const LogEntry with_bytes{RoomSeq{number}, 1s, author, CutEntry{cut, wire::encoded(cut)}};
+      EXPECT_EQ(to_bytes(with_bytes), to_bytes(plain));
+    }
+  }
+}
 
 TEST(RoomReplay, TakesOnlyTheNextLogEntry) {
   BusyRoom busy(3);
