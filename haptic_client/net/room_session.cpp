@@ -212,8 +212,6 @@ struct RoomSession::Impl {
 
   Mutex read_mutex{LockRank::received};  // received messages are passed on by one thread at a time
   std::optional<SessionReader> reader OSTEON_GUARDED_BY(read_mutex);
-  // A datagram's log entry of the present stream was wrong.
-  std::optional<Error> invalid OSTEON_GUARDED_BY(read_mutex);
   mutable Mutex fast_mutex{LockRank::leaf};
   std::shared_ptr<FastPath> fast
       OSTEON_GUARDED_BY(fast_mutex);  // of the present stream; held by those who use it at the moment
@@ -285,9 +283,7 @@ void RoomSession::Impl::write(Line& open) {
 
 void RoomSession::Impl::take(wire::IndexedEntry entry) {
   const MutexLock lock(read_mutex);
-  if (invalid) return;
-  if (const Result<void> taken = reader->take(std::move(entry)); !taken) {
-    invalid = taken.error();
+  if (!reader->take(std::move(entry))) {
     const MutexLock of_line(mutex);
     if (line) line->context.TryCancel();
   }
@@ -368,7 +364,6 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   {
     const MutexLock lock(read_mutex);
     reader->begin();
-    invalid.reset();
     passed_on = 0;
     received_leaves = false;
   }
@@ -377,25 +372,25 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
   numbered_tools.clear();
   std::thread writer([&] { write(open); });
   v1::SessionResponse response;
-  while (!broken && open.stream->Read(&response)) {
+  while (open.stream->Read(&response)) {
     {
       const MutexLock lock(mutex);
       if (over) break;
     }
-    const Result<void> delivered = [&] {
+    const bool delivered = [&] {
       // Under one lock, so that no log entry of a datagram comes between. Such an entry may name a tool that only the
       // fast path knows yet, or follow leaves that are not complete.
       const MutexLock lock(read_mutex);
       follow(response);
       const bool complete = response.has_complete();
-      Result<void> taken = reader->take(std::move(response));
+      const Result<void> taken = reader->take(std::move(response));
       passed_on = reader->seq().value;
       if (complete) received_leaves = true;
-      return taken;
+      return taken.has_value();
     }();
     if (!delivered) {
-      broken = delivered.error();
       open.context.TryCancel();
+      break;
     }
   }
   {
@@ -404,7 +399,10 @@ grpc::Status RoomSession::Impl::serve(Line& open, std::optional<Error>& broken) 
     wake.notify_all();
   }
   close_fast_path();
-  if (const MutexLock lock(read_mutex); !broken) broken = invalid;
+  {
+    const MutexLock lock(read_mutex);
+    broken = reader->fault();
+  }
   if (broken) broken->message = "the server sent an invalid message: " + broken->message;
   // Finish waits for the status, which is received once the writer has stopped.
   writer.join();

@@ -35,24 +35,27 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomC
 
 void SessionReader::begin() {
   entries_ = ReceiveWindow<Entry>();
+  fault_.reset();
   seq_ = {};
   supervised_ = false;
   partners_.clear();
 }
 
 Result<void> SessionReader::take(v1::SessionResponse response) {
+  if (fault_) return tl::unexpected(*fault_);
   // An answer outside the order: its event is in the leaves, or was received before.
   if (response.index() == 0 && response.has_committed())
     return decided_(response.committed().cut().author_seq()), Result<void>{};
   if (response.index() == 0 && response.has_rejected())
     return decided_(response.rejected().author_seq()), Result<void>{};
-  if (response.index() == 0) return deliver(response);
+  if (response.index() == 0) return remember(deliver(response));
   const std::uint64_t index = response.index();
   entries_.insert(index, std::move(response));
   return pass_on();
 }
 
 Result<void> SessionReader::take(wire::IndexedEntry entry) {
+  if (fault_) return tl::unexpected(*fault_);
   // The stream sends what such an entry stands for.
   if (entry.entry.kind == wire::SessionEntryKind::streamed) return {};
   entries_.insert(entry.index, std::move(entry.entry));
@@ -62,8 +65,13 @@ Result<void> SessionReader::take(wire::IndexedEntry entry) {
 Result<void> SessionReader::pass_on() {
   while (const std::optional<Entry> entry = entries_.take())
     if (Result<void> delivered = std::visit([&](const auto& one) { return deliver(one); }, *entry); !delivered)
-      return delivered;
+      return remember(std::move(delivered));
   return {};
+}
+
+Result<void> SessionReader::remember(Result<void> delivered) {
+  if (!delivered) fault_ = delivered.error();
+  return delivered;
 }
 
 bool SessionReader::cuts(const Cut& cut) const {

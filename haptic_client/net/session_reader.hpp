@@ -28,10 +28,12 @@ class SessionReader {
   // A stream begins. Its leaves and log entries are counted anew. place() restarts too, because the server may have
   // lost the newest events of an earlier stream. What was acknowledged as durable stays: it reveals such a loss.
   void begin();
-  // Error: the server sent what no correct server sends; take nothing more from this stream.
+  // Error: the server sent what no correct server sends. It stays, and nothing more of this stream is passed on.
   [[nodiscard]] Result<void> take(v1::SessionResponse response);
   // A log entry of the fast path that belongs to the present stream, in any order. Error: as above.
   [[nodiscard]] Result<void> take(wire::IndexedEntry entry);
+  // That error, if there is one.
+  [[nodiscard]] const std::optional<Error>& fault() const { return fault_; }
   // Every log entry up to this one was passed on.
   [[nodiscard]] std::uint64_t taken() const { return entries_.acknowledged(); }
   // A partner's tool state that was received over the fast path.
@@ -45,6 +47,7 @@ class SessionReader {
  private:
   using Entry = std::variant<v1::SessionResponse, wire::SessionEntry>;
   [[nodiscard]] Result<void> pass_on();
+  [[nodiscard]] Result<void> remember(Result<void> delivered);
   [[nodiscard]] Result<void> deliver(const v1::SessionResponse& response);
   [[nodiscard]] Result<void> deliver(const wire::SessionEntry& entry);
   [[nodiscard]] bool cuts(const Cut& cut) const;  // with a tool that was sent
@@ -58,6 +61,7 @@ class SessionReader {
   const RoomCallbacks callbacks_;
   const std::function<void(std::uint64_t)> decided_, complete_;
   ReceiveWindow<Entry> entries_;
+  std::optional<Error> fault_;
   std::optional<wire::DurableSeq> kept_;
   RoomSeq seq_;
   bool supervised_ = false;  // restrictions of the present stream were passed on, before its leaves are complete

@@ -5,6 +5,7 @@
 
 #include "common/core/overloaded.hpp"
 #include "common/field/rejection.hpp"
+#include "common/tools/tool_file.hpp"
 #include "common/wire/bone_motion.hpp"
 #include "common/wire/convert.hpp"
 #include "haptic_client/net/cuts_underway.hpp"
@@ -352,9 +353,8 @@ TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
 TEST(SessionReader, ACutThatOvertakesItsToolWaitsForIt) {
   Heard heard;
   heard.reader.begin();
-  Tool wide = find_tool("burr-round-5").value();
+  Tool wide = edited(find_tool("burr-round-5").value(), "diameter_mm", 6.0).value();
   wide.name = "burr-wide";
-  wide.diameter_mm = 6.0;
   wire::IndexedEntry cut = fast(2, 11, 2, 1);
   cut.entry.cut.tool = wide.hash();
   ASSERT_TRUE(heard.reader.take(cut));
@@ -363,7 +363,8 @@ TEST(SessionReader, ACutThatOvertakesItsToolWaitsForIt) {
   tool.set_index(1);
   tool.mutable_tool()->set_room_seq(10);
   *tool.mutable_tool()->mutable_tool() = wire::to_wire(wide);
-  ASSERT_TRUE(heard.reader.take(tool));
+  const Result<void> taken = heard.reader.take(tool);
+  ASSERT_TRUE(taken) << taken.error().message;
   EXPECT_EQ(heard.events, std::vector<std::string>{"11 of 2"});
 }
 
@@ -372,12 +373,18 @@ TEST(SessionReader, RefusesWhatNoCorrectServerSends) {
   heard.reader.begin();
   v1::SessionResponse strange = entry(1, 10, 2, 1);
   strange.mutable_committed()->mutable_cut()->set_tool_hash(std::string(32, 'x'));
+  EXPECT_FALSE(heard.reader.fault());
   EXPECT_FALSE(heard.reader.take(strange));
+  EXPECT_TRUE(heard.reader.fault());
+  heard.reader.begin();
+  EXPECT_FALSE(heard.reader.fault());
   EXPECT_FALSE(heard.reader.take(v1::SessionResponse{}));
   heard.reader.begin();
   wire::IndexedEntry unknown = fast(1, 11, 2, 2);
   unknown.entry.cut.tool.bytes[0] ^= 1;
   EXPECT_FALSE(heard.reader.take(unknown)) << "its turn has come, but not its tool";
+  EXPECT_FALSE(heard.reader.take(entry(2, 12, 2, 3))) << "an entry before it is missing";
+  EXPECT_FALSE(heard.reader.take(fast(3, 13, 2, 4)));
   EXPECT_TRUE(heard.events.empty());
 }
 
