@@ -473,6 +473,14 @@ TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
   EXPECT_FALSE(rates.take("eve", kJoin, now));
 }
 
+TEST(CallRates, LetThroughTheReserveAndNoMoreAtOnce) {
+  constexpr const char* kJoin = "/osteon.v1.RoomService/Join";
+  CallRates rates;
+  int count = 0;
+  for (int i = 0; i < 1000; ++i) count += rates.take("eve", kJoin, CallRates::Time{}) ? 1 : 0;
+  EXPECT_EQ(count, find_call_rate(kJoin)->at_once);
+}
+
 TEST(CallRates, RememberNoMorePeopleThanTheirLimit) {
   CallRates rates;
   CallRates::Time now{};

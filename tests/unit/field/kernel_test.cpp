@@ -530,5 +530,13 @@ TEST(Cut, PosesSurviveQuantisationToHalfAQuantum) {
   EXPECT_LT(back.rotation.angularDistance(pose.rotation), 1e-4);
 }
 
+// q and -q are the same rotation. Two ends must hash and replay the same bytes for it.
+TEST(Cut, ARotationIsQuantisedInOneWay) {
+  const Pose pose = pose_along({12.3456, -7.8901, 100.0}, {0.3, 0.4, -0.8});
+  Pose same = pose;
+  same.rotation.coeffs() *= -1.0;
+  EXPECT_EQ(quantise(same), quantise(pose));
+}
+
 }  // namespace
 }  // namespace osteon

@@ -46,5 +46,19 @@ TEST(HuVolume, EnclosingBoxHoldsEveryCorner) {
       }
 }
 
+TEST(HuVolume, APartHasItsVoxelsAtTheirPlaces) {
+  HuVolume whole = oblique();
+  for (int i = 0; i < 10 * 20 * 30; ++i) whole.values.push_back(static_cast<std::int16_t>(i));
+  const std::array<int, 3> first{2, 0, 5}, last{7, 19, 5};
+  const HuVolume part = cropped(whole, first, last);
+  ASSERT_EQ(part.dims, (std::array<int, 3>{6, 20, 1}));
+  ASSERT_EQ(part.values.size(), 6u * 20u);
+  std::size_t at = 0;
+  for (int row = 0; row <= 19; ++row)
+    for (int column = 2; column <= 7; ++column, ++at)
+      EXPECT_EQ(part.values[at], column + 10 * (row + 20 * 5)) << column << " " << row;
+  EXPECT_LT((part.position_mm(Vec3(1, 2, 0)) - whole.position_mm(Vec3(3, 2, 5))).norm(), 1e-12);
+}
+
 }  // namespace
 }  // namespace osteon::imaging

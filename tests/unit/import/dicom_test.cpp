@@ -272,6 +272,12 @@ TEST_F(BrokenSeries, AnotherPixelSpacingInOneSlice) {
   expect_refused(series_.string(), "slice-0002.dcm has another pixel spacing");
 }
 
+// MONOCHROME1 counts from white.
+TEST_F(BrokenSeries, OtherColoursInOneSlice) {
+  set_tag(files_[1], 0x0028, 0x0004, "MONOCHROME1 ");
+  expect_refused(series_.string(), "slice-0002.dcm has other colours");
+}
+
 TEST_F(BrokenSeries, AnotherOrientationInOneSlice) {
   set_tag(files_[1], 0x0020, 0x0037, "1\\0\\0\\0\\0.8\\0.6");
   expect_refused(series_.string(), "slice-0002.dcm has another orientation");

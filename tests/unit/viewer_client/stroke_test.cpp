@@ -48,6 +48,13 @@ TEST(Stroke, ACircleIsPassedWithinTheToleranceAndOnlyAsFinelyAsAllowed) {
   EXPECT_EQ(fine.back(), coarse.back());
 }
 
+// The middle point lies on the line through both ends, but 5 mm before the first.
+TEST(Stroke, GoesWhereThePenTurnedBack) {
+  const std::vector<Vec3> points{{0, 0, 0}, {-5, 0, 0}, {10, 0, 0}};
+  EXPECT_EQ(simplified(points, 0.1).size(), 3u);
+  EXPECT_EQ(simplified({{0, 0, 0}, {5, 0, 0}, {10, 0, 0}}, 0.1).size(), 2u);
+}
+
 TEST(Stroke, AHandThatDoesNotMoveDrawsNothing) {
   Stroke stroke;
   EXPECT_TRUE(stroke.line(1024).empty());

@@ -75,6 +75,31 @@ TEST(CaseFromParts, IsTheCaseFromTheWholeVolume) {
   EXPECT_EQ(parts->density_g_cm3({60.0, 0.0, 0.0}), 0.0);
 }
 
+// A quantum is 1/1024 mm.
+TEST(CaseFromParts, DistancesAreRoundedToTheNearestQuantum) {
+  Ball ball;
+  const CoordBox box = ball.box();
+  const auto bone = Case::build(info_of(ball.pitch_mm), box,
+                                [&](const CoordBox& part, PartSamples& to) { return ball.fill(part, to); });
+  ASSERT_TRUE(bone);
+  const Coord dims = box.dims();
+  std::vector<float> stored(static_cast<std::size_t>(dims.x) * static_cast<std::size_t>(dims.y * dims.z));
+  bone->gather_surface(box, stored);
+  double worst_mm = 0.0;
+  int compared = 0;
+  std::size_t i = 0;
+  for (std::int32_t x = box.min.x; x <= box.max.x; ++x)
+    for (std::int32_t y = box.min.y; y <= box.max.y; ++y)
+      for (std::int32_t z = box.min.z; z <= box.max.z; ++z, ++i) {
+        const double wanted = ball.distance_mm(position_mm({x, y, z}, ball.pitch_mm));
+        if (std::abs(wanted) > 1.0) continue;
+        worst_mm = std::max(worst_mm, std::abs(static_cast<double>(stored[i]) - wanted));
+        ++compared;
+      }
+  EXPECT_GT(compared, 1000);
+  EXPECT_LE(worst_mm, 0.5 / 1024.0 + 1e-5);
+}
+
 TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
   // Twice the size has eight times the volume and four times the surface.
   Ball small{.radius_mm = 20.0}, large{.radius_mm = 40.0};

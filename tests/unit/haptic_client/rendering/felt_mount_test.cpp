@@ -285,7 +285,9 @@ TEST(FeltMount, TurnsUnderSlackWithoutIt) {
     const Vec3 moved_mm = run(angle, 20) - tip_mm;
     // It slides a little on a tilting face, and the hand yields. Otherwise the slack would carry it by its whole
     // length.
-    if (angle > 0.01) ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.coupling.offset_mm.norm()) << angle;
+    if (angle > 0.01) {
+      ASSERT_LE(moved_mm.norm(), 0.5 * angle * user.last.coupling.offset_mm.norm()) << angle;
+    }
   }
   EXPECT_GT(user.force_n(), 0.9 * before_n);
   EXPECT_GT(std::abs(given_mj), 1.0);

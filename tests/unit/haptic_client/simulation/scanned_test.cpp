@@ -17,7 +17,7 @@ Case scanned_block() {
   auto volume = import::scan_phantom(slab, 0.5, keep_going);
   EXPECT_TRUE(volume);
   volume->origin_mm.z() += 30.0;
-  auto made = import::import_ct({std::move(*volume), "phantom"}, {}, keep_going);
+  auto made = import::import_ct({std::move(*volume), "phantom", {}}, {}, keep_going);
   EXPECT_TRUE(made) << made.error().message;
   return std::move(*made->bone);
 }
