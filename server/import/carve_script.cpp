@@ -33,7 +33,7 @@ Vec3 vector_of(const YAML::Node& node, const char* field) {
 }
 
 Vec3 place_of(const YAML::Node& node, const char* field) {
-  const Vec3 at = vector_of(node, field);
+  Vec3 at = vector_of(node, field);
   if (at.cwiseAbs().maxCoeff() > kFarthest_mm)
     throw Wrong{std::string(field) + " is more than a metre from the origin"};
   return at;
