@@ -523,6 +523,14 @@ TEST(FieldHash, LeavesAtTheBandCountAsAbsent) {
   EXPECT_NE(field_hash({cut}, kPitch), field_hash({elsewhere}, kPitch));
 }
 
+TEST(Cut, OneRotationHasOneSetOfBytes) {
+  const Pose pose = pose_along({1, 2, 3}, {0.3, 0.4, -0.8});
+  Pose same = pose;
+  same.rotation.coeffs() *= -1.0;
+  EXPECT_EQ(quantise(same), quantise(pose));
+  EXPECT_GE(quantise(same).rotation[3], 0);
+}
+
 TEST(Cut, PosesSurviveQuantisationToHalfAQuantum) {
   const Pose pose = pose_along({12.3456, -7.8901, 100.0}, {0.3, 0.4, -0.8});
   const Pose back = dequantise(quantise(pose));

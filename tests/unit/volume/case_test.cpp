@@ -89,6 +89,22 @@ TEST(CaseFromParts, MemoryFollowsTheSurfaceNotTheVolume) {
   EXPECT_LT(build(large), 5.0 * build(small));
 }
 
+TEST(CaseFromParts, DistancesAreThoseOfTheNearestQuantum) {
+  constexpr double kQuantum_mm = 1.0 / 1024.0, kPitch_mm = 0.5;
+  const CoordBox box{{0, 0, 0}, {7, 7, 7}};
+  const double wanted[] = {-1.6, -1.4, -0.6, -0.4, 0.4, 0.6, 1.4, 1.6};  // quanta
+  DenseVolume<float> surface(box, 0.0f);
+  const DenseVolume<float> density(box, 1.0f);
+  for (std::int32_t x = 0; x < 8; ++x)
+    for (std::int32_t y = 0; y < 8; ++y)
+      for (std::int32_t z = 0; z < 8; ++z) surface.at({x, y, z}) = static_cast<float>(wanted[z] * kQuantum_mm);
+  const auto bone = Case::build(info_of(kPitch_mm), surface, density);
+  ASSERT_TRUE(bone) << bone.error().message;
+  for (std::int32_t z = 0; z < 8; ++z)
+    EXPECT_DOUBLE_EQ(bone->surface_mm(position_mm({3, 4, z}, kPitch_mm)), std::round(wanted[z]) * kQuantum_mm)
+        << wanted[z] << " quanta";
+}
+
 TEST(CaseFromParts, StopsWhenAskedAndRefusesWhatIsNoNumber) {
   Ball ball;
   const auto fill = [&](const CoordBox& part, PartSamples& to) { return ball.fill(part, to); };
