@@ -248,6 +248,7 @@ TEST_F(RoomServerTest, VersionsMustAgree) {
 class RawSession {
  public:
   explicit RawSession(const std::string& address) : room(join(address, wire::ClientKind::haptic)) {
+    context_.set_deadline(std::chrono::system_clock::now() + kPatience);
     stream_ = v1::CuttingService::NewStub(room.channel)->Session(&context_);
   }
   void open() {

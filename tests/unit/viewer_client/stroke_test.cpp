@@ -27,6 +27,16 @@ TEST(Stroke, PointsAreAMillimetreApartAndKeepTheirCorners) {
   EXPECT_LT((line[1] - Vec3(10, 0, 0)).norm(), Stroke::kApart_mm);
 }
 
+TEST(Stroke, KeepsTheTurnOfAHandThatComesBackOnItsOwnLine) {
+  Stroke stroke;
+  for (int i = 0; i <= 300; ++i) stroke.add(Vec3(0.1 * i, 0, 0));
+  for (int i = 300; i >= 200; --i) stroke.add(Vec3(0.1 * i, 0, 0));
+  const auto line = stroke.line(1024);
+  ASSERT_EQ(line.size(), 3u);
+  EXPECT_NEAR(line[1].x(), 30.0, Stroke::kApart_mm) << "beyond both ends";
+  EXPECT_NEAR(line[2].x(), 20.0, 1e-9);
+}
+
 TEST(Stroke, ACircleIsPassedWithinTheToleranceAndOnlyAsFinelyAsAllowed) {
   Stroke stroke;
   const double radius_mm = 20.0;
