@@ -9,6 +9,7 @@ Exit code: 0 if every mutation is caught, 1 if one is not, 2 for a wrong call, 1
 """
 import argparse
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -115,9 +116,16 @@ class Copy:
             return False
         return self.run(["cmake", "--build", str(build), "-j", str(self.jobs), "--target", target], self.tree) == 0
 
-    def passes(self, target, test_filter):
-        program = self.tree / "build/dev/bin" / target
-        return self.run([str(program), f"--gtest_filter={test_filter}"], self.tree / "build/dev", self.seconds) == 0
+    def failure(self, target, test_filter):
+        """The first test that fails, or how the program ended without one. Empty: all tests pass."""
+        program, begin = self.tree / "build/dev/bin" / target, self.log.stat().st_size
+        code = self.run([str(program), f"--gtest_filter={test_filter}"], self.tree / "build/dev", self.seconds)
+        if code == 0:
+            return ""
+        failed = re.search(rb"^\[  FAILED  \] ([^\s,]+)", self.log.read_bytes()[begin:], re.MULTILINE)
+        if failed:
+            return failed[1].decode()
+        return f"no end within {self.seconds:.0f} s" if code is None else f"exit code {code}"
 
     def has_tests(self, target, test_filter):
         program = self.tree / "build/dev/bin" / target
@@ -127,40 +135,41 @@ class Copy:
 
 
 def judge(mutation, copy, sound):
-    """Verdict on one mutation. `sound`: what is known of tests on the sources as they are."""
+    """Verdict on one mutation, and what noticed it. `sound`: what is known of tests on the sources as they are."""
     key = (mutation.target, mutation.filter)
     if key not in sound:
         # A test that fails anyway, or that is not there, would prove nothing.
-        sound[key] = copy.build(mutation.target) and copy.has_tests(*key) and copy.passes(*key)
+        sound[key] = copy.build(mutation.target) and copy.has_tests(*key) and not copy.failure(*key)
     if not sound[key]:
-        return WRONG
+        return WRONG, ""
     with Mutated(mutation, copy.tree):
         if not copy.build(mutation.target):
-            return BROKEN
-        if not copy.passes(*key):
-            return CAUGHT
-    return EQUIVALENT if mutation.equivalent else SURVIVED
+            return BROKEN, ""
+        if by := copy.failure(*key):
+            return CAUGHT, by
+    return (EQUIVALENT if mutation.equivalent else SURVIVED), ""
 
 
 def judge_all(chosen, copy, say):
-    """Verdicts by number. After Ctrl-C, those so far."""
-    verdicts, sound, complete = {}, {}, False
+    """Verdicts and what noticed, by number. After Ctrl-C, those so far."""
+    verdicts, by, sound, complete = {}, {}, {}, False
     try:
         for place, (number, mutation) in enumerate(chosen, 1):
             begun = time.monotonic()
             say(f"[{place}/{len(chosen)}] {number}: {mutation.file}: {mutation.breaks}")
-            verdicts[number] = judge(mutation, copy, sound)
-            say(f"[{place}/{len(chosen)}] {number}: {verdicts[number]} after {time.monotonic() - begun:.0f} s")
+            verdicts[number], by[number] = judge(mutation, copy, sound)
+            noticed = f" by {by[number]}" if by[number] else ""
+            say(f"[{place}/{len(chosen)}] {number}: {verdicts[number]}{noticed} after {time.monotonic() - begun:.0f} s")
         complete = True
     except KeyboardInterrupt:
         say("stopped; the sources are as before")
-    return verdicts, complete
+    return verdicts, by, complete
 
 
-def table(chosen, verdicts):
-    rows = [(str(n), verdicts.get(n, "not run"), m.file, m.breaks) for n, m in chosen]
-    widths = [max(len(row[i]) for row in rows) for i in range(3)]
-    lines = ["  ".join([*(row[i].ljust(widths[i]) for i in range(3)), row[3]]) for row in rows]
+def table(chosen, verdicts, by):
+    rows = [(str(n), verdicts.get(n, "not run"), m.file, m.breaks, by.get(n, "")) for n, m in chosen]
+    widths = [max(len(row[i]) for row in rows) for i in range(5)]
+    lines = ["  ".join(row[i].ljust(widths[i]) for i in range(5)).rstrip() for row in rows]
     counts = {v: list(verdicts.values()).count(v) for v in dict.fromkeys(verdicts.values())}
     return "\n".join([*lines, ", ".join(f"{count} {verdict}" for verdict, count in counts.items())])
 
@@ -199,8 +208,8 @@ def main(mutations, given=None, root=ROOT, make_copy=Copy):
     except KeyboardInterrupt:
         print("stopped while copying")
         return 130
-    verdicts, complete = judge_all(chosen, copy, lambda line: print(line, flush=True))
-    print(table(chosen, verdicts))
+    verdicts, by, complete = judge_all(chosen, copy, lambda line: print(line, flush=True))
+    print(table(chosen, verdicts, by))
     if not complete:
         return 130
     return 0 if all(v in GOOD for v in verdicts.values()) else 1

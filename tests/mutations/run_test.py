@@ -42,8 +42,8 @@ class FakeCopy:
     def has_tests(self, *_):
         return self.tests
 
-    def passes(self, *_):
-        return self.wanted in self.text()
+    def failure(self, *_):
+        return "" if self.wanted in self.text() else "Twice.IsTwice"
 
 
 class Runner(unittest.TestCase):
@@ -68,6 +68,7 @@ class Runner(unittest.TestCase):
         code, said = self.main([mutation()])
         self.assertEqual(code, 0)
         self.assertIn("1 caught", said)
+        self.assertEqual(said.count("Twice.IsTwice"), 2)  # at once, and in the table
         self.expect_restored()
 
     def test_one_that_survives_fails_the_run(self):
@@ -136,6 +137,23 @@ class Copies(unittest.TestCase):
             copy = run.Copy(Path(folder), Path(folder) / "tree", 1, 1.0)
             self.assertIsNone(copy.run(["sleep", "1000"], folder, 0.2))
             self.assertEqual(copy.run(["false"], folder, 60.0), 1)
+
+    def test_names_the_test_that_fails_first(self):
+        ended = {
+            "echo '[  FAILED  ] Room/Cut.Is/1, where x'; echo '[  FAILED  ] Later.One'; exit 1": "Room/Cut.Is/1",
+            "exit 3": "exit code 3",
+            "sleep 1000": "no end within 1 s",
+            "echo '[  PASSED  ] 1 test.'": "",
+        }
+        for script, expected in ended.items():
+            with tempfile.TemporaryDirectory() as folder:
+                copy = run.Copy(Path(folder), Path(folder) / "tree", 1, 1.0)
+                program = copy.tree / "build/dev/bin/unit"
+                program.parent.mkdir(parents=True)
+                program.write_text(f"#!/bin/sh\n{script}\n")
+                program.chmod(0o755)
+                copy.log.write_text("[  FAILED  ] Of.AnEarlierRun\n")
+                self.assertEqual(copy.failure("unit", "*"), expected)
 
     def test_a_copy_keeps_the_times_of_what_did_not_change(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -121,17 +121,26 @@ TEST(Ticket, IsRefusedAfterAnyChangeOfABit) {
     }
 }
 
-// libsodium reads every byte from 0x80 on as '_'. So a text with such bytes would be a second one of the same ticket.
-TEST(Ticket, HasOneTextOnly) {
-  std::string text;
-  while (text.find('_') == std::string::npos) text = sign_ticket(a_ticket(), key());
-  for (std::size_t i = 0; i < text.size(); ++i)
-    for (int byte = 0; byte < 256; ++byte) {
-      std::string changed = text;
-      changed[i] = static_cast<char>(byte);
-      if (changed == text) continue;
-      EXPECT_FALSE(open_ticket(changed, check_key())) << "character " << i << ", byte " << byte;
-    }
+// Whoever compares texts of tickets must not be shown one ticket in two of them. The base64 library reads some bytes
+// that are not base64 as if they were.
+TEST(Ticket, HasOneText) {
+  std::string of_all_digits;  // its base64 has each of the 64 digits
+  for (unsigned digit = 0; digit < 64; digit += 4) {
+    const unsigned group = digit << 18 | (digit + 1) << 12 | (digit + 2) << 6 | (digit + 3);
+    for (const int shift : {16, 8, 0}) of_all_digits += static_cast<char>(group >> shift & 0xff);
+  }
+  const std::string body = contents(3, "ward", "eve");
+  // The id has 16 bytes, so three tickets have all the digits.
+  for (std::size_t part = 0; part < of_all_digits.size(); part += 16) {
+    const std::string text = signed_text(of_all_digits.substr(part, 16) + body.substr(16));
+    ASSERT_TRUE(open_ticket(text, check_key()));
+    for (std::size_t i = 0; i < text.size(); ++i)
+      for (int byte = 0x80; byte <= 0xff; ++byte) {
+        std::string changed = text;
+        changed[i] = static_cast<char>(byte);
+        EXPECT_FALSE(open_ticket(changed, check_key())) << "character " << i << " as " << byte;
+      }
+  }
 }
 
 TEST(Ticket, IsRefusedWhenCutOrLengthened) {

@@ -473,12 +473,24 @@ TEST(CallRates, LetThroughAsManyAsTheTimeAllows) {
   EXPECT_FALSE(rates.take("eve", kJoin, now));
 }
 
-TEST(CallRates, LetThroughTheReserveAndNoMoreAtOnce) {
-  constexpr const char* kJoin = "/osteon.v1.RoomService/Join";
-  CallRates rates;
-  int count = 0;
-  for (int i = 0; i < 1000; ++i) count += rates.take("eve", kJoin, CallRates::Time{}) ? 1 : 0;
-  EXPECT_EQ(count, find_call_rate(kJoin)->at_once);
+TEST(CallRates, AReserveHasItsCallsAndNotOneMore) {
+  for (const char* method : {"/osteon.v1.RoomService/Join", "/osteon.v1.PeopleService/Say"}) {
+    const CallRate* rate = find_call_rate(method);
+    ASSERT_NE(rate, nullptr);
+    CallRates rates;
+    CallRates::Time now{};
+    const auto through = [&] {
+      int count = 0;
+      while (rates.take("eve", method, now)) ++count;
+      return count;
+    };
+    EXPECT_EQ(through(), rate->at_once) << method;
+    EXPECT_EQ(through(), 0) << "the reserve is spent";
+    now += 1s;
+    EXPECT_EQ(through(), rate->per_second) << method;
+    now += 1h;
+    EXPECT_EQ(through(), rate->at_once) << "a pause fills it, and no more";
+  }
 }
 
 TEST(CallRates, RememberNoMorePeopleThanTheirLimit) {

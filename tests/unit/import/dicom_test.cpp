@@ -272,15 +272,29 @@ TEST_F(BrokenSeries, AnotherPixelSpacingInOneSlice) {
   expect_refused(series_.string(), "slice-0002.dcm has another pixel spacing");
 }
 
-// MONOCHROME1 counts from white.
-TEST_F(BrokenSeries, OtherColoursInOneSlice) {
-  set_tag(files_[1], 0x0028, 0x0004, "MONOCHROME1 ");
-  expect_refused(series_.string(), "slice-0002.dcm has other colours");
-}
-
 TEST_F(BrokenSeries, AnotherOrientationInOneSlice) {
   set_tag(files_[1], 0x0020, 0x0037, "1\\0\\0\\0\\0.8\\0.6");
   expect_refused(series_.string(), "slice-0002.dcm has another orientation");
+}
+
+TEST_F(BrokenSeries, OtherColoursInOneSlice) {
+  set_tag(files_[1], 0x0028, 0x0004, "MONOCHROME1");
+  expect_refused(series_.string(), "slice-0002.dcm has other colours");
+}
+
+// Some workstations put coloured pictures into the series of the slices that they show.
+TEST_F(BrokenSeries, ColouredPicturesOfSlicesAreLeftOut) {
+  const auto before = read_dicom_series(series_, keep_going);
+  ASSERT_TRUE(before);
+  for (std::size_t i : {1u, 2u, 3u}) {
+    const fs::path picture = series_ / ("z-" + std::to_string(i) + ".dcm");
+    fs::copy_file(files_[i], picture);
+    set_tag(picture, 0x0008, 0x0018, "1.2.3.4." + std::to_string(i));
+    set_tag(picture, 0x0028, 0x0004, "PALETTE COLOR");
+  }
+  const auto scan = read_dicom_series(series_, keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  expect_same(scan->volume, before->volume);
 }
 
 TEST(DicomSeriesFolder, ThatIsNotThere) {

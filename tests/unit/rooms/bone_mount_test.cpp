@@ -79,6 +79,23 @@ TEST(MountInARoom, APushMovesTheBoneOfAll) {
   EXPECT_LT(room.sessions[1]->seen_.back().shift.place_mm.norm(), 0.01 * expected_mm);
 }
 
+// After the machine stood still, for ten seconds or for a tenth of one, the bone goes on from where it was.
+TEST(MountInARoom, LosesTheTimeInWhichTheMachineStoodStill) {
+  const auto after = [](std::chrono::nanoseconds pause) {
+    Pair room(true);
+    room.tick(20);
+    for (int i = 0; i < 5; ++i) {
+      room.push(room.sessions[0], {{10.0, 0, 0}, Vec3::Zero()});
+      room.tick();
+    }
+    room.runtime.tick(room.now += pause);
+    return room.sessions[1]->seen_.back().shift.place_mm;
+  };
+  const Vec3 place_mm = after(100ms);
+  EXPECT_GT(place_mm.norm(), 0.0);
+  EXPECT_EQ(after(10s), place_mm);
+}
+
 TEST(MountInARoom, GrantsWhatTheOtherGives) {
   Pair room(true);
   room.push(room.sessions[0], {}, 5.0);

@@ -248,6 +248,7 @@ TEST_F(RoomServerTest, VersionsMustAgree) {
 class RawSession {
  public:
   explicit RawSession(const std::string& address) : room(join(address, wire::ClientKind::haptic)) {
+    context_.set_deadline(std::chrono::system_clock::now() + kPatience);
     stream_ = v1::CuttingService::NewStub(room.channel)->Session(&context_);
   }
   void open() {
@@ -257,6 +258,7 @@ class RawSession {
     write(request);
   }
   void write(const v1::SessionRequest& request) { stream_->Write(request); }
+  void finish_writing() { stream_->WritesDone(); }
   grpc::Status status() {
     v1::SessionResponse ignored;
     while (stream_->Read(&ignored)) {
@@ -312,6 +314,23 @@ TEST_F(RoomServerTest, MalformedRequestsAreRefusedByTheNameOfTheirField) {
   const auto hand = surgeon();
   send(*hand, strokes(hand->author(), 1, 9));
   EXPECT_TRUE(wait_until([&] { return hand->own() == 1; }, kPatience)) << "the server goes on";
+}
+
+// The other has joined too, so the room itself would take the cut.
+TEST_F(RoomServerTest, NobodyCutsInAnothersName) {
+  const wire::JoinedRoom other = join(address(), wire::ClientKind::haptic);
+  RawSession session(address());
+  session.open();
+  Cut cut = strokes(other.author, 1, 8).front();
+  cut.lease_epoch = other.lease_epoch;
+  v1::SessionRequest request;
+  *request.mutable_cut() = wire::to_wire(cut);
+  session.write(request);
+  session.finish_writing();
+  const grpc::Status status = session.status();
+  EXPECT_EQ(status.error_code(), grpc::StatusCode::INVALID_ARGUMENT);
+  EXPECT_NE(status.error_message().find("cut.author"), std::string::npos) << status.error_message();
+  EXPECT_EQ(server_->health().counts.committed, 0u);
 }
 
 TEST_F(RoomServerTest, ACutSentAgainIsAnsweredWithItsFirstSequenceNumber) {

@@ -35,9 +35,9 @@ TEST(Levels, SineOfFullScaleIsThreeDecibelsBelow) {
   EXPECT_NEAR(peak(sine(1000, 0.5, 48000)), 0.5, 1e-6);
 }
 
-TEST(Levels, ThePeakIsTheLargestOfEitherSign) {
+TEST(Levels, APeakBelowZeroCountsAsOneAbove) {
   EXPECT_EQ(peak(std::vector<float>{0.25F, -0.75F, 0.5F}), 0.75);
-  EXPECT_EQ(peak(std::vector<float>{0.25F, -0.5F, 0.75F}), 0.75);
+  EXPECT_EQ(peak(std::vector<float>{-0.5F}), 0.5);
 }
 
 TEST(Levels, SilenceHasTheLowestLevelAndNoBrightness) {
