@@ -62,22 +62,6 @@ TEST(HeldLocks, RefuseWhatIsNotHeld) {
   EXPECT_DEATH(held.expect_held(LockRank::room), "does not hold room");
 }
 
-TEST(Mutex, ChecksTheOrderInCheckedBuilds) {
-  if (!core::kCheckLockOrder) GTEST_SKIP() << "built without OSTEON_CHECK_LOCK_ORDER";
-  Mutex leaf(LockRank::leaf);
-  SharedMutex room(LockRank::room);
-  {
-    const ReaderLock reading(room);
-    const MutexLock lock(leaf);
-  }
-  EXPECT_DEATH(
-      {
-        const MutexLock lock(leaf);
-        const WriterLock writing(room);
-      },
-      "taking room .* while leaf .* is held");
-}
-
 TEST(Mutex, IsTakenByOneThreadAtATime) {
   Mutex mutex(LockRank::leaf);
   int count = 0;
