@@ -34,7 +34,7 @@ SessionReader::SessionReader(AuthorId own, std::shared_ptr<ToolBox> tools, RoomC
       complete_(std::move(complete)) {}
 
 void SessionReader::begin() {
-  entries_ = ReceiveWindow<Entry>();
+  entries_ = ReceiveWindow<Entry>(1, kMostAhead);
   fault_.reset();
   seq_ = {};
   supervised_ = false;

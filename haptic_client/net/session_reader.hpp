@@ -60,7 +60,11 @@ class SessionReader {
   const std::shared_ptr<ToolBox> tools_;  // shared with the replica's fields
   const RoomCallbacks callbacks_;
   const std::function<void(std::uint64_t)> decided_, complete_;
-  ReceiveWindow<Entry> entries_;
+  // The fast path acknowledges entries as they arrive, and hands them over later: those of 64 datagrams, some hundreds
+  // in each. Meanwhile the stream skips them and may be as far ahead. What it then delivers comes only once, so it must
+  // fit.
+  static constexpr std::uint64_t kMostAhead = 1 << 16;
+  ReceiveWindow<Entry> entries_{1, kMostAhead};
   std::optional<Error> fault_;
   std::optional<wire::DurableSeq> kept_;
   RoomSeq seq_;

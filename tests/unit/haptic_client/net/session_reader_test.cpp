@@ -349,6 +349,17 @@ TEST(SessionReader, AnswersOutsideTheOrderOnlySayWhatIsDecided) {
   EXPECT_EQ(heard.decided, (std::vector<std::uint64_t>{3, 4}));
 }
 
+// The stream skips what datagrams have brought. Its next entry may overtake thousands that are still handed over.
+TEST(SessionReader, TheStreamMayOvertakeAllThatDatagramsHaveBrought) {
+  constexpr std::uint64_t kByDatagram = 20000;
+  Heard heard;
+  heard.reader.begin();
+  ASSERT_TRUE(heard.reader.take(entry(kByDatagram + 1, kByDatagram + 1, 2, kByDatagram + 1)));
+  for (std::uint64_t n = 1; n <= kByDatagram; ++n) ASSERT_TRUE(heard.reader.take(fast(n, n, 2, n)));
+  EXPECT_EQ(heard.reader.taken(), kByDatagram + 1);
+  EXPECT_EQ(heard.events.size(), kByDatagram + 1);
+}
+
 // Datagrams overtake the stream. A cut waits for the message that brings its tool.
 TEST(SessionReader, ACutThatOvertakesItsToolWaitsForIt) {
   Heard heard;
