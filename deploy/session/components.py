@@ -1,7 +1,8 @@
 """Prints the components of Debian packages as CycloneDX 1.5: the packages, and those that they need to run.
 
 components.py FILE.deb...   The needed ones are those that apt would install on an empty Debian, without recommended
-packages, by the lists of this machine. SOURCE_DATE_EPOCH is the time in the result. The same input gives the same bytes.
+packages, by the lists of this machine. SOURCE_DATE_EPOCH is the time in the result. The same input gives the same
+bytes.
 """
 import datetime
 import hashlib
@@ -84,7 +85,8 @@ def main():
         "version": 1,
         "metadata": {
             "timestamp": date.strftime("%Y-%m-%dT%H:%M:%SZ"),
-            "component": {"type": "application", "bom-ref": "osteon", "name": "osteon", "version": own[0][0]["Version"]},
+            "component": {"type": "application", "bom-ref": "osteon", "name": "osteon",
+                          "version": own[0][0]["Version"]},
         },
         "components": [component for _, component in own] + others,
         "dependencies": [{"ref": "osteon", "dependsOn": [component["bom-ref"] for _, component in own]}] +
