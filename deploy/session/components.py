@@ -57,6 +57,14 @@ def needed(files):
             in re.findall(r"^Inst (\S+) \((\S+) .*\[(\w+)\]\)", plan, re.M)}
 
 
+def provided(packages):
+    """Name of each virtual package -> the one of `packages`, as by needed(), that provides it."""
+    text = said("apt-cache", "show", *(f"{name}={version}" for name, (version, _) in sorted(packages.items())))
+    return {re.sub(r"[:\s(].*", "", name.strip()): about["Package"]
+            for about in map(fields, text.split("\n\n")) if "Provides" in about
+            for name in about["Provides"].split(",")}
+
+
 def depends(about, known):
     """The references of its dependencies: of alternatives, the first that is there."""
     found = set()
@@ -71,13 +79,15 @@ def main():
     if not files:
         sys.exit("components.py: give the files of the packages")
     own = [own_component(file) for file in files]
+    foreign = needed(files)
+    for about, _ in own:
+        foreign.pop(about["Package"], None)
     others = []
-    for name, (version, architecture) in sorted(needed(files).items()):
-        if name not in {about["Package"] for about, _ in own}:
-            reference = purl(name, version, architecture, "debian")
-            others.append({"type": "library", "bom-ref": reference, "name": name, "version": version,
-                           "purl": reference})
+    for name, (version, architecture) in sorted(foreign.items()):
+        reference = purl(name, version, architecture, "debian")
+        others.append({"type": "library", "bom-ref": reference, "name": name, "version": version, "purl": reference})
     known = {component["name"]: component["bom-ref"] for component in [*(c for _, c in own), *others]}
+    known = {virtual: known[name] for virtual, name in provided(foreign).items()} | known
     date = datetime.datetime.fromtimestamp(int(os.environ.get("SOURCE_DATE_EPOCH", "0")), datetime.timezone.utc)
     bill = {
         "bomFormat": "CycloneDX",
