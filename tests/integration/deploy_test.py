@@ -120,7 +120,8 @@ class Packages(unittest.TestCase):
         self.assertEqual(components.purl("libstdc++6", "1:12.2~rc1+deb12", "amd64", "debian"),
                          "pkg:deb/debian/libstdc%2B%2B6@1%3A12.2~rc1%2Bdeb12?arch=amd64")
         known = {"libc6": "c", "libx2": "x"}
-        self.assertEqual(components.depends({"Depends": "libx1 | libx2, libc6 (>= 2.36), other:any"}, known), ["c", "x"])
+        about = {"Depends": "libx1 | libx2, libc6 (>= 2.36), other:any"}
+        self.assertEqual(components.depends(about, known), ["c", "x"])
 
 
 class TwoDemos(unittest.TestCase):
