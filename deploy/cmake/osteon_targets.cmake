@@ -1,7 +1,7 @@
 # Declares every Osteon target in one way: one library per folder, sources listed, headers in a FILE_SET.
 #
 #   osteon_library(tools SOURCES drill.cpp HEADERS drill.hpp DEPS osteon::geometry)
-#   osteon_program(osteon-server SOURCES main.cpp DEPS osteon::room)
+#   osteon_program(osteon-server PACKAGE osteon-server SOURCES main.cpp DEPS osteon::room)
 #   osteon_test(unit.field SOURCES kernel_test.cpp DEPS osteon::field)
 
 set(CMAKE_CXX_STANDARD 20)
@@ -47,10 +47,14 @@ function(osteon_library name)
   target_link_libraries(${target} ${scope} osteon_flags ${arg_DEPS})
 endfunction()
 
+# PACKAGE: the component of `cmake --install` and the Debian package. Programs without one are not installed.
 function(osteon_program name)
-  cmake_parse_arguments(arg "" "" "SOURCES;DEPS" ${ARGN})
+  cmake_parse_arguments(arg "" "PACKAGE" "SOURCES;DEPS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE osteon_flags ${arg_DEPS})
+  if(arg_PACKAGE)
+    osteon_install_program(${name} ${arg_PACKAGE})
+  endif()
 endfunction()
 
 # A GoogleTest program. Each of its cases is registered with ctest. LABELS name the kind of test.

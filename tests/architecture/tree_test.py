@@ -6,6 +6,7 @@ import subprocess
 import unittest
 from pathlib import Path
 
+import packages
 import references
 import style
 import tree
@@ -109,6 +110,31 @@ class TheStyle(unittest.TestCase):
         said = subprocess.run(["clang-format", "--dry-run", "-Werror", "--style=file", *files], capture_output=True,
                               text=True, check=False)
         self.assertEqual(said.returncode, 0, said.stderr[:4000])
+
+
+class ThePackages(unittest.TestCase):
+    def setUp(self):
+        self.debian = ROOT / "deploy/debian"
+        self.control = (self.debian / "control").read_text(encoding="utf-8")
+
+    def test_each_program_is_in_one(self):
+        files = (f for folder in tree.PROGRAMS for f in (ROOT / folder).rglob("CMakeLists.txt"))
+        found = packages.programs([f.read_text(encoding="utf-8") for f in files])
+        self.assertGreater(len(found), 4)
+        lists = {name: (self.debian / f"{name}.install").read_text(encoding="utf-8")
+                 for name in packages.packages(self.control)}
+        self.assertEqual(packages.install_faults(found, lists, (ROOT / "deploy/completion.bash").read_text(),
+                                                 (ROOT / "deploy/man").read_text()), [])
+
+    def test_each_list_belongs_to_one(self):
+        # PACKAGE.install, PACKAGE.docs and so on; debhelper ignores others without a word.
+        of_packages = {f.name.rpartition(".")[0] for f in self.debian.glob("*.*") if f.is_file()}
+        self.assertEqual(of_packages - set(packages.packages(self.control)), set())
+
+    def test_what_they_need_is_installed(self):
+        needed = set(packages.build_dependencies(self.control)) - {"debhelper-compat"}  # of debhelper itself
+        self.assertGreater(len(needed), 20)
+        self.assertEqual(needed - packages.listed_packages((ROOT / "deploy/packages.txt").read_text()), set())
 
 
 class TheRules(unittest.TestCase):
@@ -225,6 +251,21 @@ class TheRules(unittest.TestCase):
         self.assertTrue(faults("// as in §5.4"))
         self.assertFalse(faults("// Chi 2005, §2"))
         self.assertTrue(faults("// DESIGN section 5"))
+
+    def test_a_program_that_no_package_has_is_noticed(self):
+        found = packages.programs(["osteon_program(osteon-new\n  PACKAGE osteon\n  SOURCES main.cpp)\n"])
+        self.assertEqual(found, {"osteon-new": "osteon"})
+        complete = "usr/bin/osteon-new\nusr/share/man/man1/osteon-new*.1\n" \
+                   "usr/share/bash-completion/completions/osteon-new\n"
+        texts = ("complete -F _osteon osteon-new\n", "for program in osteon-new; do\n")
+        self.assertFalse(packages.install_faults(found, {"osteon": complete}, *texts))
+        for line in complete.splitlines():
+            self.assertTrue(packages.install_faults(found, {"osteon": complete.replace(line, "x")}, *texts), line)
+        self.assertTrue(packages.install_faults(found, {"osteon": complete}, texts[0], "for program in other; do\n"))
+        self.assertTrue(packages.install_faults(packages.programs(["osteon_program(a SOURCES b.cpp)"]),
+                                                {"osteon": complete}, *texts))
+        self.assertEqual(packages.build_dependencies("Build-Depends:\n cmake (>= 3),\n libx-dev,\nX: y\n z\n"),
+                         ["cmake", "libx-dev"])
 
     def test_style(self):
         wide = "x" * 121

@@ -12,7 +12,8 @@ from pathlib import Path
 ROOT = Path(os.environ["OSTEON_SOURCE_DIR"])
 sys.path.insert(0, str(ROOT / "deploy/session"))
 
-import demo  # noqa: E402  (found through the path above)
+import components  # noqa: E402  (found through the path above)
+import demo  # noqa: E402
 
 PRESETS = """{
   "version": 5,
@@ -82,6 +83,45 @@ class Secrets(unittest.TestCase):
                 self.assertEqual(ignored.returncode, 0, name)
             kept = ended(["git", "-C", folder, "check-ignore", "-q", "deploy/certs"])
             self.assertEqual(kept.returncode, 1, "the script of that name belongs to the project")
+
+
+class Packages(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.checkout = Path(folder.name).resolve() / "osteon"
+        (self.checkout / "deploy").mkdir(parents=True)
+        for name in ("package", "environment.sh"):
+            shutil.copy(ROOT / "deploy" / name, self.checkout / "deploy")
+
+    def refused(self, *options, **more):
+        tried = ended([self.checkout / "deploy/package", *options], **more)
+        self.assertEqual(tried.returncode, 1)
+        self.assertEqual(tried.stdout, "")
+        self.assertEqual(tried.stderr.count("\n"), 1, tried.stderr)
+        return tried.stderr
+
+    def test_are_of_a_commit(self):
+        self.assertRegex(self.refused(), r"\Adeploy/package: .*/osteon is no git repository\n")
+        git = ["git", "-C", self.checkout, "-c", "user.name=x", "-c", "user.email=x@x.invalid"]
+        subprocess.run([*git, "init", "-q"], check=True)
+        self.assertRegex(self.refused(), "is no git repository")
+        subprocess.run([*git, "add", "."], check=True)
+        subprocess.run([*git, "commit", "-qm", "Begin"], check=True)
+        self.assertRegex(self.refused(), r"\Adeploy/package: the commit \w{8} has no deploy/debian\n")
+
+    def test_are_tried_by_root_alone(self):
+        self.assertRegex(self.refused("--tri"), "takes --try")
+        other = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
+        self.checkout.parent.chmod(0o755)
+        self.assertRegex(self.refused("--try", **other), "only root")
+
+    def test_components_have_escaped_addresses(self):
+        self.assertEqual(components.purl("libstdc++6", "1:12.2~rc1+deb12", "amd64", "debian"),
+                         "pkg:deb/debian/libstdc%2B%2B6@1%3A12.2~rc1%2Bdeb12?arch=amd64")
+        known = {"libc6": "c", "libx2": "x"}
+        about = {"Depends": "libx1 | libx2, libc6 (>= 2.36), other:any"}
+        self.assertEqual(components.depends(about, known), ["c", "x"])
 
 
 class TwoDemos(unittest.TestCase):

@@ -448,8 +448,8 @@ TEST(Operators, TheContainerRunsItUnprivileged) {
   ASSERT_NE(text.rfind("\nUSER "), std::string::npos);
   EXPECT_EQ(text.find("\nUSER root"), std::string::npos);
   EXPECT_GT(text.rfind("\nUSER "), text.rfind("\nRUN ")) << "the last line that decides who runs it";
-  for (const char* word :
-       {"FROM debian:12", "deploy/install", "deploy/build", "ENTRYPOINT [\"osteon-server\"]", "STOPSIGNAL SIGTERM"})
+  for (const char* word : {"FROM debian:12", "deploy/package", "osteon-server_*.deb", "ENTRYPOINT [\"osteon-server\"]",
+                           "STOPSIGNAL SIGTERM"})
     EXPECT_NE(text.find(word), std::string::npos) << word;
 }
 
