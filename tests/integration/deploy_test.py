@@ -2,15 +2,17 @@
 import fcntl
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import threading
+import time
 import unittest
 from pathlib import Path
 
 ROOT = Path(os.environ["OSTEON_SOURCE_DIR"])
-sys.path.insert(0, str(ROOT / "deploy/session"))
+sys.path[:0] = [str(ROOT / "deploy"), str(ROOT / "deploy/session")]
 
 import components  # noqa: E402  (found through the path above)
 import demo  # noqa: E402
@@ -34,6 +36,19 @@ NOBODY = 65534
 
 def ended(command, **options):
     return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, **options)
+
+
+def is_running(process: int):
+    try:
+        status = Path(f"/proc/{process}/stat").read_text(encoding="utf-8")
+    except FileNotFoundError:
+        return False
+    return status.rpartition(")")[2].split()[0] != "Z"
+
+
+def hear_interrupts():
+    """A shell that runs in the background ignores them, and so would the programs that it starts."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 class Checkout(unittest.TestCase):
@@ -109,6 +124,42 @@ class Packages(unittest.TestCase):
         subprocess.run([*git, "add", "."], check=True)
         subprocess.run([*git, "commit", "-qm", "Begin"], check=True)
         self.assertRegex(self.refused(), r"\Adeploy/package: the commit \w{8} has no deploy/debian\n")
+
+    def script(self, file: Path, text):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("#!/bin/sh\n" + text, encoding="utf-8")
+        file.chmod(0o755)
+
+    def test_stop_at_once_and_keep_the_last_ones(self):
+        shutil.copy(ROOT / "CMakeLists.txt", self.checkout)
+        shutil.copytree(ROOT / "deploy/debian", self.checkout / "deploy/debian")
+        self.script(self.checkout / "deploy/install", "exit 0\n")
+        # A build that takes long, in a process of a process.
+        tools, begun = self.checkout.parent / "tools", self.checkout.parent / "begun"
+        self.script(tools / "dpkg-buildpackage", f"echo '[3/20] Building'\nsleep 600 &\necho $! >{begun}\nwait\n")
+        git = ["git", "-C", self.checkout, "-c", "user.name=x", "-c", "user.email=x@x.invalid"]
+        for command in (["init", "-q"], ["add", "."], ["commit", "-qm", "Begin"]):
+            subprocess.run([*git, *command], check=True)
+        last = self.checkout / "out/packages/osteon_1.deb"
+        last.parent.mkdir(parents=True)
+        last.write_text("of the last run", encoding="utf-8")
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            begun.unlink(missing_ok=True)
+            running = subprocess.Popen([self.checkout / "deploy/package"], stdin=subprocess.DEVNULL, text=True,
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                       env={**os.environ, "PATH": f"{tools}:{os.environ['PATH']}"},
+                                       preexec_fn=hear_interrupts)
+            self.addCleanup(running.kill)
+            while not (begun.exists() and begun.read_text(encoding="utf-8").strip()):
+                self.assertIsNone(running.poll(), "it ended before it built")
+                time.sleep(0.02)
+            running.send_signal(number)  # to the script alone, as another program does it
+            said, complaint = running.communicate(timeout=60)
+            self.assertEqual(running.returncode, code, complaint)
+            self.assertRegex(complaint, r"\Adeploy/package: stopped; .*/out/packages is as it was\n\Z")
+            self.assertIn("Building packages: 3 of 20", said)
+            self.assertFalse(is_running(int(begun.read_text(encoding="utf-8"))))
+            self.assertEqual(last.read_text(encoding="utf-8"), "of the last run")
 
     def test_are_tried_by_root_alone(self):
         self.assertRegex(self.refused("--tri"), "takes --try")
