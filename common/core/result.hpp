@@ -29,5 +29,11 @@ using Result = tl::expected<T, Error>;
 [[nodiscard]] inline tl::unexpected<Error> failure(ErrorCode code, std::string message) {
   return tl::unexpected<Error>(Error{code, std::move(message)});
 }
+[[nodiscard]] inline tl::unexpected<Error> bad_input(std::string message) {
+  return failure(ErrorCode::invalid_input, std::move(message));
+}
+[[nodiscard]] inline tl::unexpected<Error> bad_field(const std::string& field, const std::string& what) {
+  return bad_input(field + " " + what);
+}
 
 }  // namespace osteon

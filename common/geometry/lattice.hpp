@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <compare>
+#include <cstddef>
 #include <cstdint>
 
 #include "common/geometry/pose.hpp"
@@ -28,6 +29,9 @@ struct Coord {
 }
 // Division by 2^shift, rounding towards minus infinity.
 [[nodiscard]] constexpr Coord shift_down(Coord c, int shift) { return {c.x >> shift, c.y >> shift, c.z >> shift}; }
+
+// A coordinate, or a product of some, as the index into an array. It must not be negative.
+[[nodiscard]] constexpr std::size_t to_index(std::int32_t i) { return static_cast<std::size_t>(i); }
 
 struct CoordHash {
   std::size_t operator()(const Coord& c) const noexcept {

@@ -29,8 +29,7 @@ Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, doub
   const auto outside_value = [&](std::size_t i) { return static_cast<double>(std::min(volume.values[i], below)); };
   const std::array<std::ptrdiff_t, 3> step{1, columns, static_cast<std::ptrdiff_t>(columns) * rows};
   for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / slices))
-      return failure(ErrorCode::cancelled, "stopped while outlining the bone");
+    if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("outlining the bone");
     for (int row = 0; row < rows; ++row)
       for (int column = 0; column < columns; ++column) {
         const std::size_t i = volume.index(column, row, slice);

@@ -10,8 +10,6 @@ namespace {
 constexpr double kLeastBetween = 0.5;
 constexpr int kCorner = 8;  // voxels of a solid around one at its corner: 2³
 
-Error stopped() { return {ErrorCode::cancelled, "stopped while looking for cancellous bone"}; }
-
 // Number of voxels at or above a value in a 3 x 3 square within the slice. Voxels beyond the volume do not count.
 void count_in_slice(const HuVolume& volume, double least_hu, int slice, std::vector<std::uint8_t>& row,
                     std::vector<std::uint8_t>& out) {
@@ -70,7 +68,7 @@ Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, con
   const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   CountAround bright(volume, params.cancellous_hu), no_air(volume, params.air_hu);
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return tl::unexpected(stopped());
+    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("looking for cancellous bone");
     bright.go_to(slice);
     no_air.go_to(slice);
     const std::size_t begin = volume.index(0, 0, slice);
@@ -134,11 +132,11 @@ Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& den
     std::size_t asked = 0;
     const auto stop = [&] { return (asked++ & 0xfffff) == 0 && !keep_going(direction / 13.0); };
     for (const Place& p : places) {
-      if (stop()) return tl::unexpected(stopped());
+      if (stop()) return stopped_while("looking for cancellous bone");
       back.at(p.column, p.row, p.slice) = lead(p, -1, back);
     }
     for (auto p = places.rbegin(); p != places.rend(); ++p) {
-      if (stop()) return tl::unexpected(stopped());
+      if (stop()) return stopped_while("looking for cancellous bone");
       const std::uint8_t leads = lead(*p, 1, fore);
       fore.at(p->column, p->row, p->slice) = leads;
       if (leads != 0 && back.at(p->column, p->row, p->slice) != 0) between.at(p->column, p->row, p->slice) = 1;

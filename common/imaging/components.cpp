@@ -47,8 +47,7 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
   row_begin.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(slices) + 1);
   Forest forest;
   for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / slices))
-      return failure(ErrorCode::cancelled, "stopped while looking for connected voxels");
+    if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("looking for connected voxels");
     for (int row = 0; row < rows; ++row) {
       row_begin.push_back(static_cast<std::uint32_t>(runs.size()));
       const std::uint8_t* value = mask.values.data() + mask.index(0, row, slice);
@@ -79,8 +78,7 @@ Result<Components> find_components(const VoxelMask& mask, const std::bitset<256>
 
   std::vector<std::uint32_t> number(runs.size());
   for (std::uint32_t i = 0; i < runs.size(); ++i) {
-    if ((i & 0xfffff) == 0 && !keep_going(1.0))
-      return failure(ErrorCode::cancelled, "stopped while looking for connected voxels");
+    if ((i & 0xfffff) == 0 && !keep_going(1.0)) return stopped_while("looking for connected voxels");
     const std::uint32_t root = forest.root(i);
     if (root == i) number[i] = found.count++;
     runs[i].component = number[root];

@@ -11,8 +11,6 @@ namespace {
 
 constexpr double kCoarse_mm = 4.0;  // voxels for measuring the width of a large space
 
-Error stopped() { return {ErrorCode::cancelled, "stopped while looking for marrow spaces"}; }
-
 // One face of the volume as an image. It finds which free voxels are connected to the outside within the face.
 class Face {
  public:
@@ -205,7 +203,7 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
     for (std::size_t i = 0; i < closed.values.size(); ++i)
       if (grown->values[i] != 0) closed.values[i] = 1;
   }
-  if (!keep_going(0.8)) return tl::unexpected(stopped());
+  if (!keep_going(0.8)) return stopped_while("looking for marrow spaces");
   // The rest of narrow spaces behind them, and every other hole that no path of voxels leaves.
   VoxelMask enclosed(solid.dims);
   if (auto marked = mark_closed(closed, spacing_mm, params, ends, enclosed, part(keep_going, 0.8, 1.0)); !marked)

@@ -10,6 +10,9 @@
 
 namespace osteon::imaging {
 
+// Voxels along an axis. A file that says more is damaged.
+inline constexpr int kLargestScanAxis = 1 << 14;
+
 struct HuVolume {
   std::array<int, 3> dims{};                                 // columns, rows, slices
   Vec3 spacing_mm = Vec3::Ones();                            // between neighbours along each

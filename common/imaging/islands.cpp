@@ -34,7 +34,7 @@ Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, cons
   for (const VoxelRun& run : components->runs) {
     if ((done++ & 0xffff) == 0 &&
         !keep_going(0.6 + 0.4 * static_cast<double>(done) / static_cast<double>(components->runs.size())))
-      return failure(ErrorCode::cancelled, "stopped while measuring the islands of bone");
+      return stopped_while("measuring the islands of bone");
     Sums& s = sums[run.component];
     const std::array<int, 3> low{run.first, run.row, run.slice}, high{run.last, run.row, run.slice};
     for (std::size_t axis = 0; axis < 3; ++axis) {

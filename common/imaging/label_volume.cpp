@@ -37,9 +37,7 @@ bool each_in_parallel(int count, const std::function<void(int)>& work, const Kee
   return !stopped && keep_going(1.0);
 }
 
-tl::unexpected<Error> stopped_smoothing() {
-  return failure(ErrorCode::cancelled, "stopped while smoothing the labels");
-}
+tl::unexpected<Error> stopped_smoothing() { return stopped_while("smoothing the labels"); }
 
 // Applies [1 2 1]/4 to `count` rows of `width` values each, `step` apart. Rows of values beyond the ends equal the end
 // rows.

@@ -79,8 +79,7 @@ Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box,
   out.values.resize(static_cast<std::size_t>(dims.x) * plane);
   for (int x = box.min.x; x <= box.max.x; ++x) {
     const int done = x - box.min.x;
-    if (!keep_going(static_cast<double>(done) / dims.x))
-      return failure(ErrorCode::cancelled, "stopped while resampling the scan");
+    if (!keep_going(static_cast<double>(done) / dims.x)) return stopped_while("resampling the scan");
     const CoordBox slice{{x, box.min.y, box.min.z}, {x, box.max.y, box.max.z}};
     resample(volume, slice, pitch_mm, std::span(out.values).subspan(static_cast<std::size_t>(done) * plane, plane));
   }

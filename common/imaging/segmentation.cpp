@@ -14,14 +14,12 @@ constexpr double kThresholdEnd = 0.05, kCancellousEnd = 0.35, kEnclosedEnd = 0.9
 constexpr int kFewest = 3;  // voxels needed to decide whether a space contains air; fewer are noise within bone
 constexpr double kAirEdge_voxels = 2.0;  // width over which a scanner blurs the edge between air and bone
 
-Error stopped() { return {ErrorCode::cancelled, "stopped while looking for the bone"}; }
-
 Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
   VoxelMask dense(volume.dims);
   const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   bool any = false;
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return tl::unexpected(stopped());
+    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("looking for the bone");
     const std::size_t begin = volume.index(0, 0, slice);
     for (std::size_t i = begin; i < begin + area; ++i) {
       const bool is_dense = volume.values[i] >= threshold_hu;
@@ -57,7 +55,7 @@ Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double a
   VoxelMask air(volume.dims);
   bool any = false;
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
-    if (!keep_going(0.5 * slice / volume.dims[2])) return tl::unexpected(stopped());
+    if (!keep_going(0.5 * slice / volume.dims[2])) return stopped_while("looking for the bone");
     for (int row = 0; row < volume.dims[1]; ++row)
       for (int column = 0; column < volume.dims[0]; ++column)
         if (enclosed.at(column, row, slice) != 0 && is_air(volume, dense, {column, row, slice}, air_hu)) {

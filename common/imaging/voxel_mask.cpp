@@ -85,8 +85,7 @@ Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, doubl
 
   for (int slice = 0; slice < std::min(reach_z, slices); ++slice) measure(slice);
   for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / slices))
-      return failure(ErrorCode::cancelled, "stopped while measuring distances in the scan");
+    if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("measuring distances in the scan");
     if (slice + reach_z < slices) measure(slice + reach_z);
     bool any = false;
     for (int from = std::max(0, slice - reach_z); from <= std::min(slices - 1, slice + reach_z); ++from) {

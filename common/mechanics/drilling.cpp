@@ -6,7 +6,7 @@ namespace osteon {
 namespace {
 
 constexpr double kChiScale = 134.6, kChiSpeed = -0.3327, kChiFeed = 0.5189, kChiDensity = 1.1841;
-constexpr double kReferenceDiameter_mm = 3.2, kReferenceDensity = 1.9;
+constexpr double kReferenceDensity = 1.9;
 
 double scale_n(const DrillingParams& p, double rpm, double density_g_cm3) noexcept {
   return kChiScale * std::pow(rpm, kChiSpeed) * std::pow(density_g_cm3, kChiDensity) * p.wear *

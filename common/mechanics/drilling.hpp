@@ -16,6 +16,8 @@ struct DrillingParams {
   double heel_mm_per_rev = 0.33 * 3.2;       // feed at which the drill's heel touches the cut surface: 0.33 D
 };
 
+inline constexpr double kReferenceDiameter_mm = 3.2;  // of the drill for which (7.3) is taken
+
 // Below this speed the spindle counts as stopped, because (7.3) has no limit at N = 0.
 inline constexpr double kMinCuttingRpm = 50.0;
 

@@ -17,8 +17,6 @@
 namespace osteon {
 namespace {
 
-constexpr double kReferenceDiameter_mm = 3.2;
-
 RevolutionsPerMinute speed_of(const LawInputs& in) noexcept { return RevolutionsPerMinute{in.spindle_rpm}; }
 GramsPerCm3 density_of(const LawInputs& in) noexcept { return GramsPerCm3{in.density_g_cm3}; }
 double heel_feed(const LawTool& tool, const LawInputs& in) noexcept {

@@ -12,16 +12,16 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 // One ring of points at (r, z) whose normal into the tool is `inward` in the (radial, axial) plane.
 void add_ring(std::vector<SamplePoint>& points, double r, double z, Corner inward, double area, double spacing,
               bool active) {
-  const int count = std::max(3, static_cast<int>(std::ceil(2.0 * kPi * r / spacing)));
+  const int count = std::max(3, static_cast<int>(std::ceil(2.0 * pi * r / spacing)));
   // Successive rings are rotated against each other, so that no straight seam stays unsampled.
   const double turn = 0.5 * static_cast<double>(points.size());
   for (int i = 0; i < count; ++i) {
-    const double angle = 2.0 * kPi * (i + turn) / count;
+    const double angle = 2.0 * pi * (i + turn) / count;
     const double c = std::cos(angle), s = std::sin(angle);
     points.push_back({{r * c, r * s, z}, {inward.r * c, inward.r * s, inward.z}, area / count, active});
   }
@@ -35,17 +35,17 @@ void add_frustum(std::vector<SamplePoint>& points, Corner a, Corner b, double sp
   for (int i = 0; i < rings; ++i) {
     const double t = (i + 0.5) / rings;
     const double r = a.r + t * er;
-    add_ring(points, r, a.z + t * ez, inward, 2.0 * kPi * r * length / rings, spacing, active);
+    add_ring(points, r, a.z + t * ez, inward, 2.0 * pi * r * length / rings, spacing, active);
   }
 }
 
 void add_sphere(std::vector<SamplePoint>& points, double radius, double shank_radius, double spacing) {
-  const int rings = std::max(2, static_cast<int>(std::ceil(kPi * radius / spacing)));
+  const int rings = std::max(2, static_cast<int>(std::ceil(pi * radius / spacing)));
   for (int i = 0; i < rings; ++i) {
-    const double polar = kPi * (i + 0.5) / rings;  // from the tip
+    const double polar = pi * (i + 0.5) / rings;  // from the tip
     const double r = radius * std::sin(polar), up = radius * std::cos(polar);
     if (up < 0.0 && r < shank_radius) continue;  // here the shank leaves the sphere
-    const double area = 2.0 * kPi * radius * radius * (std::cos(kPi * i / rings) - std::cos(kPi * (i + 1) / rings));
+    const double area = 2.0 * pi * radius * radius * (std::cos(pi * i / rings) - std::cos(pi * (i + 1) / rings));
     add_ring(points, r, up - radius, {-std::sin(polar), -std::cos(polar)}, area, spacing, true);
   }
 }
@@ -68,7 +68,7 @@ std::vector<SamplePoint> points_with_spacing(const Tool& tool, double spacing) {
 
 std::vector<SamplePoint> points_on_rings(const Tool& tool, int count) {
   const double radius = 0.5 * tool.diameter_mm;
-  double spacing = std::sqrt(4.0 * kPi * radius * radius / std::max(1, count));
+  double spacing = std::sqrt(4.0 * pi * radius * radius / std::max(1, count));
   while (true) {
     std::vector<SamplePoint> points = points_with_spacing(tool, spacing);
     if (std::ranges::count_if(points, &SamplePoint::active) >= count) return points;

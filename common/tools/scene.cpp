@@ -11,7 +11,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 std::string shown(const Vec3& v) {
   std::array<char, 96> text{};
@@ -21,7 +21,7 @@ std::string shown(const Vec3& v) {
 
 // Evenly spread directions on a sphere, by the golden angle.
 Vec3 direction(int i, int count) {
-  const double z = 1.0 - (2.0 * i + 1.0) / count, r = std::sqrt(1.0 - z * z), angle = kPi * (3.0 - std::sqrt(5.0)) * i;
+  const double z = 1.0 - (2.0 * i + 1.0) / count, r = std::sqrt(1.0 - z * z), angle = pi * (3.0 - std::sqrt(5.0)) * i;
   return {r * std::cos(angle), r * std::sin(angle), z};
 }
 
@@ -95,7 +95,7 @@ bool head_meets_bone(const Tool& screw, const Pose& pose, const BoneQuery& bone)
   for (int ring = 1; ring <= kRings; ++ring) {
     const double r = inner + (outer - inner) * ring / kRings;
     for (int i = 0; i < kAround; ++i) {
-      const double angle = 2.0 * kPi * i / kAround;
+      const double angle = 2.0 * pi * i / kAround;
       if (bone(pose.point({r * std::cos(angle), r * std::sin(angle), -screw.cutting_length_mm})) < 0.0) return true;
     }
   }
@@ -212,7 +212,7 @@ Result<SceneItem> set_by_rules(std::span<const Standing> scene, const Standing* 
 
 Driven turn_screw(const Tool& screw, const Pose& pose_bone_screw, double turns, const BoneQuery& bone) {
   const double pitch = screw.thread_pitch_mm;
-  const auto at = [&](double t) { return advanced(pose_bone_screw, pitch * t, 2.0 * kPi * t); };
+  const auto at = [&](double t) { return advanced(pose_bone_screw, pitch * t, 2.0 * pi * t); };
   if (turns <= 0.0) return {at(turns), turns, turns == 0.0 && head_meets_bone(screw, pose_bone_screw, bone)};
   // Steps of 0.05 mm, so that no bone is skipped. Then the exact position at which the head meets it.
   const double step = 0.05 / std::max(0.05, pitch);

@@ -18,7 +18,6 @@
 namespace osteon {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr std::uintmax_t kLargestFile = 512u << 20;  // bytes, including a mesh's samples
 
 // Thrown while reading, caught in parse_tool().
@@ -59,20 +58,20 @@ std::int64_t whole(const YAML::Node& node, const std::string& field, std::int64_
 // The angle in degrees that reads back as exactly this one. Nothing if there is none, because not every number of
 // radians has one.
 std::optional<double> exact_degrees(double rad) {
-  const double about = rad / kDegree;
+  const double about = rad / kRadPerDegree;
   std::array<char, 32> text{};
   for (int digits = 1; digits <= 17; ++digits) {
     const auto end =
         std::to_chars(text.data(), text.data() + text.size(), about, std::chars_format::general, digits).ptr;
     double candidate = 0.0;
     std::from_chars(text.data(), end, candidate);
-    if (candidate * kDegree == rad) return candidate;
+    if (candidate * kRadPerDegree == rad) return candidate;
   }
   for (const double towards : {-1e300, 1e300}) {
     double candidate = about;
     for (int i = 0; i < 3; ++i) {
       candidate = std::nextafter(candidate, towards);
-      if (candidate * kDegree == rad) return candidate;
+      if (candidate * kRadPerDegree == rad) return candidate;
     }
   }
   return std::nullopt;
@@ -172,7 +171,7 @@ Tool read(const YAML::Node& root, const MeshLoader& load_mesh) {
     }
     if (std::ranges::find(given, &*rule) != given.end()) throw Fault{"\"" + field + "\" is there twice; remove one"};
     const bool degrees = field != rule->name;
-    set_field(tool, *rule, number(entry.second, field) * (degrees ? kDegree : 1.0));
+    set_field(tool, *rule, number(entry.second, field) * (degrees ? kRadPerDegree : 1.0));
     given.push_back(&*rule);
   }
   for (const FieldRule& rule : rules)

@@ -11,7 +11,6 @@
 namespace osteon {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
 // A wall or an end cannot be thinner than this, mm.
 constexpr double kThinnest_mm = 0.2;
 
@@ -45,7 +44,7 @@ FieldRule length(std::string_view name, double Tool::*member, double lowest, dou
   return {name, member, nullptr, lowest, highest, need == Need::required, edit == Edit::yes};
 }
 FieldRule angle(std::string_view name, double Tool::*member, double lowest_deg, double highest_deg) {
-  return {name, member, nullptr, lowest_deg * kDegree, highest_deg * kDegree, true, false};
+  return {name, member, nullptr, lowest_deg * kRadPerDegree, highest_deg * kRadPerDegree, true, false};
 }
 
 FieldRule diameter(double lowest, double highest) {
@@ -373,12 +372,12 @@ void derive_fields(Tool& tool) {
 }
 
 std::string limits_sentence(const FieldRule& rule) {
-  const double unit = is_angle(rule) ? kDegree : 1.0;
+  const double unit = is_angle(rule) ? kRadPerDegree : 1.0;
   return "from " + written(rule.lowest / unit) + " to " + written(rule.highest / unit);
 }
 
 std::optional<std::string> value_fault(const FieldRule& rule, double value) {
-  const double unit = is_angle(rule) ? kDegree : 1.0;
+  const double unit = is_angle(rule) ? kRadPerDegree : 1.0;
   if (!std::isfinite(value)) return "\"" + shown_name(rule) + "\" is not a number; choose it " + limits_sentence(rule);
   if (rule.whole() && value != std::floor(value))
     return "\"" + shown_name(rule) + "\" is " + written(value) + "; write a whole number";

@@ -1,6 +1,7 @@
 // What the definition of each kind of tool may contain: its fields, their limits, and how they must fit together. One
 // table serves files, edits and messages from the network.
 #pragma once
+#include <numbers>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +11,8 @@
 #include "common/tools/tool.hpp"
 
 namespace osteon {
+
+inline constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 
 struct KindName {
   ToolKind kind;

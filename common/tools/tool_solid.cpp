@@ -11,7 +11,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 // Arcs become chords. With these numbers no builtin tool differs from its arc by more than 0.01 mm (0.02 mm for tools
 // that cut at the case's own pitch). This is well below the resolution of the tool's level.
 constexpr int kBarrelChords = 8, kEndChords = 7, kEdgeChords = 6, kTipChords = 15;
@@ -53,7 +53,7 @@ std::vector<Corner> contoured_outline(const Tool& tool) {
   const double end = end_radius_mm(tool);
   std::vector<Corner> corners{{0, 0}, {0, -tool.cutting_length_mm}, {0.5 * tool.diameter_mm, -tool.cutting_length_mm}};
   for (int i = 0; i < kEndChords; ++i) {
-    const double a = tool.taper_rad + (0.5 * kPi - tool.taper_rad) * i / kEndChords;
+    const double a = tool.taper_rad + (0.5 * pi - tool.taper_rad) * i / kEndChords;
     corners.push_back({end * std::cos(a), end * std::sin(a) - end});
   }
   return corners;
@@ -64,7 +64,7 @@ std::vector<Corner> canal_reamer_outline(const Tool& tool) {
   std::vector<Corner> corners{{0, 0}, {0, -tool.cutting_length_mm}, {radius, -tool.cutting_length_mm}};
   if (edge <= 0.0) corners.push_back({radius, 0});
   for (int i = 0; edge > 0.0 && i <= kEdgeChords; ++i) {
-    const double a = 0.5 * kPi * i / kEdgeChords;
+    const double a = 0.5 * pi * i / kEdgeChords;
     corners.push_back({radius - edge + edge * std::cos(a), i == kEdgeChords ? 0.0 : edge * std::sin(a) - edge});
   }
   return corners;
@@ -127,12 +127,12 @@ double kerf_mm(const Tool& tool) { return tool.thickness_mm + tool.set_mm; }
 Implicit thread(const Tool& tool) {
   const double core = 0.5 * tool.core_diameter_mm, crest = 0.5 * tool.diameter_mm, pitch = tool.thread_pitch_mm;
   const double root = 0.9 * core, depth = crest - root, half_foot = 0.4 * pitch;
-  const double slant = std::hypot(depth, half_foot), shift = pitch / (2.0 * kPi * root);
+  const double slant = std::hypot(depth, half_foot), shift = pitch / (2.0 * pi * root);
   const double slower = 1.0 / std::sqrt(1.0 + shift * shift);
   const Implicit within = turned(pointed(crest, point_height_mm(tool) * crest / core, tool.cutting_length_mm));
   const auto distance = [=](const Vec3& p) {
     const double r = std::hypot(p.x(), p.y());
-    const double turn = p.z() / pitch - std::atan2(p.y(), p.x()) / (2.0 * kPi);
+    const double turn = p.z() / pitch - std::atan2(p.y(), p.x()) / (2.0 * pi);
     const double u = std::abs(turn - std::round(turn)) * pitch;
     // The flank from the foot (half_foot, root) to the crest (0, crest). Below the root there is only the core.
     const double flank = (u * depth + (r - crest) * half_foot) / slant;

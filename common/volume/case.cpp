@@ -334,7 +334,7 @@ Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fil
   const Coord first = floor_to(box.min, kPart), last = box.max;
   for (std::int32_t px = first.x; px <= last.x; px += kPart) {
     const double done = static_cast<double>(px - first.x) / std::max(1, last.x - first.x);
-    if (keep_going && !keep_going(done)) return failure(ErrorCode::cancelled, "stopped while building the case");
+    if (keep_going && !keep_going(done)) return stopped_while("building the case");
     for (std::int32_t py = first.y; py <= last.y; py += kPart)
       for (std::int32_t pz = first.z; pz <= last.z; pz += kPart) {
         const CoordBox part{{std::max(px, box.min.x), std::max(py, box.min.y), std::max(pz, box.min.z)},

@@ -8,9 +8,7 @@
 namespace osteon {
 namespace {
 
-std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-
-std::size_t count(Coord dims) { return at(dims.x) * at(dims.y) * at(dims.z); }
+std::size_t count(Coord dims) { return to_index(dims.x) * to_index(dims.y) * to_index(dims.z); }
 
 // The position of a point in a lattice: its cell, counted from the first, and the position in it. False outside.
 struct Place {
@@ -59,23 +57,25 @@ void BoneCells::update(const CutField& field, const CoordBox& changed) {
   const Coord dims = box.dims();
   std::vector<float> f(count(dims));
   field.gather_solid(level_, box, f);
-  const std::size_t sx = at(dims.y) * at(dims.z), sy = at(dims.z);
+  const std::size_t sx = to_index(dims.y) * to_index(dims.z), sy = to_index(dims.z);
   for (std::int32_t x = 0; x + 1 < dims.x; ++x)
     for (std::int32_t y = 0; y + 1 < dims.y; ++y)
       for (std::int32_t z = 0; z + 1 < dims.z; ++z) {
-        const float* p = f.data() + at(x) * sx + at(y) * sy + at(z);
+        const float* p = f.data() + to_index(x) * sx + to_index(y) * sy + to_index(z);
         const float corners[8] = {p[0], p[1], p[sy], p[sy + 1], p[sx], p[sx + 1], p[sx + sy], p[sx + sy + 1]};
         unsigned code = 0;
         for (unsigned i = 0; i < 8; ++i) code |= corners[i] < 0.0f ? 1u << i : 0u;
         const Coord cell = box.min + Coord{x, y, z} - samples_.min;
-        codes_[(at(cell.x) * at(cells_.y) + at(cell.y)) * at(cells_.z) + at(cell.z)] = static_cast<std::uint8_t>(code);
+        codes_[(to_index(cell.x) * to_index(cells_.y) + to_index(cell.y)) * to_index(cells_.z) + to_index(cell.z)] =
+            static_cast<std::uint8_t>(code);
       }
 }
 
 bool BoneCells::inside(const Vec3& point_mm, MixedCell rule) const {
   Place p;
   if (!locate(point_mm, pitch_mm_, samples_, cells_, p)) return false;
-  const unsigned code = codes_[(at(p.cell.x) * at(cells_.y) + at(p.cell.y)) * at(cells_.z) + at(p.cell.z)];
+  const unsigned code =
+      codes_[(to_index(p.cell.x) * to_index(cells_.y) + to_index(p.cell.y)) * to_index(cells_.z) + to_index(p.cell.z)];
   if (code == 0) return false;
   if (code == 255) return true;
   if (rule == MixedCell::nearest)
@@ -96,8 +96,8 @@ BoneDistance::BoneDistance(const CutField& field, int level, const CoordBox& sam
 double BoneDistance::distance_mm(const Vec3& point_mm) const {
   Place p;
   if (!locate(point_mm, pitch_mm_, samples_, dims_ - Coord{1, 1, 1}, p)) return 1e9;
-  const std::size_t sx = at(dims_.y) * at(dims_.z), sy = at(dims_.z);
-  const float* v = values_.data() + at(p.cell.x) * sx + at(p.cell.y) * sy + at(p.cell.z);
+  const std::size_t sx = to_index(dims_.y) * to_index(dims_.z), sy = to_index(dims_.z);
+  const float* v = values_.data() + to_index(p.cell.x) * sx + to_index(p.cell.y) * sy + to_index(p.cell.z);
   const auto along_z = [&](std::size_t i) {
     const auto low = static_cast<double>(v[i]), high = static_cast<double>(v[i + 1]);
     return low + p.z * (high - low);

@@ -9,21 +9,19 @@
 namespace osteon {
 namespace {
 
-std::size_t at(int level) { return static_cast<std::size_t>(level); }
-
 void sort_and_unite(std::vector<Coord>& origins) {
   std::ranges::sort(origins);
   origins.erase(std::unique(origins.begin(), origins.end()), origins.end());
 }
 
-auto place_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
+auto place_in_body(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
 
 }  // namespace
 
 void CutHistory::add(RoomSeq seq, const Cut& cut, const std::vector<Coord>& leaves) {
   OSTEON_CHECK(!cut.path.empty() && cut.level >= 0 && cut.level < kLevels && !contains(seq));
   own_.events.emplace(seq, Event{cut, {}});
-  for (const Coord origin : leaves) own_.reach[at(cut.level)][origin].push_back(seq);
+  for (const Coord origin : leaves) own_.reach[to_index(cut.level)][origin].push_back(seq);
 }
 
 void CutHistory::add_mask(RoomSeq seq, Mask mask) {
@@ -32,7 +30,7 @@ void CutHistory::add_mask(RoomSeq seq, Mask mask) {
 }
 
 void CutHistory::add_mask(RoomSeq seq, std::vector<FieldLeaf> mask) {
-  std::ranges::sort(mask, {}, place_of);
+  std::ranges::sort(mask, {}, place_in_body);
   add_mask(seq, std::make_shared<const std::vector<FieldLeaf>>(std::move(mask)));
 }
 
@@ -87,14 +85,14 @@ CutHistory::Leaves CutHistory::reached(const CutField& field, const Part& part, 
   const Event& event = part.events.at(seq);
   Leaves leaves;
   if (event.cut.path.empty()) {
-    for (const FieldLeaf& leaf : *event.mask) leaves[at(leaf.level)].push_back(leaf.origin);
+    for (const FieldLeaf& leaf : *event.mask) leaves[to_index(leaf.level)].push_back(leaf.origin);
     return leaves;
   }
-  const auto& reach = part.reach[at(event.cut.level)];
+  const auto& reach = part.reach[to_index(event.cut.level)];
   for (const Coord origin : field.reach(event.cut)) {
     const auto listed = reach.find(origin);
     if (listed != reach.end() && std::ranges::find(listed->second, seq) != listed->second.end())
-      leaves[at(event.cut.level)].push_back(origin);
+      leaves[to_index(event.cut.level)].push_back(origin);
   }
   return leaves;
 }
@@ -111,12 +109,13 @@ std::vector<LevelLeaves> CutHistory::rebuild(CutField& field, std::span<const Ro
       undone_.erase(seq);
     const Leaves leaves = reached(field, *part, seq);
     for (int level = 0; level < kLevels; ++level)
-      touched[at(level)].insert(touched[at(level)].end(), leaves[at(level)].begin(), leaves[at(level)].end());
+      touched[to_index(level)].insert(touched[to_index(level)].end(), leaves[to_index(level)].begin(),
+                                      leaves[to_index(level)].end());
   }
   std::vector<FieldLeaf> before;
   for (int level = 0; level < kLevels; ++level) {
-    sort_and_unite(touched[at(level)]);
-    for (const Coord origin : touched[at(level)]) {
+    sort_and_unite(touched[to_index(level)]);
+    for (const Coord origin : touched[to_index(level)]) {
       before.push_back({field.body(), level, origin, {}});
       field.read(before.back());
       field.reset(level, origin);
@@ -145,14 +144,14 @@ void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
   std::vector<const Event*> masks;
   const auto add_part = [&](const Part& part) {
     for (int level = 0; level < kLevels; ++level)
-      for (const Coord origin : leaves[at(level)]) {
-        const auto listed = part.reach[at(level)].find(origin);
-        if (listed == part.reach[at(level)].end()) continue;
+      for (const Coord origin : leaves[to_index(level)]) {
+        const auto listed = part.reach[to_index(level)].find(origin);
+        if (listed == part.reach[to_index(level)].end()) continue;
         for (const RoomSeq seq : listed->second) {
           if (undone(seq)) continue;
           auto& [event, of_event] = work[seq];
           event = &part.events.at(seq);
-          of_event[at(level)].push_back(origin);
+          of_event[to_index(level)].push_back(origin);
         }
       }
     for (const auto& [seq, event] : part.events)
@@ -161,7 +160,7 @@ void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
   for (const auto& part : shared_) add_part(*part);
   add_part(own_);
   for (const auto& [seq, one] : work) {
-    const std::vector<Coord>& part = one.second[at(one.first->cut.level)];
+    const std::vector<Coord>& part = one.second[to_index(one.first->cut.level)];
     field.apply_to(one.first->cut, part);
     ++cost_.cuts;
     cost_.leaf_cuts += part.size();
@@ -170,11 +169,11 @@ void CutHistory::apply_again(CutField& field, const Leaves& leaves) {
     for (int level = 0; level < kLevels; ++level) {
       // Both are sorted, so one pass through the mask is enough.
       auto mask = event->mask->begin();
-      for (const Coord origin : leaves[at(level)]) {
+      for (const Coord origin : leaves[to_index(level)]) {
         mask = std::lower_bound(mask, event->mask->end(), std::tuple(level, origin),
-                                [](const FieldLeaf& leaf, const auto& place) { return place_of(leaf) < place; });
+                                [](const FieldLeaf& leaf, const auto& place) { return place_in_body(leaf) < place; });
         if (mask == event->mask->end()) break;
-        if (place_of(*mask) != std::tuple(level, origin)) continue;
+        if (place_in_body(*mask) != std::tuple(level, origin)) continue;
         field.merge(*mask);
         ++cost_.masks;
       }

@@ -18,8 +18,6 @@
 namespace osteon {
 namespace {
 
-std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-
 constexpr std::uint8_t kPiece = 1, kRest = 2, kUnknown = 4;  // of a solid sample; air is 0
 
 std::int16_t band_of(const Case& bone, int level) {
@@ -30,7 +28,7 @@ std::int16_t band_of(const Case& bone, int level) {
 struct Sides {
   std::int32_t n = 0;
   std::vector<std::uint8_t> side;
-  [[nodiscard]] std::size_t index(Coord c) const { return at((c.x * n + c.y) * n + c.z); }
+  [[nodiscard]] std::size_t index(Coord c) const { return to_index((c.x * n + c.y) * n + c.z); }
   [[nodiscard]] bool contains(Coord c) const {
     return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < n && c.y < n && c.z < n;
   }
@@ -56,12 +54,12 @@ void flood(Sides& sides, std::vector<Coord> from) {
 // Labels of a cell at its own level, as the finder assigned them.
 std::vector<std::uint16_t> own_labels(const CutField& field, const PieceCell& cell) {
   const std::int32_t n = kLeafSize << cell.level;
-  std::vector<std::uint16_t> labels(at(n * n * n), 1);
+  std::vector<std::uint16_t> labels(to_index(n * n * n), 1);
   if (cell.full) return labels;
   std::vector<float> f(labels.size());
   field.gather_solid(cell.level, cell_box(cell.origin, cell.level), f);
   const int count = label_solid({n, n, n}, f, labels);
-  OSTEON_CHECK(at(count) == cell.in_piece.size());
+  OSTEON_CHECK(to_index(count) == cell.in_piece.size());
   return labels;
 }
 
@@ -72,7 +70,7 @@ Sides sides_of(const CutField& field, const PieceCell& cell, int level) {
   Sides sides{kLeafSize << level, {}};
   const std::vector<std::uint16_t> labels = own_labels(field, cell);
   const auto side_of = [&](std::uint16_t label) { return cell.in_piece[label - 1u] ? kPiece : kRest; };
-  sides.side.assign(at(sides.n * sides.n * sides.n), 0);
+  sides.side.assign(to_index(sides.n * sides.n * sides.n), 0);
   if (cell.level == level) {
     for (std::size_t i = 0; i < labels.size(); ++i)
       if (labels[i]) sides.side[i] = side_of(labels[i]);
@@ -132,7 +130,7 @@ void settle_unknown(SidesOf& all) {
 Sides with_margin(const SidesOf& all, Coord origin) {
   const std::int32_t n = all.at(origin).n;
   Sides grown{n + 2, {}};
-  grown.side.assign(at(grown.n * grown.n * grown.n), 0);
+  grown.side.assign(to_index(grown.n * grown.n * grown.n), 0);
   for (std::int32_t dx = -1; dx <= 1; ++dx)
     for (std::int32_t dy = -1; dy <= 1; ++dy)
       for (std::int32_t dz = -1; dz <= 1; ++dz) {
@@ -154,7 +152,7 @@ Sides with_margin(const SidesOf& all, Coord origin) {
 // For each sample: what the 27 samples around it contain, one axis at a time.
 std::vector<std::uint8_t> near_sides(const Sides& sides) {
   std::vector<std::uint8_t> now = sides.side, next(now.size());
-  const std::size_t strides[3] = {at(sides.n * sides.n), at(sides.n), 1};
+  const std::size_t strides[3] = {to_index(sides.n * sides.n), to_index(sides.n), 1};
   for (const std::size_t stride : strides) {
     for (std::size_t i = 0; i < now.size(); ++i) {
       std::uint8_t seen = now[i];
@@ -179,8 +177,8 @@ void add_leaves(BodyId body, int level, Coord cell, const std::vector<std::int16
         for (std::int32_t x = 0; x < kLeafSize; ++x)
           for (std::int32_t y = 0; y < kLeafSize; ++y)
             for (std::int32_t z = 0; z < kLeafSize; ++z) {
-              const std::int16_t v = values[at(((lx + x) * n + ly + y) * n + lz + z)];
-              leaf.values[at(x * 64 + y * 8 + z)] = v;
+              const std::int16_t v = values[to_index(((lx + x) * n + ly + y) * n + lz + z)];
+              leaf.values[to_index(x * 64 + y * 8 + z)] = v;
               cuts |= v != band;
             }
         if (!cuts) continue;
@@ -195,7 +193,7 @@ void add_interface(const CutField& field, const SidesOf& all, int level, Coord o
   const std::vector<std::uint8_t> near = near_sides(grown);
   const std::int32_t n = grown.n - 2;
   const std::int16_t band = band_of(field.bone(), level), none = static_cast<std::int16_t>(-band);
-  std::vector<std::int16_t> taken(at(n * n * n), band), left(taken.size(), band);
+  std::vector<std::int16_t> taken(to_index(n * n * n), band), left(taken.size(), band);
   std::size_t i = 0;
   for (std::int32_t x = 0; x < n; ++x)
     for (std::int32_t y = 0; y < n; ++y)
@@ -224,13 +222,13 @@ void add_constants(const CutField& field, const CellMap& map, std::span<const Pi
       const Coord step{around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1};
       const Coord next = cells[i].origin + kLeafSize * step;
       const std::int32_t place = map.find(next);
-      if (place < 0 || whole[at(place)]) continue;
+      if (place < 0 || whole[to_index(place)]) continue;
       auto& values = beyond.try_emplace(next, std::vector<std::int16_t>(kLeafVoxels, band)).first->second;
       const auto first = [](std::int32_t d) { return d < 0 ? kLeafSize - 1 : 0; };
       const auto end = [](std::int32_t d) { return d > 0 ? 1 : kLeafSize; };
       for (std::int32_t x = first(step.x); x < end(step.x); ++x)
         for (std::int32_t y = first(step.y); y < end(step.y); ++y)
-          for (std::int32_t z = first(step.z); z < end(step.z); ++z) values[at(x * 64 + y * 8 + z)] = none;
+          for (std::int32_t z = first(step.z); z < end(step.z); ++z) values[to_index(x * 64 + y * 8 + z)] = none;
     }
   }
   for (auto& [origin, values] : beyond) out.push_back({field.body(), 0, origin, std::move(values)});
@@ -269,9 +267,11 @@ class Measure {
     const CoordBox own = cell_box(cell.origin, cell.level);
     const CoordBox box{own.min - Coord{1, 1, 1}, own.max + Coord{2, 2, 2}};
     const std::int32_t n = own.dims().x, m = box.dims().x;
-    std::vector<float> f(at(m * m * m));
+    std::vector<float> f(to_index(m * m * m));
     field_.gather_solid(cell.level, box, f);
-    const auto value = [&](Coord c) { return f[at(((c.x - box.min.x) * m + c.y - box.min.y) * m + c.z - box.min.z)]; };
+    const auto value = [&](Coord c) {
+      return f[to_index(((c.x - box.min.x) * m + c.y - box.min.y) * m + c.z - box.min.z)];
+    };
     double samples = 0.0;
     for (std::int32_t x = 0; x <= n; ++x)
       for (std::int32_t y = 0; y <= n; ++y)
@@ -301,8 +301,8 @@ class Measure {
  private:
   bool in_piece(Coord sample, int level) {
     const std::int32_t i = map_.find(floor_to(shift_down(sample, level), kLeafSize));
-    if (i < 0 || !cells_[at(i)].has_piece) return false;
-    const PieceCell& cell = cells_[at(i)];
+    if (i < 0 || !cells_[to_index(i)].has_piece) return false;
+    const PieceCell& cell = cells_[to_index(i)];
     if (!cell.has_rest && cell.full) return true;
     auto found = labels_.find(i);
     if (found == labels_.end()) found = labels_.emplace(i, own_labels(field_, cell)).first;
@@ -310,7 +310,7 @@ class Measure {
     const Coord there =
         cell.level >= level ? (1 << (cell.level - level)) * sample : shift_down(sample, level - cell.level);
     const Coord c = there - (1 << cell.level) * cell.origin;
-    const std::uint16_t label = found->second[at((c.x * n + c.y) * n + c.z)];
+    const std::uint16_t label = found->second[to_index((c.x * n + c.y) * n + c.z)];
     return label && cell.in_piece[label - 1u];
   }
 
@@ -326,7 +326,7 @@ bool is_deep(const CellMap& map, std::span<const PieceCell> cells, const PieceCe
   for (int around = 0; around < 27; ++around) {
     const std::int32_t next =
         map.find(cell.origin + kLeafSize * Coord{around / 9 - 1, around / 3 % 3 - 1, around % 3 - 1});
-    if (next < 0 || !cells[at(next)].full) return false;
+    if (next < 0 || !cells[to_index(next)].full) return false;
   }
   return true;
 }
@@ -337,14 +337,14 @@ CellMap::CellMap(const CoordBox& bounds_samples, const std::vector<Coord>& origi
   // One extra cell on all sides, so that neighbours need no check.
   box_ = CoordBox{shift_down(bounds_samples.min, 3), shift_down(bounds_samples.max, 3)}.grown(1);
   const Coord d = box_.dims();
-  cells_.assign(at(d.x) * at(d.y) * at(d.z), -1);
+  cells_.assign(to_index(d.x) * to_index(d.y) * to_index(d.z), -1);
   for (std::size_t i = 0; i < origins.size(); ++i)
     cells_[index(shift_down(origins[i], 3))] = static_cast<std::int32_t>(i);
 }
 
 std::size_t CellMap::index(Coord cell) const {
   const Coord d = box_.dims(), c = cell - box_.min;
-  return (at(c.x) * at(d.y) + at(c.y)) * at(d.z) + at(c.z);
+  return (to_index(c.x) * to_index(d.y) + to_index(c.y)) * to_index(d.z) + to_index(c.z);
 }
 
 std::int32_t CellMap::find(Coord origin) const {
@@ -356,10 +356,10 @@ std::vector<std::uint8_t> CellMap::dilated(std::span<const std::uint8_t> marked)
   OSTEON_CHECK(marked.size() == count_);
   std::vector<std::uint8_t> now(cells_.size(), 0), next(cells_.size());
   for (std::size_t i = 0; i < cells_.size(); ++i)
-    if (cells_[i] >= 0) now[i] = marked[at(cells_[i])];
+    if (cells_[i] >= 0) now[i] = marked[to_index(cells_[i])];
   const Coord d = box_.dims();
   // The border is never marked, so wrapping around it has no effect.
-  for (const std::size_t stride : {at(d.y) * at(d.z), at(d.z), std::size_t{1}}) {
+  for (const std::size_t stride : {to_index(d.y) * to_index(d.z), to_index(d.z), std::size_t{1}}) {
     for (std::size_t i = 0; i < now.size(); ++i)
       next[i] = static_cast<std::uint8_t>(now[i] | (i >= stride ? now[i - stride] : 0) |
                                           (i + stride < now.size() ? now[i + stride] : 0));
@@ -367,7 +367,7 @@ std::vector<std::uint8_t> CellMap::dilated(std::span<const std::uint8_t> marked)
   }
   std::vector<std::uint8_t> result(count_, 0);
   for (std::size_t i = 0; i < cells_.size(); ++i)
-    if (cells_[i] >= 0) result[at(cells_[i])] = now[i];
+    if (cells_[i] >= 0) result[to_index(cells_[i])] = now[i];
   return result;
 }
 

@@ -17,8 +17,6 @@ constexpr std::int32_t kNoPart = -1;  // no bone of the case
 constexpr std::int32_t kSeveralParts = -2;
 constexpr int kFinest = kLevels - 1;
 
-std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-
 // Linked components: one of a cell, and one of the next cell along an axis.
 using Link = std::pair<std::uint16_t, std::uint16_t>;
 
@@ -35,7 +33,7 @@ struct Cell {
 
   [[nodiscard]] std::uint16_t face(int which, std::size_t i) const {
     if (full) return 1;
-    const auto& labels = faces[at(which)];
+    const auto& labels = faces[to_index(which)];
     return labels.empty() ? std::uint16_t{0} : labels[i];
   }
 };
@@ -55,12 +53,12 @@ struct Walk {
 // The layer of labels at one end of an axis.
 std::vector<std::uint16_t> face_labels(const std::vector<std::uint16_t>& labels, std::int32_t n, int axis, bool last) {
   std::vector<std::uint16_t> face;
-  face.reserve(at(n * n));
+  face.reserve(to_index(n * n));
   const std::int32_t fixed = last ? n - 1 : 0;
   for (std::int32_t u = 0; u < n; ++u)
     for (std::int32_t v = 0; v < n; ++v) {
       const Coord c = axis == 0 ? Coord{fixed, u, v} : axis == 1 ? Coord{u, fixed, v} : Coord{u, v, fixed};
-      face.push_back(labels[at((c.x * n + c.y) * n + c.z)]);
+      face.push_back(labels[to_index((c.x * n + c.y) * n + c.z)]);
     }
   return face;
 }
@@ -79,7 +77,7 @@ struct FragmentFinder::Parts {
     cell.level = field ? cut_level(*field, cell.origin) : 0;
     const CoordBox box = cell_box(cell.origin, cell.level);
     const std::int32_t n = kLeafSize << cell.level;
-    std::vector<float> f(at(n * n * n));
+    std::vector<float> f(to_index(n * n * n));
     if (field)
       field->gather_solid(cell.level, box, f);
     else
@@ -92,10 +90,11 @@ struct FragmentFinder::Parts {
     if (cell.full) cell.counts = {static_cast<std::uint32_t>(solid)};
     std::vector<std::uint16_t> labels;
     if (!cell.full && solid > 0) {
-      cell.counts.assign(at(label_solid({n, n, n}, f, labels)), 0);
+      cell.counts.assign(to_index(label_solid({n, n, n}, f, labels)), 0);
       for (const std::uint16_t l : labels)
         if (l) ++cell.counts[l - 1u];
-      for (int which = 0; which < 6; ++which) cell.faces[at(which)] = face_labels(labels, n, which / 2, which % 2 == 1);
+      for (int which = 0; which < 6; ++which)
+        cell.faces[to_index(which)] = face_labels(labels, n, which / 2, which % 2 == 1);
     }
     if (cell.home == kSeveralParts) vote(cell, labels);
   }
@@ -110,9 +109,9 @@ struct FragmentFinder::Parts {
         for (std::int32_t z = 0; z < n; ++z) {
           const std::uint16_t label = cell.full        ? std::uint16_t{1}
                                       : labels.empty() ? std::uint16_t{0}
-                                                       : labels[at((x * n + y) * n + z)];
+                                                       : labels[to_index((x * n + y) * n + z)];
           const Coord c = shift_down({x, y, z}, cell.level);
-          const std::uint16_t in_case = home.labels[at((c.x * kLeafSize + c.y) * kLeafSize + c.z)];
+          const std::uint16_t in_case = home.labels[to_index((c.x * kLeafSize + c.y) * kLeafSize + c.z)];
           if (label && in_case) ++votes[label - 1u][home.parts[in_case]];
         }
     for (const auto& found : votes) {
@@ -124,15 +123,15 @@ struct FragmentFinder::Parts {
   // Links of a cell to the next one along an axis, at the samples of the coarser one.
   [[nodiscard]] std::vector<Link> links_of(const Cell& cell, int axis) const {
     std::vector<Link> links;
-    if (cell.next[at(axis)] < 0) return links;
-    const Cell& next = cells[at(cell.next[at(axis)])];
+    if (cell.next[to_index(axis)] < 0) return links;
+    const Cell& next = cells[to_index(cell.next[to_index(axis)])];
     if (cell.counts.empty() || next.counts.empty()) return links;
     if (cell.full && next.full) return {{1, 1}};
     const int level = std::min(cell.level, next.level);
     const std::int32_t n = kLeafSize << level;
     const auto index = [&](const Cell& c, std::int32_t u, std::int32_t v) {
       const int shift = c.level - level;
-      return at(((u << shift) * (kLeafSize << c.level)) + (v << shift));
+      return to_index(((u << shift) * (kLeafSize << c.level)) + (v << shift));
     };
     for (std::int32_t u = 0; u < n; ++u)
       for (std::int32_t v = 0; v < n; ++v) {
@@ -159,7 +158,7 @@ struct FragmentFinder::Parts {
       for (std::size_t axis = 0; axis < 3; ++axis)
         for (const Link& link : cells[i].links[axis])
           sets.unite(result.first_node[i] + link.first - 1u,
-                     result.first_node[at(cells[i].next[axis])] + link.second - 1u);
+                     result.first_node[to_index(cells[i].next[axis])] + link.second - 1u);
     result.root.resize(nodes);
     for (std::uint32_t node = 0; node < nodes; ++node) result.root[node] = sets.find(node);
     return result;
@@ -242,13 +241,13 @@ FragmentFinder::FragmentFinder(const CutField& field) : parts_(std::make_unique<
     const Coord steps[3] = {{kLeafSize, 0, 0}, {0, kLeafSize, 0}, {0, 0, kLeafSize}};
     for (std::size_t axis = 0; axis < 3; ++axis) {
       cell.next[axis] = parts_->map.find(cell.origin + steps[axis]);
-      if (cell.next[axis] >= 0) parts_->cells[at(cell.next[axis])].previous[axis] = static_cast<std::int32_t>(i);
+      if (cell.next[axis] >= 0) parts_->cells[to_index(cell.next[axis])].previous[axis] = static_cast<std::int32_t>(i);
     }
     parts_->label(cell, nullptr, bone);
   }
   const auto link_all = [&] {
     for (Cell& cell : parts_->cells)
-      for (int axis = 0; axis < 3; ++axis) cell.links[at(axis)] = parts_->links_of(cell, axis);
+      for (int axis = 0; axis < 3; ++axis) cell.links[to_index(axis)] = parts_->links_of(cell, axis);
   };
   link_all();
   parts_->find_home();
@@ -295,20 +294,20 @@ TouchCost FragmentFinder::touch(const CutField& field, int level, const std::vec
         for (std::int32_t z = low.z; z <= own.z; z += kLeafSize) {
           const std::int32_t cell = parts_->map.find({x, y, z});
           if (cell < 0) continue;
-          if (Coord{x, y, z} == own || parts_->cells[at(cell)].level > level) touched.push_back(cell);
+          if (Coord{x, y, z} == own || parts_->cells[to_index(cell)].level > level) touched.push_back(cell);
         }
   }
   std::ranges::sort(touched);
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
   std::vector<std::pair<std::int32_t, std::size_t>> borders;
   for (const std::int32_t i : touched) {
-    Cell& cell = parts_->cells[at(i)];
+    Cell& cell = parts_->cells[to_index(i)];
     const std::size_t before = cell.counts.size();
     const std::vector<std::int32_t> parts_before = cell.parts;
     parts_->label(cell, &field, field.bone());
     cost.links |= cell.counts.size() != before || cell.parts != parts_before;
     ++cost.cells;
-    cost.samples += at(kLeafVoxels) << (3 * cell.level);
+    cost.samples += to_index(kLeafVoxels) << (3 * cell.level);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       borders.emplace_back(i, axis);
       if (cell.previous[axis] >= 0) borders.emplace_back(cell.previous[axis], axis);
@@ -317,7 +316,7 @@ TouchCost FragmentFinder::touch(const CutField& field, int level, const std::vec
   std::ranges::sort(borders);
   borders.erase(std::unique(borders.begin(), borders.end()), borders.end());
   for (const auto& [i, axis] : borders) {
-    Cell& cell = parts_->cells[at(i)];
+    Cell& cell = parts_->cells[to_index(i)];
     std::vector<Link> links = parts_->links_of(cell, static_cast<int>(axis));
     cost.links |= links != cell.links[axis];
     cell.links[axis] = std::move(links);

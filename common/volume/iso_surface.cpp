@@ -319,9 +319,7 @@ class Slab {
 Result<DenseVolume<float>> signed_distance_mm(const DenseVolume<float>& field, float iso, double pitch_mm,
                                               const KeepGoing& keep_going) {
   OSTEON_CHECK(!field.box.empty() && pitch_mm > 0);
-  const auto stopped_by_caller = [] {
-    return failure(ErrorCode::cancelled, "stopped while measuring the bone surface");
-  };
+  const auto stopped_by_caller = [] { return stopped_while("measuring the bone surface"); };
   // Called once before any work, because the threads below may finish before they are first checked.
   if (!keep_going(0.0)) return stopped_by_caller();
   DenseVolume<float> out;

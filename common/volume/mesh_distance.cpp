@@ -149,7 +149,7 @@ class BandDistance {
   openvdb::Int32Grid::ConstAccessor nearest_;
 };
 
-Result<std::shared_ptr<const SampledDistance>> measure(const TriangleMesh& mesh, std::int32_t pitch_quanta) {
+Result<std::shared_ptr<const SampledDistance>> measure_distances(const TriangleMesh& mesh, std::int32_t pitch_quanta) {
   const double pitch = pitch_quanta * kQuantum_mm;
   const std::int32_t band = std::max(4, static_cast<std::int32_t>(std::ceil(kMeshBand_mm / pitch)));
   auto made = std::make_shared<SampledDistance>();
@@ -188,7 +188,7 @@ Result<std::shared_ptr<const SampledDistance>> sampled_distance(const TriangleMe
     return tl::unexpected(good.error());
   try {
     start_openvdb();
-    return measure(mesh, quanta);
+    return measure_distances(mesh, quanta);
   } catch (const std::exception& e) {
     return failure(ErrorCode::internal, std::string("the mesh could not be measured: ") + e.what());
   }
@@ -262,8 +262,7 @@ Result<Case> build_of_mesh(CaseInfo info, const TriangleMesh& mesh, double densi
   const PartDistance bone(shells.bone, pitch, kWidth, waiting);
   std::optional<PartDistance> cavities;
   if (!bone.stopped() && !shells.cavities.triangles.empty()) cavities.emplace(shells.cavities, pitch, kWidth, waiting);
-  if (bone.stopped() || (cavities && cavities->stopped()))
-    return failure(ErrorCode::cancelled, "stopped while measuring the mesh");
+  if (bone.stopped() || (cavities && cavities->stopped())) return stopped_while("measuring the mesh");
 
   const auto fill = [&](const CoordBox& part, PartSamples& samples) {
     std::ranges::fill(samples.density_g_cm3, static_cast<float>(density_g_cm3));

@@ -11,8 +11,6 @@
 namespace osteon {
 namespace {
 
-std::size_t at(std::int32_t i) { return static_cast<std::size_t>(i); }
-
 CoordBox sub_volume_box(Coord origin, int level) {
   const Coord first = (1 << level) * origin;
   const std::int32_t n = (kSubVolumeSamples << level) - 1;
@@ -47,7 +45,7 @@ void SubVolumeField::resample(Coord origin) {
   const CoordBox box = sub_volume_box(origin, level_);
   const std::int32_t n = box.dims().x;
   std::vector<float>& surface = surface_[origin];
-  surface.resize(at(n) * at(n) * at(n));
+  surface.resize(to_index(n) * to_index(n) * to_index(n));
   field_.gather_surface(level_, box, surface);
   const std::int32_t band = band_quanta(level_pitch_mm(field_.bone().pitch_mm(), level_));
   FieldLeaf leaf{field_.body(), level_, {}, std::vector<std::int16_t>(kLeafVoxels, static_cast<std::int16_t>(band))};
@@ -65,7 +63,7 @@ void SubVolumeField::resample(Coord origin) {
 
 void SubVolumeField::gather_solid(const CoordBox& box, std::span<float> out) const {
   const Coord dims = box.dims();
-  OSTEON_CHECK(out.size() == at(dims.x) * at(dims.y) * at(dims.z));
+  OSTEON_CHECK(out.size() == to_index(dims.x) * to_index(dims.y) * to_index(dims.z));
   // If the whole box was resampled, nothing is interpolated.
   const Coord first = floor_to(shift_down(box.min, level_), kSubVolumeSamples), last = shift_down(box.max, level_);
   std::vector<float> cuts;
@@ -78,7 +76,7 @@ void SubVolumeField::gather_solid(const CoordBox& box, std::span<float> out) con
             {std::max(sub.min.x, box.min.x), std::max(sub.min.y, box.min.y), std::max(sub.min.z, box.min.z)},
             {std::min(sub.max.x, box.max.x), std::min(sub.max.y, box.max.y), std::min(sub.max.z, box.max.z)}};
         const Coord d = part.dims();
-        cuts.resize(at(d.x) * at(d.y) * at(d.z));
+        cuts.resize(to_index(d.x) * to_index(d.y) * to_index(d.z));
         if (found == surface_.end())
           field_.gather_solid(level_, part, cuts);
         else
@@ -88,15 +86,17 @@ void SubVolumeField::gather_solid(const CoordBox& box, std::span<float> out) con
         std::size_t i = 0;
         for (std::int32_t x = part.min.x; x <= part.max.x; ++x)
           for (std::int32_t y = part.min.y; y <= part.max.y; ++y) {
-            float* row = out.data() + (at(x - box.min.x) * at(dims.y) + at(y - box.min.y)) * at(dims.z) +
-                         at(part.min.z - box.min.z);
+            float* row = out.data() +
+                         (to_index(x - box.min.x) * to_index(dims.y) + to_index(y - box.min.y)) * to_index(dims.z) +
+                         to_index(part.min.z - box.min.z);
             if (found == surface_.end()) {
               std::copy_n(cuts.data() + i, d.z, row);
-              i += at(d.z);
+              i += to_index(d.z);
               continue;
             }
-            const float* s = found->second.data() + (at(x - sub.min.x) * at(n) + at(y - sub.min.y)) * at(n) +
-                             at(part.min.z - sub.min.z);
+            const float* s = found->second.data() +
+                             (to_index(x - sub.min.x) * to_index(n) + to_index(y - sub.min.y)) * to_index(n) +
+                             to_index(part.min.z - sub.min.z);
             for (std::int32_t z = 0; z < d.z; ++z, ++i) row[z] = cuts[i] < band ? std::max(s[z], -cuts[i]) : s[z];
           }
       }

@@ -15,9 +15,9 @@ constexpr double kPerMillimetre = 65536.0, kPerRadian = 1048576.0;
 constexpr std::int64_t kMostEnergy = std::int64_t{1} << 53;  // largest number of steps that a double counts exactly
 constexpr std::uint32_t kMostLag_ms = 60'000;
 
-using Numbers = google::protobuf::RepeatedField<std::int32_t>;
+using Integers = google::protobuf::RepeatedField<std::int32_t>;
 
-void set(Numbers& out, const Vec3& v, double per_unit) {
+void set(Integers& out, const Vec3& v, double per_unit) {
   constexpr double kMost = std::numeric_limits<std::int32_t>::max();
   for (int i = 0; i < 3; ++i)
     out.Add(std::isnan(v[i]) ? 0 : static_cast<std::int32_t>(std::clamp(std::round(v[i] * per_unit), -kMost, kMost)));
@@ -34,7 +34,7 @@ class Reading {
   void expect(bool good, const char* field, const std::string& what) {
     if (!good && !error_) error_ = Error{ErrorCode::invalid_input, std::string(field) + " " + what};
   }
-  Vec3 vector(const Numbers& in, double per_unit, const char* field) {
+  Vec3 vector(const Integers& in, double per_unit, const char* field) {
     expect(in.size() == 3, field, "needs 3 numbers, this has " + std::to_string(in.size()));
     return in.size() == 3 ? Vec3(Vec3(in[0], in[1], in[2]) / per_unit) : Vec3(Vec3::Zero());
   }

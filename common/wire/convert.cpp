@@ -8,10 +8,6 @@
 namespace osteon::wire {
 namespace {
 
-tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
-  return failure(ErrorCode::invalid_input, field + " " + what);
-}
-
 constexpr double kMostOfATool =
     1e6;  // limits a tool's force in N, its speed in 1/min and so on: the steps of packets end there
 bool all_of_a_tool(std::initializer_list<double> values) {
@@ -143,18 +139,18 @@ v1::FieldLeaf to_wire(const FieldLeaf& leaf) {
 
 Result<Pose> from_wire(const v1::Pose& pose) {
   if (pose.rotation_size() != 4)
-    return bad("rotation", "needs 4 entries, this has " + std::to_string(pose.rotation_size()));
+    return bad_field("rotation", "needs 4 entries, this has " + std::to_string(pose.rotation_size()));
   const Vec3 position = from_wire(pose.position_mm());
   const Eigen::Quaterniond rotation(pose.rotation(3), pose.rotation(0), pose.rotation(1), pose.rotation(2));
-  if (!position.allFinite()) return bad("position_mm", "is not finite");
-  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) return bad("rotation", "is not a unit quaternion");
+  if (!position.allFinite()) return bad_field("position_mm", "is not finite");
+  if (!(std::abs(rotation.norm() - 1.0) < 1e-3)) return bad_field("rotation", "is not a unit quaternion");
   return Pose{position, rotation.normalized()};
 }
 
 Result<Digest> digest_from_wire(const std::string& bytes) {
   Digest digest;
   if (bytes.size() != digest.bytes.size())
-    return bad("hash", "needs 32 bytes, this has " + std::to_string(bytes.size()));
+    return bad_field("hash", "needs 32 bytes, this has " + std::to_string(bytes.size()));
   std::ranges::transform(bytes, digest.bytes.begin(), [](char c) { return static_cast<std::uint8_t>(c); });
   return digest;
 }
@@ -166,24 +162,24 @@ Result<Cut> from_wire(const v1::Cut& cut) {
   out.lease_epoch = cut.lease_epoch();
   out.body = {cut.body()};
   const auto tool = digest_from_wire(cut.tool_hash());
-  if (!tool) return bad("tool_hash:", tool.error().message);
+  if (!tool) return bad_field("tool_hash:", tool.error().message);
   out.tool = *tool;
-  if (cut.level() >= static_cast<std::uint32_t>(kLevels)) return bad("level", "must be 0, 1 or 2");
+  if (cut.level() >= static_cast<std::uint32_t>(kLevels)) return bad_field("level", "must be 0, 1 or 2");
   out.level = static_cast<int>(cut.level());
-  if (cut.path().empty()) return bad("path", "needs at least one pose");
+  if (cut.path().empty()) return bad_field("path", "needs at least one pose");
   for (const v1::QuantisedPose& knot : cut.path()) {
     if (knot.position_size() != 3 || knot.rotation_size() != 4)
-      return bad("path", "has a pose without 3 positions and 4 rotations");
+      return bad_field("path", "has a pose without 3 positions and 4 rotations");
     QuantisedPose pose;
     double norm = 0.0;
     for (int i = 0; i < 3; ++i) pose.position[static_cast<std::size_t>(i)] = knot.position(i);
     for (int i = 0; i < 4; ++i) {
-      if (std::abs(knot.rotation(i)) > 32767) return bad("path", "has a rotation beyond 32767");
+      if (std::abs(knot.rotation(i)) > 32767) return bad_field("path", "has a rotation beyond 32767");
       pose.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(knot.rotation(i));
       norm += static_cast<double>(knot.rotation(i)) * knot.rotation(i);
     }
     if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3)
-      return bad("path", "has a rotation that is not a unit quaternion");
+      return bad_field("path", "has a rotation that is not a unit quaternion");
     out.path.push_back(pose);
   }
   out.spindle_rpm = cut.spindle_rpm();
@@ -199,15 +195,15 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   if (!tool) return failure(ErrorCode::invalid_input, "pose_bone_tool." + tool.error().message);
   const auto device = from_wire(state.pose_bone_device());
   if (!device) return failure(ErrorCode::invalid_input, "pose_bone_device." + device.error().message);
-  if (tool->position_mm.norm() > kFurthest_mm) return bad("pose_bone_tool", "is not near the bone");
-  if (device->position_mm.norm() > kFurthest_mm) return bad("pose_bone_device", "is not near the bone");
+  if (tool->position_mm.norm() > kFurthest_mm) return bad_field("pose_bone_tool", "is not near the bone");
+  if (device->position_mm.norm() > kFurthest_mm) return bad_field("pose_bone_device", "is not near the bone");
   out.pose_bone_tool = *tool;
   out.pose_bone_device = *device;
   out.tool_name = state.tool_name();
   out.force_physical_N = from_wire(state.force_physical_n());
   if (!all_of_a_tool({state.spindle_rpm(), state.feed_mm_per_s(), state.density_g_cm3(), state.engaged_fraction(),
                       state.torque_n_mm(), state.depth_mm(), out.force_physical_N.norm()}))
-    return bad("cutting state", "has a number that is not finite or too large for a tool");
+    return bad_field("cutting state", "has a number that is not finite or too large for a tool");
   out.spindle_rpm = state.spindle_rpm();
   out.feed_mm_per_s = state.feed_mm_per_s();
   out.density_g_cm3 = state.density_g_cm3();
@@ -215,7 +211,7 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
   out.torque_Nmm = state.torque_n_mm();
   out.depth_mm = state.depth_mm();
   if (state.phase() < v1::CUTTING_PHASE_IDLE || state.phase() > v1::CUTTING_PHASE_RUBBING)
-    return bad("phase", "is not one that this program knows");
+    return bad_field("phase", "is not one that this program knows");
   out.phase = static_cast<CuttingPhase>(state.phase());
   out.on_metal = state.on_metal();
   return out;
@@ -224,13 +220,13 @@ Result<CuttingState> from_wire(const v1::CuttingState& state) {
 Result<FieldLeaf> from_wire(const v1::FieldLeaf& leaf) {
   FieldLeaf out;
   out.body = {leaf.body()};
-  if (leaf.level() >= static_cast<std::uint32_t>(kLevels)) return bad("level", "must be 0, 1 or 2");
+  if (leaf.level() >= static_cast<std::uint32_t>(kLevels)) return bad_field("level", "must be 0, 1 or 2");
   out.level = static_cast<int>(leaf.level());
   out.origin = from_wire(leaf.origin());
-  if (floor_to(out.origin, kLeafSize) != out.origin) return bad("origin", "is not the first sample of a leaf");
+  if (floor_to(out.origin, kLeafSize) != out.origin) return bad_field("origin", "is not the first sample of a leaf");
   const std::size_t size = leaf.values().size();
   if (size != 2 && size != std::size_t{2} * kLeafVoxels)
-    return bad("values", "needs 1024 bytes or 2, this has " + std::to_string(size));
+    return bad_field("values", "needs 1024 bytes or 2, this has " + std::to_string(size));
   const auto value = [&](std::size_t i) {
     const auto low = static_cast<std::uint8_t>(leaf.values()[2 * i]),
                high = static_cast<std::uint8_t>(leaf.values()[2 * i + 1]);
@@ -258,12 +254,12 @@ Result<SceneItem> from_wire(const v1::SceneItem& item) {
   out.id = item.item();
   out.body = {item.body()};
   const auto tool = digest_from_wire(item.tool_hash());
-  if (!tool) return bad("item.tool_hash:", tool.error().message);
+  if (!tool) return bad_field("item.tool_hash:", tool.error().message);
   out.tool = *tool;
   const auto pose = from_wire(item.pose_bone_item());
   if (!pose) return failure(ErrorCode::invalid_input, "item.pose_bone_item." + pose.error().message);
   out.pose_bone_item = *pose;
-  if (!std::isfinite(item.turns())) return bad("item.turns", "is not finite");
+  if (!std::isfinite(item.turns())) return bad_field("item.turns", "is not finite");
   out.turns = item.turns();
   out.seated = item.seated();
   out.set_at = item.set_at();
@@ -278,17 +274,18 @@ Result<Placing> placing_from_wire(const v1::SetSceneItemRequest& request) {
       onto.near_mm = from_wire(given.near_mm());
       if (given.has_axis()) onto.axis = from_wire(given.axis());
       if (given.has_across()) onto.across = from_wire(given.across());
-      if (!onto.near_mm.allFinite()) return bad("onto_bone.near_mm", "is not finite");
+      if (!onto.near_mm.allFinite()) return bad_field("onto_bone.near_mm", "is not finite");
       if (onto.axis && !(onto.axis->allFinite() && onto.axis->norm() > 1e-9))
-        return bad("onto_bone.axis", "has no direction");
-      if (!(onto.across.allFinite() && onto.across.norm() > 1e-9)) return bad("onto_bone.across", "has no direction");
+        return bad_field("onto_bone.axis", "has no direction");
+      if (!(onto.across.allFinite() && onto.across.norm() > 1e-9))
+        return bad_field("onto_bone.across", "has no direction");
       return Placing(onto);
     }
     case v1::SetSceneItemRequest::kThreadTurns:
-      if (!std::isfinite(request.thread_turns())) return bad("thread_turns", "is not finite");
+      if (!std::isfinite(request.thread_turns())) return bad_field("thread_turns", "is not finite");
       return Placing(ByThread{request.thread_turns()});
     case v1::SetSceneItemRequest::kDriveHomeMm:
-      if (!std::isfinite(request.drive_home_mm())) return bad("drive_home_mm", "is not finite");
+      if (!std::isfinite(request.drive_home_mm())) return bad_field("drive_home_mm", "is not finite");
       return Placing(DriveHome{request.drive_home_mm()});
     case v1::SetSceneItemRequest::PLACING_NOT_SET:
       break;
@@ -307,20 +304,21 @@ v1::ViewFrustum to_wire(const ViewFrustum& look) {
 }
 
 Result<BlockKey> key_from_wire(const v1::MeshBlock& block) {
-  if (block.level() < kCoarsestLevel || block.level() >= kLevels) return bad("mesh block: level", "must be -2 to 2");
+  if (block.level() < kCoarsestLevel || block.level() >= kLevels)
+    return bad_field("mesh block: level", "must be -2 to 2");
   return BlockKey{BodyId{block.body()}, block.level(), from_wire(block.index())};
 }
 
 Result<ViewFrustum> from_wire(const v1::ViewFrustum& look) {
   ViewFrustum out{from_wire(look.eye_mm()), from_wire(look.target_mm()), look.pixel_rad(), look.view_rad()};
   const auto placed = [](const Vec3& at) { return at.allFinite() && at.norm() <= kFurthest_mm; };
-  if (!placed(out.eye_mm)) return bad("look.eye_mm", "is not near the bone");
-  if (!placed(out.target_mm)) return bad("look.target_mm", "is not near the bone");
-  if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad("look.pixel_rad", "must be between 0 and 1");
-  if (!(out.view_rad > 0.0 && out.view_rad < 1.5)) return bad("look.view_rad", "must be between 0 and 1.5");
+  if (!placed(out.eye_mm)) return bad_field("look.eye_mm", "is not near the bone");
+  if (!placed(out.target_mm)) return bad_field("look.target_mm", "is not near the bone");
+  if (!(out.pixel_rad > 0.0 && out.pixel_rad < 1.0)) return bad_field("look.pixel_rad", "must be between 0 and 1");
+  if (!(out.view_rad > 0.0 && out.view_rad < 1.5)) return bad_field("look.view_rad", "must be between 0 and 1.5");
   if (!look.has_up()) return out;
   const Vec3 up = from_wire(look.up());
-  if (!is_up(up, out.target_mm - out.eye_mm)) return bad("look.up", "is no unit vector across the line of sight");
+  if (!is_up(up, out.target_mm - out.eye_mm)) return bad_field("look.up", "is no unit vector across the line of sight");
   out.up = up.normalized();
   return out;
 }
@@ -334,9 +332,9 @@ v1::ToolDefinition to_wire(const Tool& tool) {
 
 Result<Tool> from_wire(const v1::ToolDefinition& tool) {
   Result<Tool> parsed = parse_tool(tool.yaml(), "the tool definition");
-  if (!parsed) return bad("tool.yaml:", parsed.error().message);
+  if (!parsed) return bad_field("tool.yaml:", parsed.error().message);
   if (!tool.tool_hash().empty() && tool.tool_hash() != to_wire(parsed->hash()))
-    return bad("tool.tool_hash", "is not that of the definition");
+    return bad_field("tool.tool_hash", "is not that of the definition");
   return parsed;
 }
 
@@ -367,12 +365,12 @@ Result<Restrictions> from_wire(const v1::Restrictions& supervision) {
   if (supervision.has_zone()) {
     const v1::ZoneLimit& zone = supervision.zone();
     if (zone.centre_size() != 3)
-      return bad("supervision.zone.centre", "needs 3 numbers, this has " + std::to_string(zone.centre_size()));
+      return bad_field("supervision.zone.centre", "needs 3 numbers, this has " + std::to_string(zone.centre_size()));
     out.zone = ZoneLimit{{zone.centre(0), zone.centre(1), zone.centre(2)}, zone.radius()};
   }
   for (const std::string& hash : supervision.tools()) {
     const auto tool = digest_from_wire(hash);
-    if (!tool) return bad("supervision.tools:", tool.error().message);
+    if (!tool) return bad_field("supervision.tools:", tool.error().message);
     out.tools.push_back(*tool);
   }
   std::ranges::sort(out.tools);
@@ -399,10 +397,11 @@ Result<Annotation> from_wire(const v1::Annotation& annotation) {
   out.id = annotation.annotation();
   out.author = {annotation.author()};
   if (annotation.kind() < v1::ANNOTATION_KIND_POINTER || annotation.kind() > v1::ANNOTATION_KIND_LABEL)
-    return bad("drawn.kind", "must be pointer, line or label");
+    return bad_field("drawn.kind", "must be pointer, line or label");
   out.kind = static_cast<AnnotationKind>(annotation.kind());
   if (annotation.points_size() % 3 != 0)
-    return bad("drawn.points", "needs 3 numbers for each point, this has " + std::to_string(annotation.points_size()));
+    return bad_field("drawn.points",
+                     "needs 3 numbers for each point, this has " + std::to_string(annotation.points_size()));
   for (int i = 0; i < annotation.points_size(); i += 3)
     out.points.push_back({annotation.points(i), annotation.points(i + 1), annotation.points(i + 2)});
   out.words = annotation.words();

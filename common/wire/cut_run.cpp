@@ -12,10 +12,6 @@
 namespace osteon::wire {
 namespace {
 
-tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
-  return failure(ErrorCode::invalid_input, field + " " + what);
-}
-
 void put_varint(std::string& out, std::uint64_t value) {
   for (; value >= 128; value >>= 7) out += static_cast<char>(value | 128);
   out += static_cast<char>(value);
@@ -194,15 +190,16 @@ Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNum
   state.last.author_seq = head.author_seq();
   state.last.lease_epoch = head.lease_epoch();
   state.last.body = {head.body()};
-  if (head.level() >= static_cast<std::uint32_t>(kLevels)) return bad("level", "must be 0, 1 or 2");
+  if (head.level() >= static_cast<std::uint32_t>(kLevels)) return bad_field("level", "must be 0, 1 or 2");
   state.last.level = static_cast<int>(head.level());
   state.last.spindle_rpm = head.spindle_rpm();
   state.last.path_us = head.path_us();
-  if (head.start_size() != 7) return bad("start", "needs 7 numbers, this has " + std::to_string(head.start_size()));
+  if (head.start_size() != 7)
+    return bad_field("start", "needs 7 numbers, this has " + std::to_string(head.start_size()));
   for (int i = 0; i < 3; ++i) state.pose.position[static_cast<std::size_t>(i)] = head.start(i);
   for (int i = 0; i < 4; ++i) {
     const std::int32_t r = head.start(3 + i);
-    if (r != static_cast<std::int16_t>(r)) return bad("start", "has a rotation beyond 16 bits");
+    if (r != static_cast<std::int16_t>(r)) return bad_field("start", "has a rotation beyond 16 bits");
     state.pose.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(r);
   }
   if (head.tool_case() == v1::CutRun::kToolNumber) {
@@ -212,7 +209,7 @@ Result<RunState> state_of(const v1::CutRun& head, AuthorId author, const ToolNum
     state.last.tool = *tool;
   } else {
     const auto tool = digest_from_wire(head.tool_hash());
-    if (!tool) return bad("tool_hash:", tool.error().message);
+    if (!tool) return bad_field("tool_hash:", tool.error().message);
     state.last.tool = *tool;
   }
   return state;
@@ -249,7 +246,7 @@ Result<void> entries_of_run(const v1::EntryRun& run, const ToolNumbers& tools, s
   if (!state) return tl::unexpected(state.error());
   std::uint64_t index = run.index(), room_seq = run.room_seq();
   Reader in{run.entries()};
-  if (in.rest.empty()) return bad("entries", "has none");
+  if (in.rest.empty()) return bad_field("entries", "has none");
   for (bool first = true; !in.rest.empty(); first = false) {
     const std::uint64_t what = in.varint();
     const std::uint64_t index_step = (what >> 1) + 1;
@@ -264,7 +261,7 @@ Result<void> entries_of_run(const v1::EntryRun& run, const ToolNumbers& tools, s
       state->last.author_seq += author_step;
     }
     Cut cut = state->last;
-    if (!get_cut(in, cut, state->pose)) return bad("entries", "is not a sequence of entries");
+    if (!get_cut(in, cut, state->pose)) return bad_field("entries", "is not a sequence of entries");
     state = state_after(cut, *state);
     entries.push_back({index, {.room_seq = {room_seq}, .kind = SessionEntryKind::committed, .cut = std::move(cut)}});
   }
@@ -339,11 +336,11 @@ Result<std::vector<Cut>> cuts_of(const v1::CutRun& run, AuthorId author, const T
   if (!state) return tl::unexpected(state.error());
   std::vector<Cut> cuts;
   Reader in{run.cuts()};
-  if (in.rest.empty()) return bad("cuts", "has none");
+  if (in.rest.empty()) return bad_field("cuts", "has none");
   while (!in.rest.empty()) {
     Cut cut = state->last;
     cut.author_seq = run.author_seq() + cuts.size();
-    if (!get_cut(in, cut, state->pose)) return bad("cuts", "is not a sequence of cuts");
+    if (!get_cut(in, cut, state->pose)) return bad_field("cuts", "is not a sequence of cuts");
     state = state_after(cut, *state);
     cuts.push_back(std::move(cut));
   }

@@ -11,10 +11,6 @@ namespace {
 
 constexpr std::size_t kMostNameBytes = 64;
 
-tl::unexpected<Error> bad(const std::string& field, const std::string& what) {
-  return failure(ErrorCode::invalid_input, field + " " + what);
-}
-
 // Whole steps, clamped to the type's range. 0 for NaN.
 template <class Integer>
 Integer steps(double value, double per_unit) {
@@ -31,18 +27,19 @@ void set_pose(v1::QuantisedPose& out, const Pose& pose) {
 }
 
 Result<Pose> pose_from(const v1::QuantisedPose& pose, const std::string& field) {
-  if (pose.position_size() != 3 || pose.rotation_size() != 4) return bad(field, "needs 3 positions and 4 rotations");
+  if (pose.position_size() != 3 || pose.rotation_size() != 4)
+    return bad_field(field, "needs 3 positions and 4 rotations");
   QuantisedPose out;
   double norm = 0.0;
   for (int i = 0; i < 3; ++i) out.position[static_cast<std::size_t>(i)] = pose.position(i);
   for (int i = 0; i < 4; ++i) {
     const std::int32_t r = pose.rotation(i);
-    if (r != static_cast<std::int16_t>(r)) return bad(field, "has a rotation beyond 16 bits");
+    if (r != static_cast<std::int16_t>(r)) return bad_field(field, "has a rotation beyond 16 bits");
     out.rotation[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(r);
     norm += static_cast<double>(r) * r;
   }
   if (std::abs(std::sqrt(norm) / 32767.0 - 1.0) > 1e-3)
-    return bad(field, "has a rotation that is not a unit quaternion");
+    return bad_field(field, "has a rotation that is not a unit quaternion");
   return dequantise(out);
 }
 
@@ -86,15 +83,15 @@ Result<bool> take_over(const v1::ToolState& sent, KnownToolState& known) {
   }
   next.spindle_rpm = sent.spindle_rpm();
   if (sent.phase() < v1::CUTTING_PHASE_IDLE || sent.phase() > v1::CUTTING_PHASE_RUBBING)
-    return bad("phase", "is not one that this program knows");
+    return bad_field("phase", "is not one that this program knows");
   next.phase = static_cast<CuttingPhase>(sent.phase());
   next.on_metal = sent.on_metal();
   if (sent.has_effort()) {
     const v1::ToolEffort& effort = sent.effort();
     if (effort.force_size() != 3)
-      return bad("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
-    if (effort.engaged() > 1000) return bad("effort.engaged", "must be at most 1000");
-    if (effort.tool_name().size() > kMostNameBytes) return bad("effort.tool_name", "is longer than 64 bytes");
+      return bad_field("effort.force", "needs 3 numbers, this has " + std::to_string(effort.force_size()));
+    if (effort.engaged() > 1000) return bad_field("effort.engaged", "must be at most 1000");
+    if (effort.tool_name().size() > kMostNameBytes) return bad_field("effort.tool_name", "is longer than 64 bytes");
     next.tool_name = effort.tool_name();
     for (int i = 0; i < 3; ++i) next.force_physical_N[i] = effort.force(i) / 1000.0;
     next.torque_Nmm = effort.torque() / 100.0;

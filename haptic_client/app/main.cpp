@@ -37,7 +37,7 @@ struct Options {
   ClientOptions client;
 };
 
-json vector(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
+json json_vector(const Vec3& v) { return json::array({v.x(), v.y(), v.z()}); }
 
 json means(const LayerMeans& m) {
   return {{"force_n", m.force_n},
@@ -58,15 +58,15 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
   if (step.plan.action == Action::wait) return out;
   if (step.plan.action == Action::place) {
     out["tool"] = step.plan.tool;
-    out["entry_mm"] = vector(step.site.entry_mm);
-    out["axis"] = vector(step.site.axis);
+    out["entry_mm"] = json_vector(step.site.entry_mm);
+    out["axis"] = json_vector(step.site.axis);
     return out;
   }
   out["law"] = law_name(tools[static_cast<std::size_t>(step.tool)]);
   if (step.plan.action == Action::free_hand) {
     out["tool"] = step.plan.tool;
     out["spindle_rpm"] = step.spindle_rpm;
-    out["entry_mm"] = vector(step.site.entry_mm);
+    out["entry_mm"] = json_vector(step.site.entry_mm);
     out["removed_mm3"] = removed_mm3;
     out["peak_force_n"] = result.peak_force_n;
     return out;
@@ -76,8 +76,8 @@ json step_summary(const ReadyStep& step, const std::vector<ToolModel>& tools, co
   out["tool"] = step.plan.tool;
   out["hand"] = kHands[static_cast<int>(step.plan.hand)];
   out["spindle_rpm"] = step.spindle_rpm;
-  out["entry_mm"] = vector(step.site.entry_mm);
-  out["axis"] = vector(step.site.axis);
+  out["entry_mm"] = json_vector(step.site.entry_mm);
+  out["axis"] = json_vector(step.site.axis);
   out["thickness_mm"] = step.site.thickness_mm;
   out["flatness_mm"] = step.site.flatness_mm;
   out["removed_mm3"] = removed_mm3;

@@ -14,8 +14,8 @@ namespace {
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kRound = 2ms;        // longest pause between two rounds
-constexpr auto kStopPatience = 2s;  // for the room's decisions after a stop was requested
+constexpr auto kLongestPause = 2ms;  // longest pause between two rounds
+constexpr auto kStopPatience = 2s;   // for the room's decisions after a stop was requested
 
 }  // namespace
 
@@ -37,7 +37,7 @@ void ReplicaWorker::run() {
   MemoryReserve reserve(kCutReserve);
   std::optional<Clock::time_point> waiting_since;
   while (true) {
-    queue_.take(batch, kRound);
+    queue_.take(batch, kLongestPause);
     const bool any_received = !batch.messages.empty();
     // Read before the cuts: what was closed up to here must still be taken.
     const bool finishing = finishing_;

@@ -11,9 +11,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kRound = 4ms;       // pause between two rounds
-constexpr auto kLagEvery = 200ms;  // between two looks at the connection's delay
-constexpr auto kItemAgain = 2s;    // after an item was denied
+constexpr auto kTelemetryPause = 4ms;  // pause between two rounds
+constexpr auto kLagEvery = 200ms;      // between two looks at the connection's delay
+constexpr auto kItemAgain = 2s;        // after an item was denied
 
 }  // namespace
 
@@ -43,7 +43,7 @@ void TelemetryWorker::run() {
       next_status += 1s;
       print_status(row);
     }
-    std::this_thread::sleep_for(kRound);
+    std::this_thread::sleep_for(kTelemetryPause);
   }
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 using Vec6 = Eigen::Matrix<double, 6, 1>;
 
-constexpr double kNothing_mm = 1e-10;
+constexpr double kNoMotion_mm = 1e-10;
 constexpr double kMostPushedOut_mm = 1.2e-4;  // what a point on its way out asks for, and rounding
 // Conditions whose normal is nearly along a forbidden direction say nothing about the remaining motion.
 constexpr double kLeastNormal2 = 1e-3;
@@ -109,7 +109,7 @@ bool Problem::solve(Vec6& x, bool& pressed) const noexcept {
   double pressure = 0.0;
   for (int step = 0; step < kMostSteps; ++step) {
     if (broken < 0) {
-      double worst = kNothing_mm;
+      double worst = kNoMotion_mm;
       for (int i = 0; i < count; ++i) {
         const double by = least[static_cast<std::size_t>(i)] - row[static_cast<std::size_t>(i)].dot(x);
         if (by > worst) worst = by, broken = i;
@@ -146,7 +146,7 @@ bool Problem::solve(Vec6& x, bool& pressed) const noexcept {
     }
   }
   pressed = !solved;
-  for (int i = 0; i < pressing.count(); ++i) pressed |= pressing.pressure(i) > kNothing_mm;
+  for (int i = 0; i < pressing.count(); ++i) pressed |= pressing.pressure(i) > kNoMotion_mm;
   return solved;
 }
 

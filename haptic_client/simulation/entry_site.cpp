@@ -11,7 +11,7 @@ constexpr double kReach_mm = 60.0;
 constexpr double kLargestGap_mm = 3.0;  // diploe below the threshold is still one bone
 constexpr double kNormalRadius_mm = 3.0;
 
-std::string shown(const Vec3& v) {
+std::string shown_position(const Vec3& v) {
   char text[96];
   std::snprintf(text, sizeof text, "(%.1f, %.1f, %.1f)", v.x(), v.y(), v.z());
   return text;
@@ -91,7 +91,7 @@ Result<EntrySite> find_site_toward(const Case& bone, const Vec3& toward) {
   const double distance = distance_to_bone_mm(bone, from, direction, 2.0 * far_mm);
   if (distance < 0.0)
     return failure(ErrorCode::invalid_input,
-                   "no bone lies along entry.toward " + shown(toward) + "; choose another direction");
+                   "no bone lies along entry.toward " + shown_position(toward) + "; choose another direction");
   site.entry_mm = from + distance * direction;
   refine(bone, site);
   site.thickness_mm = thickness_mm(bone, site);
@@ -108,7 +108,7 @@ Result<EntrySite> find_site_at(const Case& bone, const Vec3& point_mm, const Vec
   const double distance = distance_to_bone_mm(bone, from, site.axis, kReach_mm);
   if (distance < 0.0)
     return failure(ErrorCode::invalid_input,
-                   "no bone lies within 30 mm of entry.point_mm " + shown(point_mm) + " along entry.axis");
+                   "no bone lies within 30 mm of entry.point_mm " + shown_position(point_mm) + " along entry.axis");
   site.entry_mm = from + distance * site.axis;
   EntrySite flat = site;
   refine(bone, flat);

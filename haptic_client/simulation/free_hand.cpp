@@ -8,7 +8,7 @@
 namespace osteon::haptic {
 namespace {
 
-constexpr double kStandOff_mm = 10.0;
+constexpr double kHandStandOff_mm = 10.0;
 constexpr double kMostDepth_mm = 60.0, kRoom_mm = 15.0;  // depth and room that the handle must reach without the clutch
 
 // Limits for a device without force: those of one that is strong enough for the drilling of bone.
@@ -101,7 +101,7 @@ Result<ReadyPlan> make_free_hand(const FreeHandOptions& options, const Case& bon
   step.site = *site;
   step.site.axis = toward;
   step.spindle_rpm = options.spindle_rpm > 0.0 ? options.spindle_rpm : tool->spindle_rpm;
-  step.stand_off_mm = kStandOff_mm;
+  step.stand_off_mm = kHandStandOff_mm;
   step.rotation = view_along(toward);
   step.item = *tool;
   Result<ToolModel> model = ToolModel::make(*tool, bone.pitch_mm(), options.wear, options.law);

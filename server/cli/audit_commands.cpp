@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct AuditArguments {
   fs::path file, signing_key;
   std::vector<std::string> keys;
   std::string expected, person, room, since;
@@ -31,7 +31,7 @@ std::string system_user() {
 }
 
 // Accepts keys of the servers that --key names, or of the one whose signing.key lies beside the log.
-Result<std::function<bool(const PublicKey&)>> trusted(const Arguments& given) {
+Result<std::function<bool(const PublicKey&)>> trusted(const AuditArguments& given) {
   std::vector<std::string> names = given.keys;
   if (names.empty()) names.push_back(folder_of(given.file) / kSigningKeyFile);
   std::vector<std::function<bool(const PublicKey&)>> all;
@@ -50,7 +50,7 @@ Result<std::function<bool(const PublicKey&)>> trusted(const Arguments& given) {
       [all](const PublicKey& key) { return std::ranges::any_of(all, [&](const auto& trusts) { return trusts(key); }); };
 }
 
-Result<void> verify(const Arguments& given) {
+Result<void> verify_file(const AuditArguments& given) {
   const auto trusts = trusted(given);
   if (!trusts) return tl::unexpected(trusts.error());
   std::optional<Digest> expected;
@@ -81,7 +81,7 @@ std::string who_text(const AuditEntry& entry) {
   return text;
 }
 
-void print(const AuditEntry& entry) {
+void print_entry(const AuditEntry& entry) {
   const AuditRecord& record = entry.record;
   std::string line = record.time + "  " + record.action;
   if (!record.object.empty()) line += " " + record.object;
@@ -101,7 +101,7 @@ void print_json(const AuditEntry& entry) {
   std::printf("%s\n", fields.dump(-1, ' ', true, nlohmann::json::error_handler_t::replace).c_str());
 }
 
-Result<void> show(const Arguments& given) {
+Result<void> show_audit(const AuditArguments& given) {
   std::string since = given.since;
   if (since.ends_with('Z')) since.pop_back();  // a time with more digits is later than one with fewer
   if (since.find_first_not_of("0123456789-:.T") != std::string::npos || (!since.empty() && since.size() < 10))
@@ -111,7 +111,7 @@ Result<void> show(const Arguments& given) {
     if (!given.person.empty() && !is_of(entry.who, given.person)) return;
     if (!given.room.empty() && entry.record.object != given.room) return;
     if (entry.record.time < since) return;
-    given.json ? print_json(entry) : print(entry);
+    given.json ? print_json(entry) : print_entry(entry);
   });
   if (!unreadable) return tl::unexpected(unreadable.error());
   if (*unreadable == 0) return {};
@@ -119,7 +119,7 @@ Result<void> show(const Arguments& given) {
                                                " are no records; \"osteon-server audit verify\" names the first");
 }
 
-Result<void> erase_from_audit(const Arguments& given) {
+Result<void> erase_from_audit(const AuditArguments& given) {
   const AuditEvent event{.action = "audit-erase-person", .result = kOk};
   return run_audited(given.file, given.signing_key, event, [&]() -> Result<void> {
     const Result<std::size_t> gone = erase_person(system_disk(), given.file, given.person);
@@ -156,23 +156,23 @@ Result<void> run_audited(const fs::path& file, const fs::path& signing_key, Audi
 }
 
 void add_audit_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
+  const auto given = std::make_shared<AuditArguments>();  // shared by the options and the function that runs
   CLI::App* audit = app.add_subcommand("audit", "Checks or shows who did what on a server, or erases who somebody was");
   audit->require_subcommand(1);
-  const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
+  const auto command = [&](const char* name, const char* what, Result<void> (*run)(const AuditArguments&)) {
     CLI::App* sub = audit->add_subcommand(name, what);
     sub->add_option("file", given->file, "The audit log: audit.log beside the journals")->required();
     sub->callback([&chosen, given, run] { chosen = [given, run] { return run(*given); }; });
     return sub;
   };
-  CLI::App* check =
-      command("verify", "Names the first record that was changed, is missing, or is signed by another key", verify);
+  CLI::App* check = command(
+      "verify", "Names the first record that was changed, is missing, or is signed by another key", verify_file);
   check->add_option(
       "--key", given->keys,
       "Public key of the server, as \"key show\" prints it, or its signing key; by default signing.key beside the log");
   check->add_option("--expect-last", given->expected,
                     "Hash of a record, as the system's log has it: says whether records are missing at the end");
-  CLI::App* shown = command("show", "Prints the records, and who it was as far as that is known", show);
+  CLI::App* shown = command("show", "Prints the records, and who it was as far as that is known", show_audit);
   shown->add_option("--person", given->person, "Only what this person did, or somebody who claimed to be them");
   shown->add_option("--room", given->room, "Only what was done to this room");
   shown->add_option("--since", given->since, "Only from this time on, in UTC: 2026-11-25 or 2026-11-25T12:00:00Z");

@@ -20,15 +20,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void print(const RoomAdminClient::CaseLine& one) {
+void print_case(const RoomAdminClient::CaseLine& one) {
   std::printf("%s  %8.1f MB  [%s]%s\n", to_hex(one.hash).c_str(), static_cast<double>(one.bytes) / 1e6,
               one.title.c_str(), one.known ? "  was here before" : "");
 }
 
-Result<void> list(RoomAdminClient& client) {
+Result<void> list_cases(RoomAdminClient& client) {
   const auto all = client.cases();
   if (!all) return tl::unexpected(all.error());
-  for (const RoomAdminClient::CaseLine& one : *all) print(one);
+  for (const RoomAdminClient::CaseLine& one : *all) print_case(one);
   return {};
 }
 
@@ -54,7 +54,7 @@ Result<void> upload(RoomAdminClient& client, const fs::path& from) {
   Progress progress("upload");
   const auto stored = client.upload_case(archive, [&](double fraction) { progress.update(fraction); });
   if (!stored) return tl::unexpected(stored.error());
-  print(*stored);
+  print_case(*stored);
   return {};
 }
 
@@ -63,7 +63,7 @@ Result<void> upload(RoomAdminClient& client, const fs::path& from) {
 void add_case_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
   CLI::App* cases = app.add_subcommand("cases", "The cases of a server that runs: lists them, uploads one");
   cases->require_subcommand(1);
-  add_asking_command(*cases, "list", "Lists them all", chosen, list);
+  add_asking_command(*cases, "list", "Lists them all", chosen, list_cases);
   const auto from = std::make_shared<fs::path>();  // shared by the option and the function that runs
   add_asking_command(*cases, "upload", "Sends a case to the server, which checks and stores it", chosen,
                      [from](RoomAdminClient& client) { return upload(client, *from); })

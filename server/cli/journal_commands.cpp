@@ -36,7 +36,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct JournalArguments {
   fs::path file, to, case_folder, fields;
   std::string name, key;
   fs::path signing_key;
@@ -64,7 +64,7 @@ auto with_journal(const fs::path& file, const Do& what) -> decltype(what(std::de
 }
 
 // The key that signs changes: the given one, or the one in the journal's folder. Null: there is none.
-Result<std::shared_ptr<const SigningKeys>> keys_for(const Arguments& given) {
+Result<std::shared_ptr<const SigningKeys>> keys_for(const JournalArguments& given) {
   if (!given.signing_key.empty()) return load_signing_keys(given.signing_key);
   auto keys = load_signing_keys(folder_of(given.file) / kSigningKeyFile);
   if (!keys && keys.error().code == ErrorCode::not_found) return nullptr;
@@ -73,7 +73,7 @@ Result<std::shared_ptr<const SigningKeys>> keys_for(const Arguments& given) {
 
 // Opens a journal, changes it and closes it, also after an error, so that its footer is valid again.
 template <class Do>
-auto change_journal(const Arguments& given, const Do& what) -> decltype(what(std::declval<Journal&>())) {
+auto change_journal(const JournalArguments& given, const Do& what) -> decltype(what(std::declval<Journal&>())) {
   Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
   if (!keys) return tl::unexpected(keys.error());
   Result<Journal> journal = Journal::open(given.file, {.keys = std::move(*keys)});
@@ -85,7 +85,7 @@ auto change_journal(const Arguments& given, const Do& what) -> decltype(what(std
 }
 
 // The last event that is meant: that of --to, or the journal's last one if the journal confirms all of its own.
-Result<RoomSeq> last_of(const Journal& journal, const Arguments& given) {
+Result<RoomSeq> last_of(const Journal& journal, const JournalArguments& given) {
   const RoomSeq head = journal.head().seq;
   if (given.at == 0) return check_whole(journal, "--to").map([&] { return head; });
   const Error* closed = journal.closed_because();
@@ -171,7 +171,7 @@ class NewFile {
 };
 
 // Replays the room up to the sequence number of --to, or completely.
-Result<Room> replayed(const Arguments& given) {
+Result<Room> replayed(const JournalArguments& given) {
   const Result<Case> bone = Case::load(given.case_folder);
   if (!bone) return tl::unexpected(bone.error());
   return with_journal(given.file, [&](Journal& journal) -> Result<Room> {
@@ -201,7 +201,7 @@ std::string entries_text(RoomSeq from, RoomSeq to) {
 }
 
 // Says who signed what. Error invalid_input: the key does not vouch for everything.
-Result<void> check_signatures(const VerifyReport& report, const Arguments& given, const PublicKey& key) {
+Result<void> check_signatures(const VerifyReport& report, const JournalArguments& given, const PublicKey& key) {
   const Vouched vouched = vouched_by(key, report);
   const auto by = [&](const PublicKey& who) {
     return "by " + to_hex(who).substr(0, 16) + (who == key ? "" : ", an earlier or later key of this server");
@@ -219,7 +219,7 @@ Result<void> check_signatures(const VerifyReport& report, const Arguments& given
                      "do not trust what is not signed");
 }
 
-Result<void> verify(const Arguments& given) {
+Result<void> verify_file(const JournalArguments& given) {
   const Result<std::optional<PublicKey>> key =
       given.key.empty() ? Result<std::optional<PublicKey>>(std::nullopt)
                         : public_key_of(given.key).map([](const PublicKey& found) { return std::optional(found); });
@@ -249,7 +249,7 @@ Result<void> verify(const Arguments& given) {
   return {};
 }
 
-Result<void> salvage(const Arguments& given) {
+Result<void> salvage(const JournalArguments& given) {
   const Result<std::shared_ptr<const SigningKeys>> keys = keys_for(given);
   if (!keys) return tl::unexpected(keys.error());
   const Result<RecoverReport> report = salvage_journal(given.file, given.to, nullptr, {}, RoomSeq{given.at}, *keys);
@@ -262,12 +262,12 @@ Result<void> salvage(const Arguments& given) {
   return {};
 }
 
-Result<void> copy(const Arguments& given, decltype(backup_journal)* make) {
+Result<void> copy(const JournalArguments& given, decltype(backup_journal)* make) {
   return keys_for(given).and_then([&](const auto& keys) { return make(given.file, given.to, nullptr, keys); });
 }
 
 // Only older files of cut fields may be replaced. Checked before long work, and again before writing.
-Result<void> check_fields_file(const Arguments& given) {
+Result<void> check_fields_file(const JournalArguments& given) {
   const fs::path &file = given.fields, folder = folder_of(file);
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored))
@@ -281,7 +281,7 @@ Result<void> check_fields_file(const Arguments& given) {
                                         "give --fields another name");
 }
 
-Result<void> replay(const Arguments& given) {
+Result<void> replay(const JournalArguments& given) {
   if (!given.fields.empty())
     if (const Result<void> may = check_fields_file(given); !may) return may;
   const Result<Room> room = replayed(given);
@@ -308,7 +308,7 @@ Result<void> replay(const Arguments& given) {
   return save_fields(given.fields, saved);
 }
 
-Result<void> branch(const Arguments& given) {
+Result<void> branch(const JournalArguments& given) {
   Progress progress("branch");
   const Result<JournalHead> made = branch_journal(given.file, given.to, RoomSeq{given.at}, given.to.stem().string(),
                                                   {[&](double fraction) { progress.update(fraction); }, {}});
@@ -318,7 +318,7 @@ Result<void> branch(const Arguments& given) {
 }
 
 // The user must say what happens to its branches, since a deleted room cannot be restored.
-Result<void> remove(const Arguments& given) {
+Result<void> remove_journal(const JournalArguments& given) {
   const Result<std::vector<RoomFile>> branches = branches_of(folder_of(given.file), given.file);
   if (!branches && branches.error().code != ErrorCode::not_found) return tl::unexpected(branches.error());
   if (branches && !branches->empty() && !given.branches && !given.alone) {
@@ -335,7 +335,7 @@ Result<void> remove(const Arguments& given) {
 }
 
 // Writes one line of text for each event, of everybody or of one person.
-Result<void> write_out(const Arguments& given) {
+Result<void> write_out(const JournalArguments& given) {
   if (const Result<void> apart = check_apart(given.file, given.to); !apart) return apart;
   Result<NewFile> out = NewFile::begin(given.to);
   if (!out) return tl::unexpected(out.error());
@@ -381,7 +381,7 @@ Result<void> write_out(const Arguments& given) {
   });
 }
 
-Result<void> list_people(const Arguments& given) {
+Result<void> list_people(const JournalArguments& given) {
   return with_journal(given.file, [](Journal& journal) -> Result<void> {
     const Result<std::vector<Person>> people = journal.people();
     if (!people) return tl::unexpected(people.error());
@@ -398,7 +398,7 @@ Result<void> list_people(const Arguments& given) {
 
 // By number: erases that person in the audit log too, if the journal knows the name. By age: erases nobody there, since
 // these people may work in other rooms.
-Result<void> erase_in_audit_too(const Arguments& given, const std::vector<std::string>& names) {
+Result<void> erase_in_audit_too(const JournalArguments& given, const std::vector<std::string>& names) {
   std::size_t erased = 0;
   for (const std::string& name : names) {
     const Result<std::size_t> gone = erase_person(system_disk(), folder_of(given.file) / kAuditLogFile, name);
@@ -410,7 +410,7 @@ Result<void> erase_in_audit_too(const Arguments& given, const std::vector<std::s
   return {};
 }
 
-Result<void> erase_from_journal(const Arguments& given) {
+Result<void> erase_from_journal(const JournalArguments& given) {
   if ((given.person == 0) == !given.days)
     return failure(ErrorCode::invalid_input,
                    "erase-person needs either --person NUMBER, as \"people\" lists it, or --older-than DAYS");
@@ -438,7 +438,7 @@ Result<void> erase_from_journal(const Arguments& given) {
 }
 
 // The audit record of a command; nothing for commands that only read.
-std::optional<AuditEvent> audited_as(const std::string& name, const Arguments& given) {
+std::optional<AuditEvent> audited_as(const std::string& name, const JournalArguments& given) {
   if (name == "verify" || name == "people" || (name == "replay" && given.fields.empty())) return {};
   AuditEvent event{.action = name, .object = given.file.filename().string(), .result = kOk};
   if (!given.to.empty()) event.detail = "to " + given.to.filename().string();
@@ -449,14 +449,15 @@ std::optional<AuditEvent> audited_as(const std::string& name, const Arguments& g
   return event;
 }
 
-Result<void> run_command(const std::string& name, Result<void> (*run)(const Arguments&), const Arguments& given) {
+Result<void> run_command(const std::string& name, Result<void> (*run)(const JournalArguments&),
+                         const JournalArguments& given) {
   std::optional<AuditEvent> event = audited_as(name, given);
   if (!event) return run(given);
   return run_audited(given.file, given.signing_key, std::move(*event), [&] { return run(given); });
 }
 
 // The file's name decides as which room a server serves it. So a new name must be given on purpose.
-Result<void> rename_room(const Arguments& given) {
+Result<void> rename_room(const JournalArguments& given) {
   return change_journal(given, [&](Journal& journal) -> Result<void> {
     if (const Error* closed = journal.closed_because()) return tl::unexpected(*closed);
     const Result<std::string> before = room_name(journal);
@@ -471,15 +472,15 @@ Result<void> rename_room(const Arguments& given) {
 }  // namespace
 
 void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
-  const auto command = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
+  const auto given = std::make_shared<JournalArguments>();  // shared by the options and the function that runs
+  const auto command = [&](const char* name, const char* what, Result<void> (*run)(const JournalArguments&)) {
     CLI::App* sub = app.add_subcommand(name, what);
     sub->add_option("file", given->file, "The journal; no server may have it open")->required();
     sub->callback(
         [&chosen, given, name, run] { chosen = [given, name, run] { return run_command(name, run, *given); }; });
     return sub;
   };
-  const auto copies = [&](const char* name, const char* what, Result<void> (*run)(const Arguments&)) {
+  const auto copies = [&](const char* name, const char* what, Result<void> (*run)(const JournalArguments&)) {
     CLI::App* sub = command(name, what, run);
     sub->add_option("new", given->to, "The file to make; nothing may be there")->required();
     return sub;
@@ -489,16 +490,16 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
                     "The server's signing key; by default signing.key beside the journal, where that is there");
   };
   CLI::App* check =
-      command("verify", "Checks every event, the checkpoints and the footer against the chain of hashes", verify);
+      command("verify", "Checks every event, the checkpoints and the footer against the chain of hashes", verify_file);
   check->add_option("--case", given->case_folder, "Folder of the case: also replays the room and prints its hashes");
   check->add_option("--key", given->key,
                     "Public key of the server, as \"key show\" prints it: says which events were signed, and by whom");
   CLI::App* recovered = copies("salvage", "Copies what can be confirmed of a damaged journal into a new one", salvage);
   recovered->add_option("--to", given->at, "room_seq of the last event; all by default");
   signs(recovered);
-  signs(copies("backup", "Copies a sound journal", [](const Arguments& a) { return copy(a, backup_journal); }));
+  signs(copies("backup", "Copies a sound journal", [](const JournalArguments& a) { return copy(a, backup_journal); }));
   signs(copies("migrate", "Copies a journal of an earlier version into one of today's",
-               [](const Arguments& a) { return copy(a, migrate_journal); }));
+               [](const JournalArguments& a) { return copy(a, migrate_journal); }));
   CLI::App* branched = copies("branch", "Makes a new room from another one as it was at one event", branch);
   signs(branched);
   branched->add_option("--at", given->at, "room_seq of the last event that it takes over; all by default");
@@ -525,7 +526,7 @@ void add_journal_commands(CLI::App& app, std::function<Result<void>()>& chosen) 
       command("rename-room", "Gives a room another name, which its file must have to be served", rename_room);
   renamed->add_option("name", given->name, "The new name: that of the file, without .journal")->required();
   signs(renamed);
-  CLI::App* end = command("delete", "Removes a room: its journal and all files beside it", remove);
+  CLI::App* end = command("delete", "Removes a room: its journal and all files beside it", remove_journal);
   signs(end);
   CLI::Option* too = end->add_flag("--branches", given->branches, "And its branches in the same folder, and theirs");
   end->add_flag("--alone", given->alone, "Its branches stay")->excludes(too);

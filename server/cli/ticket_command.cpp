@@ -15,13 +15,13 @@
 namespace osteon {
 namespace {
 
-struct Arguments {
+struct TicketArguments {
   std::filesystem::path key;
   std::string room, user, role;
   double hours = 0;
 };
 
-Result<void> run(const Arguments& given) {
+Result<void> make_ticket(const TicketArguments& given) {
   const Result<std::string> text = read_file(given.key);
   if (!text) return tl::unexpected(text.error());
   if (const auto why = who_else_reads(given.key)) std::fprintf(stderr, "warning: %s\n", why->c_str());
@@ -52,7 +52,7 @@ Result<void> run(const Arguments& given) {
 }  // namespace
 
 void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen) {
-  const auto given = std::make_shared<Arguments>();  // shared by the options and the function that runs
+  const auto given = std::make_shared<TicketArguments>();  // shared by the options and the function that runs
   CLI::App* ticket =
       app.add_subcommand("ticket", "Signs a ticket, with which a person with a certificate may enter a room");
   ticket
@@ -62,7 +62,7 @@ void add_ticket_command(CLI::App& app, std::function<Result<void>()>& chosen) {
   ticket->add_option("--user", given->user, "Whose: the name in the person's certificate")->required();
   ticket->add_option("--role", given->role, "observer, trainee, collaborator, instructor or operator")->required();
   ticket->add_option("--hours", given->hours, "How long it is good")->required()->check(CLI::Range(0.001, 87600.0));
-  ticket->callback([&chosen, given] { chosen = [given] { return run(*given); }; });
+  ticket->callback([&chosen, given] { chosen = [given] { return make_ticket(*given); }; });
 }
 
 }  // namespace osteon

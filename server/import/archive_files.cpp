@@ -119,9 +119,7 @@ class Unpacker {
     const double done = static_cast<double>(archive_filter_bytes(archive_.get(), -1)) / size_;
     return keep_going_(std::clamp(done, 0.0, 1.0));
   }
-  [[nodiscard]] tl::unexpected<Error> stopped() const {
-    return failure(ErrorCode::cancelled, "stopped while unpacking " + file_.string());
-  }
+  [[nodiscard]] tl::unexpected<Error> stopped() const { return stopped_while("unpacking " + file_.string()); }
 
   // The next bytes of the entry, up to a full buffer; none at its end. A single entry may be damaged.
   Result<std::optional<std::size_t>> read_piece() {

@@ -26,7 +26,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct BoneArguments {
   std::string bone, script, out, fields, surface, report, file, stl, tool, name, title;
   std::vector<std::string> set;
   std::vector<double> at, axis;
@@ -53,7 +53,7 @@ Result<std::string> write_surface(const CutField& field, const std::string& file
 }
 
 // The bone after the cuts of --fields: one body of them.
-Result<CutField> load_body(const Arguments& a) {
+Result<CutField> load_body(const BoneArguments& a) {
   auto bone = Case::load(a.bone);
   if (!bone) return tl::unexpected(bone.error());
   CutField field(*bone, BodyId{a.body});
@@ -67,7 +67,7 @@ Result<CutField> load_body(const Arguments& a) {
   return field;
 }
 
-Result<std::string> run_surface(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_surface(const BoneArguments& a, const StopSignal& stop) {
   if (auto good = check_mesh_name(a.out); !good) return tl::unexpected(good.error());
   const auto field = load_body(a);
   if (!field) return tl::unexpected(field.error());
@@ -101,7 +101,7 @@ std::string contact_line(const char* way, const std::vector<SamplePoint>& points
   return line;
 }
 
-Result<std::string> run_contact(const Arguments& a) {
+Result<std::string> run_contact(const BoneArguments& a) {
   constexpr double kMostSamples = 1e8;
   const auto tool = tool_named(a.tool, fs::current_path());
   if (!tool) return tl::unexpected(tool.error());
@@ -179,7 +179,7 @@ std::string nothing_removed(std::size_t number, const CarveStep& step, const Ste
   return text;
 }
 
-Result<std::string> run_carve(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_carve(const BoneArguments& a, const StopSignal& stop) {
   for (const std::string& file : {a.out, a.report})
     if (!file.empty())
       if (auto is_free = check_free(file); !is_free) return tl::unexpected(is_free.error());
@@ -282,7 +282,7 @@ Result<std::string> change(Tool& tool, const std::vector<std::string>& settings)
 
 // Writes the tool with the changes of --set, --name and --title as a tool file. A room identifies tools by name, so a
 // changed tool gets another name: that of its file, unless --name gives one.
-Result<void> write_changed(Tool& tool, const Arguments& a) {
+Result<void> write_changed(Tool& tool, const BoneArguments& a) {
   const fs::path file(a.out);
   if (file.extension() != ".yaml" && file.extension() != ".yml")
     return failure(ErrorCode::invalid_input, a.out + " does not end in .yaml");
@@ -309,7 +309,7 @@ std::string limits(ToolKind kind) {
   return text;
 }
 
-Result<std::string> run_tools(const Arguments& a) {
+Result<std::string> run_tools(const BoneArguments& a) {
   std::vector<Tool> tools(builtin_tools().begin(), builtin_tools().end());
   if (!a.file.empty()) {
     auto own = load_tool_file(a.file);  // with the STL that it may name
@@ -355,7 +355,7 @@ Result<std::string> run_tools(const Arguments& a) {
   return text;
 }
 
-Result<std::string> run_hash(const Arguments& a) {
+Result<std::string> run_hash(const BoneArguments& a) {
   const auto saved = load_fields(a.fields);
   if (!saved) return tl::unexpected(saved.error());
   return to_hex(field_hash(saved->leaves, saved->pitch_mm)) + "\n";
@@ -365,8 +365,8 @@ Result<std::string> run_hash(const Arguments& a) {
 
 void add_bone_commands(CLI::App& app, std::vector<Command>& commands) {
   // Shared by the options that write into it and the command that reads it, both for the life of the program.
-  const auto shared = std::make_shared<Arguments>();
-  Arguments& a = *shared;
+  const auto shared = std::make_shared<BoneArguments>();
+  BoneArguments& a = *shared;
 
   CLI::App* surface = app.add_subcommand("surface", "Write a bone's surface, cut or not, as a closed mesh");
   surface->add_option("CASE_DIR", a.bone, "Folder of the case")->required();

@@ -29,7 +29,7 @@ Result<TriangleMesh> bone_surface(const CutField& field, const KeepGoing& keep_g
   BlockSamples gathered;
   for (std::size_t i = 0; i < keys.size(); ++i) {
     if (!keep_going(0.8 * static_cast<double>(i) / static_cast<double>(keys.size())))
-      return failure(ErrorCode::cancelled, "stopped while meshing the bone");
+      return stopped_while("meshing the bone");
     gather_block(field, blocks, keys[i], bone.pitch_mm(), gathered);
     if (gathered.covered == kWhollyCovered) continue;
     Mesh mesh;

@@ -14,7 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kMostSteps = 100000;
-constexpr double kFarthest_mm = 1000.0;
+constexpr double kFarthestCut_mm = 1000.0;
 
 // A fault of one step. It is caught where the file and the step's number are known.
 struct Wrong {
@@ -34,7 +34,7 @@ Vec3 vector_of(const YAML::Node& node, const char* field) {
 
 Vec3 place_of(const YAML::Node& node, const char* field) {
   Vec3 at = vector_of(node, field);
-  if (at.cwiseAbs().maxCoeff() > kFarthest_mm)
+  if (at.cwiseAbs().maxCoeff() > kFarthestCut_mm)
     throw Wrong{std::string(field) + " is more than a metre from the origin"};
   return at;
 }

@@ -91,8 +91,7 @@ Result<StepReport> Carving::run(const CarveStep& step, const KeepGoing& keep_goi
   std::vector<const CutField*> fields;
   for (const CutField& body : bodies_) fields.push_back(&body);
   for (std::size_t i = 0; i < cuts.size(); ++i) {
-    if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size())))
-      return failure(ErrorCode::cancelled, "stopped while carving");
+    if (!keep_going(static_cast<double>(i) / static_cast<double>(cuts.size()))) return stopped_while("carving");
     const auto begin = Clock::now();
     const bool metal = meets_metal(cuts[i], tool.body, fields);
     report.metal_refused += metal;

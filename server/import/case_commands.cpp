@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 constexpr double kPhantomPitch_mm = 0.4;
 constexpr double kMeshPitch_mm = 0.5;
 
-struct Arguments {
+struct CaseArguments {
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm";
   std::string keep;
   std::vector<std::string> bone_colours;
@@ -67,7 +67,7 @@ Error about(const std::string& input, const Error& error) {
 }
 
 // Reads a scan of any kind; the input's content decides which.
-Result<CtScan> read_scan(const Arguments& a, const KeepGoing& reading) {
+Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
   const InputKind kind = input_kind(a.input, reading);
   if (!reading(0.0)) return tl::unexpected(stopped());
   if (kind == InputKind::absent)
@@ -84,7 +84,7 @@ Result<CtScan> read_scan(const Arguments& a, const KeepGoing& reading) {
   return read_inv3(a.input, reading);
 }
 
-Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (a.out.empty() && !a.list)
     return failure(ErrorCode::invalid_input,
                    "--out is missing; name the folder of the case, or give --list to see the islands alone");
@@ -116,7 +116,7 @@ Result<std::string> run_ct(const Arguments& a, const StopSignal& stop) {
   return report_text(*made->bone) + series + segmentation_text(made->found);
 }
 
-Result<std::string> run_series(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
   if (input_kind(a.input, searching) == InputKind::inv3)
@@ -127,7 +127,7 @@ Result<std::string> run_series(const Arguments& a, const StopSignal& stop) {
   return a.json ? list_json(*report) : list_text(*report);
 }
 
-Result<std::string> run_phantom(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) {
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   if (!a.dicom.empty())
     if (auto is_free = check_free(a.dicom); !is_free) return tl::unexpected(is_free.error());
@@ -169,7 +169,7 @@ Result<Vec3> parse_spacing(const std::string& text) {
   return spacing;
 }
 
-Result<std::string> run_labels(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   const auto spacing = parse_spacing(a.spacing);
   if (!spacing) return tl::unexpected(spacing.error());
@@ -233,7 +233,7 @@ double millimetres_of(const std::string& unit) {
   return unit == "m" ? 1000.0 : unit == "inch" ? 25.4 : unit == "cm" ? 10.0 : 1.0;
 }
 
-Result<std::string> run_stl(const Arguments& a, const StopSignal& stop) {
+Result<std::string> run_stl(const CaseArguments& a, const StopSignal& stop) {
   if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
   auto mesh = read_stl(a.input);
   if (!mesh) return tl::unexpected(mesh.error());
@@ -258,7 +258,7 @@ Result<std::string> run_stl(const Arguments& a, const StopSignal& stop) {
   return report_text(*bone) + line;
 }
 
-Result<std::string> run_info(const Arguments& a) {
+Result<std::string> run_info(const CaseArguments& a) {
   const auto bone = Case::load(a.input);
   if (!bone) return tl::unexpected(bone.error());
   return a.json ? report_json(*bone) : report_text(*bone);
@@ -275,8 +275,8 @@ Result<void> check_free(const std::string& path) {
 
 void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   // Shared by the options that write into it and the command that reads it, both for the life of the program.
-  const auto shared = std::make_shared<Arguments>();
-  Arguments& a = *shared;
+  const auto shared = std::make_shared<CaseArguments>();
+  CaseArguments& a = *shared;
 
   CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
   ct->add_option("INPUT", a.input,

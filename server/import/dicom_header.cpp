@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
 constexpr std::uint32_t kLongestValue = 4096;
-constexpr double kFarthest_mm = 1e6;
+constexpr double kFarthestSlice_mm = 1e6;
 constexpr std::size_t kShownLetters = 64;
 
 // SOP classes that are not images of a modality, by the beginning of their UID below 1.2.840.10008. The first match
@@ -104,7 +104,7 @@ std::vector<double> numbers(const std::string& text) {
 
 // Lengths and positions within a plausible range. Values beyond it count as missing.
 std::vector<double> near(std::vector<double> values) {
-  if (std::ranges::any_of(values, [](double v) { return std::abs(v) > kFarthest_mm; })) values.clear();
+  if (std::ranges::any_of(values, [](double v) { return std::abs(v) > kFarthestSlice_mm; })) values.clear();
   return values;
 }
 

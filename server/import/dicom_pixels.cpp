@@ -20,7 +20,7 @@ constexpr std::int16_t kPadding_hu = -1024;  // air
 
 namespace fs = std::filesystem;
 
-const gdcm::Tag kPixelData(0x7fe0, 0x0010);
+const gdcm::Tag kPixels(0x7fe0, 0x0010);
 
 std::uint32_t little_endian(const unsigned char* bytes, int count) {
   std::uint32_t value = 0;
@@ -58,7 +58,7 @@ Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::
   gdcm::ImageReader reader;
   reader.SetFileName(file.c_str());
   const bool read = reader.Read();
-  if (!reader.GetFile().GetDataSet().FindDataElement(kPixelData)) return broken("has no pixel data");
+  if (!reader.GetFile().GetDataSet().FindDataElement(kPixels)) return broken("has no pixel data");
   if (!read) return broken("has pixel data that cannot be read");
   const gdcm::Image& image = reader.GetImage();
   const std::size_t pixels = out.size();

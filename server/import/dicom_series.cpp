@@ -11,7 +11,6 @@
 namespace osteon::import {
 namespace {
 
-constexpr int kLargestAxis = 1 << 14;
 constexpr double kMostVoxels = 4e9;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;
 constexpr int kFewSlices = 8;                // fewer are not a volume to operate on
@@ -178,7 +177,7 @@ class Arranger {
     if (h.frames > 1)
       return cannot("several frames in a file",
                     "holds " + std::to_string(h.frames) + " frames; export the series with one file for each slice");
-    if (h.columns < 2 || h.rows < 2 || h.columns > kLargestAxis || h.rows > kLargestAxis)
+    if (h.columns < 2 || h.rows < 2 || h.columns > imaging::kLargestScanAxis || h.rows > imaging::kLargestScanAxis)
       return lacks("Rows and Columns (0028,0010-0011)");
     if (h.samples != 1 || h.photometric != "MONOCHROME2")
       return cannot(

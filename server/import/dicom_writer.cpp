@@ -77,8 +77,7 @@ Result<void> write_slices(const imaging::HuVolume& volume, const fs::path& folde
   uids.series = generator.Generate();
   uids.frame = generator.Generate();
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / volume.dims[2]))
-      return failure(ErrorCode::cancelled, "stopped while writing " + folder.string());
+    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("writing " + folder.string());
     char name[32];
     std::snprintf(name, sizeof name, "slice-%04d.dcm", slice + 1);
     if (!write_slice(volume, slice, uids, folder / name))

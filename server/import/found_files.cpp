@@ -103,8 +103,7 @@ class Walk {
   Result<void> folder(const fs::path& folder, int levels) {
     std::error_code error;
     for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-      if (++seen_ % 256 == 0 && !keep_going_(0.0))
-        return failure(ErrorCode::cancelled, "stopped while listing " + root_.string());
+      if (++seen_ % 256 == 0 && !keep_going_(0.0)) return stopped_while("listing " + root_.string());
       if (seen_ > kMostFiles)
         return failure(ErrorCode::invalid_input, root_.string() + " holds more than " + std::to_string(kMostFiles) +
                                                      " files; give the folder with the CT series");

@@ -19,7 +19,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kChunk = 1 << 20;
 constexpr std::size_t kLargestPlist = 16 << 20;
-constexpr int kLargestAxis = 1 << 14;
 constexpr std::size_t kFirstValues = std::size_t{1} << 20;  // for which memory is allocated before any data has arrived
 
 struct CloseArchive {
@@ -107,11 +106,12 @@ Result<Project> parse_project(const std::string& text, const std::string& where)
   int axis = 2;  // the shape counts slices, rows, columns
   for (const pugi::xml_node n : value_of(matrix, "shape").children()) {
     const int count = n.text().as_int();
-    if (axis < 0 || count < 2 || count > kLargestAxis)
-      return wrong("matrix shape must be three numbers from 2 to " + std::to_string(kLargestAxis));
+    if (axis < 0 || count < 2 || count > imaging::kLargestScanAxis)
+      return wrong("matrix shape must be three numbers from 2 to " + std::to_string(imaging::kLargestScanAxis));
     project.dims[static_cast<std::size_t>(axis--)] = count;
   }
-  if (axis != -1) return wrong("matrix shape must be three numbers from 2 to " + std::to_string(kLargestAxis));
+  if (axis != -1)
+    return wrong("matrix shape must be three numbers from 2 to " + std::to_string(imaging::kLargestScanAxis));
 
   int count = 0;
   for (const pugi::xml_node n : value_of(top, "spacing").children()) {
@@ -182,7 +182,7 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
   std::size_t got = 0;
   while (got < expected) {
     if (!keep_going(static_cast<double>(got) / static_cast<double>(expected)))
-      return failure(ErrorCode::cancelled, "stopped while reading " + file.string());
+      return stopped_while("reading " + file.string());
     std::size_t room = volume.values.size() * sizeof(std::int16_t);
     if (got == room) {
       volume.values.resize(std::min(volume.count(), std::max(kFirstValues, 2 * volume.values.size())));

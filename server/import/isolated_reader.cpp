@@ -159,7 +159,7 @@ IsolatedEnd listen(Line& line, const IsolatedWork& work) {
     }
   }
   if (line.stopped) {
-    end.result = failure(ErrorCode::cancelled, "stopped while reading the scan");
+    end.result = stopped_while("reading the scan");
   } else {
     end.died = true;
     end.result =

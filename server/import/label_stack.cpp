@@ -234,8 +234,7 @@ Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& l
     const int depth = std::min(kBatch, count - first);
     batch.assign(static_cast<std::size_t>(depth), {});
     for (int i = 0; i < depth; ++i) {
-      if (!keep_going(static_cast<double>(first + i) / count))
-        return failure(ErrorCode::cancelled, "stopped while reading the slices");
+      if (!keep_going(static_cast<double>(first + i) / count)) return stopped_while("reading the slices");
       const fs::path& file = (*slices)[static_cast<std::size_t>(first + i)].file;
       int width = 0, height = 0;
       const auto pixels = read_png(file, width, height);

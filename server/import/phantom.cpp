@@ -13,7 +13,7 @@
 namespace osteon::import {
 namespace {
 
-constexpr double kDensest_g_cm3 = 3.0;  // enamel
+constexpr double kDensestLayer_g_cm3 = 3.0;  // enamel
 constexpr double kThickest_mm = 500.0;
 constexpr int kSubsamples = 16;  // along a voxel's edge, where the tube's circles cross it
 
@@ -94,8 +94,8 @@ Result<std::vector<Layer>> parse_layers(std::string_view text) {
       return wrong("\"" + std::string(part) + "\" is not a layer");
     if (layer.thickness_mm <= 0.0 || layer.thickness_mm > kThickest_mm)
       return wrong("a thickness must be above 0 and at most " + number(kThickest_mm) + " mm");
-    if (layer.density_g_cm3 <= 0.0 || layer.density_g_cm3 > kDensest_g_cm3)
-      return wrong("a density must be above 0 and at most " + number(kDensest_g_cm3) + " g/cm3");
+    if (layer.density_g_cm3 <= 0.0 || layer.density_g_cm3 > kDensestLayer_g_cm3)
+      return wrong("a density must be above 0 and at most " + number(kDensestLayer_g_cm3) + " g/cm3");
     layers.push_back(layer);
     begin = end + 1;
   }
@@ -160,8 +160,7 @@ Result<Case> build_phantom_case(const Phantom& phantom, double pitch_mm, const s
   DenseVolume<float> density(box, 0.0f);
   std::size_t n = 0;
   for (int x = box.min.x; x <= box.max.x; ++x) {
-    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x))
-      return failure(ErrorCode::cancelled, "stopped while building the phantom");
+    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x)) return stopped_while("building the phantom");
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z, ++n) {
         const Vec3 at = position_mm({x, y, z}, pitch_mm);
@@ -208,7 +207,7 @@ Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm
       return hu_above_air(phantom.layers.back());
     };
     for (int row = 0; row < scan.dims[1]; ++row) {
-      if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped while scanning the phantom");
+      if (!keep_going(0.0)) return stopped_while("scanning the phantom");
       for (int column = 0; column < scan.dims[0]; ++column) {
         const Vec3 centre = scan.position_mm(Vec3(column, row, 0));
         double sum = 0.0;
@@ -225,8 +224,7 @@ Result<imaging::HuVolume> scan_phantom(const Phantom& phantom, double spacing_mm
 
   std::size_t n = 0;
   for (int slice = 0; slice < scan.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / scan.dims[2]))
-      return failure(ErrorCode::cancelled, "stopped while scanning the phantom");
+    if (!keep_going(static_cast<double>(slice) / scan.dims[2])) return stopped_while("scanning the phantom");
     for (int row = 0; row < scan.dims[1]; ++row)
       for (int column = 0; column < scan.dims[0]; ++column) {
         const Vec3 c = scan.position_mm(Vec3(column, row, slice));

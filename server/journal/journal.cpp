@@ -12,7 +12,6 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kCheckpointsKept = 2;
-constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
 constexpr std::uint64_t kTidyBytes = std::uint64_t{64} << 10;
 
 fs::path with(const fs::path& file, std::string_view end) { return file.string() + std::string(end); }

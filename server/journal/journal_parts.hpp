@@ -11,6 +11,9 @@
 
 namespace osteon {
 
+// A slice of the log that is read at once ends after this size.
+inline constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
+
 struct JournalOptions {
   Disk* disk = nullptr;  // null: the computer's; must outlive the journal
   std::size_t most_entry_bytes = std::size_t{64} << 20;

@@ -11,7 +11,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kSliceBytes = std::size_t{1} << 20;
 // More openings than the lost part of any journal can have counted.
 constexpr std::uint64_t kEpochsSkipped = 1'000'000;
 

@@ -15,8 +15,6 @@ namespace {
 // Key, in a body's history, of a field that was loaded. It is no event of its own. Sequence numbers stay below it.
 constexpr std::uint64_t kLoaded = std::uint64_t{1} << 62;
 
-tl::unexpected<Error> refuse(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
-
 auto position_of(const FieldLeaf& leaf) { return std::tuple(leaf.level, leaf.origin); }
 
 // Unites the masks of several fragments. A leaf that several masks contain is kept once, with the smallest values.
@@ -83,7 +81,7 @@ Result<Room> Room::resume(Case bone, const SavedFields& saved, CutLimits limits,
   RoomEvent nobody_hears;
   for (auto& [id, of_body] : leaves) {
     const auto found = room.bodies_.find(id);
-    if (found == room.bodies_.end()) return refuse("the saved fields have leaves of a body that they do not list");
+    if (found == room.bodies_.end()) return bad_input("the saved fields have leaves of a body that they do not list");
     for (const FieldLeaf& leaf : of_body) found->second.field.restore(leaf);
     found->second.history.add_mask(RoomSeq{kLoaded}, of_body);
     room.show_whole(id, nobody_hears);
@@ -96,8 +94,8 @@ Result<Room> Room::resume(Case bone, const SavedFields& saved, CutLimits limits,
   // Nobody set them, and they cannot be undone.
   room.events_[RoomSeq{}] = {.kind = EventKind::tool};
   for (const SceneItem& item : saved.items) {
-    if (!room.tools_->find(item.tool)) return refuse("the saved scene has an item of a tool that is not saved");
-    if (!room.exists(item.body)) return refuse("the saved scene has an item on a body that is not saved");
+    if (!room.tools_->find(item.tool)) return bad_input("the saved scene has an item of a tool that is not saved");
+    if (!room.exists(item.body)) return bad_input("the saved scene has an item on a body that is not saved");
     room.items_[item.id] = {{RoomSeq{}, item}};
     room.last_item_ = std::max(room.last_item_, item.id);
   }
@@ -161,7 +159,7 @@ std::vector<Standing> Room::with_tools(const std::vector<SceneItem>& items) cons
 
 Result<void> Room::check_member(AuthorId by) const {
   if (knows(by)) return {};
-  return refuse("author " + std::to_string(by.value) + " has not joined this room; call Join first");
+  return bad_input("author " + std::to_string(by.value) + " has not joined this room; call Join first");
 }
 
 Result<RoomEvent> Room::add_tool(AuthorId by, const Tool& tool) {
@@ -182,7 +180,7 @@ Result<void> Room::know(const Tool& tool) const {
   if (tools_->find(tool.hash())) return {};
   const auto entries = tools_->entries();
   if (entries.size() >= kMostTools)
-    return refuse("the room knows " + std::to_string(kMostTools) + " tools and takes no more");
+    return bad_input("the room knows " + std::to_string(kMostTools) + " tools and takes no more");
   // States and lists identify tools by name, so two tools must not share a name.
   for (const ToolBox::Entry* entry : entries)
     if (entry->tool.name == tool.name)
@@ -241,10 +239,10 @@ RoomEvent Room::take_back(AuthorId by, std::set<RoomSeq> seqs) {
 
 Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> seqs) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (seqs.empty()) return refuse("undo names no event");
+  if (seqs.empty()) return bad_input("undo names no event");
   for (const RoomSeq seq : seqs) {
-    if (!can_be_undone(seq)) return refuse("event " + std::to_string(seq.value) + " cannot be undone");
-    if (events_.at(seq).undone) return refuse("event " + std::to_string(seq.value) + " is undone already");
+    if (!can_be_undone(seq)) return bad_input("event " + std::to_string(seq.value) + " cannot be undone");
+    if (events_.at(seq).undone) return bad_input("event " + std::to_string(seq.value) + " is undone already");
   }
   const std::set<RoomSeq> named(seqs.begin(), seqs.end());
   if (Result<void> may = may_take_back(by, named); !may) return tl::unexpected(may.error());
@@ -253,7 +251,7 @@ Result<RoomEvent> Room::undo(AuthorId by, std::span<const RoomSeq> seqs) {
 
 Result<RoomEvent> Room::undo_last(AuthorId by, std::size_t count, AuthorId of) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (count == 0) return refuse("undo needs a count of at least 1");
+  if (count == 0) return bad_input("undo needs a count of at least 1");
   std::set<RoomSeq> seqs;
   for (auto event = events_.rbegin(); event != events_.rend() && seqs.size() < count; ++event) {
     const Event& entry = event->second;
@@ -274,7 +272,7 @@ Result<RoomEvent> Room::undo_since(AuthorId by, std::chrono::nanoseconds since) 
 
 Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (mark > room_seq_) return refuse("event " + std::to_string(mark.value) + " lies beyond the newest event");
+  if (mark > room_seq_) return bad_input("event " + std::to_string(mark.value) + " lies beyond the newest event");
   std::set<RoomSeq> seqs;
   for (auto event = events_.upper_bound(mark); event != events_.end(); ++event)
     if (can_be_undone(event->first) && !event->second.undone) seqs.insert(event->first);
@@ -287,7 +285,7 @@ Result<RoomEvent> Room::undo_to(AuthorId by, RoomSeq mark) {
 
 Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (count == 0) return refuse("redo needs a count of at least 1");
+  if (count == 0) return bad_input("redo needs a count of at least 1");
   RedoEntry entry;
   for (auto event = events_.rbegin(); event != events_.rend() && entry.undos.size() < count; ++event)
     if (event->second.kind == EventKind::undo && !event->second.undone) entry.undos.push_back(event->first);
@@ -314,9 +312,9 @@ Result<RoomEvent> Room::redo_last(AuthorId by, std::size_t count) {
 Result<RoomEvent> Room::mark(AuthorId by, std::string label) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (label.empty() || label.size() > kMostLabelBytes)
-    return refuse("a mark needs a label of 1 to " + std::to_string(kMostLabelBytes) + " bytes");
+    return bad_input("a mark needs a label of 1 to " + std::to_string(kMostLabelBytes) + " bytes");
   if (marks().size() >= kMostMarks)
-    return refuse("the room has " + std::to_string(kMostMarks) + " marks and takes no more");
+    return bad_input("the room has " + std::to_string(kMostMarks) + " marks and takes no more");
   return decide(by, MarkEntry{std::move(label)});
 }
 
@@ -329,15 +327,15 @@ std::vector<std::pair<RoomSeq, std::string>> Room::marks() const {
 
 Result<RoomEvent> Room::remove_body(AuthorId by, BodyId body) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (!exists(body)) return refuse("the room has no body " + std::to_string(body.value));
-  if (bodies().size() == 1) return refuse("body " + std::to_string(body.value) + " is the last one and stays");
+  if (!exists(body)) return bad_input("the room has no body " + std::to_string(body.value));
+  if (bodies().size() == 1) return bad_input("body " + std::to_string(body.value) + " is the last one and stays");
   return decide(by, RemoveBodyEntry{body});
 }
 
 Result<RoomEvent> Room::split(Separation found) {
   if (found.seen != bone_epoch_ || !exists(found.parent))
     return failure(ErrorCode::unavailable, "bone has come back since these pieces were found");
-  if (found.fragments.empty()) return refuse("a split needs a piece");
+  if (found.fragments.empty()) return bad_input("a split needs a piece");
   SplitEntry entry{.parent = found.parent, .taken = {}, .pieces = {}};
   std::vector<FieldLeaf> taken;
   std::uint32_t next = last_body_;
@@ -349,7 +347,7 @@ Result<RoomEvent> Room::split(Separation found) {
     entry.pieces.push_back({BodyId{++next}, reach, shared(std::move(fragment.left))});
   }
   if (bodies().size() + entry.pieces.size() > kMostBodies)
-    return refuse("the room has " + std::to_string(kMostBodies) + " bodies and makes no more; take some away");
+    return bad_input("the room has " + std::to_string(kMostBodies) + " bodies and makes no more; take some away");
   entry.taken = shared(std::move(taken));
   ready_ = std::move(found.fields);
   RoomEvent event = decide(AuthorId{}, std::move(entry));
@@ -359,12 +357,12 @@ Result<RoomEvent> Room::split(Separation found) {
 
 Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& placing) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
-  if (!exists(item.body)) return refuse("the room has no body " + std::to_string(item.body.value));
-  if (!tools_->find(item.tool)) return refuse("item.tool_hash names a tool that the room does not have");
+  if (!exists(item.body)) return bad_input("the room has no body " + std::to_string(item.body.value));
+  if (!tools_->find(item.tool)) return bad_input("item.tool_hash names a tool that the room does not have");
   if (item.id != 0 && !items_.contains(item.id))
-    return refuse("item.item: the room has no item " + std::to_string(item.id));
+    return bad_input("item.item: the room has no item " + std::to_string(item.id));
   if (item.id == 0 && items_.size() >= kMostItems)
-    return refuse("the scene has had " + std::to_string(kMostItems) + " items and takes no more");
+    return bad_input("the scene has had " + std::to_string(kMostItems) + " items and takes no more");
   const std::vector<SceneItem> standing = items();
   const std::vector<Standing> scene = with_tools(standing);
   const auto found = std::ranges::find(scene, item.id, [](const Standing& one) { return one.item.id; });
@@ -376,7 +374,7 @@ Result<RoomEvent> Room::set_item(AuthorId by, SceneItem item, const Placing& pla
   const Box room = bone().bounds().grown(limits_.beyond_bone_mm);
   const Vec3& at = stands->item.pose_bone_item.position_mm;
   if (!((at.array() >= room.min_mm.array()).all() && (at.array() <= room.max_mm.array()).all()))
-    return refuse("item.pose_bone_item is too far from the bone");
+    return bad_input("item.pose_bone_item is too far from the bone");
   Result<SceneItem> ruled = set_by_rules(scene, before, {stands->item, tool}, solid);
   if (!ruled) return tl::unexpected(ruled.error());
   item = *ruled;
@@ -391,9 +389,9 @@ Result<RoomEvent> Room::remove_item(AuthorId by, std::uint32_t item) {
   if (Result<void> may = may_change(by); !may) return tl::unexpected(may.error());
   const auto standing = items();
   const auto found = std::ranges::find(standing, item, &SceneItem::id);
-  if (found == standing.end()) return refuse("item " + std::to_string(item) + " does not stand in the scene");
+  if (found == standing.end()) return bad_input("item " + std::to_string(item) + " does not stand in the scene");
   const Tool& tool = tools_->find(found->tool)->tool;
-  if (is_guide(tool) && found->seated) return refuse("\"" + tool.name + "\" is fixed by pins; draw a pin first");
+  if (is_guide(tool) && found->seated) return bad_input("\"" + tool.name + "\" is fixed by pins; draw a pin first");
   return decide(by, ItemEntry{item, std::nullopt});
 }
 

@@ -7,7 +7,6 @@
 namespace osteon {
 namespace {
 
-tl::unexpected<Error> refuse(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
 tl::unexpected<Error> deny(std::string why) { return failure(ErrorCode::denied, std::move(why)); }
 
 std::string author_name(AuthorId author) { return "author " + std::to_string(author.value); }
@@ -23,12 +22,12 @@ Result<RoomEvent> Room::supervise(AuthorId by, AuthorId subject, Restrictions su
   for (const AuthorId named : {supervision.taken_by, supervision.guide}) {
     if (!named) continue;
     if (named == subject)
-      return refuse("supervision names the author itself as holder or guide of its tool; name another author");
-    if (!knows(named)) return refuse("supervision names " + author_name(named) + ", who has not joined this room");
+      return bad_input("supervision names the author itself as holder or guide of its tool; name another author");
+    if (!knows(named)) return bad_input("supervision names " + author_name(named) + ", who has not joined this room");
   }
   for (const Digest& tool : supervision.tools)
     if (!tools_->find(tool))
-      return refuse("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
+      return bad_input("supervision.tools names " + to_hex(tool) + ", which this room does not know; add it first");
   // The instructor may not know yet that the person has joined again. If both authors had the same restrictions, the
   // new one gets these too.
   const Restrictions before = people_.supervised(subject).supervision;
@@ -48,8 +47,8 @@ Result<RoomEvent> Room::annotate(AuthorId by, Annotation drawn) {
   if (drawn.id == 0) drawn.id = people_.replaced_by(drawn);
   if (drawn.id == 0) {
     if (all.size() >= kMostAnnotations)
-      return refuse("the room has " + std::to_string(kMostAnnotations) +
-                    " annotations and takes no more; wipe some off");
+      return bad_input("the room has " + std::to_string(kMostAnnotations) +
+                       " annotations and takes no more; wipe some off");
     drawn.id = people_.last_annotation() + 1;
   } else {
     const auto known = all.find(drawn.id);
@@ -76,8 +75,8 @@ Result<RoomEvent> Room::say(AuthorId by, AuthorId to, std::string words) {
   if (Result<void> member = check_member(by); !member) return tl::unexpected(member.error());
   if (to && !knows(to)) return failure(ErrorCode::not_found, author_name(to) + " has not joined this room");
   if (words.empty() || words.size() > kMostWordsBytes)
-    return refuse("words need 1 to " + std::to_string(kMostWordsBytes) + " bytes, these have " +
-                  std::to_string(words.size()));
+    return bad_input("words need 1 to " + std::to_string(kMostWordsBytes) + " bytes, these have " +
+                     std::to_string(words.size()));
   return decide(by, WordsEntry{to, std::move(words)});
 }
 

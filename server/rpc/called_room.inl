@@ -1,4 +1,5 @@
 // Finds the caller and the room of a call. Only for the source files of the services, since gRPC stays out of headers.
+#pragma once
 #include <grpcpp/grpcpp.h>
 
 #include <algorithm>

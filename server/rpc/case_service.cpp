@@ -28,7 +28,7 @@ v1::CaseInfo to_wire(const Digest& hash, const std::string& title, std::uint64_t
   return info;
 }
 
-std::uint64_t bytes_of(const std::filesystem::path& folder) {
+std::uint64_t folder_bytes(const std::filesystem::path& folder) {
   std::uint64_t bytes = 0;
   for (const std::string_view file : kCaseFiles) {
     std::error_code none;
@@ -206,7 +206,7 @@ class CaseServiceImpl final : public v1::CaseService::CallbackService {
     if (!admitted<v1::ListCasesRequest>(rooms_, *context, reactor)) return reactor;
     rooms_.files.run([this, reactor, response] {
       for (const KnownCase& one : rooms_.cases())
-        *response->add_cases() = to_wire(one.hash, one.title, bytes_of(one.folder));
+        *response->add_cases() = to_wire(one.hash, one.title, folder_bytes(one.folder));
       reactor->Finish(Status::OK);
     });
     return reactor;

@@ -73,7 +73,7 @@ class Page {
   std::vector<MetricFamily> families_;
 };
 
-double bytes_of(const fs::path& journal) {
+double journal_bytes(const fs::path& journal) {
   double bytes = 0;
   for (const fs::path& file : {journal, wal_of(journal), log_of(journal), mirror_of(journal)}) {
     std::error_code failed;
@@ -105,7 +105,7 @@ void add_room(Page& page, OpenRoom& room, bool draining) {
                static_cast<double>(health.tick.missed));
   page.histogram("osteon_journal_commit_seconds", "Transactions of the journal.", with(), health.commit);
   if (room.store())
-    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), bytes_of(room.store_file()));
+    page.gauge("osteon_journal_bytes", "The journal's file and its log.", with(), journal_bytes(room.store_file()));
 
   const char* queue =
       "What waits: cuts for a tick, entries for the disk, blocks for the surface, the slowest reader's entries or "

@@ -1,4 +1,5 @@
 // Adapts an open stream to gRPC. Only for the source files of the services, since gRPC stays out of headers.
+#pragma once
 #include <grpcpp/alarm.h>
 #include <grpcpp/grpcpp.h>
 

@@ -17,8 +17,6 @@ namespace {
 
 constexpr std::uint32_t kGenesisVersion = 1;
 
-tl::unexpected<Error> bad(std::string what) { return failure(ErrorCode::invalid_input, std::move(what)); }
-
 template <class List>
 void put(const std::vector<RoomSeq>& seqs, List& out) {
   for (const RoomSeq seq : seqs) out.Add(seq.value);
@@ -52,9 +50,9 @@ void put(const Pose& pose, google::protobuf::RepeatedField<double>& out) {
 }
 Result<Pose> pose_of(const google::protobuf::RepeatedField<double>& parts) {
   if (parts.size() != 7 || !std::ranges::all_of(parts, [](double part) { return std::isfinite(part); }))
-    return bad("item.pose_bone_item has not 7 finite numbers");
+    return bad_input("item.pose_bone_item has not 7 finite numbers");
   Pose pose{{parts[0], parts[1], parts[2]}, Eigen::Quaterniond(parts[6], parts[3], parts[4], parts[5])};
-  if (std::abs(pose.rotation.norm() - 1.0) > 1e-3) return bad("item.pose_bone_item is not a unit quaternion");
+  if (std::abs(pose.rotation.norm() - 1.0) > 1e-3) return bad_input("item.pose_bone_item is not a unit quaternion");
   return pose;
 }
 
@@ -138,10 +136,10 @@ struct Writer {
 using What = decltype(LogEntry::what);
 
 Result<What> read(const v1::JournalJoin& entry) {
-  if (entry.kind() > static_cast<std::uint32_t>(MemberKind::watcher)) return bad("join.kind is not known");
+  if (entry.kind() > static_cast<std::uint32_t>(MemberKind::watcher)) return bad_input("join.kind is not known");
   const Result<Digest> secret = wire::digest_from_wire(entry.secret());
-  if (!secret) return bad("join.secret: " + secret.error().message);
-  if (entry.role() >= static_cast<std::uint32_t>(kRoles)) return bad("join.role is not known");
+  if (!secret) return bad_input("join.secret: " + secret.error().message);
+  if (entry.role() >= static_cast<std::uint32_t>(kRoles)) return bad_input("join.role is not known");
   return JoinEntry{AuthorId{entry.author()}, static_cast<MemberKind>(entry.kind()), entry.person(), *secret,
                    static_cast<Role>(entry.role())};
 }
@@ -154,8 +152,8 @@ Result<What> read(const v1::Cut& entry) {
 
 Result<What> read(const v1::JournalRejection& entry) {
   const Result<Digest> bytes = wire::digest_from_wire(entry.digest());
-  if (!bytes) return bad("rejection.digest: " + bytes.error().message);
-  if (entry.reason() >= static_cast<std::uint32_t>(kRejections)) return bad("rejection.reason is not known");
+  if (!bytes) return bad_input("rejection.digest: " + bytes.error().message);
+  if (entry.reason() >= static_cast<std::uint32_t>(kRejections)) return bad_input("rejection.reason is not known");
   return RejectionEntry{AuthorId{entry.author()}, entry.author_seq(), *bytes, static_cast<Rejection>(entry.reason())};
 }
 
@@ -163,11 +161,11 @@ Result<What> read(const v1::JournalSplit& entry) {
   SplitEntry split;
   split.parent = BodyId{entry.parent()};
   Result<Mask> taken = mask_of(entry.taken());
-  if (!taken) return bad("split.taken: " + taken.error().message);
+  if (!taken) return bad_input("split.taken: " + taken.error().message);
   split.taken = std::move(*taken);
   for (const v1::JournalPiece& one : entry.pieces()) {
     Result<Mask> left = mask_of(one.left());
-    if (!left) return bad("split.pieces.left: " + left.error().message);
+    if (!left) return bad_input("split.pieces.left: " + left.error().message);
     const CoordBox reach{wire::from_wire(one.reach_min()), wire::from_wire(one.reach_max())};
     split.pieces.push_back({BodyId{one.body()}, reach, std::move(*left)});
   }
@@ -268,19 +266,19 @@ std::string to_bytes(const RoomGenesis& genesis) {
 Result<RoomGenesis> genesis_from_bytes(std::string_view bytes) {
   v1::JournalGenesis in;
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())))
-    return bad("the journal does not say what its room began as");
+    return bad_input("the journal does not say what its room began as");
   if (in.version() != kGenesisVersion)
     return failure(ErrorCode::unsupported, "the journal is of version " + std::to_string(in.version()) +
                                                " and this release knows " + std::to_string(kGenesisVersion));
   RoomGenesis genesis;
   const Result<Digest> hash = wire::digest_from_wire(in.case_hash()), began = wire::digest_from_wire(in.room_genesis());
-  if (!hash || !began) return bad("the journal does not name its case");
+  if (!hash || !began) return bad_input("the journal does not name its case");
   genesis.case_hash = *hash;
   genesis.room_genesis = *began;
   genesis.kernel_version = in.kernel_version();
   for (const v1::ToolDefinition& tool : in.tools()) {
     Result<Tool> one = wire::from_wire(tool);
-    if (!one) return bad("a tool of the journal: " + one.error().message);
+    if (!one) return bad_input("a tool of the journal: " + one.error().message);
     genesis.tools.push_back(std::move(*one));
   }
   genesis.room = in.room();
@@ -303,7 +301,8 @@ Result<Room> begin_room(const Case& bone, const RoomGenesis& genesis, const CutL
   auto tools = std::make_shared<ToolBox>();
   for (const Tool& tool : genesis.tools) tools->add(tool);
   Room room(bone, limits, std::move(tools));
-  if (room.genesis() != genesis.room_genesis) return bad("the journal's tools are not those that its room began with");
+  if (room.genesis() != genesis.room_genesis)
+    return bad_input("the journal's tools are not those that its room began with");
   return room;
 }
 
@@ -338,7 +337,7 @@ Result<std::string> entry_as_json(RoomSeq seq, std::chrono::nanoseconds at, std:
   names.preserve_proto_field_names = true;
   if (!in.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) ||
       !google::protobuf::util::MessageToJsonString(in, &event, names).ok())
-    return bad("entry " + std::to_string(seq.value) + ": it is no entry of a room");
+    return bad_input("entry " + std::to_string(seq.value) + ": it is no entry of a room");
   return "{\"room_seq\":" + std::to_string(seq.value) +
          ",\"at_s\":" + std::to_string(std::chrono::duration<double>(at).count()) + ",\"event\":" + event + "}";
 }

@@ -196,7 +196,7 @@ def size_faults(path: str, text: str):
 
 def declaration_faults(path: str, cmake_text: str, source_text=None):
     """A source that no target lists is never built. A header that no target lists is not compiled alone by
-    architecture.headers, unless its own source (`source_text`) includes it first."""
+    deploy/nightly, unless its own source (`source_text`) includes it first."""
     name = path.rsplit("/", 1)[-1]
     if path.startswith("tests/unit/") and name.endswith(".hpp"):
         return []  # a helper of the only test program beside it

@@ -18,10 +18,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kPitch_mm = 1.0;
+constexpr double kCasePitch_mm = 1.0;
 
 const Case& a_case() {
-  static const Case made = test::plain_block(4.0, 3.0, kPitch_mm);
+  static const Case made = test::plain_block(4.0, 3.0, kCasePitch_mm);
   return made;
 }
 
@@ -83,7 +83,7 @@ Bytes some_fields() {
   SavedFields saved{.case_hash = a_case().hash(),
                     .kernel_version = kKernelVersion,
                     .room_seq = {1},
-                    .pitch_mm = kPitch_mm,
+                    .pitch_mm = kCasePitch_mm,
                     .leaves = field.leaves(),
                     .bodies = {BodyId{0}}};
   OSTEON_CHECK(save_fields(path, saved));

@@ -18,7 +18,7 @@ namespace {
 constexpr int kWidth = 6, kHeight = 5;
 constexpr std::size_t kSmall = 4096;  // voxels: larger volumes are read, but no case is made of them
 
-Bytes a_slice(png_uint_32 format) {
+Bytes label_slice(png_uint_32 format) {
   constexpr std::array<png_byte, 4> kBone{255, 249, 219, 255};
   const std::size_t channels = PNG_IMAGE_SAMPLE_CHANNELS(format);
   std::vector<png_byte> pixels;
@@ -45,7 +45,7 @@ bool is_new(const imaging::LabelVolume& volume) {
   return seen.insert(hasher.finish()).second;
 }
 
-void read_slice(std::span<const std::uint8_t> data) {
+void read_label_slice(std::span<const std::uint8_t> data) {
   static const InputFile file("slice1.png");
   static const import::LabelLegend legend;
   file.write(data);
@@ -62,8 +62,9 @@ void read_slice(std::span<const std::uint8_t> data) {
 }  // namespace
 
 Target label_slice_target() {
-  Target target{
-      "label_slice", read_slice, {a_slice(PNG_FORMAT_RGBA), a_slice(PNG_FORMAT_RGB), a_slice(PNG_FORMAT_GRAY)}};
+  Target target{"label_slice",
+                read_label_slice,
+                {label_slice(PNG_FORMAT_RGBA), label_slice(PNG_FORMAT_RGB), label_slice(PNG_FORMAT_GRAY)}};
   target.mutations = 50;
   return target;
 }

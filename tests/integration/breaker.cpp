@@ -26,8 +26,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kFaultsKept = 20;
 
-bool has(const std::string& text, std::string_view part) { return text.find(part) != text.npos; }
-
 }  // namespace
 
 struct Breaker::Parts {

@@ -14,14 +14,6 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-bool has(const std::string& text, std::string_view part) { return text.find(part) != text.npos; }
-
-std::optional<std::uint64_t> number_after(const std::string& text, const std::string& label) {
-  std::smatch found;
-  if (!std::regex_search(text, found, std::regex("(^|\n)" + label + ": +([0-9]+)"))) return std::nullopt;
-  return std::stoull(found[2]);
-}
-
 }  // namespace
 
 std::string BreakerJudge::unsaid(const std::string& what, const std::string& text, std::uint64_t events,

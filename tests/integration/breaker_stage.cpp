@@ -18,6 +18,8 @@ namespace {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
+}  // namespace
+
 bool has(const std::string& text, std::string_view part) { return text.find(part) != text.npos; }
 
 std::optional<std::uint64_t> number_after(const std::string& text, const std::string& label) {
@@ -25,8 +27,6 @@ std::optional<std::uint64_t> number_after(const std::string& text, const std::st
   if (!std::regex_search(text, found, std::regex("(^|\n)" + label + ": +([0-9]+)"))) return std::nullopt;
   return std::stoull(found[2]);
 }
-
-}  // namespace
 
 std::string read_bytes(const fs::path& file) {
   std::ostringstream bytes;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -23,6 +24,9 @@ using Image = std::map<std::string, std::string>;  // bytes of the files of a fo
 void put(const Image& image, const std::filesystem::path& folder);
 // What differs, as "NAME was changed". Empty: nothing.
 [[nodiscard]] std::string difference(const Image& before, const Image& after);
+[[nodiscard]] bool has(const std::string& text, std::string_view part);
+// The number in the line "LABEL: NUMBER" of a command's output. LABEL is a regular expression.
+[[nodiscard]] std::optional<std::uint64_t> number_after(const std::string& text, const std::string& label);
 [[nodiscard]] std::string said(const RunResult& result);
 
 // A server on FOLDER/NAME.journal.

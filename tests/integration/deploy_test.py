@@ -88,6 +88,53 @@ class Checkout(unittest.TestCase):
         self.assertFalse((self.checkout / "build").exists())
 
 
+class Budget(unittest.TestCase):
+    """deploy/test in a checkout whose build and tests take no time."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.deploy = Path(folder.name) / "deploy"
+        self.deploy.mkdir()
+        shutil.copy(ROOT / "deploy/environment.sh", self.deploy)
+        for name in ("install", "build"):
+            self.program(name, "exit 0")
+
+    def program(self, name, text):
+        (self.deploy / name).write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        (self.deploy / name).chmod(0o755)
+
+    def run_script(self, *options, build_budget=720, ctest="exit 0"):
+        script = (ROOT / "deploy/test").read_text(encoding="utf-8")
+        self.assertIn("build_budget=720 ", script)
+        self.program("ctest", ctest)
+        test = self.deploy / "test"
+        test.write_text(script.replace("build_budget=720 ", f"build_budget={build_budget} "), encoding="utf-8")
+        test.chmod(0o755)
+        return ended([test, *options], env={**os.environ, "PATH": f"{self.deploy}:{os.environ['PATH']}"})
+
+    def test_is_printed_and_kept(self):
+        kept = self.run_script("--budget")
+        self.assertEqual((kept.returncode, kept.stderr), (0, ""))
+        self.assertRegex(kept.stdout, r"\nBuild \d+ s of 720, tests \d+ s of 780\n\Z")
+
+    def test_that_is_exceeded_fails_if_asked_for(self):
+        told = self.run_script(build_budget=-1)
+        self.assertEqual(told.returncode, 0)
+        self.assertRegex(told.stderr, r"\AOVER BUDGET: .*\n\Z")
+        failed = self.run_script("--budget", build_budget=-1)
+        self.assertEqual(failed.returncode, 1)
+        self.assertEqual(failed.stderr, told.stderr)
+
+    def test_does_not_hide_a_failed_test(self):
+        for budget in (720, -1):
+            for options in ((), ("--budget",)):
+                self.assertEqual(self.run_script(*options, build_budget=budget, ctest="exit 8").returncode, 8)
+
+    def test_leaves_other_options_to_ctest(self):
+        self.assertRegex(self.run_script("--budget", "-R", "unit", ctest='echo "given: $*"').stdout, "given: .* -R unit\n")
+
+
 class Secrets(unittest.TestCase):
     def test_git_ignores_those_of_the_security_chapter(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 
+#include "common/core/read_number.hpp"
 #include "common/tools/cut_body.hpp"
 
 namespace osteon {
@@ -15,18 +15,6 @@ using namespace std::chrono_literals;
 
 constexpr std::chrono::milliseconds kUntilSaid{5000};  // until the people's state shows the decision
 constexpr double kAcknowledgePatience_s = 30.0;
-
-tl::unexpected<Error> bad(std::string why) { return failure(ErrorCode::invalid_input, std::move(why)); }
-
-template <class T>
-std::optional<T> number(std::string_view word) {
-  T value{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
-  if constexpr (std::is_floating_point_v<T>)
-    if (!std::isfinite(value)) return std::nullopt;
-  return value;
-}
 
 std::string at(RoomSeq seq) { return "at " + std::to_string(seq.value); }
 
@@ -48,15 +36,15 @@ std::string quoted(std::string_view words) {
 // In steps of 2^-10 mm. Error invalid_input: more than about a kilometre away.
 Result<std::int32_t> steps(double mm) {
   const double steps = std::round(mm / kQuantum_mm);
-  if (std::abs(steps) > 1 << 30) return bad(text_of(mm) + " mm is too far away");
+  if (std::abs(steps) > 1 << 30) return bad_input(text_of(mm) + " mm is too far away");
   return static_cast<std::int32_t>(steps);
 }
 
 Result<std::array<std::int32_t, 3>> point_at(const std::vector<std::string>& words, std::size_t first) {
   std::array<std::int32_t, 3> point{};
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto mm = first + i < words.size() ? number<double>(words[first + i]) : std::nullopt;
-    if (!mm) return bad("a point is three numbers in millimetres, X Y Z");
+    const auto mm = first + i < words.size() ? read_number<double>(words[first + i]) : std::nullopt;
+    if (!mm) return bad_input("a point is three numbers in millimetres, X Y Z");
     const Result<std::int32_t> in_steps = steps(*mm);
     if (!in_steps) return tl::unexpected(in_steps.error());
     point[i] = *in_steps;
@@ -95,7 +83,7 @@ Result<std::vector<std::string>> words_of_line(std::string_view line) {
         continue;
       }
       const std::size_t end = line.find('"', i + 1);
-      if (end == std::string_view::npos) return bad("a quote has no end");
+      if (end == std::string_view::npos) return bad_input("a quote has no end");
       word += line.substr(i + 1, end - i - 1);
       i = end;
     }
@@ -181,7 +169,7 @@ std::optional<std::string> Console::answer(std::string_view line) {
 Result<PersonSeen> Console::find(const std::string& name) const {
   std::vector<PersonSeen> all = room_.people();
   if (name.starts_with('#')) {
-    const auto author = number<std::uint64_t>(std::string_view(name).substr(1));
+    const auto author = read_number<std::uint64_t>(std::string_view(name).substr(1));
     const auto found =
         std::ranges::find_if(all, [&](const PersonSeen& one) { return author && one.author.value == *author; });
     if (found == all.end()) return failure(ErrorCode::not_found, "there is no author " + name);
@@ -196,7 +184,7 @@ Result<PersonSeen> Console::find(const std::string& name) const {
   if (all.size() > 1) {
     std::string which;
     for (const PersonSeen& one : all) which += (which.empty() ? "#" : ", #") + std::to_string(one.author.value);
-    return bad("several are called " + quoted(name) + "; say which: " + which);
+    return bad_input("several are called " + quoted(name) + "; say which: " + which);
   }
   return all.front();
 }
@@ -238,7 +226,7 @@ std::string Console::text_of(const PersonSeen& person) const {
 }
 
 Console::Answer Console::people(const Words& words) {
-  if (words.size() != 1) return bad("");
+  if (words.size() != 1) return bad_input("");
   if (auto tools = room_.tools()) tools_ = std::move(*tools);
   const std::vector<PersonSeen> all = room_.people();
   std::string out = std::to_string(all.size()) + " people";
@@ -292,7 +280,7 @@ Console::Answer Console::supervise(const std::string& name, const std::function<
 }
 
 Console::Answer Console::freeze(const Words& words) {
-  if (words.size() < 2) return bad("");
+  if (words.size() < 2) return bad_input("");
   return supervise(words[1], [&](Restrictions& word) {
     word.stopped = true;
     word.words = joined(words, 2);
@@ -300,7 +288,7 @@ Console::Answer Console::freeze(const Words& words) {
 }
 
 Console::Answer Console::free(const Words& words) {
-  if (words.size() != 2) return bad("");
+  if (words.size() != 2) return bad_input("");
   return supervise(words[1], [](Restrictions& word) {
     word.stopped = false;
     word.words.clear();
@@ -308,7 +296,7 @@ Console::Answer Console::free(const Words& words) {
 }
 
 Console::Answer Console::take(const Words& words) {
-  if (words.size() < 2 || words[1] == "all") return bad("");
+  if (words.size() < 2 || words[1] == "all") return bad_input("");
   // A person who has a hand in this room takes the tool into that hand.
   const std::vector<PersonSeen> all = room_.people();
   const auto self = std::ranges::find(all, room_.self(), &PersonSeen::author);
@@ -325,7 +313,7 @@ Console::Answer Console::take(const Words& words) {
 }
 
 Console::Answer Console::give_back(const Words& words) {
-  if (words.size() != 2) return bad("");
+  if (words.size() != 2) return bad_input("");
   return supervise(words[1], [](Restrictions& word) {
     word.taken_by = {};
     word.words.clear();
@@ -334,9 +322,9 @@ Console::Answer Console::give_back(const Words& words) {
 
 Console::Answer Console::guide(const Words& words) {
   const bool with_share = words.size() == 6 && words[4] == "share";
-  if ((words.size() != 4 && !with_share) || words[2] != "along") return bad("");
-  const auto share = with_share ? number<double>(words[5]) : std::optional(1.0);
-  if (!share || *share < 0 || *share > 1) return bad("the share is a number from 0 to 1");
+  if ((words.size() != 4 && !with_share) || words[2] != "along") return bad_input("");
+  const auto share = with_share ? read_number<double>(words[5]) : std::optional(1.0);
+  if (!share || *share < 0 || *share > 1) return bad_input("the share is a number from 0 to 1");
   const Result<PersonSeen> leader = find(words[3]);
   if (!leader) return tl::unexpected(leader.error());
   return supervise(words[1], [&](Restrictions& word) {
@@ -346,7 +334,7 @@ Console::Answer Console::guide(const Words& words) {
 }
 
 Console::Answer Console::unguide(const Words& words) {
-  if (words.size() != 2) return bad("");
+  if (words.size() != 2) return bad_input("");
   return supervise(words[1], [](Restrictions& word) {
     word.guide = {};
     word.guide_share = 0;
@@ -354,29 +342,29 @@ Console::Answer Console::unguide(const Words& words) {
 }
 
 Console::Answer Console::limit(const Words& words) {
-  if (words.size() < 4) return bad("");
+  if (words.size() < 4) return bad_input("");
   const std::string &what = words[1], &name = words[2];
   const bool none = words.size() == 4 && words[3] == "none";
   if (what == "force") {
-    const auto newtons = none ? std::optional(0.0) : number<double>(words[3]);
-    if (words.size() != 4 || !newtons || *newtons < 0) return bad("");
+    const auto newtons = none ? std::optional(0.0) : read_number<double>(words[3]);
+    if (words.size() != 4 || !newtons || *newtons < 0) return bad_input("");
     if (*newtons > 0.01 * kMostForceLimit)
-      return bad("the most that can be said is " + osteon::text_of(0.01 * kMostForceLimit) + " N");
+      return bad_input("the most that can be said is " + osteon::text_of(0.01 * kMostForceLimit) + " N");
     // A limit of 0 N must not become "no limit".
     const int hundredths = none ? 0 : std::max(1, static_cast<int>(std::lround(100 * *newtons)));
     return supervise(name, [&](Restrictions& word) { word.force_limit = hundredths; });
   }
   if (what == "zone") {
     if (none) return supervise(name, [](Restrictions& word) { word.zone.reset(); });
-    const auto radius_mm = words.size() == 7 ? number<double>(words[6]) : std::nullopt;
-    if (!radius_mm) return bad("");
+    const auto radius_mm = words.size() == 7 ? read_number<double>(words[6]) : std::nullopt;
+    if (!radius_mm) return bad_input("");
     const auto centre = point_at(words, 3);
     if (!centre) return tl::unexpected(centre.error());
     const Result<std::int32_t> radius = steps(*radius_mm);
     if (!radius) return tl::unexpected(radius.error());
     return supervise(name, [&](Restrictions& word) { word.zone = ZoneLimit{*centre, *radius}; });
   }
-  if (what != "tools" || words.size() != 4) return bad("");
+  if (what != "tools" || words.size() != 4) return bad_input("");
   std::vector<Digest> allowed;
   if (!none) {
     auto known = room_.tools();
@@ -411,14 +399,14 @@ Console::Answer Console::undo(const Words& words) {
   } else {
     const bool seconds = words.size() == 3 && words[2] == "s";
     const bool of_one = words.size() == 4 && words[2] == "of";
-    if (!(words.size() == 2 || seconds || of_one)) return bad("");
+    if (!(words.size() == 2 || seconds || of_one)) return bad_input("");
     if (seconds) {
-      const auto asked = number<double>(words[1]);
-      if (!asked || *asked <= 0 || *asked > 1e9) return bad("");
+      const auto asked = read_number<double>(words[1]);
+      if (!asked || *asked <= 0 || *asked > 1e9) return bad_input("");
       what.newest = std::max(1ms, std::chrono::milliseconds(std::llround(1000 * *asked)));
     } else {
-      const auto count = number<std::uint32_t>(words[1]);
-      if (!count || *count == 0) return bad("");
+      const auto count = read_number<std::uint32_t>(words[1]);
+      if (!count || *count == 0) return bad_input("");
       what.count = *count;
     }
     if (of_one) {
@@ -434,16 +422,16 @@ Console::Answer Console::undo(const Words& words) {
 
 Console::Answer Console::redo(const Words& words) {
   const auto count = words.size() == 1   ? std::optional(1u)
-                     : words.size() == 2 ? number<std::uint32_t>(words[1])
+                     : words.size() == 2 ? read_number<std::uint32_t>(words[1])
                                          : std::nullopt;
-  if (!count || *count == 0) return bad("");
+  if (!count || *count == 0) return bad_input("");
   const auto redone = room_.redo(*count);
   if (!redone) return tl::unexpected(redone.error());
   return at(redone->first) + " events " + std::to_string(redone->second);
 }
 
 Console::Answer Console::mark(const Words& words) {
-  if (words.size() < 2) return bad("");
+  if (words.size() < 2) return bad_input("");
   const Result<RoomSeq> seq = room_.mark(joined(words, 1));
   if (!seq) return tl::unexpected(seq.error());
   return at(*seq);
@@ -470,20 +458,20 @@ Console::Answer Console::draw(AnnotationKind kind, const Words& words, std::size
 Console::Answer Console::point(const Words& words) { return draw(AnnotationKind::pointer, words, 1); }
 
 Console::Answer Console::line(const Words& words) {
-  if (words.size() < 7 || words.size() % 3 != 1) return bad("");
+  if (words.size() < 7 || words.size() % 3 != 1) return bad_input("");
   return draw(AnnotationKind::line, words, words.size() / 3);
 }
 
 Console::Answer Console::label(const Words& words) {
-  if (words.size() < 5) return bad("");
+  if (words.size() < 5) return bad_input("");
   return draw(AnnotationKind::label, words, 1);
 }
 
 Console::Answer Console::wipe(const Words& words) {
   const auto which = words.size() != 2   ? std::nullopt
                      : words[1] == "all" ? std::optional(0u)
-                                         : number<std::uint32_t>(words[1]);
-  if (!which || (*which == 0 && words[1] != "all")) return bad("");
+                                         : read_number<std::uint32_t>(words[1]);
+  if (!which || (*which == 0 && words[1] != "all")) return bad_input("");
   if (const Result<void> gone = room_.wipe_off(*which); !gone) return tl::unexpected(gone.error());
   const auto seen = [&] {
     return std::ranges::none_of(room_.annotations(), [&](const Annotation& one) {
@@ -495,7 +483,7 @@ Console::Answer Console::wipe(const Words& words) {
 }
 
 Console::Answer Console::drawn(const Words& words) {
-  if (words.size() != 1) return bad("");
+  if (words.size() != 1) return bad_input("");
   const std::vector<Annotation> all = room_.annotations();
   std::string out = std::to_string(all.size()) + " drawings";
   for (const Annotation& one : all) {
@@ -511,7 +499,7 @@ Console::Answer Console::drawn(const Words& words) {
 }
 
 Console::Answer Console::say(const Words& words) {
-  if (words.size() < 2) return bad("");
+  if (words.size() < 2) return bad_input("");
   AuthorId to;
   std::size_t first = 1;
   if (words.size() > 2 && words[1] == "all") {
@@ -535,7 +523,7 @@ Console::Answer Console::say(const Words& words) {
 }
 
 Console::Answer Console::said(const Words& words) {
-  if (words.size() != 1) return bad("");
+  if (words.size() != 1) return bad_input("");
   std::string out;
   for (const WordsSeen& one : room_.words())
     out += (out.empty() ? "" : "; ") + at(one.place) + " " + name_of(one.from) + " to " +
@@ -544,7 +532,7 @@ Console::Answer Console::said(const Words& words) {
 }
 
 Console::Answer Console::view(const Words& words) {
-  if (words.size() != 2) return bad("");
+  if (words.size() != 2) return bad_input("");
   // The view belongs to the person's viewer, which has no hand.
   std::optional<ViewFrustum> look;
   const Result<PersonSeen> person = find(words[1]);
@@ -563,23 +551,23 @@ Console::Answer Console::demonstrate(const Words& words) {
   if (const auto name = take_pair(rest, "of")) {
     const Result<PersonSeen> person = find(*name);
     const auto author =
-        name->starts_with('#') ? number<std::uint64_t>(std::string_view(*name).substr(1)) : std::nullopt;
+        name->starts_with('#') ? read_number<std::uint64_t>(std::string_view(*name).substr(1)) : std::nullopt;
     // In another room the number may belong to somebody else.
     if (!person && !author) return tl::unexpected(person.error());
     what.of = author ? AuthorId{*author} : person->author;
   }
   for (const auto& [key, seq] : {std::pair("from", &what.from), std::pair("to", &what.to)})
     if (const auto said = take_pair(rest, key)) {
-      const auto value = number<std::uint64_t>(*said);
-      if (!value) return bad("");
+      const auto value = read_number<std::uint64_t>(*said);
+      if (!value) return bad_input("");
       *seq = RoomSeq{*value};
     }
   if (const auto said = take_pair(rest, "speed")) {
-    const auto speed = number<double>(*said);
-    if (!speed || *speed <= 0) return bad("the speed is a number above 0");
+    const auto speed = read_number<double>(*said);
+    if (!speed || *speed <= 0) return bad_input("the speed is a number above 0");
     what.speed = *speed;
   }
-  if (rest.size() > 1) return bad("");
+  if (rest.size() > 1) return bad_input("");
   if (!rest.empty()) what.room = rest.front();
   const auto shown = room_.demonstrate(what);
   if (!shown) return tl::unexpected(shown.error());
@@ -592,20 +580,20 @@ Console::Answer Console::demonstrate(const Words& words) {
 }
 
 Console::Answer Console::end_demonstration(const Words& words) {
-  if (words.size() != 2) return bad("");
+  if (words.size() != 2) return bad_input("");
   const std::string_view word = words[1];
-  const auto which = number<std::uint64_t>(word.starts_with('#') ? word.substr(1) : word);
-  if (!which) return bad("");
+  const auto which = read_number<std::uint64_t>(word.starts_with('#') ? word.substr(1) : word);
+  if (!which) return bad_input("");
   if (const Result<void> ended = room_.end_demonstration(AuthorId{*which}); !ended)
     return tl::unexpected(ended.error());
   return std::string();
 }
 
 Console::Answer Console::wait(const Words& words) {
-  const auto patience_s = words.size() == 4 ? number<double>(words[3]) : std::optional(kAcknowledgePatience_s);
+  const auto patience_s = words.size() == 4 ? read_number<double>(words[3]) : std::optional(kAcknowledgePatience_s);
   if (words.size() < 3 || words.size() > 4 || words[1] != "acknowledged" || !patience_s || *patience_s < 0 ||
       *patience_s > 1e6)
-    return bad("");
+    return bad_input("");
   const auto acknowledged = [&] {
     const Result<PersonSeen> person = find(words[2]);
     return !person || !person->pending();
@@ -620,7 +608,7 @@ Console::Answer Console::wait(const Words& words) {
 }
 
 Console::Answer Console::status(const Words& words) {
-  if (words.size() != 1) return bad("");
+  if (words.size() != 1) return bad_input("");
   const Result<RoomSeen> seen = room_.status();
   if (!seen) return tl::unexpected(seen.error());
   std::string out = "room " + quoted(seen->name) + " " + at(seen->room_seq) + " hash " + to_hex(seen->field_hash) +
@@ -631,7 +619,7 @@ Console::Answer Console::status(const Words& words) {
 }
 
 Console::Answer Console::quit(const Words& words) {
-  if (words.size() != 1) return bad("");
+  if (words.size() != 1) return bad_input("");
   over_ = true;
   return std::string();
 }

@@ -6,11 +6,11 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
-#include <cmath>
 #include <cstring>
 #include <utility>
 #include <vector>
+
+#include "common/core/read_number.hpp"
 
 namespace osteon {
 
@@ -36,21 +36,10 @@ std::string rest_of(std::string_view line, std::string_view first_word) {
   return std::string(line.substr(from, line.find_last_not_of(kBlank) - from + 1));
 }
 
-template <class T>
-std::optional<T> number(std::string_view word) {
-  T value{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
-  if constexpr (std::is_floating_point_v<T>) {
-    if (!std::isfinite(value)) return std::nullopt;
-  }
-  return value;
-}
-
 std::optional<Vec3> vector_at(const std::vector<std::string_view>& words, std::size_t first) {
   Vec3 v;
   for (std::size_t i = 0; i < 3; ++i) {
-    const auto component = number<double>(words[first + i]);
+    const auto component = read_number<double>(words[first + i]);
     if (!component) return std::nullopt;
     v[static_cast<Eigen::Index>(i)] = *component;
   }
@@ -66,10 +55,10 @@ Parsed expected(std::string_view form) {
 Parsed parse_wait(const std::vector<std::string_view>& words) {
   if (words.size() == 2 && words[1] == "surface") return Command(WaitForSurface{});
   if (words.size() == 3 && words[1] == "seq") {
-    if (const auto seq = number<std::uint64_t>(words[2])) return Command(WaitForSeq{RoomSeq{*seq}});
+    if (const auto seq = read_number<std::uint64_t>(words[2])) return Command(WaitForSeq{RoomSeq{*seq}});
   }
   if (words.size() == 3 && (words[1] == "bodies" || words[1] == "items" || words[1] == "drawn")) {
-    if (const auto count = number<std::size_t>(words[2])) {
+    if (const auto count = read_number<std::size_t>(words[2])) {
       if (words[1] == "drawn") return Command(WaitForDrawn{*count});
       if (words[1] == "bodies") return Command(WaitForBodies{*count});
       return Command(WaitForItems{*count});
@@ -81,7 +70,7 @@ Parsed parse_wait(const std::vector<std::string_view>& words) {
 // undo N, redo N, take-away BODY: one number.
 template <class Make>
 Parsed parse_number(const std::vector<std::string_view>& words, std::string_view form, std::uint32_t least, Make make) {
-  const auto value = words.size() == 2 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  const auto value = words.size() == 2 ? read_number<std::uint32_t>(words[1]) : std::nullopt;
   if (!value || *value < least) return expected(form);
   return Command(RoomRequest(make(*value)));
 }
@@ -119,7 +108,7 @@ Parsed parse_place(const std::vector<std::string_view>& words) {
   const auto where = words.size() > 2 ? parse_where(words, next) : std::nullopt;
   auto body = std::optional<std::uint32_t>(0);
   if (next + 2 == words.size() && words[next] == "on") {
-    body = number<std::uint32_t>(words[next + 1]);
+    body = read_number<std::uint32_t>(words[next + 1]);
     next += 2;
   }
   if (!where || !body || next != words.size()) return expected(kForm);
@@ -129,7 +118,7 @@ Parsed parse_place(const std::vector<std::string_view>& words) {
 // move, turn, seat, remove: an item by its number.
 Parsed parse_item_command(const std::vector<std::string_view>& words) {
   const std::string_view verb = words[0];
-  const auto item = words.size() > 1 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  const auto item = words.size() > 1 ? read_number<std::uint32_t>(words[1]) : std::nullopt;
   const bool known = item && *item > 0;
   if (verb == "move") {
     std::size_t next = 2;
@@ -142,7 +131,7 @@ Parsed parse_item_command(const std::vector<std::string_view>& words) {
     if (!known || words.size() != 2) return expected("remove ITEM");
     return Command(RoomRequest(RemoveItem{*item}));
   }
-  const auto amount = words.size() == 3 ? number<double>(words[2]) : std::nullopt;
+  const auto amount = words.size() == 3 ? read_number<double>(words[2]) : std::nullopt;
   if (verb == "turn") {
     if (!known || !amount) return expected("turn ITEM TURNS");
     return Command(RoomRequest(TurnItem{*item, *amount}));
@@ -191,7 +180,7 @@ Parsed parse_draw(std::string_view line, const std::vector<std::string_view>& wo
 
 Parsed parse_wipe(const std::vector<std::string_view>& words) {
   if (words.size() == 2 && words[1] == "all") return Command(WipeOff{});
-  const auto id = words.size() == 2 ? number<std::uint32_t>(words[1]) : std::nullopt;
+  const auto id = words.size() == 2 ? read_number<std::uint32_t>(words[1]) : std::nullopt;
   if (!id || *id == 0) return expected("wipe NUMBER` or `wipe all");
   return Command(WipeOff{*id});
 }
@@ -210,7 +199,7 @@ Parsed parse_say(std::string_view line, const std::vector<std::string_view>& wor
 Parsed parse_look(const std::vector<std::string_view>& words) {
   if (words.size() == 2 && words[1] == "overview") return Command(LookAtWhole{});
   if (words.size() == 3 && words[1] == "tool") {
-    const auto distance = number<double>(words[2]);
+    const auto distance = read_number<double>(words[2]);
     if (distance && *distance > 0.0) return Command(LookAtTool{*distance});
   }
   if (words.size() == 13 && words[1] == "at" && words[5] == "from" && words[9] == "up") {
@@ -260,7 +249,7 @@ Parsed parse_command(std::string_view line) {
     return Command(RoomRequest(MarkMoment{label}));
   }
   if (verb == "undo" && words.size() == 3 && words[1] == "to") {
-    const auto mark = number<std::uint64_t>(words[2]);
+    const auto mark = read_number<std::uint64_t>(words[2]);
     if (!mark || *mark == 0) return expected("undo to MARK");
     return Command(RoomRequest(UndoTo{RoomSeq{*mark}}));
   }

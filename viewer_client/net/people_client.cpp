@@ -21,8 +21,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds kRetryPause{200};
-constexpr std::chrono::seconds kAnswerTime{30};
+constexpr std::chrono::milliseconds kPeopleRetryPause{200};
+constexpr std::chrono::seconds kPeopleAnswerTime{30};
 constexpr std::size_t kMostWords = 64;
 
 Error error_of(const grpc::Status& status) {
@@ -113,7 +113,7 @@ struct PeopleClient::Impl {
   Result<Response> ask(grpc::Status (Service::Stub::*call)(grpc::ClientContext*, const Request&, Response*),
                        const Request& request) const {
     grpc::ClientContext context;
-    context.set_deadline(std::chrono::system_clock::now() + kAnswerTime);
+    context.set_deadline(std::chrono::system_clock::now() + kPeopleAnswerTime);
     Response response;
     const auto stub = Service::NewStub(room().channel);
     const grpc::Status status = (stub.get()->*call)(&context, request, &response);
@@ -187,7 +187,7 @@ void PeopleClient::Impl::read_beside_window() {
     const grpc::Status ended = read_stream();
     if (ended.error_code() == grpc::StatusCode::UNIMPLEMENTED || ended.error_code() == grpc::StatusCode::INTERNAL)
       return fail(error_of(ended));
-    if (!stopping()) std::this_thread::sleep_for(kRetryPause);
+    if (!stopping()) std::this_thread::sleep_for(kPeopleRetryPause);
   }
 }
 
@@ -202,7 +202,7 @@ void PeopleClient::Impl::read() {
       return fail(error_of(ended));
     log::warn("people stream ended", {{"server", options.address}, {"reason", ended.error_message()}});
     while (!stopping()) {
-      std::this_thread::sleep_for(kRetryPause);
+      std::this_thread::sleep_for(kPeopleRetryPause);
       Result<wire::JoinedRoom> again = wire::join_again(room(), wire::ClientKind::console, {});
       if (again) {
         const MutexLock lock(mutex);
@@ -284,7 +284,7 @@ bool PeopleClient::wait(const std::function<bool()>& done, std::chrono::millisec
     if (done()) return true;
     if (Clock::now() >= until || impl_->stopping()) return false;
     MutexLock lock(impl_->mutex);
-    impl_->changed.wait_for(lock, std::min<Clock::duration>(kRetryPause, until - Clock::now()));
+    impl_->changed.wait_for(lock, std::min<Clock::duration>(kPeopleRetryPause, until - Clock::now()));
   }
 }
 

@@ -59,7 +59,7 @@ vtkSmartPointer<vtkTextActor> text_actor(int size, const Rgb& colour) {
   return actor;
 }
 
-vtkSmartPointer<vtkActor> actor_of(vtkAlgorithmOutput* shape, std::uint32_t colour, double opacity) {
+vtkSmartPointer<vtkActor> shape_actor(vtkAlgorithmOutput* shape, std::uint32_t colour, double opacity) {
   vtkNew<vtkPolyDataMapper> mapper;
   mapper->SetInputConnection(shape);
   mapper->ScalarVisibilityOff();
@@ -183,8 +183,8 @@ PeopleOverlay::Impl::Drawn PeopleOverlay::Impl::make(const Annotation& annotatio
     one.tube->CappingOn();
     shape = one.tube->GetOutputPort();
   }
-  one.solid = actor_of(shape, annotation.colour, 1.0);
-  one.through = actor_of(shape, annotation.colour, kThrough);
+  one.solid = shape_actor(shape, annotation.colour, 1.0);
+  one.through = shape_actor(shape, annotation.colour, kThrough);
   one.words = text_actor(kLabelText, kLight);
   const Rgb c = rgb(annotation.colour);
   one.words->GetTextProperty()->SetFrame(1);

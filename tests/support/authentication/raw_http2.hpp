@@ -12,6 +12,9 @@
 
 namespace osteon::test {
 
+// The path of a call that a person may make.
+inline constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
+
 struct Http2Frame {
   std::uint8_t type = 0;  // 0 DATA, 1 HEADERS, 3 RST_STREAM, 4 SETTINGS, 6 PING, 7 GOAWAY
   std::uint32_t stream = 0;

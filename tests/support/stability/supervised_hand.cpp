@@ -11,7 +11,7 @@ namespace {
 
 using namespace haptic;
 
-constexpr double kPitch_mm = 0.5;
+constexpr double kHandPitch_mm = 0.5;
 constexpr int kPatchTicks = 10;
 constexpr int kServerTicks = 8;  // 120 Hz, nearly
 
@@ -20,7 +20,7 @@ Case block() {
   const auto distance = [](const Vec3& p) {
     return std::max({std::abs(p.x()) - 15.0, std::abs(p.y()) - 8.0, -p.z(), p.z() - 12.0});
   };
-  return make_bone({{-17, -10, -4}, {17, 10, 14}}, kPitch_mm, distance, [](const Vec3&) { return 1.9; });
+  return make_bone({{-17, -10, -4}, {17, 10, 14}}, kHandPitch_mm, distance, [](const Vec3&) { return 1.9; });
 }
 
 bool touches(const LoopReport& report) {
@@ -209,7 +209,8 @@ void OverseenHand::follow() {
   }
   room_.tick(replica_);
   if (ticks_ % kPatchTicks != 0) return;
-  for (const ChangedLeaves& change : replica_.take_changes()) builder_.changed(kPitch_mm, change.level, change.origins);
+  for (const ChangedLeaves& change : replica_.take_changes())
+    builder_.changed(kHandPitch_mm, change.level, change.origins);
   builder_.build(replica_.bodies(), loop_->tool(0), last_.pose_bone_proxy, patch_);
   patch_.own_cuts = replica_.last_own();
   patch_.room_seq = replica_.room_seq();

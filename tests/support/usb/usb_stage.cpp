@@ -15,7 +15,6 @@ namespace osteon::test {
 namespace {
 
 constexpr const char* kLibrary = "libumockdev-preload.so.0";
-constexpr std::chrono::seconds kPatience{20};
 
 void write_image(const std::filesystem::path& file, std::string_view beginning, std::size_t size) {
   std::string image(beginning);

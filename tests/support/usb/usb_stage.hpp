@@ -3,6 +3,7 @@
 // a device.
 #pragma once
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -12,6 +13,9 @@
 #include "tests/support/process.hpp"
 
 namespace osteon::test {
+
+// How long a test waits for what an emulated device must do.
+inline constexpr std::chrono::seconds kPatience{20};
 
 // Call it first in main(). Runs this program again under the preloaded library, unless it already is.
 void enter_usb_emulation(char** argv);

@@ -32,11 +32,11 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::content;
+using test::kGetStatus;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
 
-constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
 constexpr const char* kWatch = "/osteon.v1.WatchService/WatchCutting";
 constexpr std::uint8_t kDataFrame = 0, kHeadersFrame = 1;
 

@@ -24,13 +24,13 @@ namespace osteon {
 namespace {
 
 using namespace std::chrono_literals;
+using test::kGetStatus;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
 using testing::Not;
 
 constexpr std::uint8_t kHeadersFrame = 1;
-constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
 constexpr const char* kSession = "/osteon.v1.CuttingService/Session";
 
 class Insiders : public ::testing::Test {

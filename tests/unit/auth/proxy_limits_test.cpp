@@ -32,11 +32,10 @@ namespace {
 
 using namespace std::chrono_literals;
 using test::content;
+using test::kGetStatus;
 using test::kPatience;
 using test::RawHttp2;
 using testing::HasSubstr;
-
-constexpr const char* kGetStatus = "/osteon.v1.RoomService/GetStatus";
 
 // TCP connections over which nothing is sent.
 class Connected {

@@ -3,11 +3,10 @@
 #include <gtest/gtest.h>
 
 #include "common/imaging/calibration.hpp"
+#include "tests/unit/imaging/always.hpp"
 
 namespace osteon::imaging {
 namespace {
-
-bool always(double) { return true; }
 
 struct Scene {
   HuVolume volume;

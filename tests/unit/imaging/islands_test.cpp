@@ -6,13 +6,12 @@
 #include "common/imaging/calibration.hpp"
 #include "common/imaging/resample.hpp"
 #include "common/imaging/segmentation.hpp"
+#include "tests/unit/imaging/always.hpp"
 
 namespace osteon::imaging {
 namespace {
 
 constexpr double kThreshold_hu = 226.0;
-bool always(double) { return true; }
-
 HuVolume empty_volume() {
   HuVolume volume;
   volume.dims = {24, 20, 16};

@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/unit/imaging/always.hpp"
+
 namespace osteon {
 namespace {
 
-bool always(double) { return true; }
 constexpr double kPitch_mm = 0.5;
 
 // A field with values like HU whose value 300 lies at distance zero. The edge is `blur_mm` wide, as a scanner blurs it.
@@ -29,7 +30,7 @@ DenseVolume<float> edge_field(const CoordBox& box, double blur_mm, Distance dist
 // value.
 template <class Distance>
 double worst_error(const DenseVolume<float>& field, double within_mm, Distance distance_mm) {
-  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, always);
+  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, imaging::always);
   EXPECT_TRUE(s);
   double worst = 0.0;
   const CoordBox& box = field.box;
@@ -82,7 +83,7 @@ TEST(IsoSurface, SphereIsWithinATenthOfAVoxelAtAScannersEdge) {
 TEST(IsoSurface, EnclosedCavityIsOutside) {
   const auto distance = [](const Vec3& p) { return std::max(p.norm() - 10.0, 6.0 - p.norm()); };
   const auto field = edge_field({{-28, -28, -28}, {28, 28, 28}}, 40.0, distance);
-  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, always);
+  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, imaging::always);
   ASSERT_TRUE(s);
   EXPECT_GT(s->at({0, 0, 0}), 0.0f);
   EXPECT_LT(s->at({16, 0, 0}), 0.0f);
@@ -93,7 +94,7 @@ TEST(IsoSurface, EnclosedCavityIsOutside) {
 TEST(IsoSurface, IsClippedToFourPitches) {
   const auto distance = [](const Vec3& p) { return p.x(); };
   const auto field = edge_field({{-40, -3, -3}, {40, 3, 3}}, 200.0, distance);
-  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, always);
+  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, imaging::always);
   ASSERT_TRUE(s);
   for (int x = -40; x <= 40; ++x) {
     const double expected = std::clamp(x * kPitch_mm, -4.0 * kPitch_mm, 4.0 * kPitch_mm);
@@ -106,7 +107,7 @@ TEST(IsoSurface, SamplesAtTheThresholdAreInside) {
   for (int x = 0; x <= 10; ++x)
     for (int y = 0; y <= 7; ++y)
       for (int z = 0; z <= 7; ++z) field.at({x, y, z}) = 300.0f;
-  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, always);
+  const auto s = signed_distance_mm(field, 300.0f, kPitch_mm, imaging::always);
   ASSERT_TRUE(s);
   EXPECT_LE(s->at({10, 4, 4}), 0.0f);
   EXPECT_TRUE(std::signbit(s->at({10, 4, 4})));
@@ -124,10 +125,10 @@ TEST(IsoSurface, SlabsMeetWithoutASeam) {
 TEST(IsoSurface, EqualFieldsGiveEqualBytes) {
   const auto distance = [](const Vec3& p) { return p.norm() - 9.0 + std::sin(3.0 * p.x()) * std::cos(2.0 * p.y()); };
   const auto field = edge_field({{-80, -26, -26}, {80, 26, 26}}, 1.0, distance);
-  const auto first = signed_distance_mm(field, 300.0f, kPitch_mm, always);
+  const auto first = signed_distance_mm(field, 300.0f, kPitch_mm, imaging::always);
   ASSERT_TRUE(first);
   for (int again = 0; again < 3; ++again) {
-    const auto next = signed_distance_mm(field, 300.0f, kPitch_mm, always);
+    const auto next = signed_distance_mm(field, 300.0f, kPitch_mm, imaging::always);
     ASSERT_TRUE(next);
     EXPECT_EQ(first->values, next->values);
   }

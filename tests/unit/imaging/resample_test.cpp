@@ -4,10 +4,10 @@
 
 #include <cmath>
 
+#include "tests/unit/imaging/always.hpp"
+
 namespace osteon::imaging {
 namespace {
-
-bool always(double) { return true; }
 
 TEST(Resample, ReproducesALinearFieldOnAnObliqueGrid) {
   HuVolume volume;

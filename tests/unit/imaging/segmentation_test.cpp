@@ -6,10 +6,10 @@
 #include <functional>
 #include <random>
 
+#include "tests/unit/imaging/always.hpp"
+
 namespace osteon::imaging {
 namespace {
-
-bool always(double) { return true; }
 
 constexpr std::int16_t kCortex = 1500, kFat = -90, kMuscle = 55, kAir = -1000;
 

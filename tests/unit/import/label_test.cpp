@@ -43,7 +43,7 @@ void write_stack(const fs::path& folder, int width, int height, int slices,
 }
 
 constexpr double kRadius = 11.0;  // voxels
-Rgba ball(int x, int y, int z) {
+Rgba coloured_ball(int x, int y, int z) {
   if ((x == 3 && y == 4) || (x == 14 && y == 4 && z == 14)) return kNoise;
   return (Vec3(x, y, z) - Vec3(14.2, 15.4, 13.8)).norm() < kRadius ? kBone : kEmpty;
 }
@@ -75,7 +75,7 @@ TEST_F(Labels, SlicesLieByTheirNumbers) {
 }
 
 TEST_F(Labels, ABallBecomesABall) {
-  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 29, 30, 28, ball));
+  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 29, 30, 28, coloured_ball));
   const double h = 0.25;
   auto stack = read_label_stack(folder_ / "s", {}, Vec3::Constant(h), keep_going);
   ASSERT_TRUE(stack) << stack.error().message;
@@ -230,7 +230,7 @@ TEST_F(Labels, BadStacksAreOneSentence) {
 }
 
 TEST_F(Labels, TheProgramImportsAndReports) {
-  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 29, 30, 28, ball));
+  ASSERT_NO_FATAL_FAILURE(write_stack(folder_ / "s", 29, 30, 28, coloured_ball));
   const auto made = test::run(OSTEON_IMPORT_PROGRAM,
                               {"labels", path("s"), "--spacing", "0.25", "--out", path("case"), "--title", "Ball"});
   ASSERT_EQ(made.exit_code, 0) << made.err;

@@ -9,13 +9,13 @@
 namespace osteon {
 namespace {
 
-constexpr double kDt = 1.0 / 120.0;
+constexpr double kPeriod_s = 1.0 / 120.0;
 
 TEST(Mount, RestsWhereLoadAndSpringAreEqual) {
   const MountParams params;
   Mount mount(params);
   const Load load{{10.0, -4.0, 2.0}, {300.0, 0.0, -900.0}};
-  for (int i = 0; i < 600; ++i) mount.step(load, kDt);
+  for (int i = 0; i < 600; ++i) mount.step(load, kPeriod_s);
   EXPECT_LT((mount.shift().place_mm - load.force_n / params.stiffness_n_per_mm).norm(), 1e-9);
   EXPECT_LT((mount.shift().turn_rad - load.moment_nmm / params.stiffness_nmm_per_rad).norm(), 1e-12);
   const Shift& at = mount.shift();
@@ -56,7 +56,7 @@ TEST(Mount, NeverHasMoreEnergyThanWasPutIn) {
   const auto any = [&] { return Vec3(even(random), even(random), even(random)); };
   for (const double mass_kg : {1e-4, 0.1, 5.0})
     for (const double damping : {0.0, 1.0})
-      for (const double dt : {1e-4, 1e-3, kDt, 0.1}) {
+      for (const double dt : {1e-4, 1e-3, kPeriod_s, 0.1}) {
         MountParams params;
         params.mass_kg = mass_kg;
         params.inertia_kg_mm2 = 100.0 * mass_kg;
@@ -83,8 +83,8 @@ TEST(Mount, IsTheSameInAllDirections) {
   const Load load{{10.0, -4.0, 2.0}, {300.0, 0.0, -900.0}};
   Mount plain{MountParams{}}, other{MountParams{}};
   for (int i = 0; i < 20; ++i) {
-    plain.step(load, kDt);
-    other.step({turned * load.force_n, turned * load.moment_nmm}, kDt);
+    plain.step(load, kPeriod_s);
+    other.step({turned * load.force_n, turned * load.moment_nmm}, kPeriod_s);
     EXPECT_LT((other.shift().place_mm - turned * plain.shift().place_mm).norm(), 1e-12);
     EXPECT_LT((other.shift().turn_rad - turned * plain.shift().turn_rad).norm(), 1e-12);
   }
@@ -112,7 +112,7 @@ TEST(Mount, TakesNoBadNumbers) {
   params.stiffness_n_per_mm = 0.0;
   EXPECT_FALSE(params.good());
   Mount mount{MountParams{}};
-  mount.step({{std::nan(""), 0, 0}, Vec3::Zero()}, kDt);
+  mount.step({{std::nan(""), 0, 0}, Vec3::Zero()}, kPeriod_s);
   EXPECT_TRUE(mount.shift().finite());
 }
 

@@ -11,10 +11,10 @@ namespace osteon {
 namespace {
 
 const GramsPerCm3 kSubchondral{0.9};
-const RevolutionsPerMinute kSpeed{250};
+const RevolutionsPerMinute kReamerSpeed{250};
 
 double thrust(const ReamingParams& reamer, double feed, double edge_mm, GramsPerCm3 density,
-              RevolutionsPerMinute speed = kSpeed) {
+              RevolutionsPerMinute speed = kReamerSpeed) {
   return resistance_n(reaming_law(reamer, speed, edge_mm, density), feed);
 }
 
@@ -28,7 +28,7 @@ TEST(Reaming, IsMillingAlongTheAxis) {
     const double width = radius / rings, r = (i + 0.5) * width;
     const MillingParams mill{.diameter_mm = 2.0 * radius, .pole_radius = 0.0, .edge_n_per_mm = 0.0};
     const double ring = milling_resistance(mill, 2.0 * std::numbers::pi * r * width, r, kSubchondral.value());
-    tangential += resistance_n(milling_law(mill, kSpeed, ring, teeth * width, kSubchondral), feed);
+    tangential += resistance_n(milling_law(mill, kReamerSpeed, ring, teeth * width, kSubchondral), feed);
   }
   EXPECT_NEAR(thrust(reamer, feed, teeth * radius, kSubchondral), 0.5 * tangential, 1e-9 * tangential);
 }
@@ -41,8 +41,8 @@ TEST(Reaming, HasItsClosedForm) {
 
 TEST(Reaming, InverseUndoesForwardAndEdgesPlough) {
   const ReamingParams reamer;
-  const FeedLaw law = reaming_law(reamer, kSpeed, 600.0, kSubchondral);
-  const FeedLaw cortical = reaming_law(reamer, kSpeed, 1000.0, GramsPerCm3{1.9});
+  const FeedLaw law = reaming_law(reamer, kReamerSpeed, 600.0, kSubchondral);
+  const FeedLaw cortical = reaming_law(reamer, kReamerSpeed, 1000.0, GramsPerCm3{1.9});
   for (const double v : {0.05, 0.5, 3.0}) EXPECT_NEAR(feed_at_mm_per_s(law, resistance_n(law, v)), v, 1e-9);
   EXPECT_EQ(feed_at_mm_per_s(cortical, 9.9), 0.0);
   EXPECT_GT(feed_at_mm_per_s(cortical, 10.1), 0.0);

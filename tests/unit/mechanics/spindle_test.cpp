@@ -9,11 +9,11 @@
 namespace osteon {
 namespace {
 
-constexpr double kDt = 1e-3;
+constexpr double kTick_s = 1e-3;
 constexpr SpindleParams kMotor{
     .full_rpm = 1000, .run_up_s = 0.3, .droop_rpm_per_nmm = 0.2, .most_nmm = 400, .response_s = 0.02};
 
-void run(Spindle& spindle, double command_rpm, double torque_nmm, double seconds, double dt_s = kDt) {
+void run(Spindle& spindle, double command_rpm, double torque_nmm, double seconds, double dt_s = kTick_s) {
   for (int i = 0; i < static_cast<int>(std::lround(seconds / dt_s)); ++i)
     spindle.step(kMotor, command_rpm, torque_nmm, dt_s);
 }

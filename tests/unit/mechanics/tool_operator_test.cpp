@@ -8,7 +8,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kDt = 1e-3;
+constexpr double kLoop_s = 1e-3;
 
 // Against a wall that takes exactly the push, nothing moves and the spring is not stretched.
 TEST(Hand, PushesWithItsPush) {
@@ -17,7 +17,7 @@ TEST(Hand, PushesWithItsPush) {
   double force = 0.0;
   for (int i = 0; i < 4000; ++i) {
     force = 50.0 * hand.position_mm().x();  // a wall of 50 N/mm
-    hand.step(push, {-force, 0, 0}, kDt);
+    hand.step(push, {-force, 0, 0}, kLoop_s);
   }
   EXPECT_NEAR(force, 29.0, 0.05);
 }
@@ -28,11 +28,11 @@ TEST(Hand, PlungesByPushOverStiffness) {
     Hand hand(params, Vec3::Zero());
     const HandCommand push{HandMode::push, Vec3::Zero(), Vec3::UnitX()},
         release{HandMode::release, Vec3::Zero(), Vec3::UnitX()};
-    for (int i = 0; i < 4000; ++i) hand.step(push, {-50.0 * hand.position_mm().x(), 0, 0}, kDt);
+    for (int i = 0; i < 4000; ++i) hand.step(push, {-50.0 * hand.position_mm().x(), 0, 0}, kLoop_s);
     const double start = hand.position_mm().x();
     double furthest = start;
     for (int i = 0; i < 1500; ++i) {
-      hand.step(release, Vec3::Zero(), kDt);
+      hand.step(release, Vec3::Zero(), kLoop_s);
       furthest = std::max(furthest, hand.position_mm().x());
     }
     EXPECT_NEAR(furthest - start, params.push_n / params.stiffness_n_per_mm,
@@ -49,8 +49,8 @@ TEST(Hand, CarriesAsACriticallyDampedOscillator) {
   params.damping_n_s_per_mm = 2.0 * std::sqrt(params.stiffness_n_per_mm * mass);
   Hand hand(params, Vec3::Zero());
   for (int i = 1; i <= 100; ++i) {
-    hand.step({HandMode::carry, {10, 0, 0}, Vec3::UnitX()}, Vec3::Zero(), kDt);
-    const double t = i * kDt;
+    hand.step({HandMode::carry, {10, 0, 0}, Vec3::UnitX()}, Vec3::Zero(), kLoop_s);
+    const double t = i * kLoop_s;
     EXPECT_NEAR(hand.position_mm().x(), 10.0 * (1.0 - (1.0 + omega * t) * std::exp(-omega * t)), 0.1);
   }
 }
@@ -61,8 +61,8 @@ TEST(Hand, ScalingForcesKeepsMotion) {
   for (int i = 0; i < 500; ++i) {
     const HandCommand command{HandMode::push, Vec3::Zero(), Vec3::UnitX()};
     const double load = 20.0 * full.position_mm().x();
-    full.step(command, {-load, 0.5, 0}, kDt);
-    light.step(command, {-s * load, s * 0.5, 0}, kDt);
+    full.step(command, {-load, 0.5, 0}, kLoop_s);
+    light.step(command, {-s * load, s * 0.5, 0}, kLoop_s);
   }
   EXPECT_NEAR((full.position_mm() - light.position_mm()).norm(), 0.0, 1e-9);
   EXPECT_GT(full.position_mm().x(), 0.5);
@@ -70,7 +70,7 @@ TEST(Hand, ScalingForcesKeepsMotion) {
 
 TEST(Hand, ARigGoesExactlyToItsTarget) {
   Hand hand(expert_hand(), Vec3::Zero());
-  hand.step({HandMode::rig, {1, 2, 3}, Vec3::UnitX()}, {-1000, 0, 0}, kDt);
+  hand.step({HandMode::rig, {1, 2, 3}, Vec3::UnitX()}, {-1000, 0, 0}, kLoop_s);
   EXPECT_EQ(hand.position_mm(), Vec3(1, 2, 3));
 }
 

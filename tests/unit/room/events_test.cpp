@@ -19,7 +19,7 @@ using test::strokes;
 using test::test_block;
 using test::tool_named;
 
-RoomSeq commit(Room& room, const Cut& cut) {
+RoomSeq commit_cut(Room& room, const Cut& cut) {
   const Result<Outcome> outcome = room.submit(cut);
   EXPECT_TRUE(outcome.has_value()) << outcome.error().message;
   EXPECT_TRUE(outcome->committed()) << sentence(outcome->rejection);
@@ -52,7 +52,7 @@ TEST(RoomUndo, LeavesTheBoneOfTheOtherCuts) {
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 5, 31);
   std::vector<RoomSeq> seqs;
-  for (const Cut& cut : cuts) seqs.push_back(commit(room, cut));
+  for (const Cut& cut : cuts) seqs.push_back(commit_cut(room, cut));
   const Digest all = room.field_hash();
   EXPECT_EQ(all, bone_after(cuts));
 
@@ -82,8 +82,8 @@ TEST(RoomUndo, CountsTheEventsOfOneAuthorOrOfAll) {
                  watcher = room.join(MemberKind::watcher);
   const auto of_a = strokes(a, 2, 32), of_b = strokes(b, 2, 33);
   for (int i = 0; i < 2; ++i) {
-    commit(room, of_a[static_cast<std::size_t>(i)]);
-    commit(room, of_b[static_cast<std::size_t>(i)]);
+    commit_cut(room, of_a[static_cast<std::size_t>(i)]);
+    commit_cut(room, of_b[static_cast<std::size_t>(i)]);
   }
   ASSERT_TRUE(room.undo_last(watcher, 1, a));
   EXPECT_EQ(room.field_hash(), bone_after({of_a[0], of_b[0], of_b[1]}));
@@ -95,20 +95,20 @@ TEST(RoomUndo, EndsTheLeasesUnderWhichOthersCut) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   auto cuts = strokes(surgeon, 3, 34);
-  commit(room, cuts[0]);
+  commit_cut(room, cuts[0]);
   const std::uint64_t before = room.lease_epoch(surgeon);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_GT(room.lease_epoch(surgeon), before);
   EXPECT_EQ(room.submit(cuts[1])->rejection, Rejection::lease);
   cuts[2].lease_epoch = room.lease_epoch(surgeon);
-  commit(room, cuts[2]);
+  commit_cut(room, cuts[2]);
 }
 
 // A redo changes bone under everyone, as the undo did. So no cut of an earlier epoch is taken after it.
 TEST(RoomUndo, ARedoEndsTheLeasesToo) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon), partner = room.join(MemberKind::surgeon);
-  commit(room, strokes(surgeon, 1, 34)[0]);
+  commit_cut(room, strokes(surgeon, 1, 34)[0]);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   const std::uint64_t of_surgeon = room.lease_epoch(surgeon), of_partner = room.lease_epoch(partner);
   ASSERT_TRUE(room.redo_last(surgeon, 1));
@@ -118,13 +118,13 @@ TEST(RoomUndo, ARedoEndsTheLeasesToo) {
   cuts[0].lease_epoch = of_partner;
   EXPECT_EQ(room.submit(cuts[0])->rejection, Rejection::lease);
   cuts[1].lease_epoch = room.lease_epoch(partner);
-  commit(room, cuts[1]);
+  commit_cut(room, cuts[1]);
 }
 
 TEST(RoomUndo, RefusesWhatCannotBeUndoneWithoutASequenceNumber) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
-  const RoomSeq cut = commit(room, strokes(surgeon, 1, 35)[0]);
+  const RoomSeq cut = commit_cut(room, strokes(surgeon, 1, 35)[0]);
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   const RoomSeq undo = room.room_seq(), unknown{77};
   for (const RoomSeq seq : {cut, undo, unknown}) {
@@ -152,7 +152,7 @@ TEST(RoomUndo, NamesEveryBlockThatItMakesStale) {
   };
   refresh(room.bone_blocks());
   for (const Cut& cut : strokes(surgeon, 8, 36)) {
-    commit(room, cut);
+    commit_cut(room, cut);
     refresh(room.take_stale_blocks());
   }
   ASSERT_TRUE(room.undo_last(surgeon, 3, {}));
@@ -174,8 +174,8 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 4, 37);
-  const RoomSeq saw = commit(room, cuts[0]);
-  commit(room, cuts[1]);
+  const RoomSeq saw = commit_cut(room, cuts[0]);
+  commit_cut(room, cuts[1]);
   const double before_mm3 = room.field().removed_mm3();
   const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch());
   ASSERT_TRUE(split) << split.error().message;
@@ -195,7 +195,7 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   // A cut across the plane of the split takes bone of both bodies.
   Cut across = test::straight_cut(tool_named("burr-round-5"), {-4, 0, -1}, {4, 0, -1}, {0, 0, -1}, 3);
   across.author = surgeon;
-  commit(room, across);
+  commit_cut(room, across);
   EXPECT_GT(room.find_field(BodyId{1})->solid_mm({3, 0, -0.5}), 0.0);
   EXPECT_GT(room.field().solid_mm({-3, 0, -0.5}), 0.0);
 
@@ -226,8 +226,8 @@ TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
   fast.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 8, 41);
   for (std::size_t i = 0; i < 4; ++i) {
-    commit(slow, cuts[i]);
-    commit(fast, cuts[i]);
+    commit_cut(slow, cuts[i]);
+    commit_cut(fast, cuts[i]);
   }
   Separation found{BodyId{0}, {half(fast.bone(), true)}, fast.bone_epoch()};
   found.fields.emplace_back(fast.bone(), fast.next_body(), fast.tools());
@@ -235,8 +235,8 @@ TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
   for (FieldLeaf leaf : fast.field().leaves()) found.fields[0].restore(leaf);
   for (const FieldLeaf& leaf : found.fragments[0].left) found.fields[0].merge(leaf);
   for (std::size_t i = 4; i < 8; ++i) {
-    commit(slow, cuts[i]);
-    commit(fast, cuts[i]);
+    commit_cut(slow, cuts[i]);
+    commit_cut(fast, cuts[i]);
   }
   const auto split = fast.split(std::move(found));
   ASSERT_TRUE(split) << split.error().message;
@@ -267,7 +267,7 @@ TEST(RoomSplit, DebrisVanishesInTheSameEvent) {
 TEST(RoomSplit, IsRefusedWhereBoneHasComeBackMeanwhile) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
-  commit(room, strokes(surgeon, 1, 38)[0]);
+  commit_cut(room, strokes(surgeon, 1, 38)[0]);
   const std::uint64_t seen = room.bone_epoch();
   ASSERT_TRUE(room.undo_last(surgeon, 1, {}));
   EXPECT_FALSE(room.split(BodyId{0}, {half(room.bone(), true)}, seen));
@@ -297,7 +297,7 @@ TEST(RoomSplit, OfTwoPiecesOfABodyTheLaterFallsWithTheEarlier) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 2, 38);
-  for (const Cut& cut : cuts) commit(room, cut);
+  for (const Cut& cut : cuts) commit_cut(room, cut);
   const auto first = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x >= 6; })}, room.bone_epoch());
   const auto second = room.split(BodyId{0}, {part(room.bone(), [](int x) { return x < -6; })}, room.bone_epoch());
   ASSERT_TRUE(first && second);
@@ -368,7 +368,7 @@ TEST(RoomSplit, ABodyThatIsAwayMissesNoCut) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 2, 39);
-  for (const Cut& cut : cuts) commit(room, cut);
+  for (const Cut& cut : cuts) commit_cut(room, cut);
   const auto split = room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch());
   ASSERT_TRUE(split);
   const auto away = room.remove_body(surgeon, BodyId{0});
@@ -377,7 +377,7 @@ TEST(RoomSplit, ABodyThatIsAwayMissesNoCut) {
   across.author = surgeon;
   across.body = BodyId{1};
   across.lease_epoch = room.lease_epoch(surgeon);
-  commit(room, across);
+  commit_cut(room, across);
 
   const RoomSeq back[] = {away->room_seq};
   ASSERT_TRUE(room.undo(surgeon, back));
@@ -535,7 +535,7 @@ TEST(RoomTools, AToolIsAddedOnceAndCutsFromThenOn) {
   EXPECT_EQ(added->tool->hash, burr.hash());
   cut.author_seq = 2;
   cut.lease_epoch = room.lease_epoch(surgeon);
-  commit(room, cut);
+  commit_cut(room, cut);
 
   EXPECT_EQ(room.add_tool(surgeon, burr)->room_seq, RoomSeq{}) << "the tool is known, so there is no event";
   EXPECT_EQ(room.add_tool(surgeon, tool_named("drill-3.2"))->room_seq, RoomSeq{});
@@ -553,7 +553,7 @@ TEST(RoomReplica, DropsWhatWasPredictedOnFallenBone) {
   Replica replica(room.bone(), BodyId{0});
   for (int i = 0; i < 2; ++i) replica.add_own(cuts[static_cast<std::size_t>(i)]);
   for (int i = 0; i < 2; ++i)
-    replica.commit(commit(room, cuts[static_cast<std::size_t>(i)]), cuts[static_cast<std::size_t>(i)], true);
+    replica.commit(commit_cut(room, cuts[static_cast<std::size_t>(i)]), cuts[static_cast<std::size_t>(i)], true);
   replica.add_own(cuts[2]);  // This cut is under way when the other author undoes.
   const auto undo = room.undo_last(b, 1, {});
   ASSERT_TRUE(undo);
@@ -583,7 +583,7 @@ TEST(RoomReplica, PredictsInPiecesThatItReceivesLate) {
   EXPECT_EQ(replica.bodies().size(), 2u);
   EXPECT_EQ(replica.unconfirmed(), cuts.size());
   const Digest predicted = replica.hash();
-  for (const Cut& cut : cuts) replica.commit(commit(room, cut), cut, true);
+  for (const Cut& cut : cuts) replica.commit(commit_cut(room, cut), cut, true);
   replica.settle();
   EXPECT_EQ(replica.hash(), room.field_hash());
   EXPECT_EQ(predicted, room.field_hash()) << "the prediction was right";
@@ -622,7 +622,7 @@ TEST(RoomReplica, EveryHolderHasTheRoomsHashAfterAnyEvents) {
         default: {
           Cut& cut = cuts[who][next[who]++];
           cut.lease_epoch = room.lease_epoch(cut.author);
-          const RoomSeq seq = commit(room, cut);
+          const RoomSeq seq = commit_cut(room, cut);
           for (Replica& holder : holders) holder.commit(seq, cut, false);
         }
       }
@@ -665,14 +665,14 @@ TEST(RoomReplica, IsRenewedAfterTheConnectionWasDown) {
     std::size_t next = 0, next_other = 0;
     for (int i = 0; i < 4; ++i) {
       replica.add_own(cuts[next]);
-      replica.commit(commit(room, cuts[next]), cuts[next], true);
+      replica.commit(commit_cut(room, cuts[next]), cuts[next], true);
       ++next;
     }
     // The connection is down. Own cuts go on, some of them reach the room, and others work.
     const std::size_t reached = random() % 5;
     for (std::size_t i = 0; i < 6; ++i) replica.add_own(cuts[next + i]);
-    for (std::size_t i = 0; i < reached; ++i) commit(room, cuts[next + i]);
-    for (int i = 0; i < 3; ++i) commit(room, others[next_other++]);
+    for (std::size_t i = 0; i < reached; ++i) commit_cut(room, cuts[next + i]);
+    for (int i = 0; i < 3; ++i) commit_cut(room, others[next_other++]);
     const bool splits = random() % 2, undoes = random() % 2;
     if (splits) {
       ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
@@ -693,7 +693,7 @@ TEST(RoomReplica, IsRenewedAfterTheConnectionWasDown) {
       EXPECT_EQ(replica.hash(), room.field_hash());
     }
     for (std::size_t i = reached; !undoes && i < 6; ++i)
-      replica.commit(commit(room, cuts[next + i]), cuts[next + i], true);
+      replica.commit(commit_cut(room, cuts[next + i]), cuts[next + i], true);
     replica.settle();
     EXPECT_EQ(replica.hash(), room.field_hash());
     EXPECT_EQ(replica.room_seq(), room.room_seq());
@@ -713,7 +713,7 @@ TEST(RoomReplica, EqualsTheRoomOnceWhatIsUnacknowledgedIsDropped) {
   const auto cuts = strokes(own, 12, 43);
   Replica replica(room.bone(), BodyId{0});
   for (const Cut& cut : cuts) replica.add_own(cut);
-  for (std::size_t i = 0; i < 5; ++i) replica.commit(commit(room, cuts[i]), cuts[i], true);
+  for (std::size_t i = 0; i < 5; ++i) replica.commit(commit_cut(room, cuts[i]), cuts[i], true);
   replica.settle();
   ASSERT_NE(replica.hash(), room.field_hash());
   EXPECT_EQ(replica.drop_unconfirmed(), 7u);
@@ -727,7 +727,7 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
   Room room(test_block());
   const AuthorId surgeon = room.join(MemberKind::surgeon);
   const auto cuts = strokes(surgeon, 6, 42);
-  for (int i = 0; i < 3; ++i) commit(room, cuts[static_cast<std::size_t>(i)]);
+  for (int i = 0; i < 3; ++i) commit_cut(room, cuts[static_cast<std::size_t>(i)]);
   ASSERT_TRUE(room.split(BodyId{0}, {half(room.bone(), true)}, room.bone_epoch()));
   SavedFields saved;
   saved.case_hash = room.bone().hash();
@@ -756,10 +756,10 @@ TEST(RoomResume, GoesOnFromWhatWasSaved) {
       << "events from before cannot be undone";
   for (int i = 3; i < 6; ++i) {
     Cut cut = cuts[static_cast<std::size_t>(i)];
-    commit(room, cut);
+    commit_cut(room, cut);
     cut.author = again;
     cut.author_seq = static_cast<std::uint64_t>(i) - 2;
-    commit(*resumed, cut);
+    commit_cut(*resumed, cut);
   }
   EXPECT_EQ(resumed->field_hash(), room.field_hash());
   ASSERT_TRUE(room.undo_last(surgeon, 2, {}));

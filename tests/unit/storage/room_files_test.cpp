@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-constexpr const char* kFile = "/rooms/femur";
+constexpr const char* kRoomFile = "/rooms/femur";
 
 class RoomFilesTest : public ::testing::Test {
  protected:
@@ -57,24 +57,24 @@ TEST(RoomsFolder, IsOneServersAsLongAsItHoldsIt) {
 }
 
 TEST_F(RoomFilesTest, WhatAJournalBeganAsIsReadBesideWhoeverUsesIt) {
-  KeptCuts kept(kFile, &disk_, "femur");
+  KeptCuts kept(kRoomFile, &disk_, "femur");
   kept.cut(5);
   const MemoryDisk::Image before = disk_.image();
-  const Result<RoomGenesis> peeked = peek_genesis(kFile, &disk_);
+  const Result<RoomGenesis> peeked = peek_genesis(kRoomFile, &disk_);
   ASSERT_TRUE(peeked) << peeked.error().message;
   EXPECT_EQ(to_bytes(*peeked), to_bytes(kept.store->genesis()));
   EXPECT_EQ(disk_.image(), before);
   kept.cut(5);
   EXPECT_TRUE(kept.store->verify(test_block(), kept.bone())->sound());
   ASSERT_TRUE(kept.store->close());
-  EXPECT_EQ(peek_genesis(kFile, &disk_)->room, "femur");
+  EXPECT_EQ(peek_genesis(kRoomFile, &disk_)->room, "femur");
 
   EXPECT_EQ(peek_genesis("/rooms/tibia", &disk_).error().code, ErrorCode::not_found);
   for (const std::string& bytes : {std::string(), std::string("a list"), std::string(4096, 'x')}) {
     disk_.put("/rooms/list", bytes);
     EXPECT_EQ(peek_genesis("/rooms/list", &disk_).error().code, ErrorCode::invalid_input);
   }
-  std::string spoiled = disk_.image().at(kFile);
+  std::string spoiled = disk_.image().at(kRoomFile);
   const std::size_t name = spoiled.find("femur");
   ASSERT_NE(name, std::string::npos);
   spoiled.replace(name, 5, "tibia");
@@ -99,38 +99,38 @@ TEST(RoomFiles, APeekOnTheComputersDiskDisturbsNobody) {
 
 TEST_F(RoomFilesTest, ARoomIsOpenedOnlyUnderItsName) {
   {
-    KeptCuts kept(kFile, &disk_, "femur");
+    KeptCuts kept(kRoomFile, &disk_, "femur");
     kept.cut(5);
     ASSERT_TRUE(kept.store->close());
   }
   RoomStore::Options options;
   options.journal.disk = &disk_;
   options.name = "tibia";
-  const auto refused = RoomStore::open(kFile, test_block(), options);
+  const auto refused = RoomStore::open(kRoomFile, test_block(), options);
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().message,
-            std::string(kFile) +
+            std::string(kRoomFile) +
                 " holds the room femur, not tibia; give the file its name again, or rename the room: "
                 "osteon-server rename-room " +
-                kFile + " tibia");
+                kRoomFile + " tibia");
   {
-    Journal journal = std::move(Journal::open(kFile, {.disk = &disk_}).value());
+    Journal journal = std::move(Journal::open(kRoomFile, {.disk = &disk_}).value());
     ASSERT_TRUE(journal.set_register(kNameRegister, "tibia"));
     ASSERT_TRUE(journal.close());
   }
-  const auto renamed = RoomStore::open(kFile, test_block(), options);
+  const auto renamed = RoomStore::open(kRoomFile, test_block(), options);
   ASSERT_TRUE(renamed) << renamed.error().message;
   EXPECT_EQ(renamed->store->genesis().room, "tibia");
 }
 
 TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsErased) {
   std::int32_t today = 100;
-  KeptCuts kept(kFile, &disk_, "femur");
+  KeptCuts kept(kRoomFile, &disk_, "femur");
   kept.keep();
   kept.options.today = [&] { return today; };
   kept.options.retention_days = 30;
   kept.store.reset();
-  kept.open(kFile);
+  kept.open(kRoomFile);
   ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u);
   today = 120;
   ASSERT_EQ(kept.store->person("Bela Neu").value(), 2u);
@@ -148,13 +148,13 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsErased) {
   kept.cut(3);
   kept.store.reset();
   today = 151;
-  kept.open(kFile);
+  kept.open(kRoomFile);
   EXPECT_FALSE(anywhere("Bela Neu"));
   EXPECT_THAT(kept.store->people().value(), ElementsAre(Person{"3", "Anna Alt", 131}));
   kept.store.reset();
   today = 100'000;
   kept.options.retention_days = 0;
-  kept.open(kFile);
+  kept.open(kRoomFile);
   EXPECT_EQ(kept.store->erase_old_people().value(), 0u);
   EXPECT_TRUE(anywhere("Anna Alt")) << "the name stays for ever";
   EXPECT_TRUE(kept.store->erase_person(3).value());
@@ -164,7 +164,7 @@ TEST_F(RoomFilesTest, WhoJoinedTooLongAgoIsErased) {
 
 // Messages, labels and names of marks of one person, and what was decided about them and said to them.
 TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
-  KeptCuts kept(kFile, &disk_, "femur");
+  KeptCuts kept(kRoomFile, &disk_, "femur");
   ASSERT_EQ(kept.store->person("Anna Alt").value(), 1u);
   ASSERT_EQ(kept.store->person("Bela Neu").value(), 2u);
   Room& room = *kept.room;
@@ -200,18 +200,18 @@ TEST_F(RoomFilesTest, WordsGoWithThePersonAndTheChainStays) {
   const Digest later = room.field_hash();
   ASSERT_TRUE(kept.store->close());
   kept.store.reset();
-  const auto report = verify_journal(kFile, &disk_);
+  const auto report = verify_journal(kRoomFile, &disk_);
   ASSERT_TRUE(report);
   EXPECT_THAT(report->faults, IsEmpty());
   EXPECT_THAT(report->notes, ElementsAre(HasSubstr("text was erased from")));
-  kept.open(kFile);
+  kept.open(kRoomFile);
   EXPECT_EQ(kept.room->field_hash(), later);
   EXPECT_EQ(test::replay_of(test::entries_of(*kept.store, head.seq)).field_hash(), bone);
   EXPECT_FALSE(anywhere("Zwetschge"));
 }
 
 TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
-  KeptCuts kept(kFile, &disk_, "femur");
+  KeptCuts kept(kRoomFile, &disk_, "femur");
   ASSERT_EQ(kept.store->person("Anna \"A\"\n").value(), 1u);
   ASSERT_EQ(kept.store->person("Bela").value(), 2u);
   kept.cut(4);  // By 1: its join, 4 cuts, 4 marks.
@@ -252,7 +252,7 @@ TEST_F(RoomFilesTest, APersonGetsAllThatThereIsOfIt) {
 class FamilyTest : public RoomFilesTest {
  protected:
   void SetUp() override {
-    make(kFile, 1, {"b1", "b2"});
+    make(kRoomFile, 1, {"b1", "b2"});
     ASSERT_TRUE(branch_journal("/rooms/b1", "/rooms/b11", RoomSeq{6}, "b11", {}, &disk_));
     make("/rooms/other", 2, {"c1"});
     disk_.put("/rooms/notes.txt", "of the day");
@@ -275,50 +275,51 @@ class FamilyTest : public RoomFilesTest {
 };
 
 TEST_F(FamilyTest, BranchesAreKnownByTheHistoryThatTheyName) {
-  EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11"));
+  EXPECT_THAT(branches(kRoomFile), ElementsAre("b1", "b2", "b11"));
   EXPECT_THAT(branches("/rooms/other"), ElementsAre("c1"));
   EXPECT_THAT(branches("/rooms/b1"), ElementsAre("b11"));
   EXPECT_THAT(branches("/rooms/b2"), IsEmpty());
   EXPECT_FALSE(branches_of("/rooms", "/rooms/notes.txt", {}, &disk_));
-  EXPECT_TRUE(has_head(kFile, first_head(to_bytes(*peek_genesis(kFile, &disk_))), &disk_).value());
-  EXPECT_FALSE(has_head(kFile, {RoomSeq{5}, {}}, &disk_).value());
-  EXPECT_FALSE(has_head(kFile, {RoomSeq{5000}, {}}, &disk_).value());
+  EXPECT_TRUE(has_head(kRoomFile, first_head(to_bytes(*peek_genesis(kRoomFile, &disk_))), &disk_).value());
+  EXPECT_FALSE(has_head(kRoomFile, {RoomSeq{5}, {}}, &disk_).value());
+  EXPECT_FALSE(has_head(kRoomFile, {RoomSeq{5000}, {}}, &disk_).value());
 
   // In use, with entries that are only in its log.
-  KeptCuts live(kFile, &disk_, "femur");
-  EXPECT_THAT(branches(kFile), ElementsAre("b1", "b2", "b11")) << "these branches are of entries in the database file";
+  KeptCuts live(kRoomFile, &disk_, "femur");
+  EXPECT_THAT(branches(kRoomFile), ElementsAre("b1", "b2", "b11"))
+      << "these branches are of entries in the database file";
   live.cut(2);
   const RoomSeq newest = live.store->head().seq;
   ASSERT_TRUE(live.store->branch("/rooms/b3", newest, "b3"));
-  EXPECT_EQ(branches_of("/rooms", kFile, {}, &disk_).error().code, ErrorCode::exists) << "only the store can know";
+  EXPECT_EQ(branches_of("/rooms", kRoomFile, {}, &disk_).error().code, ErrorCode::exists) << "only the store can know";
   const HasHead has = [&](const fs::path& file, const JournalHead& head) {
-    return file == kFile ? live.store->has_head(head) : has_head(file, head, &disk_);
+    return file == kRoomFile ? live.store->has_head(head) : has_head(file, head, &disk_);
   };
-  EXPECT_THAT(branches(kFile, has), ElementsAre("b1", "b2", "b3", "b11"));
+  EXPECT_THAT(branches(kRoomFile, has), ElementsAre("b1", "b2", "b3", "b11"));
 }
 
 TEST_F(FamilyTest, DeletedWithItsBranchesNothingOfItIsLeft) {
   {
     const KeptCuts used("/rooms/b11", &disk_, "b11");
     const MemoryDisk::Image before = disk_.image();
-    EXPECT_EQ(delete_room(kFile, true, &disk_).error().code, ErrorCode::exists);
+    EXPECT_EQ(delete_room(kRoomFile, true, &disk_).error().code, ErrorCode::exists);
     EXPECT_EQ(disk_.image(), before);
   }
-  const auto gone = delete_room(kFile, true, &disk_);
+  const auto gone = delete_room(kRoomFile, true, &disk_);
   ASSERT_TRUE(gone) << gone.error().message;
-  EXPECT_THAT(*gone, ElementsAre("/rooms/b11", "/rooms/b2", "/rooms/b1", kFile));
+  EXPECT_THAT(*gone, ElementsAre("/rooms/b11", "/rooms/b2", "/rooms/b1", kRoomFile));
   for (const std::string& name : names())
     EXPECT_TRUE(name.starts_with("/rooms/other") || name.starts_with("/rooms/c1") || name == "/rooms/notes.txt")
         << name;
   EXPECT_TRUE(verify_journal("/rooms/other", &disk_)->sound());
   EXPECT_TRUE(verify_journal("/rooms/c1", &disk_)->sound());
-  EXPECT_EQ(delete_room(kFile, true, &disk_).error().code, ErrorCode::not_found);
-  const KeptCuts anew(kFile, &disk_, "femur");
+  EXPECT_EQ(delete_room(kRoomFile, true, &disk_).error().code, ErrorCode::not_found);
+  const KeptCuts anew(kRoomFile, &disk_, "femur");
   EXPECT_EQ(anew.room->room_seq(), RoomSeq{1});
 }
 
 TEST_F(FamilyTest, AloneItLeavesItsBranchesWhole) {
-  ASSERT_THAT(*delete_room(kFile, false, &disk_), ElementsAre(kFile));
+  ASSERT_THAT(*delete_room(kRoomFile, false, &disk_), ElementsAre(kRoomFile));
   for (const char* file : {"/rooms/b1", "/rooms/b2", "/rooms/b11"})
     EXPECT_TRUE(verify_journal(file, &disk_)->sound()) << file;
   ASSERT_TRUE(delete_room("/rooms/b1", true, &disk_));
@@ -331,23 +332,23 @@ TEST_F(FamilyTest, AloneItLeavesItsBranchesWhole) {
 TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
   RoomSeq last;
   {
-    KeptCuts kept(kFile, &disk_, "femur");
+    KeptCuts kept(kRoomFile, &disk_, "femur");
     kept.keep();
     ASSERT_TRUE(kept.store->write(test::plain_entries(kept.store->head().seq, 40)));
     last = kept.store->head().seq;
     ASSERT_TRUE(kept.store->close());
   }
-  const std::size_t at = disk_.image().at(kFile).find("30." + std::string(20, 'x'));
+  const std::size_t at = disk_.image().at(kRoomFile).find("30." + std::string(20, 'x'));
   ASSERT_NE(at, std::string::npos);
-  disk_.flip_bit(kFile, 8 * (at + 6) + 1);
-  const auto all = branch_journal(kFile, "/rooms/b", {}, "b", {}, &disk_);
+  disk_.flip_bit(kRoomFile, 8 * (at + 6) + 1);
+  const auto all = branch_journal(kRoomFile, "/rooms/b", {}, "b", {}, &disk_);
   ASSERT_FALSE(all);
   EXPECT_EQ(all.error().code, ErrorCode::unavailable);
   EXPECT_THAT(all.error().message,
               AllOf(HasSubstr("entry 30 does not fit the chain"), HasSubstr("--at 29 takes these")));
-  EXPECT_EQ(branch_journal(kFile, "/rooms/b", last, "b", {}, &disk_).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(branch_journal(kRoomFile, "/rooms/b", last, "b", {}, &disk_).error().code, ErrorCode::invalid_input);
   EXPECT_FALSE(disk_.size("/rooms/b").value());
-  const auto confirmed = branch_journal(kFile, "/rooms/b", RoomSeq{29}, "b", {}, &disk_);
+  const auto confirmed = branch_journal(kRoomFile, "/rooms/b", RoomSeq{29}, "b", {}, &disk_);
   ASSERT_TRUE(confirmed) << confirmed.error().message;
   EXPECT_EQ(confirmed->seq, RoomSeq{29});
 }
@@ -357,7 +358,7 @@ TEST_F(RoomFilesTest, ABranchOfAllIsNotMadeOfADamagedJournal) {
 TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   RoomSeq head;
   {
-    KeptCuts kept(kFile, &disk_, "femur");
+    KeptCuts kept(kRoomFile, &disk_, "femur");
     kept.cut(4);
     kept.checkpoint();
     kept.cut(4);
@@ -370,11 +371,11 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
   for (bool failed = true; failed; ++cases) {
     disk_.load(before);
     disk_.fail_power_at(static_cast<std::uint64_t>(cases / 5 + 1));
-    const bool done = delete_room(kFile, true, &disk_).has_value();
+    const bool done = delete_room(kRoomFile, true, &disk_).has_value();
     failed = disk_.has_failed();
     EXPECT_EQ(done, !failed);
     disk_.power_returns();
-    for (const char* file : {kFile, "/rooms/b"}) {
+    for (const char* file : {kRoomFile, "/rooms/b"}) {
       Result<Journal> left = Journal::open(file, {.disk = &disk_});
       if (left) {
         ++whole;
@@ -385,9 +386,9 @@ TEST_F(RoomFilesTest, CutShortADeletionLeavesAWholeRoomOrNone) {
         EXPECT_EQ(left.error().code, ErrorCode::not_found) << left.error().message;
       }
     }
-    const auto again = delete_room(kFile, true, &disk_);
+    const auto again = delete_room(kRoomFile, true, &disk_);
     EXPECT_TRUE(again || again.error().code == ErrorCode::not_found) << again.error().message;
-    EXPECT_TRUE(Journal::create(kFile, "bone", {.disk = &disk_})) << "nothing prevents a new journal";
+    EXPECT_TRUE(Journal::create(kRoomFile, "bone", {.disk = &disk_})) << "nothing prevents a new journal";
   }
   std::printf("%d places to fail at: %d journals whole, %d gone\n", cases / 5, whole, none);
   EXPECT_GT(whole, 2);

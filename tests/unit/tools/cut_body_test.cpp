@@ -13,7 +13,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 // True if a point is in the body: exact, in doubles.
 bool in_body(const CutBody& body, const Vec3& p) {
@@ -226,7 +226,7 @@ TEST(CutBody, ArcsAreWithinTheirChordsShareOfACell) {
         0.5 * barrel.diameter_mm - barrel.corner_mm + std::sqrt(barrel.corner_mm * barrel.corner_mm - off * off);
     ASSERT_NEAR(barrel_part({r, 0, z}), 0.0, kShare_mm);
     const double end = end_radius_mm(contoured),
-                 angle = contoured.taper_rad + (0.5 * kPi - contoured.taper_rad) * i / 1000.0;
+                 angle = contoured.taper_rad + (0.5 * pi - contoured.taper_rad) * i / 1000.0;
     ASSERT_NEAR(contoured_part({end * std::cos(angle), 0, end * std::sin(angle) - end}), 0.0, kShare_mm);
   }
   // The taper continues from the rounded end to the full diameter.

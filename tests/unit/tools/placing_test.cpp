@@ -10,11 +10,11 @@ namespace osteon {
 namespace {
 
 // A ball of bone round the origin.
-BoneQuery ball(double radius_mm) {
+BoneQuery bone_ball(double radius_mm) {
   return [radius_mm](const Vec3& p) { return p.norm() - radius_mm; };
 }
 // Bone above z = 0 with a hemisphere of this radius reamed into it. +z points into the bone.
-BoneQuery reamed(double radius_mm) {
+BoneQuery bone_with_cup(double radius_mm) {
   return [radius_mm](const Vec3& p) { return std::max(-p.z(), radius_mm - p.norm()); };
 }
 
@@ -31,14 +31,14 @@ double between(const Vec3& a, const Vec3& b) { return std::atan2(a.cross(b).norm
 
 TEST(Placing, WithoutAWayTheItemStandsWhereItSays) {
   const Standing guide = one("guide-1", pose_along({1, 2, 3}, {0, 1, 0}));
-  const auto stands = placed({}, nullptr, guide, ball(10));
+  const auto stands = placed({}, nullptr, guide, bone_ball(10));
   ASSERT_TRUE(stands);
   EXPECT_TRUE(stands->item == guide.item);
 }
 
 TEST(Placing, OntoABallItStandsOnTheRadius) {
   const Vec3 near(8, 9, 12);  // 17 from the middle
-  const auto stands = placed(OntoBone{near, {}, Vec3::UnitX()}, nullptr, one("guide-1"), ball(20));
+  const auto stands = placed(OntoBone{near, {}, Vec3::UnitX()}, nullptr, one("guide-1"), bone_ball(20));
   ASSERT_TRUE(stands) << stands.error().message;
   const Pose& pose = stands->item.pose_bone_item;
   EXPECT_NEAR(pose.position_mm.norm(), 20.0, 1e-3);
@@ -48,12 +48,12 @@ TEST(Placing, OntoABallItStandsOnTheRadius) {
   EXPECT_NEAR(pose.direction(Vec3::UnitY()).dot(Vec3::UnitX()), 0.0, 1e-9);
   EXPECT_GT(pose.direction(Vec3::UnitX()).dot(Vec3::UnitX()), 0.0);
 
-  const auto along = placed(OntoBone{near, Vec3(0, 0, -3), Vec3::UnitX()}, nullptr, one("guide-1"), ball(20));
+  const auto along = placed(OntoBone{near, Vec3(0, 0, -3), Vec3::UnitX()}, nullptr, one("guide-1"), bone_ball(20));
   ASSERT_TRUE(along);
   EXPECT_LT(between(along->item.pose_bone_item.direction(Vec3::UnitZ()), Vec3(0, 0, -1)), 1e-9);
   EXPECT_NEAR(along->item.pose_bone_item.position_mm.norm(), 20.0, 1e-3);
 
-  EXPECT_FALSE(placed(OntoBone{{0, 0, 50}, {}, Vec3::UnitX()}, nullptr, one("guide-1"), ball(20)))
+  EXPECT_FALSE(placed(OntoBone{{0, 0, 50}, {}, Vec3::UnitX()}, nullptr, one("guide-1"), bone_ball(20)))
       << "no bone within 20 mm";
 }
 
@@ -61,7 +61,7 @@ TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
   Standing screw = one("screw-1");
   screw.item.turns = 2.0;
   const double pitch = screw.tool.thread_pitch_mm, length = screw.tool.cutting_length_mm;
-  const auto turned = placed(ByThread{1.25}, &screw, screw, reamed(1.0));
+  const auto turned = placed(ByThread{1.25}, &screw, screw, bone_with_cup(1.0));
   ASSERT_TRUE(turned) << turned.error().message;
   EXPECT_DOUBLE_EQ(turned->item.turns, 3.25);
   EXPECT_NEAR(turned->item.pose_bone_item.position_mm.z(), 1.25 * pitch, 1e-9);
@@ -69,14 +69,14 @@ TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
       << "a turn and a quarter";
 
   // Driven home: the underside of its head is one length above the tip.
-  const auto home = placed(ByThread{80.0 / pitch}, &screw, screw, reamed(0.0));
+  const auto home = placed(ByThread{80.0 / pitch}, &screw, screw, bone_with_cup(0.0));
   ASSERT_TRUE(home) << home.error().message;
   EXPECT_NEAR(home->item.pose_bone_item.position_mm.z(), length, 0.01);
   EXPECT_NEAR(home->item.turns - 2.0, length / pitch, 0.01 / pitch);
-  EXPECT_TRUE(set_by_rules({}, &screw, {home->item, screw.tool}, reamed(0.0)))
+  EXPECT_TRUE(set_by_rules({}, &screw, {home->item, screw.tool}, bone_with_cup(0.0)))
       << "it moves by its pitch times its turns";
 
-  const auto out = placed(ByThread{-0.5}, &screw, screw, reamed(0.0));
+  const auto out = placed(ByThread{-0.5}, &screw, screw, bone_with_cup(0.0));
   ASSERT_TRUE(out);
   EXPECT_NEAR(out->item.pose_bone_item.position_mm.z(), -0.5 * pitch, 1e-9);
 }
@@ -84,12 +84,12 @@ TEST(Placing, AScrewTurnsByItsThreadUntilItsHeadIsOnBone) {
 TEST(Placing, ACupIsDrivenIntoACavityOfItsSize) {
   const Standing cup = one("trial-cup-50", {Vec3(0, 0, -1.0), Eigen::Quaterniond::Identity()});
   const double radius = 0.5 * cup.tool.diameter_mm;
-  const auto home = placed(DriveHome{60.0}, &cup, cup, reamed(radius));
+  const auto home = placed(DriveHome{60.0}, &cup, cup, bone_with_cup(radius));
   ASSERT_TRUE(home) << home.error().message;
   // Its pole, the origin, reaches the cavity's pole.
   EXPECT_NEAR(home->item.pose_bone_item.position_mm.z(), radius, 0.1);
   EXPECT_GT(home->contact_fraction, 0.9);
-  const auto short_way = placed(DriveHome{5.0}, &cup, cup, reamed(radius));
+  const auto short_way = placed(DriveHome{5.0}, &cup, cup, bone_with_cup(radius));
   ASSERT_TRUE(short_way);
   EXPECT_NEAR(short_way->item.pose_bone_item.position_mm.z(), 4.0, 1e-9);
   EXPECT_LT(short_way->contact_fraction, 0.5);
@@ -98,7 +98,7 @@ TEST(Placing, ACupIsDrivenIntoACavityOfItsSize) {
 TEST(Placing, RefusesWhatMakesNoSense) {
   const Standing guide = one("guide-1"), screw = one("screw-1"), cup = one("trial-cup-50");
   const auto refused = [](const Placing& how, const Standing* before, const Standing& wanted) {
-    const auto stands = placed(how, before, wanted, ball(10));
+    const auto stands = placed(how, before, wanted, bone_ball(10));
     EXPECT_FALSE(stands) << wanted.tool.name;
     if (stands) return;
     EXPECT_EQ(stands.error().code, ErrorCode::invalid_input);

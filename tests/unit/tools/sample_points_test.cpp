@@ -12,7 +12,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 double area_of(const std::vector<SamplePoint>& points) {
   double sum = 0.0;
@@ -82,25 +82,25 @@ TEST(SamplePoints, StandForTheWholeCuttingFace) {
   for (const SamplePoint& point : sample_points(drill, 200))
     if (point.active) face += point.area_mm2;
   // Lateral area of the cone: π R times its slant, R / sin(59°).
-  EXPECT_NEAR(face, kPi * 1.6 * 1.6 / std::sin(59.0 * kPi / 180.0), 1e-6);
+  EXPECT_NEAR(face, pi * 1.6 * 1.6 / std::sin(59.0 * pi / 180.0), 1e-6);
 
   const Tool burr = *find_tool("burr-round-5");
   double forward = 0.0;
   for (const SamplePoint& point : sample_points(burr, 200))
     forward += point.active ? point.area_mm2 * std::max(0.0, -point.inward.z()) : 0.0;
   // Along the axis a sphere appears as a disc.
-  EXPECT_NEAR(forward, kPi * 2.5 * 2.5, 0.02 * kPi * 2.5 * 2.5);
+  EXPECT_NEAR(forward, pi * 2.5 * 2.5, 0.02 * pi * 2.5 * 2.5);
 
   // A hemisphere of 50 mm.
   double dome = 0.0;
   for (const SamplePoint& point : sample_points(*find_tool("reamer-sphere"), 200))
     dome += point.active ? point.area_mm2 : 0.0;
-  EXPECT_NEAR(dome, 2.0 * kPi * 25.0 * 25.0, 0.02 * 2.0 * kPi * 25.0 * 25.0);
+  EXPECT_NEAR(dome, 2.0 * pi * 25.0 * 25.0, 0.02 * 2.0 * pi * 25.0 * 25.0);
   // A flat disc of 9.5 mm.
   double end = 0.0;
   for (const SamplePoint& point : sample_points(*find_tool("end-drill"), 200))
     end += point.active ? point.area_mm2 : 0.0;
-  EXPECT_NEAR(end, kPi * 4.75 * 4.75, 0.02 * kPi * 4.75 * 4.75);
+  EXPECT_NEAR(end, pi * 4.75 * 4.75, 0.02 * pi * 4.75 * 4.75);
 }
 
 const auto everywhere = [](const Vec3&, const Vec3&) { return true; };
@@ -110,8 +110,8 @@ TEST(SpreadPoints, AreasAddUpToTheSurfaceOfSphereCylinderAndBox) {
     Implicit solid;
     double area_mm2;
   } cases[] = {
-      {ball({1, 2, 3}, 4.0), 4.0 * kPi * 16.0},
-      {cylinder(2.0, -7.0, 3.0), 2.0 * kPi * 2.0 * 10.0 + 2.0 * kPi * 4.0},
+      {ball({1, 2, 3}, 4.0), 4.0 * pi * 16.0},
+      {cylinder(2.0, -7.0, 3.0), 2.0 * pi * 2.0 * 10.0 + 2.0 * pi * 4.0},
       {cuboid({Vec3(-1, -2, -3), Vec3(4, 3, 5)}), 2.0 * (25.0 + 40.0 + 40.0)},
   };
   for (const auto& c : cases) {
@@ -129,7 +129,7 @@ TEST(SpreadPoints, AreNowhereTooNearAndLeaveNoBarePatch) {
   for (const int count : {60, 240, 1000}) {
     const Implicit solid = ball({0, 0, 0}, 3.0);
     const auto points = spread_points(solid, surface_of(solid, 0.3), everywhere, {.count = count});
-    const double packed = std::sqrt(2.0 / std::sqrt(3.0) * 4.0 * kPi * 9.0 / static_cast<double>(points.size()));
+    const double packed = std::sqrt(2.0 / std::sqrt(3.0) * 4.0 * pi * 9.0 / static_cast<double>(points.size()));
     double closest = 1e9;
     for (std::size_t i = 0; i < points.size(); ++i)
       for (std::size_t j = 0; j < i; ++j)
@@ -139,7 +139,7 @@ TEST(SpreadPoints, AreNowhereTooNearAndLeaveNoBarePatch) {
     // positions of a golden spiral, which do not depend on the points.
     double barest = 0.0;
     for (int i = 0; i < 5000; ++i) {
-      const double z = 1.0 - (2.0 * i + 1.0) / 5000.0, angle = i * kPi * (3.0 - std::sqrt(5.0)),
+      const double z = 1.0 - (2.0 * i + 1.0) / 5000.0, angle = i * pi * (3.0 - std::sqrt(5.0)),
                    r = std::sqrt(1.0 - z * z);
       const Vec3 p = 3.0 * Vec3(r * std::cos(angle), r * std::sin(angle), z);
       double nearest = 1e9;

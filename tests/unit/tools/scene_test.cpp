@@ -9,7 +9,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 // A slab below z = 0. +z points into it.
 double slab(const Vec3& p) { return -p.z(); }

@@ -13,7 +13,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
+using std::numbers::pi;
 
 TEST(ToolSurface, KeepsSharpEdgesAndRoundFaces) {
   // Sharp edges: the volume and area of a box are right, whatever the cells are.
@@ -24,7 +24,7 @@ TEST(ToolSurface, KeepsSharpEdgesAndRoundFaces) {
   EXPECT_NEAR(area_mm2(mesh), 2.0 * (5.0 * 5.3 + 5.3 * 8.0 + 8.0 * 5.0), 1e-3);
   // Round faces: the error falls with the square of the cell.
   const Implicit sphere = ball({0.1, 0.2, 0.3}, 3.0);
-  const double volume = 4.0 / 3.0 * kPi * 27.0;
+  const double volume = 4.0 / 3.0 * pi * 27.0;
   const double coarse = volume - enclosed_mm3(surface_of(sphere, 0.6)),
                fine = volume - enclosed_mm3(surface_of(sphere, 0.3));
   EXPECT_LT(std::abs(coarse), 0.03 * volume);
@@ -85,7 +85,7 @@ TEST(ToolSurface, GoesOutAsStlAndComesBackClosed) {
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(open_edges(*back), 0u);
   // A tube of 8 and 3.4 mm, 40 mm long.
-  EXPECT_NEAR(enclosed_mm3(*back), kPi * (16.0 - 1.7 * 1.7) * 40.0, 0.02 * kPi * 16.0 * 40.0);
+  EXPECT_NEAR(enclosed_mm3(*back), pi * (16.0 - 1.7 * 1.7) * 40.0, 0.02 * pi * 16.0 * 40.0);
 }
 
 }  // namespace

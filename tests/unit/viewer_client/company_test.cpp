@@ -17,7 +17,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-constexpr AuthorId kAda{3}, kBerg{4}, kSelf{8};
+constexpr AuthorId kPartner{3}, kOther{4}, kMe{8};
 
 // A room as on a server, as far as a viewer asks for it.
 class SmallRoom final : public SupervisionClient {
@@ -27,7 +27,7 @@ class SmallRoom final : public SupervisionClient {
   std::vector<WordsSeen> said;
   bool closed = false;
 
-  AuthorId self() const override { return kSelf; }
+  AuthorId self() const override { return kMe; }
   std::vector<PersonSeen> people() const override { return people_here; }
   std::vector<Annotation> annotations() const override { return drawn; }
   std::vector<WordsSeen> words() const override { return said; }
@@ -35,16 +35,16 @@ class SmallRoom final : public SupervisionClient {
   Result<std::uint32_t> draw(const Annotation& one) override {
     if (closed) return refused();
     drawn.push_back(one);
-    drawn.back().author = kSelf;
+    drawn.back().author = kMe;
     return drawn.back().id = ++given_;
   }
   Result<void> wipe_off(std::uint32_t id) override {
     if (closed) return refused();
-    std::erase_if(drawn, [&](const Annotation& one) { return id == 0 ? one.author == kSelf : one.id == id; });
+    std::erase_if(drawn, [&](const Annotation& one) { return id == 0 ? one.author == kMe : one.id == id; });
     return {};
   }
   Result<RoomSeq> say(AuthorId to, const std::string& words) override {
-    said.push_back({RoomSeq{said.size() + 1}, kSelf, to, words});
+    said.push_back({RoomSeq{said.size() + 1}, kMe, to, words});
     return said.back().place;
   }
   Result<RoomSeq> supervise(AuthorId, const Restrictions&) override { return refused(); }
@@ -66,10 +66,10 @@ class Company : public test::Picture {
   void SetUp() override {
     test::Picture::SetUp();
     PersonSeen ada, berg;
-    ada.author = kAda;
+    ada.author = kPartner;
     ada.name = "Ada";
     ada.hand = true;
-    berg.author = kBerg;
+    berg.author = kOther;
     berg.name = "Dr. Berg";
     berg.role = Role::instructor;
     ada.here = berg.here = true;
@@ -133,9 +133,9 @@ TEST_F(Company, WordsGoToWhomTheyAreMeantFor) {
   EXPECT_EQ(room_.said[0].words, "good morning");
   EXPECT_EQ(room_.said[0].to, AuthorId{});
   EXPECT_EQ(room_.said[1].words, "slower");
-  EXPECT_EQ(room_.said[1].to, kAda);
-  EXPECT_EQ(room_.said[2].to, kBerg);
-  EXPECT_EQ(room_.said[3].to, kAda);
+  EXPECT_EQ(room_.said[1].to, kPartner);
+  EXPECT_EQ(room_.said[2].to, kOther);
+  EXPECT_EQ(room_.said[3].to, kPartner);
   EXPECT_EQ(room_.said[4].words, "Ada is good");
   EXPECT_EQ(room_.said[4].to, AuthorId{});
   EXPECT_EQ(room_.said[5].words, "hello");

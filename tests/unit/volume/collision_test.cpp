@@ -25,13 +25,13 @@ CoordBox whole(int level) {
 }
 
 // Distance between the surface that a query shows and the ball's, in pitches: root mean square and largest, along rays.
-struct Error {
+struct SurfaceError {
   double rms = 0.0, largest = 0.0;
 };
-Error surface_error(const std::function<bool(const Vec3&)>& inside, double pitch) {
+SurfaceError surface_error(const std::function<bool(const Vec3&)>& inside, double pitch) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
-  Error error;
+  SurfaceError error;
   constexpr int kRays = 2000;
   for (int i = 0; i < kRays; ++i) {
     const Vec3 direction = Vec3{normal(random), normal(random), normal(random)}.normalized();
@@ -50,10 +50,11 @@ TEST(CellCollision, EachRuleIsAsAccurateAsItCanBe) {
   const CutField field(ball(), {});
   const BoneCells cells(field, 0, whole(0));
   const BoneDistance distance(field, 0, whole(0));
-  const Error nearest = surface_error([&](const Vec3& p) { return cells.inside(p, MixedCell::nearest); }, kPitch_mm);
-  const Error trilinear =
+  const SurfaceError nearest =
+      surface_error([&](const Vec3& p) { return cells.inside(p, MixedCell::nearest); }, kPitch_mm);
+  const SurfaceError trilinear =
       surface_error([&](const Vec3& p) { return cells.inside(p, MixedCell::trilinear); }, kPitch_mm);
-  const Error by_distance = surface_error([&](const Vec3& p) { return distance.inside(p); }, kPitch_mm);
+  const SurfaceError by_distance = surface_error([&](const Vec3& p) { return distance.inside(p); }, kPitch_mm);
   std::printf("error in pitches, rms / largest: nearest %.3f / %.3f, trilinear %.3f / %.3f, distance %.4f / %.4f\n",
               nearest.rms, nearest.largest, trilinear.rms, trilinear.largest, by_distance.rms, by_distance.largest);
   // A sample stands for a cube. It can be wrong by half the cube's diagonal at most. The rms is at least a quarter of

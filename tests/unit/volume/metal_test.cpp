@@ -12,7 +12,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPitch_mm = 0.5;
+constexpr double kMetalPitch_mm = 0.5;
 const Vec3 kDown{0, 0, -1};
 
 // A plate from 5 mm to 7 mm below the face, and a cap of enamel at one side of it.
@@ -25,7 +25,7 @@ Tissue rod(const Vec3& p) {
   return std::abs(p.x()) < 0.1 && std::abs(p.z() + 5.0) < 0.1 ? Tissue::metal : Tissue::none;
 }
 
-Case plate_block() { return test::marked_block(24.0, 12.0, kPitch_mm, plate); }
+Case plate_block() { return test::marked_block(24.0, 12.0, kMetalPitch_mm, plate); }
 
 bool meets(const CutField& field, const Cut& cut) {
   const CutField* const one = &field;
@@ -51,14 +51,14 @@ TEST(Metal, IsFoundInTheCase) {
   EXPECT_EQ(loaded->hash(), bone.hash());
   EXPECT_EQ(loaded->metal_leaves(), bone.metal_leaves());
   EXPECT_EQ(loaded->hard_leaves(), bone.hard_leaves());
-  EXPECT_TRUE(test::plain_block(24.0, 12.0, kPitch_mm).hard_leaves().empty());
+  EXPECT_TRUE(test::plain_block(24.0, 12.0, kMetalPitch_mm).hard_leaves().empty());
 }
 
 // For each sample of a level, the tissue of the nearest level-0 sample that is bone.
 TEST(Metal, IsKnownOnEveryLevel) {
   const Case bone = plate_block();
   for (int level = -2; level <= 2; ++level) {
-    const double pitch_mm = level_pitch_mm(kPitch_mm, level);
+    const double pitch_mm = level_pitch_mm(kMetalPitch_mm, level);
     const CoordBox box = covering_samples({{-3, -3, -9}, {11, 3, 1}}, pitch_mm);
     const Coord n = box.dims();
     std::vector<Tissue> found(static_cast<std::size_t>(n.x) * static_cast<std::size_t>(n.y) *
@@ -70,12 +70,12 @@ TEST(Metal, IsKnownOnEveryLevel) {
         for (std::int32_t z = box.min.z; z <= box.max.z; ++z, ++i) {
           // Half-way between two samples either may be the nearest.
           const Vec3 p = position_mm({x, y, z}, pitch_mm);
-          const Tissue above = plate(p + Vec3::Constant(0.5 * kPitch_mm)),
-                       below = plate(p - Vec3::Constant(0.5 * kPitch_mm));
+          const Tissue above = plate(p + Vec3::Constant(0.5 * kMetalPitch_mm)),
+                       below = plate(p - Vec3::Constant(0.5 * kMetalPitch_mm));
           if (above == below && p.z() < 0.0 && p.head<2>().cwiseAbs().maxCoeff() < 11.5) {
             ASSERT_EQ(found[i], above) << level << ": " << p.transpose();
           }
-          if (p.z() > kPitch_mm) {
+          if (p.z() > kMetalPitch_mm) {
             ASSERT_EQ(found[i], Tissue::none) << level << ": " << p.transpose();
           }
         }
@@ -93,16 +93,17 @@ TEST(Metal, IsMetDeeperThanAVoxel) {
         const double cone = tool.kind == ToolKind::drill ? std::sin(0.5 * 118.0 / 180.0 * std::numbers::pi) : 1.0;
         Cut cut = test::straight_cut(tool, {0, 0, 1}, {0, 0, -5.0 - deep_mm / cone}, kDown);
         cut.level = level;
-        EXPECT_EQ(meets(field, cut), deep_mm > kPitch_mm) << name << " level " << level << ", " << deep_mm << " mm";
+        EXPECT_EQ(meets(field, cut), deep_mm > kMetalPitch_mm)
+            << name << " level " << level << ", " << deep_mm << " mm";
       }
-  EXPECT_FALSE(meets(CutField(test::plain_block(24.0, 12.0, kPitch_mm), BodyId{}),
+  EXPECT_FALSE(meets(CutField(test::plain_block(24.0, 12.0, kMetalPitch_mm), BodyId{}),
                      test::straight_cut(*find_tool("burr-round-5"), {0, 0, 1}, {0, 0, -7}, kDown)));
 }
 
 // Both ends of the path are clear of the rod, but the middle is not. The tool moves across it, or turns about its far
 // end.
 TEST(Metal, IsMetAnywhereOnTheWay) {
-  const CutField field(test::marked_block(24.0, 12.0, kPitch_mm, rod), BodyId{});
+  const CutField field(test::marked_block(24.0, 12.0, kMetalPitch_mm, rod), BodyId{});
   const Tool burr = *find_tool("burr-round-5");
   EXPECT_FALSE(meets(field, test::straight_cut(burr, {-8, 0, -6}, {-8, 0, -6}, kDown)));
   EXPECT_FALSE(meets(field, test::straight_cut(burr, {8, 0, -6}, {8, 0, -6}, kDown)));

@@ -25,7 +25,7 @@ constexpr std::uint64_t kForgedForEachGenuine = 31;
 constexpr Time kBetween = 50us, kCut = 8ms, kRest = 500ms;
 constexpr std::uint64_t kRekeyPackets = 700;  // so that keys change often
 
-FillRandom seeded(std::uint64_t seed) {
+FillRandom seeded_bytes(std::uint64_t seed) {
   return [random = std::make_shared<std::mt19937_64>(seed)](std::span<std::uint8_t> into) {
     for (auto& byte : into) byte = static_cast<std::uint8_t>((*random)());
   };
@@ -42,7 +42,7 @@ using Sent = std::vector<std::pair<Endpoint, Bytes>>;
 class ServerEnd {
  public:
   ServerEnd(const SessionKeys& keys, AuthorId author)
-      : author_(author), link(keys, author, seeded(keys.session), 1, 1, rekeyed(wire::server_link_options())) {}
+      : author_(author), link(keys, author, seeded_bytes(keys.session), 1, 1, rekeyed(wire::server_link_options())) {}
 
   // Takes all that the link holds for its owner. Returns how much that was.
   std::uint64_t take(bool decide) {
@@ -242,7 +242,7 @@ Bytes forged(Forgery kind, const Bytes& on_its_way, const Bytes& replayed, const
 ForgeryReport forge(std::uint64_t count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::vector<SessionKeys> keys;
-  for (std::uint32_t i = 0; i < kPeers; ++i) keys.push_back(make_session_keys(100 + i, seeded(seed + 1 + i)));
+  for (std::uint32_t i = 0; i < kPeers; ++i) keys.push_back(make_session_keys(100 + i, seeded_bytes(seed + 1 + i)));
   Server server(keys);
   std::vector<std::unique_ptr<Peer>> peers;
   for (const SessionKeys& of : keys)

@@ -14,7 +14,7 @@
 namespace osteon::haptic::test {
 namespace {
 
-Condition wall(const Vec3& n, double least_mm = 0.0, const Vec3& at = Vec3::Zero()) {
+Condition wall_contact(const Vec3& n, double least_mm = 0.0, const Vec3& at = Vec3::Zero()) {
   return {n, at.cross(n), least_mm};
 }
 Motion solve(const Motion& wanted, const std::vector<Condition>& walls, bool& held, const MotionLimits& limits = {}) {
@@ -35,7 +35,7 @@ TEST(LeastMotion, AWedgeHoweverNarrowIsExact) {
   for (const double half_angle : {0.5, 0.1, 0.02, 0.004}) {
     // The wedge opens along +z. Its walls are a tenth of a millimetre from the tip along their normals.
     const double s = std::sin(half_angle), c = std::cos(half_angle);
-    const std::vector<Condition> walls = {wall({c, 0, s}, -0.1), wall({-c, 0, s}, -0.1)};
+    const std::vector<Condition> walls = {wall_contact({c, 0, s}, -0.1), wall_contact({-c, 0, s}, -0.1)};
     bool held = false;
     const Motion down = solve({{0.02, 0.3, -100.0}, Vec3::Zero()}, walls, held, {.may_turn = false});
     EXPECT_TRUE(held);
@@ -54,8 +54,8 @@ TEST(LeastMotion, WhatIsPressedFromTwoSidesStaysAndSlides) {
   std::vector<Condition> walls;
   for (int i = 0; i < 40; ++i) {
     const Vec3 at(0.5 * (i % 8), 0, -0.7 * (i / 8));
-    walls.push_back(wall(Vec3::UnitY(), 1e-4, at));
-    walls.push_back(wall(-Vec3::UnitY(), 1e-4, at));
+    walls.push_back(wall_contact(Vec3::UnitY(), 1e-4, at));
+    walls.push_back(wall_contact(-Vec3::UnitY(), 1e-4, at));
   }
   bool held = false;
   const Motion motion = solve({{0.05, 0.3, 0.2}, {0.01, 0.002, 0.01}}, walls, held);
@@ -77,7 +77,7 @@ TEST(LeastMotion, NoAllowedMotionIsNearer) {
     const MotionLimits limits{.arm_mm = 20.0, .may_turn = trial % 3 != 0};
     std::vector<Condition> walls;
     for (int i = 0; i < 60; ++i)
-      walls.push_back(wall(vec().normalized(), -0.2 * std::abs(normal(random)) * (i % 4), 15.0 * vec()));
+      walls.push_back(wall_contact(vec().normalized(), -0.2 * std::abs(normal(random)) * (i % 4), 15.0 * vec()));
     const Motion wanted{vec(), 0.05 * vec()};
     bool held = false;
     const Motion found = solve(wanted, walls, held, limits);

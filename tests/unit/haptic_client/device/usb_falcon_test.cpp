@@ -23,12 +23,12 @@ namespace osteon::haptic {
 namespace {
 
 using namespace std::chrono_literals;
+using test::kPatience;
 using test::wait_until;
 using testing::AssertionFailure;
 using testing::AssertionResult;
 using testing::AssertionSuccess;
 
-constexpr auto kPatience = 20s;
 constexpr std::size_t kImageBytes = 5000;  // not a multiple of a block
 
 class FalconOnUsb : public testing::Test {

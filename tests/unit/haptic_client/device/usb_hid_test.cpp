@@ -20,9 +20,8 @@ namespace osteon::haptic {
 namespace {
 
 using namespace std::chrono_literals;
+using test::kPatience;
 using test::wait_until;
-
-constexpr auto kPatience = 20s;
 
 class HidOnUsb : public testing::Test {
  protected:

@@ -18,9 +18,8 @@ namespace osteon::haptic {
 namespace {
 
 using namespace std::chrono_literals;
+using test::kPatience;
 using test::wait_until;
-
-constexpr auto kPatience = 20s;
 
 class Together : public testing::Test {
  protected:
