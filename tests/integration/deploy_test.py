@@ -132,7 +132,8 @@ class Budget(unittest.TestCase):
                 self.assertEqual(self.run_script(*options, build_budget=budget, ctest="exit 8").returncode, 8)
 
     def test_leaves_other_options_to_ctest(self):
-        self.assertRegex(self.run_script("--budget", "-R", "unit", ctest='echo "given: $*"').stdout, "given: .* -R unit\n")
+        told = self.run_script("--budget", "-R", "unit", ctest='echo "given: $*"')
+        self.assertRegex(told.stdout, "given: .* -R unit\n")
 
 
 class Secrets(unittest.TestCase):
