@@ -15,7 +15,7 @@ using osteon::test::Crossed;
 using osteon::test::OverseenHand;
 using osteon::test::OverseenRun;
 
-constexpr double kBudget_mj = 0.01;  // of one contact
+constexpr double kContactBudget_mj = 0.01;  // of one contact
 
 ZoneLimit ball(const Vec3& centre_mm, double radius_mm) {
   return {quantise({centre_mm, Eigen::Quaterniond::Identity()}).position,
@@ -154,7 +154,7 @@ class Overseen : public ::testing::TestWithParam<std::tuple<const char*, int, bo
         run_.tool, run_.delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.fall_n,
         static_cast<long long>(crossed.cutting), static_cast<long long>(crossed.touching));
     EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
-    EXPECT_LE(crossed.worst_mj, kBudget_mj);
+    EXPECT_LE(crossed.worst_mj, kContactBudget_mj);
     EXPECT_EQ(crossed.allocations, 0);
     EXPECT_GT(crossed.touching, 500);
   }
@@ -296,8 +296,8 @@ TEST_P(OnAMount, IsOverruledAsGentlyAsOnBoneThatStands) {
       tool, delay_ms, crossed.step_over_slew, crossed.worst_mj, crossed.led_mj, crossed.made_mj, crossed.carried_mm,
       static_cast<long long>(crossed.cutting), held.stopped, held.taken, held.given_back, held.led, held.undone);
   EXPECT_LE(crossed.step_over_slew, 1.0 + 1e-6);
-  EXPECT_LE(crossed.worst_mj, kBudget_mj);
-  EXPECT_LE(crossed.led_mj, kBudget_mj);
+  EXPECT_LE(crossed.worst_mj, kContactBudget_mj);
+  EXPECT_LE(crossed.led_mj, kContactBudget_mj);
   EXPECT_LE(crossed.made_mj, 2.0 * MountFollowerParams{}.allowance_mj);
   EXPECT_GT(crossed.carried_mm, 5.0);
   EXPECT_GT(crossed.cutting, 1000);
@@ -357,7 +357,7 @@ TEST(Zone, NothingIsCutBeyondItsEdge) {
   EXPECT_GT(hand.replica().predicted().solid_mm({0, 0, 0.2}), 0.0);
   EXPECT_LT(hand.replica().predicted().solid_mm({7.5, 0, 0.2}), 0.0);  // a little more than a radius beyond
   EXPECT_LE(hand.crossed().step_over_slew, 1.0 + 1e-6);
-  EXPECT_LE(hand.crossed().worst_mj, kBudget_mj);
+  EXPECT_LE(hand.crossed().worst_mj, kContactBudget_mj);
 }
 
 TEST(Zone, AToolThatIsNotAllowedNeverTurns) {

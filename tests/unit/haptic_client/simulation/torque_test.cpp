@@ -92,7 +92,7 @@ const DeviceLimits kSixAxes{.peak_n = 12,
                             .continuous_nmm = 70};
 
 // A handle that the test moves.
-class Handle final : public HapticDevice {
+class TurnedHandle final : public HapticDevice {
  public:
   [[nodiscard]] std::string_view name() const override { return "handle"; }
   [[nodiscard]] DeviceLimits limits() const override { return limits_are; }
@@ -109,7 +109,7 @@ class Handle final : public HapticDevice {
 constexpr double kShown = 4.0 / 30.0 / 0.6;
 
 // Leans towards the wall in the air. Then presses on until its tip would be `beyond_mm` beyond where its end touches.
-void press(Before& wall, Handle& handle, double lean_rad, double beyond_mm) {
+void press(Before& wall, TurnedHandle& handle, double lean_rad, double beyond_mm) {
   handle.reading.pose_device_tool = {Vec3::Zero(), leaning(lean_rad)};
   wall.wait(400);  // by then all of the force is shown
   const double way_mm = (beyond_mm - wall.beyond_mm()) / wall.workspace_scale();
@@ -129,7 +129,7 @@ double push_n(const Before& wall) {
 
 TEST(TorqueOnTheHand, IsTheWallsPushTimesItsArm) {
   for (const double beyond_mm : {1.0, 3.0}) {
-    Handle handle;
+    TurnedHandle handle;
     Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
     press(side, handle, 0.06, beyond_mm);
     EXPECT_NEAR(side.beyond_mm(), beyond_mm, 1e-9);
@@ -161,7 +161,7 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
   const double to_mm = kBeyond_mm + kReach_mm * (std::sin(kTo_rad) - std::sin(kFrom_rad)) +
                        kRadius_mm * (std::cos(kTo_rad) - std::cos(kFrom_rad));
   for (const bool six_axes : {true, false}) {
-    Handle handle;
+    TurnedHandle handle;
     if (!six_axes) handle.limits_are.peak_nmm = handle.limits_are.continuous_nmm = 0.0;
     Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
     press(side, handle, kFrom_rad, kBeyond_mm);
@@ -193,7 +193,7 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
     EXPECT_NEAR((report.coupling.torque_nmm - side.arm_times_force()).norm(), 0.0, kRing_mm * force_n);
     EXPECT_GT(force_n, 5.0 * before_n);
 
-    Handle other;
+    TurnedHandle other;
     Before pressed(wall(), {0, 0, 0}, {-1, 0, 0}, other);
     press(pressed, other, kTo_rad, to_mm);
     EXPECT_NEAR(pressed.report().coupling.force_n.norm(), force_n, 0.02 * force_n);
@@ -206,7 +206,7 @@ TEST(TorqueOnTheHand, ATurnAgainstAWallIsFeltAsForceAndTorque) {
 }
 
 TEST(TorqueOnTheHand, IsWithinTheDevicesLimit) {
-  Handle handle;
+  TurnedHandle handle;
   Before side(wall(), {0, 0, 0}, {-1, 0, 0}, handle);
   press(side, handle, 0.1, 7.5);
   EXPECT_GT(kShown * side.report().coupling.torque_nmm.norm(), 220.0);
@@ -220,7 +220,7 @@ TEST(TorqueOnTheHand, IsWithinTheDevicesLimit) {
 
 // A device of three axes shows the same force and no torque.
 TEST(TorqueOnTheHand, IsNoForceWhereItCannotBeShown) {
-  Handle six, three;
+  TurnedHandle six, three;
   three.limits_are.peak_nmm = three.limits_are.continuous_nmm = 0.0;
   Before of_six(wall(), {0, 0, 0}, {-1, 0, 0}, six), of_three(wall(), {0, 0, 0}, {-1, 0, 0}, three);
   press(of_six, six, 0.06, 3.0);
@@ -241,7 +241,7 @@ TEST(TorqueOnTheHand, InAHoleIsThatOfTheTurn) {
         return std::max(-p.z(), -in_hole);
       },
       dense);
-  Handle handle;
+  TurnedHandle handle;
   handle.reading.pose_device_tool.rotation = pointing_away();
   Before hole(bone, {0, 0, kDeep_mm + 10.0}, {0, 0, 1}, handle);  // starts 10 mm over the bottom of the hole
   hole.wait(400);
