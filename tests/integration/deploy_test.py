@@ -1,6 +1,7 @@
 """The scripts under deploy/ where they were not made for: a moved checkout, another user's, two at a time."""
 import fcntl
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -221,6 +222,92 @@ class Packages(unittest.TestCase):
         known = {"libc6": "c", "libx2": "x"}
         about = {"Depends": "libx1 | libx2, libc6 (>= 2.36), other:any"}
         self.assertEqual(components.depends(about, known), ["c", "x"])
+
+
+class Nightly(unittest.TestCase):
+    """The step of the mutations, with a compiler that only copies. And what the other steps name."""
+
+    MUTATIONS = """from run import Mutation as M
+MUTATIONS = [M("twice.txt", "2 * x", "3 * x", "it is thrice", "unit", "*"),
+             M("twice.txt", "int", "long", "it is long", "unit", "*")]
+"""
+    PROGRAM = """case $1 in --gtest_list_tests) printf 'Twice.\\n  IsTwice\\n'; exit;; esac
+grep -q '%s' ../../twice.txt || { echo '[  FAILED  ] Twice.IsTwice'; exit 1; }
+"""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.parent = Path(folder.name).resolve()
+        self.checkout, self.tools = self.parent / "osteon", self.parent / "tools"
+        for name in ("deploy/nightly", "deploy/environment.sh", "tests/mutations/run.py", ".gitignore"):
+            (self.checkout / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, self.checkout / name)
+        (self.checkout / "tests/mutations/mutations.py").write_text(self.MUTATIONS, encoding="utf-8")
+        (self.checkout / "twice.txt").write_text("int twice(auto x) { return 2 * x; }\n",
+                                                 encoding="utf-8")
+        subprocess.run(["git", "init", "-q", self.checkout], check=True)
+        self.script("program", self.PROGRAM % "int.*2 [*] x")
+
+    def script(self, name, text):
+        self.tools.mkdir(exist_ok=True)
+        (self.tools / name).write_text("#!/bin/sh\n" + text, encoding="utf-8")
+        (self.tools / name).chmod(0o755)
+
+    def command(self, cmake):
+        self.script("cmake", cmake)
+        return {"args": [self.checkout / "deploy/nightly", "--only", "mutations"],
+                "env": {**os.environ, "PATH": f"{self.tools}:{os.environ['PATH']}"}}
+
+    def mutated(self):
+        command = self.command(f"mkdir -p build/dev/bin\ncp {self.tools}/program build/dev/bin/unit\n")
+        return ended(command["args"], env=command["env"])
+
+    def test_says_how_many_mutations_were_caught(self):
+        sound = self.mutated()
+        self.assertEqual(sound.returncode, 0, sound.stdout + sound.stderr)
+        self.assertRegex(sound.stdout, r"\Amutations +\d+ s  2 of 2 caught\n\Z")
+        self.assertEqual(list((self.checkout / "out/nightly/finds").iterdir()), [])
+
+    def test_a_mutation_that_survives_is_a_find(self):
+        self.script("program", self.PROGRAM % "2 [*] x")
+        found = self.mutated()
+        self.assertEqual(found.returncode, 1)
+        self.assertRegex(found.stdout, r"\Amutations +\d+ s  1 of 2 caught, FAILED\n\Z")
+        log = (self.checkout / "out/nightly/finds/mutations.log").read_text(encoding="utf-8")
+        self.assertIn("1 caught, 1 survived", log)
+
+    def test_a_signal_ends_the_build_of_a_mutation(self):
+        begun = self.parent / "begun"
+        command = self.command(f"echo $$ >{begun}\nexec sleep 600\n")
+        for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
+            begun.unlink(missing_ok=True)
+            running = subprocess.Popen(**command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                       preexec_fn=hear_interrupts)
+            self.addCleanup(running.kill)
+            while not (begun.exists() and begun.read_text(encoding="utf-8").strip()):
+                self.assertIsNone(running.poll(), "it ended before it built")
+                time.sleep(0.02)
+            running.send_signal(number)
+            self.assertEqual(running.wait(60), code)
+            self.assertFalse(is_running(int(begun.read_text(encoding="utf-8"))))
+
+    def test_names_programs_and_libraries_that_there_are(self):
+        script = (ROOT / "deploy/nightly").read_text(encoding="utf-8")
+        named = {name: set(re.search(rf"^{name}=\(([^)]*)\)", script, re.MULTILINE)[1].split())
+                 for name in ("asan_tests", "tsan_tests", "lint_targets")}
+        listed = [path for folder in ("common", "server", "haptic_client", "viewer_client", "audio_client", "tests")
+                  for path in (ROOT / folder).rglob("CMakeLists.txt")]
+        texts = {path.relative_to(ROOT): path.read_text(encoding="utf-8") for path in listed}
+        tests = {name for text in texts.values() for name in re.findall(r"^osteon_test\(([\w.]+)", text, re.MULTILINE)}
+        self.assertLessEqual(named["asan_tests"] | named["tsan_tests"], tests)
+        libraries = {path: {f"osteon_{name}" for name in re.findall(r"^osteon_library\((\w+)", text, re.MULTILINE)}
+                     for path, text in texts.items() if path.parts[0] != "tests"}
+        self.assertLessEqual(named["lint_targets"], set().union(*libraries.values()))
+        clients = [found for path, found in libraries.items()
+                   if path.parts[0].endswith("_client") or path.parent == Path("common/wire")]
+        self.assertGreater(len(clients), 10)
+        self.assertLessEqual(set().union(*clients), named["lint_targets"])
 
 
 class TwoDemos(unittest.TestCase):

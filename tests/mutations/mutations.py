@@ -148,7 +148,7 @@ MUTATIONS = [
       "a pushed handle leaves its reach", "unit.usb_devices", "*"),
     M("viewer_client/scene/stroke.cpp", "std::clamp((point - from).dot(way) / square, 0.0, 1.0)",
       "(point - from).dot(way) / square",
-      "a stroke is simplified by its line, not by its part", "unit.viewer_client", "Stroke.*"),
+      "a stroke is simplified by its line, not by its part", "unit.viewer_scene", "Stroke.*"),
     M("audio_client/synth/limiter.cpp", "peak > kCeiling ? kCeiling / peak : 1.0F", "1.0F",
       "loud sound is not limited", "unit.audio_client", "*"),
 ]

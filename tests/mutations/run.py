@@ -5,7 +5,7 @@
   python3 -B tests/mutations/run.py --list       prints them
   python3 -B tests/mutations/run.py --check      whether each can still be made; builds nothing
 
-Exit code: 0 if every mutation is caught, 1 if one is not, 2 for a wrong call, 130 after Ctrl-C.
+Exit code: 0 if every mutation is caught, 1 if one is not, 2 for a wrong call, 130 after Ctrl-C or SIGTERM.
 """
 import argparse
 import os
@@ -75,6 +75,22 @@ class Mutated:
         self.path.write_text(self.before, encoding="utf-8")
 
 
+def end(process):
+    """Ends the process and its group. Ninja's compilers have groups of their own: ninja itself must end them."""
+    os.killpg(process.pid, signal.SIGTERM)
+    try:
+        process.wait(10)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+
+
+def stop_on_sigterm():
+    """SIGTERM does what Ctrl-C does. A process that a shell started in the background ignores SIGINT."""
+    def stop(_number, _frame):
+        raise KeyboardInterrupt
+    signal.signal(signal.SIGTERM, stop)
+
+
 class Copy:
     """A copy of the sources with a build of its own. Files that did not change keep their times, so little is built."""
 
@@ -108,7 +124,7 @@ class Copy:
                 return None
             finally:
                 if process.poll() is None:
-                    os.killpg(process.pid, signal.SIGKILL)
+                    end(process)
 
     def build(self, target):
         build = self.tree / "build/dev"
@@ -217,4 +233,5 @@ def main(mutations, given=None, root=ROOT, make_copy=Copy):
 
 if __name__ == "__main__":
     from mutations import MUTATIONS
+    stop_on_sigterm()
     sys.exit(main(MUTATIONS))

@@ -1,8 +1,11 @@
 """Tests the runner of the mutations with a small tree and a build that only reads it."""
 import contextlib
 import io
+import signal
+import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -137,6 +140,22 @@ class Copies(unittest.TestCase):
             copy = run.Copy(Path(folder), Path(folder) / "tree", 1, 1.0)
             self.assertIsNone(copy.run(["sleep", "1000"], folder, 0.2))
             self.assertEqual(copy.run(["false"], folder, 60.0), 1)
+
+    def test_sigterm_ends_what_it_runs(self):
+        script = ("import run, sys; from pathlib import Path; run.stop_on_sigterm(); folder = Path(sys.argv[1]); "
+                  "copy = run.Copy(folder, folder / 'tree', 1, 1.0); "
+                  "copy.run(['sh', '-c', 'echo $$ >begun; exec sleep 600'], folder)")
+        with tempfile.TemporaryDirectory() as folder:
+            begun = Path(folder) / "begun"
+            running = subprocess.Popen([sys.executable, "-Bc", script, folder], cwd=Path(run.__file__).parent,
+                                       stderr=subprocess.DEVNULL)
+            self.addCleanup(running.kill)
+            while not (begun.exists() and begun.read_text().strip()):
+                self.assertIsNone(running.poll(), "it ended before the command began")
+                time.sleep(0.02)
+            running.send_signal(signal.SIGTERM)
+            running.wait(60)
+            self.assertFalse(Path("/proc", begun.read_text().strip()).exists())
 
     def test_names_the_test_that_fails_first(self):
         ended = {
