@@ -53,7 +53,9 @@ TEST(SecretFile, MayBeReadByTheGroupThroughWhichThisProcessReadsIt) {
   ASSERT_EQ(::seteuid(64123), 0);
   const auto of_all = who_else_reads(file);
   ASSERT_EQ(::seteuid(0), 0);
-  if (reached) EXPECT_NE(of_all.value_or("").find("chmod o= "), std::string::npos);
+  if (reached) {
+    EXPECT_NE(of_all.value_or("").find("chmod o= "), std::string::npos);
+  }
 }
 
 }  // namespace

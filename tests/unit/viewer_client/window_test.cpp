@@ -17,7 +17,7 @@ using test::kHeight;
 using test::kWidth;
 using test::sphere_mesh;
 
-constexpr RegionKey kHere{BodyId{0}, 0, {0, 0, 0}};
+constexpr RegionKey kRegion{BodyId{0}, 0, {0, 0, 0}};
 
 class Window : public test::Picture {};
 
@@ -31,7 +31,7 @@ TEST_F(Window, TheCameraIsWhereItWasPut) {
 }
 
 TEST_F(Window, IsSavedAsPng) {
-  window_->show_region(kHere, sphere_mesh(Vec3::Zero(), 15.0, 0));
+  window_->show_region(kRegion, sphere_mesh(Vec3::Zero(), 15.0, 0));
   const test::TempDir folder;
   const auto file = folder / "picture.png";
   ASSERT_TRUE(window_->save_png(file));
