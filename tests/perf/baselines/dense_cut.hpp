@@ -1,0 +1,33 @@
+// Baseline of a cut: one dense array of floats over the whole bone. Each row near the tool is one loop that the
+// compiler vectorises. It needs the memory of the whole box, cut or not.
+#pragma once
+#include <vector>
+
+#include "tests/perf/baselines/swept_shape.hpp"
+
+namespace osteon::baselines {
+
+class DenseCut {
+ public:
+  // Samples from `min` to `max`, both included, of the pitch; z fastest. All hold the band: nothing is cut.
+  DenseCut(std::array<int, 3> min, std::array<int, 3> max, float pitch_mm, float band_mm);
+
+  // Planes of x are spread over the threads that oneTBB allows, if there are several.
+  void apply(const SweptShape& shape, int threads = 1);
+  [[nodiscard]] float at(int x, int y, int z) const { return values_[index(x, y, z)]; }
+
+ private:
+  [[nodiscard]] std::size_t index(int x, int y, int z) const {
+    return (static_cast<std::size_t>(x - min_[0]) * static_cast<std::size_t>(dims_[1]) +
+            static_cast<std::size_t>(y - min_[1])) *
+               static_cast<std::size_t>(dims_[2]) +
+           static_cast<std::size_t>(z - min_[2]);
+  }
+  void lower_plane(const SweptShape& shape, int x, int first_y, int last_y);
+
+  std::array<int, 3> min_, max_, dims_;
+  float pitch_mm_;
+  std::vector<float> values_;
+};
+
+}  // namespace osteon::baselines
