@@ -5,28 +5,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/check.hpp"
 #include "tests/perf/baselines/lowering.hpp"
 
 namespace osteon::baselines {
 
 DenseCut::DenseCut(std::array<int, 3> min, std::array<int, 3> max, float pitch_mm, float band_mm)
-    : min_(min),
-      max_(max),
-      dims_{max[0] - min[0] + 1, max[1] - min[1] + 1, max[2] - min[2] + 1},
-      pitch_mm_(pitch_mm),
-      values_(index(max[0], max[1], max[2]) + 1, band_mm) {}
-
-void DenseCut::lower_plane(const SweptShape& shape, int x, int first_y, int last_y) {
-  const float x_mm = static_cast<float>(x) * pitch_mm_;
-  for (int y = first_y; y <= last_y; ++y) {
-    const float y_mm = static_cast<float>(y) * pitch_mm_;
-    const RowSpan span = row_span(shape, x_mm, y_mm);
-    const int first = std::max(min_[2], static_cast<int>(std::ceil(span.from_mm / pitch_mm_)));
-    const int last = std::min(max_[2], static_cast<int>(std::floor(span.to_mm / pitch_mm_)));
-    if (first <= last)
-      lower_row(shape, x_mm, y_mm, static_cast<float>(first) * pitch_mm_, last - first + 1,
-                &values_[index(x, y, first)]);
-  }
+    : min_(min), max_(max), row_(((max[2] - min[2]) / kRowStep + 1) * kRowStep), pitch_mm_(pitch_mm) {
+  const std::size_t samples = index(max[0], max[1], min[2]) + static_cast<std::size_t>(row_);
+  values_.reset(static_cast<float*>(std::aligned_alloc(kRowStep * sizeof(float), samples * sizeof(float))));
+  OSTEON_CHECK(values_);
+  std::fill_n(values_.get(), samples, band_mm);
 }
 
 void DenseCut::apply(const SweptShape& shape, int threads) {
@@ -35,11 +24,13 @@ void DenseCut::apply(const SweptShape& shape, int threads) {
     first[k] = std::max(min_[k], static_cast<int>(std::ceil(shape.low[k] / pitch_mm_)));
     last[k] = std::min(max_[k], static_cast<int>(std::floor(shape.high[k] / pitch_mm_)));
   }
+  const DenseSamples samples{min_, max_, row_, values_.get()};
+  const auto plane = [&](int x) { lower_plane(shape, samples, x, first[1], last[1]); };
   if (threads > 1) {
-    tbb::parallel_for(first[0], last[0] + 1, [&](int x) { lower_plane(shape, x, first[1], last[1]); });
+    tbb::parallel_for(first[0], last[0] + 1, plane);
     return;
   }
-  for (int x = first[0]; x <= last[0]; ++x) lower_plane(shape, x, first[1], last[1]);
+  for (int x = first[0]; x <= last[0]; ++x) plane(x);
 }
 
 }  // namespace osteon::baselines

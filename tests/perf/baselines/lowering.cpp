@@ -27,9 +27,12 @@ struct LeafPlane {
   [[nodiscard]] float z(int i) const { return static_cast<float>(i & 7) * pitch; }
 };
 
-// `x`, `y`, `z`: the first sample relative to the shape's start.
+// `x`, `y`, `z`: the first sample relative to the shape's start. n is a multiple of kRowStep, and the mask tells the
+// compiler so: no loop has a remainder.
 template <class Offsets>
-void lower_ball(const SweptShape& shape, const Offsets& at, float x, float y, float z, int n, float* values) {
+void lower_ball(const SweptShape& shape, const Offsets& at, float x, float y, float z, int n,
+                float* __restrict values) {
+  n &= -kRowStep;
   const auto [mx, my, mz] = shape.motion;
   const float inverse = shape.inverse_square, radius = shape.radius, band = shape.band_mm;
   for (int i = 0; i < n; ++i) {
@@ -42,7 +45,9 @@ void lower_ball(const SweptShape& shape, const Offsets& at, float x, float y, fl
 
 // The distance to the convex outline: beyond it to the nearest of its edges, within it to the nearest of their lines.
 template <class Offsets>
-void lower_turned(const SweptShape& shape, const Offsets& at, float x, float y, float z, int n, float* values) {
+void lower_turned(const SweptShape& shape, const Offsets& at, float x, float y, float z, int n,
+                  float* __restrict values) {
+  n &= -kRowStep;
   float r[kChunk], s[kChunk], inside[kChunk], outside[kChunk];
   const float u0 = dot(shape.u, x, y, z), v0 = dot(shape.v, x, y, z), s0 = dot(shape.axis, x, y, z);
   const float uy = shape.u[1], uz = shape.u[2], vy = shape.v[1], vz = shape.v[2], sy = shape.axis[1],
@@ -82,41 +87,72 @@ void lower(const SweptShape& shape, const Offsets& at, float x, float y, float z
     lower_turned(shape, at, x, y, z, n, values);
 }
 
+// The samples of a row along z that the tool's band may reach: those in a ball round a capsule, or in a cylinder round
+// a turned body's axis, and in the tool's box. a z² + 2 b z + c ≤ 0 for z relative to the start.
+class NearTool {
+ public:
+  explicit NearTool(const SweptShape& shape) : shape_(shape), inverse_pitch_(1.0f / shape.pitch_mm) {
+    for (std::size_t k = 0; k < 3; ++k) middle_[k] = 0.5f * shape.motion[k];
+    const auto [mx, my, mz] = middle_;
+    reach_ = shape.radius + shape.band_mm + (shape.ball ? std::sqrt(mx * mx + my * my + mz * mz) : 0.0f);
+    const float a = shape.ball ? 1.0f : shape.u[2] * shape.u[2] + shape.v[2] * shape.v[2];
+    a_ = a < 1e-6f ? 0.0f : a;  // rows along the axis
+    inverse_a_ = a_ > 0.0f ? 1.0f / a_ : 0.0f;
+  }
+
+  // Narrows from and to, in samples. False if nothing is left.
+  bool clip(float x_mm, float y_mm, int& from, int& to) const {
+    const float x = x_mm - shape_.start[0], y = y_mm - shape_.start[1];
+    float b, c;
+    if (shape_.ball) {
+      const float dx = x - middle_[0], dy = y - middle_[1];
+      b = -middle_[2];
+      c = dx * dx + dy * dy + middle_[2] * middle_[2] - reach_ * reach_;
+    } else {
+      const float u = shape_.u[0] * x + shape_.u[1] * y, v = shape_.v[0] * x + shape_.v[1] * y;
+      b = u * shape_.u[2] + v * shape_.v[2];
+      c = u * u + v * v - reach_ * reach_;
+    }
+    const float root = b * b - a_ * c;
+    if (a_ > 0.0f ? root < 0.0f : c > 0.0f) return false;
+    float low = shape_.low[2], high = shape_.high[2];
+    if (a_ > 0.0f) {
+      const float half = std::sqrt(root);
+      low = most(low, shape_.start[2] + (-b - half) * inverse_a_);
+      high = least(high, shape_.start[2] + (-b + half) * inverse_a_);
+    }
+    const int first = static_cast<int>(std::ceil(low * inverse_pitch_)),
+              last = static_cast<int>(std::floor(high * inverse_pitch_));
+    from = from < first ? first : from;
+    to = last < to ? last : to;
+    return from <= to;
+  }
+
+ private:
+  const SweptShape& shape_;
+  std::array<float, 3> middle_{};
+  float inverse_pitch_, reach_, a_, inverse_a_;
+};
+
 }  // namespace
 
-RowSpan row_span(const SweptShape& shape, float x_mm, float y_mm) {
-  constexpr RowSpan kNone{1.0f, 0.0f};
-  const float x = x_mm - shape.start[0], y = y_mm - shape.start[1], z0 = shape.start[2];
-  float a, b, c;  // a z² + 2 b z + c ≤ 0 for z relative to the start
-  if (shape.ball) {
-    // The ball round the capsule's middle.
-    const float mx = 0.5f * shape.motion[0], my = 0.5f * shape.motion[1], mz = 0.5f * shape.motion[2];
-    const float reach = shape.radius + shape.band_mm + std::sqrt(mx * mx + my * my + mz * mz);
-    a = 1.0f;
-    b = -mz;
-    c = (x - mx) * (x - mx) + (y - my) * (y - my) + mz * mz - reach * reach;
-  } else {
-    // The cylinder round the axis.
-    const float reach = shape.radius + shape.band_mm;
-    const float u = shape.u[0] * x + shape.u[1] * y, v = shape.v[0] * x + shape.v[1] * y;
-    a = shape.u[2] * shape.u[2] + shape.v[2] * shape.v[2];
-    b = u * shape.u[2] + v * shape.v[2];
-    c = u * u + v * v - reach * reach;
+void lower_plane(const SweptShape& shape, const DenseSamples& samples, int x, int first_y, int last_y) {
+  const float pitch = shape.pitch_mm, x_mm = static_cast<float>(x) * pitch;
+  const NearTool near(shape);
+  const auto width = static_cast<std::size_t>(samples.max[1] - samples.min[1] + 1);
+  const int lowest = samples.min[2], highest = samples.max[2];
+  for (int y = first_y; y <= last_y; ++y) {
+    const float y_mm = static_cast<float>(y) * pitch;
+    int from = lowest, to = highest;
+    if (!near.clip(x_mm, y_mm, from, to)) continue;
+    float* row = samples.values +
+                 (static_cast<std::size_t>(x - samples.min[0]) * width + static_cast<std::size_t>(y - samples.min[1])) *
+                     static_cast<std::size_t>(samples.row);
+    const int first = (from - lowest) / kRowStep * kRowStep, last = (to - lowest) / kRowStep * kRowStep + kRowStep;
+    for (int at = first; at < last; at += kChunk)
+      lower(shape, AlongRow{pitch}, x_mm, y_mm, static_cast<float>(lowest + at) * pitch,
+            last - at < kChunk ? last - at : kChunk, row + at);
   }
-  RowSpan span{shape.low[2], shape.high[2]};
-  if (a < 1e-6f) return c > 0.0f ? kNone : span;
-  const float root = b * b - a * c;
-  if (root < 0.0f) return kNone;
-  const float half = std::sqrt(root);
-  span.from_mm = most(span.from_mm, z0 + (-b - half) / a);
-  span.to_mm = least(span.to_mm, z0 + (-b + half) / a);
-  return span;
-}
-
-void lower_row(const SweptShape& shape, float x_mm, float y_mm, float z_mm, int n, float* values) {
-  for (int i = 0; i < n; i += kChunk)
-    lower(shape, AlongRow{shape.pitch_mm}, x_mm, y_mm, z_mm + static_cast<float>(i) * shape.pitch_mm,
-          n - i < kChunk ? n - i : kChunk, values + i);
 }
 
 void lower_leaf(const SweptShape& shape, float x_mm, float y_mm, float z_mm, float* values) {

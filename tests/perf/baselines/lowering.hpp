@@ -6,14 +6,17 @@
 
 namespace osteon::baselines {
 
-// The samples of a row along z that the tool's band may reach, by a ball or a cylinder round the tool.
-struct RowSpan {
-  float from_mm, to_mm;  // empty if to < from
+// A dense array of samples from `min` to `max`, both included; z fastest. A row has `row` samples, a multiple of
+// kRowStep: it is filled up, so that no loop has a remainder.
+inline constexpr int kRowStep = 16;
+struct DenseSamples {
+  std::array<int, 3> min, max;
+  int row;
+  float* values;
 };
-[[nodiscard]] RowSpan row_span(const SweptShape& shape, float x_mm, float y_mm);
 
-// n samples along z, a pitch apart, from (x, y, z) on.
-void lower_row(const SweptShape& shape, float x_mm, float y_mm, float z_mm, int n, float* values);
+// The samples of the plane x, for y from first_y to last_y. Skips what is outside a ball or a cylinder round the tool.
+void lower_plane(const SweptShape& shape, const DenseSamples& samples, int x, int first_y, int last_y);
 
 // The 8³ samples of a leaf, z fastest, from (x, y, z) on.
 void lower_leaf(const SweptShape& shape, float x_mm, float y_mm, float z_mm, float* values);
