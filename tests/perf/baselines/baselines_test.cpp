@@ -189,7 +189,8 @@ TEST(FlyingEdgesBaseline, CropHoldsWhatAFrameChanged) {
   CutField field(plain_block(16, 8, kPitch_mm), BodyId{});
   SurfaceBlocks blocks{BodyId{}};
   std::vector<Coord> changed;
-  for (const Cut& cut : works()[1].cuts) {
+  const Work work = works()[1];
+  for (const Cut& cut : work.cuts) {
     const CutReport report = field.apply(cut);
     (void)blocks.touch(report.level, report.changed_leaves);
     changed.insert(changed.end(), report.changed_leaves.begin(), report.changed_leaves.end());
