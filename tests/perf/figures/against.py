@@ -90,8 +90,8 @@ class Runner:
             raise
         if program.returncode not in (0, 1) or not out.strip():  # 1: a figure is short
             last = (errors.strip().splitlines() or ["it says nothing"])[-1]
-            where = "this checkout" if tree == ROOT else tree.relative_to(ROOT)
-            raise Trouble(f"deploy/figures in {where} ended with {program.returncode}: {last}")
+            where = "this checkout" if tree == ROOT else "the other commit"
+            raise Trouble(f"deploy/figures of {where} ended with {program.returncode}: {last}")
         return out
 
 

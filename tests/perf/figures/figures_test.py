@@ -115,6 +115,23 @@ class Against(unittest.TestCase):
                 against.resolve("none-such", root)
 
 
+    def test_a_short_figure_counts_and_a_failure_is_one_sentence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = Path(folder) / "deploy/figures"
+            program.parent.mkdir()
+            runner = against.Runner(soak=False, say=print)
+
+            def write(text):
+                program.write_text("#!/bin/sh\n" + text, encoding="utf-8")
+                program.chmod(0o755)
+            write("""echo '{"figures": {"fast": {"value": 2.5, "unit": "us"}}}'; exit 1""")
+            self.assertEqual(runner.measure(Path(folder), ["fast"]), {"fast": (2.5, "us")})
+            write("echo one >&2; echo 'no compiler' >&2; exit 2")
+            with self.assertRaisesRegex(against.Trouble,
+                                        "^deploy/figures of the other commit ended with 2: no compiler$"):
+                runner.measure(Path(folder), ["fast"])
+
+
 class Results(unittest.TestCase):
     MACHINE = {"processor": "AMD EPYC", "cores": 2, "kernel": "6.1"}
     GROUPS = {"a": "cutting", "b": "cutting", "c": "rooms_per_core"}
