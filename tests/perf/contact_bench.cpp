@@ -1,6 +1,7 @@
-// One collision and force evaluation of a tool of 4096 points with density, compared with OpenVDB's sampler and central
-// differences. A bur is half immersed in bone that it has cut. Points, poses and sums are the same, and the two take
-// turns. Prints JSON.
+// One collision and force evaluation of a tool of 4096 points with density, compared with the dense baseline
+// (tests/perf/baselines) and with OpenVDB's sampler and central differences. A bur is half immersed in bone that it has
+// cut. Points, poses and sums are the same, and all take turns, with warm and with cold caches. The ratio is that of
+// the fastest of the others over ours. Prints JSON.
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
@@ -13,6 +14,8 @@
 #include "common/field/kernel.hpp"
 #include "haptic_client/contact/contact.hpp"
 #include "haptic_client/contact/patch_builder.hpp"
+#include "tests/perf/baselines/contact_input.hpp"
+#include "tests/perf/cold_caches.hpp"
 #include "tests/support/scenes/bones.hpp"
 
 namespace osteon::haptic::test {
@@ -70,7 +73,22 @@ Sums by_samplers(const std::vector<ContactPoint>& points, const ContactQuery& qu
   return sums;
 }
 
-double us(Clock::time_point from) { return 1e6 * std::chrono::duration<double>(Clock::now() - from).count(); }
+template <class Call>
+double us_of(Call call) {
+  const auto began = Clock::now();
+  call();
+  return 1e6 * std::chrono::duration<double>(Clock::now() - began).count();
+}
+
+// Calls once to warm the caches, then five times. Returns the third time.
+template <class Call>
+double hot(std::vector<double>& times, Call call) {
+  call();
+  for (int i = 0; i < 5; ++i) times.push_back(us_of(call));
+  return times[times.size() - 3];
+}
+
+double apart(const Vec3& theirs, const Vec3& ours) { return (theirs - ours).norm() / theirs.norm(); }
 
 void print(const char* name, std::vector<double> values) {
   std::ranges::sort(values);
@@ -148,45 +166,68 @@ int run() {
   const openvdb::tools::GridSampler<openvdb::FloatGrid, openvdb::tools::BoxSampler> plain(*solid),
       plain_density(*density);
 
-  std::vector<double> ours, accessor, tree, ratios, distances(kPoints);
-  double worst_mm = 0.0, worst_sum = 0.0, engaged = 0.0;
+  const baselines::PointArrays arrays = baselines::point_arrays(set);
+  const baselines::DenseGrid dense_solid = baselines::dense_solid(field, model.cut_level, fine),
+                             dense_density = baselines::dense_density(field.bone(), coarse);
+  baselines::PointValues dense_values = baselines::room_for(arrays);
+
+  std::vector<double> ours, dense, accessor, tree, cold_ours, cold_dense, cold_accessor, ratios, cold_ratios,
+      distances(kPoints);
+  double worst_mm = 0.0, worst_sum = 0.0;
   int touching = 0, compared = 0;
   for (int round = 0; round < kRounds; ++round) {
     const ContactQuery& query = queries[static_cast<std::size_t>(round % kPoses)];
-    // Hot: the caches hold the patch, as in a loop that does almost nothing else every millisecond.
-    double mine = 1e9;
     ContactSums sums;
-    for (int i = 0; i < 5; ++i) {
-      const auto began = Clock::now();
-      sums = evaluate_contact(patch, set, query, values);
-      ours.push_back(us(began));
-      mine = std::min(mine, ours.back());
-    }
-    auto began = Clock::now();
-    const Sums theirs =
-        by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, fast, fast_density, distances);
-    accessor.push_back(us(began));
-    ratios.push_back(accessor.back() / ours[ours.size() - 3]);
+    Sums theirs;
+    baselines::ContactTotals totals;
+    const auto by_ours = [&] { sums = evaluate_contact(patch, set, query, values); };
+    const auto by_dense = [&] {
+      totals =
+          baselines::dense_contact(dense_solid, dense_density, arrays, baselines::contact_task(query), dense_values);
+    };
+    const auto by_accessor = [&] {
+      theirs =
+          by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, fast, fast_density, distances);
+    };
+    const auto cold = [](std::vector<double>& times, auto call) {
+      osteon::test::flush_caches();
+      times.push_back(us_of(call));
+    };
+    // Hot: the caches hold the bone, as in a loop that does almost nothing else every millisecond.
+    const double mine = hot(ours, by_ours), by_array = hot(dense, by_dense);
+    accessor.push_back(us_of(by_accessor));
+    ratios.push_back(std::min(by_array, accessor.back()) / mine);
+    cold(cold_ours, by_ours);
+    cold(cold_dense, by_dense);
+    cold(cold_accessor, by_accessor);
+    cold_ratios.push_back(std::min(cold_dense.back(), cold_accessor.back()) / cold_ours.back());
     for (std::size_t i = 0; i < points.size(); ++i) {
       if (std::abs(distances[i]) > 0.4) continue;  // beyond this, samples are clipped differently
-      worst_mm = std::max(worst_mm, std::abs(distances[i] - static_cast<double>(values.distance_mm[i])));
+      const auto value = static_cast<double>(values.distance_mm[i]);
+      worst_mm = std::max({worst_mm, std::abs(distances[i] - value),
+                           std::abs(static_cast<double>(dense_values.distance_mm[i]) - value)});
       ++compared;
     }
     touching += static_cast<int>(std::ranges::count_if(distances, [](double d) { return d < 0.0; }));
-    engaged += theirs.engaged;
-    worst_sum = std::max({worst_sum, (theirs.force - sums.force).norm() / theirs.force.norm(),
-                          (theirs.torque - sums.torque).norm() / theirs.torque.norm()});
-    began = Clock::now();
-    by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, plain, plain_density, distances);
-    tree.push_back(us(began));
+    const auto vector = [](const std::array<float, 3>& v) { return Vec3(v[0], v[1], v[2]); };
+    worst_sum = std::max({worst_sum, apart(theirs.force, sums.force), apart(theirs.torque, sums.torque),
+                          apart(vector(totals.force), sums.force), apart(vector(totals.torque), sums.torque)});
+    tree.push_back(us_of([&] {
+      by_samplers(points, query, model.fine_pitch_mm, model.strength, least_arm_mm, plain, plain_density, distances);
+    }));
   }
   const int lanes = limit_contact_lanes(16);
   std::printf("{\"points\": %d, \"lanes\": %d, \"in_bone\": %.4f, ", kPoints, lanes,
               static_cast<double>(touching) / (kRounds * kPoints));
   print("contact_us", ours);
+  print("dense_us", dense);
   print("accessor_us", accessor);
   print("tree_us", tree);
   print("speedup", ratios);
+  print("cold_contact_us", cold_ours);
+  print("cold_dense_us", cold_dense);
+  print("cold_accessor_us", cold_accessor);
+  print("cold_speedup", cold_ratios);
   std::printf("\"compared\": %d, \"largest_difference_mm\": %.3g, \"largest_force_difference\": %.3g}\n", compared,
               worst_mm, worst_sum);
   return 0;

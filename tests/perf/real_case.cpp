@@ -1,5 +1,6 @@
 // A room with a real bone, burred for some seconds of frames of 33 cuts each. Measures the time of the cuts and of the
-// blocks that they made stale, and the memory.
+// blocks that they made stale, and the memory. Counts the triangles of the whole bone, uncut, that VTK's flying edges
+// has more or fewer.
 // Takes the case's folder, the number of frames, and a file for the final vertices, from which a picture can be made:
 // x, y, z, the normal, and 1 on cuts, as floats. Prints JSON.
 #include <malloc.h>
@@ -14,6 +15,7 @@
 
 #include "common/core/check.hpp"
 #include "server/room/room.hpp"
+#include "tests/perf/baselines/flying_edges.hpp"
 #include "tests/support/scenes/known_cuts.hpp"
 
 namespace osteon::test {
@@ -57,6 +59,22 @@ SurfacePoint point_on(const Room& room, const std::vector<BlockKey>& blocks, Ran
   }
 }
 
+// Triangles of the whole bone by flying edges, in slabs of a few planes, because a dense image of all may not fit.
+std::int64_t flying_edges_triangles(const Room& room, baselines::Inside inside) {
+  constexpr std::int32_t kCells = 32;
+  const CoordBox all = room.bone().bounds_samples().grown(1);
+  std::int64_t triangles = 0;
+  for (std::int32_t x = all.min.x; x < all.max.x; x += kCells) {
+    vtkNew<vtkImageData> image;
+    const std::int32_t last = std::min(x + kCells, all.max.x);
+    baselines::fill_image(*image, room.field(), 0, {{x, all.min.y, all.min.z}, {last, all.max.y, all.max.z}}, inside);
+    baselines::FlyingEdges flying_edges(image, inside);
+    flying_edges.run();
+    triangles += flying_edges.triangles();
+  }
+  return triangles;
+}
+
 bool write_vertices(const Room& room, const std::set<BlockKey>& blocks, const char* file) {
   std::FILE* out = std::fopen(file, "wb");
   if (!out) return false;
@@ -93,6 +111,11 @@ int run(const char* folder, int frames, const char* vertices) {
   std::size_t triangles = 0;
   for (const BlockKey& key : blocks) triangles += mesh_of(room, key).triangles.size();
   const double whole_ms = ms_since(start);
+  const auto difference = [&](baselines::Inside inside) {
+    return std::abs(static_cast<std::int64_t>(triangles) - flying_edges_triangles(room, inside));
+  };
+  const std::int64_t bone_apart = difference(baselines::Inside::above),
+                     air_apart = difference(baselines::Inside::below);
 
   Random random(2);
   const double uncut = heap_bytes();
@@ -124,13 +147,14 @@ int run(const char* folder, int frames, const char* vertices) {
   const Coord samples = room.bone().bounds_samples().dims();
   std::printf(
       "{\"pitch_mm\": %.5f, \"cut_pitch_mm\": %.5f, \"samples\": [%d, %d, %d], \"bone_cm3\": %.2f, \"case_mb\": %.1f, "
-      "\"whole_ms\": %.1f, \"triangles\": %zu, \"frames\": %d, \"cut_us_p50\": %.1f, \"cut_us_p99\": %.1f, "
+      "\"whole_ms\": %.1f, \"triangles\": %zu, \"triangle_difference\": %lld, \"triangle_difference_air_apart\": %lld, "
+      "\"frames\": %d, \"cut_us_p50\": %.1f, \"cut_us_p99\": %.1f, "
       "\"frame_ms_p50\": %.3f, \"frame_ms_min\": %.3f, \"frame_ms_max\": %.3f, \"stale_p50\": %.0f, "
       "\"removed_mm3\": %.2f, \"cut_mb\": %.2f}\n",
       h, level_pitch_mm(h, level), samples.x, samples.y, samples.z, room.bone().volume_mm3() / 1000.0, case_bytes / 1e6,
-      whole_ms, triangles, frames, quantile(cut_us, 0.5), quantile(cut_us, 0.99), quantile(frame_ms, 0.5),
-      quantile(frame_ms, 0), quantile(frame_ms, 1), quantile(stale, 0.5), room.field().removed_mm3(),
-      (heap_bytes() - uncut) / 1e6);
+      whole_ms, triangles, static_cast<long long>(bone_apart), static_cast<long long>(air_apart), frames,
+      quantile(cut_us, 0.5), quantile(cut_us, 0.99), quantile(frame_ms, 0.5), quantile(frame_ms, 0),
+      quantile(frame_ms, 1), quantile(stale, 0.5), room.field().removed_mm3(), (heap_bytes() - uncut) / 1e6);
   if (vertices && !write_vertices(room, drawn, vertices)) {
     std::fprintf(stderr, "osteon-real-case: cannot write %s\n", vertices);
     return 1;

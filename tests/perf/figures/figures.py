@@ -3,7 +3,6 @@ import argparse
 import json
 import math
 import os
-import re
 import shutil
 import signal
 import subprocess
@@ -11,7 +10,9 @@ import sys
 from datetime import datetime, timezone
 from pathlib import Path
 
+import against
 import registry
+import results as tables_of_results
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -50,7 +51,9 @@ def commit():
     def git(*arguments):
         return subprocess.run(["git", "-C", str(ROOT), *arguments], capture_output=True, text=True,
                               check=False).stdout.strip()
-    changed = " with uncommitted changes" if git("status", "--porcelain", "--untracked-files=no") else ""
+    # Results that were just saved are no change of the program.
+    changed = git("status", "--porcelain", "--untracked-files=no", "--", ".", ":!tests/perf/results")
+    changed = " with uncommitted changes" if changed else ""
     return (git("rev-parse", "--short=12", "HEAD") or "unknown") + changed
 
 
@@ -74,20 +77,18 @@ def print_tables(tables):
             print("#   " + "  ".join(f"{cell!s:{width}}" for cell, width in zip(row, widths)).rstrip())
 
 
-def results(figures, values, soak, machine, load):
-    """Contents of tests/perf/results: numbers with the commit and the conditions."""
+def results(figures, values, soak, conditions):
+    """Numbers with the commit and the conditions. `conditions`: machine, compiler, simd_bits, load_before."""
     return {
-        "commit": commit(), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"), "machine": machine,
-        "size": "soak" if soak else "quick", "build": "perf",
-        "load_before": round(load, 2),  # processes that waited for a processor in the minute before
+        "commit": commit(), "date": datetime.now(timezone.utc).strftime("%Y-%m-%d"),
+        "size": "soak" if soak else "quick", "build": "perf", **conditions,
         "figures": {f.name: saved(f, values[f.name]) for f in figures},
     }
 
 
-def results_file(machine):
-    """One file for each kind of machine, named by processor and cores, without host names."""
-    words = re.sub(r"[^a-z0-9]+", "-", f"{machine['processor']} {machine['cores']} cores".lower()).strip("-")
-    return ROOT / "tests" / "perf" / "results" / f"{words}.json"
+def simd_bits(run):
+    """Width of the registers that the cut kernel uses on this machine."""
+    return 32 * json.loads(run.output("osteon-set-property", 1, 1, 1, 0, 16))["lanes"]
 
 
 def rounded(value):
@@ -115,8 +116,13 @@ def stop(*_):
     raise KeyboardInterrupt
 
 
+def say(text):
+    print(f"# {text}", file=sys.stderr, flush=True)
+
+
 def main():
-    parser = argparse.ArgumentParser(prog="deploy/figures", description="Measures the numbers that Osteon promises.")
+    parser = argparse.ArgumentParser(prog="deploy/figures", allow_abbrev=False,
+                                     description="Measures the numbers that Osteon promises.")
     parser.add_argument("names", nargs="*", metavar="NAME", help="figures to run; all without any")
     parser.add_argument("--list", action="store_true", help="show the figures and what they measure; run nothing")
     parser.add_argument("--json", action="store_true", help="print JSON instead of lines")
@@ -124,15 +130,20 @@ def main():
     parser.add_argument("--full", action="store_true",
                         help="also the figures that take minutes; each also runs when it is named")
     parser.add_argument("--save", action="store_true",
-                        help="also write all results with commit and conditions into tests/perf/results")
+                        help="also write the results with commit and conditions into tests/perf/results; without "
+                             "names, of all figures (--full)")
+    parser.add_argument("--against", metavar="COMMIT",
+                        help="measure this checkout and COMMIT in alternation; print both medians and their ratio")
     parser.add_argument("--build", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    if options.save and options.names:
-        print("deploy/figures: --save is for all figures at once; leave out the names", file=sys.stderr)
+    if options.save and options.against:
+        print("deploy/figures: --save and --against do not go together", file=sys.stderr)
         return 2
     try:
-        figures = registry.by_name(options.names, options.full or options.list)
-    except ValueError as error:
+        figures = registry.by_name(options.names, options.full or options.list or options.save)
+        if options.against:
+            against.resolve(options.against)
+    except (ValueError, against.Trouble) as error:
         print(f"deploy/figures: {error}", file=sys.stderr)
         return 2
     if options.list:
@@ -141,16 +152,25 @@ def main():
     if options.build is None:
         return 0  # the caller only asked if the arguments are valid
 
-    import groups  # needs numpy, but --list does not
     signal.signal(signal.SIGTERM, stop)
+    if options.against:
+        try:
+            return against.run(options.against, figures, options.soak, say)
+        except against.Trouble as trouble:
+            print(f"deploy/figures: {trouble}", file=sys.stderr)
+            return 2
+        except KeyboardInterrupt:
+            print("deploy/figures: stopped", file=sys.stderr)
+            return 130
+
+    import groups  # needs numpy, but --list does not
     if options.save and commit().endswith("changes"):
         print("deploy/figures: --save needs all changes committed, so that its numbers can be traced", file=sys.stderr)
         return 2
     folder = options.build / "figures"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    run = groups.Run(options.build / "bin", folder, options.soak,
-                     lambda text: print(f"# {text}", file=sys.stderr, flush=True))
+    run = groups.Run(options.build / "bin", folder, options.soak, say)
     load = os.getloadavg()[0]
     try:
         values = measure(figures, run, groups.GROUPS)
@@ -161,9 +181,11 @@ def main():
         print("deploy/figures: stopped; every program has been ended", file=sys.stderr)
         return 130
     decided = [f for f in figures if not skip_reason(f, run.skipped)]
-    outcome = results(decided, values, options.soak, groups.record.machine(), load)
+    outcome = results(decided, values, options.soak,
+                      {"machine": groups.record.machine(), "compiler": tables_of_results.compiler(options.build),
+                       "simd_bits": simd_bits(run), "load_before": round(load, 2)})
     if options.save:
-        results_file(outcome["machine"]).write_text(json.dumps(outcome, indent=2) + "\n", encoding="utf-8")
+        say(f"wrote {tables_of_results.save(outcome, registry.FIGURES).relative_to(ROOT)}")
     if options.json:
         print(json.dumps(outcome, indent=2))
     else:

@@ -1,14 +1,18 @@
 """Tests the rules of the figures: the printed form, the verdicts, and that the registry is complete."""
 import re
+import subprocess
 import sys
+import tempfile
 import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
+import against  # noqa: E402
 import figures  # noqa: E402
 import groups  # noqa: E402
 import registry  # noqa: E402
+import results  # noqa: E402
 from registry import Figure  # noqa: E402
 
 FORM = re.compile(r"^\S+ \S+ \S+ \(baseline \S+, ratio \S+(, min \S+, max \S+)?(, threads \d+)?\) "
@@ -55,6 +59,106 @@ class Lines(unittest.TestCase):
         self.assertEqual(Figure("f", "count", "x", "bench", ("==", 0)).verdict(1), "short")
         self.assertEqual(Figure("f", "us", "x", "bench").verdict(1e9), "info")
         self.assertEqual(Figure("f", "count", "x", "bench", ("==", 0)).verdict(None), "short")
+
+
+class FakeRunner:
+    """Gives values that were written down, and notes the order in which the sides were measured."""
+
+    def __init__(self, values, known=("fast", "slow")):
+        self.values, self.known, self.order = {side: iter(rounds) for side, rounds in values.items()}, known, []
+
+    def say(self, _text):
+        pass
+
+    def names(self, _tree):
+        return self.known
+
+    def measure(self, tree, names):
+        self.order.append(tree)
+        value = next(self.values[tree])
+        return {name: (value, "us") for name in names if name != "lost"}
+
+
+class Against(unittest.TestCase):
+    def test_both_sides_take_turns_and_the_medians_count(self):
+        runner = FakeRunner({"here": [10.0, 30.0, 12.0], "there": [20.0, 20.0, 48.0]})
+        (found,), missing = against.compare(runner, ["fast"], "here", "there", 3)
+        self.assertEqual(runner.order, ["here", "there", "there", "here", "here", "there"])
+        self.assertEqual(missing, [])
+        self.assertEqual(found.line("0123abc"), "fast us: here 12 (min 10, max 30); 0123abc 20 (min 20, max 48); "
+                                                "ratio 0.5 (min 0.25, max 1.5)")
+
+    def test_a_figure_of_one_side_only_is_left_out_and_named(self):
+        runner = FakeRunner({"here": [1.0], "there": [2.0]}, known=("fast", "lost"))
+        found, missing = against.compare(runner, ["fast", "new", "lost"], "here", "there", 1)
+        self.assertEqual(([c.name for c in found], missing), (["fast"], ["new"]))
+        with self.assertRaises(against.Trouble):
+            against.compare(runner, ["new"], "here", "there", 1)
+
+    def test_the_other_commit_gets_a_worktree_that_is_used_again(self):
+        with tempfile.TemporaryDirectory() as folder:
+            root = Path(folder)
+            git = ("git", "-C", folder, "-c", "user.name=a", "-c", "user.email=a@b", "-c", "init.defaultBranch=main")
+            (root / "deploy").mkdir()
+            commits = []
+            subprocess.run([*git, "init", "-q"], check=True)
+            for text in ("one", "two"):
+                (root / "deploy/figures").write_text(text, encoding="utf-8")
+                subprocess.run([*git, "add", "-A"], check=True)
+                subprocess.run([*git, "commit", "-q", "-m", text], check=True)
+                commits.append(against.resolve("HEAD", root))
+            tree = root / "build" / "against"
+            for commit, text in zip(commits, ("one", "two")):
+                against.prepare(commit, root, tree)
+                self.assertEqual((tree / "deploy/figures").read_text(encoding="utf-8"), text)
+            with self.assertRaisesRegex(against.Trouble, "^there is no commit 'none-such' in this checkout$"):
+                against.resolve("none-such", root)
+
+
+    def test_a_short_figure_counts_and_a_failure_is_one_sentence(self):
+        with tempfile.TemporaryDirectory() as folder:
+            program = Path(folder) / "deploy/figures"
+            program.parent.mkdir()
+            runner = against.Runner(soak=False, say=print)
+
+            def write(text):
+                program.write_text("#!/bin/sh\n" + text, encoding="utf-8")
+                program.chmod(0o755)
+            write("""echo '{"figures": {"fast": {"value": 2.5, "unit": "us"}}}'; exit 1""")
+            self.assertEqual(runner.measure(Path(folder), ["fast"]), {"fast": (2.5, "us")})
+            write("echo one >&2; echo 'no compiler' >&2; exit 2")
+            with self.assertRaisesRegex(against.Trouble,
+                                        "^deploy/figures of the other commit ended with 2: no compiler$"):
+                runner.measure(Path(folder), ["fast"])
+
+
+class Results(unittest.TestCase):
+    MACHINE = {"processor": "AMD EPYC", "cores": 2, "kernel": "6.1"}
+    GROUPS = {"a": "cutting", "b": "cutting", "c": "rooms_per_core"}
+
+    def outcome(self, commit, values):
+        return {"commit": commit, "date": "2026-11-27", "size": "quick", "build": "perf", "machine": self.MACHINE,
+                "compiler": "g++ 12", "simd_bits": 512, "load_before": 1.5,
+                "figures": {name: figures.saved(Figure(name, "us", "x", "bench", ("<=", 2.0)), (value, None))
+                            for name, value in values.items()}}
+
+    def test_a_page_says_under_which_conditions(self):
+        text = results.write([results.section(self.outcome("abc", {"a": 1.5, "c": 3}))], self.MACHINE, self.GROUPS)
+        for part in ("AMD EPYC, 2 cores", "## abc, 2026-11-27", "g++ 12", "512 bits", "Load before: 1.5", "### cutting",
+                     "### rooms per core", "| a | 1.5 | us | - | - | - | - | <=2 | ok |", "| c | 3 | us |"):
+            self.assertIn(part, text)
+        self.assertLessEqual(max(len(line) for line in text.splitlines()), 120)
+
+    def test_what_is_measured_again_moves_and_the_rest_stays(self):
+        old = results.section(self.outcome("abc", {"a": 1.0, "b": 2.0, "gone": 4.0}))
+        text = results.write([old], self.MACHINE, {**self.GROUPS, "gone": "rig"})
+        again = results.merged(results.read(text), results.section(self.outcome("def", {"a": 9.0})), self.GROUPS)
+        self.assertEqual([(s.commit, list(s.rows)) for s in again], [("def", ["a"]), ("abc", ["b"])])
+        self.assertEqual(again[1].conditions, old.conditions)
+        self.assertIn("| 9 |", again[0].rows["a"])
+
+    def test_the_file_is_named_by_the_processor(self):
+        self.assertEqual(results.results_file(self.MACHINE).name, "amd-epyc-2-cores.md")
 
 
 class SeveralSessions(unittest.TestCase):

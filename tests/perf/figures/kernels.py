@@ -46,41 +46,54 @@ def over(values, baseline=None, threads=None):
     return Measured(float(np.median(values)), baseline, float(min(values)), float(max(values)), threads)
 
 
+# The baselines of a cut, as osteon-bench names and numbers them.
+CUTTERS = {"ours": "Osteon", "dense": "dense array", "leaves": "OpenVDB, culled leaves", "csg": "csgDifference"}
+NUMBERED = ("ours", "ours_2", "dense", "dense_2", "leaves", "leaves_2", "csg")
+
+
+def middle_pass(runs, name):
+    """Of several repetitions, the one with the median ratio. Empty if the benchmark is missing."""
+    passes = sorted(runs.get(name, [{}]), key=lambda b: b.get("ratio", 0.0))
+    return passes[len(passes) // 2]
+
+
+def cutters(tool, caches, w):
+    """Rows of everyone who made the cuts."""
+    rows = []
+    for who, name in CUTTERS.items():
+        for suffix, threads in (("", 1), ("_2", 2)):
+            if f"{who}{suffix}_median_us" in w:
+                rows.append((tool, caches, name, threads,
+                             *(f"{w[f'{who}{suffix}_{key}_us']:.1f}" for key in ("median", "min", "p99", "max"))))
+    return rows
+
+
 def cutting(run):
-    """The verdict is for working cuts: successive cuts through fresh bone. Two other values are for information: the
-    same cut again and again, and the plain way restricted to the leaves near the tool."""
+    """A burr and a drill at work: successive cuts through fresh bone, in turns with the baselines. The same with cold
+    caches, each cut at a place of its own. The fastest baseline counts."""
     run.say("cutting, a burr and a drill at work")
-    work = {tool: {} for tool in ("burr", "drill")}
-    for name, passes in repeated(run, "^cut_(burr|drill)/work", 3 if run.soak else 1).items():
-        work[name.split("/")[0].removeprefix("cut_")] = sorted(passes, key=lambda b: b["ratio"])[len(passes) // 2]
-    run.say("cutting the same again, and with cold caches")
-    runs = repeated(run, "^cut_(burr|drill)/(hot|world_box|near_leaves)", 7 if run.soak else 3)
-    runs |= repeated(run, "^cut_(burr|drill)/cold", 7 if run.soak else 3)
+    versus = repeated(run, "^cut_(burr|drill)/(work|versus_cold)", 3 if run.soak else 1)
+    run.say("cutting with cold caches")
+    runs = repeated(run, "^cut_(burr|drill)/cold", 7 if run.soak else 3)
     values = {}
-    rows = [("tool", "way", "us p50", "min", "p99", "max", "visited", "computed", "modified",
-             "samples a quantum apart")]
-    for tool, w in work.items():
+    rows = [("tool", "caches", "way", "threads", "us p50", "min", "p99", "max")]
+    for tool in ("burr", "drill"):
         def times(name, key="real_time", tool=tool):
             return np.array([b[key] for b in runs[f"cut_{tool}/{name}"]])
-        values[f"cut_{tool}"] = Measured(w["ours_median_us"], w["plain_median_us"], w["ours_min_us"], w["ours_max_us"],
-                                         1)
-        plain, near = times("world_box"), times("near_leaves")
+        warm, cold = middle_pass(versus, f"cut_{tool}/work"), middle_pass(versus, f"cut_{tool}/versus_cold")
+        fastest = NUMBERED[int(warm["fastest"])]
+        values[f"cut_{tool}"] = Measured(warm["ours_median_us"], warm[f"{fastest}_median_us"], warm["ours_min_us"],
+                                         warm["ours_max_us"], 1)
         for suffix, threads in (("", 1), ("_2", 2)):
-            values[f"cut_{tool}_speedup{suffix}"] = Measured(w[f"ratio{suffix}"], None, w[f"ratio{suffix}_min"],
-                                                             w[f"ratio{suffix}_max"], threads)
-            cold = times(f"cold/threads:{threads}", "p99_us")
-            values[f"cut_{tool}_cold_p99{suffix}"] = over(cold / CUT_BUDGET_US, None, threads)
+            values[f"cut_{tool}_speedup{suffix}"] = spread(warm, f"ratio{suffix}", threads)
+            values[f"cut_{tool}_speedup_cold{suffix}"] = spread(cold, f"ratio{suffix}", threads)
+            late = times(f"cold/threads:{threads}", "p99_us")
+            values[f"cut_{tool}_cold_p99{suffix}"] = over(late / CUT_BUDGET_US, None, threads)
             values[f"cut_{tool}_cold{suffix}"] = over(times(f"cold/threads:{threads}", "median_us"), None, threads)
             given = times(f"cold_given/threads:{threads}", "p99_us")
             values[f"cut_{tool}_cold_given_p99{suffix}"] = over(given / CUT_BUDGET_US, None, threads)
-        values[f"cut_{tool}_speedup_hot"] = over(plain / times("hot/threads:1"), None, 1)
-        values[f"cut_{tool}_speedup_near"] = over(near / times("hot/threads:1"), None, 1)
-        for way, prefix, counts in (("ours, 1 thread", "ours_", ""), ("ours, 2 threads", "ours_2_", ""),
-                                    ("accessor", "plain_", "plain_")):
-            rows.append((tool, way, *(f"{w[f'{prefix}{key}_us']:.1f}" for key in ("median", "min", "p99", "max")),
-                         *(f"{w[f'{counts}{key}']:.0f}" for key in ("visited", "computed", "modified")),
-                         f"{w['differing_share']:.2g}"))
-    run.tables.append(("cuts of 8 ms at work, in turns with the accessor's; equal bones in the end", rows))
+        rows += cutters(tool, "warm", warm) + cutters(tool, "cold", cold)
+    run.tables.append(("cuts of 8 ms in turns; equal bones in the end", rows))
 
     run.say("cutting with every tool")
     # Of several runs, takes the one with the median 99th percentile, so that other load on the machine does not decide.
@@ -122,23 +135,31 @@ def cutting(run):
 def surface(run):
     run.say("surface")
     b = benchmarks(run, "^mesh_")
-    whole = {threads: b.get(f"mesh_whole_bone_versus_flying_edges/{threads}", {}) for threads in (1, 2)}
+
+    def versus(name, caches, threads=1, suffix=""):
+        return spread(b.get(f"{name}/{caches}{suffix}", {}), threads=threads)
+
+    whole = {threads: b.get(f"mesh_whole_bone_versus_flying_edges/warm/{threads}", {}) for threads in (1, 2)}
     differences = [abs(w["triangles"] - w["flying_edges_triangles"]) for w in whole.values() if w]
-    frame = b.get("mesh_frame_of_33_cuts", {})
-    parts = [key
-             for key in ("frame_ms", "frame_max_ms", "touch_ms", "blocks_ms", "cuts_ms", "flying_edges_ms", "blocks")
-             if key in frame]
-    if parts:
-        run.tables.append(("a frame of 33 burr cuts: naming its stale blocks (touch) and making them; the cuts are "
-                           "beside it", [
-            tuple(parts), tuple(f"{frame[key]:.3g}" for key in parts)]))
+    rows = []
+    for caches in ("warm", "cold"):
+        frame = b.get(f"mesh_frame_of_33_cuts/{caches}", {})
+        parts = [key for key in ("frame_ms", "frame_max_ms", "touch_ms", "blocks_ms", "cuts_ms", "flying_edges_ms",
+                                 "blocks", "flying_edges_samples") if key in frame]
+        rows += [] if rows else [("caches", *parts)]
+        rows.append((caches, *(f"{frame[key]:.3g}" for key in parts)))
+    run.tables.append(("a frame of 33 burr cuts: naming its stale blocks (touch) and making them; flying edges on the "
+                       "box of what they changed; the cuts are beside it", rows))
+    speedups = {}
+    for suffix, caches in (("", "warm"), ("_cold", "cold")):
+        speedups[f"mesh_block_speedup{suffix}"] = versus("mesh_block_versus_flying_edges", caches)
+        speedups[f"mesh_frame_speedup{suffix}"] = versus("mesh_frame_of_33_cuts", caches)
+        for threads, number in ((1, ""), (2, "_2")):
+            speedups[f"mesh_whole_bone_speedup{suffix}{number}"] = versus(
+                "mesh_whole_bone_versus_flying_edges", caches, threads, f"/{threads}")
     return {
-        "mesh_block_speedup": spread(b.get("mesh_block_versus_flying_edges", {}), threads=1),
-        "mesh_whole_bone_speedup": spread(whole[1], threads=1),
-        "mesh_whole_bone_speedup_2": spread(whole[2], threads=2),
+        **speedups,
         "mesh_triangle_difference": Measured(int(max(differences)) if differences else None),
-        "mesh_frame_share": spread(frame, threads=1),
-        "mesh_frame_share_with_cuts": spread(frame, "with_cuts", 1),
         "mesh_bytes_per_triangle": spread(b.get("mesh_bytes_per_triangle_cut", {}), "bytes_per_triangle"),
         "mesh_bytes_per_triangle_bone": spread(b.get("mesh_bytes_per_triangle_bone", {}), "bytes_per_triangle"),
         "mesh_encode": Measured(b["mesh_encode"]["real_time"], b["mesh_flying_edges"]["real_time"]),
@@ -361,17 +382,22 @@ def collision(run):
 
 
 def contact(run):
-    """Thousands of points of a tool against the bone round it, compared with OpenVDB's sampler."""
+    """Thousands of points of a tool against the bone round it, compared with a dense array and with OpenVDB's
+    sampler."""
     run.say("contact")
     out = json.loads(run.output("osteon-contact-bench"))
     run.tables.append((f"contact of {out['points']} points, {out['lanes']} at a time, {100.0 * out['in_bone']:.0f} % "
                        "of them in bone", [
         ("way", "us p50", "min", "max")] + [
         (way, *(f"{out[f'{key}_us_{what}']:.1f}" for what in ("p50", "min", "max")))
-        for way, key in (("ours", "contact"), ("GridSampler, accessor", "accessor"), ("GridSampler, tree", "tree"))]))
+        for way, key in (("ours", "contact"), ("dense array", "dense"), ("GridSampler, accessor", "accessor"),
+                         ("GridSampler, tree", "tree"), ("ours, cold", "cold_contact"),
+                         ("dense array, cold", "cold_dense"), ("GridSampler, accessor, cold", "cold_accessor"))]))
     return {
-        "contact_4096": of(out, "contact_us", "accessor_us", 1),
+        "contact_4096": of(out, "contact_us", "dense_us", 1),
         "contact_speedup": Measured(out["speedup_p50"], None, out["speedup_min"], out["speedup_max"], 1),
+        "contact_speedup_cold": Measured(out["cold_speedup_p50"], None, out["cold_speedup_min"],
+                                         out["cold_speedup_max"], 1),
         "contact_of_budget": Measured(out["contact_us_p50"] / 25.0, None, None, None, 1),
         "contact_difference": Measured(1000.0 * out["largest_difference_mm"]),
         "contact_force_difference": Measured(out["largest_force_difference"]),
@@ -385,7 +411,7 @@ def real_case(run, name, make_case):
     """A bone from real images, burred in frames of 33 cuts. Skipped with a message if its images are not there."""
     case = run.folder / name
     reason = make_case(case)
-    names = ("frame", "frame_budget", "cut_p99", "memory", "memory_cut")
+    names = ("frame", "frame_budget", "cut_p99", "memory", "memory_cut", "triangle_difference")
     if reason:
         run.skip(f"real_{name}", reason)
         return {f"real_{name}_{what}": Measured(None) for what in names}
@@ -406,6 +432,7 @@ def real_case(run, name, make_case):
         f"real_{name}_frame_budget": Measured(out["frame_ms_p50"] / FRAME_MS, None, out["frame_ms_min"] / FRAME_MS,
                                               out["frame_ms_max"] / FRAME_MS, 1),
         f"real_{name}_cut_p99": Measured(out["cut_us_p99"], out["cut_us_p50"], None, None, 1),
+        f"real_{name}_triangle_difference": Measured(out["triangle_difference"], out["triangle_difference_air_apart"]),
         f"real_{name}_memory": Measured(out["case_mb"]),
         f"real_{name}_memory_cut": Measured(out["cut_mb"]),
     }
