@@ -19,6 +19,7 @@
 #include "server/import/inv3_reader.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/phantom.hpp"
+#include "server/import/volume_reader.hpp"
 
 namespace osteon::import {
 namespace {
@@ -29,10 +30,11 @@ constexpr double kPhantomPitch_mm = 0.4;
 constexpr double kMeshPitch_mm = 0.5;
 
 struct CaseArguments {
-  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm";
+  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median;
   std::string keep;
   std::vector<std::string> bone_colours;
   std::optional<double> pitch_mm, threshold_hu;
+  double gaussian_mm = 0.0;
   std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false, list = false;
@@ -72,16 +74,17 @@ Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
   if (!reading(0.0)) return tl::unexpected(stopped());
   if (kind == InputKind::absent)
     return failure(ErrorCode::not_found, "there is no file or folder " + a.input +
-                                             "; give a folder, zip or ISO image with a CT series, or an .inv3 file");
+                                             "; give a folder, zip or ISO image with a CT series, or a NIfTI, "
+                                             "NRRD, MetaImage or .inv3 file");
   if (kind != InputKind::inv3 && kind != InputKind::other)
     return read_dicom_series(a.input, {.series = a.series}, reading);
   std::error_code error;
   if (!fs::is_regular_file(a.input, error))
     return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
-  if (kind == InputKind::inv3 && a.series)
-    return failure(ErrorCode::invalid_input,
-                   "--series is for DICOM; " + a.input + " is an InVesalius project with one scan");
-  return read_inv3(a.input, reading);
+  const bool volume = kind == InputKind::other && is_volume_file(a.input);
+  if (a.series && (volume || kind == InputKind::inv3))
+    return bad_input("--series is for DICOM; " + a.input + " is a file with one scan");
+  return volume ? read_volume(a.input, reading) : read_inv3(a.input, reading);
 }
 
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
@@ -95,6 +98,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.merge = a.merge;
   options.hollow = a.hollow;
   options.list_only = a.list;
+  if (!a.median.empty()) options.median = a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
+  options.gaussian_mm = a.gaussian_mm;
   Bar bar(stop);
   auto scan = read_scan(a, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
@@ -119,9 +124,9 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
-  if (input_kind(a.input, searching) == InputKind::inv3)
-    return failure(ErrorCode::invalid_input,
-                   a.input + " is an InVesalius project with one scan; give it to osteon-import ct");
+  const InputKind kind = input_kind(a.input, searching);
+  if (kind == InputKind::inv3 || (kind == InputKind::other && is_volume_file(a.input)))
+    return bad_input(a.input + " is a file with one scan; give it to osteon-import ct");
   const auto report = list_dicom_series(a.input, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
@@ -279,8 +284,10 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
 
   CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
-  ct->add_option("INPUT", a.input,
-                 "DICOM: a folder (with all its subfolders), a zip or an ISO image; or an InVesalius project (.inv3)")
+  ct->add_option(
+        "INPUT", a.input,
+        "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or a "
+        "NIfTI, NRRD or MetaImage file")
       ->required();
   ct->add_option("--series", a.series,
                  "Number of the series, as osteon-import series lists them (default: the largest CT)");
@@ -295,6 +302,13 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_flag("--list", a.list, "List the islands and write nothing");
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
+  ct->add_option("--median", a.median,
+                 "First replace each voxel by the median of its 3 x 3 neighbours in the slice, or of its 3 x 3 x 3 in "
+                 "the volume: takes out single wrong voxels")
+      ->check(CLI::IsMember({"slice", "volume"}));
+  ct->add_option("--gaussian", a.gaussian_mm,
+                 "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
+      ->check(within(0.0, 10.0));
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
 

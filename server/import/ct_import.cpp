@@ -1,8 +1,10 @@
 #include "server/import/ct_import.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bitset>
 #include <cmath>
+#include <cstdio>
 #include <new>
 #include <numeric>
 
@@ -16,11 +18,11 @@ namespace osteon::import {
 namespace {
 
 // Shares of the stages in the total time, for one progress bar over all of them.
-constexpr double kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
+constexpr double kSmoothEnd = 0.05, kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
 // Smallest size of parts of an island that are reported if only marrow connects them: absolute, and relative to the
 // largest.
 constexpr double kLargePiece_cm3 = 0.5, kLargePiece = 0.1;
-constexpr double kLeastPitch_mm = 0.02, kMostPitch_mm = 10.0;
+constexpr double kLeastPitch_mm = 0.02, kMostPitch_mm = 10.0, kMostGaussian_mm = 10.0;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;  // of a CT's voxels
 // Margin around the processed voxels, so that everything that the segmentation reads beside a bone is included.
 constexpr double kMargin_mm = 5.0;
@@ -263,6 +265,24 @@ Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& i
   return {};
 }
 
+// The filters that the options name, and their names for the case's source. Error: cancelled.
+Result<std::string> smooth(imaging::HuVolume& scan, const CtOptions& options, const KeepGoing& keep_going) {
+  std::string names;
+  if (options.median) {
+    if (auto done = imaging::smooth_median(scan, *options.median, part(keep_going, 0.0, 0.5)); !done)
+      return tl::unexpected(done.error());
+    names += options.median == imaging::MedianBox::slice ? ", median 3x3" : ", median 3x3x3";
+  }
+  if (options.gaussian_mm > 0.0) {
+    if (auto done = imaging::smooth_gaussian(scan, options.gaussian_mm, part(keep_going, 0.5, 1.0)); !done)
+      return tl::unexpected(done.error());
+    std::array<char, 32> text{};
+    std::snprintf(text.data(), text.size(), ", Gaussian %g mm", options.gaussian_mm);
+    names += text.data();
+  }
+  return names;
+}
+
 Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const KeepGoing& keep_going) {
   const auto work = dense_region(scan, options.threshold_hu, keep_going);
   if (!work) return tl::unexpected(work.error());
@@ -326,7 +346,11 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
   if (!std::isfinite(options.threshold_hu))
     return failure(ErrorCode::invalid_input, "the threshold must be a number; give another --threshold");
 
-  auto s = segment(std::move(scan.volume), options, part(keep_going, 0.0, kSegmentEnd));
+  if (!(options.gaussian_mm >= 0.0 && options.gaussian_mm <= kMostGaussian_mm))
+    return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
+  const auto smoothed = smooth(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+  if (!smoothed) return tl::unexpected(smoothed.error());
+  auto s = segment(std::move(scan.volume), options, part(keep_going, kSmoothEnd, kSegmentEnd));
   if (!s) return tl::unexpected(s.error());
   if (options.list_only) return CtImport{std::move(s->found), {}};
   const auto surface_mm =
@@ -340,7 +364,7 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
 
   CaseInfo info;
   info.title = options.title;
-  info.source = scan.source;
+  info.source = scan.source + *smoothed;
   info.pitch_mm = pitch_mm;
   info.calibration = options.calibration;
   info.threshold_hu = options.threshold_hu;

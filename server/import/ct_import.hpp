@@ -6,6 +6,7 @@
 
 #include "common/imaging/calibration.hpp"
 #include "common/imaging/islands.hpp"
+#include "common/imaging/smoothing.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/iso_surface.hpp"
 #include "server/import/ct_scan.hpp"
@@ -22,6 +23,9 @@ struct CtOptions {
   bool merge = false;      // the kept islands count as one bone
   bool hollow = false;     // cavities enclosed by bone are not bone
   bool list_only = false;  // find the islands and make no case
+  // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
+  std::optional<imaging::MedianBox> median;
+  double gaussian_mm = 0.0;  // its sigma; 0: none
 };
 
 // Result of the segmentation.

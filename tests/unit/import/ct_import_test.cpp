@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
@@ -204,6 +205,63 @@ TEST(CtImport, BoneThatReachesTheEndOfTheScanEndsWithTheLastVoxel) {
   EXPECT_NEAR(bone->surface_mm({5.5, 5.5, 0.0}), -1.0, 0.01);
   EXPECT_NEAR(bone->surface_mm({2.5, 5.5, 10.0}), 0.0, 0.01);
   EXPECT_NEAR(bone->volume_mm3(), 6.0 * 6.0 * 20.0, 0.02 * 720.0);
+}
+
+// Single wrong voxels around and within the bone, as a worn scanner makes them.
+TEST(CtImport, AMedianTakesOutSingleWrongVoxels) {
+  const Phantom phantom{.kind = PhantomKind::block, .layers = {{8.0, 1.5}}, .width_mm = 8.0};
+  auto scan = scan_phantom(phantom, 0.5, keep_going);
+  ASSERT_TRUE(scan);
+  const auto clean = import_ct({*scan, "phantom", {}}, {.threshold_hu = 500.0}, keep_going);
+  ASSERT_TRUE(clean) << clean.error().message;
+  std::mt19937 random(3);
+  for (std::int16_t& hu : scan->values)
+    if (random() % 200 == 0) hu = hu > 500 ? -1000 : 3000;
+  const auto noisy = import_ct({*scan, "phantom", {}}, {.threshold_hu = 500.0, .keep_all = true}, keep_going);
+  ASSERT_TRUE(noisy) << noisy.error().message;
+  EXPECT_GT(noisy->found.islands.size(), 10u);
+  for (const auto box : {imaging::MedianBox::slice, imaging::MedianBox::volume}) {
+    const auto mended =
+        import_ct({*scan, "phantom", {}}, {.threshold_hu = 500.0, .keep_all = true, .median = box}, keep_going);
+    ASSERT_TRUE(mended) << mended.error().message;
+    EXPECT_EQ(mended->found.islands.size(), 1u);
+    EXPECT_NEAR(mended->bone->volume_mm3(), clean->bone->volume_mm3(), 0.02 * clean->bone->volume_mm3());
+  }
+}
+
+TEST(CtImport, AGaussianTakesOutNoise) {
+  const Phantom phantom{.kind = PhantomKind::block, .layers = {{8.0, 1.5}}, .width_mm = 8.0};
+  auto scan = scan_phantom(phantom, 0.5, keep_going);
+  ASSERT_TRUE(scan);
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise(0.0, 150.0);
+  for (std::int16_t& hu : scan->values) hu = static_cast<std::int16_t>(hu + std::lround(noise(random)));
+  const auto worst = [&](double gaussian_mm) {
+    const auto made =
+        import_ct({*scan, "phantom", {}}, {.threshold_hu = 500.0, .gaussian_mm = gaussian_mm}, keep_going);
+    EXPECT_TRUE(made);
+    double error = 0.0;
+    for (double x = -2.0; x <= 2.0; x += 0.25)
+      for (double z = -6.0; z <= -2.0; z += 0.25)
+        error = std::max(error, std::abs(made->bone->density_g_cm3({x, 0.25, z}) - 1.5));
+    return error;
+  };
+  const double before = worst(0.0), after = worst(0.7);
+  EXPECT_GT(before, 0.1);
+  EXPECT_LT(after, 0.4 * before);
+}
+
+TEST(CtImport, TheSourceNamesTheFilters) {
+  const Phantom phantom{.kind = PhantomKind::block, .layers = {{8.0, 1.5}}, .width_mm = 8.0};
+  const auto scan = scan_phantom(phantom, 0.5, keep_going);
+  ASSERT_TRUE(scan);
+  const CtOptions options{.threshold_hu = 500.0, .median = imaging::MedianBox::volume, .gaussian_mm = 0.5};
+  const auto made = import_ct({*scan, "phantom", {}}, options, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->bone->info().source, "phantom, median 3x3x3, Gaussian 0.5 mm");
+  const auto refused = import_ct({*scan, "phantom", {}}, {.gaussian_mm = std::nan("")}, keep_going);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("--gaussian"), std::string::npos);
 }
 
 TEST(CtImport, OtherIslandsAreGone) {

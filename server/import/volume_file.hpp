@@ -1,0 +1,44 @@
+// NIfTI, NRRD and MetaImage files, as ITK reads them. ITK may abort on a damaged file, so call the readers in a process
+// that may die. Its headers stay in the source file: they bring an Eigen of their own.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <string_view>
+
+#include "common/core/result.hpp"
+
+namespace osteon::import {
+
+enum class VolumeFormat { none, nifti, nrrd, meta_image };
+
+// By the first bytes, also of a compressed file.
+[[nodiscard]] VolumeFormat volume_format(const std::filesystem::path& file);
+[[nodiscard]] std::string_view name_of(VolumeFormat format);
+
+// The endings that ITK demands.
+struct FileEndings {
+  std::string_view plain, compressed;
+  std::string_view header;  // of a file whose voxels are in another file
+};
+[[nodiscard]] FileEndings endings_of(VolumeFormat format);
+
+struct VolumeHeader {
+  std::array<std::uint64_t, 3> dims{};          // columns, rows, slices
+  std::array<double, 3> spacing_mm{};           // between neighbours along each
+  std::array<double, 3> origin_mm{};            // centre of the first voxel, LPS
+  std::array<std::array<double, 3>, 3> axes{};  // directions of columns, rows and slices, LPS
+  std::uint64_t voxel_bytes = 0;                // of one voxel, uncompressed
+};
+
+// Errors: invalid_input (damaged, one slice), unsupported (several volumes, colours, vectors).
+[[nodiscard]] Result<VolumeHeader> read_volume_header(const std::filesystem::path& file, VolumeFormat format);
+
+// Calls `on_slice` with each slice: whole HU, columns fastest. Fractions are rounded, what exceeds int16 is clamped,
+// and voxels without a number are air (-1024 HU). Errors: invalid_input (truncated, damaged), unsupported.
+[[nodiscard]] Result<void> read_volume_slices(const std::filesystem::path& file, VolumeFormat format,
+                                              const std::function<void(std::span<const std::int16_t>)>& on_slice);
+
+}  // namespace osteon::import
