@@ -37,7 +37,8 @@ struct VolumeHeader {
 [[nodiscard]] Result<VolumeHeader> read_volume_header(const std::filesystem::path& file, VolumeFormat format);
 
 // Calls `on_slice` with each slice: whole HU, columns fastest. Fractions are rounded, what exceeds int16 is clamped,
-// and voxels without a number are air (-1024 HU). Errors: invalid_input (truncated, damaged), unsupported.
+// and voxels without a number are air (-1024 HU). In NIfTI these, and infinite ones, are 0 HU: its library replaces
+// them. Errors: invalid_input (truncated, damaged), unsupported.
 [[nodiscard]] Result<void> read_volume_slices(const std::filesystem::path& file, VolumeFormat format,
                                               const std::function<void(std::span<const std::int16_t>)>& on_slice);
 

@@ -11,8 +11,8 @@ namespace osteon::import {
 [[nodiscard]] bool is_volume_file(const std::filesystem::path& file);
 
 // Positions and directions become LPS, whatever the file uses. Values become whole HU: fractions are rounded, what
-// exceeds int16 is clamped, and voxels without a number are air (-1024 HU). ITK reads the file in another process,
-// because it may abort on a damaged file.
+// exceeds int16 is clamped, and voxels without a number are air (-1024 HU; in NIfTI 0 HU). ITK reads the file in
+// another process, because it may abort on a damaged file.
 // Errors: not_found, invalid_input (truncated, damaged, name without the format's ending, axes not at right angles, one
 // slice), unsupported (colours, vectors, time), exhausted (memory), cancelled, internal.
 [[nodiscard]] Result<CtScan> read_volume(const std::filesystem::path& file, const KeepGoing& keep_going);

@@ -225,7 +225,8 @@ TEST(CtImport, AMedianTakesOutSingleWrongVoxels) {
         import_ct({*scan, "phantom", {}}, {.threshold_hu = 500.0, .keep_all = true, .median = box}, keep_going);
     ASSERT_TRUE(mended) << mended.error().message;
     EXPECT_EQ(mended->found.islands.size(), 1u);
-    EXPECT_NEAR(mended->bone->volume_mm3(), clean->bone->volume_mm3(), 0.02 * clean->bone->volume_mm3());
+    // It rounds the twelve edges of 8 mm: half a voxel's section is 12 mm³ along all of them.
+    EXPECT_NEAR(mended->bone->volume_mm3(), clean->bone->volume_mm3(), 16.0);
   }
 }
 
