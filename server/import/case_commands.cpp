@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "common/geometry/mesh_file.hpp"
 #include "common/volume/mesh_distance.hpp"
@@ -68,6 +69,12 @@ Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
 }
 
+// The kind of an input that has one scan and no series; empty for others.
+std::string_view name_of_one_scan(InputKind kind) {
+  if (kind == InputKind::inv3) return "an InVesalius project";
+  return kind == InputKind::volume_file ? "a volume in one file" : "";
+}
+
 // Reads a scan of any kind; the input's content decides which.
 Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
   const InputKind kind = input_kind(a.input, reading);
@@ -76,15 +83,16 @@ Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
     return failure(ErrorCode::not_found, "there is no file or folder " + a.input +
                                              "; give a folder, zip or ISO image with a CT series, or a NIfTI, "
                                              "NRRD, MetaImage or .inv3 file");
+  if (const std::string_view one = name_of_one_scan(kind); a.series && !one.empty())
+    return bad_input("--series is for DICOM; leave it out, because " + a.input + " is " + std::string(one) +
+                     " with one scan");
+  if (kind == InputKind::volume_file) return read_volume(a.input, reading);
   if (kind != InputKind::inv3 && kind != InputKind::other)
     return read_dicom_series(a.input, {.series = a.series}, reading);
   std::error_code error;
   if (!fs::is_regular_file(a.input, error))
     return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
-  const bool volume = kind == InputKind::other && is_volume_file(a.input);
-  if (a.series && (volume || kind == InputKind::inv3))
-    return bad_input("--series is for DICOM; " + a.input + " is a file with one scan");
-  return volume ? read_volume(a.input, reading) : read_inv3(a.input, reading);
+  return read_inv3(a.input, reading);
 }
 
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
@@ -124,9 +132,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
-  const InputKind kind = input_kind(a.input, searching);
-  if (kind == InputKind::inv3 || (kind == InputKind::other && is_volume_file(a.input)))
-    return bad_input(a.input + " is a file with one scan; give it to osteon-import ct");
+  if (const std::string_view one = name_of_one_scan(input_kind(a.input, searching)); !one.empty())
+    return bad_input(a.input + " is " + std::string(one) + " with one scan; give it to osteon-import ct");
   const auto report = list_dicom_series(a.input, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);

@@ -11,6 +11,7 @@
 #include <system_error>
 
 #include "server/import/archive_files.hpp"
+#include "server/import/volume_format.hpp"
 
 namespace osteon::import {
 namespace {
@@ -180,6 +181,7 @@ InputKind input_kind(const fs::path& path, const KeepGoing& keep_going) {
   std::array<unsigned char, 5> mark{};
   if (opened.read(kIsoMark, mark) == mark.size() && has(mark, 0, "CD001")) return InputKind::archive;
   if (is_zip(head)) return InputKind::archive;
+  if (volume_format(path) != VolumeFormat::none) return InputKind::volume_file;
   // An InVesalius project is a tar, compressed or not.
   if (is_gzip(head) || is_tar(head)) return path.extension() == ".inv3" ? InputKind::inv3 : tar_kind(path, keep_going);
   return content_of(head) == Content::dicom ? InputKind::dicom_file : InputKind::other;

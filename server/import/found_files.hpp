@@ -44,7 +44,7 @@ inline constexpr std::size_t kHeadBytes = 4096;
 [[nodiscard]] Content content_of(std::span<const unsigned char> head);
 
 // How a path can be read as a scan.
-enum class InputKind { absent, folder, archive, dicom_file, inv3, other };
+enum class InputKind { absent, folder, archive, dicom_file, inv3, volume_file, other };
 [[nodiscard]] InputKind input_kind(const std::filesystem::path& path, const KeepGoing& keep_going);
 
 }  // namespace osteon::import

@@ -6,24 +6,11 @@
 #include <filesystem>
 #include <functional>
 #include <span>
-#include <string_view>
 
 #include "common/core/result.hpp"
+#include "server/import/volume_format.hpp"
 
 namespace osteon::import {
-
-enum class VolumeFormat { none, nifti, nrrd, meta_image };
-
-// By the first bytes, also of a compressed file.
-[[nodiscard]] VolumeFormat volume_format(const std::filesystem::path& file);
-[[nodiscard]] std::string_view name_of(VolumeFormat format);
-
-// The endings that ITK demands.
-struct FileEndings {
-  std::string_view plain, compressed;
-  std::string_view header;  // of a file whose voxels are in another file
-};
-[[nodiscard]] FileEndings endings_of(VolumeFormat format);
 
 struct VolumeHeader {
   std::array<std::uint64_t, 3> dims{};          // columns, rows, slices

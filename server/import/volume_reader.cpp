@@ -9,6 +9,7 @@
 
 #include "server/import/isolated_reader.hpp"
 #include "server/import/volume_file.hpp"
+#include "server/import/volume_format.hpp"
 
 namespace osteon::import {
 namespace {
@@ -16,23 +17,11 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kMostSkew = 1e-3;                           // of a cosine between two axes
-constexpr std::uint64_t kMostCompression = 1100;             // deflate makes one byte of at most 1032
 constexpr std::size_t kBesideVoxels = std::size_t{1} << 30;  // bytes that the library may take beside the voxels
 constexpr double kReadShare = 0.5;                           // of the time until the first slice comes
 
 tl::unexpected<Error> wrong(const fs::path& file, const std::string& what) {
   return bad_input(file.string() + ": " + what + "; export it again, or give the DICOM series");
-}
-
-Result<void> check_ending(const fs::path& file, VolumeFormat format) {
-  const FileEndings endings = endings_of(format);
-  for (const std::string_view ending : {endings.plain, endings.compressed, endings.header})
-    if (file.string().ends_with(ending)) return {};
-  return bad_input(file.string() + " is a " + std::string(name_of(format)) + " file; let its name end in " +
-                   std::string(endings.plain) +
-                   (endings.compressed == endings.plain
-                        ? std::string()
-                        : ", or in " + std::string(endings.compressed) + " if it is compressed"));
 }
 
 Result<VolumeHeader> read_header(const fs::path& file, VolumeFormat format, const KeepGoing& keep_going) {
@@ -83,14 +72,14 @@ Result<void> read_voxels(const fs::path& file, VolumeFormat format, std::uint64_
                          imaging::HuVolume& volume, const KeepGoing& keep_going) {
   const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   const IsolatedEnd end =
-      run_isolated({.run =
-                        [&](ChildChannel& channel) {
-                          int slices = 0;
-                          return read_volume_slices(file, format, [&](std::span<const std::int16_t> slice) {
-                            channel.send({reinterpret_cast<const char*>(slice.data()), slice.size_bytes()});
-                            channel.progress(kReadShare + (1.0 - kReadShare) * ++slices / volume.dims[2]);
-                          });
-                        },
+      run_isolated({.run = [&](ChildChannel& channel) -> Result<void> {
+                      if (auto whole = check_voxels(file, format, volume.count(), voxel_bytes); !whole) return whole;
+                      int slices = 0;
+                      return read_volume_slices(file, format, [&](std::span<const std::int16_t> slice) {
+                        channel.send({reinterpret_cast<const char*>(slice.data()), slice.size_bytes()});
+                        channel.progress(kReadShare + (1.0 - kReadShare) * ++slices / volume.dims[2]);
+                      });
+                    },
                     .on_message =
                         [&](std::string_view message) {
                           // Memory grows with the voxels that arrive, not with the size that the file claims.
@@ -110,26 +99,22 @@ Result<void> read_voxels(const fs::path& file, VolumeFormat format, std::uint64_
 
 }  // namespace
 
-bool is_volume_file(const fs::path& file) { return volume_format(file) != VolumeFormat::none; }
-
 Result<CtScan> read_volume(const fs::path& file, const KeepGoing& keep_going) try {
   std::error_code error;
-  const std::uint64_t file_bytes = fs::file_size(file, error);
-  if (error) return failure(ErrorCode::not_found, "there is no file " + file.string() + "; give a CT volume");
+  if (!fs::exists(file, error))
+    return failure(ErrorCode::not_found, "there is no file " + file.string() + "; give a CT volume");
   const VolumeFormat format = volume_format(file);
   if (format == VolumeFormat::none) return wrong(file, "it is neither NIfTI nor NRRD nor MetaImage");
-  if (auto known = check_ending(file, format); !known) return tl::unexpected(known.error());
+  if (auto known = check_kind(file, format); !known) return tl::unexpected(known.error());
   const Result<VolumeHeader> header = read_header(file, format, keep_going);
   if (!header) return tl::unexpected(header.error());
   Result<imaging::HuVolume> volume = geometry_of(file, *header);
   if (!volume) return tl::unexpected(volume.error());
-  const bool beside = file.string().ends_with(endings_of(format).header);
-  if (!beside && volume->count() * header->voxel_bytes / kMostCompression > file_bytes)
-    return wrong(file, "it claims more voxels than it can hold");
   if (auto read = read_voxels(file, format, header->voxel_bytes, *volume, keep_going); !read)
     return tl::unexpected(read.error());
   CtScan scan;
   scan.source = std::string(name_of(format)) + " CT, " + imaging::describe(*volume);
+  if (!says_orientation(file, format)) scan.source += ", orientation not in the file: left and right may be swapped";
   scan.volume = std::move(*volume);
   return scan;
 } catch (const std::bad_alloc&) {

@@ -7,9 +7,6 @@
 
 namespace osteon::import {
 
-// By its first bytes, also of a compressed file.
-[[nodiscard]] bool is_volume_file(const std::filesystem::path& file);
-
 // Positions and directions become LPS, whatever the file uses. Values become whole HU: fractions are rounded, what
 // exceeds int16 is clamped, and voxels without a number are air (-1024 HU; in NIfTI 0 HU). ITK reads the file in
 // another process, because it may abort on a damaged file.

@@ -270,6 +270,9 @@ TEST_F(Program, WrongSeriesNumbersAreOneSentence) {
   ASSERT_NO_FATAL_FAILURE(write_inv3(folder_ / "a.inv3", {}));
   expect_refused({"ct", path("a.inv3"), "--series", "1", "--out", path("case")}, "InVesalius", folder_);
   expect_refused({"series", path("a.inv3")}, "InVesalius", folder_);
+  std::ofstream(folder_ / "a.nrrd") << "NRRD0004\n";
+  expect_refused({"ct", path("a.nrrd"), "--series", "1", "--out", path("case")}, "leave it out", folder_);
+  expect_refused({"series", path("a.nrrd")}, "osteon-import ct", folder_);
   expect_refused({"series", path("absent")}, path("absent"), folder_);
   ASSERT_EQ(::mkfifo((folder_ / "pipe").c_str(), 0600), 0);
   expect_refused({"ct", path("pipe"), "--out", path("case")}, "is a pipe or device", folder_);

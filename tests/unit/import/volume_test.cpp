@@ -12,6 +12,7 @@
 #include <span>
 #include <sstream>
 
+#include "server/import/found_files.hpp"
 #include "server/import/volume_reader.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/temp_dir.hpp"
@@ -139,6 +140,14 @@ void expect_equal(const imaging::HuVolume& read, const Volume& volume, const Eig
       }
 }
 
+void expect_refused(const fs::path& file, const std::string& bytes, const std::string& why) {
+  write(file, bytes);
+  const auto scan = read_volume(file, keep_going);
+  ASSERT_FALSE(scan) << why;
+  expect_one_sentence(scan.error(), file.string());
+  EXPECT_NE(scan.error().message.find(why), std::string::npos) << scan.error().message;
+}
+
 const Eigen::Matrix3d kFromRas = Vec3(-1.0, -1.0, 1.0).asDiagonal();
 const Eigen::Matrix3d kFromLps = Eigen::Matrix3d::Identity();
 
@@ -160,7 +169,7 @@ void each_orientation(const Check& check) {
 
 void expect_read(const fs::path& file, const std::string& bytes, const Volume& volume, const Eigen::Matrix3d& to_lps) {
   write(file, bytes);
-  ASSERT_TRUE(is_volume_file(file));
+  ASSERT_EQ(input_kind(file, keep_going), InputKind::volume_file);
   const auto scan = read_volume(file, keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   expect_equal(scan->volume, volume, to_lps);
@@ -188,6 +197,26 @@ TEST(VolumeFile, MetaImageKeepsEveryOrientation) {
   });
 }
 
+// Of a computer with the other order of bytes.
+TEST(VolumeFile, NiftiOfTheOtherByteOrderIsTheSame) {
+  const test::TempDir folder;
+  const Volume volume;
+  std::string bytes = nifti_header(volume) + voxels(volume);
+  const auto swap = [&](std::size_t from, std::size_t to, std::ptrdiff_t size) {
+    const auto begin = bytes.begin();
+    for (auto at = begin + static_cast<std::ptrdiff_t>(from); at < begin + static_cast<std::ptrdiff_t>(to); at += size)
+      std::reverse(at, at + size);
+  };
+  swap(0, 4, 4);      // size of the header
+  swap(40, 56, 2);    // dimensions
+  swap(68, 76, 2);    // type of the voxels
+  swap(76, 120, 4);   // spacing, offset, scale
+  swap(252, 256, 2);  // codes of the frames
+  swap(256, 328, 4);  // frames
+  swap(352, bytes.size(), 2);
+  expect_read(folder / "a.nii", bytes, volume, kFromRas);
+}
+
 TEST(VolumeFile, NiftiKeepsATiltedScan) {
   const test::TempDir folder;
   Volume volume;
@@ -200,7 +229,7 @@ TEST(VolumeFile, ACompressedOneIsTheSame) {
   const test::TempDir folder;
   const Volume volume;
   ASSERT_NO_FATAL_FAILURE(write_compressed(folder / "a.nii.gz", nifti_header(volume) + voxels(volume)));
-  ASSERT_TRUE(is_volume_file(folder / "a.nii.gz"));
+  ASSERT_EQ(input_kind(folder / "a.nii.gz", keep_going), InputKind::volume_file);
   const auto scan = read_volume(folder / "a.nii.gz", keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   expect_equal(scan->volume, volume, kFromRas);
@@ -262,14 +291,6 @@ TEST(VolumeFile, TheSourceSaysNothingOfThePatient) {
   EXPECT_EQ(scan->source, "NIfTI CT, 3x4x5, 0.5x0.75x2 mm");
 }
 
-void expect_refused(const fs::path& file, const std::string& bytes, const std::string& why) {
-  write(file, bytes);
-  const auto scan = read_volume(file, keep_going);
-  ASSERT_FALSE(scan) << why;
-  expect_one_sentence(scan.error(), file.string());
-  EXPECT_NE(scan.error().message.find(why), std::string::npos) << scan.error().message;
-}
-
 TEST(VolumeFile, RefusesWhatIsNoScan) {
   const test::TempDir folder;
   const Volume volume;
@@ -283,6 +304,15 @@ TEST(VolumeFile, RefusesWhatIsNoScan) {
   Volume skewed;
   skewed.axes_mm(0, 1) = 0.4;
   expect_refused(folder / "f.nrrd", nrrd_header(skewed, "left-posterior-superior") + voxels(skewed), "right angles");
+  std::string second(544, '\0');
+  put(second, 0, std::int32_t{540});
+  second.replace(4, 3, "n+2");
+  expect_refused(folder / "h.nii", second, "save it as NIfTI-1");
+  Volume sheared;
+  sheared.axes_mm(0, 1) = 0.4;
+  expect_refused(folder / "i.nii", nifti_header(sheared) + voxels(sheared), "right angles");
+  ASSERT_NO_FATAL_FAILURE(write_compressed(folder / "packed", nifti_header(volume) + voxels(volume)));
+  expect_refused(folder / "j.nii", test::content(folder / "packed"), "let its name end in .nii.gz");
   Volume still;
   still.axes_mm.setZero();
   expect_refused(folder / "g.nii", nifti_header(still) + voxels(still), "");
@@ -316,6 +346,72 @@ TEST(VolumeFile, RefusesATruncatedCompressedOne) {
   expect_one_sentence(scan.error(), (folder / "b.nii.gz").string());
 }
 
+// Writes a header, its voxels in another file, and tries to read them whole, without their end, and not at all.
+void expect_both_needed(const fs::path& file, const std::string& header, const fs::path& data, const Volume& volume,
+                        const Eigen::Matrix3d& to_lps) {
+  write(data, voxels(volume));
+  ASSERT_NO_FATAL_FAILURE(expect_read(file, header, volume, to_lps));
+  const std::string whole = test::content(data);
+  write(data, whole.substr(0, whole.size() - 1));
+  const auto cut = read_volume(file, keep_going);
+  ASSERT_FALSE(cut) << file;
+  expect_one_sentence(cut.error(), data.string());
+  fs::remove(data);
+  const auto alone = read_volume(file, keep_going);
+  ASSERT_FALSE(alone) << file;
+  expect_one_sentence(alone.error(), file.string());
+}
+
+TEST(VolumeFile, ReadsVoxelsFromTheFileBesideAndNeedsAllOfThem) {
+  const test::TempDir folder;
+  const Volume volume;
+  std::string nifti = nifti_header(volume);
+  nifti.replace(344, 3, "ni1");
+  put(nifti, 108, 0.0f);
+  expect_both_needed(folder / "a.hdr", nifti, folder / "a.img", volume, kFromRas);
+  std::string nrrd = nrrd_header(volume, "left-posterior-superior");
+  nrrd.insert(nrrd.size() - 1, "data file: b.raw\n");
+  expect_both_needed(folder / "b.nhdr", nrrd, folder / "b.raw", volume, kFromLps);
+  std::string meta = meta_header(volume);
+  meta.replace(meta.find("LOCAL"), 5, "c.raw");
+  expect_both_needed(folder / "c.mhd", meta, folder / "c.raw", volume, kFromLps);
+  meta.replace(meta.find("c.raw"), 5, "c%02d.raw 1 5 1");
+  expect_refused(folder / "d.mhd", meta, "");
+}
+
+// Another program's NRRD: compressed behind its header.
+TEST(VolumeFile, ReadsACompressedNrrdAndNeedsAllOfIt) {
+  const test::TempDir folder;
+  const Volume volume;
+  ASSERT_NO_FATAL_FAILURE(write_compressed(folder / "voxels.gz", voxels(volume)));
+  std::string header = nrrd_header(volume, "left-posterior-superior");
+  header.replace(header.find("raw"), 3, "gzip");
+  const std::string packed = test::content(folder / "voxels.gz");
+  expect_read(folder / "a.nrrd", header + packed, volume, kFromLps);
+  expect_refused(folder / "b.nrrd", header + packed.substr(0, packed.size() - 30), "ends before its last voxel");
+}
+
+// The library reads zeros from it.
+TEST(VolumeFile, RefusesACompressedMetaImageWithoutItsSize) {
+  const test::TempDir folder;
+  std::string header = meta_header(Volume());
+  header.replace(header.find("CompressedData = False"), 22, "CompressedData = True");
+  expect_refused(folder / "a.mha", header + "x\x9c", "CompressedDataSize");
+  header.insert(header.find("DimSize"), "CompressedDataSize = 100\n");
+  expect_refused(folder / "b.mha", header + "x\x9c", "ends before its last voxel");
+}
+
+TEST(VolumeFile, SaysWhenLeftAndRightAreAGuess) {
+  const test::TempDir folder;
+  const Volume volume;
+  std::string header = nifti_header(volume);
+  put(header, 254, std::int16_t{0});
+  write(folder / "a.nii", header + voxels(volume));
+  const auto scan = read_volume(folder / "a.nii", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_NE(scan->source.find("left and right may be swapped"), std::string::npos) << scan->source;
+}
+
 TEST(VolumeFile, RefusesAClaimOfMoreThanItHolds) {
   const test::TempDir folder;
   Volume huge;
@@ -324,7 +420,7 @@ TEST(VolumeFile, RefusesAClaimOfMoreThanItHolds) {
   ASSERT_NO_FATAL_FAILURE(write_compressed(folder / "a.nii.gz", nifti_header(huge)));
   const auto scan = read_volume(folder / "a.nii.gz", keep_going);
   ASSERT_FALSE(scan);
-  EXPECT_NE(scan.error().message.find("claims more voxels"), std::string::npos) << scan.error().message;
+  EXPECT_NE(scan.error().message.find("ends before its last voxel"), std::string::npos) << scan.error().message;
 }
 
 TEST(VolumeFile, CanBeStopped) {

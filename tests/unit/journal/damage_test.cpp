@@ -15,7 +15,6 @@ namespace {
 using test::MemoryDisk;
 using test::plain_head;
 
-constexpr const char* kDamaged = "/room/journal";
 constexpr std::uint64_t kLogBytes = 3000;
 
 struct Outcomes {
@@ -31,8 +30,8 @@ class DamageTest : public ::testing::TestWithParam<bool> {
   // Small pages keep the journal small. `closed`: with a footer and without a log. Otherwise all but the first entries
   // are in the log.
   void SetUp() override {
-    Journal journal = std::move(
-        Journal::create(kDamaged, "bone", {.disk = &disk_, .log_bytes = kLogBytes, .page_bytes = 512}).value());
+    Journal journal =
+        std::move(Journal::create(kFile, "bone", {.disk = &disk_, .log_bytes = kLogBytes, .page_bytes = 512}).value());
     append(journal, entries_, 0, 8);
     ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
     ASSERT_TRUE(journal.next_server_epoch());
@@ -40,7 +39,7 @@ class DamageTest : public ::testing::TestWithParam<bool> {
     ASSERT_TRUE(file && file->write("the room at place 8") && file->finish());
     ASSERT_TRUE(journal.add_checkpoint(std::move(*file)));
     ASSERT_TRUE(journal.close());
-    journal = std::move(Journal::open(kDamaged, {.disk = &disk_, .log_bytes = kLogBytes}).value());
+    journal = std::move(Journal::open(kFile, {.disk = &disk_, .log_bytes = kLogBytes}).value());
     append(journal, entries_, 8, 10);
     append(journal, entries_, 10, 11);
     append(journal, entries_, 11, 12);
@@ -62,14 +61,14 @@ class DamageTest : public ::testing::TestWithParam<bool> {
   void look(const std::string& what) {
     SCOPED_TRACE(what);
     const MemoryDisk::Image damaged = disk_.image();
-    const auto report = verify_journal(kDamaged, &disk_);
+    const auto report = verify_journal(kFile, &disk_);
     if (!report || !report->sound()) ++outcomes_.found;
     ASSERT_EQ(disk_.image(), damaged) << "verifying must change nothing";
 
-    auto opened = Journal::open(kDamaged, {.disk = &disk_, .log_bytes = kLogBytes});
+    auto opened = Journal::open(kFile, {.disk = &disk_, .log_bytes = kLogBytes});
     if (!opened) {
       ++outcomes_.refused;
-      ASSERT_NE(opened.error().message.find(kDamaged), std::string::npos) << opened.error().message;
+      ASSERT_NE(opened.error().message.find(kFile), std::string::npos) << opened.error().message;
       ASSERT_FALSE(report && report->sound());
       return;
     }

@@ -11,6 +11,9 @@
 
 namespace osteon {
 
+// Of the tests' room, on a disk in memory.
+inline constexpr const char* kFile = "/room/journal";
+
 // Entries with the sequence numbers 1 to `count`.
 inline std::vector<JournalEntry> some_entries(std::uint64_t seed, std::size_t count, std::size_t most_bytes = 300) {
   std::mt19937_64 random(seed);

@@ -26,8 +26,6 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
 
-constexpr const char* kFile = "/room/journal";
-
 class JournalTest : public ::testing::Test {
  protected:
   Journal create() { return std::move(Journal::create(kFile, "bone", options()).value()); }

@@ -25,14 +25,14 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-constexpr const char *kLogged = "/room/journal", *kLog = "/room/journal-log", *kMirror = "/room/journal-mirror";
+constexpr const char *kLog = "/room/journal-log", *kMirror = "/room/journal-mirror";
 
 class LogTest : public ::testing::Test {
  protected:
   JournalOptions options() { return {.disk = &disk_, .log_bytes = 32 << 10}; }
   // A journal whose process was killed: some entries are in the database, the others in its log.
   void make_killed() {
-    Journal journal = std::move(Journal::create(kLogged, "bone", options()).value());
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
     append(journal, entries_, 0, 40);
     ASSERT_TRUE(journal.next_server_epoch());
     before_ = disk_.image();
@@ -40,9 +40,9 @@ class LogTest : public ::testing::Test {
   }
   // Opens it and expects all entries. Returns what was repaired.
   std::vector<std::string> expect_whole() {
-    const auto report = verify_journal(kLogged, &disk_);
+    const auto report = verify_journal(kFile, &disk_);
     EXPECT_TRUE(report && report->sound()) << (report ? report->faults.front() : report.error().message);
-    Journal journal = std::move(Journal::open(kLogged, options()).value());
+    Journal journal = std::move(Journal::open(kFile, options()).value());
     EXPECT_EQ(journal.closed_because(), nullptr) << journal.closed_because()->message;
     EXPECT_TRUE(equal(entries_of(journal), entries_));
     EXPECT_EQ(report->notes, journal.notes());
@@ -50,10 +50,10 @@ class LogTest : public ::testing::Test {
   }
   // Opens it and expects that it takes no entries. Returns the reason.
   std::string expect_closed(std::size_t entries) {
-    const auto report = verify_journal(kLogged, &disk_);
+    const auto report = verify_journal(kFile, &disk_);
     EXPECT_TRUE(report && !report->sound());
-    EXPECT_EQ(backup_journal(kLogged, "/backup/journal", &disk_).error().code, ErrorCode::invalid_input);
-    Journal journal = std::move(Journal::open(kLogged, options()).value());
+    EXPECT_EQ(backup_journal(kFile, "/backup/journal", &disk_).error().code, ErrorCode::invalid_input);
+    Journal journal = std::move(Journal::open(kFile, options()).value());
     EXPECT_NE(journal.closed_because(), nullptr) << "the journal takes entries";
     if (journal.closed_because() == nullptr) return {};
     EXPECT_FALSE(journal.next_server_epoch()) << "an epoch could be given twice";
@@ -116,7 +116,7 @@ TEST_F(LogTest, DamageToBothIsNamedWithTheEntriesThatAreMissing) {
   for (const char* file : {kLog, kMirror}) flip(file, 50);
   EXPECT_THAT(expect_closed(50),
               HasSubstr("goes to event 50, but its log vouches for event 60: 10 entries are missing"));
-  const auto recovered = salvage_journal(kLogged, "/room/new", &disk_);
+  const auto recovered = salvage_journal(kFile, "/room/new", &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->head.seq, RoomSeq{50});
   EXPECT_EQ(recovered->lost(), 10u);
@@ -133,7 +133,7 @@ TEST_F(LogTest, ItsLossIsNamed) {
   disk_.load(killed);
   for (const char* file : {kLog, kMirror}) disk_.cut(file, 0);
   EXPECT_THAT(expect_closed(40), HasSubstr("is damaged"));
-  EXPECT_THAT(verify_journal(kLogged, &disk_)->faults, Contains(HasSubstr("after event 40 cannot be told")));
+  EXPECT_THAT(verify_journal(kFile, &disk_)->faults, Contains(HasSubstr("after event 40 cannot be told")));
   // Cut behind the first sector and at the end of an entry, the rest looks like a log with fewer entries.
   for (const std::size_t entry : {40, 50}) {
     disk_.load(killed);
@@ -142,7 +142,7 @@ TEST_F(LogTest, ItsLossIsNamed) {
                           ? 4096
                           : killed.at(file).find(entries_[entry - 1].bytes) + entries_[entry - 1].bytes.size() + 16);
     EXPECT_THAT(expect_closed(entry), HasSubstr("was cut"));
-    EXPECT_THAT(verify_journal(kLogged, &disk_)->faults,
+    EXPECT_THAT(verify_journal(kFile, &disk_)->faults,
                 Contains(HasSubstr("after event " + std::to_string(entry) + " cannot be told")));
   }
 }
@@ -176,7 +176,7 @@ TEST_F(LogTest, ReadsTheFilesOfVersion3) {
 TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
   MemoryDisk::Image earlier;
   {
-    Journal journal = std::move(Journal::create(kLogged, "bone", options()).value());
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
     append(journal, entries_, 0, 20);
     ASSERT_TRUE(journal.next_server_epoch());
     earlier = disk_.image();
@@ -184,18 +184,18 @@ TEST_F(LogTest, AnOlderDatabaseBesideANewerLogIsNamed) {
     ASSERT_TRUE(journal.next_server_epoch());
     append(journal, entries_, 40, 60);
   }
-  disk_.put(kLogged, earlier.at(kLogged));
+  disk_.put(kFile, earlier.at(kFile));
   EXPECT_THAT(expect_closed(20),
               HasSubstr("goes to event 20, but its log vouches for event 60: 40 entries are missing"));
   for (const char* file : {kLog, kMirror}) disk_.put(file, earlier.at(file));
-  EXPECT_EQ(Journal::open(kLogged, options())->head().seq, RoomSeq{20})
+  EXPECT_EQ(Journal::open(kFile, options())->head().seq, RoomSeq{20})
       << "this is an older copy of all files, which only witnesses can detect";
 }
 
 TEST_F(LogTest, AnOlderLogBesideANewerDatabaseIsNamed) {
   MemoryDisk::Image earlier;
   {
-    Journal journal = std::move(Journal::create(kLogged, "bone", options()).value());
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
     append(journal, entries_, 0, 20);
     earlier = disk_.image();
     ASSERT_TRUE(journal.next_server_epoch());
@@ -218,10 +218,10 @@ TEST_F(LogTest, IsNotTakenFromAnotherJournalThatBeganAlike) {
 TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
   const std::vector<std::pair<const char*, const char*>> damages{
       {"removed", "removed"}, {"replaced", "replaced or cut"}, {"cut", "replaced or cut"}};
-  for (const char* file : {kLogged, kLog, kMirror})
+  for (const char* file : {kFile, kLog, kMirror})
     for (const auto& [what, said] : damages) {
       disk_.load({});
-      Journal journal = std::move(Journal::create(kLogged, "bone", options()).value());
+      Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
       append(journal, entries_, 0, 40);
       const MemoryDisk::Image now = disk_.image();
       if (std::string_view(what) == "removed") {
@@ -239,7 +239,7 @@ TEST_F(LogTest, FailsTheRoomWhoseFilesAreExchangedCutOrRemoved) {
 // The entry has the largest allowed size, and contains bytes that look like an entry of a log.
 TEST_F(LogTest, TakesAnEntryThatIsLargerThanItself) {
   {
-    Journal journal = std::move(Journal::create(kLogged, "bone", options()).value());
+    Journal journal = std::move(Journal::create(kFile, "bone", options()).value());
     append(journal, entries_, 0, 59);
     entries_[59].bytes = disk_.image().at(kLog) + disk_.image().at(kMirror);
     append(journal, entries_, 59, 60);

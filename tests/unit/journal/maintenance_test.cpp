@@ -20,13 +20,13 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-constexpr const char *kFrom = "/room/journal", *kTo = "/backup/journal";
+constexpr const char* kTo = "/backup/journal";
 
 class JournalMaintenanceTest : public ::testing::Test {
  protected:
   // A journal with every kind of content.
   void make(bool closed) {
-    Journal journal = std::move(Journal::create(kFrom, "bone", {.disk = &disk_}).value());
+    Journal journal = std::move(Journal::create(kFile, "bone", {.disk = &disk_}).value());
     for (std::size_t i = 0; i < entries_.size(); i += 5) append(journal, entries_, i, i + 5);
     ASSERT_TRUE(journal.set_person({"p1", "Anna", 20000}));
     ASSERT_TRUE(journal.set_register("retention_days", "30"));
@@ -63,7 +63,7 @@ TEST_F(JournalMaintenanceTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
     disk_.load({});
     make(closed);
     const MemoryDisk::Image before = disk_.image();
-    const auto report = verify_journal(kFrom, &disk_);
+    const auto report = verify_journal(kFile, &disk_);
     ASSERT_TRUE(report) << report.error().message;
     EXPECT_THAT(report->faults, IsEmpty());
     EXPECT_EQ(report->version, 4);
@@ -76,19 +76,19 @@ TEST_F(JournalMaintenanceTest, ASoundJournalIsFoundSoundAndIsLeftAsItWas) {
 
 TEST_F(JournalMaintenanceTest, TheFirstBadEntryIsNamed) {
   make(true);
-  const std::string bytes = disk_.image().at(kFrom);
+  const std::string bytes = disk_.image().at(kFile);
   const std::size_t at = bytes.find(entries_[17].bytes);
   ASSERT_NE(at, std::string::npos);
-  disk_.flip_bit(kFrom, 8 * at + 3);
-  const auto report = verify_journal(kFrom, &disk_);
+  disk_.flip_bit(kFile, 8 * at + 3);
+  const auto report = verify_journal(kFile, &disk_);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->first_bad, RoomSeq{18});
   EXPECT_THAT(report->faults.front(), HasSubstr("entry 18 does not fit the chain of hashes"));
   EXPECT_EQ(report->head, plain_head("bone", {entries_.begin(), entries_.begin() + 17}));
 
   const MemoryDisk::Image before = disk_.image();
-  EXPECT_EQ(backup_journal(kFrom, kTo, &disk_).error().code, ErrorCode::invalid_input);
-  const auto recovered = salvage_journal(kFrom, kTo, &disk_);
+  EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::invalid_input);
+  const auto recovered = salvage_journal(kFile, kTo, &disk_);
   ASSERT_TRUE(recovered) << recovered.error().message;
   EXPECT_EQ(recovered->head.seq, RoomSeq{17});
   EXPECT_EQ(recovered->lost(), 23u) << "of the 40 entries that the footer confirms";
@@ -108,13 +108,13 @@ TEST_F(JournalMaintenanceTest, ASpoiledCheckpointIsFoundAndLeftBehind) {
   make(true);
   const std::string newest = checkpoint_path(disk_, {RoomSeq{25}, {}});
   disk_.flip_bit(newest, 0);
-  const auto report = verify_journal(kFrom, &disk_);
+  const auto report = verify_journal(kFile, &disk_);
   ASSERT_TRUE(report);
   ASSERT_THAT(report->faults, SizeIs(1));
   EXPECT_THAT(report->faults.front(), HasSubstr(newest + " is not what was written"));
   EXPECT_EQ(report->first_bad, std::nullopt);
-  EXPECT_FALSE(backup_journal(kFrom, kTo, &disk_));
-  const auto recovered = salvage_journal(kFrom, kTo, &disk_);
+  EXPECT_FALSE(backup_journal(kFile, kTo, &disk_));
+  const auto recovered = salvage_journal(kFile, kTo, &disk_);
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->lost(), 0u);
   Journal journal = open(kTo);
@@ -127,7 +127,7 @@ TEST_F(JournalMaintenanceTest, ABackupIsTheJournalAgain) {
     disk_.load({});
     make(closed);
     const MemoryDisk::Image before = disk_.image();
-    const Result<void> done = backup_journal(kFrom, kTo, &disk_);
+    const Result<void> done = backup_journal(kFile, kTo, &disk_);
     ASSERT_TRUE(done) << done.error().message;
     const MemoryDisk::Image after = disk_.image();
     for (const auto& [name, content] : before) EXPECT_EQ(after.at(name), content) << name;
@@ -136,13 +136,13 @@ TEST_F(JournalMaintenanceTest, ABackupIsTheJournalAgain) {
     expect_copied(copy);
     EXPECT_EQ(copy.next_server_epoch().value(), 2u);
     EXPECT_FALSE(copy.recovered_to());
-    EXPECT_EQ(backup_journal(kFrom, kTo, &disk_).error().code, ErrorCode::exists);
+    EXPECT_EQ(backup_journal(kFile, kTo, &disk_).error().code, ErrorCode::exists);
   }
 }
 
 TEST_F(JournalMaintenanceTest, ABackupInSlicesLetsEntriesBeAppendedBetween) {
   make(false);
-  Journal journal = open(kFrom);
+  Journal journal = open(kFile);
   auto copy = JournalCopy::begin(journal, kTo);
   ASSERT_TRUE(copy) << copy.error().message;
   const std::vector<JournalEntry> all = some_entries(10, 60);
@@ -163,7 +163,7 @@ TEST_F(JournalMaintenanceTest, ABackupInSlicesLetsEntriesBeAppendedBetween) {
 TEST_F(JournalMaintenanceTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay) {
   make(false);
   {
-    Journal journal = open(kFrom);
+    Journal journal = open(kFile);
     const MemoryDisk::Image before = disk_.image();
     auto copy = JournalCopy::begin(journal, kTo);
     ASSERT_TRUE(copy && copy->step(7));
@@ -171,18 +171,18 @@ TEST_F(JournalMaintenanceTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay
   for (const auto& [name, bytes] : disk_.image()) EXPECT_FALSE(name.starts_with("/backup/")) << name;
   for (std::uint64_t n = 1; n < 150; n += 3) {
     disk_.fail_power_at(n);
-    const bool done = backup_journal(kFrom, kTo, &disk_).has_value();
+    const bool done = backup_journal(kFile, kTo, &disk_).has_value();
     EXPECT_EQ(done, !disk_.has_failed());
     disk_.power_returns();
     if (disk_.size(kTo).value()) {  // everything but the sync of the last step may be done
       Journal copy = open(kTo);
       expect_copied(copy);
     } else {
-      const Result<void> again = backup_journal(kFrom, kTo, &disk_);
+      const Result<void> again = backup_journal(kFile, kTo, &disk_);
       // Checkpoints that already had their names prevent a new copy, and the error says so.
       EXPECT_TRUE(again || again.error().code == ErrorCode::exists) << again.error().message;
     }
-    Journal source = open(kFrom);
+    Journal source = open(kFile);
     EXPECT_EQ(source.closed_because(), nullptr);
     ASSERT_TRUE(equal(entries_of(source), entries_));
     MemoryDisk::Image kept = disk_.image();
@@ -194,7 +194,7 @@ TEST_F(JournalMaintenanceTest, ACopyThatIsGivenUpOrCutShortLeavesNothingInTheWay
 
 TEST_F(JournalMaintenanceTest, WhatClientsKnowCountsAsLost) {
   make(true);
-  const auto recovered = salvage_journal(kFrom, kTo, &disk_, {{RoomSeq{39}, {}}, {RoomSeq{44}, {}}});
+  const auto recovered = salvage_journal(kFile, kTo, &disk_, {{RoomSeq{39}, {}}, {RoomSeq{44}, {}}});
   ASSERT_TRUE(recovered);
   EXPECT_EQ(recovered->lost(), 4u);
 }
@@ -203,7 +203,7 @@ TEST_F(JournalMaintenanceTest, WhatClientsKnowCountsAsLost) {
 // has a different bone, salvaged or not.
 TEST_F(JournalMaintenanceTest, ASalvagedJournalRefusesAnotherHistory) {
   make(true);
-  ASSERT_TRUE(salvage_journal(kFrom, kTo, &disk_));
+  ASSERT_TRUE(salvage_journal(kFile, kTo, &disk_));
   Journal journal = open(kTo);
   ASSERT_TRUE(journal.recovered_to());
   EXPECT_TRUE(journal.check_witness(plain_head("bone", {entries_.begin(), entries_.begin() + 3})));

@@ -11,13 +11,13 @@ namespace osteon {
 namespace {
 
 constexpr double kStiffness = 50.0, kStep_s = 1e-3;
-const FeedLaw kDense = drilling_law({}, RevolutionsPerMinute{1000}, GramsPerCm3{1.9}, 1.0);
+const FeedLaw kCorticalLaw = drilling_law({}, RevolutionsPerMinute{1000}, GramsPerCm3{1.9}, 1.0);
 
 TEST(FeedLaw, SolutionBalancesCouplingAndResistance) {
   for (const double extension : {0.05, 0.2, 0.58, 0.7}) {
-    const FeedSolution solution = solve_feed(kDense, kStiffness, extension, kStep_s);
+    const FeedSolution solution = solve_feed(kCorticalLaw, kStiffness, extension, kStep_s);
     EXPECT_NEAR(kStiffness * (extension - solution.feed_mm_per_s * kStep_s),
-                resistance_n(kDense, solution.feed_mm_per_s), 1e-6);
+                resistance_n(kCorticalLaw, solution.feed_mm_per_s), 1e-6);
     EXPECT_FALSE(solution.rubbing);
   }
 }
@@ -31,26 +31,26 @@ TEST(FeedLaw, LinearLawHasItsClosedForm) {
 TEST(FeedLaw, PushingHarderDrillsFasterUntilTheHeelTouches) {
   double before = 0.0;
   for (double extension = 0.1; extension < 2.0; extension += 0.1) {
-    const double feed = solve_feed(kDense, kStiffness, extension, kStep_s).feed_mm_per_s;
+    const double feed = solve_feed(kCorticalLaw, kStiffness, extension, kStep_s).feed_mm_per_s;
     EXPECT_GT(feed, before);
     before = feed;
   }
-  const FeedSolution hard = solve_feed(kDense, kStiffness, 5.0, kStep_s);
+  const FeedSolution hard = solve_feed(kCorticalLaw, kStiffness, 5.0, kStep_s);
   EXPECT_TRUE(hard.heel_contact);
-  EXPECT_EQ(hard.feed_mm_per_s, kDense.max_feed_mm_per_s);
+  EXPECT_EQ(hard.feed_mm_per_s, kCorticalLaw.max_feed_mm_per_s);
 }
 
 TEST(FeedLaw, BelowTheThresholdItRubs) {
-  const FeedSolution soft = solve_feed(kDense, kStiffness, 0.95 / kStiffness, kStep_s);
+  const FeedSolution soft = solve_feed(kCorticalLaw, kStiffness, 0.95 / kStiffness, kStep_s);
   EXPECT_TRUE(soft.rubbing);
   EXPECT_EQ(soft.feed_mm_per_s, 0.0);
-  EXPECT_GT(solve_feed(kDense, kStiffness, 1.05 / kStiffness, kStep_s).feed_mm_per_s, 0.0);
+  EXPECT_GT(solve_feed(kCorticalLaw, kStiffness, 1.05 / kStiffness, kStep_s).feed_mm_per_s, 0.0);
 }
 
 TEST(FeedLaw, NeverOvertakesTheDevice) {
   const FeedLaw nothing{.scale_n = 0.0, .exponent = 0.5, .max_feed_mm_per_s = 1e6, .threshold_n = 0.0};
   EXPECT_LE(solve_feed(nothing, kStiffness, 0.01, kStep_s).feed_mm_per_s * kStep_s, 0.01 + 1e-15);
-  EXPECT_EQ(solve_feed(kDense, kStiffness, -0.1, kStep_s).feed_mm_per_s, 0.0);
+  EXPECT_EQ(solve_feed(kCorticalLaw, kStiffness, -0.1, kStep_s).feed_mm_per_s, 0.0);
 }
 
 // A law with an offset: v = (K e - offset) / (c + K dt).
