@@ -240,6 +240,14 @@ std::vector<BlockKey> Room::take_stale_blocks() {
   return keys;
 }
 
+std::vector<BodyLeaves> Room::take_changes() {
+  std::vector<BodyLeaves> leaves;
+  for (const auto& [place, origins] : changes_)
+    leaves.push_back({place.first, place.second, {origins.begin(), origins.end()}});
+  changes_.clear();
+  return leaves;
+}
+
 std::vector<BlockKey> Room::bone_blocks() const {
   std::vector<BlockKey> keys;
   for (const auto& [id, body] : bodies_)

@@ -154,8 +154,8 @@ class Room {
   [[nodiscard]] std::vector<SceneItem> items() const;
   // Number of events that changed the bone in another way than by cutting.
   [[nodiscard]] std::uint64_t bone_changes() const { return bone_changes_; }
-  // Leaves that changed since the last call.
-  [[nodiscard]] std::vector<BodyLeaves> take_changes() { return std::exchange(changes_, {}); }
+  // Leaves that changed since the last call, each once, however many cuts reached it.
+  [[nodiscard]] std::vector<BodyLeaves> take_changes();
 
   // Blocks whose payload became stale since the last call, each once.
   [[nodiscard]] std::vector<BlockKey> take_stale_blocks();
@@ -276,7 +276,7 @@ class Room {
   std::map<RoomSeq, Event> events_;                        // committed events, tombstones included
   std::vector<Focus> focuses_;
   std::set<BlockKey> stale_;
-  std::vector<BodyLeaves> changes_;
+  std::map<std::pair<BodyId, int>, std::set<Coord>> changes_;  // by body and level
   RoomSeq room_seq_;
   std::chrono::nanoseconds now_{};
   std::uint64_t authors_ = 0, bone_epoch_ = 1, bone_changes_ = 0;

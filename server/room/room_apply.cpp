@@ -367,7 +367,7 @@ void Room::note_changed(BodyId id, const std::vector<LevelLeaves>& changed, Room
   for (const LevelLeaves& leaves : changed) {
     if (leaves.origins.empty()) continue;
     for (const BlockKey& key : body.surface.touch(leaves.level, leaves.origins)) stale_.insert(key);
-    changes_.push_back({id, leaves.level, leaves.origins});
+    changes_[{id, leaves.level}].insert(leaves.origins.begin(), leaves.origins.end());
     if (!event) continue;
     for (const Coord origin : leaves.origins) {
       FieldLeaf& leaf = event->leaves.emplace_back(FieldLeaf{id, leaves.level, origin, {}});
@@ -411,10 +411,10 @@ CutField Room::made_piece(const Body& parent, const SplitPiece& piece) const {
 // loses bone.
 void Room::catch_up(const Body& parent, CutField& field) const {
   FieldLeaf leaf;
-  for (const BodyLeaves& change : changes_) {
-    if (change.body != parent.field.body()) continue;
-    for (const Coord origin : change.origins) {
-      leaf.level = change.level;
+  for (const auto& [place, origins] : changes_) {
+    if (place.first != parent.field.body()) continue;
+    for (const Coord origin : origins) {
+      leaf.level = place.second;
       leaf.origin = origin;
       parent.field.read(leaf);
       field.merge(leaf);

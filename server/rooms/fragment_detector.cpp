@@ -48,9 +48,12 @@ std::vector<Separation> FragmentDetector::look() {
     for (const Coord origin : change.origins) leaves.push_back({change.body, change.level, origin, {}});
     read_(leaves);
     for (const FieldLeaf& leaf : leaves) found->second.copy.restore(leaf);
-    found->second.finder.touch(found->second.copy, change.level, change.origins);
     touched.insert(change.body);
   }
+  // Only once the copies are complete: a change of one level also affects cells of a finer one.
+  for (const BodyLeaves& change : changes)
+    if (const auto found = bodies_.find(change.body); found != bodies_.end())
+      found->second.finder.touch(found->second.copy, change.level, change.origins);
   std::vector<Separation> found;
   for (const BodyId body : touched) {
     Watched& watched = bodies_.at(body);

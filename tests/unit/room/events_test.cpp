@@ -219,6 +219,29 @@ TEST(RoomSplit, MakesABodyOfThePieceAndCutsReachBoth) {
   EXPECT_EQ(room.find_field(BodyId{1})->hash(), piece.hash());
 }
 
+// A busy server looks for pieces after many cuts at once. The look must not grow with their number.
+TEST(RoomSplit, ReportsALeafOnceHoweverManyCutsReachIt) {
+  Room once(test_block()), often(test_block());
+  const AuthorId surgeon = once.join(MemberKind::surgeon);
+  often.join(MemberKind::surgeon);
+  std::vector<Cut> cuts = strokes(surgeon, 1, 41);
+  commit_cut(once, cuts[0]);
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    Cut again = cuts[0];
+    again.author_seq += i;
+    commit_cut(often, again);
+  }
+  const std::vector<BodyLeaves> of_one = once.take_changes(), of_many = often.take_changes();
+  ASSERT_FALSE(of_one.empty());
+  ASSERT_EQ(of_many.size(), of_one.size());
+  for (std::size_t i = 0; i < of_one.size(); ++i) {
+    EXPECT_EQ(of_many[i].body, of_one[i].body);
+    EXPECT_EQ(of_many[i].level, of_one[i].level);
+    EXPECT_TRUE(std::ranges::equal(of_many[i].origins, of_one[i].origins));
+  }
+  EXPECT_TRUE(often.take_changes().empty());
+}
+
 // A body made in advance, from a copy that lacks the last cuts, equals the one that the room would have made.
 TEST(RoomSplit, TakesAPieceThatWasMadeBeforehand) {
   Room slow(test_block()), fast(test_block());
