@@ -125,26 +125,27 @@ class DrillingRoom : public testing::Test {
     EXPECT_FALSE(found.empty()) << "between " << from_mm << " and " << to_mm;
     return found;
   }
-  // Mean of a column over the ticks in which the tool moves. On a busy machine the tool stands still in some ticks.
-  // They may be a tenth at most, and do not count: they would measure how busy the machine is.
-  static double mean(const Hole& hole, const std::string& column, double from_mm, double to_mm) {
-    double sum = 0.0;
-    int moving = 0, standing = 0;
+  // Median of a column over the ticks in which the tool moves. On a busy machine the tool stands still in some ticks,
+  // and starts and stops in those beside them. A mean would measure how busy the machine is. At most a tenth may stand.
+  static double typical(const Hole& hole, const std::string& column, double from_mm, double to_mm) {
+    std::vector<double> values;
+    std::size_t standing = 0;
     for (const std::size_t i : on_the_way_in(hole, from_mm, to_mm)) {
-      if (hole.log["feed_mm_per_s"][i] < 1e-3) {
+      if (hole.log["feed_mm_per_s"][i] < 1e-3)
         ++standing;
-      } else {
-        sum += hole.log[column][i];
-        ++moving;
-      }
+      else
+        values.push_back(hole.log[column][i]);
     }
-    EXPECT_LT(standing, 0.1 * (standing + moving)) << column << " between " << from_mm << " and " << to_mm;
-    return sum / std::max(1, moving);
+    EXPECT_LT(10 * standing, standing + values.size()) << column << " between " << from_mm << " and " << to_mm;
+    if (values.empty()) return 0.0;
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::ranges::nth_element(values, middle);
+    return *middle;
   }
   // The whole cone is in the near cortex, in the medulla, or in the far cortex.
-  static double near_cortex(const Hole& hole, const std::string& column) { return mean(hole, column, 1.5, 4.8); }
-  static double medulla(const Hole& hole, const std::string& column) { return mean(hole, column, 6.5, 24.5); }
-  static double far_cortex(const Hole& hole, const std::string& column) { return mean(hole, column, 26.5, 29.5); }
+  static double near_cortex(const Hole& hole, const std::string& column) { return typical(hole, column, 1.5, 4.8); }
+  static double medulla(const Hole& hole, const std::string& column) { return typical(hole, column, 6.5, 24.5); }
+  static double far_cortex(const Hole& hole, const std::string& column) { return typical(hole, column, 26.5, 29.5); }
 
   // How far the tip goes beyond the far face.
   static double plunge_mm(const Hole& hole) {

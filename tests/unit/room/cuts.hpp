@@ -1,8 +1,11 @@
-// Cuts for the room's tests: seeded strokes of a burr and a drill over a plain block.
+// Cuts for the room's tests: seeded strokes of a burr and a drill over a plain block, and a room that commits them.
 #pragma once
+#include <gtest/gtest.h>
+
 #include <random>
 #include <vector>
 
+#include "server/room/room.hpp"
 #include "tests/support/scenes/bones.hpp"
 
 namespace osteon::test {
@@ -28,6 +31,13 @@ inline std::vector<Cut> strokes(AuthorId author, int count, unsigned seed) {
     cuts.push_back(cut);
   }
   return cuts;
+}
+
+inline RoomSeq commit_cut(Room& room, const Cut& cut) {
+  const Result<Outcome> outcome = room.submit(cut);
+  EXPECT_TRUE(outcome.has_value()) << outcome.error().message;
+  EXPECT_TRUE(outcome->committed()) << sentence(outcome->rejection);
+  return outcome->room_seq;
 }
 
 }  // namespace osteon::test

@@ -33,4 +33,12 @@ inline Fragment part(const Case& bone, const std::function<bool(int)>& has, doub
   return fragment;
 }
 
+// One side of the plane x = 0.
+inline Fragment half(const Case& bone, bool upper, double volume_mm3 = 1000.0) {
+  Fragment fragment = part(
+      bone, [&](int x) { return (x >= 0) == upper; }, volume_mm3);
+  (upper ? fragment.bounds.min_mm : fragment.bounds.max_mm).x() = 0.0;
+  return fragment;
+}
+
 }  // namespace osteon::test
