@@ -13,6 +13,7 @@
 #include <string_view>
 
 #include "tests/fuzz/targets.hpp"
+#include "tests/support/trials.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -98,7 +99,7 @@ TEST(Fuzz, TargetsStandMutatedInputs) {
     for (const Bytes& seed : target.seeds) target.run(seed);
     settle();
     if (!asked) {
-      for (long i = 0; i < target.mutations; ++i)
+      for (long i = 0; i < test::trials(static_cast<unsigned>(target.mutations)); ++i)
         for (const Bytes& seed : target.seeds) target.run(changed(target, seed, random));
       settle();
       continue;
@@ -119,7 +120,7 @@ TEST(Fuzz, TargetsStandNoiseAndNothing) {
   std::mt19937 random(2);
   for (const Target& target : targets()) {
     target.run({});
-    for (int i = 0; i < 500; ++i) {
+    for (int i = 0; i < static_cast<int>(test::trials(500)); ++i) {
       Bytes noise(random() % 2000);
       for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
       target.run(noise);

@@ -11,6 +11,7 @@
 #include "tests/integration/killed_servers.hpp"
 #include "tests/integration/stage.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/trials.hpp"
 #include "tests/unit/rooms/members.hpp"
 
 namespace osteon::test {
@@ -18,12 +19,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-TEST(PersistedRooms, AHundredKilledServersLoseNothingTheyAcknowledged) {
-  const KilledServers report = kill_servers(100, 1);
+TEST(PersistedRooms, KilledServersLoseNothingTheyAcknowledged) {
+  const int kills = static_cast<int>(trials(100));
+  const KilledServers report = kill_servers(kills, 1);
   EXPECT_EQ(report.fault, "");
-  EXPECT_EQ(report.kills, 100);
-  EXPECT_LT(report.killed_idle, 50) << "most kills are during work";
-  EXPECT_GT(report.acknowledged, 1000u);
+  EXPECT_EQ(report.kills, kills);
+  EXPECT_LT(report.killed_idle, kills / 2) << "most kills are during work";
+  EXPECT_GT(report.acknowledged, trials(1000));
   EXPECT_EQ(report.lost, 0u);
   EXPECT_EQ(report.twice, 0u);
   EXPECT_EQ(report.missing, 0u);

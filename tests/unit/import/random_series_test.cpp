@@ -10,12 +10,13 @@
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/support/trials.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
 namespace osteon::import {
 namespace {
 
-constexpr int kScans = 2000;
+const int kScans = static_cast<int>(test::trials(2000));
 // Most progress calls of one import. Each stands for a slice of a stage, or a hundredth of a second of the distance's
 // threads.
 constexpr int kMostQuestions = 20'000;

@@ -1,4 +1,4 @@
-// Thousands of trials of the journal on disks that lose power and that fail.
+// Hundreds of trials, every night thousands, of the journal on disks that lose power and that fail.
 #include <gtest/gtest.h>
 
 #include <cerrno>
@@ -6,6 +6,7 @@
 
 #include "tests/support/disk/damage_trials.hpp"
 #include "tests/support/disk/journal_trials.hpp"
+#include "tests/support/trials.hpp"
 
 namespace osteon::test {
 namespace {
@@ -23,14 +24,14 @@ void expect_nothing_lost(const Tally& tally) {
 }
 
 TEST(JournalTrials, LosesNothingAcknowledgedWhenThePowerFails) {
-  const Tally tally = power_loss_trials(1, 2000);
+  const Tally tally = power_loss_trials(1, trials(2000));
   show("power loss", tally);
   expect_nothing_lost(tally);
   EXPECT_EQ(tally.closed, 0u) << "a power failure alone is no reason to refuse entries";
   // The trials are hard: the disk fails in most of them, and often while a batch is under way.
   EXPECT_GT(tally.failed, tally.trials * 9 / 10);
   EXPECT_GT(tally.acknowledged, 10 * tally.trials);
-  EXPECT_GT(tally.kept_unasked, 100u);
+  EXPECT_GT(tally.kept_unasked, trials(100));
 }
 
 // The same trials must find the loss when entries are acknowledged before the disk has them.
@@ -42,27 +43,27 @@ TEST(JournalTrials, FindsEntriesLostWhenNobodyWaitsForTheDisk) {
 }
 
 TEST(JournalTrials, LosesNothingAcknowledgedWhenAnyWriteOrSyncFails) {
-  const Tally tally = failing_disk_trials(10000, 1000, EIO);
+  const Tally tally = failing_disk_trials(10000, trials(1000), EIO);
   show("EIO", tally);
   expect_nothing_lost(tally);
-  EXPECT_EQ(tally.failed, 1000u);
-  EXPECT_GT(tally.closed, 300u);
+  EXPECT_EQ(tally.failed, trials(1000));
+  EXPECT_GT(tally.closed, trials(240));
 }
 
 TEST(JournalTrials, LosesNothingAcknowledgedWhenTheDiskIsFullAtAnyWrite) {
-  const Tally tally = failing_disk_trials(20000, 1000, ENOSPC);
+  const Tally tally = failing_disk_trials(20000, trials(1000), ENOSPC);
   show("ENOSPC", tally);
   expect_nothing_lost(tally);
-  EXPECT_EQ(tally.failed, 1000u);
-  EXPECT_GT(tally.closed, 300u);
+  EXPECT_EQ(tally.failed, trials(1000));
+  EXPECT_GT(tally.closed, trials(240));
 }
 
 // Data that looks written after a failed sync is not. The next process must write it again before it appends.
 TEST(JournalTrials, LosesNothingAcknowledgedWhereAFailedSyncWasForgotten) {
-  const Tally tally = forgotten_sync_trials(1, 1000);
+  const Tally tally = forgotten_sync_trials(1, trials(1000));
   show("forgotten sync", tally);
   expect_nothing_lost(tally);
-  EXPECT_EQ(tally.failed, 1000u);
+  EXPECT_EQ(tally.failed, trials(1000));
   EXPECT_EQ(tally.closed, 0u);
 }
 
@@ -74,7 +75,7 @@ void show(const char* what, const DamageTally& tally) {
 }
 
 TEST(JournalTrials, DamageToAnyOneFileIsHarmlessOrNamed) {
-  const DamageTally tally = damage_trials(1, 2000);
+  const DamageTally tally = damage_trials(1, trials(2000));
   show("damage", tally);
   EXPECT_EQ(tally.silent, 0u) << tally.faults.front();
   EXPECT_GT(tally.whole, tally.trials / 4);
@@ -91,7 +92,7 @@ TEST(JournalTrials, DamageToTheOnlyLogIsSilent) {
 
 TEST(JournalTrials, NobodyCallsAKilledJournalDamaged) {
   for (const bool power_fails : {false, true}) {
-    const DamageTally tally = kill_trials(30000, 1000, power_fails);
+    const DamageTally tally = kill_trials(30000, trials(1000), power_fails);
     show(power_fails ? "power failures" : "kills", tally);
     EXPECT_EQ(tally.called_damaged, 0u);
     EXPECT_EQ(tally.silent, 0u);

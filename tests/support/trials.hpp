@@ -1,0 +1,15 @@
+// How many random trials a test makes.
+#pragma once
+#include <cstdlib>
+#include <string_view>
+
+namespace osteon::test {
+
+// All with OSTEON_TRIALS=all, as deploy/nightly sets it. Otherwise a quarter, so that deploy/test stays in its budget
+// (decision 0052). Expected counts are given in the same way.
+[[nodiscard]] inline unsigned trials(unsigned all) {
+  const char* asked = std::getenv("OSTEON_TRIALS");
+  return asked != nullptr && std::string_view(asked) == "all" ? all : (all + 3) / 4;
+}
+
+}  // namespace osteon::test
