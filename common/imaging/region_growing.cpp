@@ -159,12 +159,13 @@ Result<void> check_seed(const HuVolume& volume, const std::array<int, 3>& seed, 
   for (std::size_t axis = 0; axis < 3; ++axis)
     if (seed[axis] < 0 || seed[axis] >= volume.dims[axis])
       return failure(ErrorCode::invalid_input, "the seed at " + text_of(volume.position_mm(voxel)) +
-                                                   " lies outside the scan; give one inside it");
+                                                   " lies outside the scan; give a --seed inside it");
   const int hu = volume.at(seed[0], seed[1], seed[2]);
   if (params.similarity != Similarity::interval || (params.low_hu <= hu && hu <= params.high_hu)) return {};
   std::array<char, 160> text{};
-  std::snprintf(text.data(), text.size(), " has %d HU, and the region takes %g to %g HU; move it, or change the limits",
-                hu, params.low_hu, params.high_hu);
+  std::snprintf(text.data(), text.size(),
+                " has %d HU, and its region takes %g to %g HU; give another --seed or --threshold", hu, params.low_hu,
+                params.high_hu);
   return failure(ErrorCode::invalid_input, "the seed at " + text_of(volume.position_mm(voxel)) + text.data());
 }
 
@@ -185,7 +186,7 @@ Result<std::array<int, 3>> seed_voxel(const HuVolume& volume, const Vec3& positi
   const Vec3 last(volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1);
   const Box box = enclosing_box(volume, Vec3::Zero(), last);
   return failure(ErrorCode::invalid_input, "the seed at " + text_of(position_mm) +
-                                               " lies outside the scan; give one between " + text_of(box.min_mm) +
+                                               " lies outside the scan; give a --seed between " + text_of(box.min_mm) +
                                                " and " + text_of(box.max_mm));
 }
 
