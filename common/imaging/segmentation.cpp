@@ -76,21 +76,28 @@ Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double a
 Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params, const ScanEnds& ends,
                                const KeepGoing& keep_going) {
   auto dense = dense_voxels(volume, params.threshold_hu, part(keep_going, 0.0, kThresholdEnd));
-  if (!dense || params.hollow) return dense;
+  if (!dense) return dense;
+  return segment_bone(volume, std::move(*dense), params, ends, keep_going);
+}
 
-  VoxelMask solid = *dense;
+Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const SegmentationParams& params,
+                               const ScanEnds& ends, const KeepGoing& keep_going) {
+  for (std::uint8_t& value : dense.values) value = value != 0 ? 1 : 0;
+  if (params.hollow) return dense;
+
+  VoxelMask solid = dense;
   if (params.cancellous_hu < params.threshold_hu) {
-    auto cancellous = cancellous_between(volume, *dense, params, part(keep_going, kThresholdEnd, kCancellousEnd));
+    auto cancellous = cancellous_between(volume, dense, params, part(keep_going, kThresholdEnd, kCancellousEnd));
     if (!cancellous) return cancellous;
     for (std::size_t i = 0; i < solid.values.size(); ++i) solid.values[i] |= cancellous->values[i];
   }
   auto enclosed = enclosed_by(solid, volume.spacing_mm, params, ends, part(keep_going, kCancellousEnd, kEnclosedEnd));
   if (!enclosed) return enclosed;
-  if (auto opened = remove_air(volume, *dense, params.air_hu, *enclosed, part(keep_going, kEnclosedEnd, 1.0)); !opened)
+  if (auto opened = remove_air(volume, dense, params.air_hu, *enclosed, part(keep_going, kEnclosedEnd, 1.0)); !opened)
     return tl::unexpected(opened.error());
 
   for (std::size_t i = 0; i < solid.values.size(); ++i) {
-    if (dense->values[i] != 0) continue;
+    if (dense.values[i] != 0) continue;
     const BoneVoxel kind = solid.values[i] != 0       ? BoneVoxel::cancellous
                            : enclosed->values[i] != 0 ? BoneVoxel::marrow
                                                       : BoneVoxel::none;

@@ -42,4 +42,8 @@ inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}
 [[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params,
                                              const ScanEnds& ends, const KeepGoing& keep_going);
 
+// The same for dense bone that was found in another way: the voxels that are not 0 in `dense`.
+[[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const SegmentationParams& params,
+                                             const ScanEnds& ends, const KeepGoing& keep_going);
+
 }  // namespace osteon::imaging

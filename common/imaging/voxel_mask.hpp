@@ -29,6 +29,9 @@ struct VoxelMask {
   [[nodiscard]] std::uint8_t& at(int column, int row, int slice) { return values[index(column, row, slice)]; }
 };
 
+// The voxels from `first` to `last`, both included. Takes over the memory of `mask`.
+[[nodiscard]] VoxelMask cropped(VoxelMask mask, const std::array<int, 3>& first, const std::array<int, 3>& last);
+
 // 1 for every voxel whose centre is at most `radius_mm` from the centre of a voxel of the mask, including that voxel.
 // Exact Euclidean distances on voxels of `spacing_mm`. Error: cancelled.
 [[nodiscard]] Result<VoxelMask> within_mm(const VoxelMask& mask, const Vec3& spacing_mm, double radius_mm,

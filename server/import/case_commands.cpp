@@ -29,16 +29,18 @@ namespace fs = std::filesystem;
 
 constexpr double kPhantomPitch_mm = 0.4;
 constexpr double kMeshPitch_mm = 0.5;
+constexpr const char* kSuggest = "suggest";
 
 struct CaseArguments {
-  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median;
+  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold,
+                                                                       grow_by = "volume";
   std::string keep;
-  std::vector<std::string> bone_colours;
-  std::optional<double> pitch_mm, threshold_hu;
+  std::vector<std::string> bone_colours, seeds;
+  std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0;
   std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
-  bool json = false, merge = false, hollow = false, list = false;
+  bool json = false, merge = false, hollow = false, list = false, adaptive = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
@@ -108,13 +110,22 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.list_only = a.list;
   if (!a.median.empty()) options.median = a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
   options.gaussian_mm = a.gaussian_mm;
+  for (const std::string& seed : a.seeds) {
+    const auto position_mm = parse_seed(seed);
+    if (!position_mm) return tl::unexpected(position_mm.error());
+    options.grow.seeds_mm.push_back(*position_mm);
+  }
+  options.grow.similar_hu = a.similar_hu;
+  options.grow.adaptive = a.adaptive;
+  options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   Bar bar(stop);
   auto scan = read_scan(a, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
   const std::string series = report_lines(scan->report);
 
   options.pitch_mm = a.pitch_mm;
-  if (a.threshold_hu) options.threshold_hu = *a.threshold_hu;
+  options.suggest_threshold = a.threshold == kSuggest;
+  if (!a.threshold.empty() && !options.suggest_threshold) options.threshold_hu = std::stod(a.threshold);
   if (!a.title.empty()) options.title = a.title;
   if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
@@ -241,6 +252,16 @@ CLI::Validator within(double low, double high) {
   return {check, text, "within"};
 }
 
+// The word "suggest", or a number within these limits.
+CLI::Validator suggest_or_within(double low, double high) {
+  const auto check = [number = within(low, high)](std::string value) {
+    if (value == kSuggest) return std::string();
+    const std::string wrong = number(value);
+    return wrong.empty() ? wrong : wrong + ", nor the word " + kSuggest;
+  };
+  return {check, "NUMBER or suggest", "suggest or within"};
+}
+
 double millimetres_of(const std::string& unit) {
   return unit == "m" ? 1000.0 : unit == "inch" ? 25.4 : unit == "cm" ? 10.0 : 1.0;
 }
@@ -301,11 +322,32 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
       ->check(within(0.02, 10.0));
-  ct->add_option("--threshold", a.threshold_hu,
-                 "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm)")
-      ->check(within(-1000.0, 4000.0));
-  ct->add_option("--keep", a.keep,
-                 "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  CLI::Option* threshold =
+      ct->add_option("--threshold", a.threshold,
+                     "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm), or "
+                     "suggest: find it in the scan, and say why")
+          ->check(suggest_or_within(-1000.0, 4000.0));
+  CLI::Option* keep = ct->add_option(
+      "--keep", a.keep,
+      "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  CLI::Option* seed =
+      ct->add_option("--seed", a.seeds,
+                     "X,Y,Z, mm (LPS): keep the bone that grows from there over voxels that reach the threshold and "
+                     "share a face, instead of islands; may be given again")
+          ->expected(1)
+          ->take_all()
+          ->excludes(keep);
+  CLI::Option* similar = ct->add_option("--similar", a.similar_hu,
+                                        "Grow over voxels within this number of HU of the seed, instead of a threshold")
+                             ->check(within(1.0, 4000.0))
+                             ->needs(seed)
+                             ->excludes(threshold);
+  ct->add_flag("--adaptive", a.adaptive, "With --similar: of the mean of the region so far, instead of the seed")
+      ->needs(similar);
+  ct->add_option("--by", a.grow_by, "Grow in the whole volume, or slice by slice from that of the seed")
+      ->check(CLI::IsMember({"slice", "volume"}))
+      ->capture_default_str()
+      ->needs(seed);
   ct->add_flag("--list", a.list, "List the islands and write nothing");
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");

@@ -12,13 +12,14 @@
 #include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/resample.hpp"
 #include "common/imaging/segmentation.hpp"
+#include "common/imaging/threshold.hpp"
 #include "server/import/import_steps.hpp"
 
 namespace osteon::import {
 namespace {
 
 // Shares of the stages in the total time, for one progress bar over all of them.
-constexpr double kSmoothEnd = 0.05, kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
+constexpr double kSmoothEnd = 0.05, kGrowEnd = 0.1, kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
 // Smallest size of parts of an island that are reported if only marrow connects them: absolute, and relative to the
 // largest.
 constexpr double kLargePiece_cm3 = 0.5, kLargePiece = 0.1;
@@ -283,22 +284,64 @@ Result<std::string> smooth(imaging::HuVolume& scan, const CtOptions& options, co
   return names;
 }
 
-Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const KeepGoing& keep_going) {
-  const auto work = dense_region(scan, options.threshold_hu, keep_going);
+Result<imaging::ThresholdSuggestion> suggested_threshold(const imaging::HuVolume& scan, const KeepGoing& keep_going) {
+  const auto histogram = imaging::hu_histogram(scan, keep_going);
+  if (!histogram) return tl::unexpected(histogram.error());
+  return imaging::suggest_threshold(*histogram);
+}
+
+// The part around all regions.
+Region grown_region(const std::vector<imaging::Region>& regions, const imaging::HuVolume& volume) {
+  std::array<int, 3> first = volume.dims, last{-1, -1, -1};
+  for (const imaging::Region& region : regions)
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      first[axis] = std::min(first[axis], region.first[axis]);
+      last[axis] = std::max(last[axis], region.last[axis]);
+    }
+  return grown(first, last, volume);
+}
+
+// The islands with the regions' seeds, in the order of the seeds. `first`: the part's first voxel in the scan.
+std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const imaging::Islands& islands,
+                            const std::array<int, 3>& first) {
+  std::vector<int> numbers;
+  for (const imaging::Region& region : regions)
+    for (const imaging::VoxelRun& run : islands.components.runs) {
+      if (run.slice != region.seed[2] - first[2] || run.row != region.seed[1] - first[1] ||
+          run.first > region.seed[0] - first[0] || run.last < region.seed[0] - first[0])
+        continue;
+      const int number = islands.number[run.component];
+      if (std::ranges::find(numbers, number) == numbers.end()) numbers.push_back(number);
+    }
+  return numbers;
+}
+
+// `bones`: what grew from seeds, if there are any.
+Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std::optional<GrownBones> bones,
+                          const KeepGoing& keep_going) {
+  const auto work =
+      bones ? Result<Region>(grown_region(bones->regions, scan)) : dense_region(scan, options.threshold_hu, keep_going);
   if (!work) return tl::unexpected(work.error());
   Segmented s;
   s.volume = imaging::cropped(std::move(scan), work->first, work->last);
   imaging::SegmentationParams params;
   params.threshold_hu = options.threshold_hu;
   params.hollow = options.hollow;
-  const auto bone = imaging::segment_bone(s.volume, params, work->ends, part(keep_going, 0.0, 0.8));
+  const KeepGoing segmenting = part(keep_going, 0.0, 0.8);
+  const auto bone =
+      bones ? imaging::segment_bone(s.volume, imaging::cropped(std::move(bones->labels), work->first, work->last),
+                                    params, work->ends, segmenting)
+            : imaging::segment_bone(s.volume, params, work->ends, segmenting);
   if (!bone) return tl::unexpected(bone.error());
   const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 0.9));
   if (!islands) return tl::unexpected(islands.error());
-  auto kept = options.list_only ? Result<std::vector<int>>{} : islands_to_keep(options, islands->list);
+  auto kept = options.list_only ? Result<std::vector<int>>{}
+              : bones           ? Result<std::vector<int>>(islands_of(bones->regions, *islands, work->first))
+                                : islands_to_keep(options, islands->list);
   if (!kept) return tl::unexpected(kept.error());
   s.bones = imaging::number_bones(*islands, *kept, options.merge, s.volume.dims);
   s.found.merged = options.merge;
+  if (bones) s.found.regions = std::move(bones->regions);
   s.first = s.volume.dims;
   s.last = {-1, -1, -1};
   for (const int number : *kept)
@@ -330,7 +373,7 @@ Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::Hu
   return surface_mm;
 }
 
-Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) {
+Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
   imaging::HuVolume geometry;  // of the whole scan, without its values
   geometry.dims = scan.volume.dims;
   geometry.spacing_mm = scan.volume.spacing_mm;
@@ -350,8 +393,29 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
     return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
   const auto smoothed = smooth(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
-  auto s = segment(std::move(scan.volume), options, part(keep_going, kSmoothEnd, kSegmentEnd));
+  scan.source += *smoothed;
+  std::string reason;
+  if (options.suggest_threshold) {
+    const auto suggested = suggested_threshold(scan.volume, part(keep_going, kSmoothEnd, kSmoothEnd));
+    if (!suggested) return tl::unexpected(suggested.error());
+    options.threshold_hu = suggested->threshold_hu;
+    reason = suggested->reason;
+    scan.source += ", threshold suggested";
+  }
+  std::optional<GrownBones> bones;
+  if (!options.grow.seeds_mm.empty()) {
+    auto grown = grow_bones(scan.volume, options.grow, options.threshold_hu, part(keep_going, kSmoothEnd, kGrowEnd));
+    if (!grown) return tl::unexpected(grown.error());
+    options.threshold_hu = grown->threshold_hu;
+    scan.source += grown->description;
+    bones = std::move(*grown);
+  }
+  auto s = segment(std::move(scan.volume), options, std::move(bones), part(keep_going, kGrowEnd, kSegmentEnd));
   if (!s) return tl::unexpected(s.error());
+  s->found.threshold_reason = std::move(reason);
+  if (!s->found.regions.empty())
+    s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
+                                             Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
   if (options.list_only) return CtImport{std::move(s->found), {}};
   const auto surface_mm =
       measure_surface(*s, geometry, options.threshold_hu, pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
@@ -364,7 +428,7 @@ Result<CtImport> make_case(CtScan scan, const CtOptions& options, const KeepGoin
 
   CaseInfo info;
   info.title = options.title;
-  info.source = scan.source + *smoothed;
+  info.source = scan.source;
   info.pitch_mm = pitch_mm;
   info.calibration = options.calibration;
   info.threshold_hu = options.threshold_hu;

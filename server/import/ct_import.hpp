@@ -10,12 +10,15 @@
 #include "common/volume/case.hpp"
 #include "common/volume/iso_surface.hpp"
 #include "server/import/ct_scan.hpp"
+#include "server/import/grown_bones.hpp"
 
 namespace osteon::import {
 
 struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
+  bool suggest_threshold = false;  // take suggest_threshold() instead
+  GrowOptions grow;                // with seeds: the bones that grow from them are kept, instead of islands
   DensityCalibration calibration = imaging::kRho1995;
   std::string title = "CT";  // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;     // islands by number, from 1; empty: the largest
@@ -30,6 +33,8 @@ struct CtOptions {
 
 // Result of the segmentation.
 struct CtSegmentation {
+  std::string threshold_reason;          // empty if the threshold was not suggested
+  std::vector<imaging::Region> regions;  // that grew from seeds
   std::vector<imaging::Island> islands;  // largest first; number N is islands[N - 1]
   std::vector<int> kept;                 // numbers; empty if the islands were only listed
   bool merged = false;                   // the kept islands are one bone
@@ -38,7 +43,7 @@ struct CtSegmentation {
   std::vector<double> joined_cm3;  // parts of dense and cancellous bone that only marrow joins, if several are large
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
-  Box region;                                // part of the scan around everything that reaches the threshold, LPS
+  Box region;  // part of the scan around everything that reaches the threshold, LPS. With seeds: the whole scan
 };
 
 struct CtImport {
@@ -46,7 +51,8 @@ struct CtImport {
   std::optional<Case> bone;  // empty only if the islands were only listed
 };
 
-// segment_bone() decides what is bone, and the options decide which islands are kept. If the scan ends within bone, the
+// segment_bone() decides what is bone, and the options decide which islands are kept. With seeds, the grown regions
+// take the place of the voxels at or above the threshold. If the scan ends within bone, the
 // bone ends with the last whole voxel. No density is above that of compact bone; denser parts of the scan are labelled
 // metal or enamel. Errors: invalid_input (no bone, no such island, voxels of an impossible size, too many samples),
 // exhausted (memory), cancelled, internal.

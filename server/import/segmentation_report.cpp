@@ -43,6 +43,12 @@ std::string segmentation_text(const CtSegmentation& found) {
   std::string text;
   double kept_cm3 = 0.0, others_cm3 = 0.0, all_cm3 = 0.0, largest_other_cm3 = 0.0;
   std::size_t listed = 0, others = 0;
+  if (!found.threshold_reason.empty()) text += "suggested  " + found.threshold_reason + "\n";
+  for (std::size_t i = 0; i < found.regions.size(); ++i) {
+    const imaging::Region& region = found.regions[i];
+    text += line("%s %6zu  %lld voxels from %.0f to %.0f HU\n", i == 0 ? "grown     " : "          ", i + 1,
+                 static_cast<long long>(region.voxels), region.low_hu, region.high_hu);
+  }
   text += "islands    number     cm3   g/cm3       centre, mm (LPS)\n";
   const std::vector<bool> is_kept = kept_flags(found);
   for (std::size_t i = 0; i < found.islands.size(); ++i) {
@@ -67,7 +73,9 @@ std::string segmentation_text(const CtSegmentation& found) {
   if (found.kept.empty()) return text;
   const std::size_t left_out = found.islands.size() - found.kept.size();
   if (left_out == 0)
-    text += line("kept       all %.2f cm3; nothing was left out\n", kept_cm3);
+    text += line(found.regions.empty() ? "kept       all %.2f cm3; nothing was left out\n"
+                                       : "kept       all %.2f cm3 that grew from the seeds\n",
+                 kept_cm3);
   else
     text += line(
         "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out\n"

@@ -3,6 +3,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 
 import numpy as np
 
@@ -61,6 +62,51 @@ def real_imports(run):
             measured = Measured(float(np.median(now)), before, min(now), max(now)) if now else Measured(None)
             values[f"import_{name}_{what}"] = measured
     return values
+
+
+def floods():
+    """Region growing as a user of SciPy or scikit-image writes it, for those of them that are installed."""
+    found = {}
+    try:
+        from scipy import ndimage
+
+        def scipy_label(scan, low_hu, seed):
+            labels, _ = ndimage.label(scan >= low_hu)
+            return labels == labels[seed]
+        found["SciPy"] = scipy_label
+    except ImportError:
+        pass
+    try:
+        from skimage.segmentation import flood
+        found["scikit-image"] = lambda scan, low_hu, seed: flood(scan >= low_hu, seed, connectivity=1)
+    except ImportError:
+        pass
+    return found
+
+
+def region_growing(run):
+    """CPU time of one region, beside the fastest of ITK, SciPy and scikit-image. All must give the same voxels."""
+    skull = run.example("Cranium.inv3")
+    if skull is None:
+        run.skip("region_growing", "the package invesalius-examples is not installed")
+        return {"region_growing_cpu": Measured(None), "region_growing_speedup": Measured(None)}
+    folder = run.folder / "region-growing"
+    folder.mkdir(exist_ok=True)
+    out = json.loads(run.output("osteon-region-growing", skull, folder))
+    scan = np.fromfile(folder / "scan.raw", np.int16).reshape(out["dims"][::-1])
+    region = np.fromfile(folder / "region.raw", np.uint8).reshape(scan.shape) != 0
+    others, same = {"ITK": out["itk_ms"]}, out["same"]
+    for name, grow in floods().items():
+        run.say(f"region growing: {name}")
+        others[name] = []
+        for _ in range(len(out["itk_ms"])):
+            start = time.process_time()
+            grown = grow(scan, out["low_hu"], tuple(out["seed"][::-1]))
+            others[name].append(1e3 * (time.process_time() - start))
+        same = same and np.array_equal(grown, region)
+    ours, fastest = float(np.median(out["ours_ms"])), min(float(np.median(ms)) for ms in others.values())
+    return {"region_growing_cpu": Measured(ours, fastest, min(out["ours_ms"]), max(out["ours_ms"]), 1),
+            "region_growing_speedup": Measured(fastest / ours if same else None, None, None, None, 1)}
 
 
 def scanned_slab(run):

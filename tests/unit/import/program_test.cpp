@@ -231,6 +231,66 @@ TEST_F(Program, WrongIslandsAreOneSentence) {
   expect_refused({"ct", path("series")}, "--out", folder_);
 }
 
+TEST_F(Program, GrowsBonesFromSeeds) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  const auto import = [&](const char* name, std::vector<std::string> more) {
+    std::vector<std::string> arguments{"ct", path("series"), "--out", path(name)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = test::run(kProgram, arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  };
+  import("second", {"--keep", "2"});
+  EXPECT_NE(import("grown", {"--seed", "17,3.2,3"}).find("that grew from the seeds"), std::string::npos);
+  import("both", {"--seed", "17,3,3", "--seed", "3,3,3"});
+  import("similar", {"--seed=17,3,3", "--similar", "200", "--adaptive", "--by", "slice"});
+  const auto second = Case::load(path("second")), grown = Case::load(path("grown")), both = Case::load(path("both")),
+             similar = Case::load(path("similar"));
+  ASSERT_TRUE(second && grown && both && similar);
+  EXPECT_EQ(grown->volume_mm3(), second->volume_mm3()) << "the second island grows from its seed";
+  EXPECT_NE(grown->info().source.find(", voxels of 226 HU and more grown in the volume from 17,3.2,3 mm"),
+            std::string::npos)
+      << grown->info().source;
+  EXPECT_NE(similar->info().source.find("within 200 HU of the region's mean grown slice by slice from 17,3,3 mm"),
+            std::string::npos)
+      << similar->info().source;
+  EXPECT_EQ(both->bone_number({20, 6, 4}), 1) << "in the order of the seeds";
+  EXPECT_EQ(both->bone_number({7, 7, 4}), 2);
+}
+
+TEST_F(Program, WrongSeedsAreOneSentence) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  expect_refused({"ct", path("series"), "--out", path("case"), "--seed", "1,2"}, "write X,Y,Z in mm", folder_);
+  const auto with = [&](std::vector<std::string> more) {
+    std::vector<std::string> arguments{"ct", path("series"), "--out", path("case")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return arguments;
+  };
+  expect_refused(with({"--similar", "50"}), "--seed", folder_);
+  expect_refused(with({"--by", "slice"}), "--seed", folder_);
+  expect_refused(with({"--seed", "3,3,3", "--adaptive"}), "--similar", folder_);
+  expect_refused(with({"--seed", "3,3,3", "--by", "row"}), "--by", folder_);
+  expect_refused(with({"--seed", "3,3,3", "--keep", "1"}), "--keep", folder_);
+  expect_refused(with({"--seed", "3,3,3", "--similar", "50", "--threshold", "300"}), "--threshold", folder_);
+  for (const char* wrong : {"0", "nan"})
+    expect_refused(with({"--seed", "3,3,3", "--similar", wrong}), "--similar", folder_);
+  expect_refused(with({"--threshold", "Suggest"}), "nor the word suggest", folder_);
+}
+
+TEST_F(Program, SuggestsAThresholdAndSaysWhy) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  const auto made = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--threshold", "suggest"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_NE(made.out.find("parts soft tissue (-90 +- 0 HU) from bone (1400 +- 0 HU"), std::string::npos) << made.out;
+  const auto bone = Case::load(path("case"));
+  ASSERT_TRUE(bone);
+  EXPECT_GT(bone->info().threshold_hu, -90.0);
+  EXPECT_LT(bone->info().threshold_hu, 1400.0);
+  EXPECT_NE(made.out.find("threshold  " + std::to_string(std::lround(bone->info().threshold_hu)) + " HU"),
+            std::string::npos)
+      << made.out;
+}
+
 TEST_F(Program, AStepThatRemovesNothingSaysWhy) {
   ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "6:1.9", "--width", "10", "--pitch", "0.5", "--out",
                                  path("case")})
