@@ -64,14 +64,14 @@ void filter_line(float* line, int count) {
 }
 
 // The two voxels around a sample, and its position from the first to the second.
-struct Bracket {
+struct LabelBracket {
   int low = 0, high = 0;
   float part = 0;
 };
 
-std::vector<Bracket> brackets(int first_sample, int last_sample, double pitch_mm, double spacing_mm, int first_voxel,
-                              int last_voxel) {
-  std::vector<Bracket> out;
+std::vector<LabelBracket> brackets(int first_sample, int last_sample, double pitch_mm, double spacing_mm,
+                                   int first_voxel, int last_voxel) {
+  std::vector<LabelBracket> out;
   for (int i = first_sample; i <= last_sample; ++i) {
     const double at =
         std::clamp(i * pitch_mm / spacing_mm, static_cast<double>(first_voxel), static_cast<double>(last_voxel));
@@ -161,8 +161,8 @@ Result<DenseVolume<float>> resample(const DenseVolume<float>& field, const Vec3&
       [&](int x) {
         float* value =
             out.values.data() + static_cast<std::ptrdiff_t>(x) * static_cast<std::ptrdiff_t>(ys.size() * zs.size());
-        const Bracket& i = xs[static_cast<std::size_t>(x)];
-        for (const Bracket& j : ys) {
+        const LabelBracket& i = xs[static_cast<std::size_t>(x)];
+        for (const LabelBracket& j : ys) {
           const float* line[4] = {
               field.values.data() + i.low * plane + j.low * row, field.values.data() + i.low * plane + j.high * row,
               field.values.data() + i.high * plane + j.low * row, field.values.data() + i.high * plane + j.high * row};
@@ -171,7 +171,7 @@ Result<DenseVolume<float>> resample(const DenseVolume<float>& field, const Vec3&
           const auto at = [&](int k) {
             return weight[0] * line[0][k] + weight[1] * line[1][k] + weight[2] * line[2][k] + weight[3] * line[3][k];
           };
-          for (const Bracket& k : zs)
+          for (const LabelBracket& k : zs)
             *value++ = k.part == 0.0f ? at(k.low) : (1.0f - k.part) * at(k.low) + k.part * at(k.high);
         }
       },

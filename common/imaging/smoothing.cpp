@@ -20,6 +20,7 @@ constexpr double kSigmas = 4.0;         // where the weights end
 constexpr double kLeastSigma = 0.1;     // of the spacing
 constexpr std::size_t kMedianRows = 9;  // around a row, in 3 slices
 constexpr std::size_t kPart = 256;      // of a row
+constexpr std::size_t kBlock = 16;      // sums that fit into registers
 
 // The weights of a voxel and of its neighbours on one side. They sum up to 1 over both sides.
 std::vector<float> gaussian_weights(double sigma) {
@@ -37,88 +38,131 @@ std::vector<float> gaussian_weights(double sigma) {
   return out;
 }
 
-// A slice with the nearest voxel repeated around it.
-template <class T>
+// A slice with the nearest voxel repeated once around it.
 class PaddedSlice {
  public:
-  PaddedSlice(int columns, int rows, std::size_t margin)
+  PaddedSlice(int columns, int rows)
       : columns_(static_cast<std::size_t>(columns)),
         rows_(static_cast<std::size_t>(rows)),
-        margin_(margin),
-        stride_(columns_ + 2 * margin),
-        values_(stride_ * rows_) {}
+        values_((columns_ + 2) * rows_) {}
 
-  template <class From>
-  void set(const From* from) {
+  void set(const Hu* from) {
     for (std::size_t y = 0; y < rows_; ++y, from += columns_) {
-      T* row = values_.data() + y * stride_;
-      std::fill_n(row, margin_, static_cast<T>(from[0]));
-      std::copy_n(from, columns_, row + margin_);
-      std::fill_n(row + margin_ + columns_, margin_, static_cast<T>(from[columns_ - 1]));
+      Hu* row = values_.data() + y * (columns_ + 2);
+      row[0] = from[0];
+      std::copy_n(from, columns_, row + 1);
+      row[columns_ + 1] = from[columns_ - 1];
     }
   }
-  // The first voxel of row `y`, clamped. As many voxels as the margin lie on both sides of the row.
-  [[nodiscard]] const T* row(std::ptrdiff_t y) const {
-    const auto clamped = std::clamp<std::ptrdiff_t>(y, 0, static_cast<std::ptrdiff_t>(rows_) - 1);
-    return values_.data() + static_cast<std::size_t>(clamped) * stride_ + margin_;
-  }
-
- private:
-  std::size_t columns_, rows_, margin_, stride_;
-  std::vector<T> values_;
-};
-
-// out[i] = weights[0] * middle[i] + weights[d] * (before[d][i] + after[d][i]) over all d > 0.
-template <class Neighbour>
-void add_weighted(std::span<const float> weights, const Neighbour& neighbour, std::size_t n, float* __restrict out) {
-  const float* middle = neighbour(0);
-  for (std::size_t i = 0; i < n; ++i) out[i] = weights[0] * middle[i];
-  for (std::size_t d = 1; d < weights.size(); ++d) {
-    const float *before = neighbour(-static_cast<std::ptrdiff_t>(d)),
-                *after = neighbour(static_cast<std::ptrdiff_t>(d));
-    const float weight = weights[d];
-    for (std::size_t i = 0; i < n; ++i) out[i] += weight * (before[i] + after[i]);
-  }
-}
-
-// A Gaussian within slices, row by row.
-class SliceGaussian {
- public:
-  SliceGaussian(const HuVolume& volume, std::vector<float> along_rows, std::vector<float> along_columns)
-      : columns_(static_cast<std::size_t>(volume.dims[0])),
-        rows_(static_cast<std::size_t>(volume.dims[1])),
-        along_rows_(std::move(along_rows)),
-        along_columns_(std::move(along_columns)),
-        padded_(volume.dims[0], volume.dims[1], along_rows_.size() - 1),
-        across_(columns_ * rows_) {}
-
-  void apply(const Hu* slice, float* out) {
-    padded_.set(slice);
-    for (std::size_t y = 0; y < rows_; ++y) {
-      const float* row = padded_.row(static_cast<std::ptrdiff_t>(y));
-      add_weighted(
-          along_rows_, [&](std::ptrdiff_t d) { return row + d; }, columns_, across_.data() + y * columns_);
-    }
-    for (std::size_t y = 0; y < rows_; ++y) {
-      const auto neighbour = [&](std::ptrdiff_t d) {
-        const auto last = static_cast<std::ptrdiff_t>(rows_) - 1;
-        const auto at = std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(y) + d, 0, last);
-        return across_.data() + static_cast<std::size_t>(at) * columns_;
-      };
-      add_weighted(along_columns_, neighbour, columns_, out + y * columns_);
-    }
+  // The voxel before the first one of row `y`, clamped.
+  [[nodiscard]] const Hu* row(int y) const {
+    const auto clamped = static_cast<std::size_t>(std::clamp(y, 0, static_cast<int>(rows_) - 1));
+    return values_.data() + clamped * (columns_ + 2);
   }
 
  private:
   std::size_t columns_, rows_;
-  std::vector<float> along_rows_, along_columns_;
-  PaddedSlice<float> padded_;
-  std::vector<float> across_;
+  std::vector<Hu> values_;
 };
+
+// out[i] = weights[0] * middle[0][i] + weights[d] * (middle[-d][i] + middle[d][i]) over all d > 0, for `n` values from
+// `x` on.
+template <std::size_t n>
+void sum_block(std::span<const float> weights, const float* const* middle, std::size_t x, float* __restrict out) {
+  std::array<float, n> sum;
+  for (std::size_t i = 0; i < n; ++i) sum[i] = weights[0] * middle[0][x + i];
+  for (std::size_t d = 1; d < weights.size(); ++d) {
+    const float *before = *(middle - d) + x, *after = middle[d] + x;
+    for (std::size_t i = 0; i < n; ++i) sum[i] += weights[d] * (before[i] + after[i]);
+  }
+  for (std::size_t i = 0; i < n; ++i) out[x + i] = sum[i];
+}
+
+// The same for a whole row of `n` values, in blocks whose sums stay in registers.
+void sum_row(std::span<const float> weights, const std::vector<const float*>& rows, std::size_t n,
+             float* __restrict out) {
+  const float* const* middle = rows.data() + rows.size() / 2;
+  std::size_t x = 0;
+  for (; x + kBlock <= n; x += kBlock) sum_block<kBlock>(weights, middle, x, out);
+  for (; x < n; ++x) sum_block<1>(weights, middle, x, out);
+}
 
 void round_row(const float* __restrict from, std::size_t n, Hu* __restrict to) {
   for (std::size_t i = 0; i < n; ++i) to[i] = static_cast<Hu>(static_cast<int>(from[i] + (from[i] < 0 ? -0.5f : 0.5f)));
 }
+
+// Smooths slices in their order, in place. Each row is smoothed along slices first, so that only a few rows of sums
+// must be kept.
+class Gaussian {
+ public:
+  Gaussian(HuVolume& volume, double sigma_mm)
+      : volume_(volume),
+        columns_(static_cast<std::size_t>(volume.dims[0])),
+        along_rows_(gaussian_weights(sigma_mm / volume.spacing_mm[0])),
+        along_columns_(gaussian_weights(sigma_mm / volume.spacing_mm[1])),
+        along_slices_(gaussian_weights(sigma_mm / volume.spacing_mm[2])),
+        original_(std::min(2 * along_slices_.size() - 1, static_cast<std::size_t>(volume.dims[2])),
+                  std::vector<float>(columns_ * static_cast<std::size_t>(volume.dims[1]))),
+        across_(columns_ + 2 * reach(along_rows_)),
+        within_(std::min(2 * along_columns_.size() - 1, static_cast<std::size_t>(volume.dims[1])),
+                std::vector<float>(columns_)),
+        row_(columns_) {}
+
+  // `slice`: the one behind the last.
+  void apply(int slice) {
+    const int farthest = std::min(slice + static_cast<int>(reach(along_slices_)), volume_.dims[2] - 1);
+    while (last_original_ < farthest) {
+      std::vector<float>& next = original(++last_original_);
+      std::copy_n(slice_row(last_original_, 0), next.size(), next.data());
+    }
+    const int last = volume_.dims[1] - 1, reach_y = static_cast<int>(reach(along_columns_));
+    for (int y = 0, done = -1; y <= last; ++y) {
+      for (; done < std::min(y + reach_y, last); ++done) smooth_within(slice, done + 1);
+      const auto rows = neighbours(along_columns_, y, last, [&](int at) { return within(at).data(); });
+      sum_row(along_columns_, rows, columns_, row_.data());
+      round_row(row_.data(), columns_, slice_row(slice, y));
+    }
+  }
+
+ private:
+  static std::size_t reach(const std::vector<float>& weights) { return weights.size() - 1; }
+
+  // The rows around `middle`, the nearest one instead of those beyond the edge.
+  template <class Row>
+  static std::vector<const float*> neighbours(const std::vector<float>& weights, int middle, int last, const Row& row) {
+    std::vector<const float*> rows;
+    const int far = static_cast<int>(reach(weights));
+    for (int at = middle - far; at <= middle + far; ++at) rows.push_back(row(std::clamp(at, 0, last)));
+    return rows;
+  }
+
+  // Along slices, then along the row.
+  void smooth_within(int slice, int y) {
+    const auto rows = neighbours(along_slices_, slice, volume_.dims[2] - 1,
+                                 [&](int at) { return original(at).data() + static_cast<std::size_t>(y) * columns_; });
+    const std::size_t margin = reach(along_rows_);
+    float* across = across_.data() + margin;
+    sum_row(along_slices_, rows, columns_, across);
+    std::fill_n(across_.data(), margin, across[0]);
+    std::fill_n(across + columns_, margin, across[columns_ - 1]);
+    std::vector<const float*> shifted;
+    for (std::size_t d = 0; d <= 2 * margin; ++d) shifted.push_back(across_.data() + d);
+    sum_row(along_rows_, shifted, columns_, within(y).data());
+  }
+
+  Hu* slice_row(int slice, int y) { return volume_.values.data() + volume_.index(0, y, slice); }
+  std::vector<float>& original(int slice) { return original_[static_cast<std::size_t>(slice) % original_.size()]; }
+  std::vector<float>& within(int y) { return within_[static_cast<std::size_t>(y) % within_.size()]; }
+
+  HuVolume& volume_;
+  std::size_t columns_;
+  std::vector<float> along_rows_, along_columns_, along_slices_;
+  std::vector<std::vector<float>> original_;  // slices from the first to the last neighbour, in turns
+  std::vector<float> across_;                 // a row smoothed along slices, with the nearest value repeated around it
+  std::vector<std::vector<float>> within_;    // rows smoothed along slices and along themselves, in turns
+  std::vector<float> row_;
+  int last_original_ = -1;  // the last slice in `original_`
+};
 
 // Branches would keep these loops from being vectorised.
 constexpr Hu low(Hu a, Hu b) { return a < b ? a : b; }
@@ -206,30 +250,10 @@ void median_of_slice(const Hu* __restrict above, const Hu* __restrict here, cons
 
 Result<void> smooth_gaussian(HuVolume& volume, double sigma_mm, const KeepGoing& keep_going) {
   OSTEON_CHECK(sigma_mm > 0.0);
-  const auto columns = static_cast<std::size_t>(volume.dims[0]);
-  const std::size_t area = columns * static_cast<std::size_t>(volume.dims[1]);
-  const auto weights = [&](int axis) { return gaussian_weights(sigma_mm / volume.spacing_mm[axis]); };
-  SliceGaussian within(volume, weights(0), weights(1));
-  const std::vector<float> along = weights(2);
-  const int reach = static_cast<int>(along.size()) - 1, last = volume.dims[2] - 1;
-  // Slices that are smoothed within themselves, from `slice - reach` to `slice + reach`.
-  std::vector<std::vector<float>> near(2 * static_cast<std::size_t>(reach) + 1, std::vector<float>(area));
-  const auto kept = [&](int slice) -> std::vector<float>& {
-    return near[static_cast<std::size_t>(slice) % near.size()];
-  };
-  std::vector<float> row(columns);
-  int done = -1;  // the last slice that is smoothed within itself
-  for (int slice = 0; slice <= last; ++slice) {
+  Gaussian gaussian(volume, sigma_mm);
+  for (int slice = 0; slice < volume.dims[2]; ++slice) {
     if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("smoothing the scan");
-    for (; done < std::min(slice + reach, last); ++done)
-      within.apply(volume.values.data() + volume.index(0, 0, done + 1), kept(done + 1).data());
-    for (std::size_t at = 0; at < area; at += columns) {
-      const auto neighbour = [&](std::ptrdiff_t d) {
-        return kept(std::clamp(slice + static_cast<int>(d), 0, last)).data() + at;
-      };
-      add_weighted(along, neighbour, columns, row.data());
-      round_row(row.data(), columns, volume.values.data() + volume.index(0, 0, slice) + at);
-    }
+    gaussian.apply(slice);
   }
   return {};
 }
@@ -237,15 +261,15 @@ Result<void> smooth_gaussian(HuVolume& volume, double sigma_mm, const KeepGoing&
 Result<void> smooth_median(HuVolume& volume, MedianBox box, const KeepGoing& keep_going) {
   const auto columns = static_cast<std::size_t>(volume.dims[0]);
   const int last = volume.dims[2] - 1;
-  std::vector<PaddedSlice<Hu>> near(3, PaddedSlice<Hu>(volume.dims[0], volume.dims[1], 1));
-  const auto kept = [&](int slice) -> PaddedSlice<Hu>& { return near[static_cast<std::size_t>(slice) % 3]; };
+  std::vector<PaddedSlice> near(3, PaddedSlice(volume.dims[0], volume.dims[1]));
+  const auto kept = [&](int slice) -> PaddedSlice& { return near[static_cast<std::size_t>(slice) % 3]; };
   kept(0).set(volume.values.data());
   for (int slice = 0; slice <= last; ++slice) {
     if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("smoothing the scan");
     if (slice < last) kept(slice + 1).set(volume.values.data() + volume.index(0, 0, slice + 1));
     for (int y = 0; y < volume.dims[1]; ++y) {
       Hu* out = volume.values.data() + volume.index(0, y, slice);
-      const auto row = [&](int dy, int dz) { return kept(std::clamp(slice + dz, 0, last)).row(y + dy) - 1; };
+      const auto row = [&](int dy, int dz) { return kept(std::clamp(slice + dz, 0, last)).row(y + dy); };
       if (box == MedianBox::slice) {
         median_of_slice(row(-1, 0), row(0, 0), row(1, 0), columns, out);
         continue;

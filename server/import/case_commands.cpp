@@ -20,6 +20,7 @@
 #include "server/import/inv3_reader.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/phantom.hpp"
+#include "server/import/slice_images.hpp"
 #include "server/import/volume_reader.hpp"
 
 namespace osteon::import {
@@ -32,12 +33,11 @@ constexpr double kMeshPitch_mm = 0.5;
 constexpr const char* kSuggest = "suggest";
 
 struct CaseArguments {
-  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold,
-                                                                       grow_by = "volume";
-  std::string keep;
+  std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
+  std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
   std::vector<std::string> bone_colours, seeds;
   std::optional<double> pitch_mm, similar_hu;
-  double gaussian_mm = 0.0;
+  double gaussian_mm = 0.0, sigma_mm = 1.0;
   std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false, list = false, adaptive = false;
@@ -97,6 +97,11 @@ Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
   return read_inv3(a.input, reading);
 }
 
+std::optional<imaging::MedianBox> median_box(const CaseArguments& a) {
+  if (a.median.empty()) return {};
+  return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
+}
+
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (a.out.empty() && !a.list)
     return failure(ErrorCode::invalid_input,
@@ -108,7 +113,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.merge = a.merge;
   options.hollow = a.hollow;
   options.list_only = a.list;
-  if (!a.median.empty()) options.median = a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
+  options.median = median_box(a);
   options.gaussian_mm = a.gaussian_mm;
   for (const std::string& seed : a.seeds) {
     const auto position_mm = parse_seed(seed);
@@ -148,6 +153,53 @@ Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   const auto report = list_dicom_series(a.input, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
+}
+
+// "A,B", both finite.
+std::optional<std::pair<double, double>> parse_pair(const std::string& text) {
+  double first = 0, second = 0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf%c", &first, &second, &rest) != 2) return {};
+  if (!std::isfinite(first) || !std::isfinite(second)) return {};
+  return std::pair(first, second);
+}
+
+Result<SliceOptions> slice_options(const CaseArguments& a) {
+  SliceOptions options;
+  const auto window = parse_pair(a.window);
+  if (!window || window->second < 1.0)
+    return bad_input("--window " + a.window +
+                     " is not a window; write its centre and its width of at least 1 HU, such "
+                     "as 400,1800");
+  options.window = {window->first, window->second};
+  const auto limits = parse_pair(a.limits);
+  if (!limits || !(limits->first > 0.0) || !(limits->first <= limits->second))
+    return bad_input("--limits " + a.limits +
+                     " are not limits of a gradient; write the lower and the higher one in "
+                     "HU/mm, above 0, such as 100,300");
+  options.edges = {a.sigma_mm, limits->first, limits->second,
+                   a.space == "slice" ? imaging::EdgeSpace::slice : imaging::EdgeSpace::volume};
+  options.content = a.edges == "canny"      ? SliceContent::canny
+                    : a.edges == "gradient" ? SliceContent::gradient
+                                            : SliceContent::grey;
+  options.median = median_box(a);
+  options.gaussian_mm = a.gaussian_mm;
+  return options;
+}
+
+Result<std::string> run_slices(const CaseArguments& a, const StopSignal& stop) {
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto options = slice_options(a);
+  if (!options) return tl::unexpected(options.error());
+  Bar bar(stop);
+  auto scan = read_scan(a, bar.stage(0.0, 0.4));
+  if (!scan) return tl::unexpected(scan.error());
+  const std::string text = "slices     " + imaging::describe(scan->volume) + ", as PNG in " + a.out + "\n";
+  const std::string series = report_lines(scan->report);
+  if (auto written = write_slice_images(std::move(scan->volume), a.out, *options, bar.stage(0.4, 1.0)); !written)
+    return tl::unexpected(written.error());
+  bar.stage(1.0, 1.0)(1.0);
+  return text + series;
 }
 
 Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) {
@@ -306,19 +358,65 @@ Result<void> check_free(const std::string& path) {
   return {};
 }
 
+namespace {
+
+void add_scan_options(CLI::App& command, CaseArguments& a) {
+  command
+      .add_option("INPUT", a.input,
+                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or "
+                  "a NIfTI, NRRD or MetaImage file")
+      ->required();
+  command.add_option("--series", a.series,
+                     "Number of the series, as osteon-import series lists them (default: the largest CT)");
+}
+
+void add_smoothing_options(CLI::App& command, CaseArguments& a) {
+  command
+      .add_option("--median", a.median,
+                  "First replace each voxel by the median of its 3 x 3 neighbours in the slice, or of its 3 x 3 x 3 in "
+                  "the volume: takes out single wrong voxels")
+      ->check(CLI::IsMember({"slice", "volume"}));
+  command
+      .add_option("--gaussian", a.gaussian_mm,
+                  "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
+      ->check(within(0.0, 10.0));
+}
+
+void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& shared, std::vector<Command>& commands) {
+  CaseArguments& a = *shared;
+  CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
+  add_scan_options(*slices, a);
+  slices->add_option("--out", a.out, "Folder of the images, made by this command")->required();
+  add_smoothing_options(*slices, a);
+  slices->add_option("--window", a.window, "CENTRE,WIDTH: the HU that become grey; without --edges")
+      ->capture_default_str();
+  slices
+      ->add_option("--edges", a.edges,
+                   "Show edges instead: gradient (how much the HU change, white from the higher limit on) or canny "
+                   "(white lines where they change most)")
+      ->check(CLI::IsMember({"gradient", "canny"}));
+  slices->add_option("--sigma", a.sigma_mm, "Of edges: smooth with a Gaussian of this sigma first, mm")
+      ->check(within(0.0, 10.0))
+      ->capture_default_str();
+  slices
+      ->add_option("--limits", a.limits,
+                   "LOW,HIGH of edges, HU/mm: a line begins at the higher gradient and goes on to the lower one")
+      ->capture_default_str();
+  slices->add_option("--edges-in", a.space, "Find edges in each slice by itself, or in the whole volume")
+      ->check(CLI::IsMember({"slice", "volume"}))
+      ->capture_default_str();
+  commands.push_back({slices, [shared](const StopSignal& stop) { return run_slices(*shared, stop); }});
+}
+
+}  // namespace
+
 void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   // Shared by the options that write into it and the command that reads it, both for the life of the program.
   const auto shared = std::make_shared<CaseArguments>();
   CaseArguments& a = *shared;
 
   CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
-  ct->add_option(
-        "INPUT", a.input,
-        "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or a "
-        "NIfTI, NRRD or MetaImage file")
-      ->required();
-  ct->add_option("--series", a.series,
-                 "Number of the series, as osteon-import series lists them (default: the largest CT)");
+  add_scan_options(*ct, a);
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
       ->check(within(0.02, 10.0));
@@ -351,15 +449,11 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_flag("--list", a.list, "List the islands and write nothing");
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
-  ct->add_option("--median", a.median,
-                 "First replace each voxel by the median of its 3 x 3 neighbours in the slice, or of its 3 x 3 x 3 in "
-                 "the volume: takes out single wrong voxels")
-      ->check(CLI::IsMember({"slice", "volume"}));
-  ct->add_option("--gaussian", a.gaussian_mm,
-                 "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
-      ->check(within(0.0, 10.0));
+  add_smoothing_options(*ct, a);
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
+
+  add_slices_command(app, shared, commands);
 
   CLI::App* series = app.add_subcommand("series", "List the CT series of a folder, zip or ISO image");
   series->add_option("INPUT", a.input, "Folder (with all its subfolders), zip or ISO image")->required();

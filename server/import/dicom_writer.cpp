@@ -4,12 +4,13 @@
 #include <gdcmImageWriter.h>
 #include <gdcmTrace.h>
 #include <gdcmUIDGenerator.h>
-#include <unistd.h>
 
 #include <cstdio>
 #include <exception>
 #include <string>
 #include <vector>
+
+#include "server/import/new_folder.hpp"
 
 namespace osteon::import {
 namespace {
@@ -94,24 +95,7 @@ Result<void> write_dicom_series(const imaging::HuVolume& volume, const fs::path&
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
-  std::error_code error;
-  fs::path target = folder.has_filename() ? folder : folder.parent_path();
-  if (fs::exists(target, error))
-    return failure(ErrorCode::exists, target.string() + " is already there; choose another name or remove it first");
-  fs::path partial = target;
-  partial += ".partial-" + std::to_string(::getpid());
-  fs::create_directories(partial, error);
-  if (error) return failure(ErrorCode::internal, "cannot make the folder " + partial.string() + ": " + error.message());
-
-  Result<void> written = write_slices(volume, partial, keep_going);
-  if (written) {
-    fs::rename(partial, target, error);
-    if (error)
-      written = failure(ErrorCode::internal,
-                        "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
-  }
-  if (!written) fs::remove_all(partial, error);
-  return written;
+  return write_new_folder(folder, [&](const fs::path& partial) { return write_slices(volume, partial, keep_going); });
 }
 
 }  // namespace osteon::import

@@ -9,6 +9,7 @@ import numpy as np
 
 import devices
 import feel
+import filters
 import haptics
 import imports
 import kernels
@@ -248,6 +249,6 @@ def scan(run):
 
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
-          **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
+          **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
           "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
           "region_growing": imports.region_growing}

@@ -51,8 +51,29 @@ class Program : public ::testing::Test {
 TEST_F(Program, HelpNamesTheCommands) {
   const auto result = test::run(kProgram, {"--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* command : {"ct", "phantom", "info", "series"})
+  for (const char* command : {"ct", "phantom", "info", "series", "slices"})
     EXPECT_NE(result.out.find(command), std::string::npos);
+}
+
+TEST_F(Program, WritesSlicesAsImages) {
+  write_inv3(folder_ / "scan.inv3", {});
+  const auto made = test::run(kProgram, {"slices", path("scan.inv3"), "--out", path("images"), "--edges", "canny"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_NE(made.out.find("4x5x6"), std::string::npos) << made.out;
+  EXPECT_EQ(files_of(folder_ / "images").size(), 6u);
+  expect_refused({"slices", path("scan.inv3"), "--out", path("images")}, "already there", folder_);
+}
+
+TEST_F(Program, WrongOptionsOfSlicesAreOneSentence) {
+  write_inv3(folder_ / "scan.inv3", {});
+  const auto refused = [&](const char* option, const char* value) {
+    expect_refused({"slices", path("scan.inv3"), "--out", path("images"), option, value}, option, folder_);
+  };
+  for (const char* window : {"400", "400,0.5", "nan,100", "400,inf", "400,100,3", "a,b"}) refused("--window", window);
+  for (const char* limits : {"300,100", "0,100", "-1,2", "nan,300", "100", "1,2,3"}) refused("--limits", limits);
+  for (const char* sigma : {"-1", "11", "nan"}) refused("--sigma", sigma);
+  refused("--edges", "sobel");
+  refused("--edges-in", "row");
 }
 
 TEST_F(Program, MakesAPhantomAndReportsIt) {

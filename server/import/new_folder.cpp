@@ -1,0 +1,32 @@
+#include "server/import/new_folder.hpp"
+
+#include <unistd.h>
+
+#include <string>
+
+namespace osteon::import {
+
+namespace fs = std::filesystem;
+
+Result<void> write_new_folder(const fs::path& folder, const std::function<Result<void>(const fs::path&)>& write) {
+  std::error_code error;
+  const fs::path target = folder.has_filename() ? folder : folder.parent_path();
+  if (fs::exists(target, error))
+    return failure(ErrorCode::exists, target.string() + " is already there; choose another name or remove it first");
+  fs::path partial = target;
+  partial += ".partial-" + std::to_string(::getpid());
+  fs::create_directories(partial, error);
+  if (error) return failure(ErrorCode::internal, "cannot make the folder " + partial.string() + ": " + error.message());
+
+  Result<void> written = write(partial);
+  if (written) {
+    fs::rename(partial, target, error);
+    if (error)
+      written = failure(ErrorCode::internal,
+                        "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
+  }
+  if (!written) fs::remove_all(partial, error);
+  return written;
+}
+
+}  // namespace osteon::import
