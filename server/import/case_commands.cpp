@@ -35,7 +35,7 @@ struct CaseArguments {
   std::string keep;
   std::vector<std::string> bone_colours;
   std::optional<double> pitch_mm, threshold_hu;
-  double gaussian_mm = 0.0;
+  double gaussian_mm = 0.0, margin_mm = CtOptions{}.margin_mm;
   std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false, list = false;
@@ -44,6 +44,10 @@ struct CaseArguments {
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
   if (stop.requested()) return tl::unexpected(stopped());
   return bone.save(out, [&](double) { return !stop.requested(); });
+}
+Result<void> save(const Case& bone, const CaseScan& scan, const std::string& out, const StopSignal& stop) {
+  if (stop.requested()) return tl::unexpected(stopped());
+  return bone.save(out, scan, [&](double) { return !stop.requested(); });
 }
 
 // "all", or numbers such as "1,3". Empty: the largest.
@@ -108,6 +112,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.list_only = a.list;
   if (!a.median.empty()) options.median = a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
   options.gaussian_mm = a.gaussian_mm;
+  options.margin_mm = a.margin_mm;
   Bar bar(stop);
   auto scan = read_scan(a, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
@@ -124,7 +129,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
     bar.stage(1.0, 1.0)(1.0);
     return series + segmentation_text(made->found);
   }
-  if (auto saved = save(*made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
   return report_text(*made->bone) + series + segmentation_text(made->found);
 }
@@ -207,7 +212,7 @@ Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.95));
   if (!made) return tl::unexpected(about(a.input, made.error()));
-  if (auto saved = save(made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  if (auto saved = save(made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
 
   std::string text = report_text(made->bone);
@@ -316,6 +321,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_option("--gaussian", a.gaussian_mm,
                  "First smooth the scan with a Gaussian of this sigma, mm: takes out noise")
       ->check(within(0.0, 10.0));
+  ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
+      ->check(within(0.0, 200.0))
+      ->capture_default_str();
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
 

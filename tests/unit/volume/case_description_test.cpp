@@ -1,6 +1,9 @@
 // What case.json says, and its share in the hash of a case.
 #include "common/volume/case_description.hpp"
 
+#include <gtest/gtest.h>
+
+#include <algorithm>
 #include <fstream>
 #include <functional>
 #include <limits>
@@ -9,8 +12,8 @@
 
 #include "tests/support/content.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/scenes/described_case.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/volume/described_case.hpp"
 
 namespace osteon {
 namespace {

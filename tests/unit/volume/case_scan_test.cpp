@@ -1,6 +1,7 @@
 // The scan of a case: HU and labels on the scanner's voxels.
 #include "common/volume/case_scan.hpp"
 
+#include <gtest/gtest.h>
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
@@ -9,8 +10,8 @@
 #include "common/volume/openvdb_start.hpp"
 #include "common/volume/sparse_volume.hpp"
 #include "tests/support/content.hpp"
+#include "tests/support/scenes/described_case.hpp"
 #include "tests/support/temp_dir.hpp"
-#include "tests/unit/volume/described_case.hpp"
 
 namespace osteon {
 namespace {
@@ -65,6 +66,11 @@ TEST_F(CaseScanTest, SampleIjkIsColumnRowAndSlice) {
   EXPECT_EQ(labels->tree().getValue(openvdb::Coord(9, 5, 0)), 7);
   EXPECT_EQ(labels->tree().getValue(openvdb::Coord(9, 6, 0)), 0);
   EXPECT_EQ(tissue->tree().getValue(openvdb::Coord(0, 0, 3)), 2);
+}
+
+// Computed with Python's hashlib and struct from the rules of deploy/docs/case.md.
+TEST_F(CaseScanTest, TheHashIsTheOneThatTheDocumentationDescribes) {
+  EXPECT_EQ(to_hex(bone_.info().scan->hash), "ba0a8b3e44cc39e979de26c511b9a73262e99f2271dfb7b022f9730b545665fc");
 }
 
 TEST_F(CaseScanTest, AVoxelLiesWhereItsAxesSay) {

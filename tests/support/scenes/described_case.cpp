@@ -1,16 +1,13 @@
-// A small ball of bone with any description, and a description in which every field is set.
-#pragma once
-#include <gtest/gtest.h>
+#include "tests/support/scenes/described_case.hpp"
 
 #include <cstdint>
+#include <utility>
 
 #include "common/core/check.hpp"
-#include "common/volume/case.hpp"
-#include "common/volume/case_scan.hpp"
 
 namespace osteon::test {
 
-inline Result<Case> described_ball(CaseInfo info) {
+Result<Case> described_ball(CaseInfo info) {
   const CoordBox box{{-8, -8, -8}, {8, 8, 8}};
   DenseVolume<float> surface(box, 0.0f);
   const DenseVolume<float> density(box, 1.5f);
@@ -21,8 +18,7 @@ inline Result<Case> described_ball(CaseInfo info) {
   return Case::build(std::move(info), surface, density);
 }
 
-// Voxels of 0.5 x 0.75 x 2 mm, turned about two axes and mirrored. No two voxels beside each other have the same HU.
-inline CaseScan turned_scan() {
+CaseScan turned_scan() {
   CaseScan scan;
   scan.geometry.dims = {19, 11, 7};
   scan.geometry.origin_mm = {-10.25, 20.5, 7.125};
@@ -41,7 +37,7 @@ inline CaseScan turned_scan() {
   return scan;
 }
 
-inline CaseInfo full_description(const CaseScan& scan) {
+CaseInfo full_description(const CaseScan& scan) {
   const auto described = describe_scan(scan);
   OSTEON_CHECK(described.has_value());
   return {.title = "A femur",
