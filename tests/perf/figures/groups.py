@@ -249,4 +249,5 @@ def scan(run):
 
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
           **feel.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
-          "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports}
+          "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
+          "case_schema": imports.case_schemas}

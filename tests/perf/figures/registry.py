@@ -655,6 +655,15 @@ FIGURES = [
                baseline="the earlier program named by OSTEON_EARLIER_IMPORT"),
         Figure(f"import_{name}_memory", "mb", f"peak memory of the import of {what}", "real_imports",
                baseline="the earlier program"))],
+    # What the scan in a case costs.
+    *[figure for name, what in (("skull", "a skull of 108 slices"), ("tibia", "two lower legs of 46 slices"))
+      for figure in (
+        Figure(f"case_schema_{name}_size", "mb", f"{what}: all files of the case", "case_schema",
+               baseline="the same bone in schema 1, without its scan"),
+        Figure(f"case_schema_{name}_load", "ms", f"{what}: time to load the bone, median", "case_schema",
+               baseline="the same bone in schema 1"),
+        Figure(f"case_schema_{name}_scan_load", "ms", f"{what}: time to load and verify its scan, median",
+               "case_schema", baseline="time to load the bone"))],
     # Bones from real images, burred in frames of 33 cuts.
     *[figure for name, what in (("temporal", "a temporal bone at its own 0.096 mm"),
                                 ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (
