@@ -6,16 +6,13 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
-#include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "common/core/check.hpp"
 #include "common/field/kernel.hpp"
+#include "common/volume/case_scan.hpp"
 #include "common/volume/sparse_volume.hpp"
 
 namespace osteon {
-
-using nlohmann::json;
 
 // Grids of one case. `clearance` has one sample for each leaf of level 0, at the leaf's middle.
 struct Case::Grids {
@@ -31,22 +28,13 @@ namespace {
 
 constexpr const char* kInfoFile = "case.json";
 constexpr const char* kVolumeFile = "bone.vdb";
-constexpr std::uintmax_t kMostInfoBytes = 1 << 20;
 const std::vector<std::string> kGridNames{"surface", "density", "clearance", "bone", "tissue"};
-// A case of a temporal bone at 0.1 mm takes 0.5 GiB, five times the size of its file. A file that declares more than
-// all these limits is damaged or hostile. A file of up to 64 MiB stays below 1 GiB.
-constexpr std::uint64_t kCaseMemoryBytes = std::uint64_t{768} << 20, kMemoryToFile = 12, kMostCaseLeaves = 4'000'000;
+constexpr std::uint64_t kMostCaseLeaves = 4'000'000;  // of a grid; a larger one is of no bone
 
 VdbLimits limits_for(const std::filesystem::path& file) {
-  std::error_code error;
-  const std::uintmax_t bytes = std::filesystem::file_size(file, error);
-  const std::uint64_t memory =
-      error ? kCaseMemoryBytes : std::max<std::uint64_t>(kCaseMemoryBytes, kMemoryToFile * bytes);
-  return {.memory_bytes = memory, .leaves = kMostCaseLeaves, .grids = 16};
+  return {.memory_bytes = most_case_memory(file), .leaves = kMostCaseLeaves, .grids = 16};
 }
 
-// Bone above it counts as cortical. [A] Apparent densities of cancellous bone end near here.
-constexpr float kCorticalFrom_g_cm3 = 1.0f;
 // Clearance is stored up to this distance from the bone, in leaves. Farther points get this distance.
 constexpr int kClearanceLeaves = 12;
 
@@ -138,13 +126,7 @@ void hash_volume(Hasher& hasher, const std::string& name, const SparseVolume& vo
 
 Digest content_hash(const Case::Grids& grids) {
   Hasher hasher;
-  hasher.integer(kCaseSchemaVersion);
-  hasher.text(grids.info.title);
-  hasher.text(grids.info.source);
-  hasher.number(grids.info.pitch_mm);
-  hasher.number(grids.info.calibration.slope_g_cm3_per_hu);
-  hasher.number(grids.info.calibration.intercept_g_cm3);
-  hasher.number(grids.info.threshold_hu);
+  hash_description(hasher, grids.info);
   const SparseVolume* volumes[] = {&grids.surface, &grids.density, &grids.clearance, &grids.bone, &grids.tissue};
   for (std::size_t i = 0; i < kGridNames.size(); ++i) hash_volume(hasher, kGridNames[i], *volumes[i]);
   return hasher.finish();
@@ -287,19 +269,6 @@ SparseVolume make_clearance(const SparseVolume& surface, double pitch) {
   return clearance;
 }
 
-json to_json(const Case::Grids& grids) {
-  const CaseInfo& info = grids.info;
-  return {{"schema_version", kCaseSchemaVersion},
-          {"title", info.title},
-          {"source", info.source},
-          {"pitch_mm", info.pitch_mm},
-          {"calibration",
-           {{"slope_g_cm3_per_hu", info.calibration.slope_g_cm3_per_hu},
-            {"intercept_g_cm3", info.calibration.intercept_g_cm3}}},
-          {"segmentation", {{"threshold_hu", info.threshold_hu}}},
-          {"content_hash", to_hex(grids.hash)}};
-}
-
 // A box of samples from a larger volume. Empty if the volume is empty.
 template <class T>
 void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>& out) {
@@ -316,7 +285,8 @@ void copy_part(const DenseVolume<T>& from, const CoordBox& part, std::vector<T>&
 }  // namespace
 
 Result<Case> Case::build(CaseInfo info, const CoordBox& box, const FillPart& fill, const KeepGoing& keep_going) {
-  if (!(info.pitch_mm > 0.0)) return failure(ErrorCode::invalid_input, "a case needs a pitch above zero");
+  if (const Result<void> sound = check_description(info); !sound)
+    return bad_input("the description of the case: " + sound.error().message);
   const float band = band_mm(info.pitch_mm);
   auto grids = std::make_shared<Grids>(Grids{std::move(info),
                                              {},
@@ -392,43 +362,17 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
   if (!std::filesystem::is_directory(folder))
     return failure(ErrorCode::not_found,
                    "there is no case folder " + folder.string() + "; make one with osteon-import");
-  std::ifstream in(file);
-  if (!in)
+  std::error_code error;
+  if (!std::filesystem::exists(file, error))
     return failure(ErrorCode::invalid_input,
                    folder.string() + " is not a case: it has no " + kInfoFile + "; make one with osteon-import");
-  std::error_code unknown;
-  if (std::filesystem::file_size(file, unknown) > kMostInfoBytes && !unknown)
-    return failure(ErrorCode::invalid_input,
-                   file.string() + " is longer than any case description; import the case again");
-  CaseInfo info;
-  Digest named;
-  try {
-    const json j = json::parse(in);
-    const json& version = j.at("schema_version");  // compared as JSON, because any number may be there
-    if (version != kCaseSchemaVersion)
-      return failure(ErrorCode::unsupported, file.string() + ": schema_version is " + version.dump().substr(0, 20) +
-                                                 ", but this program reads version " +
-                                                 std::to_string(kCaseSchemaVersion) +
-                                                 "; import the case again with this program's osteon-import");
-    info.title = j.at("title").get<std::string>();
-    info.source = j.at("source").get<std::string>();
-    info.pitch_mm = j.at("pitch_mm").get<double>();
-    info.calibration.slope_g_cm3_per_hu = j.at("calibration").at("slope_g_cm3_per_hu").get<double>();
-    info.calibration.intercept_g_cm3 = j.at("calibration").at("intercept_g_cm3").get<double>();
-    info.threshold_hu = j.at("segmentation").at("threshold_hu").get<double>();
-    const auto hash = digest_from_hex(j.at("content_hash").get<std::string>());
-    if (!hash) return failure(ErrorCode::invalid_input, file.string() + ": content_hash: " + hash.error().message);
-    named = *hash;
-  } catch (const std::exception& e) {
-    return failure(ErrorCode::invalid_input,
-                   file.string() + " is not a case description (" + e.what() + "); import the case again");
-  }
-  if (!(info.pitch_mm > 0.0))
-    return failure(ErrorCode::invalid_input, file.string() + ": pitch_mm must be above zero; import the case again");
+  auto described = read_description(file);
+  if (!described) return tl::unexpected(described.error());
+  const Digest named = described->content_hash;
   auto volumes = load_volumes(folder / kVolumeFile, kGridNames, limits_for(folder / kVolumeFile));
   if (!volumes) return tl::unexpected(volumes.error());
   auto& v = *volumes;
-  auto grids = std::make_shared<Grids>(Grids{std::move(info),
+  auto grids = std::make_shared<Grids>(Grids{std::move(described->info),
                                              named,
                                              std::move(v[0]),
                                              std::move(v[1]),
@@ -450,6 +394,16 @@ Result<Case> Case::load(const std::filesystem::path& folder) {
 }
 
 Result<void> Case::save(const std::filesystem::path& folder, const KeepGoing& keep_going) const {
+  return write(folder, nullptr, keep_going);
+}
+
+Result<void> Case::save(const std::filesystem::path& folder, const CaseScan& scan, const KeepGoing& keep_going) const {
+  OSTEON_CHECK(info().scan && info().scan->geometry == scan.geometry);
+  if (Result<void> known = check_labels_of(scan, info()); !known) return known;
+  return write(folder, &scan, keep_going);
+}
+
+Result<void> Case::write(const std::filesystem::path& folder, const CaseScan* scan, const KeepGoing& keep_going) const {
   namespace fs = std::filesystem;
   const auto stopped = [&] { return keep_going && !keep_going(1.0); };
   if (stopped()) return failure(ErrorCode::cancelled, "stopped; nothing was written");
@@ -463,7 +417,7 @@ Result<void> Case::save(const std::filesystem::path& folder, const KeepGoing& ke
   fs::create_directories(partial, error);
   if (error) return failure(ErrorCode::internal, "cannot make the folder " + partial.string() + ": " + error.message());
 
-  const auto write = [&]() -> Result<void> {
+  const auto write_files = [&]() -> Result<void> {
     const auto& g = *grids_;
     if (auto saved = save_volumes(partial / kVolumeFile, g.info.pitch_mm,
                                   {{"surface", &g.surface},
@@ -473,8 +427,11 @@ Result<void> Case::save(const std::filesystem::path& folder, const KeepGoing& ke
                                    {"tissue", &g.tissue}});
         !saved)
       return saved;
+    if (stopped()) return failure(ErrorCode::cancelled, "stopped; nothing was written");
+    if (scan)
+      if (auto saved = save_scan(partial / kScanFile, *scan, keep_going); !saved) return saved;
     std::ofstream out(partial / kInfoFile);
-    out << to_json(g).dump(2) << '\n';
+    out << to_text({g.info, g.hash});
     out.close();
     if (!out)
       return failure(ErrorCode::internal, "cannot write " + (partial / kInfoFile).string() + "; is the disk full?");
@@ -485,7 +442,7 @@ Result<void> Case::save(const std::filesystem::path& folder, const KeepGoing& ke
                      "cannot rename " + partial.string() + " to " + target.string() + ": " + error.message());
     return {};
   };
-  Result<void> written = write();
+  Result<void> written = write_files();
   if (!written) fs::remove_all(partial, error);
   return written;
 }

@@ -1,5 +1,6 @@
-// A case: the imported bone, which never changes. It is a folder with case.json and bone.vdb, named by the hash of its
-// content.
+// A case: the imported bone, which never changes. It is a folder with case.json, bone.vdb and, if it comes from a scan,
+// scan.vdb. It is named by the hash of its content. case.json contains the hash of the scan, so the first two files can
+// be verified without the third.
 #pragma once
 #include <filesystem>
 #include <functional>
@@ -12,28 +13,13 @@
 #include "common/core/result.hpp"
 #include "common/field/tissue.hpp"
 #include "common/volume/block_gather.hpp"
+#include "common/volume/case_description.hpp"
 #include "common/volume/dense_volume.hpp"
 #include "common/volume/iso_surface.hpp"
 
 namespace osteon {
 
-inline constexpr int kCaseSchemaVersion = 1;
-
-// density (g/cm³) = intercept + slope · HU, never below zero.
-struct DensityCalibration {
-  double slope_g_cm3_per_hu = 0.0;
-  double intercept_g_cm3 = 0.0;
-  friend bool operator==(const DensityCalibration&, const DensityCalibration&) = default;
-};
-
-struct CaseInfo {
-  std::string title;    // shown to people; no patient identity
-  std::string source;   // kind and geometry of the input, e.g. "DICOM CT, 512x512x46, 0.84x0.84x3 mm"
-  double pitch_mm = 0;  // h, isotropic
-  DensityCalibration calibration;
-  double threshold_hu = 0;  // bone is at or above it
-  friend bool operator==(const CaseInfo&, const CaseInfo&) = default;
-};
+struct CaseScan;
 
 // What an importer knows about the samples beside distance and density. Each volume is empty or covers the same box as
 // the distance.
@@ -73,12 +59,17 @@ class Case {
   static constexpr std::int32_t kPartSamples = 64;
   [[nodiscard]] static Result<Case> build(CaseInfo info, const CoordBox& box, const FillPart& fill,
                                           const KeepGoing& keep_going = {});
-  // Errors: not_found (no such folder), invalid_input (no or broken case.json / bone.vdb, or content that does not
-  // match its hash), unsupported (schema version), exhausted (more memory than a file of its size may need).
+  // Does not read the scan, see load_scan(). Errors: not_found (no such folder), invalid_input (no or broken case.json
+  // / bone.vdb, or content that does not match its hash), unsupported (schema version), exhausted (more memory than a
+  // file of its size may need).
   [[nodiscard]] static Result<Case> load(const std::filesystem::path& folder);
   // Writes beside `folder` and renames, so that a partly written case is never visible. `keep_going` is called before
   // the renaming, too. Errors: exists, internal (disk), cancelled.
   [[nodiscard]] Result<void> save(const std::filesystem::path& folder, const KeepGoing& keep_going = {}) const;
+  // The same with its scan, which describe_scan() has described for info(). Error invalid_input too: the scan has
+  // labels that info() does not list.
+  [[nodiscard]] Result<void> save(const std::filesystem::path& folder, const CaseScan& scan,
+                                  const KeepGoing& keep_going = {}) const;
 
   [[nodiscard]] const CaseInfo& info() const;
   [[nodiscard]] const Digest& hash() const;
@@ -119,6 +110,8 @@ class Case {
 
  private:
   Case() = default;
+  [[nodiscard]] Result<void> write(const std::filesystem::path& folder, const CaseScan* scan,
+                                   const KeepGoing& keep_going) const;
   std::shared_ptr<const Grids> grids_;  // shared by copies of one case: immutable
 };
 

@@ -31,6 +31,8 @@ constexpr std::int32_t kRootChild = 4096;          // samples along a child of t
 constexpr std::int32_t kFarthest = 1 << 23;        // samples
 constexpr std::uint64_t kRootEntryBytes = 96;      // of a tile or child in the root's table
 constexpr std::uint64_t kLeafNodeBytes = kLeafVoxels * sizeof(float) + 128;
+static_assert(sizeof(float) == sizeof(std::int32_t));  // so the same walk fits the grids of both
+constexpr std::uint64_t kCaseMemoryBytes = std::uint64_t{768} << 20, kMemoryToFile = 12;
 
 // A fault of a file. Thrown during the walk and caught by measure_vdb().
 struct Refusal {
@@ -262,7 +264,8 @@ class GridWalk {
   std::vector<std::uint16_t> leaves_;  // number of active values of each leaf
 };
 
-VdbSize walk(const fs::path& file, const VdbLimits& limits) {
+VdbSize walk(const fs::path& file, const VdbLimits& limits, VdbValues values_of_grids) {
+  const bool floats = values_of_grids == VdbValues::floats;
   Bytes bytes(file);
   if (bytes.number<std::int64_t>() != kMagic) damaged("it does not begin as one does");
   if (bytes.number<std::uint32_t>() != kFormat) damaged("its format is another than " + std::to_string(kFormat));
@@ -277,7 +280,8 @@ VdbSize walk(const fs::path& file, const VdbLimits& limits) {
   VdbSize size;
   for (std::uint32_t i = 0; i < grids; ++i) {
     (void)bytes.text();  // name
-    if (bytes.text() != "Tree_float_5_4_3") damaged("it has a grid that is not one of float");
+    if (bytes.text() != (floats ? "Tree_float_5_4_3" : "Tree_int32_5_4_3"))
+      damaged(std::string("it has a grid that is not one of ") + (floats ? "float" : "int32"));
     if (!bytes.text().empty()) damaged("it has a grid that is another one's");
     const auto first = bytes.number<std::uint64_t>(), values = bytes.number<std::uint64_t>(),
                end = bytes.number<std::uint64_t>();
@@ -290,11 +294,11 @@ VdbSize walk(const fs::path& file, const VdbLimits& limits) {
 
 }  // namespace
 
-Result<VdbSize> measure_vdb(const fs::path& file, const VdbLimits& limits) {
+Result<VdbSize> measure_vdb(const fs::path& file, const VdbLimits& limits, VdbValues values) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) return failure(ErrorCode::not_found, "there is no file " + file.string());
   try {
-    return walk(file, limits);
+    return walk(file, limits, values);
   } catch (const Refusal& refusal) {
     const char* verdict =
         refusal.code == ErrorCode::exhausted ? " is too large: " : " is damaged or not a .vdb file of Osteon: ";
@@ -302,6 +306,12 @@ Result<VdbSize> measure_vdb(const fs::path& file, const VdbLimits& limits) {
   } catch (const std::exception& e) {
     return failure(ErrorCode::invalid_input, file.string() + " cannot be read: " + e.what());
   }
+}
+
+std::uint64_t most_case_memory(const fs::path& file) {
+  std::error_code error;
+  const std::uintmax_t bytes = fs::file_size(file, error);
+  return error ? kCaseMemoryBytes : std::max<std::uint64_t>(kCaseMemoryBytes, kMemoryToFile * bytes);
 }
 
 }  // namespace osteon

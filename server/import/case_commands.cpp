@@ -37,7 +37,7 @@ struct CaseArguments {
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
   std::vector<std::string> bone_colours, seeds;
   std::optional<double> pitch_mm, similar_hu;
-  double gaussian_mm = 0.0, sigma_mm = 1.0;
+  double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
   std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false, list = false, adaptive = false;
@@ -46,6 +46,10 @@ struct CaseArguments {
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
   if (stop.requested()) return tl::unexpected(stopped());
   return bone.save(out, [&](double) { return !stop.requested(); });
+}
+Result<void> save(const Case& bone, const CaseScan& scan, const std::string& out, const StopSignal& stop) {
+  if (stop.requested()) return tl::unexpected(stopped());
+  return bone.save(out, scan, [&](double) { return !stop.requested(); });
 }
 
 // "all", or numbers such as "1,3". Empty: the largest.
@@ -123,6 +127,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.similar_hu = a.similar_hu;
   options.grow.adaptive = a.adaptive;
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
+  options.margin_mm = a.margin_mm;
   Bar bar(stop);
   auto scan = read_scan(a, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
@@ -140,7 +145,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
     bar.stage(1.0, 1.0)(1.0);
     return series + segmentation_text(made->found);
   }
-  if (auto saved = save(*made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
   return report_text(*made->bone) + series + segmentation_text(made->found);
 }
@@ -270,7 +275,7 @@ Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.95));
   if (!made) return tl::unexpected(about(a.input, made.error()));
-  if (auto saved = save(made->bone, a.out, stop); !saved) return tl::unexpected(saved.error());
+  if (auto saved = save(made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
 
   std::string text = report_text(made->bone);
@@ -450,6 +455,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
   add_smoothing_options(*ct, a);
+  ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
+      ->check(within(0.0, 200.0))
+      ->capture_default_str();
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
 

@@ -14,6 +14,7 @@
 #include "common/imaging/segmentation.hpp"
 #include "common/imaging/threshold.hpp"
 #include "server/import/import_steps.hpp"
+#include "server/import/kept_scan.hpp"
 
 namespace osteon::import {
 namespace {
@@ -23,7 +24,7 @@ constexpr double kSmoothEnd = 0.05, kGrowEnd = 0.1, kSegmentEnd = 0.35, kSurface
 // Smallest size of parts of an island that are reported if only marrow connects them: absolute, and relative to the
 // largest.
 constexpr double kLargePiece_cm3 = 0.5, kLargePiece = 0.1;
-constexpr double kLeastPitch_mm = 0.02, kMostPitch_mm = 10.0, kMostGaussian_mm = 10.0;
+constexpr double kLeastPitch_mm = 0.02, kMostPitch_mm = 10.0, kMostGaussian_mm = 10.0, kMostMargin_mm = 200.0;
 constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;  // of a CT's voxels
 // Margin around the processed voxels, so that everything that the segmentation reads beside a bone is included.
 constexpr double kMargin_mm = 5.0;
@@ -34,10 +35,11 @@ struct Region {
   imaging::ScanEnds ends{};
 };
 
-Region grown(const std::array<int, 3>& first, const std::array<int, 3>& last, const imaging::HuVolume& volume) {
+Region grown(const std::array<int, 3>& first, const std::array<int, 3>& last, const imaging::HuVolume& volume,
+             double margin_mm) {
   Region region;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int margin = 2 + static_cast<int>(std::ceil(kMargin_mm / volume.spacing_mm[static_cast<int>(axis)]));
+    const int margin = 2 + static_cast<int>(std::ceil(margin_mm / volume.spacing_mm[static_cast<int>(axis)]));
     region.first[axis] = std::max(0, first[axis] - margin);
     region.last[axis] = std::min(volume.dims[axis] - 1, last[axis] + margin);
     region.ends[axis] = {region.first[axis] == 0, region.last[axis] == volume.dims[axis] - 1};
@@ -45,22 +47,28 @@ Region grown(const std::array<int, 3>& first, const std::array<int, 3>& last, co
   return region;
 }
 
-// The part around everything at or above the threshold; the whole scan if there is nothing. Error: cancelled.
-Result<Region> dense_region(const imaging::HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
+// Margin of what is processed, so that it contains what the case keeps of the scan.
+double margin_mm_of(const CtOptions& options) { return std::max(kMargin_mm, options.margin_mm); }
+
+// The part around everything at or above the threshold, with what the case keeps of the scan; the whole scan if there
+// is nothing. Error: cancelled.
+Result<Region> dense_region(const imaging::HuVolume& volume, const CtOptions& options, const KeepGoing& keep_going) {
+  const double margin_mm = margin_mm_of(options);
   std::array<int, 3> first = volume.dims, last{-1, -1, -1};
   for (int slice = 0; slice < volume.dims[2]; ++slice) {
     if (!keep_going(0.0)) return failure(ErrorCode::cancelled, "stopped before looking for the bone");
     for (int row = 0; row < volume.dims[1]; ++row) {
       const std::int16_t* hu = volume.values.data() + volume.index(0, row, slice);
       for (int column = 0; column < volume.dims[0]; ++column) {
-        if (hu[column] < threshold_hu) continue;
+        if (hu[column] < options.threshold_hu) continue;
         first = {std::min(first[0], column), std::min(first[1], row), std::min(first[2], slice)};
         last = {std::max(last[0], column), std::max(last[1], row), std::max(last[2], slice)};
       }
     }
   }
-  if (last[0] < 0) return grown({0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}, volume);
-  return grown(first, last, volume);
+  if (last[0] < 0)
+    return grown({0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}, volume, margin_mm);
+  return grown(first, last, volume, margin_mm);
 }
 
 // The bone's voxels, the cell around each, and the band beyond.
@@ -291,14 +299,14 @@ Result<imaging::ThresholdSuggestion> suggested_threshold(const imaging::HuVolume
 }
 
 // The part around all regions.
-Region grown_region(const std::vector<imaging::Region>& regions, const imaging::HuVolume& volume) {
+Region grown_region(const std::vector<imaging::Region>& regions, const imaging::HuVolume& volume, double margin_mm) {
   std::array<int, 3> first = volume.dims, last{-1, -1, -1};
   for (const imaging::Region& region : regions)
     for (std::size_t axis = 0; axis < 3; ++axis) {
       first[axis] = std::min(first[axis], region.first[axis]);
       last[axis] = std::max(last[axis], region.last[axis]);
     }
-  return grown(first, last, volume);
+  return grown(first, last, volume, margin_mm);
 }
 
 // The islands with the regions' seeds, in the order of the seeds. `first`: the part's first voxel in the scan.
@@ -319,8 +327,8 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
 // `bones`: what grew from seeds, if there are any.
 Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std::optional<GrownBones> bones,
                           const KeepGoing& keep_going) {
-  const auto work =
-      bones ? Result<Region>(grown_region(bones->regions, scan)) : dense_region(scan, options.threshold_hu, keep_going);
+  const auto work = bones ? Result<Region>(grown_region(bones->regions, scan, margin_mm_of(options)))
+                          : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
   Segmented s;
   s.volume = imaging::cropped(std::move(scan), work->first, work->last);
@@ -391,6 +399,8 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
 
   if (!(options.gaussian_mm >= 0.0 && options.gaussian_mm <= kMostGaussian_mm))
     return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
+  if (!(options.margin_mm >= 0.0 && options.margin_mm <= kMostMargin_mm))
+    return bad_input("the margin of the scan must be from 0 to 200 mm; give another --margin");
   const auto smoothed = smooth(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed;
@@ -416,7 +426,7 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
   if (!s->found.regions.empty())
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
-  if (options.list_only) return CtImport{std::move(s->found), {}};
+  if (options.list_only) return CtImport{std::move(s->found), {}, {}};
   const auto surface_mm =
       measure_surface(*s, geometry, options.threshold_hu, pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
@@ -432,13 +442,18 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
   info.pitch_mm = pitch_mm;
   info.calibration = options.calibration;
   info.threshold_hu = options.threshold_hu;
+  CaseScan kept = kept_scan(s->volume, s->bones, hard->tissue, s->first, s->last, options);
+  list_labels(kept, options, s->found, info);
+  const auto described = describe_scan(kept, part(building, 0.2, 0.3));
+  if (!described) return tl::unexpected(described.error());
+  info.scan = *described;
   const bool several = s->found.kept.size() > 1 && !options.merge;
   CaseSamples content(s->volume, s->bones, hard->tissue, several, *surface_mm, options, pitch_mm);
   const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
-  auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.2, 1.0));
+  auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.3, 1.0));
   if (!built) return tl::unexpected(built.error());
   s->found.case_cm3 = built->volume_mm3() * 1e-3;
-  return CtImport{std::move(s->found), std::move(*built)};
+  return CtImport{std::move(s->found), std::move(*built), std::move(kept)};
 }
 
 }  // namespace

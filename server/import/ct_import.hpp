@@ -8,6 +8,7 @@
 #include "common/imaging/islands.hpp"
 #include "common/imaging/smoothing.hpp"
 #include "common/volume/case.hpp"
+#include "common/volume/case_scan.hpp"
 #include "common/volume/iso_surface.hpp"
 #include "server/import/ct_scan.hpp"
 #include "server/import/grown_bones.hpp"
@@ -29,6 +30,8 @@ struct CtOptions {
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none
+  // The case keeps the scan this far around its bones. It has the HU after the filters.
+  double margin_mm = 10.0;
 };
 
 // Result of the segmentation.
@@ -49,6 +52,7 @@ struct CtSegmentation {
 struct CtImport {
   CtSegmentation found;
   std::optional<Case> bone;  // empty only if the islands were only listed
+  CaseScan scan;             // of `bone`
 };
 
 // segment_bone() decides what is bone, and the options decide which islands are kept. With seeds, the grown regions

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "server/import/import_steps.hpp"
+#include "server/import/kept_scan.hpp"
 
 namespace osteon::import {
 namespace {
@@ -93,6 +94,9 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
                  position_mm(voxels.max, 1.0).cwiseProduct(spacing)};
   const CoordBox box = covering_samples(bone.grown(kMargin * pitch_mm), pitch_mm);
   if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
+  CaseScan kept = kept_scan(volume);
+  const auto described = describe_scan(kept);
+  if (!described) return tl::unexpected(described.error());
 
   auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kSmoothEnd));
   if (!smooth) return tl::unexpected(smooth.error());
@@ -120,9 +124,11 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   info.title = options.title;
   info.source = source;
   info.pitch_mm = pitch_mm;  // densities are given by label, so there is neither a calibration nor a threshold
+  info.scan = *described;
+  list_labels(legend, info);
   auto built = Case::build(std::move(info), *surface_mm, *density);
   if (!built) return tl::unexpected(built.error());
-  return LabelImport{std::move(*built), labelled_mm3};
+  return LabelImport{std::move(*built), labelled_mm3, std::move(kept)};
 }
 
 }  // namespace osteon::import

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/volume/case.hpp"
+#include "common/volume/case_scan.hpp"
 #include "server/import/label_stack.hpp"
 
 namespace osteon::import {
@@ -17,6 +18,7 @@ struct LabelOptions {
 struct LabelImport {
   Case bone;
   double labelled_mm3 = 0;  // volume of the bone's voxels; that of `bone` is the volume after smoothing
+  CaseScan scan;            // of `bone`: the labels, without HU
 };
 
 // Errors: invalid_input (a lattice too large), cancelled.

@@ -54,11 +54,11 @@ class Unpacker {
       if (status != ARCHIVE_OK && status != ARCHIVE_WARN) return damaged();
       if (++entries > quota_.entries)
         return failure(ErrorCode::exhausted, name_ + " has more than " + std::to_string(quota_.entries) +
-                                                 " entries; a case has " + std::to_string(std::size(kCaseFiles)) +
-                                                 " files");
+                                                 " entries; a case has at most " +
+                                                 std::to_string(std::size(kCaseFiles)) + " files");
       if (Result<void> taken = take(entry); !taken) return tl::unexpected(taken.error());
     }
-    for (const std::string_view file : kCaseFiles)
+    for (const std::string_view file : std::span(kCaseFiles).first(kNeededCaseFiles))
       if (!files_.contains(std::string(file)))
         return bad("has no " + std::string(file) + "; pack the whole folder of a case");
     return files_;
@@ -89,7 +89,7 @@ class Unpacker {
     const bool plain = folder != ".." && folder != "." && (slash == std::string::npos || !folder.empty()) &&
                        folder.find('\\') == std::string::npos;
     if (!plain || std::ranges::find(kCaseFiles, file) == std::end(kCaseFiles))
-      return refuse("is not a file of a case; pack only case.json and bone.vdb");
+      return refuse("is not a file of a case; pack only case.json, bone.vdb and scan.vdb");
     if (folder_ && *folder_ != folder) return refuse("lies in another folder than those before it; pack one case");
     folder_ = folder;
     if (files_.contains(file)) return refuse("comes twice; pack the case again");
@@ -171,6 +171,8 @@ Result<void> pack_case(const fs::path& folder, const fs::path& file) {
     std::error_code error;
     const std::uint64_t size = fs::file_size(from, error);
     std::ifstream in(from, std::ios::binary);
+    const bool needed = name != kCaseFiles[kNeededCaseFiles];
+    if (!needed && error == std::errc::no_such_file_or_directory) continue;
     if (error || !in)
       return failure(ErrorCode::not_found, folder.string() + " is not a case: it has no " + std::string(name));
     const std::unique_ptr<archive_entry, FreeEntry> entry(archive_entry_new());

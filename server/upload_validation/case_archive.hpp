@@ -31,8 +31,10 @@ struct UploadQuota {
   std::uint64_t ratio_free_bytes = std::uint64_t{1} << 20;
 };
 
-// The files of a case. An archive may contain only these names, at its top or all in one folder.
-inline constexpr std::string_view kCaseFiles[] = {"case.json", "bone.vdb"};
+// The files of a case, the ones that it must have first. An archive may contain only these names, at its top or all in
+// one folder.
+inline constexpr std::string_view kCaseFiles[] = {"case.json", "bone.vdb", "scan.vdb"};
+inline constexpr std::size_t kNeededCaseFiles = 2;
 
 // Takes the next part of a file of the case. The parts of one file follow each other.
 using PutPiece = std::function<Result<void>(std::string_view file, std::span<const std::byte> piece)>;

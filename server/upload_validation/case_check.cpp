@@ -19,6 +19,7 @@
 #include <new>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <span>
 #include <thread>
 #include <utility>
@@ -26,6 +27,7 @@
 #include "common/core/bounded_text.hpp"
 #include "common/runtime/log.hpp"
 #include "common/volume/case.hpp"
+#include "common/volume/case_scan.hpp"
 #include "server/upload_validation/confine.hpp"
 
 extern char** environ;
@@ -161,15 +163,16 @@ void say_what_holds(const nlohmann::json& answer) {
 }
 
 bool has_plain_files(const fs::path& folder) {
-  std::size_t files = 0;
+  std::set<std::string> names;
   std::error_code error;
   if (fs::symlink_status(folder, error).type() != fs::file_type::directory) return false;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const bool known = std::ranges::find(kCaseFiles, entry.path().filename().string()) != std::end(kCaseFiles);
     if (!known || entry.symlink_status(error).type() != fs::file_type::regular || error) return false;
-    ++files;
+    names.insert(entry.path().filename().string());
   }
-  return !error && files == std::size(kCaseFiles);
+  return !error && std::ranges::all_of(std::span(kCaseFiles).first(kNeededCaseFiles),
+                                       [&](std::string_view needed) { return names.contains(std::string(needed)); });
 }
 
 // Writes the files of the case while it is unpacked.
@@ -199,18 +202,37 @@ class Files {
   std::ofstream out_;
 };
 
+struct SentCase {
+  Case bone;
+  std::optional<CaseScan> scan;  // if it was sent
+};
+
+Error not_sound(const Error& error) {
+  return error.code == ErrorCode::exhausted
+             ? error
+             : Error{ErrorCode::invalid_input, "the case is not sound: " + error.message};
+}
+
 // [the process]
-Result<Case> unpack_and_read(const fs::path& archive, const fs::path& sent, const UploadQuota& quota) {
+Result<SentCase> unpack_and_read(const fs::path& archive, const fs::path& sent, const UploadQuota& quota) {
   std::error_code error;
   fs::create_directory(sent, error);
   if (error) return failure(ErrorCode::internal, "the server cannot unpack a case: " + error.message());
   Files files(sent);
   const auto put = [&](std::string_view file, std::span<const std::byte> piece) { return files.put(file, piece); };
-  if (const auto unpacked = unpack_case(archive, quota, put); !unpacked) return tl::unexpected(unpacked.error());
+  const auto unpacked = unpack_case(archive, quota, put);
+  if (!unpacked) return tl::unexpected(unpacked.error());
   if (const Result<void> closed = files.close(); !closed) return tl::unexpected(closed.error());
-  Result<Case> read = Case::load(sent);
-  if (read || read.error().code == ErrorCode::exhausted) return read;
-  return failure(ErrorCode::invalid_input, "the case is not sound: " + read.error().message);
+  Result<Case> bone = Case::load(sent);
+  if (!bone) return tl::unexpected(not_sound(bone.error()));
+  if (!unpacked->contains(kScanFile)) return SentCase{std::move(*bone), std::nullopt};
+  Result<CaseScan> scan = load_scan(sent, *bone);
+  if (!scan) return tl::unexpected(not_sound(scan.error()));
+  return SentCase{std::move(*bone), std::move(*scan)};
+}
+
+Result<void> write_again(const SentCase& sent, const fs::path& folder) {
+  return sent.scan ? sent.bone.save(folder, *sent.scan) : sent.bone.save(folder);
 }
 
 }  // namespace
@@ -276,11 +298,13 @@ int run_case_check(const fs::path& archive, const fs::path& folder, const std::s
   const Confinement held = confine_to(folder);
   nlohmann::json answer;
   try {
-    const Result<Case> read = unpack_and_read(archive, folder / "sent", quota_of(quota_text));
-    if (const Result<void> kept = read ? read->save(folder / kSoundCase) : tl::unexpected(read.error()); !kept)
+    const Result<SentCase> read = unpack_and_read(archive, folder / "sent", quota_of(quota_text));
+    if (const Result<void> kept = read ? write_again(*read, folder / kSoundCase) : tl::unexpected(read.error()); !kept)
       answer = {{"error", kept.error().message}, {"code", word_of(kept.error().code)}};
     else
-      answer = {{"hash", to_hex(read->hash())}, {"title", read->info().title}, {"memory_bytes", read->memory_bytes()}};
+      answer = {{"hash", to_hex(read->bone.hash())},
+                {"title", read->bone.info().title},
+                {"memory_bytes", read->bone.memory_bytes()}};
   } catch (const std::bad_alloc&) {
     answer = {{"error", "reading the case takes more memory than allowed"}, {"code", word_of(ErrorCode::exhausted)}};
   } catch (const std::exception& broken) {

@@ -8,6 +8,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/volume/case_scan.hpp"
 #include "server/upload_validation/case_check.hpp"
 
 namespace osteon {
@@ -110,18 +111,25 @@ Result<StoredCase> CaseRepository::keep(std::unique_ptr<Upload> upload, const st
   std::ofstream(sound / kNote) << nlohmann::json{{"memory_bytes", checked->memory_bytes}} << "\n";
 
   const MutexLock lock(keeping_);
-  StoredCase stored{checked->hash,   checked->title, folder_ / to_hex(checked->hash),
-                    bytes_in(sound), false,          checked->memory_bytes};
-  if (fs::exists(stored.folder, error)) {
-    stored.known = true;
-    return stored;
-  }
+  StoredCase stored{checked->hash,
+                    checked->title,
+                    folder_ / to_hex(checked->hash),
+                    bytes_in(sound),
+                    fs::exists(folder_ / to_hex(checked->hash), error),
+                    checked->memory_bytes};
+  // A case that was stored without its scan gets it from a later upload.
+  const bool has_all =
+      stored.known && (fs::exists(stored.folder / kScanFile, error) || !fs::exists(sound / kScanFile, error));
+  if (has_all) return stored;
+  const fs::path from = stored.known ? sound / kScanFile : sound,
+                 to = stored.known ? stored.folder / kScanFile : stored.folder;
+  const std::uint64_t bytes = stored.known ? fs::file_size(from, error) : stored.bytes;
   // Other cases may have been stored since this upload began.
-  if (case_bytes() + stored.bytes > quota_.kept_bytes)
-    return failure(ErrorCode::exhausted, "the server's folder of cases has no " + std::to_string(stored.bytes) +
+  if (case_bytes() + bytes > quota_.kept_bytes)
+    return failure(ErrorCode::exhausted, "the server's folder of cases has no " + std::to_string(bytes) +
                                              " bytes left for this one; ask the operator to delete some");
-  fs::rename(sound, stored.folder, error);
-  if (error) return disk(stored.folder, error.message());
+  fs::rename(from, to, error);
+  if (error) return disk(to, error.message());
   return stored;
 }
 

@@ -8,10 +8,12 @@
 #include "common/core/digest.hpp"
 #include "common/field/kernel.hpp"
 #include "common/volume/case.hpp"
+#include "common/volume/case_scan.hpp"
 #include "common/volume/field_file.hpp"
 #include "tests/fuzz/import_files.hpp"
 #include "tests/fuzz/import_targets.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/scenes/described_case.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -25,10 +27,25 @@ const Case& a_case() {
   return made;
 }
 
+const CaseScan& a_scan() {
+  static const CaseScan made = test::turned_scan();
+  return made;
+}
+
+// A case in which every field of the description is set.
+const Case& a_described_case() {
+  static const Case made = [] {
+    const auto built = test::described_ball(test::full_description(a_scan()));
+    OSTEON_CHECK(built.has_value());
+    return *built;
+  }();
+  return made;
+}
+
 // A valid case in a folder. The input replaces one of its files.
 class CaseFolder {
  public:
-  CaseFolder() { OSTEON_CHECK(a_case().save(folder_ / "case")); }
+  CaseFolder() { OSTEON_CHECK(a_described_case().save(folder_ / "case", a_scan())); }
   [[nodiscard]] fs::path path() const { return folder_ / "case"; }
   [[nodiscard]] Bytes file(const char* name) const { return bytes_of_file(path() / name); }
 
@@ -52,6 +69,24 @@ void read_with(std::span<const std::uint8_t> data, const char* name) {
   if (!fs::exists(changed.folder() / other)) fs::copy_file(sound.path() / other, changed.folder() / other);
   changed.write(data);
   load_case(changed.folder());
+}
+
+// The bone with all that schema 2 has, and the same bone in schema 1.
+std::vector<Bytes> descriptions() {
+  CaseInfo earlier{
+      .title = "A femur", .source = "closed form", .pitch_mm = 0.5, .calibration = {}, .threshold_hu = 0.0};
+  earlier.schema_version = 1;
+  const auto bone = test::described_ball(earlier);
+  OSTEON_CHECK(bone.has_value());
+  return {CaseFolder().file("case.json"), bytes_of_text(to_text({earlier, bone->hash()}))};
+}
+
+// An accepted scan is the one that the case describes.
+void read_scan(std::span<const std::uint8_t> data) {
+  static const InputFile file("scan.vdb");
+  const auto scan = load_scan(file.write(data).parent_path(), a_described_case());
+  if (!scan) return expect_bounded(scan.error());
+  OSTEON_CHECK(scan->hu == a_scan().hu && scan->labels == a_scan().labels && scan->tissue == a_scan().tissue);
 }
 
 // The end of a file of fields. Every input gets a valid one, because otherwise only the seal would be tested.
@@ -95,9 +130,7 @@ Bytes some_fields() {
 }  // namespace
 
 Target case_info_target() {
-  Target target{"case_info",
-                [](std::span<const std::uint8_t> data) { read_with(data, "case.json"); },
-                {CaseFolder().file("case.json")}};
+  Target target{"case_info", [](std::span<const std::uint8_t> data) { read_with(data, "case.json"); }, descriptions()};
   target.change = change_number;
   target.mutations = 200;
   return target;
@@ -107,6 +140,12 @@ Target bone_volume_target() {
   Target target{"bone_volume",
                 [](std::span<const std::uint8_t> data) { read_with(data, "bone.vdb"); },
                 {CaseFolder().file("bone.vdb")}};
+  target.mutations = 300;
+  return target;
+}
+
+Target scan_volume_target() {
+  Target target{"scan_volume", read_scan, {CaseFolder().file("scan.vdb")}};
   target.mutations = 300;
   return target;
 }

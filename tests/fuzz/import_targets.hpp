@@ -10,6 +10,7 @@ namespace osteon::fuzz {
 [[nodiscard]] Target legend_target();        // YAML file with the colours of a label volume
 [[nodiscard]] Target case_info_target();     // case.json beside a valid bone.vdb
 [[nodiscard]] Target bone_volume_target();   // bone.vdb beside a valid case.json
+[[nodiscard]] Target scan_volume_target();   // scan.vdb beside a valid case.json
 [[nodiscard]] Target cut_fields_target();    // cut fields
 [[nodiscard]] Target dicom_target();         // one CT slice
 [[nodiscard]] Target inv3_target();          // InVesalius project

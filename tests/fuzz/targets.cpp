@@ -240,6 +240,7 @@ std::vector<Target> targets() {
       legend_target(),
       case_info_target(),
       bone_volume_target(),
+      scan_volume_target(),
       cut_fields_target(),
       dicom_target(),
       inv3_target(),

@@ -109,6 +109,26 @@ def region_growing(run):
             "region_growing_speedup": Measured(fastest / ours if same else None, None, None, None, 1)}
 
 
+def case_schemas(run):
+    """The cases of two real scans, beside the same bones without their scan in schema 1."""
+    values = {}
+    for name in ("skull", "tibia"):
+        scan = find_scan(run, name)
+        names = [f"case_schema_{name}_{what}" for what in ("size", "load", "scan_load")]
+        if scan is None:
+            run.skip(f"case_schema_{name}", "there is no shared/data beside the checkout")
+            values |= {figure: Measured(None) for figure in names}
+            continue
+        run.say(f"a case and its scan: {name}")
+        case = run.folder / f"case-schema-{name}"
+        run.output("osteon-import", "ct", scan, "--out", case)
+        found = json.loads(run.output("osteon-case-load", case))
+        values |= dict(zip(names, (Measured(found["bytes"] / 1e6, found["earlier_bytes"] / 1e6),
+                                   Measured(found["load_ms"], found["earlier_load_ms"]),
+                                   Measured(found["scan_load_ms"], found["load_ms"]))))
+    return values
+
+
 def scanned_slab(run):
     """The layered block of the rig's figures as DICOM slices, imported at the default threshold."""
     folder = run.folder / "scanned-slab"

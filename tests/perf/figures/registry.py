@@ -668,6 +668,15 @@ FIGURES = [
     Figure("median_speedup", "ratio", f"median of 3 x 3 x 3 voxels: CPU time of {FILTERS}, over ours, one thread",
            "median", (">=", 8.0), full=True),
     Figure("median_differences", "count", "voxels in which it differs from SciPy's", "median", ("==", 0), full=True),
+    # What the scan in a case costs.
+    *[figure for name, what in (("skull", "a skull of 108 slices"), ("tibia", "two lower legs of 46 slices"))
+      for figure in (
+        Figure(f"case_schema_{name}_size", "mb", f"{what}: all files of the case", "case_schema",
+               baseline="the same bone in schema 1, without its scan"),
+        Figure(f"case_schema_{name}_load", "ms", f"{what}: time to load the bone, median", "case_schema",
+               baseline="the same bone in schema 1"),
+        Figure(f"case_schema_{name}_scan_load", "ms", f"{what}: time to load and verify its scan, median",
+               "case_schema", baseline="time to load the bone"))],
     # Bones from real images, burred in frames of 33 cuts.
     *[figure for name, what in (("temporal", "a temporal bone at its own 0.096 mm"),
                                 ("skull", "a skull, cuts at a quarter of its pitch")) for figure in (

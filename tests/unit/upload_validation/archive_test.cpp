@@ -86,6 +86,13 @@ TEST(CaseArchive, FilesAtTheTopOrInOneFolderComeOut) {
   EXPECT_EQ(within->files.size(), 2U);
 }
 
+TEST(CaseArchive, TheScanMayComeToo) {
+  const auto out = unpack(zip(with({"scan.vdb", "voxels"})));
+  ASSERT_TRUE(out) << out.error().message;
+  EXPECT_EQ(out->files.at("scan.vdb"), "voxels");
+  EXPECT_FALSE(unpack(zip({{"case.json", "{}"}, {"scan.vdb", "x"}}))) << "it does not replace the bone";
+}
+
 TEST(CaseArchive, NothingElseIsTaken) {
   struct Evil {
     const char* what;
@@ -192,8 +199,18 @@ TEST(CaseArchive, WhatIsPackedUnpacksTheSame) {
     return Result<void>{};
   });
   ASSERT_TRUE(out) << out.error().message;
+  EXPECT_EQ(files.size(), 2u);
   EXPECT_EQ(files.at("bone.vdb"), content);
   EXPECT_EQ(files.at("case.json"), "{\"title\":1}");
+  std::ofstream(temp / "case" / "scan.vdb", std::ios::binary) << "voxels";
+  ASSERT_TRUE(pack_case(temp / "case", temp / "scanned.zip"));
+  files.clear();
+  ASSERT_TRUE(unpack_case(temp / "scanned.zip", {}, [&](std::string_view file, std::span<const std::byte> piece) {
+    files[std::string(file)].append(reinterpret_cast<const char*>(piece.data()), piece.size());
+    return Result<void>{};
+  }));
+  EXPECT_EQ(files.size(), 3u);
+  EXPECT_EQ(files.at("scan.vdb"), "voxels");
   std::filesystem::remove(temp / "case" / "case.json");
   const auto none = pack_case(temp / "case", temp / "other.zip");
   ASSERT_FALSE(none);

@@ -9,6 +9,7 @@
 #include "server/upload_validation/case_check.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/scenes/bones.hpp"
+#include "tests/support/scenes/described_case.hpp"
 #include "tests/support/temp_dir.hpp"
 
 namespace osteon {
@@ -75,6 +76,75 @@ TEST_F(StoreTest, ACaseIsKeptUnderItsHashAndIsTheSameCase) {
   ASSERT_TRUE(twice) << twice.error().message;
   EXPECT_TRUE(twice->known);
   EXPECT_EQ(store_->folders().size(), 1U);
+}
+
+// A case with a scan and a plan, and what is stored of it.
+class ScannedStoreTest : public StoreTest {
+ protected:
+  ScannedStoreTest() : scan_(test::turned_scan()), scanned_(*test::described_ball(test::full_description(scan_))) {
+    EXPECT_TRUE(scanned_.save(folder_, scan_));
+  }
+  Result<StoredCase> stored() {
+    fs::remove(temp_ / "scanned.zip");
+    EXPECT_TRUE(pack_case(folder_, temp_ / "scanned.zip"));
+    return keep(*store_, content_of(temp_ / "scanned.zip"));
+  }
+  const CaseScan scan_;
+  const Case scanned_;
+  const fs::path folder_ = temp_ / "scanned", file_ = folder_ / "scan.vdb";
+};
+
+TEST_F(ScannedStoreTest, TheScanIsKeptToo) {
+  const auto kept = stored();
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ(kept->hash, scanned_.hash());
+  const auto again = Case::load(kept->folder);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->info(), scanned_.info());
+  const auto scan = load_scan(kept->folder, *again);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->hu, scan_.hu);
+  EXPECT_EQ(scan->labels, scan_.labels);
+  EXPECT_EQ(scan->tissue, scan_.tissue);
+}
+
+TEST_F(ScannedStoreTest, ItMayBeLeftOut) {
+  fs::remove(file_);
+  const auto kept = stored();
+  ASSERT_TRUE(kept) << kept.error().message;
+  EXPECT_EQ(kept->hash, scanned_.hash());
+  EXPECT_FALSE(fs::exists(kept->folder / "scan.vdb"));
+  // It may come later, and is not lost when it is left out again.
+  ASSERT_TRUE(save_scan(file_, scan_));
+  const auto later = stored();
+  ASSERT_TRUE(later) << later.error().message;
+  EXPECT_TRUE(later->known);
+  EXPECT_TRUE(load_scan(kept->folder, scanned_));
+  fs::remove(file_);
+  ASSERT_TRUE(stored());
+  EXPECT_TRUE(load_scan(kept->folder, scanned_));
+}
+
+TEST_F(ScannedStoreTest, AScanThatIsDamagedOrOfNoCaseIsRefused) {
+  const auto expect_refused = [&](const std::string& named) {
+    const auto out = stored();
+    ASSERT_FALSE(out) << named;
+    EXPECT_EQ(out.error().code, ErrorCode::invalid_input) << out.error().message;
+    EXPECT_NE(out.error().message.find(named), std::string::npos) << out.error().message;
+    EXPECT_EQ(left_over(), 0U);
+    EXPECT_TRUE(store_->folders().empty());
+  };
+  const std::string sound = content_of(file_);
+  std::ofstream(file_, std::ios::binary) << sound.substr(0, sound.size() / 2);
+  expect_refused("scan.vdb");
+  CaseScan other = scan_;
+  ++other.hu[3];
+  fs::remove(file_);
+  ASSERT_TRUE(save_scan(file_, other));
+  expect_refused("scan.hash differs");
+  fs::copy_file(temp_ / "case" / "case.json", folder_ / "case.json", fs::copy_options::overwrite_existing);
+  fs::copy_file(temp_ / "case" / "bone.vdb", folder_ / "bone.vdb", fs::copy_options::overwrite_existing);
+  expect_refused("has no scan");
 }
 
 // The hash of a case or the format of its files covers every byte. With a flipped byte it is another case, or none.
@@ -157,6 +227,7 @@ TEST_F(StoreTest, AReaderThatDiesOrHangsOrWantsTooMuchIsOneSentence) {
       << "the file is a link";
   EXPECT_EQ(with(plain + "echo > $3/sound/bone.vdb; echo > $3/sound/more; " + lie).code, ErrorCode::invalid_input)
       << "there are more files than in a case";
+  EXPECT_EQ(with(plain + "echo > $3/sound/scan.vdb; " + lie).code, ErrorCode::invalid_input) << "there is no bone";
   EXPECT_EQ(with("mkdir $3/real; ln -s real $3/sound; echo > $3/real/case.json; echo > $3/real/bone.vdb; " + lie).code,
             ErrorCode::invalid_input);
   EXPECT_EQ(with("exec yes").code, ErrorCode::exhausted);

@@ -22,7 +22,7 @@ namespace {
 
 using test::plain_block;
 
-const Vec3 kDown(0.0, 0.0, -1.0);
+const Vec3 kDownward(0.0, 0.0, -1.0);
 
 Cut swept(const Tool& tool, const Pose& from, const Pose& to, int level) {
   Cut cut;
@@ -35,8 +35,8 @@ Cut swept(const Tool& tool, const Pose& from, const Pose& to, int level) {
 
 // A blade's cut straight down at x or y = `at`, to the depth `deep`. It reaches beyond the block on both sides.
 Cut kerf(const Vec3& across, const Vec3& at, double deep) {
-  return swept(*find_tool("saw-oscillating-1"), pose_across(at + Vec3(0, 0, 1), kDown, across),
-               pose_across(at - Vec3(0, 0, deep), kDown, across), 2);
+  return swept(*find_tool("saw-oscillating-1"), pose_across(at + Vec3(0, 0, 1), kDownward, across),
+               pose_across(at - Vec3(0, 0, deep), kDownward, across), 2);
 }
 Cut kerf_at_x(double x, double deep) { return kerf(Vec3::UnitY(), {x, 0, 0}, deep); }
 Cut kerf_at_y(double y, double deep) { return kerf(Vec3::UnitX(), {0, y, 0}, deep); }
@@ -60,7 +60,7 @@ std::vector<Cut> crossing_cuts(std::size_t count, const std::array<int, 3>& leve
       cuts.push_back(swept(tool, at(-15.0), at(0.5 * x), level));
       continue;
     }
-    const auto at = [&](double z) { return pose_across({x, y, z}, kDown, {std::cos(turn), std::sin(turn), 0.0}); };
+    const auto at = [&](double z) { return pose_across({x, y, z}, kDownward, {std::cos(turn), std::sin(turn), 0.0}); };
     cuts.push_back(swept(tool, at(1.0), at(-deep), level));
   }
   return cuts;

@@ -76,7 +76,7 @@ TEST(Case, RefusesWhatIsNotACaseInOneSentenceNamingIt) {
 
   const Case bone = plain_block(8.0, 8.0, 0.5);
   for (const char* name : {"version", "tampered", "broken", "cut-off"}) ASSERT_TRUE(bone.save(temp / name));
-  replace_in(temp / "version" / "case.json", "\"schema_version\": 1", "\"schema_version\": 99");
+  replace_in(temp / "version" / "case.json", "\"schema_version\": 2", "\"schema_version\": 99");
   EXPECT_NE(message("version").find("99"), std::string::npos);
   // Undefined behaviour as an int: the sanitizers would detect it.
   replace_in(temp / "version" / "case.json", "\"schema_version\": 99", "\"schema_version\": 1e17");

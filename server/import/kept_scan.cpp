@@ -1,0 +1,142 @@
+#include "server/import/kept_scan.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <set>
+#include <string>
+
+#include "common/core/bounded_text.hpp"
+#include "common/field/tissue.hpp"
+#include "common/imaging/calibration.hpp"
+
+namespace osteon::import {
+namespace {
+
+constexpr int kMostBoneNumbers = 255;  // more islands share the last number, see number_bones()
+
+std::uint8_t tissue_of(const DensityCalibration& calibration, std::int16_t hu) {
+  const auto density = static_cast<float>(imaging::bone_density_g_cm3(calibration, hu));
+  return static_cast<std::uint8_t>(density >= kCorticalFrom_g_cm3 ? Tissue::cortical : Tissue::trabecular);
+}
+
+// Replaces the threshold by the regions that grew from seeds.
+void add_growing(const GrowOptions& grow, LabelProvenance& provenance) {
+  const char* takes = !grow.similar_hu ? "at or above the threshold"
+                      : grow.adaptive  ? "similar to the mean of the region"
+                                       : "similar to the seed";
+  provenance.method = std::string("region growing by ") + (grow.by == imaging::GrowBy::slice ? "slice" : "volume") +
+                      ", " + takes + provenance.method.substr(std::strlen("threshold"));
+  if (grow.similar_hu) provenance.parameters["similar_hu"] = *grow.similar_hu;
+  for (std::size_t i = 0; i < grow.seeds_mm.size(); ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      provenance.parameters["seed_" + std::to_string(i + 1) + "_" + "xyz"[axis] + "_mm"] = grow.seeds_mm[i][axis];
+}
+
+// How every label of the scan was found.
+LabelProvenance provenance_of(const CtOptions& options) {
+  LabelProvenance provenance;
+  provenance.method = options.hollow ? "threshold, islands" : "threshold, enclosed marrow, islands";
+  provenance.parameters["threshold_hu"] = options.threshold_hu;
+  if (!options.grow.seeds_mm.empty()) add_growing(options.grow, provenance);
+  if (options.median) provenance.parameters["median_voxels"] = *options.median == imaging::MedianBox::slice ? 9 : 27;
+  if (options.gaussian_mm > 0.0) provenance.parameters["gaussian_mm"] = options.gaussian_mm;
+  return provenance;
+}
+
+void list_tissues(const CaseScan& scan, CaseInfo& info) {
+  const CaseLabel known[] = {
+      {static_cast<int>(Tissue::cortical),
+       "cortical",
+       LabelKind::cortical,
+       {"density", {{"from_g_cm3", static_cast<double>(kCorticalFrom_g_cm3)}}, {}}},
+      {static_cast<int>(Tissue::trabecular),
+       "cancellous",
+       LabelKind::cancellous,
+       {"density", {{"below_g_cm3", static_cast<double>(kCorticalFrom_g_cm3)}}, {}}},
+      {static_cast<int>(Tissue::metal), "metal", LabelKind::metal, {"HU", {{"from_hu", imaging::kMetal_hu}}, {}}},
+      {static_cast<int>(Tissue::enamel),
+       "enamel",
+       LabelKind::enamel,
+       {"density", {{"above_g_cm3", imaging::kCompactBone_g_cm3}}, {}}},
+  };
+  for (const CaseLabel& label : known)
+    if (std::ranges::find(scan.tissue, static_cast<std::uint8_t>(label.value)) != scan.tissue.end())
+      info.tissues.push_back(label);
+}
+
+}  // namespace
+
+CaseScan kept_scan(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard,
+                   const std::array<int, 3>& first, const std::array<int, 3>& last, const CtOptions& options) {
+  std::array<int, 3> low{}, high{};
+  CaseScan scan;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const int margin = static_cast<int>(std::ceil(options.margin_mm / volume.spacing_mm[static_cast<int>(axis)]));
+    low[axis] = std::max(0, first[axis] - margin);
+    high[axis] = std::min(volume.dims[axis] - 1, last[axis] + margin);
+    scan.geometry.dims[axis] = high[axis] - low[axis] + 1;
+  }
+  scan.geometry.origin_mm = volume.position_mm(Vec3(low[0], low[1], low[2]));
+  scan.geometry.axes_mm = volume.directions * volume.spacing_mm.asDiagonal();
+  const std::size_t count = scan.geometry.count();
+  scan.hu.reserve(count);
+  scan.labels.reserve(count);
+  scan.tissue.reserve(count);
+  for (int slice = low[2]; slice <= high[2]; ++slice)
+    for (int row = low[1]; row <= high[1]; ++row)
+      for (int column = low[0]; column <= high[0]; ++column) {
+        const std::size_t i = volume.index(column, row, slice);
+        const std::uint8_t found = hard.values.empty() ? std::uint8_t{0} : hard.values[i];
+        scan.hu.push_back(volume.values[i]);
+        scan.labels.push_back(bones.values[i]);
+        scan.tissue.push_back(bones.values[i] == 0 ? std::uint8_t{0}
+                              : found != 0         ? found
+                                                   : tissue_of(options.calibration, volume.values[i]));
+      }
+  return scan;
+}
+
+void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info) {
+  const int bones = found.merged ? 1 : std::min(kMostBoneNumbers, static_cast<int>(found.kept.size()));
+  for (int bone = 1; bone <= bones; ++bone) {
+    CaseLabel label{bone, "bone " + std::to_string(bone), LabelKind::bone, provenance_of(options)};
+    if (!found.merged) label.provenance.parameters["island"] = found.kept[static_cast<std::size_t>(bone - 1)];
+    info.labels.push_back(std::move(label));
+  }
+  list_tissues(scan, info);
+}
+
+CaseScan kept_scan(const imaging::LabelVolume& volume) {
+  const CoordBox& box = volume.labels.box;
+  CaseScan scan;
+  scan.geometry.dims = {box.dims().x, box.dims().y, box.dims().z};
+  scan.geometry.origin_mm = position_mm(box.min, 1.0).cwiseProduct(volume.spacing_mm);
+  scan.geometry.axes_mm = volume.spacing_mm.asDiagonal();
+  scan.labels.reserve(scan.geometry.count());
+  for (int z = box.min.z; z <= box.max.z; ++z)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int x = box.min.x; x <= box.max.x; ++x) scan.labels.push_back(volume.labels.at({x, y, z}));
+  return scan;
+}
+
+void list_labels(const LabelLegend& legend, CaseInfo& info) {
+  constexpr std::size_t kMostNameBytes = kMostCaseTextBytes - 20;  // a number may follow
+  std::set<std::string> taken;
+  for (const BoneColour& colour : legend.bones) {
+    CaseLabel label;
+    label.value = static_cast<int>(info.labels.size()) + 1;
+    const std::string given = colour.name.empty() ? "bone" : bounded_text(colour.name, kMostNameBytes);
+    label.name = given;
+    for (int n = 2; !taken.insert(label.name).second; ++n) label.name = given + " " + std::to_string(n);
+    label.provenance.method = "colour of the slices";
+    label.provenance.parameters = {{"red", colour.rgb[0]},
+                                   {"green", colour.rgb[1]},
+                                   {"blue", colour.rgb[2]},
+                                   {"tolerance", legend.tolerance},
+                                   {"density_g_cm3", colour.density_g_cm3}};
+    info.labels.push_back(std::move(label));
+  }
+}
+
+}  // namespace osteon::import

@@ -1,0 +1,201 @@
+// The scan of a case: HU and labels on the scanner's voxels.
+#include "common/volume/case_scan.hpp"
+
+#include <gtest/gtest.h>
+#include <openvdb/openvdb.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "common/volume/openvdb_start.hpp"
+#include "common/volume/sparse_volume.hpp"
+#include "tests/support/content.hpp"
+#include "tests/support/scenes/described_case.hpp"
+#include "tests/support/temp_dir.hpp"
+
+namespace osteon {
+namespace {
+
+namespace fs = std::filesystem;
+
+class CaseScanTest : public ::testing::Test {
+ protected:
+  CaseScanTest() : scan_(test::turned_scan()), bone_(*test::described_ball(test::full_description(scan_))) {
+    EXPECT_TRUE(bone_.save(folder_, scan_));
+  }
+  void expect_same(const CaseScan& loaded) const {
+    EXPECT_EQ(loaded.geometry, scan_.geometry);
+    EXPECT_EQ(loaded.hu, scan_.hu);
+    EXPECT_EQ(loaded.labels, scan_.labels);
+    EXPECT_EQ(loaded.tissue, scan_.tissue);
+  }
+  [[nodiscard]] Error refused() const {
+    const auto loaded = load_scan(folder_, bone_);
+    EXPECT_FALSE(loaded);
+    return loaded ? Error{} : loaded.error();
+  }
+  // Writes another scan in the place of the case's own.
+  void replace_by(const CaseScan& other) const {
+    fs::remove(file_);
+    ASSERT_TRUE(save_scan(file_, other));
+  }
+
+  test::TempDir temp_;
+  CaseScan scan_;
+  Case bone_;
+  const fs::path folder_ = temp_ / "case", file_ = folder_ / "scan.vdb";
+};
+
+TEST_F(CaseScanTest, EveryVoxelComesBack) {
+  const auto loaded = load_scan(folder_, bone_);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  expect_same(*loaded);
+}
+
+// Asked of OpenVDB itself, so that another program finds the voxels as the header says.
+TEST_F(CaseScanTest, SampleIjkIsColumnRowAndSlice) {
+  start_openvdb();
+  openvdb::io::File file(file_.string());
+  file.open(false);
+  const auto hu = openvdb::gridPtrCast<openvdb::Int32Grid>(file.readGrid("hu"));
+  const auto labels = openvdb::gridPtrCast<openvdb::Int32Grid>(file.readGrid("labels"));
+  const auto tissue = openvdb::gridPtrCast<openvdb::Int32Grid>(file.readGrid("tissue"));
+  ASSERT_TRUE(hu && labels && tissue);
+  EXPECT_EQ(hu->tree().getValue(openvdb::Coord(3, 4, 5)), 3 + 400 + 5000 - 3000);
+  EXPECT_EQ(labels->tree().getValue(openvdb::Coord(8, 5, 0)), 1);
+  EXPECT_EQ(labels->tree().getValue(openvdb::Coord(9, 5, 0)), 7);
+  EXPECT_EQ(labels->tree().getValue(openvdb::Coord(9, 6, 0)), 0);
+  EXPECT_EQ(tissue->tree().getValue(openvdb::Coord(0, 0, 3)), 2);
+}
+
+// Computed with Python's hashlib and struct from the rules of deploy/docs/case.md.
+TEST_F(CaseScanTest, TheHashIsTheOneThatTheDocumentationDescribes) {
+  EXPECT_EQ(to_hex(bone_.info().scan->hash), "ba0a8b3e44cc39e979de26c511b9a73262e99f2271dfb7b022f9730b545665fc");
+}
+
+TEST_F(CaseScanTest, AVoxelLiesWhereItsAxesSay) {
+  const ScanGeometry& geometry = bone_.info().scan->geometry;
+  const Vec3 step = geometry.position_mm({0, 0, 1}) - geometry.position_mm({0, 0, 0});
+  EXPECT_NEAR(step.norm(), 2.0, 1e-12);
+  EXPECT_TRUE(geometry.position_mm(Vec3::Zero()).isApprox(Vec3(-10.25, 20.5, 7.125)));
+}
+
+TEST_F(CaseScanTest, GridsThatAreNotKnownStayEmpty) {
+  CaseScan labels_alone = scan_;
+  labels_alone.hu.clear();
+  labels_alone.tissue.clear();
+  CaseInfo info = test::full_description(labels_alone);
+  const auto bone = test::described_ball(info);
+  ASSERT_TRUE(bone && bone->save(temp_ / "labels", labels_alone));
+  const auto loaded = load_scan(temp_ / "labels", *bone);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_TRUE(loaded->hu.empty() && loaded->tissue.empty());
+  EXPECT_EQ(loaded->labels, scan_.labels);
+}
+
+TEST_F(CaseScanTest, TheBoneIsReadAndVerifiedWithoutTheScan) {
+  fs::remove(file_);
+  const auto loaded = Case::load(folder_);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  EXPECT_EQ(loaded->hash(), bone_.hash());
+  const Error missing = refused();
+  EXPECT_EQ(missing.code, ErrorCode::not_found);
+  EXPECT_EQ(missing.message, "there is no file " + file_.string() + "; import the case again");
+}
+
+TEST_F(CaseScanTest, ACaseWithoutScanSaysSo) {
+  CaseInfo info = test::full_description(scan_);
+  info.scan.reset();
+  const auto bone = test::described_ball(info);
+  ASSERT_TRUE(bone && bone->save(temp_ / "none"));
+  EXPECT_FALSE(fs::exists(temp_ / "none" / "scan.vdb"));
+  const auto loaded = load_scan(temp_ / "none", *bone);
+  ASSERT_FALSE(loaded);
+  EXPECT_EQ(loaded.error().code, ErrorCode::not_found);
+  EXPECT_NE(loaded.error().message.find("has no scan; import it again"), std::string::npos);
+}
+
+TEST_F(CaseScanTest, OneChangedVoxelIsAnotherScan) {
+  for (const int grid : {0, 1, 2}) {
+    CaseScan other = scan_;
+    if (grid == 0) other.hu[700] += 1;
+    if (grid == 1) other.labels[700] = other.labels[700] == 1 ? 7 : 1;
+    if (grid == 2) other.tissue[700] = other.tissue[700] == 1 ? 2 : 1;
+    replace_by(other);
+    const Error wrong = refused();
+    EXPECT_EQ(wrong.code, ErrorCode::invalid_input);
+    EXPECT_EQ(wrong.message,
+              file_.string() + " is another scan than the case describes: scan.hash differs; import the case again");
+  }
+}
+
+TEST_F(CaseScanTest, ValuesThatNoLabelListsAreRefused) {
+  CaseInfo info = test::full_description(scan_);
+  info.labels.pop_back();
+  info.regions.clear();
+  const auto bone = test::described_ball(info);
+  ASSERT_TRUE(bone);
+  const auto saved = bone->save(temp_ / "unlisted", scan_);
+  ASSERT_FALSE(saved);
+  EXPECT_EQ(saved.error().message, "labels does not list the value 7, which voxels of the scan have");
+  // The same in a folder that somebody put together.
+  ASSERT_TRUE(bone->save(temp_ / "unlisted"));
+  fs::copy_file(file_, temp_ / "unlisted" / "scan.vdb");
+  const auto loaded = load_scan(temp_ / "unlisted", *bone);
+  ASSERT_FALSE(loaded);
+  EXPECT_NE(loaded.error().message.find("scan.vdb: labels does not list the value 7"), std::string::npos)
+      << loaded.error().message;
+}
+
+TEST_F(CaseScanTest, ALargerScanIsRefusedBeforeItIsRead) {
+  CaseScan larger{.geometry = scan_.geometry};
+  larger.geometry.dims = {64, 64, 64};
+  larger.labels.assign(larger.geometry.count(), 1);
+  for (std::size_t i = 0; i < larger.labels.size(); i += 2) larger.labels[i] = 7;
+  replace_by(larger);
+  const Error wrong = refused();
+  EXPECT_EQ(wrong.code, ErrorCode::exhausted) << wrong.message;
+  EXPECT_NE(wrong.message.find("scan.vdb"), std::string::npos);
+}
+
+TEST_F(CaseScanTest, ADamagedFileIsOneSentence) {
+  const std::string sound = test::content(file_);
+  const auto expect_sentence = [&](const std::string& bytes, std::size_t at) {
+    std::ofstream(file_, std::ios::binary | std::ios::trunc) << bytes;
+    const auto loaded = load_scan(folder_, bone_);
+    if (loaded) return expect_same(*loaded);  // the byte has no meaning
+    EXPECT_TRUE(loaded.error().code == ErrorCode::invalid_input || loaded.error().code == ErrorCode::exhausted) << at;
+    EXPECT_NE(loaded.error().message.find("scan.vdb"), std::string::npos) << loaded.error().message;
+    EXPECT_EQ(loaded.error().message.find('\n'), std::string::npos);
+  };
+  for (std::size_t at = 0; at < sound.size(); at += 1 + sound.size() / 400) {
+    std::string changed = sound;
+    changed[at] = static_cast<char>(changed[at] ^ 0x41);
+    expect_sentence(changed, at);
+  }
+  for (std::size_t end = 0; end < sound.size(); end += 1 + sound.size() / 100) {
+    std::ofstream(file_, std::ios::binary | std::ios::trunc) << sound.substr(0, end);
+    EXPECT_NE(refused().message.find("import the case again"), std::string::npos) << end;
+  }
+  const SparseVolume floats(0.0f);
+  ASSERT_TRUE(save_volumes(file_, 1.0, {{"hu", &floats}}));
+  EXPECT_NE(refused().message.find("not one of int32"), std::string::npos) << refused().message;
+}
+
+TEST_F(CaseScanTest, StopsWhenAsked) {
+  for (const int calls : {0, 1, 3, 8, 10}) {
+    int left = calls;
+    const KeepGoing stop = [&](double) { return left-- > 0; };
+    const auto saved = bone_.save(temp_ / "stopped", scan_, stop);
+    ASSERT_FALSE(saved) << calls;
+    EXPECT_EQ(saved.error().code, ErrorCode::cancelled);
+    EXPECT_FALSE(fs::exists(temp_ / "stopped"));
+    left = calls;
+    const auto loaded = load_scan(folder_, bone_, stop);
+    ASSERT_FALSE(loaded) << calls;
+    EXPECT_EQ(loaded.error().code, ErrorCode::cancelled);
+  }
+}
+
+}  // namespace
+}  // namespace osteon
