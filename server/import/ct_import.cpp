@@ -381,26 +381,24 @@ Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::Hu
   return surface_mm;
 }
 
-Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
-  imaging::HuVolume geometry;  // of the whole scan, without its values
-  geometry.dims = scan.volume.dims;
-  geometry.spacing_mm = scan.volume.spacing_mm;
-  geometry.origin_mm = scan.volume.origin_mm;
-  geometry.directions = scan.volume.directions;
+// What is wrong with the voxels or the options. Error: invalid_input.
+Result<void> check_options(const imaging::HuVolume& geometry, const CtOptions& options, double pitch_mm) {
   if (!(geometry.spacing_mm.minCoeff() >= kLeastSpacing_mm) || !(geometry.spacing_mm.maxCoeff() <= kMostSpacing_mm))
     return failure(ErrorCode::invalid_input,
                    "voxels of " + imaging::describe(geometry) + " are not those of a CT; export the scan again");
-
-  const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
   if (!(pitch_mm >= kLeastPitch_mm) || !(pitch_mm <= kMostPitch_mm))
     return failure(ErrorCode::invalid_input, "the pitch must be a number from 0.02 to 10 mm; give another --pitch");
   if (!std::isfinite(options.threshold_hu))
     return failure(ErrorCode::invalid_input, "the threshold must be a number; give another --threshold");
-
   if (!(options.gaussian_mm >= 0.0 && options.gaussian_mm <= kMostGaussian_mm))
     return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
   if (!(options.margin_mm >= 0.0 && options.margin_mm <= kMostMargin_mm))
     return bad_input("the margin of the scan must be from 0 to 200 mm; give another --margin");
+  return {};
+}
+
+// Finds the bones in the scan, and adds to its source what was done. `options`: gets the threshold that was used.
+Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& keep_going) {
   const auto smoothed = smooth(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed;
@@ -421,8 +419,20 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
     bones = std::move(*grown);
   }
   auto s = segment(std::move(scan.volume), options, std::move(bones), part(keep_going, kGrowEnd, kSegmentEnd));
+  if (s) s->found.threshold_reason = std::move(reason);
+  return s;
+}
+
+Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
+  imaging::HuVolume geometry;  // of the whole scan, without its values
+  geometry.dims = scan.volume.dims;
+  geometry.spacing_mm = scan.volume.spacing_mm;
+  geometry.origin_mm = scan.volume.origin_mm;
+  geometry.directions = scan.volume.directions;
+  const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
+  if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
+  auto s = find_bones(scan, options, keep_going);
   if (!s) return tl::unexpected(s.error());
-  s->found.threshold_reason = std::move(reason);
   if (!s->found.regions.empty())
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
