@@ -78,12 +78,15 @@ class OpenVoxels {
 
   std::uint64_t& word(std::size_t index) {
     const std::size_t block = index / words_at_once;
-    if (owner_[block] != number_) {
-      owner_[block] = number_;
-      const std::size_t begin = block * words_at_once, end = std::min(begin + words_at_once, words_.size());
-      for (std::size_t i = begin; i < end; ++i) words_[i] = open_word(64 * i);
-    }
+    if (owner_[block] != number_) work_out(block);
     return words_[index];
+  }
+
+  // Not inlined, so that the loops over words stay short.
+  [[gnu::noinline]] void work_out(std::size_t block) {
+    owner_[block] = number_;
+    const std::size_t begin = block * words_at_once, end = std::min(begin + words_at_once, words_.size());
+    for (std::size_t i = begin; i < end; ++i) words_[i] = open_word(64 * i);
   }
 
   [[nodiscard]] std::uint64_t open_word(std::size_t begin) const {
