@@ -51,9 +51,9 @@ inline constexpr int kMostSeeds = 255;
 // The voxel at a position (mm, LPS). Error: invalid_input (outside the scan, or not a number).
 [[nodiscard]] Result<std::array<int, 3>> seed_voxel(const HuVolume& volume, const Vec3& position_mm);
 
-// One region from each seed, one after the other. A seed that lies in an earlier region makes none. Voxels wait in a
-// first-in-first-out queue. Each one that leaves it offers its neighbours to the region, in the order of memory; a
-// voxel of another region is not taken. The order decides what an adaptive region takes, and nothing else.
+// One region from each seed, one after the other. A seed that lies in an earlier region makes none. Voxels of an
+// adaptive region wait in a first-in-first-out queue. Each one that leaves it offers its neighbours to the region, in
+// the order of memory; a voxel of another region is not taken. A fixed region does not depend on the order.
 // By slice, a region first grows in the slice of its seed. Each following slice, first towards the end and then towards
 // the beginning of the volume, starts from the voxels beside the region's in the slice before, and grows within itself.
 // Errors: invalid_input (no seed, more than kMostSeeds, a seed outside the volume or not similar itself), cancelled.

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/core/large_pages.hpp"
 #include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/volume/iso_surface.hpp"
@@ -17,9 +18,8 @@ struct VoxelMask {
   VoxelMask() = default;
   explicit VoxelMask(std::array<int, 3> size)
       : dims(size),
-        values(
-            static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) * static_cast<std::size_t>(size[2]),
-            0) {}
+        values(zeros<std::uint8_t>(static_cast<std::size_t>(size[0]) * static_cast<std::size_t>(size[1]) *
+                                   static_cast<std::size_t>(size[2]))) {}
   [[nodiscard]] std::size_t index(int column, int row, int slice) const {
     return (static_cast<std::size_t>(slice) * static_cast<std::size_t>(dims[1]) + static_cast<std::size_t>(row)) *
                static_cast<std::size_t>(dims[0]) +

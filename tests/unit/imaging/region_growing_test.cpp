@@ -17,8 +17,9 @@ namespace {
 using Voxel = std::array<int, 3>;
 using Labels = std::vector<std::uint32_t>;
 
-constexpr std::array<Voxel, 7> kShapes{
-    {{9, 8, 7}, {23, 4, 3}, {1, 1, 1}, {17, 13, 1}, {1, 1, 12}, {1, 9, 5}, {2, 1, 6}}};
+constexpr std::array<Voxel, 8> kShapes{
+    {{9, 8, 7}, {150, 3, 2}, {23, 4, 3}, {1, 1, 1}, {17, 13, 1}, {1, 1, 12}, {1, 9, 5}, {2, 1, 6}}};
+constexpr Voxel kLarge{150, 7, 5};  // more voxels than are worked out at once
 constexpr std::array kSpaces{GrowBy::slice, GrowBy::volume};
 constexpr std::array kConnectivities{Connectivity::faces, Connectivity::corners};
 
@@ -185,7 +186,9 @@ void expect_boxes_and_counts(const HuVolume& volume, const SeededRegions& found)
 TEST(RegionGrowing, FromSeedsIsWhatTheDefinitionSays) {
   std::mt19937 random(1);
   std::uint32_t round = 0;
-  for (const Voxel& dims : kShapes)
+  std::vector<Voxel> shapes(kShapes.begin(), kShapes.end());
+  shapes.push_back(kLarge);
+  for (const Voxel& dims : shapes)
     for (const GrowBy by : kSpaces)
       for (const Connectivity connectivity : kConnectivities)
         for (const Similarity similarity : {Similarity::interval, Similarity::seed, Similarity::mean})
