@@ -180,7 +180,15 @@ TEST_F(DrillingRoom, TheRigFeelsChisForcesAndNothingAfterTheExit) {
   EXPECT_NEAR(far_cortex(rig, "force_physical_n"), 28.9, 0.05 * 28.9);
   for (const std::size_t i : on_the_way_in(rig, kThickness_mm + kCone_mm + 0.5, kThickness_mm + 2.9))
     EXPECT_LT(rig.log["force_physical_n"][i], 0.05);
-  EXPECT_NEAR(near_cortex(rig, "feed_mm_per_s"), 1.0, 0.02);
+  // The rig's hand moves at 1 mm/s. The drill follows it. Where a busy machine misses ticks, the device shows too
+  // little force: the coupling releases that extension, and the drill stays behind. The forces above bound how far.
+  const std::vector<std::size_t> in_cortex = on_the_way_in(rig, 1.5, 4.8);
+  ASSERT_GT(in_cortex.size(), 1000u);
+  const auto change = [&](const std::string& column) {
+    return rig.log[column][in_cortex.back()] - rig.log[column][in_cortex.front()];
+  };
+  EXPECT_NEAR(change("device_depth_mm") / (1e-3 * change("state_seq")), 1.0, 0.02) << "mm/s; a tick is 1 ms";
+  EXPECT_LE(near_cortex(rig, "feed_mm_per_s"), 1.02);
 }
 
 TEST_F(DrillingRoom, HandsAreHeldBackByTheCortexAndPlungeWhenItGivesWay) {
