@@ -2,13 +2,8 @@
 #include "server/import/grown_bones.hpp"
 
 #include <cmath>
-#include <filesystem>
 #include <random>
 
-#include "common/imaging/threshold.hpp"
-#include "server/import/dicom_reader.hpp"
-#include "server/import/inv3_reader.hpp"
-#include "tests/support/shared_data.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
 namespace osteon::import {
@@ -171,62 +166,6 @@ TEST(SuggestedThreshold, FindsTheBoneInNoise) {
   // Both means are more than 5 deviations away from the threshold: none of 64000 voxels is on the wrong side.
   EXPECT_EQ(made->found.islands.size(), 1u);
   EXPECT_EQ(made->found.islands[0].voxels, 20 * 20 * 20);
-}
-
-// Soft tissue ends at 300 HU and bone begins at 500 HU (Niu 2008, table 3.1). Air would take Otsu's threshold of the
-// whole scan to -397 HU.
-void expect_between_soft_tissue_and_bone(const imaging::HuVolume& volume) {
-  const auto histogram = imaging::hu_histogram(volume, keep_going);
-  ASSERT_TRUE(histogram);
-  const auto found = imaging::suggest_threshold(*histogram);
-  ASSERT_TRUE(found) << found.error().message;
-  EXPECT_GT(found->threshold_hu, 110.0) << found->reason;
-  EXPECT_LT(found->threshold_hu, 500.0) << found->reason;
-}
-
-TEST(SuggestedThreshold, OfASkull) {
-  const auto file = test::find_skull();
-  ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
-  const auto scan = read_inv3(*file, keep_going);
-  ASSERT_TRUE(scan);
-  expect_between_soft_tissue_and_bone(scan->volume);
-}
-
-class SharedLegs : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const auto shared = test::find_shared();
-    if (!shared || !std::filesystem::is_directory(*shared / "data"))
-      GTEST_SKIP() << "no shared/data beside the checkout";
-    data_ = *shared / "data";
-  }
-  std::filesystem::path data_;
-};
-
-TEST_F(SharedLegs, HaveASuggestedThreshold) {
-  for (const char* name : {"tibia-dicom", "body-j2k-dicom"}) {
-    const auto scan = read_dicom_series(data_ / name, keep_going);
-    ASSERT_TRUE(scan);
-    expect_between_soft_tissue_and_bone(scan->volume);
-  }
-}
-
-// The tibiae touch no other bone: what grows from a voxel of theirs is their island.
-TEST_F(SharedLegs, ATibiaGrowsFromItsCortex) {
-  const auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
-  ASSERT_TRUE(scan);
-  const auto island = import_ct(*scan, {.pitch_mm = 2.0, .keep = {2}}, keep_going);
-  ASSERT_TRUE(island);
-  // README: the tibiae lie at columns 90 to 122 and 347 to 383. The second is the smaller one.
-  Vec3 seed = Vec3::Constant(std::nan(""));
-  for (int column = 347; column <= 383; ++column)
-    if (scan->volume.at(column, 320, 23) >= 1000) seed = scan->volume.position_mm(Vec3(column, 320, 23));
-  CtOptions options = grown_from({seed});
-  options.pitch_mm = 2.0;
-  const auto grown = import_ct(*scan, options, keep_going);
-  ASSERT_TRUE(grown) << grown.error().message;
-  EXPECT_EQ(grown->found.islands[0].voxels, island->found.islands[1].voxels);
-  EXPECT_EQ(grown->bone->volume_mm3(), island->bone->volume_mm3());
 }
 
 }  // namespace

@@ -45,6 +45,14 @@ void expect_refused(const std::vector<std::string>& arguments, const std::string
 class Program : public ::testing::Test {
  protected:
   [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
+  // What the program prints while it makes a case of the folder "series".
+  std::string import_series(const char* name, const std::vector<std::string>& more) const {
+    std::vector<std::string> arguments{"ct", path("series"), "--out", path(name)};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    const auto result = test::run(kProgram, arguments);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return result.out;
+  }
   test::TempDir folder_;
 };
 
@@ -206,17 +214,10 @@ TEST_F(Program, KeepsTheIslandsThatAreAskedForAndSaysWhatItLeavesOut) {
   EXPECT_NE(listed.out.find("     2     0.34"), std::string::npos) << listed.out;
   EXPECT_EQ(files_of(folder_.path()).size(), 1u) << "--list wrote something";
 
-  const auto import = [&](const char* name, std::vector<std::string> more) {
-    std::vector<std::string> arguments{"ct", path("series"), "--out", path(name)};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const auto result = test::run(kProgram, arguments);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return result.out;
-  };
-  EXPECT_NE(import("one", {}).find("1 island with 0.34 cm3 (40 %) left out"), std::string::npos);
-  EXPECT_NE(import("second", {"--keep", "2"}).find("1 island with 0.51 cm3 (60 %) left out"), std::string::npos);
-  EXPECT_NE(import("all", {"--keep", "all"}).find("2 in the case"), std::string::npos);
-  EXPECT_NE(import("merged", {"--keep", "1,2", "--merge"}).find("1 in the case"), std::string::npos);
+  EXPECT_NE(import_series("one", {}).find("1 island with 0.34 cm3 (40 %) left out"), std::string::npos);
+  EXPECT_NE(import_series("second", {"--keep", "2"}).find("1 island with 0.51 cm3 (60 %) left out"), std::string::npos);
+  EXPECT_NE(import_series("all", {"--keep", "all"}).find("2 in the case"), std::string::npos);
+  EXPECT_NE(import_series("merged", {"--keep", "1,2", "--merge"}).find("1 in the case"), std::string::npos);
   const auto numbers = [&](const char* name) {
     const auto bone = Case::load(path(name));
     EXPECT_TRUE(bone);
@@ -254,17 +255,10 @@ TEST_F(Program, WrongIslandsAreOneSentence) {
 
 TEST_F(Program, GrowsBonesFromSeeds) {
   ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
-  const auto import = [&](const char* name, std::vector<std::string> more) {
-    std::vector<std::string> arguments{"ct", path("series"), "--out", path(name)};
-    arguments.insert(arguments.end(), more.begin(), more.end());
-    const auto result = test::run(kProgram, arguments);
-    EXPECT_EQ(result.exit_code, 0) << result.err;
-    return result.out;
-  };
-  import("second", {"--keep", "2"});
-  EXPECT_NE(import("grown", {"--seed", "17,3.2,3"}).find("that grew from the seeds"), std::string::npos);
-  import("both", {"--seed", "17,3,3", "--seed", "3,3,3"});
-  import("similar", {"--seed=17,3,3", "--similar", "200", "--adaptive", "--by", "slice"});
+  import_series("second", {"--keep", "2"});
+  EXPECT_NE(import_series("grown", {"--seed", "17,3.2,3"}).find("that grew from the seeds"), std::string::npos);
+  import_series("both", {"--seed", "17,3,3", "--seed", "3,3,3"});
+  import_series("similar", {"--seed=17,3,3", "--similar", "200", "--adaptive", "--by", "slice"});
   const auto second = Case::load(path("second")), grown = Case::load(path("grown")), both = Case::load(path("both")),
              similar = Case::load(path("similar"));
   ASSERT_TRUE(second && grown && both && similar);

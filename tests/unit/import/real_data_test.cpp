@@ -1,9 +1,10 @@
 // Real scans, where available: the skull of Debian's invesalius-examples, and the scans in the shared data folder.
+#include <cmath>
+#include <fstream>
 #include <map>
 
-#include <fstream>
-
 #include "common/geometry/mesh_file.hpp"
+#include "common/imaging/threshold.hpp"
 #include "server/import/carving.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
@@ -290,6 +291,51 @@ TEST_F(SharedScans, EachOddFileAloneIsOneSentence) {
     ++refused;
   }
   EXPECT_GE(refused, 12);
+}
+
+// Soft tissue ends at 300 HU and bone begins at 500 HU (Niu 2008, table 3.1). Air would take Otsu's threshold of the
+// whole scan to -397 HU.
+void expect_between_soft_tissue_and_bone(const imaging::HuVolume& volume) {
+  const auto histogram = imaging::hu_histogram(volume, keep_going);
+  ASSERT_TRUE(histogram);
+  const auto found = imaging::suggest_threshold(*histogram);
+  ASSERT_TRUE(found) << found.error().message;
+  EXPECT_GT(found->threshold_hu, 110.0) << found->reason;
+  EXPECT_LT(found->threshold_hu, 500.0) << found->reason;
+}
+
+TEST(Skull, HasASuggestedThreshold) {
+  const auto file = test::find_skull();
+  ASSERT_TRUE(file) << "Cranium.inv3 of the package invesalius-examples is not there; run deploy/install";
+  const auto scan = read_inv3(*file, keep_going);
+  ASSERT_TRUE(scan);
+  expect_between_soft_tissue_and_bone(scan->volume);
+}
+
+TEST_F(SharedScans, HaveASuggestedThreshold) {
+  for (const char* name : {"tibia-dicom", "body-j2k-dicom"}) {
+    const auto scan = read_dicom_series(data_ / name, keep_going);
+    ASSERT_TRUE(scan);
+    expect_between_soft_tissue_and_bone(scan->volume);
+  }
+}
+
+// The tibiae touch no other bone: what grows from a voxel of theirs is their island.
+TEST_F(SharedScans, ATibiaGrowsFromItsCortex) {
+  const auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
+  ASSERT_TRUE(scan);
+  const auto island = import_ct(*scan, {.pitch_mm = 2.0, .keep = {2}}, keep_going);
+  ASSERT_TRUE(island);
+  // README: the tibiae lie at columns 90 to 122 and 347 to 383. The second is the smaller one.
+  Vec3 seed = Vec3::Constant(std::nan(""));
+  for (int column = 347; column <= 383; ++column)
+    if (scan->volume.at(column, 320, 23) >= 1000) seed = scan->volume.position_mm(Vec3(column, 320, 23));
+  CtOptions options{.pitch_mm = 2.0};
+  options.grow.seeds_mm = {seed};
+  const auto grown = import_ct(*scan, options, keep_going);
+  ASSERT_TRUE(grown) << grown.error().message;
+  EXPECT_EQ(grown->found.islands[0].voxels, island->found.islands[1].voxels);
+  EXPECT_EQ(grown->bone->volume_mm3(), island->bone->volume_mm3());
 }
 
 }  // namespace
