@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "common/geometry/mesh_file.hpp"
+#include "common/volume/case_scan.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/import/case_report.hpp"
 #include "server/import/command.hpp"
@@ -351,6 +352,9 @@ Result<std::string> run_stl(const CaseArguments& a, const StopSignal& stop) {
 Result<std::string> run_info(const CaseArguments& a) {
   const auto bone = Case::load(a.input);
   if (!bone) return tl::unexpected(bone.error());
+  // A case that a client received has no scan. One that is there must be whole.
+  if (bone->info().scan && fs::exists(fs::path(a.input) / kScanFile))
+    if (const auto scan = load_scan(a.input, *bone); !scan) return tl::unexpected(scan.error());
   return a.json ? report_json(*bone) : report_text(*bone);
 }
 

@@ -399,6 +399,17 @@ TEST_F(Program, AFolderThatCannotBeMadeIsOneSentence) {
   EXPECT_NE(result.err.find(path("file")), std::string::npos) << result.err;
 }
 
+TEST_F(Program, InfoFindsADamagedScanAndNeedsNone) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  import_series("case", {});
+  const auto file = folder_ / "case" / "scan.vdb";
+  ASSERT_EQ(test::run(kProgram, {"info", path("case")}).exit_code, 0);
+  truncate_file(file, 0.9);
+  expect_refused({"info", path("case")}, "scan.vdb", folder_);
+  fs::remove(file);
+  EXPECT_EQ(test::run(kProgram, {"info", path("case")}).exit_code, 0) << "as a client receives it";
+}
+
 TEST_F(Program, InfoOfABrokenCaseIsOneSentence) {
   ASSERT_EQ(test::run(kProgram, {"phantom", "block", "--layers", "3:1.9", "--width", "4", "--pitch", "0.5", "--out",
                                  path("case")})
