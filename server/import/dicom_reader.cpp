@@ -188,9 +188,9 @@ Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
   return input;
 }
 
-// Fills the series' volume slice by slice.
+// Fills the series' volume plane by plane.
 Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGoing& keep_going) {
-  imaging::HuVolume& volume = series.grid;
+  imaging::HuVolume& volume = series.grid.volume;
   try {
     volume.values.resize(volume.count());
   } catch (const std::bad_alloc&) {
@@ -198,26 +198,35 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
                                              imaging::describe(volume) + "; export thicker slices");
   }
   const std::size_t pixels = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
-  const std::size_t slices = series.slices.size();
+  const std::size_t slices = series.slices.size(), planes = static_cast<std::size_t>(volume.dims[2]);
   std::size_t next = 0;
   IsolatedWork work;
   work.memory_bytes = std::size_t{4} << 30;
   work.run = [&](ChildChannel& channel) -> Result<void> {
     silence_library();
-    std::vector<std::int16_t> slice(pixels);
+    std::vector<std::int16_t> slice(static_cast<std::size_t>(series.entry.columns) *
+                                    static_cast<std::size_t>(series.entry.rows));
+    const auto send = [&](std::span<const std::int16_t> plane) {
+      channel.send({reinterpret_cast<const char*>(plane.data()), plane.size_bytes()});
+    };
+    std::optional<SliceResampler> resampler;
+    if (!series.grid.places.empty()) resampler.emplace(series.grid, series.entry.columns, series.entry.rows);
     for (std::size_t i = 0; i < slices; ++i) {
       channel.at_file(series.slices[i].file);
       if (auto read = read_pixels(series.slices[i], found.files[series.slices[i].file].path,
                                   found.shown(series.slices[i].file), slice);
           !read)
         return read;
-      channel.send({reinterpret_cast<const char*>(slice.data()), pixels * sizeof(std::int16_t)});
+      if (resampler)
+        resampler->add(slice, send);
+      else
+        send(slice);
       channel.progress(static_cast<double>(i + 1) / static_cast<double>(slices));
     }
     return {};
   };
   work.on_message = [&](std::string_view message) {
-    if (next == slices || message.size() != pixels * sizeof(std::int16_t)) return false;
+    if (next == planes || message.size() != pixels * sizeof(std::int16_t)) return false;
     std::memcpy(volume.values.data() + pixels * next++, message.data(), message.size());
     return true;
   };
@@ -226,7 +235,7 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
     return failure(ErrorCode::invalid_input,
                    found.shown(*end.file) + " is damaged so that it cannot be read; copy or export it again");
   if (!end.result) return tl::unexpected(end.result.error());
-  if (next != slices) return failure(ErrorCode::internal, "the reader of " + found.input + " ended early");
+  if (next != planes) return failure(ErrorCode::internal, "the reader of " + found.input + " ended early");
   return {};
 }
 
@@ -274,8 +283,9 @@ Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& opt
   }
   const KeepGoing reading = part(keep_going, kHeadersEnd, 1.0);
   if (auto read = read_volume(series, found->input.found, reading); !read) return tl::unexpected(read.error());
-  CtScan scan{std::move(series.grid), {}, std::move(found->report)};
+  CtScan scan{std::move(series.grid.volume), {}, std::move(found->report)};
   scan.source = "DICOM CT, " + imaging::describe(scan.volume);
+  if (series.entry.resampled > 0) scan.source += ", resampled from slices " + series.entry.irregularity;
   scan.report.taken = series.entry.number;
   return scan;
 }

@@ -30,6 +30,7 @@ namespace fs = std::filesystem;
 constexpr const char* kExplicit = "1.2.840.10008.1.2.1";
 constexpr const char* kImplicit = "1.2.840.10008.1.2";
 constexpr int kRows = 4, kColumns = 5;
+constexpr std::size_t kMostResampled = 1 << 16;  // voxels
 // GDCM allocates and clears what a damaged length claims. When an assertion fails, this memory is leaked. No valid
 // input needs more than this.
 constexpr std::size_t kMostBytesAtOnce = std::size_t{4} << 20;
@@ -85,14 +86,14 @@ std::string a_slice(const std::string& syntax) {
   return std::string(128, '\0') + "DICM" + head + meta.bytes() + data.bytes();
 }
 
-// Reads the slice and a second one 2 mm beside it, as the import does: headers, series, and the pixels of what can be
-// imported.
+// Reads the slice and a second one beside it, as of a tilted gantry, as the import does: headers, series, the pixels of
+// what can be imported, and the planes of the grid.
 void read_slice(const fs::path& file) {
   import::DicomHeader header = import::read_header(file);
   import::DicomHeader beside = header;
   beside.instance += ".1";
   beside.file = 1;
-  if (beside.position.size() == 3) beside.position[2] += 2.0;
+  if (beside.position.size() == 3) beside.position[1] += 1.0, beside.position[2] += 2.0;
   const import::FoundFiles found{.input = "scan", .archive = false, .files = {{file, "a"}, {file, "b"}}, .skipped = {}};
   import::SkippedFiles skipped;
   auto series = import::sort_series({header, beside}, found, skipped);
@@ -101,11 +102,16 @@ void read_slice(const fs::path& file) {
   if (!chosen) return expect_bounded(chosen.error());
   const import::CtSeries& taken = series[*chosen];
   if (taken.fault) return expect_bounded(taken.fault->error);
-  const std::size_t pixels =
-      static_cast<std::size_t>(taken.grid.dims[0]) * static_cast<std::size_t>(taken.grid.dims[1]);
-  std::vector<std::int16_t> out(pixels);
+  std::vector<std::int16_t> out(static_cast<std::size_t>(taken.entry.columns) *
+                                static_cast<std::size_t>(taken.entry.rows));
   const auto read = import::read_pixels(taken.slices.front(), file, "a", out);
-  if (!read) expect_bounded(read.error());
+  if (!read) return expect_bounded(read.error());
+  const imaging::HuVolume& volume = taken.grid.volume;
+  if (taken.grid.places.empty() || volume.count() > kMostResampled) return;
+  import::SliceResampler resampler(taken.grid, taken.entry.columns, taken.entry.rows);
+  int planes = 0;
+  for (std::size_t i = 0; i < taken.slices.size(); ++i) resampler.add(out, [&](auto) { ++planes; });
+  OSTEON_CHECK(planes == volume.dims[2]);
 }
 
 // GDCM aborts by assert() on some damaged files, so the import reads them in child processes. Here the target leaves
