@@ -13,7 +13,7 @@ namespace osteon::import {
 namespace {
 
 constexpr double kMostVoxels = 4e9;
-constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;
+constexpr double kLeastPixel_mm = 0.01, kMostPixel_mm = 20.0;
 constexpr int kFewSlices = 8;            // fewer are not a volume to operate on
 constexpr std::size_t kFewDoubled = 10;  // at most a tenth of the slices may lie where another one lies
 constexpr double kDegrees = 180.0 / std::numbers::pi;
@@ -25,7 +25,7 @@ Vec3 vec(const std::vector<double>& v, std::size_t first = 0) { return {v[first]
 
 bool has_spacing(const DicomHeader& h) {
   return h.spacing.size() == 2 &&
-         std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastSpacing_mm && mm <= kMostSpacing_mm; });
+         std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastPixel_mm && mm <= kMostPixel_mm; });
 }
 // Two unit vectors. With others, positions along the normal would not be finite numbers.
 bool has_orientation(const DicomHeader& h) {
@@ -36,7 +36,8 @@ bool has_place(const DicomHeader& h) { return has_spacing(h) && has_orientation(
 
 // How the second differs from the first; null if both may be slices of one volume.
 const char* difference(const DicomHeader& a, const DicomHeader& b) {
-  if ((a.frames > 1) != (b.frames > 1)) return b.frames > 1 ? "several frames" : "a single frame";
+  if (a.has_frames_without_position() != b.has_frames_without_position())
+    return b.has_frames_without_position() ? "several frames" : "a single frame";
   if (a.columns != b.columns || a.rows != b.rows) return "another size";
   if (a.samples != b.samples || a.photometric != b.photometric) return "other colours";
   if (has_spacing(a) != has_spacing(b) || (has_spacing(a) && (std::abs(a.spacing[0] - b.spacing[0]) >= 1e-4 ||
@@ -49,16 +50,18 @@ const char* difference(const DicomHeader& a, const DicomHeader& b) {
   return nullptr;
 }
 
-// Removes copied files: the same instance at the same position. The largest is kept, because a copy may be truncated.
+// Removes copied files: the same instance, and the same frame of it, at the same position. The largest is kept, because
+// a copy may be truncated.
 Slices without_copies(Slices slices, SkippedFiles& skipped, const FoundFiles& found) {
-  std::map<std::tuple<std::string, std::string, std::vector<double>, int>, std::size_t> seen;
+  std::map<std::tuple<std::string, std::string, std::vector<double>, int, int>, std::size_t> seen;
   Slices kept;
   for (DicomHeader& h : slices) {
     if (h.instance.empty()) {
       kept.push_back(std::move(h));
       continue;
     }
-    const auto [place, is_new] = seen.try_emplace({h.series, h.instance, h.position, h.acquisition}, kept.size());
+    const auto [place, is_new] =
+        seen.try_emplace({h.series, h.instance, h.position, h.acquisition, h.frame}, kept.size());
     if (is_new) {
       kept.push_back(std::move(h));
       continue;
@@ -91,7 +94,8 @@ std::vector<Slices> group_compatible(Slices slices) {
   for (Slices& group : groups) {
     const auto takes = [&](const Slices& g) {
       const DicomHeader &a = g.front(), &b = group.front();
-      return !is_lost(g) && a.columns == b.columns && a.rows == b.rows && a.frames == b.frames;
+      return !is_lost(g) && a.columns == b.columns && a.rows == b.rows &&
+             a.has_frames_without_position() == b.has_frames_without_position();
     };
     const auto end = kept.begin() + static_cast<std::ptrdiff_t>(std::min(compared, kept.size()));
     const auto whole = is_lost(group) ? std::find_if(kept.begin(), end, takes) : end;
@@ -155,7 +159,8 @@ class Arranger {
  private:
   [[nodiscard]] const DicomHeader& first() const { return series_.slices.front(); }
   [[nodiscard]] std::string name(const DicomHeader& slice) const {
-    return shown_text(found_.files[slice.file].name, 80);
+    const std::string file = shown_text(found_.files[slice.file].name, 80);
+    return slice.frame < 0 ? file : "frame " + std::to_string(slice.frame + 1) + " of " + file;
   }
   static SeriesFault wrong(const std::string& brief, const std::string& sentence,
                            ErrorCode code = ErrorCode::invalid_input) {
@@ -172,15 +177,20 @@ class Arranger {
     const auto cannot = [&](const std::string& brief, const std::string& what) {
       return wrong(brief, file + " " + what, ErrorCode::unsupported);
     };
-    if (h.frames > 1)
+    if (h.has_frames_without_position())
       return cannot("several frames in a file",
-                    "holds " + std::to_string(h.frames) + " frames; export the series with one file for each slice");
+                    "holds " + std::to_string(h.frames) +
+                        " frames without a position for each; export the series with one file for each slice");
     if (h.columns < 2 || h.rows < 2 || h.columns > imaging::kLargestScanAxis || h.rows > imaging::kLargestScanAxis)
       return lacks("Rows and Columns (0028,0010-0011)");
     if (h.samples != 1 || h.photometric != "MONOCHROME2")
       return cannot(
           "no Hounsfield units",
           "stores " + h.photometric + " pixels instead of Hounsfield units (MONOCHROME2); export original CT slices");
+    if (!h.is_hu)
+      return cannot("no Hounsfield units",
+                    "stores numbers that are not Hounsfield units, by its RescaleType (0028,1054); export original CT "
+                    "slices");
     if (h.bits_allocated != 8 && h.bits_allocated != 16)
       return cannot("neither 8 nor 16 bits",
                     "stores " + std::to_string(h.bits_allocated) + " bits for a pixel; only 8 and 16 can be read");
@@ -190,10 +200,13 @@ class Arranger {
     if (!has_orientation(h)) return lacks("ImageOrientationPatient (0020,0037)");
     if (h.intercept.size() != 1 || h.slope.size() != 1 || h.slope[0] == 0.0)
       return lacks("RescaleSlope and RescaleIntercept (0028,1052-1053)");
-    // Spectral selection and progression were retired from DICOM. Decoders return noise without an error.
-    if (h.transfer_syntax == "1.2.840.10008.1.2.4.53" || h.transfer_syntax == "1.2.840.10008.1.2.4.55")
+    if (h.compression == Compression::retired)
       return cannot("a retired compression", "uses a retired JPEG compression (" + h.transfer_syntax +
                                                  "); export the series uncompressed or lossless");
+    if (h.compression == Compression::unknown)
+      return cannot("an unknown compression", "uses a compression that cannot be read (" +
+                                                  shown_text(h.transfer_syntax, 64) +
+                                                  "); export the series uncompressed or lossless");
     return std::nullopt;
   }
 
@@ -269,6 +282,8 @@ class Arranger {
           "more than 4e9 voxels",
           subject_ + " has more than the 4e9 voxels that can be imported; export a part of it, or thicker slices");
     series_.entry.slice_mm = volume.spacing_mm.z();
+    series_.entry.lossy =
+        static_cast<int>(std::ranges::count(series_.slices, Compression::lossy, &DicomHeader::compression));
     series_.entry.irregularity = irregularity(grid);
     series_.entry.resampled = grid.places.empty() ? 0 : volume.dims[2];
     return std::nullopt;
@@ -330,7 +345,7 @@ std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t a
     const char* what = i == at || groups[i].size() > groups[at].size() ? nullptr : difference(own, h);
     if (what == nullptr) continue;
     const std::string detail =
-        h.frames > 1 ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
+        h.has_frames_without_position() ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
     if (!add(found.files[h.file].name, detail)) return text;
   }
   for (const SkippedFiles::Count& c : skipped.counts())
@@ -355,9 +370,10 @@ Error no_series(const FoundFiles& found, const SkippedFiles& skipped) {
   if (what.size() > 160) what = what.substr(0, what.rfind(", ", 160)) + " and more";
   return {any_dicom ? ErrorCode::unsupported : ErrorCode::invalid_input,
           input + (any_dicom ? " holds no CT series: " : " holds no DICOM files: ") + what +
-              (only_archives ? "; unpack what is inside and give the folder"
-               : any_dicom   ? "; only original CT slices, one in a file, can be imported"
-                             : "; give the folder with the CT series")};
+              (only_archives                                 ? "; unpack what is inside and give the folder"
+               : skipped.count(FileKind::unknown_syntax) > 0 ? "; export the series uncompressed"
+               : any_dicom ? "; only original CT slices, one in a file, can be imported"
+                           : "; give the folder with the CT series")};
 }
 
 }  // namespace

@@ -13,7 +13,7 @@ std::string problem_text(const SeriesEntry& entry) {
   return entry.problem.empty() ? "" : " (cannot be imported: " + entry.problem + ")";
 }
 
-// What the import does with the slices of the series that it takes.
+// What the import does with the slices of the series that it takes, and what is doubtful about them.
 std::string changes(const SeriesEntry& entry) {
   std::string text;
   char part[160];
@@ -25,6 +25,9 @@ std::string changes(const SeriesEntry& entry) {
   if (entry.doubled > 0)
     text += "left out   " + std::to_string(entry.doubled) +
             (entry.doubled == 1 ? " slice at the position of another one\n" : " slices at positions of other ones\n");
+  if (entry.lossy > 0)
+    text += "warning    " + std::to_string(entry.lossy) + " of " + std::to_string(entry.slices) +
+            " slices were compressed with loss: their HU differ from the scanner's\n";
   return text;
 }
 
@@ -100,6 +103,7 @@ std::string list_json(const SeriesReport& report) {
                       {"irregularity", entry.irregularity},
                       {"resampled", entry.resampled},
                       {"doubled", entry.doubled},
+                      {"lossy", entry.lossy},
                       {"problem", entry.problem}});
   nlohmann::json skipped = nlohmann::json::array();
   for (const SkippedFiles::Count& c : report.skipped.counts())

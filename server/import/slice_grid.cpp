@@ -17,7 +17,7 @@ constexpr std::size_t kAround = 3;   // gaps on each side that say what is usual
 constexpr double kRounding = 1e-6;   // of a step, by which a slice may miss its plane
 constexpr double kShift = 1e-3;      // of a pixel, for which the grid needs no further column
 constexpr double kShownTilt = 0.05;  // degrees
-constexpr float kAir_hu = -1024.0f;
+constexpr float kOutside_hu = -1024.0f;
 
 bool is_even(std::span<const double> gaps_mm, double usual_mm, double step_mm) {
   double from_first_mm = 0.0;
@@ -154,7 +154,7 @@ void SliceResampler::place(std::span<const std::int16_t> slice, const Vec3& at, 
   std::size_t n = 0;
   for (const Between& row : rows) {
     if (row.first < 0) {
-      std::fill_n(plane.begin() + static_cast<std::ptrdiff_t>(n), columns.size(), kAir_hu);
+      std::fill_n(plane.begin() + static_cast<std::ptrdiff_t>(n), columns.size(), kOutside_hu);
       n += columns.size();
       continue;
     }
@@ -165,7 +165,7 @@ void SliceResampler::place(std::span<const std::int16_t> slice, const Vec3& at, 
         return static_cast<float>(line[column.first]) * (1.0f - column.weight) +
                static_cast<float>(line[column.second]) * column.weight;
       };
-      plane[n++] = column.first < 0 ? kAir_hu : along(upper) * (1.0f - row.weight) + along(lower) * row.weight;
+      plane[n++] = column.first < 0 ? kOutside_hu : along(upper) * (1.0f - row.weight) + along(lower) * row.weight;
     }
   }
 }
