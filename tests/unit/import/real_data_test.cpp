@@ -9,8 +9,10 @@
 #include "server/import/carving.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
+#include "server/import/grey_stack.hpp"
 #include "server/import/inv3_reader.hpp"
 #include "server/import/label_import.hpp"
+#include "server/import/raw_volume.hpp"
 #include "tests/support/shared_data.hpp"
 #include "tests/support/temp_dir.hpp"
 #include "tests/unit/import/fixtures.hpp"
@@ -248,6 +250,49 @@ TEST_F(SharedScans, ATroubledFolderIsListedAndCounted) {
                               "18.5 degrees\n"),
       std::string::npos)
       << list_text(*report);
+}
+
+// README: 64 x 64 unsigned numbers of 16 bits in each file, the top of the head first; 7.0 % of the voxels lie above
+// 300 HU, and 3.9 % above 700 HU.
+TEST_F(SharedScans, RawSlicesOfAHead) {
+  RawFormat format;
+  format.size = {64, 64, 93};
+  format.type = RawType::uint16;
+  format.given.spacing_mm = {3.2, 3.2, 1.5};
+  format.given.intercept = -1024.0;
+  format.given.directions = *parse_axes("LPI");
+  const auto scan = read_raw_volume(data_ / "headsq-raw", format, keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  const auto [least, most] = std::ranges::minmax(scan->volume.values);
+  EXPECT_EQ(least, -1024);
+  EXPECT_EQ(most, 3926 - 1024);
+  const auto above = [&](int hu) {
+    return 100.0 * static_cast<double>(std::ranges::count_if(scan->volume.values, [&](int v) { return v > hu; })) /
+           static_cast<double>(scan->volume.count());
+  };
+  EXPECT_NEAR(above(300), 7.0, 0.05);
+  EXPECT_NEAR(above(700), 3.9, 0.05);
+}
+
+// README: 512 x 512 x 640 grey values of 8 bits, HU = 16 value - 1024; 0.77 % lie above 300 HU. Every eighth slice is
+// enough to see it.
+TEST_F(SharedScans, GreySlicesOfAHand) {
+  GreyFormat format;
+  format.given.spacing_mm = Vec3::Constant(0.33);
+  format.given.slope = 16.0;
+  format.given.intercept = -1024.0;
+  const test::TempDir folder;
+  for (int k = 0; k < 640; k += 8) {
+    char name[32];
+    std::snprintf(name, sizeof name, "hand%04d.png", k);
+    fs::create_symlink(data_ / "hand-png" / name, folder / ("slice" + std::to_string(k / 8) + ".png"));
+  }
+  const auto scan = read_grey_stack(folder.path(), format, keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{512, 512, 80}));
+  EXPECT_LE(std::ranges::max(scan->volume.values), 16 * 237 - 1024);
+  const auto bright = std::ranges::count_if(scan->volume.values, [](int hu) { return hu > 300; });
+  EXPECT_NEAR(100.0 * static_cast<double>(bright) / static_cast<double>(scan->volume.count()), 0.77, 0.02);
 }
 
 TEST_F(SharedScans, RawSlicesAreNoDicom) {
