@@ -368,12 +368,17 @@ Error no_series(const FoundFiles& found, const SkippedFiles& skipped) {
   const bool only_archives = !any_dicom && skipped.count(FileKind::archive) > 0;
   std::string what = skipped.text(false);
   if (what.size() > 160) what = what.substr(0, what.rfind(", ", 160)) + " and more";
+  const char* remedy = "give the folder with the CT series";
+  if (only_archives)
+    remedy = "unpack what is inside and give the folder";
+  else if (skipped.count(FileKind::unknown_syntax) > 0)
+    remedy = "export the series uncompressed";
+  else if (any_dicom)
+    remedy = "only original CT slices can be imported";
+  else if (skipped.count(FileKind::not_dicom) > 0)
+    remedy = "give the folder with the CT series, --spacing for PNG slices, or --size too for raw numbers";
   return {any_dicom ? ErrorCode::unsupported : ErrorCode::invalid_input,
-          input + (any_dicom ? " holds no CT series: " : " holds no DICOM files: ") + what +
-              (only_archives                                 ? "; unpack what is inside and give the folder"
-               : skipped.count(FileKind::unknown_syntax) > 0 ? "; export the series uncompressed"
-               : any_dicom ? "; only original CT slices, one in a file, can be imported"
-                           : "; give the folder with the CT series")};
+          input + (any_dicom ? " holds no CT series: " : " holds no DICOM files: ") + what + "; " + remedy};
 }
 
 }  // namespace

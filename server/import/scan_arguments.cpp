@@ -176,6 +176,11 @@ Result<CtScan> read_scan(const ScanArguments& a, const KeepGoing& reading) {
   std::error_code error;
   if (!fs::is_regular_file(a.input, error))
     return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
+  if (kind == InputKind::other && fs::path(a.input).extension() != ".inv3")
+    return bad_input(
+        a.input +
+        " is no DICOM, NIfTI, NRRD, MetaImage or InVesalius file; give one, or --size, --spacing and --type "
+        "if it holds raw numbers");
   return read_inv3(a.input, reading);
 }
 

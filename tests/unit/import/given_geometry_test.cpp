@@ -256,6 +256,13 @@ TEST_F(Given, AGreyWindowIsTheInverseOfTheOneThatWroteTheSlices) {
     EXPECT_NEAR(scan->volume.values[i], volume.values[i], 0.5 * 1799.0 / 255.0 + 0.5) << i;
 }
 
+TEST_F(Given, ReadingGreySlicesCanBeStopped) {
+  write_stack(folder_ / "stack", 16);
+  const auto scan = read_grey_stack(folder_ / "stack", grey_format(), [](double done) { return done < 0.5; });
+  ASSERT_FALSE(scan);
+  EXPECT_EQ(scan.error().code, ErrorCode::cancelled);
+}
+
 TEST_F(Given, WrongGreySlicesAreOneSentence) {
   const fs::path stack = folder_ / "stack";
   const auto refused = [&](const std::string& why) {

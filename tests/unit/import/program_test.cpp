@@ -170,6 +170,8 @@ TEST_F(Program, ImportsThePhantomsDicomSeries) {
 TEST_F(Program, WrongInputsAreOneSentence) {
   std::ofstream(folder_ / "letter.txt") << "Dear reader\n";
   expect_refused({"ct", path("letter.txt"), "--out", path("case")}, path("letter.txt"), folder_);
+  expect_refused({"ct", path("letter.txt"), "--out", path("case")},
+                 "--size, --spacing and --type if it holds raw numbers", folder_);
   expect_refused({"ct", path("absent"), "--out", path("case")}, path("absent"), folder_);
   fs::create_directory(folder_ / "empty");
   expect_refused({"ct", path("empty"), "--out", path("case")}, path("empty"), folder_);

@@ -296,7 +296,8 @@ TEST_F(SharedScans, GreySlicesOfAHand) {
 }
 
 TEST_F(SharedScans, RawSlicesAreNoDicom) {
-  expect_refused(data_ / "headsq-raw", "holds no DICOM files: 94 files that are not DICOM");
+  expect_refused(data_ / "headsq-raw",
+                 "holds no DICOM files: 94 files that are not DICOM; give the folder with the CT series, --spacing");
 }
 
 // Two hospitals' series on one disc: neither hides the other.
