@@ -11,6 +11,7 @@
 
 namespace osteon::import {
 
+// As many as a DICOM series may have.
 inline constexpr double kMostGivenVoxels = 4e9;
 
 struct GivenGeometry {
