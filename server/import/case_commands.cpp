@@ -18,11 +18,10 @@
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
 #include "server/import/found_files.hpp"
-#include "server/import/inv3_reader.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/phantom.hpp"
+#include "server/import/scan_arguments.hpp"
 #include "server/import/slice_images.hpp"
-#include "server/import/volume_reader.hpp"
 
 namespace osteon::import {
 namespace {
@@ -34,12 +33,12 @@ constexpr double kMeshPitch_mm = 0.5;
 constexpr const char* kSuggest = "suggest";
 
 struct CaseArguments {
+  ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
   std::vector<std::string> bone_colours, seeds;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
-  std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false, list = false, adaptive = false;
 };
@@ -76,32 +75,6 @@ Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
 }
 
-// The kind of an input that has one scan and no series; empty for others.
-std::string_view name_of_one_scan(InputKind kind) {
-  if (kind == InputKind::inv3) return "an InVesalius project";
-  return kind == InputKind::volume_file ? "a volume in one file" : "";
-}
-
-// Reads a scan of any kind; the input's content decides which.
-Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
-  const InputKind kind = input_kind(a.input, reading);
-  if (!reading(0.0)) return tl::unexpected(stopped());
-  if (kind == InputKind::absent)
-    return failure(ErrorCode::not_found, "there is no file or folder " + a.input +
-                                             "; give a folder, zip or ISO image with a CT series, or a NIfTI, "
-                                             "NRRD, MetaImage or .inv3 file");
-  if (const std::string_view one = name_of_one_scan(kind); a.series && !one.empty())
-    return bad_input("--series is for DICOM; leave it out, because " + a.input + " is " + std::string(one) +
-                     " with one scan");
-  if (kind == InputKind::volume_file) return read_volume(a.input, reading);
-  if (kind != InputKind::inv3 && kind != InputKind::other)
-    return read_dicom_series(a.input, {.series = a.series}, reading);
-  std::error_code error;
-  if (!fs::is_regular_file(a.input, error))
-    return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
-  return read_inv3(a.input, reading);
-}
-
 std::optional<imaging::MedianBox> median_box(const CaseArguments& a) {
   if (a.median.empty()) return {};
   return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
@@ -130,7 +103,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   options.margin_mm = a.margin_mm;
   Bar bar(stop);
-  auto scan = read_scan(a, bar.stage(0.0, 0.2));
+  auto scan = read_scan(a.scan, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
   const std::string series = report_lines(scan->report);
 
@@ -141,7 +114,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
   const auto made = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
-  if (!made) return tl::unexpected(about(a.input, made.error()));
+  if (!made) return tl::unexpected(about(a.scan.input, made.error()));
   if (a.list) {
     bar.stage(1.0, 1.0)(1.0);
     return series + segmentation_text(made->found);
@@ -154,20 +127,11 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
-  if (const std::string_view one = name_of_one_scan(input_kind(a.input, searching)); !one.empty())
+  if (const std::string_view one = name_of_one_scan(a.input, searching); !one.empty())
     return bad_input(a.input + " is " + std::string(one) + " with one scan; give it to osteon-import ct");
   const auto report = list_dicom_series(a.input, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
-}
-
-// "A,B", both finite.
-std::optional<std::pair<double, double>> parse_pair(const std::string& text) {
-  double first = 0, second = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf%c", &first, &second, &rest) != 2) return {};
-  if (!std::isfinite(first) || !std::isfinite(second)) return {};
-  return std::pair(first, second);
 }
 
 Result<SliceOptions> slice_options(const CaseArguments& a) {
@@ -198,7 +162,7 @@ Result<std::string> run_slices(const CaseArguments& a, const StopSignal& stop) {
   const auto options = slice_options(a);
   if (!options) return tl::unexpected(options.error());
   Bar bar(stop);
-  auto scan = read_scan(a, bar.stage(0.0, 0.4));
+  auto scan = read_scan(a.scan, bar.stage(0.0, 0.4));
   if (!scan) return tl::unexpected(scan.error());
   const std::string text = "slices     " + imaging::describe(scan->volume) + ", as PNG in " + a.out + "\n";
   const std::string series = report_lines(scan->report);
@@ -236,18 +200,6 @@ Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) 
   }
   bar.stage(1.0, 1.0)(1.0);
   return report_text(*bone);
-}
-
-Result<Vec3> parse_spacing(const std::string& text) {
-  double x = 0, y = 0, z = 0;
-  char rest = 0;
-  const int parts = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &z, &rest);
-  const Vec3 spacing = parts == 1 && text.find(',') == std::string::npos ? Vec3::Constant(x) : Vec3(x, y, z);
-  if ((parts != 3 && parts != 1) || !(spacing.minCoeff() >= 0.01) || !(spacing.maxCoeff() <= 10.0))
-    return failure(
-        ErrorCode::invalid_input,
-        "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
-  return spacing;
 }
 
 Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
@@ -369,16 +321,6 @@ Result<void> check_free(const std::string& path) {
 
 namespace {
 
-void add_scan_options(CLI::App& command, CaseArguments& a) {
-  command
-      .add_option("INPUT", a.input,
-                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or "
-                  "a NIfTI, NRRD or MetaImage file")
-      ->required();
-  command.add_option("--series", a.series,
-                     "Number of the series, as osteon-import series lists them (default: the largest CT)");
-}
-
 void add_smoothing_options(CLI::App& command, CaseArguments& a) {
   command
       .add_option("--median", a.median,
@@ -394,7 +336,7 @@ void add_smoothing_options(CLI::App& command, CaseArguments& a) {
 void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& shared, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
   CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
-  add_scan_options(*slices, a);
+  add_scan_options(*slices, a.scan);
   slices->add_option("--out", a.out, "Folder of the images, made by this command")->required();
   add_smoothing_options(*slices, a);
   slices->add_option("--window", a.window, "CENTRE,WIDTH: the HU that become grey; without --edges")
@@ -425,7 +367,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
 
   CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
-  add_scan_options(*ct, a);
+  add_scan_options(*ct, a.scan);
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
       ->check(within(0.02, 10.0));

@@ -12,9 +12,9 @@ namespace {
 
 constexpr int kMargin = 5;  // samples beyond the bone: the band and the cell around it
 // Shares of the stages in the total time.
-constexpr double kSmoothEnd = 0.35;
+constexpr double kLabelSmoothEnd = 0.35;
 constexpr double kResampleEnd = 0.4;
-constexpr double kSurfaceEnd = 0.85;
+constexpr double kLabelSurfaceEnd = 0.85;
 
 DenseVolume<std::uint8_t> cropped(const DenseVolume<std::uint8_t>& from, const CoordBox& box) {
   DenseVolume<std::uint8_t> out;
@@ -98,12 +98,12 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   const auto described = describe_scan(kept);
   if (!described) return tl::unexpected(described.error());
 
-  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kSmoothEnd));
+  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kLabelSmoothEnd));
   if (!smooth) return tl::unexpected(smooth.error());
-  auto field = imaging::resample(*smooth, spacing, box, pitch_mm, part(keep_going, kSmoothEnd, kResampleEnd));
+  auto field = imaging::resample(*smooth, spacing, box, pitch_mm, part(keep_going, kLabelSmoothEnd, kResampleEnd));
   if (!field) return tl::unexpected(field.error());
   smooth->values = {};
-  auto surface_mm = signed_distance_mm(*field, 0.0f, pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
+  auto surface_mm = signed_distance_mm(*field, 0.0f, pitch_mm, part(keep_going, kResampleEnd, kLabelSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   field->values = {};
   cap_at_volume(volume, pitch_mm, *surface_mm);
@@ -112,7 +112,7 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
 
   std::vector<float> densities{0.0f};
   for (const BoneColour& colour : legend.bones) densities.push_back(static_cast<float>(colour.density_g_cm3));
-  auto density = imaging::label_density(volume, densities, box, pitch_mm, part(keep_going, kSurfaceEnd, 0.9));
+  auto density = imaging::label_density(volume, densities, box, pitch_mm, part(keep_going, kLabelSurfaceEnd, 0.9));
   if (!density) return tl::unexpected(density.error());
   volume.labels = {};
   if (!keep_going(0.9)) return failure(ErrorCode::cancelled, "stopped before building the case");

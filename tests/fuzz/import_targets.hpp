@@ -16,5 +16,7 @@ namespace osteon::fuzz {
 [[nodiscard]] Target inv3_target();          // InVesalius project
 [[nodiscard]] Target scan_archive_target();  // zip, ISO 9660 image, tar
 [[nodiscard]] Target label_slice_target();   // PNG
+[[nodiscard]] Target raw_volume_target();    // numbers, and the options that describe them
+[[nodiscard]] Target grey_slice_target();    // PNG
 
 }  // namespace osteon::fuzz

@@ -30,6 +30,7 @@ namespace fs = std::filesystem;
 constexpr const char* kExplicit = "1.2.840.10008.1.2.1";
 constexpr const char* kImplicit = "1.2.840.10008.1.2";
 constexpr int kRows = 4, kColumns = 5;
+constexpr std::size_t kMostResampled = 1 << 16;  // voxels
 // GDCM allocates and clears what a damaged length claims. When an assertion fails, this memory is leaked. No valid
 // input needs more than this.
 constexpr std::size_t kMostBytesAtOnce = std::size_t{4} << 20;
@@ -44,13 +45,18 @@ class DataSet {
     if (value.size() % 2 != 0) value += std::string_view(vr) == "UI" ? '\0' : ' ';
     number(group, 2), number(element, 2);
     if (explicit_vr_) bytes_ += vr;
-    if (explicit_vr_ && std::string_view(vr) == "OW") bytes_ += std::string(2, '\0');
-    number(value.size(), explicit_vr_ && std::string_view(vr) != "OW" ? 2 : 4);
+    const bool is_long = std::string_view(vr) == "OW" || std::string_view(vr) == "SQ";
+    if (explicit_vr_ && is_long) bytes_ += std::string(2, '\0');
+    number(value.size(), explicit_vr_ && !is_long ? 2 : 4);
     bytes_ += value;
     return *this;
   }
   DataSet& add_number(std::uint16_t group, std::uint16_t element, std::uint16_t value) {
     return add(group, element, "US", {static_cast<char>(value & 0xff), static_cast<char>(value >> 8)});
+  }
+  DataSet& append(const std::string& elements) {
+    bytes_ += elements;
+    return *this;
   }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
@@ -62,7 +68,34 @@ class DataSet {
   std::string bytes_;
 };
 
-std::string a_slice(const std::string& syntax) {
+// Item by item, each with its length.
+std::string items(const std::vector<std::string>& sets) {
+  std::string value;
+  for (const std::string& set : sets) {
+    value += std::string("\xfe\xff\x00\xe0", 4);
+    for (int i = 0; i < 4; ++i) value += static_cast<char>(set.size() >> 8 * i & 0xff);
+    value += set;
+  }
+  return value;
+}
+
+// The same slice in two frames, 2 mm apart, whose place is in functional groups.
+std::string functional_groups() {
+  const auto group = [](std::uint16_t group, std::uint16_t element, const DataSet& item) {
+    return DataSet(true).add(group, element, "SQ", items({item.bytes()})).bytes();
+  };
+  const std::string shared =
+      group(0x20, 0x9116, DataSet(true).add(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0")) +
+      group(0x28, 0x9110, DataSet(true).add(0x28, 0x30, "DS", "0.5\\0.75")) +
+      group(0x28, 0x9145, DataSet(true).add(0x28, 0x1052, "DS", "-1024").add(0x28, 0x1053, "DS", "1"));
+  std::vector<std::string> frames;
+  for (const char* position : {"-10\\-20\\30", "-10\\-20\\32"})
+    frames.push_back(group(0x20, 0x9111, DataSet(true).add_number(0x20, 0x9156, 1)) +
+                     group(0x20, 0x9113, DataSet(true).add(0x20, 0x32, "DS", position)));
+  return DataSet(true).add(0x5200, 0x9229, "SQ", items({shared})).add(0x5200, 0x9230, "SQ", items(frames)).bytes();
+}
+
+std::string a_slice(const std::string& syntax, bool enhanced = false) {
   const std::string ct = "1.2.840.10008.5.1.4.1.1.2";
   DataSet meta(true);
   meta.add(2, 2, "UI", ct).add(2, 3, "UI", "1.2.3.4.5").add(2, 0x10, "UI", syntax);
@@ -74,38 +107,47 @@ std::string a_slice(const std::string& syntax) {
   data.add(8, 0x103e, "LO", "HEAD 1.0").add(0x18, 0x1210, "SH", "H60s");
   data.add(0x20, 0x0e, "UI", "1.2.3.4").add(0x20, 0x11, "IS", "1").add(0x20, 0x32, "DS", "-10\\-20\\30");
   data.add(0x20, 0x37, "DS", "1\\0\\0\\0\\1\\0").add_number(0x28, 2, 1).add(0x28, 4, "CS", "MONOCHROME2");
+  if (enhanced) data.add(0x28, 8, "IS", "2");
   data.add_number(0x28, 0x10, kRows).add_number(0x28, 0x11, kColumns).add(0x28, 0x30, "DS", "0.5\\0.75");
   data.add_number(0x28, 0x100, 16).add_number(0x28, 0x101, 12).add_number(0x28, 0x102, 11).add_number(0x28, 0x103, 0);
   data.add(0x28, 0x1052, "DS", "-1024").add(0x28, 0x1053, "DS", "1");
   std::string pixels;
   for (int i = 0; i < kRows * kColumns; ++i) pixels += {static_cast<char>(i), static_cast<char>(i % 16)};
+  if (enhanced) data.append(functional_groups()), pixels += pixels;
   data.add(0x7fe0, 0x10, "OW", pixels);
   const auto length = static_cast<char>(meta.bytes().size());
   const std::string head = DataSet(true).add(2, 0, "UL", {length, 0, 0, 0}).bytes();
   return std::string(128, '\0') + "DICM" + head + meta.bytes() + data.bytes();
 }
 
-// Reads the slice and a second one 2 mm beside it, as the import does: headers, series, and the pixels of what can be
-// imported.
+// Reads the slice and a second one beside it, as of a tilted gantry, as the import does: headers, series, the pixels of
+// what can be imported, and the planes of the grid.
 void read_slice(const fs::path& file) {
-  import::DicomHeader header = import::read_header(file);
-  import::DicomHeader beside = header;
+  std::vector<import::DicomHeader> headers = import::read_headers(file);
+  import::DicomHeader beside = headers.front();
   beside.instance += ".1";
   beside.file = 1;
-  if (beside.position.size() == 3) beside.position[2] += 2.0;
+  if (beside.position.size() == 3) beside.position[1] += 1.0, beside.position[2] += 2.0;
   const import::FoundFiles found{.input = "scan", .archive = false, .files = {{file, "a"}, {file, "b"}}, .skipped = {}};
   import::SkippedFiles skipped;
-  auto series = import::sort_series({header, beside}, found, skipped);
+  headers.push_back(beside);
+  auto series = import::sort_series(headers, found, skipped);
   OSTEON_CHECK(skipped.text().size() < 4096);
   const auto chosen = import::choose_series(series, found, skipped, {}, {});
   if (!chosen) return expect_bounded(chosen.error());
   const import::CtSeries& taken = series[*chosen];
   if (taken.fault) return expect_bounded(taken.fault->error);
-  const std::size_t pixels =
-      static_cast<std::size_t>(taken.grid.dims[0]) * static_cast<std::size_t>(taken.grid.dims[1]);
-  std::vector<std::int16_t> out(pixels);
-  const auto read = import::read_pixels(taken.slices.front(), file, "a", out);
-  if (!read) expect_bounded(read.error());
+  std::vector<std::int16_t> out(static_cast<std::size_t>(taken.entry.columns) *
+                                static_cast<std::size_t>(taken.entry.rows));
+  import::PixelReader reader;
+  const auto read = reader.read(taken.slices.back(), file, "a", out);
+  if (!read) return expect_bounded(read.error());
+  const imaging::HuVolume& volume = taken.grid.volume;
+  if (taken.grid.places.empty() || volume.count() > kMostResampled) return;
+  import::SliceResampler resampler(taken.grid, taken.entry.columns, taken.entry.rows);
+  int planes = 0;
+  for (std::size_t i = 0; i < taken.slices.size(); ++i) resampler.add(out, [&](auto) { ++planes; });
+  OSTEON_CHECK(planes == volume.dims[2]);
 }
 
 // GDCM aborts by assert() on some damaged files, so the import reads them in child processes. Here the target leaves
@@ -193,7 +235,10 @@ Target dicom_target() {
   gdcm::Trace::DebugOff();
   gdcm::Trace::WarningOff();
   gdcm::Trace::ErrorOff();
-  Target target{"dicom", read_dicom, {bytes_of_text(a_slice(kExplicit)), bytes_of_text(a_slice(kImplicit))}};
+  Target target{
+      "dicom",
+      read_dicom,
+      {bytes_of_text(a_slice(kExplicit)), bytes_of_text(a_slice(kImplicit)), bytes_of_text(a_slice(kExplicit, true))}};
   target.mutations = 40;
   target.most_bytes_at_once = kMostBytesAtOnce;
   return target;
