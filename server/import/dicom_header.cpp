@@ -153,6 +153,7 @@ void read_slice(const Values& values, const gdcm::File& file, DicomHeader& h) {
   const auto text = [&](std::uint16_t group, std::uint16_t element) { return values.text(group, element); };
   h.series = text(0x0020, 0x000e);
   h.instance = text(0x0008, 0x0018);
+  h.frame_of_reference = text(0x0020, 0x0052);
   if (const char* syntax = file.GetHeader().GetDataSetTransferSyntax().GetString()) h.transfer_syntax = trimmed(syntax);
   const bool latin1 = text(0x0008, 0x0005).find("100") != std::string::npos;
   h.description = shown_text(text(0x0008, 0x103e), kShownLetters, latin1);
@@ -218,7 +219,7 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
 void DicomHeader::pack(ByteWriter& to) const {
   to.add(file), to.add(bytes), to.add(pixel_offset), to.add(kind), to.add(modality);
   to.add(series), to.add(instance), to.add(transfer_syntax), to.add(photometric), to.add(image_type),
-      to.add(description), to.add(kernel);
+      to.add(frame_of_reference), to.add(description), to.add(kernel);
   to.add(series_number), to.add(acquisition), to.add(temporal_position), to.add(frames), to.add(columns), to.add(rows);
   to.add(bits_allocated), to.add(bits_stored), to.add(samples);
   to.add(position), to.add(orientation), to.add(spacing), to.add(slope), to.add(intercept), to.add(padding);
@@ -227,9 +228,9 @@ void DicomHeader::pack(ByteWriter& to) const {
 bool DicomHeader::unpack(ByteReader& from) {
   return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && kind <= FileKind::too_deep &&
          from.get(modality) && from.get(series) && from.get(instance) && from.get(transfer_syntax) &&
-         from.get(photometric) && from.get(image_type) && from.get(description) && from.get(kernel) &&
-         from.get(series_number) && from.get(acquisition) && from.get(temporal_position) && from.get(frames) &&
-         from.get(columns) && from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) &&
+         from.get(photometric) && from.get(image_type) && from.get(frame_of_reference) && from.get(description) &&
+         from.get(kernel) && from.get(series_number) && from.get(acquisition) && from.get(temporal_position) &&
+         from.get(frames) && from.get(columns) && from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) &&
          from.get(samples) && from.get(position) && from.get(orientation) && from.get(spacing) && from.get(slope) &&
          from.get(intercept) && from.get(padding);
 }
