@@ -60,6 +60,7 @@ Result<LabelMap> read_structures(const fs::path& folder, const std::vector<fs::p
                        " has several labels among other files of labels; give this file alone, or "
                        "a folder with one file for each structure");
     if (i == 0) map.grid = one->grid;
+    map.oriented = map.oriented && one->oriented;
     if (!same_voxels(map.grid, one->grid))
       return bad_input(files[i].string() + " has other voxels than " + files[0].filename().string() +
                        "; export all structures on the voxels of the CT");

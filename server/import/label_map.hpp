@@ -25,6 +25,7 @@ struct LabelMap {
   std::string file;                    // as the user gave it, for errors
   std::string kind;                    // such as "NIfTI", for a label's provenance
   imaging::HuVolume grid;              // where its voxels lie; without values
+  bool oriented = true;                // the file says how it lies in the patient
   std::string frame_of_reference;      // UID of DICOM, empty for others; never stored
   std::vector<LabelSegment> segments;  // by layer, then by number
 };

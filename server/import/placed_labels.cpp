@@ -78,8 +78,9 @@ Result<Values> choose_values(const LabelMap& map, const std::vector<Structure>& 
     values.of_segment[i] = static_cast<std::uint8_t>(value);
   };
   const auto kept = [&](std::size_t i) { return structures[i].kind && !map.segments[i].runs.empty(); };
-  if (static_cast<std::size_t>(
-          std::ranges::count_if(structures, [](const Structure& s) { return s.kind.has_value(); })) > kMostLabelsOfCase)
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < structures.size(); ++i) count += kept(i) ? 1 : 0;
+  if (count > kMostLabelsOfCase)
     return bad_input(map.file + " has more than 255 labels of bone and structures at risk; leave some out by " +
                      "--label-names NUMBER=NAME:none");
   for (std::size_t i = 0; i < structures.size(); ++i)
@@ -207,6 +208,7 @@ Result<PlacedLabels> place(LabelMap map, const LabelNames& names, const imaging:
   const auto before = counts_of(*drawn);
   const GridSteps between = steps_between(ct, map.grid);
   placed.same_grid = between.same_voxels(ct.dims);
+  placed.oriented = map.oriented;
   auto on_ct = resampled(*drawn, between, ct.dims, part(keep_going, 0.3, 1.0));
   if (!on_ct) return tl::unexpected(on_ct.error());
   placed.values = std::move(*on_ct);
@@ -258,6 +260,8 @@ std::string labels_text(const PlacedLabels& placed, double bone_cm3) {
   text += line.data();
   text += placed.same_grid ? "grid       that of the CT, voxel for voxel\n"
                            : "grid       another than the CT's; each voxel has the nearest label\n";
+  if (!placed.oriented)
+    text += "           the file does not say how it lies in the patient: left and right may be swapped\n";
   if (placed.beyond_cm3 > 0.0) {
     std::snprintf(line.data(), line.size(), "beyond     %.2f cm3 of labels lie where the CT has ended\n",
                   placed.beyond_cm3);

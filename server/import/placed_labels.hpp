@@ -21,6 +21,7 @@ struct PlacedLabels {
   std::vector<double> cm3;        // of each label, in the CT
   std::vector<LeftOutLabel> left_out;
   bool same_grid = false;   // a voxel of the labels for each voxel of the CT that both cover
+  bool oriented = true;     // the file says how it lies in the patient
   double beyond_cm3 = 0.0;  // of labels, where the CT has ended; a difference of volumes
 };
 

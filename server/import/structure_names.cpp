@@ -28,18 +28,19 @@ struct Words {
   std::span<const std::string_view> list;
 };
 
-constexpr std::string_view kNerve[] = {"nerve", "nerves", "nervus", "cord", "medulla", "plexus", "ganglion", "cauda"};
-constexpr std::string_view kVessel[] = {"artery", "arteries", "arteria",   "vein",    "veins", "vena",
-                                        "cava",   "vessel",   "vessels",   "aorta",   "trunk", "jugular",
-                                        "venous", "arterial", "arteriole", "vascular"};
+constexpr std::string_view kNerve[] = {"nerve",  "nerves",   "nervus", "cord",  "medulla",
+                                       "plexus", "ganglion", "cauda",  "chorda"};
+constexpr std::string_view kVessel[] = {"artery", "arteries", "arteria",   "vein",     "veins",  "vena",
+                                        "cava",   "vessel",   "vessels",   "aorta",    "trunk",  "jugular",
+                                        "venous", "arterial", "arteriole", "vascular", "carotis"};
 constexpr std::string_view kDura[] = {"dura", "dural", "meninges", "meninx", "thecal"};
 constexpr std::string_view kCartilage[] = {"cartilage",      "cartilages", "disc",     "discs",  "disk",
                                            "disks",          "meniscus",   "menisci",  "labrum", "chondral",
                                            "fibrocartilage", "discus",     "cartilago"};
-constexpr std::string_view kMetal[] = {"metal",    "implant", "implants", "screw", "screws",        "plate",
-                                       "plates",   "nail",    "stem",     "wire",  "wires",         "prosthesis",
-                                       "hardware", "crown",   "bracket",  "rod",   "rods",          "cage",
-                                       "titanium", "cup",     "filling",  "clip",  "endoprosthesis"};
+constexpr std::string_view kMetal[] = {"metal",    "implant", "implants", "screw", "screws",         "plate",
+                                       "plates",   "nail",    "stem",     "wire",  "wires",          "prosthesis",
+                                       "hardware", "crown",   "bracket",  "rod",   "rods",           "cage",
+                                       "titanium", "cup",     "filling",  "clip",  "endoprosthesis", "bridge"};
 constexpr std::string_view kEnamel[] = {"enamel"};
 constexpr std::string_view kCortical[] = {"cortical", "cortex", "corticalis", "compacta"};
 constexpr std::string_view kCancellous[] = {"cancellous", "trabecular", "spongiosa", "spongious", "spongy"};
@@ -69,7 +70,8 @@ constexpr std::string_view kBone[] = {
     "metatarsal", "metatarsals", "tooth",      "teeth",      "incisor",    "canine",     "premolar",   "molar",
     "zygoma",     "palate",      "atlas",      "axis",       "dens",       "mastoid",    "malleus",    "incus",
     "stapes",     "ossicle",     "ossicles",   "vomer",      "tuberosity", "trochanter", "dentin",     "osseous",
-    "condyle",    "olecranon",   "glenoid",    "innominate", "osteophyte", "callus",     "arch"};
+    "condyle",    "olecranon",   "glenoid",    "innominate", "osteophyte", "callus",     "arch",       "jawbone",
+    "coxae",      "coxa"};
 // Words that say where, which, or of what, and decide nothing.
 constexpr std::string_view kPlace[] = {"left",        "right",
                                        "l",           "r",
@@ -135,7 +137,21 @@ constexpr std::string_view kPlace[] = {"left",        "right",
                                        "first",       "second",
                                        "third",       "fourth",
                                        "fifth",       "brachii",
-                                       "region"};
+                                       "region",      "cricoid",
+                                       "central",     "tympani",
+                                       "dexter",      "dextra",
+                                       "sinister",    "sinistra",
+                                       "femoralis",   "ischiadicus",
+                                       "facialis",    "opticus",
+                                       "alveolaris",  "mandibularis",
+                                       "tibialis",    "fibularis",
+                                       "medianus",    "ulnaris",
+                                       "radialis",    "spinalis",
+                                       "iliaca",      "poplitea",
+                                       "vertebralis", "temporale",
+                                       "frontale",    "parietale",
+                                       "occipitale",  "nasale",
+                                       "inferius"};
 
 constexpr Words kWords[] = {{Word::nerve, kNerve},
                             {Word::vessel, kVessel},
@@ -193,8 +209,9 @@ bool all_digits(std::string_view text) {
   return std::ranges::all_of(text, [](unsigned char c) { return std::isdigit(c) != 0; });
 }
 
-// A number, or a level of the spine such as L1, T12 or C7.
+// A number, a tooth such as fdi11, or a level of the spine such as L1, T12 or C7.
 bool is_number(std::string_view word) {
+  if (word.starts_with("fdi")) word.remove_prefix(3);
   if (word.size() <= 3 && all_digits(word)) return true;
   return word.size() >= 2 && word.size() <= 3 &&
          std::string_view("ctls").find(word.front()) != std::string_view::npos && all_digits(word.substr(1));

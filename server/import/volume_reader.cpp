@@ -248,11 +248,11 @@ Result<LabelMap> read_label_volume(const fs::path& file, const KeepGoing& keep_g
                                                "Slicer; give a label map, with one number for each voxel");
   auto runs = read_runs(file, *opened, *grid, keep_going);
   if (!runs) return tl::unexpected(runs.error());
-  LabelMap map{.file = file.string(),
-               .kind = named.empty() ? std::string(name_of(opened->format)) : "3D Slicer segmentation",
-               .grid = std::move(*grid),
-               .frame_of_reference = {},
-               .segments = {}};
+  LabelMap map;
+  map.file = file.string();
+  map.kind = named.empty() ? std::string(name_of(opened->format)) : "3D Slicer segmentation";
+  map.grid = std::move(*grid);
+  map.oriented = says_orientation(file, opened->format);
   map.segments = segments_of(std::move(named), *fields, std::move(*runs));
   return map;
 } catch (const std::bad_alloc&) {

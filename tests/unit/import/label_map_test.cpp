@@ -115,6 +115,38 @@ TEST_F(LabelMaps, LabelsKeepTheirNumbersAndSayWhereTheyComeFrom) {
   EXPECT_NEAR(found->cm3[0], 4 * 5 * 5 * 3.0e-3, 1e-9) << "voxels of 1 x 1.5 x 2 mm";
 }
 
+TEST_F(LabelMaps, NumbersAbove255GetFreeOnes) {
+  std::vector<int> values;
+  for (const int label : labels_of(grid_, label_at_))
+    values.push_back(label == 3 ? 1 : label == 7 ? 300 : label * 7000);
+  const auto found = placed(write("labels.nii", nifti_file(grid_, {512, 16, bytes_of<std::uint16_t>(values)})),
+                            {"1=femur,300=vein,63000=nerve"});
+  ASSERT_TRUE(found) << found.error().message;
+  ASSERT_EQ(found->labels.size(), 3u);
+  EXPECT_EQ(found->labels[1].value, 2);
+  EXPECT_EQ(found->labels[1].provenance.parameters.at("number_in_file"), 300.0);
+  EXPECT_EQ(found->labels[2].value, 3);
+  EXPECT_EQ(std::ranges::count(found->values.values, 2), std::ranges::count(drawn(), 7));
+  EXPECT_EQ(std::ranges::count(found->values.values, 3), std::ranges::count(drawn(), 9));
+}
+
+TEST_F(LabelMaps, AFileThatDoesNotSayHowItLiesIsReported) {
+  TestGrid near = grid_;
+  near.axes_mm = Vec3(1.0, 1.5, 2.0).asDiagonal();
+  std::string file = nifti_file(near, [](const Vec3&) { return 3; });
+  const CtScan ct = scan_of({.dims = {30, 30, 30}, .origin_mm = {-15.0, -15.0, 0.0}}, [](const Vec3&) { return 0; });
+  for (const bool oriented : {true, false}) {
+    if (!oriented) file[254] = 0;  // no affine transform
+    auto map = read_label_map(write("labels.nii", file), keep_going);
+    ASSERT_TRUE(map) << map.error().message;
+    EXPECT_EQ(map->oriented, oriented);
+    map->grid.origin_mm = {-5.0, -5.0, 5.0};
+    const auto found = place_labels(std::move(*map), *parse_label_names({"3=femur"}), ct.volume, "", keep_going);
+    ASSERT_TRUE(found) << found.error().message;
+    EXPECT_EQ(labels_text(*found, 1.0).find("left and right may be swapped") == std::string::npos, oriented);
+  }
+}
+
 // A voxel of the CT takes the label whose voxel's centre is nearest, by comparison with all of them.
 TEST_F(LabelMaps, AnotherGridGivesTheNearestLabel) {
   TestGrid coarse{.dims = {9, 9, 6}, .origin_mm = grid_.origin_mm + Vec3(-7.3, -1.1, -0.7)};

@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "server/import/ct_import.hpp"
+#include "server/import/dicom_reader.hpp"
 #include "server/import/label_export.hpp"
 #include "tests/support/content.hpp"
 #include "tests/support/process.hpp"
@@ -214,6 +215,33 @@ TEST_F(LabelProgram, LabelsComeOutAsTheyWentIn) {
       run({"ct", path("ct.nii"), "--labels", path("out.seg.nrrd"), "--out", path("again"), "--margin", "1"});
   ASSERT_EQ(again.exit_code, 0) << again.err;
   EXPECT_EQ(test::content(folder_ / "again" / "case.json"), json);
+}
+
+// A series and its segmentation name one frame of reference.
+TEST_F(LabelProgram, DicomSegmentsBelongToTheirSeries) {
+  ASSERT_NO_FATAL_FAILURE(write_small_series(folder_ / "series"));
+  for (const fs::path& file : files_of(folder_ / "series")) set_tag(file, 0x0020, 0x0052, "1.2.826.0.1.4711.4");
+  const auto scan = read_dicom_series(folder_ / "series", keep_going);
+  ASSERT_TRUE(scan) << scan.error().message;
+  const imaging::HuVolume& volume = scan->volume;
+  const TestGrid grid{.dims = volume.dims,
+                      .origin_mm = volume.origin_mm,
+                      .axes_mm = volume.directions * volume.spacing_mm.asDiagonal()};
+  std::vector<int> mask;
+  for (const std::int16_t hu : volume.values) mask.push_back(hu > 500 ? 1 : 0);
+  SegOptions options;
+  options.frame_of_reference = "1.2.826.0.1.4711.4";
+  write_bytes(folder_ / "seg.dcm", seg_file(grid, {{1, "Tibia", "", mask}}, options));
+  const auto made = run({"ct", path("series"), "--labels", path("seg.dcm"), "--out", path("case")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const std::string json = test::content(folder_ / "case" / "case.json");
+  EXPECT_NE(json.find("label map, DICOM SEG"), std::string::npos) << json;
+  for (const char* secret : {"4711", "DOE", "JANE", "1.2.3"}) EXPECT_EQ(json.find(secret), std::string::npos) << secret;
+  options.frame_of_reference = "1.2.826.0.1.4711.5";
+  write_bytes(folder_ / "other.dcm", seg_file(grid, {{1, "Tibia", "", mask}}, options));
+  const auto other = run({"ct", path("series"), "--labels", path("other.dcm"), "--out", path("other")});
+  EXPECT_EQ(other.exit_code, 1);
+  EXPECT_NE(other.err.find("another frame of reference"), std::string::npos) << other.err;
 }
 
 TEST_F(LabelProgram, ASlicerFileSaysWhereEachSegmentIs) {

@@ -92,6 +92,9 @@ TEST(StructureNames, WordsDecideInAnyOrder) {
   EXPECT_EQ(kind_of_name("hip_implant"), LabelKind::metal);
   EXPECT_EQ(kind_of_name("enamel of the first molar"), LabelKind::enamel);
   EXPECT_EQ(kind_of_name("levator_scapulae_left"), std::nullopt) << "a muscle";
+  EXPECT_EQ(kind_of_name("Nervus ischiadicus"), LabelKind::nerve);
+  EXPECT_EQ(kind_of_name("upper_right_central_incisor_fdi11"), LabelKind::bone);
+  EXPECT_EQ(kind_of_name("Left Inferior Alveolar Canal"), LabelKind::nerve);
   EXPECT_EQ(kind_of_name("liver"), std::nullopt);
 }
 
