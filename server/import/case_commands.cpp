@@ -477,8 +477,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       "Take bones and structures at risk from this label map instead: NIfTI, NRRD (.seg.nrrd), MetaImage or DICOM SEG, "
       "or a folder with one such file for each structure");
   ct->add_option("--label-names", a.label_names,
-                 "What the labels are: NUMBER=NAME,... or NUMBER=NAME:KIND,... with " + kind_choice_text() +
-                     ", or totalsegmentator; may be given again")
+                 "What the labels are: totalsegmentator, or NUMBER=NAME,... or NUMBER=NAME:KIND,... with a kind of " +
+                     kind_choice_text() + " (left out); may be given again")
       ->expected(1)
       ->take_all()
       ->needs(labels_option);
