@@ -49,6 +49,7 @@ Result<LabelMap> read_structures(const fs::path& folder, const std::vector<fs::p
   LabelMap map;
   map.file = folder.string();
   map.kind = "folder of label files";
+  map.numbered = false;
   const auto count = static_cast<double>(files.size());
   for (std::size_t i = 0; i < files.size(); ++i) {
     const KeepGoing reading = part(keep_going, static_cast<double>(i) / count, static_cast<double>(i + 1) / count);

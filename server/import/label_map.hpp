@@ -26,6 +26,7 @@ struct LabelMap {
   std::string kind;                    // such as "NIfTI", for a label's provenance
   imaging::HuVolume grid;              // where its voxels lie; without values
   bool oriented = true;                // the file says how it lies in the patient
+  bool numbered = true;                // numbers of segments are those of the file, not of the order of files
   std::string frame_of_reference;      // UID of DICOM, empty for others; never stored
   std::vector<LabelSegment> segments;  // by layer, then by number
 };

@@ -73,7 +73,7 @@ Result<Values> choose_values(const LabelMap& map, const std::vector<Structure>& 
     for (int n = 2; !taken_names.insert(label.name).second; ++n)
       label.name = structures[i].name + " " + std::to_string(n);
     label.provenance.method = "label map, " + map.kind;
-    label.provenance.parameters["number_in_file"] = map.segments[i].number;
+    if (map.numbered) label.provenance.parameters["number_in_file"] = map.segments[i].number;
     values.labels.push_back(std::move(label));
     values.of_segment[i] = static_cast<std::uint8_t>(value);
   };

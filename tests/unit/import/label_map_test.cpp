@@ -265,6 +265,7 @@ TEST_F(LabelMaps, AFolderHasOneFileForEachStructure) {
   ASSERT_EQ(found->labels.size(), 3u);
   EXPECT_EQ(found->labels[0].name, "femur_left");
   EXPECT_EQ(found->labels[0].provenance.method, "label map, folder of label files");
+  EXPECT_TRUE(found->labels[0].provenance.parameters.empty()) << "the order of the files says nothing";
   EXPECT_EQ(std::ranges::count(found->values.values, found->labels[0].value), std::ranges::count(drawn(), 3));
   ASSERT_EQ(found->left_out.size(), 1u) << "the spleen has no voxels";
   EXPECT_EQ(found->left_out[0].name, "liver");
