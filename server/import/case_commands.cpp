@@ -18,7 +18,9 @@
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
 #include "server/import/found_files.hpp"
+#include "server/import/label_export.hpp"
 #include "server/import/label_import.hpp"
+#include "server/import/label_map.hpp"
 #include "server/import/phantom.hpp"
 #include "server/import/scan_arguments.hpp"
 #include "server/import/slice_images.hpp"
@@ -36,7 +38,8 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::vector<std::string> bone_colours, seeds;
+  std::string labels;
+  std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
   double width_mm = 20.0, density_g_cm3 = 1.9;
@@ -80,6 +83,17 @@ std::optional<imaging::MedianBox> median_box(const CaseArguments& a) {
   return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
 }
 
+// The labels of --labels on the voxels of the scan. Nothing without that option.
+Result<std::optional<PlacedLabels>> read_labels(const CaseArguments& a, const LabelNames& names, const CtScan& scan,
+                                                const KeepGoing& reading) {
+  if (a.labels.empty()) return std::optional<PlacedLabels>();
+  auto map = read_label_map(a.labels, part(reading, 0.0, 0.5));
+  if (!map) return tl::unexpected(map.error());
+  auto placed = place_labels(std::move(*map), names, scan.volume, scan.frame_of_reference, part(reading, 0.5, 1.0));
+  if (!placed) return tl::unexpected(placed.error());
+  return std::optional(std::move(*placed));
+}
+
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (a.out.empty() && !a.list)
     return failure(ErrorCode::invalid_input,
@@ -102,6 +116,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.adaptive = a.adaptive;
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   options.margin_mm = a.margin_mm;
+  const auto names = parse_label_names(a.label_names);
+  if (!names) return tl::unexpected(names.error());
   Bar bar(stop);
   auto scan = read_scan(a.scan, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
@@ -113,7 +129,12 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
-  const auto made = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
+  auto placed = read_labels(a, *names, *scan, bar.stage(0.2, 0.35));
+  if (!placed) return tl::unexpected(placed.error());
+  const KeepGoing making = bar.stage(*placed ? 0.35 : 0.2, 0.95);
+  const bool labelled = placed->has_value();
+  const auto made = labelled ? import_ct(std::move(*scan), std::move(**placed), options, making)
+                             : import_ct(std::move(*scan), options, making);
   if (!made) return tl::unexpected(about(a.scan.input, made.error()));
   if (a.list) {
     bar.stage(1.0, 1.0)(1.0);
@@ -121,7 +142,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   }
   if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*made->bone) + series + segmentation_text(made->found);
+  return report_text(*made->bone) + series +
+         (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found));
 }
 
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
@@ -301,6 +323,27 @@ Result<std::string> run_stl(const CaseArguments& a, const StopSignal& stop) {
   return report_text(*bone) + line;
 }
 
+Result<std::string> run_export_labels(const CaseArguments& a, const StopSignal& stop) {
+  if (auto known = check_label_file(a.out); !known) return tl::unexpected(known.error());
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto bone = Case::load(a.input);
+  if (!bone) return tl::unexpected(bone.error());
+  Bar bar(stop, "exporting");
+  const auto scan = load_scan(a.input, *bone, bar.stage(0.0, 0.7));
+  if (!scan) return tl::unexpected(scan.error());
+  const std::vector<CaseLabel>& labels = bone->info().labels;
+  if (auto written = write_labels(*scan, labels, a.out, bar.stage(0.7, 1.0)); !written) {
+    const Error& error = written.error();
+    return tl::unexpected(error.code == ErrorCode::invalid_input ? about(a.input, error) : error);
+  }
+  bar.stage(1.0, 1.0)(1.0);
+  std::string text = "labels     " + std::to_string(labels.size()) + " in " + a.out + "\n";
+  for (const CaseLabel& label : labels)
+    text +=
+        "           " + std::to_string(label.value) + "=" + label.name + ":" + std::string(name_of(label.kind)) + "\n";
+  return text;
+}
+
 Result<std::string> run_info(const CaseArguments& a) {
   const auto bone = Case::load(a.input);
   if (!bone) return tl::unexpected(bone.error());
@@ -371,21 +414,34 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
       ->check(within(0.02, 10.0));
+  CLI::Option* labels_option = ct->add_option(
+      "--labels", a.labels,
+      "Take bones and structures at risk from this label map instead: NIfTI, NRRD (.seg.nrrd), MetaImage or DICOM SEG, "
+      "or a folder with one such file for each structure");
+  ct->add_option("--label-names", a.label_names,
+                 "What the labels are: totalsegmentator, or NUMBER=NAME,... or NUMBER=NAME:KIND,... with a kind of " +
+                     kind_choice_text() + " (left out); may be given again")
+      ->expected(1)
+      ->take_all()
+      ->needs(labels_option);
   CLI::Option* threshold =
       ct->add_option("--threshold", a.threshold,
                      "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm), or "
                      "suggest: find it in the scan, and say why")
-          ->check(suggest_or_within(-1000.0, 4000.0));
+          ->check(suggest_or_within(-1000.0, 4000.0))
+          ->excludes(labels_option);
   CLI::Option* keep = ct->add_option(
       "--keep", a.keep,
       "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  keep->excludes(labels_option);
   CLI::Option* seed =
       ct->add_option("--seed", a.seeds,
                      "X,Y,Z, mm (LPS): keep the bone that grows from there over voxels that reach the threshold and "
                      "share a face, instead of islands; may be given again")
           ->expected(1)
           ->take_all()
-          ->excludes(keep);
+          ->excludes(keep)
+          ->excludes(labels_option);
   CLI::Option* similar = ct->add_option("--similar", a.similar_hu,
                                         "Grow over voxels within this number of HU of the seed, instead of a threshold")
                              ->check(within(1.0, 4000.0))
@@ -397,9 +453,11 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->check(CLI::IsMember({"slice", "volume"}))
       ->capture_default_str()
       ->needs(seed);
-  ct->add_flag("--list", a.list, "List the islands and write nothing");
-  ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
-  ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
+  ct->add_flag("--list", a.list, "List the islands and write nothing")->excludes(labels_option);
+  ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own")
+      ->excludes(labels_option);
+  ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
+      ->excludes(labels_option);
   add_smoothing_options(*ct, a);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
       ->check(within(0.0, 200.0))
@@ -455,6 +513,12 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->capture_default_str();
   stl->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({stl, [shared](const StopSignal& stop) { return run_stl(*shared, stop); }});
+
+  CLI::App* exported = app.add_subcommand("export-labels", "Write the labels of a case as a file for other programs");
+  exported->add_option("CASE_DIR", a.input, "Folder of the case")->required();
+  exported->add_option("FILE", a.out, "File to write: .nii.gz or .nii (NIfTI), .seg.nrrd (3D Slicer) or .nrrd")
+      ->required();
+  commands.push_back({exported, [shared](const StopSignal& stop) { return run_export_labels(*shared, stop); }});
 
   CLI::App* info = app.add_subcommand("info", "Say what a case is");
   info->add_option("CASE_DIR", a.input, "Folder of the case")->required();

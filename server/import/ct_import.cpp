@@ -15,6 +15,7 @@
 #include "common/imaging/threshold.hpp"
 #include "server/import/import_steps.hpp"
 #include "server/import/kept_scan.hpp"
+#include "server/import/label_surface.hpp"
 
 namespace osteon::import {
 namespace {
@@ -116,7 +117,7 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
 }
 
 // Labels of the lattice's samples from those of the voxels. A sample takes the label of the nearest voxel. If that is
-// not bone, as near the surface, it takes that of any voxel of the cell.
+// not bone, as near the surface, it takes that of any voxel of the cell, or else of any beside the nearest.
 class NearestLabel {
  public:
   NearestLabel(const imaging::HuVolume& volume, const imaging::VoxelMask& bones) : volume_(volume), bones_(bones) {}
@@ -135,6 +136,13 @@ class NearestLabel {
                                               clamped(std::floor(at.z()) + (corner >> 2), 2));
       if (bones_.values[beside] != 0) return beside;
     }
+    // The surface of labels may lie a part of a voxel beyond the cell.
+    const int column = clamped(std::round(at.x()), 0), row = clamped(std::round(at.y()), 1),
+              slice = clamped(std::round(at.z()), 2);
+    for (int z = std::max(0, slice - 1); z <= std::min(volume_.dims[2] - 1, slice + 1); ++z)
+      for (int y = std::max(0, row - 1); y <= std::min(volume_.dims[1] - 1, row + 1); ++y)
+        for (int x = std::max(0, column - 1); x <= std::min(volume_.dims[0] - 1, column + 1); ++x)
+          if (bones_.at(x, y, z) != 0) return bones_.index(x, y, z);
     return nearest;
   }
 
@@ -222,12 +230,12 @@ class CaseSamples {
   std::vector<float> hu_;
 };
 
-// The part of the scan with dense voxels, its islands, and the bone to which each voxel belongs.
+// The part of the scan with bone, and the bone to which each voxel belongs.
 struct Segmented {
   imaging::HuVolume volume;
   imaging::VoxelMask bones;
-  std::array<int, 3> first{}, last{};  // voxel box of the kept islands
-  CtSegmentation found;
+  std::array<int, 3> first{}, last{};  // voxel box of the bones
+  CtSegmentation found;                // without a label map
 };
 
 // Large parts of kept islands that consist of dense and cancellous bone, cm³, largest first. Error: cancelled.
@@ -363,6 +371,90 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std:
   return s;
 }
 
+// The part of the scan with the labels of a map.
+struct Labelled {
+  Segmented s;
+  imaging::VoxelMask labels;                         // of the part's voxels
+  std::array<int, 3> labels_first{}, labels_last{};  // voxel box of all labels
+};
+
+// Widens a box by a run of voxels.
+void widen(std::array<int, 3>& first, std::array<int, 3>& last, const std::array<int, 3>& at) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    first[axis] = std::min(first[axis], at[axis]);
+    last[axis] = std::max(last[axis], at[axis]);
+  }
+}
+
+Result<Labelled> take_labels(imaging::HuVolume scan, PlacedLabels& placed, const CtOptions& options,
+                             const KeepGoing& keep_going) {
+  std::array<bool, 256> carved{};
+  for (const CaseLabel& label : placed.labels) carved[static_cast<std::size_t>(label.value)] = is_carved(label.kind);
+  Labelled found;
+  Segmented& s = found.s;
+  s.first = found.labels_first = scan.dims;
+  s.last = found.labels_last = {-1, -1, -1};
+  for (int slice = 0; slice < scan.dims[2]; ++slice) {
+    if (!keep_going(static_cast<double>(slice) / scan.dims[2])) return stopped_while("taking the labels");
+    for (int row = 0; row < scan.dims[1]; ++row)
+      for (int column = 0; column < scan.dims[0]; ++column) {
+        const std::uint8_t value = placed.values.at(column, row, slice);
+        if (value == 0) continue;
+        widen(found.labels_first, found.labels_last, {column, row, slice});
+        if (carved[value]) widen(s.first, s.last, {column, row, slice});
+      }
+  }
+  const Region work = grown(found.labels_first, found.labels_last, scan, margin_mm_of(options));
+  s.volume = imaging::cropped(std::move(scan), work.first, work.last);
+  found.labels = imaging::cropped(std::move(placed.values), work.first, work.last);
+  s.bones = found.labels;
+  for (std::uint8_t& value : s.bones.values) value = carved[value] ? value : std::uint8_t{0};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::array<int, 3>* end : {&s.first, &s.last, &found.labels_first, &found.labels_last})
+      (*end)[axis] -= work.first[axis];
+  return found;
+}
+
+// What the labels of tissues say counts more than the HU.
+void take_tissues(const PlacedLabels& placed, const imaging::VoxelMask& labels, imaging::HardTissue& hard) {
+  std::array<Tissue, 256> tissue{};
+  for (const CaseLabel& label : placed.labels) {
+    const Tissue said = label.kind == LabelKind::cortical     ? Tissue::cortical
+                        : label.kind == LabelKind::cancellous ? Tissue::trabecular
+                        : label.kind == LabelKind::metal      ? Tissue::metal
+                        : label.kind == LabelKind::enamel     ? Tissue::enamel
+                                                              : Tissue::none;
+    tissue[static_cast<std::size_t>(label.value)] = said;
+  }
+  if (std::ranges::all_of(tissue, [](Tissue t) { return t == Tissue::none; })) return;
+  if (hard.tissue.values.empty()) hard.tissue = imaging::VoxelMask(labels.dims);
+  for (std::size_t i = 0; i < labels.values.size(); ++i)
+    if (const Tissue said = tissue[labels.values[i]]; said != Tissue::none)
+      hard.tissue.values[i] = static_cast<std::uint8_t>(said);
+}
+
+// The signed distance to labelled bones, which end where the scan ends. `geometry`: of the whole scan.
+Result<DenseVolume<float>> measure_labels(const Segmented& s, const imaging::HuVolume& geometry, double pitch_mm,
+                                          const KeepGoing& keep_going) {
+  const CoordBox box = lattice_box(s.volume, s.first, s.last, pitch_mm);
+  if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
+  auto field = label_field(s.bones, s.volume, s.first, s.last, part(keep_going, 0.0, 0.3));
+  if (!field) return tl::unexpected(field.error());
+  auto samples = imaging::resample(*field, box, pitch_mm, part(keep_going, 0.3, 0.4));
+  if (!samples) return tl::unexpected(samples.error());
+  field->values = {};
+  auto surface_mm = signed_distance_mm(*samples, 0.0f, pitch_mm, part(keep_going, 0.4, 0.9));
+  if (!surface_mm) return surface_mm;
+  samples->values = {};
+  const auto voxels = std::ranges::count_if(s.bones.values, [](std::uint8_t value) { return value != 0; });
+  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 0.95)); !capped)
+    return tl::unexpected(capped.error());
+  restore_volume(static_cast<double>(voxels) * geometry.spacing_mm.prod(), pitch_mm, *surface_mm);
+  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.95, 1.0)); !capped)
+    return tl::unexpected(capped.error());
+  return surface_mm;
+}
+
 // The signed distance to the kept bones, which end where the scan ends. `geometry`: of the whole scan.
 Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::HuVolume& geometry, double threshold_hu,
                                            double pitch_mm, const KeepGoing& keep_going) {
@@ -423,13 +515,40 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& 
   return s;
 }
 
+// The scan without its voxels.
+imaging::HuVolume geometry_of(const imaging::HuVolume& scan) {
+  return {.dims = scan.dims,
+          .spacing_mm = scan.spacing_mm,
+          .origin_mm = scan.origin_mm,
+          .directions = scan.directions,
+          .values = {}};
+}
+
+double pitch_mm_of(const imaging::HuVolume& geometry, const CtOptions& options) {
+  return options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
+}
+
+// What the case says of itself, without labels.
+CaseInfo description(const CtScan& scan, const CtOptions& options, double pitch_mm) {
+  CaseInfo info;
+  info.title = options.title;
+  info.source = scan.source;
+  info.pitch_mm = pitch_mm;
+  info.calibration = options.calibration;
+  return info;
+}
+
+// The case of a described scan. `several`: bones have numbers.
+Result<Case> build(CaseInfo info, const Segmented& s, const imaging::VoxelMask& tissue, bool several,
+                   const DenseVolume<float>& surface_mm, const CtOptions& options, const KeepGoing& keep_going) {
+  CaseSamples content(s.volume, s.bones, tissue, several, surface_mm, options, info.pitch_mm);
+  const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
+  return Case::build(std::move(info), surface_mm.box, fill, keep_going);
+}
+
 Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
-  imaging::HuVolume geometry;  // of the whole scan, without its values
-  geometry.dims = scan.volume.dims;
-  geometry.spacing_mm = scan.volume.spacing_mm;
-  geometry.origin_mm = scan.volume.origin_mm;
-  geometry.directions = scan.volume.directions;
-  const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
+  const imaging::HuVolume geometry = geometry_of(scan.volume);
+  const double pitch_mm = pitch_mm_of(geometry, options);
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
   auto s = find_bones(scan, options, keep_going);
   if (!s) return tl::unexpected(s.error());
@@ -446,33 +565,69 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
 
-  CaseInfo info;
-  info.title = options.title;
-  info.source = scan.source;
-  info.pitch_mm = pitch_mm;
-  info.calibration = options.calibration;
+  CaseInfo info = description(scan, options, pitch_mm);
   info.threshold_hu = options.threshold_hu;
-  CaseScan kept = kept_scan(s->volume, s->bones, hard->tissue, s->first, s->last, options);
+  CaseScan kept = kept_scan(s->volume, {s->bones, s->bones, hard->tissue}, s->first, s->last, options);
   list_labels(kept, options, s->found, info);
   const auto described = describe_scan(kept, part(building, 0.2, 0.3));
   if (!described) return tl::unexpected(described.error());
   info.scan = *described;
   const bool several = s->found.kept.size() > 1 && !options.merge;
-  CaseSamples content(s->volume, s->bones, hard->tissue, several, *surface_mm, options, pitch_mm);
-  const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
-  auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.3, 1.0));
+  auto built = build(std::move(info), *s, hard->tissue, several, *surface_mm, options, part(building, 0.3, 1.0));
   if (!built) return tl::unexpected(built.error());
   s->found.case_cm3 = built->volume_mm3() * 1e-3;
   return CtImport{std::move(s->found), std::move(*built), std::move(kept)};
 }
+
+// The same with the bones and structures of a label map, instead of islands.
+Result<CtImport> make_labelled_case(CtScan scan, PlacedLabels placed, const CtOptions& options,
+                                    const KeepGoing& keep_going) {
+  const imaging::HuVolume geometry = geometry_of(scan.volume);
+  const double pitch_mm = pitch_mm_of(geometry, options);
+  if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
+  const auto smoothed = smooth(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+  if (!smoothed) return tl::unexpected(smoothed.error());
+  scan.source += *smoothed + ", bones of a label map";
+  auto found = take_labels(std::move(scan.volume), placed, options, part(keep_going, kSmoothEnd, kGrowEnd));
+  if (!found) return tl::unexpected(found.error());
+  const Segmented& s = found->s;
+  const auto surface_mm = measure_labels(s, geometry, pitch_mm, part(keep_going, kGrowEnd, kSurfaceEnd));
+  if (!surface_mm) return tl::unexpected(surface_mm.error());
+  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
+  auto hard = imaging::find_hard_tissue(s.volume, s.bones, options.calibration, part(building, 0.0, 0.2));
+  if (!hard) return tl::unexpected(hard.error());
+  take_tissues(placed, found->labels, *hard);
+
+  CaseInfo info = description(scan, options, pitch_mm);
+  CaseScan kept =
+      kept_scan(s.volume, {found->labels, s.bones, hard->tissue}, found->labels_first, found->labels_last, options);
+  list_labels(kept, placed, info);
+  const auto described = describe_scan(kept, part(building, 0.2, 0.3));
+  if (!described) return tl::unexpected(described.error());
+  info.scan = *described;
+  auto built = build(std::move(info), s, hard->tissue, true, *surface_mm, options, part(building, 0.3, 1.0));
+  if (!built) return tl::unexpected(built.error());
+  CtImport made{.found = {}, .bone = std::move(*built), .scan = std::move(kept), .labels = std::move(placed)};
+  made.found.case_cm3 = made.bone->volume_mm3() * 1e-3;
+  return made;
+}
+
+constexpr const char* kNoMemory =
+    "this machine has no memory for a scan of that size; export thicker slices or a smaller region";
 
 }  // namespace
 
 Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going) try {
   return make_case(std::move(scan), options, keep_going);
 } catch (const std::bad_alloc&) {
-  return failure(ErrorCode::exhausted,
-                 "this machine has no memory for a scan of that size; export thicker slices or a smaller region");
+  return failure(ErrorCode::exhausted, kNoMemory);
+}
+
+Result<CtImport> import_ct(CtScan scan, PlacedLabels labels, const CtOptions& options,
+                           const KeepGoing& keep_going) try {
+  return make_labelled_case(std::move(scan), std::move(labels), options, keep_going);
+} catch (const std::bad_alloc&) {
+  return failure(ErrorCode::exhausted, kNoMemory);
 }
 
 }  // namespace osteon::import

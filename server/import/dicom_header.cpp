@@ -143,6 +143,7 @@ void read_slice(const Values& values, const gdcm::File& file, DicomHeader& h) {
   const auto text = [&](std::uint16_t group, std::uint16_t element) { return values.text(group, element); };
   h.series = text(0x0020, 0x000e);
   h.instance = text(0x0008, 0x0018);
+  h.frame_of_reference = text(0x0020, 0x0052);
   if (const char* syntax = file.GetHeader().GetDataSetTransferSyntax().GetString()) h.transfer_syntax = trimmed(syntax);
   h.compression = compression_of(h.transfer_syntax, text(0x0028, 0x2110));
   const bool latin1 = text(0x0008, 0x0005).find("100") != std::string::npos;
@@ -213,7 +214,7 @@ void read_dicom(const fs::path& file, DicomHeader& h, std::vector<DicomHeader>& 
 void DicomHeader::pack(ByteWriter& to) const {
   to.add(file), to.add(bytes), to.add(pixel_offset), to.add(kind), to.add(modality), to.add(compression);
   to.add(series), to.add(instance), to.add(transfer_syntax), to.add(photometric), to.add(image_type),
-      to.add(description), to.add(kernel);
+      to.add(frame_of_reference), to.add(description), to.add(kernel);
   to.add(series_number), to.add(acquisition), to.add(temporal_position), to.add(frames), to.add(frame), to.add(is_hu),
       to.add(columns), to.add(rows);
   to.add(bits_allocated), to.add(bits_stored), to.add(samples);
@@ -224,11 +225,11 @@ bool DicomHeader::unpack(ByteReader& from) {
   return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && kind <= FileKind::too_deep &&
          from.get(modality) && from.get(compression) && compression <= Compression::unknown && from.get(series) &&
          from.get(instance) && from.get(transfer_syntax) && from.get(photometric) && from.get(image_type) &&
-         from.get(description) && from.get(kernel) && from.get(series_number) && from.get(acquisition) &&
-         from.get(temporal_position) && from.get(frames) && from.get(frame) && from.get(is_hu) && from.get(columns) &&
-         from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) && from.get(samples) &&
-         from.get(position) && from.get(orientation) && from.get(spacing) && from.get(slope) && from.get(intercept) &&
-         from.get(padding);
+         from.get(frame_of_reference) && from.get(description) && from.get(kernel) && from.get(series_number) &&
+         from.get(acquisition) && from.get(temporal_position) && from.get(frames) && from.get(frame) &&
+         from.get(is_hu) && from.get(columns) && from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) &&
+         from.get(samples) && from.get(position) && from.get(orientation) && from.get(spacing) && from.get(slope) &&
+         from.get(intercept) && from.get(padding);
 }
 
 Compression compression_of(std::string_view transfer_syntax, std::string_view said_lossy) {

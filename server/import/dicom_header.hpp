@@ -30,6 +30,7 @@ struct DicomHeader {
   // For a CT slice, and for one without pixels.
   Compression compression = Compression::lossless;
   std::string series, instance, transfer_syntax, photometric, image_type;
+  std::string frame_of_reference;   // UID; compared with that of labels, never stored
   std::string description, kernel;  // safe to be shown
   int series_number = 0, acquisition = 0, temporal_position = 0;
   int frames = 1;  // of the file

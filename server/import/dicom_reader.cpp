@@ -289,11 +289,12 @@ Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& opt
   }
   const KeepGoing reading = part(keep_going, kHeadersEnd, 1.0);
   if (auto read = read_volume(series, found->input.found, reading); !read) return tl::unexpected(read.error());
-  CtScan scan{std::move(series.grid.volume), {}, std::move(found->report)};
+  CtScan scan{.volume = std::move(series.grid.volume), .report = std::move(found->report)};
   scan.source = "DICOM CT, " + imaging::describe(scan.volume);
   if (series.entry.resampled > 0) scan.source += ", resampled from slices " + series.entry.irregularity;
   if (series.entry.lossy > 0) scan.source += ", compressed with loss";
   scan.report.taken = series.entry.number;
+  scan.frame_of_reference = series.slices.front().frame_of_reference;
   return scan;
 }
 

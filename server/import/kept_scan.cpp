@@ -67,8 +67,8 @@ void list_tissues(const CaseScan& scan, CaseInfo& info) {
 
 }  // namespace
 
-CaseScan kept_scan(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard,
-                   const std::array<int, 3>& first, const std::array<int, 3>& last, const CtOptions& options) {
+CaseScan kept_scan(const imaging::HuVolume& volume, const FoundVoxels& found, const std::array<int, 3>& first,
+                   const std::array<int, 3>& last, const CtOptions& options) {
   std::array<int, 3> low{}, high{};
   CaseScan scan;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -87,12 +87,12 @@ CaseScan kept_scan(const imaging::HuVolume& volume, const imaging::VoxelMask& bo
     for (int row = low[1]; row <= high[1]; ++row)
       for (int column = low[0]; column <= high[0]; ++column) {
         const std::size_t i = volume.index(column, row, slice);
-        const std::uint8_t found = hard.values.empty() ? std::uint8_t{0} : hard.values[i];
+        const std::uint8_t known = found.tissue.values.empty() ? std::uint8_t{0} : found.tissue.values[i];
         scan.hu.push_back(volume.values[i]);
-        scan.labels.push_back(bones.values[i]);
-        scan.tissue.push_back(bones.values[i] == 0 ? std::uint8_t{0}
-                              : found != 0         ? found
-                                                   : tissue_of(options.calibration, volume.values[i]));
+        scan.labels.push_back(found.labels.values[i]);
+        scan.tissue.push_back(found.bones.values[i] == 0 ? std::uint8_t{0}
+                              : known != 0               ? known
+                                                         : tissue_of(options.calibration, volume.values[i]));
       }
   return scan;
 }
@@ -105,6 +105,15 @@ void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegment
     info.labels.push_back(std::move(label));
   }
   list_tissues(scan, info);
+}
+
+void list_labels(const CaseScan& scan, const PlacedLabels& placed, CaseInfo& info) {
+  info.labels = placed.labels;
+  list_tissues(scan, info);
+  // Tissue that the label map names is not found by its density.
+  for (CaseLabel& tissue : info.tissues)
+    if (std::ranges::find(info.labels, tissue.kind, &CaseLabel::kind) != info.labels.end())
+      tissue.provenance.method += ", or as its label says";
 }
 
 CaseScan kept_scan(const imaging::LabelVolume& volume) {

@@ -6,6 +6,7 @@
 
 #include "server/import/import_steps.hpp"
 #include "server/import/kept_scan.hpp"
+#include "server/import/label_surface.hpp"
 
 namespace osteon::import {
 namespace {
@@ -50,25 +51,6 @@ void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVol
         *value = std::min(band, std::max({*value, x, y, z}));
         ++value;
       }
-}
-
-// Smoothing moves the surface of convex bone inwards by some hundredths of a voxel. This moves the whole surface back
-// by one distance, so that the volume is again that of the labels: dV = A δ, with A from the samples within half a
-// pitch of the surface.
-void restore_volume(double labelled_mm3, double pitch_mm, DenseVolume<float>& surface_mm) {
-  constexpr double kMost = 0.15;  // voxels: more would be another bone
-  double inside = 0, near = 0;
-  for (const float s : surface_mm.values) {
-    const double voxels = static_cast<double>(s) / pitch_mm;
-    if (voxels > 0.5) continue;
-    inside += std::min(1.0, 0.5 - voxels);
-    near += voxels > -0.5 ? 1.0 : 0.0;
-  }
-  const double missing = labelled_mm3 / std::pow(pitch_mm, 3) - inside;
-  const auto out = static_cast<float>(pitch_mm * std::clamp(missing / std::max(1.0, near), -kMost, kMost));
-  const auto band = static_cast<float>(4.0 * pitch_mm);
-  for (float& s : surface_mm.values)
-    if (std::abs(s) < band) s = std::clamp(s - out, -band, band);
 }
 
 }  // namespace

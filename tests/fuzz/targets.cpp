@@ -247,7 +247,10 @@ std::vector<Target> targets() {
       scan_archive_target(),
       label_slice_target(),
       raw_volume_target(),
-      grey_slice_target()};
+      grey_slice_target(),
+      label_names_target(),
+      label_header_target(),
+      dicom_segments_target()};
 }
 
 }  // namespace osteon::fuzz

@@ -26,7 +26,7 @@ constexpr int kColumns = 5, kRows = 4, kSlices = 3;
 int stored_at(int i, int j, int k) { return 1 + i + 20 * j + 300 * k; }
 
 template <class T>
-std::string bytes_of(T value, bool big) {
+std::string stored_bytes(T value, bool big) {
   std::string bytes(sizeof(T), '\0');
   const auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
   std::ranges::copy(raw, bytes.begin());
@@ -38,7 +38,7 @@ template <class T>
 std::string slice_bytes(int k, bool big = false) {
   std::string bytes;
   for (int j = 0; j < kRows; ++j)
-    for (int i = 0; i < kColumns; ++i) bytes += bytes_of(static_cast<T>(stored_at(i, j, k)), big);
+    for (int i = 0; i < kColumns; ++i) bytes += stored_bytes(static_cast<T>(stored_at(i, j, k)), big);
   return bytes;
 }
 template <class T>
@@ -100,8 +100,8 @@ TEST_F(Given, SlopeInterceptAndSkippedBytes) {
 }
 
 TEST_F(Given, NumbersBeyondHuAreClampedAndWhatIsNoNumberIsAir) {
-  std::string bytes = bytes_of(std::numeric_limits<float>::quiet_NaN(), false) + bytes_of(1e9f, false) +
-                      bytes_of(-1e9f, false) + bytes_of(99.6f, false);
+  std::string bytes = stored_bytes(std::numeric_limits<float>::quiet_NaN(), false) + stored_bytes(1e9f, false) +
+                      stored_bytes(-1e9f, false) + stored_bytes(99.6f, false);
   bytes.resize(4 * kColumns * kRows * kSlices);
   write(file_, bytes);
   const auto scan = read_raw_volume(file_, format_of(RawType::float32), keep_going);
