@@ -1,5 +1,7 @@
 #include "haptic_client/device/connection.hpp"
 
+#include "haptic_client/device/emergency_stop.hpp"
+
 namespace osteon::haptic {
 
 DeviceConnection::DeviceConnection(HapticDevice& device, DeviceNotice notice, const ConnectionPace& pace)
@@ -49,6 +51,8 @@ void DeviceConnection::keep() {
                          [this]() OSTEON_REQUIRES(mutex_) { return stopping_; }))
         return;
     }
+    // A device whose motors were stopped for good looks like a lost one.
+    if (EmergencyStop::process_ends()) return;
     if (connected_) {
       const Result<void> well = device_.tend();
       if (well) {

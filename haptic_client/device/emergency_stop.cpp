@@ -19,8 +19,10 @@ struct Place {
   std::atomic<void*> what{nullptr};
 };
 std::array<Place, 8> places;
+std::atomic<bool> ends{false};
 
 void stop_all() noexcept {
+  ends = true;
   for (Place& place : places)
     if (const EmergencyStop::Stop stop = place.stop.exchange(nullptr)) stop(place.what.load());
 }
@@ -52,7 +54,7 @@ void install_once() {
 
 }  // namespace
 
-EmergencyStop::EmergencyStop(Stop stop, void* what) : place_(-1) {
+EmergencyStop::EmergencyStop(Stop stop, void* what) : stop_(stop), what_(what), place_(-1) {
   install_once();
   for (std::size_t i = 0; i < places.size() && place_ < 0; ++i) {
     void* nobody = nullptr;
@@ -62,6 +64,13 @@ EmergencyStop::EmergencyStop(Stop stop, void* what) : place_(-1) {
   }
   OSTEON_CHECK(place_ >= 0);
 }
+
+// Either stop_all() comes after the start and stops the motors, or it was first and `ends` is seen here.
+void EmergencyStop::started() const noexcept {
+  if (ends) stop_(what_);
+}
+
+bool EmergencyStop::process_ends() noexcept { return ends; }
 
 EmergencyStop::~EmergencyStop() {
   Place& place = places[static_cast<std::size_t>(place_)];

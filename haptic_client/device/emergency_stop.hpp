@@ -13,10 +13,17 @@ class EmergencyStop {
   using Stop = void (*)(void* what);
   EmergencyStop(Stop stop, void* what);
   ~EmergencyStop();
+  // To be called after the motors were started. Stops them if the process has ended meanwhile: other threads still run
+  // then, and may open a device anew.
+  void started() const noexcept;
+  // Whether the process ends, so that no motor may be started. Any thread.
+  [[nodiscard]] static bool process_ends() noexcept;
   EmergencyStop(const EmergencyStop&) = delete;
   EmergencyStop& operator=(const EmergencyStop&) = delete;
 
  private:
+  Stop stop_;
+  void* what_;
   int place_;
 };
 

@@ -216,6 +216,7 @@ class OpenHaptics final : public HapticDevice {
                                               hd::kHighestPriority);
     running_ = true;
     call_->start_scheduler();
+    emergency_->started();
     if (const unsigned code = take_error(*call_); code != hd::kNoError && code != hd::kWarmMotors) {
       const Error why = sentence(code);
       close();

@@ -14,6 +14,10 @@
 #include "haptic_client/device/force_dimension.hpp"
 #include "haptic_client/device/openhaptics.hpp"
 
+#ifdef __SANITIZE_THREAD__
+// The tested handler must get the signals.
+extern "C" const char* __tsan_default_options() { return "handle_segv=0"; }  // NOLINT(bugprone-reserved-identifier)
+#endif
 #ifdef __SANITIZE_ADDRESS__
 // It always ends while it holds its device. The tested handler must get the signals, and nothing is freed.
 extern "C" const char* __asan_default_options() {

@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <cstdlib>
 #include <thread>
 
 #include "haptic_client/device/combined_device.hpp"
 #include "haptic_client/device/device_exchange.hpp"
 #include "haptic_client/device/device_list.hpp"
 #include "haptic_client/device/dynamic_library.hpp"
+#include "haptic_client/device/emergency_stop.hpp"
 #include "tests/support/allocation_counter.hpp"
 #include "tests/unit/haptic_client/device/devices.hpp"
 
@@ -312,6 +314,26 @@ TEST(DynamicLibrary, TellsMissingFromWrong) {
   ASSERT_TRUE(found->find("cos", cosine));
   EXPECT_EQ(cosine(0.0), 1.0);
   EXPECT_FALSE(found->find("no_such_function", cosine));
+}
+
+// The first handler that is registered at the exit runs last, when all motors have been stopped.
+void start_motors_at_the_end() {
+  int stops = 0;
+  const EmergencyStop stop([](void* count) { ++*static_cast<int*>(count); }, &stops);
+  stop.started();
+  std::_Exit(EmergencyStop::process_ends() && stops == 1 ? 0 : 1);
+}
+
+TEST(EmergencyStop, StopsMotorsThatAreStartedWhileTheProcessEnds) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");  // a process in which nothing is registered yet
+  const auto end = [] {
+    std::atexit(start_motors_at_the_end);
+    int stops = 0;
+    const EmergencyStop stop([](void* count) { ++*static_cast<int*>(count); }, &stops);
+    stop.started();
+    std::exit(EmergencyStop::process_ends() || stops > 0 ? 2 : 0);
+  };
+  EXPECT_EXIT(end(), ::testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

@@ -300,8 +300,9 @@ TEST_P(PhantomsEnd, StopsTheScheduler) {
   ASSERT_TRUE(child.wait_for_out("holding", kPatience)) << child.err();
   if (end.signal) child.signal(end.signal);
   ASSERT_TRUE(child.wait(kPatience));
-  EXPECT_EQ(arm()->scheduler_starts, 1u);
-  EXPECT_EQ(arm()->scheduler_stops, 1u);
+  // A thread that looks after the device may begin to open it anew just then. It must stop what it starts.
+  EXPECT_GE(arm()->scheduler_starts, 1u);
+  EXPECT_EQ(arm()->scheduler_stops, arm()->scheduler_starts);
   EXPECT_GT(arm()->peak_n, 0.9);
   EXPECT_EQ(arm().force_n(), 0.0);
   arm()->opened = arm()->closed.load();  // a crash leaves the handle to the system
