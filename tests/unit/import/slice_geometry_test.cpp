@@ -104,8 +104,8 @@ TEST(SliceGeometry, ALinearFieldComesBackFromTiltedAndUnevenSlices) {
     }
 }
 
-// Linear interpolation over a distance h is wrong by at most h²/8 of the second derivative, here 1000/σ² HU/mm² along
-// each axis. Gaps of up to 3 mm and pixels of 1 and 0.8 mm give (9 + 1 + 0.64)/8 of the steepest axis.
+// Linear interpolation over a distance h is wrong by at most h²/8 of the second derivative, here 1000/σ² HU/mm²
+// along each axis. Gaps of up to 3 mm and pixels of 1 and 0.8 mm give (9 + 1 + 0.64)/8 of the steepest axis.
 TEST(SliceGeometry, AnEllipsoidComesBackFromTiltedAndUnevenSlices) {
   const Vec3 sigma(5.0, 4.5, 6.0);
   const Hu blob = [&](const Vec3& p) { return 1000.0 * std::exp(-0.5 * p.cwiseQuotient(sigma).squaredNorm()); };
