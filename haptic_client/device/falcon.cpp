@@ -64,6 +64,7 @@ class Falcon final : public HapticDevice {
     serial_ = usb->serial();
     usb_.emplace(std::move(*usb));
     emergency_.emplace([](void* wire) { static_cast<FalconUsb*>(wire)->stop_motors(); }, &*usb_);
+    emergency_->started();  // the thread below starts the motors, unless they were stopped
     exchange_.forget_output();
     stopping_ = false;
     homed_ = false;

@@ -181,6 +181,7 @@ class ForceDimension final : public HapticDevice {
         return failure(ErrorCode::unavailable,
                        "the Force Dimension device does not switch its motors on: " + last_error().message);
       force_on_ = true;
+      emergency_->started();
     }
     return {};
   }

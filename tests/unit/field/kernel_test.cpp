@@ -320,7 +320,8 @@ std::vector<Motion> motions() {
 }
 
 // Everything that is skipped without evaluation (sweeps, leaves, edges, planes, rows) must not matter.
-// A kernel without optimisation takes ten times as long for each leaf. The optimised builds check all of them.
+// A kernel without optimisation takes ten times as long for each leaf. With all trials, the optimised builds check all
+// of them.
 #ifdef OSTEON_KERNEL_IS_SLOW
 constexpr unsigned kEveryLeaf = 5;
 #else
