@@ -16,6 +16,7 @@ find_package(ITK 5.2 REQUIRED COMPONENTS ITKIOMeta ITKIONIFTI ITKIONRRD ITKRegio
 # Its targets name no folder of headers.
 find_path(OSTEON_ITK_HEADERS itkNiftiImageIO.h PATH_SUFFIXES ITK-5.2 REQUIRED)
 find_package(PNG REQUIRED)
+find_package(ZLIB REQUIRED)
 find_package(OpenSSL REQUIRED)
 find_package(prometheus-cpp REQUIRED)
 find_package(VTK 9.1 REQUIRED COMPONENTS

@@ -1,9 +1,8 @@
 #include "server/import/volume_format.hpp"
 
-#include <archive.h>
-#include <archive_entry.h>
 #include <fcntl.h>
 #include <unistd.h>
+#include <zlib.h>
 
 #include <array>
 #include <cctype>
@@ -26,19 +25,10 @@ constexpr std::size_t kHeadLength = 1024;
 constexpr std::size_t kLongestHeader = std::size_t{1} << 20;  // of text
 constexpr std::uint64_t kMostCompression = 1100;              // deflate makes one byte of at most 1032
 
-using Archive = std::unique_ptr<archive, decltype(&archive_read_free)>;
+// What follows the voxels is read up to here, for the checksum at its end.
+constexpr std::uint64_t kMostBeyond = std::uint64_t{64} << 20;
 
-// A stream that is compressed by gzip, or not. Null if it cannot be read.
-Archive unpacking(int descriptor) {
-  Archive a(archive_read_new(), archive_read_free);
-  archive_read_support_filter_gzip(a.get());
-  archive_read_support_format_raw(a.get());
-  archive_entry* entry = nullptr;
-  if (archive_read_open_fd(a.get(), descriptor, std::size_t{1} << 16) != ARCHIVE_OK ||
-      archive_read_next_header(a.get(), &entry) != ARCHIVE_OK)
-    a.reset();
-  return a;
-}
+enum class Unpacked { short_of_bytes, damaged, whole };
 
 class OpenFile {
  public:
@@ -50,27 +40,39 @@ class OpenFile {
   OpenFile& operator=(const OpenFile&) = delete;
 
   [[nodiscard]] std::string unpacked_head(std::size_t bytes) const {
-    const Archive a = unpacking(descriptor_);
+    const Stream stream = unpacking();
     std::string head(bytes, '\0');
-    const auto n = a ? archive_read_data(a.get(), head.data(), head.size()) : 0;
+    const int n = stream ? gzread(stream.get(), head.data(), static_cast<unsigned>(head.size())) : 0;
     head.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
     return head;
   }
-  // True if that many bytes follow `start`, unpacked.
-  [[nodiscard]] bool has_unpacked(std::uint64_t start, std::uint64_t bytes) const {
-    if (::lseek(descriptor_, static_cast<off_t>(start), SEEK_SET) < 0) return false;
-    const Archive a = unpacking(descriptor_);
+  // Whether that many bytes follow `start`, unpacked, and have the checksum that gzip stores behind them.
+  [[nodiscard]] Unpacked unpack(std::uint64_t start, std::uint64_t bytes) const {
+    if (::lseek(descriptor_, static_cast<off_t>(start), SEEK_SET) < 0) return Unpacked::short_of_bytes;
+    const Stream stream = unpacking();
     std::vector<char> part(std::size_t{1} << 20);
     std::uint64_t count = 0;
-    while (a && count < bytes) {
-      const auto n = archive_read_data(a.get(), part.data(), part.size());
-      if (n <= 0) break;
+    int n = 0;
+    while (stream && count < bytes + kMostBeyond &&
+           (n = gzread(stream.get(), part.data(), static_cast<unsigned>(part.size()))) > 0)
       count += static_cast<std::uint64_t>(n);
-    }
-    return count >= bytes;
+    int code = Z_OK;
+    if (stream) gzerror(stream.get(), &code);
+    if (code == Z_DATA_ERROR) return Unpacked::damaged;
+    // A stream that is cut off after the voxels has lost its checksum.
+    return count < bytes || code == Z_BUF_ERROR ? Unpacked::short_of_bytes : Unpacked::whole;
   }
 
  private:
+  using Stream = std::unique_ptr<gzFile_s, decltype(&gzclose_r)>;
+  // From where the descriptor stands, compressed by gzip or not. Null if it cannot be read.
+  [[nodiscard]] Stream unpacking() const {
+    const int own = ::dup(descriptor_);
+    Stream stream(own < 0 ? nullptr : gzdopen(own, "rb"), gzclose_r);
+    if (!stream && own >= 0) ::close(own);
+    return stream;
+  }
+
   int descriptor_;
 };
 
@@ -281,9 +283,14 @@ Result<void> check_voxels(const fs::path& file, VolumeFormat format, std::uint64
   if (error)
     return failure(ErrorCode::not_found,
                    file.string() + " has its voxels in " + s.file.string() + ", which is not there; copy both files");
-  const bool whole = s.packed ? s.bytes / kMostCompression <= there && OpenFile(s.file).has_unpacked(s.start, s.bytes)
-                              : there >= s.start && there - s.start >= s.bytes;
-  if (!whole) return bad_input(s.file.string() + " ends before its last voxel; copy or export it again");
+  const bool is_short = there < s.start || (s.packed ? s.bytes / kMostCompression > there : there - s.start < s.bytes);
+  const Unpacked found = is_short   ? Unpacked::short_of_bytes
+                         : s.packed ? OpenFile(s.file).unpack(s.start, s.bytes)
+                                    : Unpacked::whole;
+  if (found == Unpacked::short_of_bytes)
+    return bad_input(s.file.string() + " ends before its last voxel; copy or export it again");
+  if (found == Unpacked::damaged)
+    return bad_input(s.file.string() + " is damaged: its checksum is not that of its bytes; copy or export it again");
   return {};
 }
 

@@ -1,5 +1,5 @@
 // Which of NIfTI, NRRD and MetaImage a file is, and whether all its voxels are there. The libraries of these formats
-// take a file that ends within its voxels for a whole one, and the rest for zeros.
+// take a file that ends within its voxels for a whole one, and the rest for zeros. They also ignore gzip's checksum.
 #pragma once
 #include <cstdint>
 #include <filesystem>
@@ -25,7 +25,8 @@ enum class VolumeFormat { none, nifti, nrrd, meta_image };
 [[nodiscard]] bool says_orientation(const std::filesystem::path& file, VolumeFormat format);
 
 // `voxels`: their number; `voxel_bytes`: of one, uncompressed. The voxels may be in another file, which the header
-// names. Errors: invalid_input (they end early), not_found (the other file), unsupported (several files).
+// names. Errors: invalid_input (they end early, or are not those that were compressed), not_found (the other file),
+// unsupported (several files).
 [[nodiscard]] Result<void> check_voxels(const std::filesystem::path& file, VolumeFormat format, std::uint64_t voxels,
                                         std::uint64_t voxel_bytes);
 
