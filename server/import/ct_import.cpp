@@ -7,12 +7,17 @@
 #include <cstdio>
 #include <new>
 #include <numeric>
+#include <span>
+#include <vector>
 
+#include "common/core/freed_memory.hpp"
 #include "common/imaging/bone_field.hpp"
 #include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/resample.hpp"
 #include "common/imaging/segmentation.hpp"
 #include "common/imaging/threshold.hpp"
+#include "common/volume/narrow_band.hpp"
+#include "server/import/case_samples.hpp"
 #include "server/import/import_steps.hpp"
 #include "server/import/kept_scan.hpp"
 
@@ -79,25 +84,6 @@ CoordBox lattice_box(const imaging::HuVolume& volume, const std::array<int, 3>& 
   return covering_samples(cells.grown(5.0 * pitch_mm), pitch_mm);
 }
 
-// Bone ends where the scan ends: the intersection of two solids is the maximum of their distances.
-Result<void> cap_at_scan(const imaging::HuVolume& scan, double pitch_mm, DenseVolume<float>& surface_mm,
-                         const KeepGoing& keep_going) {
-  const auto band = static_cast<float>(4.0 * pitch_mm);
-  const CoordBox& box = surface_mm.box;
-  float* value = surface_mm.values.data();
-  for (int x = box.min.x; x <= box.max.x; ++x) {
-    if (!keep_going(static_cast<double>(x - box.min.x) / box.dims().x))
-      return failure(ErrorCode::cancelled, "stopped at the ends of the scan");
-    for (int y = box.min.y; y <= box.max.y; ++y)
-      for (int z = box.min.z; z <= box.max.z; ++z, ++value) {
-        if (*value >= band) continue;
-        const auto outside = static_cast<float>(imaging::outside_scan_mm(scan, position_mm({x, y, z}, pitch_mm)));
-        *value = std::min(band, std::max(*value, outside));
-      }
-  }
-  return {};
-}
-
 Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::vector<imaging::Island>& islands) {
   std::vector<int> all(islands.size());
   std::iota(all.begin(), all.end(), 1);
@@ -114,113 +100,6 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
   }
   return kept;
 }
-
-// Labels of the lattice's samples from those of the voxels. A sample takes the label of the nearest voxel. If that is
-// not bone, as near the surface, it takes that of any voxel of the cell.
-class NearestLabel {
- public:
-  NearestLabel(const imaging::HuVolume& volume, const imaging::VoxelMask& bones) : volume_(volume), bones_(bones) {}
-  // The index of the voxel from which a sample in bone takes its labels.
-  [[nodiscard]] std::size_t voxel(const Vec3& position_mm) const {
-    const Vec3 at = volume_.voxel(position_mm);
-    const auto clamped = [&](double c, std::size_t axis) {
-      return std::clamp(static_cast<int>(c), 0, volume_.dims[axis] - 1);
-    };
-    const std::size_t nearest =
-        bones_.index(clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1), clamped(std::round(at.z()), 2));
-    if (bones_.values[nearest] != 0) return nearest;
-    for (int corner = 0; corner < 8; ++corner) {
-      const std::size_t beside = bones_.index(clamped(std::floor(at.x()) + (corner & 1), 0),
-                                              clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
-                                              clamped(std::floor(at.z()) + (corner >> 2), 2));
-      if (bones_.values[beside] != 0) return beside;
-    }
-    return nearest;
-  }
-
- private:
-  const imaging::HuVolume& volume_;
-  const imaging::VoxelMask& bones_;
-};
-
-// Makes the samples of the case from the scan, one part at a time. Density and labels are computed only where bone is
-// in or near a leaf.
-class CaseSamples {
- public:
-  CaseSamples(const imaging::HuVolume& volume, const imaging::VoxelMask& bones, const imaging::VoxelMask& hard,
-              bool several, const DenseVolume<float>& surface_mm, const CtOptions& options, double pitch_mm)
-      : volume_(volume),
-        bones_(bones),
-        hard_(hard),
-        several_(several),
-        surface_mm_(surface_mm),
-        calibration_(options.calibration),
-        pitch_mm_(pitch_mm),
-        band_(static_cast<float>(4.0 * pitch_mm)),
-        label_(volume, bones) {}
-
-  PartKind fill(const CoordBox& part, PartSamples& to) {
-    const auto row = static_cast<std::size_t>(part.dims().z);
-    std::size_t n = 0;
-    for (int x = part.min.x; x <= part.max.x; ++x)
-      for (int y = part.min.y; y <= part.max.y; ++y, n += row)
-        std::copy_n(&surface_mm_.values[surface_mm_.index({x, y, part.min.z})], row, &to.surface_mm[n]);
-    if (std::ranges::all_of(to.surface_mm, [&](float s) { return s >= band_; })) return PartKind::outside;
-
-    std::ranges::fill(to.density_g_cm3, 0.0f);
-    if (several_) to.bone.assign(to.surface_mm.size(), 0);
-    if (!hard_.values.empty()) to.tissue.assign(to.surface_mm.size(), Tissue::none);
-    const Coord first = floor_to(part.min, kLeafSize);
-    for (int x = first.x; x <= part.max.x; x += kLeafSize)
-      for (int y = first.y; y <= part.max.y; y += kLeafSize)
-        for (int z = first.z; z <= part.max.z; z += kLeafSize) fill_leaf({x, y, z}, part, to);
-    return PartKind::samples;
-  }
-
- private:
-  void fill_leaf(Coord origin, const CoordBox& part, PartSamples& to) {
-    const CoordBox box{{std::max(origin.x, part.min.x), std::max(origin.y, part.min.y), std::max(origin.z, part.min.z)},
-                       {std::min(origin.x + kLeafSize - 1, part.max.x), std::min(origin.y + kLeafSize - 1, part.max.y),
-                        std::min(origin.z + kLeafSize - 1, part.max.z)}};
-    const Coord dims = part.dims();
-    const auto index = [&](Coord c) {
-      return (static_cast<std::size_t>(c.x - part.min.x) * static_cast<std::size_t>(dims.y) +
-              static_cast<std::size_t>(c.y - part.min.y)) *
-                 static_cast<std::size_t>(dims.z) +
-             static_cast<std::size_t>(c.z - part.min.z);
-    };
-    const auto each = [&](auto visit) {
-      for (int x = box.min.x; x <= box.max.x; ++x)
-        for (int y = box.min.y; y <= box.max.y; ++y)
-          for (int z = box.min.z; z <= box.max.z; ++z) visit(Coord{x, y, z}, index({x, y, z}));
-    };
-    bool near = false;
-    each([&](Coord, std::size_t i) { near = near || to.surface_mm[i] < band_; });
-    if (!near) return;
-    const Coord size = box.dims();
-    hu_.resize(static_cast<std::size_t>(size.x) * static_cast<std::size_t>(size.y) * static_cast<std::size_t>(size.z));
-    imaging::resample(volume_, box, pitch_mm_, hu_);
-    std::size_t n = 0;
-    each([&](Coord c, std::size_t i) {
-      to.density_g_cm3[i] =
-          static_cast<float>(imaging::bone_density_g_cm3(calibration_, static_cast<double>(hu_[n++])));
-      if (to.surface_mm[i] >= 0.0f || (to.bone.empty() && to.tissue.empty())) return;
-      const std::size_t voxel = label_.voxel(position_mm(c, pitch_mm_));
-      if (!to.bone.empty()) to.bone[i] = bones_.values[voxel];
-      if (!to.tissue.empty()) to.tissue[i] = static_cast<Tissue>(hard_.values[voxel]);
-    });
-  }
-
-  const imaging::HuVolume& volume_;
-  const imaging::VoxelMask &bones_, &hard_;
-  bool several_;
-  const DenseVolume<float>& surface_mm_;
-  DensityCalibration calibration_;
-  double pitch_mm_;
-  float band_;
-  NearestLabel label_;
-  std::vector<float> hu_;
-};
 
 // The part of the scan with dense voxels, its islands, and the bone to which each voxel belongs.
 struct Segmented {
@@ -363,22 +242,44 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std:
   return s;
 }
 
-// The signed distance to the kept bones, which end where the scan ends. `geometry`: of the whole scan.
-Result<DenseVolume<float>> measure_surface(const Segmented& s, const imaging::HuVolume& geometry, double threshold_hu,
-                                           double pitch_mm, const KeepGoing& keep_going) {
-  const CoordBox box = lattice_box(s.volume, s.first, s.last, pitch_mm);
+// The signed distance to the kept bones in the narrow band around their surface.
+Result<SparseVolume> measure_surface(const Segmented& s, const CoordBox& box, double threshold_hu, double pitch_mm,
+                                     const KeepGoing& keep_going) {
   if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
-  auto field = imaging::bone_field(s.volume, s.bones, threshold_hu, part(keep_going, 0.0, 0.1));
-  if (!field) return tl::unexpected(field.error());
-  auto samples = imaging::resample(*field, box, pitch_mm, part(keep_going, 0.1, 0.25));
-  if (!samples) return tl::unexpected(samples.error());
-  field->values = {};
-  auto surface_mm =
-      signed_distance_mm(*samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.25, 0.9));
-  if (!surface_mm) return surface_mm;
-  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 1.0)); !capped)
-    return tl::unexpected(capped.error());
-  return surface_mm;
+  const imaging::BoneField field(s.volume, s.bones, threshold_hu);
+  const SampledField samples{
+      .box = box,
+      .inside = [&](const CoordBox& part) { return field.inside(imaging::voxels_for(s.volume, part, pitch_mm)); },
+      .read =
+          [&](const CoordBox& part, std::span<float> values) {
+            const imaging::VoxelBox voxels = imaging::voxels_for(s.volume, part, pitch_mm);
+            std::vector<std::int16_t> hu(voxels.count());
+            field.read(voxels, hu);
+            imaging::resample(s.volume, voxels, hu, part, pitch_mm, values);
+          }};
+  return narrow_band_mm(samples, static_cast<float>(threshold_hu), pitch_mm, keep_going);
+}
+
+// The geometry of a volume without its values.
+imaging::HuVolume geometry_of(const imaging::HuVolume& volume) {
+  imaging::HuVolume geometry;
+  geometry.dims = volume.dims;
+  geometry.spacing_mm = volume.spacing_mm;
+  geometry.origin_mm = volume.origin_mm;
+  geometry.directions = volume.directions;
+  return geometry;
+}
+
+// The HU of a box.
+std::vector<std::int16_t> hu_of(const imaging::HuVolume& volume, const imaging::VoxelBox& box) {
+  std::vector<std::int16_t> hu;
+  hu.reserve(box.count());
+  for (int slice = box.first[2]; slice <= box.last[2]; ++slice)
+    for (int row = box.first[1]; row <= box.last[1]; ++row) {
+      const auto line = volume.values.begin() + static_cast<std::ptrdiff_t>(volume.index(box.first[0], row, slice));
+      hu.insert(hu.end(), line, line + box.dim(0));
+    }
+  return hu;
 }
 
 // What is wrong with the voxels or the options. Error: invalid_input.
@@ -424,11 +325,7 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& 
 }
 
 Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep_going) {
-  imaging::HuVolume geometry;  // of the whole scan, without its values
-  geometry.dims = scan.volume.dims;
-  geometry.spacing_mm = scan.volume.spacing_mm;
-  geometry.origin_mm = scan.volume.origin_mm;
-  geometry.directions = scan.volume.directions;
+  const imaging::HuVolume geometry = geometry_of(scan.volume);
   const double pitch_mm = options.pitch_mm.value_or(std::max(kLeastPitch_mm, geometry.spacing_mm.minCoeff()));
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
   auto s = find_bones(scan, options, keep_going);
@@ -437,11 +334,14 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
   if (options.list_only) return CtImport{std::move(s->found), {}, {}};
-  const auto surface_mm =
-      measure_surface(*s, geometry, options.threshold_hu, pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
+  give_back_freed_memory();
+  const CoordBox lattice = lattice_box(s->volume, s->first, s->last, pitch_mm);
+  auto surface_mm =
+      measure_surface(*s, lattice, options.threshold_hu, pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
+  give_back_freed_memory();
   const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
-  const auto hard = imaging::find_hard_tissue(s->volume, s->bones, options.calibration, part(building, 0.0, 0.2));
+  auto hard = imaging::find_hard_tissue(s->volume, s->bones, options.calibration, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
@@ -452,15 +352,30 @@ Result<CtImport> make_case(CtScan scan, CtOptions options, const KeepGoing& keep
   info.pitch_mm = pitch_mm;
   info.calibration = options.calibration;
   info.threshold_hu = options.threshold_hu;
-  CaseScan kept = kept_scan(s->volume, s->bones, hard->tissue, s->first, s->last, options);
+  // The samples are made from the scan that the case keeps, so that no voxel is in memory twice. Only a small margin
+  // has too few voxels for that.
+  const imaging::HuVolume volume = geometry_of(s->volume);
+  const imaging::VoxelBox kept_box = kept_voxels(volume, s->first, s->last, options.margin_mm),
+                          needed = imaging::voxels_for(volume, lattice, pitch_mm);
+  std::vector<std::int16_t> beyond;
+  if (!kept_box.contains(needed)) beyond = hu_of(s->volume, needed);
+  CaseScan kept = kept_scan(std::move(s->volume), std::move(s->bones), std::move(hard->tissue), kept_box, options);
   list_labels(kept, options, s->found, info);
   const auto described = describe_scan(kept, part(building, 0.2, 0.3));
   if (!described) return tl::unexpected(described.error());
   info.scan = *described;
-  const bool several = s->found.kept.size() > 1 && !options.merge;
-  CaseSamples content(s->volume, s->bones, hard->tissue, several, *surface_mm, options, pitch_mm);
+  CaseSamples content({.scan = geometry,
+                       .volume = volume,
+                       .hu_box = beyond.empty() ? kept_box : needed,
+                       .hu = beyond.empty() ? kept.hu : beyond,
+                       .kept_box = kept_box,
+                       .kept = kept,
+                       .several = s->found.kept.size() > 1 && !options.merge,
+                       .hard = hard->metal_cm3 > 0.0 || hard->enamel_cm3 > 0.0,
+                       .calibration = options.calibration},
+                      *surface_mm, pitch_mm);
   const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
-  auto built = Case::build(std::move(info), surface_mm->box, fill, part(building, 0.3, 1.0));
+  auto built = Case::build(std::move(info), lattice, fill, part(building, 0.3, 1.0));
   if (!built) return tl::unexpected(built.error());
   s->found.case_cm3 = built->volume_mm3() * 1e-3;
   return CtImport{std::move(s->found), std::move(*built), std::move(kept)};

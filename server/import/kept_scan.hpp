@@ -11,12 +11,14 @@
 
 namespace osteon::import {
 
-// Voxels from `first` to `last`, and those within `margin_mm` of this box along each axis. HU are those of `volume`.
-// Labels are the numbers in `bones`; tissues are values of Tissue: metal and enamel as in `hard` (which may be empty),
-// cortical from kCorticalFrom_g_cm3 on, otherwise trabecular. Voxels without a bone have neither.
-[[nodiscard]] CaseScan kept_scan(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
-                                 const imaging::VoxelMask& hard, const std::array<int, 3>& first,
-                                 const std::array<int, 3>& last, const CtOptions& options);
+// Voxels from `first` to `last`, and those within `margin_mm` of this box along each axis.
+[[nodiscard]] imaging::VoxelBox kept_voxels(const imaging::HuVolume& volume, const std::array<int, 3>& first,
+                                            const std::array<int, 3>& last, double margin_mm);
+// HU are those of `volume`. Labels are the numbers in `bones`; tissues are values of Tissue: metal and enamel as in
+// `hard` (which may be empty), cortical from kCorticalFrom_g_cm3 on, otherwise trabecular. Voxels without a bone have
+// neither. Takes over the memory of all three.
+[[nodiscard]] CaseScan kept_scan(imaging::HuVolume volume, imaging::VoxelMask bones, imaging::VoxelMask hard,
+                                 const imaging::VoxelBox& box, const CtOptions& options);
 // Lists the labels and tissues that kept_scan() gives.
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info);
 
