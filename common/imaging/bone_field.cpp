@@ -28,11 +28,17 @@ BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, double thre
       bones_(bones),
       threshold_hu_(threshold_hu),
       below_(static_cast<std::int16_t>(std::ceil(threshold_hu) - 1)) {
-  const auto [columns, rows, slices] = volume.dims;
   for (std::size_t axis = 0; axis < 3; ++axis) bricks_[axis] = (volume.dims[axis] + kBrick - 1) / kBrick;
-  const VoxelMask places(bricks_);
+}
+
+Result<BoneField> BoneField::make(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+                                  const KeepGoing& keep_going) {
+  BoneField field(volume, bones, threshold_hu);
+  const auto [columns, rows, slices] = volume.dims;
+  const VoxelMask places(field.bricks_);
   std::vector<bool> any(places.values.size(), false), all(places.values.size(), true);
-  for (int slice = 0; slice < slices; ++slice)
+  for (int slice = 0; slice < slices; ++slice) {
+    if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("looking for the bone's surface");
     for (int row = 0; row < rows; ++row)
       for (int first = 0; first < columns; first += kBrick) {
         const std::uint8_t* line = bones.values.data() + bones.index(first, row, slice);
@@ -42,8 +48,10 @@ BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, double thre
         any[brick] = any[brick] || kept > 0;
         all[brick] = all[brick] && kept == count;
       }
+  }
   for (std::size_t i = 0; i < any.size(); ++i)
-    brick_.push_back(all[i] ? Inside::all : any[i] ? Inside::some : Inside::none);
+    field.brick_.push_back(all[i] ? Inside::all : any[i] ? Inside::some : Inside::none);
+  return field;
 }
 
 Inside BoneField::inside(const VoxelBox& part) const {

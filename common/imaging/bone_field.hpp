@@ -17,8 +17,9 @@ namespace osteon::imaging {
 // voxels. The field is worked out part by part, so it takes no memory beside the scan's. Any thread.
 class BoneField {
  public:
-  // `bones`: not 0 for kept voxels. Both must outlive the field.
-  BoneField(const HuVolume& volume, const VoxelMask& bones, double threshold_hu);
+  // `bones`: not 0 for kept voxels. Both must outlive the field. Error: cancelled.
+  [[nodiscard]] static Result<BoneField> make(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+                                              const KeepGoing& keep_going);
 
   // Which voxels of a part are kept, and therefore at or above the threshold.
   [[nodiscard]] Inside inside(const VoxelBox& part) const;
@@ -26,6 +27,7 @@ class BoneField {
   void read(const VoxelBox& part, std::span<std::int16_t> values) const;
 
  private:
+  BoneField(const HuVolume& volume, const VoxelMask& bones, double threshold_hu);
   [[nodiscard]] std::int16_t marrow_value(const std::array<int, 3>& at, std::size_t i) const;
 
   const HuVolume& volume_;

@@ -106,7 +106,7 @@ struct CaseInfo {
   std::string source;   // kind and geometry of the input, e.g. "DICOM CT, 512x512x46, 0.84x0.84x3 mm"
   double pitch_mm = 0;  // h, isotropic
   DensityCalibration calibration;
-  double threshold_hu = 0;  // bone is at or above it
+  double threshold_hu = 0;  // bone is at or above it; 0 if bones come from labels
   std::optional<ScanInfo> scan = {};
   std::vector<CaseLabel> labels = {};   // of the grid "labels" of the scan: what a voxel belongs to
   std::vector<CaseLabel> tissues = {};  // of its grid "tissue": what a voxel is made of

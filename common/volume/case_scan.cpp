@@ -31,6 +31,7 @@ using ScanBlock = openvdb::tools::Dense<T, openvdb::tools::LayoutXYZ>;
 constexpr const char *kHuGrid = "hu", *kLabelGrid = "labels", *kTissueGrid = "tissue";
 constexpr std::int32_t kUsualPadding_hu = -1024;  // background: voxels that have it take no space in the file
 constexpr std::uint32_t kMostScanGrids = 3;
+constexpr double kReadEnd = 0.6;  // of the time to load a scan; then its hash
 constexpr const char* kScanRemedy = "; import the case again";
 
 openvdb::CoordBBox voxels_of(const ScanGeometry& geometry) {
@@ -245,9 +246,10 @@ Result<CaseScan> load_scan(const std::filesystem::path& folder, const Case& bone
     if (error.code != ErrorCode::exhausted) error.message += kScanRemedy;
     return tl::unexpected(error);
   }
-  Result<CaseScan> scan = read_scan_file(file, named.geometry, keep_going);
+  const KeepGoing all = keep_going ? keep_going : [](double) { return true; };
+  Result<CaseScan> scan = read_scan_file(file, named.geometry, part(all, 0.0, kReadEnd));
   if (!scan) return scan;
-  const Result<ScanInfo> found = describe_scan(*scan, keep_going);
+  const Result<ScanInfo> found = describe_scan(*scan, part(all, kReadEnd, 1.0));
   if (!found) return tl::unexpected(found.error());
   if (*found != named)
     return bad_input(file.string() + " is another scan than the case describes: scan.hash differs" + kScanRemedy);

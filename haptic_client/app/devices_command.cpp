@@ -24,7 +24,7 @@ std::string list_devices(const std::vector<DeviceLine>& lines) {
   for (const DeviceLine& line : lines) {
     std::string name(line.name);
     name.resize(std::max<std::size_t>(name.size(), 16), ' ');
-    text += name + ' ' + std::string(line.what) + '\n';
+    text.append(name).append(" ").append(line.what).append("\n");
     const std::string indent(17, ' ');
     for (const std::string& found : line.finding.found) text += indent + "found: " + found + '\n';
     if (line.finding.found.empty() && line.finding.missing.empty()) text += indent + "not here: none is plugged in\n";

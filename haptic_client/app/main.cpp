@@ -278,8 +278,8 @@ Result<void> run(Options& options, const StopSignal& stop) {
   if (!outcome) return tl::unexpected(outcome.error());
   const ReadyPlan& plan = (*session)->plan();
   // Both files are written, whatever the result of the other and of the session.
-  const Result<void> cut_log = write_cut_log(options.cut_log, outcome->replica.cuts);
-  const Result<void> summary =
+  Result<void> cut_log = write_cut_log(options.cut_log, outcome->replica.cuts);
+  Result<void> summary =
       options.summary.empty()
           ? Result<void>()
           : write_file(options.summary, summary_of(*outcome, plan, hand->device_name(), losses).dump(2) + "\n");

@@ -58,7 +58,7 @@ void only(const json& object, const std::set<std::string>& known) {
   for (const auto& [key, value] : object.items())
     if (!known.contains(key)) {
       std::string names;
-      for (const std::string& name : known) names += (names.empty() ? "" : ", ") + name;
+      for (const std::string& name : known) names.append(names.empty() ? "" : ", ").append(name);
       throw Wrong("\"" + key + "\" is not known here; choose from " + names);
     }
 }
@@ -85,7 +85,7 @@ PlanEntry read_entry(const json& step) {
 // The force law; empty if none is named. A tool that is not in the tool box may be the room's own. Then only the room
 // can say whether it exists and which laws suit it.
 std::string read_law(const json& object, const std::string& tool) {
-  const std::string law = text(object, "law", "");
+  std::string law = text(object, "law", "");
   if (const Result<void> well = check_law(tool, law); !well) throw Wrong("\"law\": " + well.error().message);
   return law;
 }

@@ -5,7 +5,7 @@
 
 namespace osteon::haptic {
 
-Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, DeviceNotice notice) {
+Result<ToolOperator> ToolOperator::make(const ToolOperatorOptions& options, const DeviceNotice& notice) {
   ToolOperator choice;
   choice.options_ = options;
   if (options.device.starts_with("recorded:") && options.device.size() > std::string_view("recorded:").size()) {

@@ -30,7 +30,7 @@ class ToolOperator {
  public:
   // Checks what can be checked without a room. Opens the person's devices and keeps them connected from then on. Errors
   // are sentences with the remedy.
-  [[nodiscard]] static Result<ToolOperator> make(const ToolOperatorOptions& options, DeviceNotice notice);
+  [[nodiscard]] static Result<ToolOperator> make(const ToolOperatorOptions& options, const DeviceNotice& notice);
 
   // Makes the session on a bone, with tools of `tools`, all that the room has. `force_scale` 0: from the device, or as
   // it was recorded. The session must not outlive this object. Errors: there is no such tool; its law does not suit it;

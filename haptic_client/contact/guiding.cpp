@@ -9,7 +9,7 @@ std::optional<GuidedPose> Guiding::step(std::span<const PlacedGuide> guides, con
   if (held_) {
     const auto guide = std::ranges::find(guides, id_, &PlacedGuide::id);
     if (guide != guides.end() && opening_ < opening_count(guide->shape))
-      if (const auto guided = constrain(guide->shape, opening_, guide->pose_bone_guide, tool, wanted_bone_tool))
+      if (auto guided = constrain(guide->shape, opening_, guide->pose_bone_guide, tool, wanted_bone_tool))
         return guided;
     held_ = false;
   }

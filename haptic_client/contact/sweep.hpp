@@ -22,7 +22,7 @@ struct Sweep {
 using Parts = std::array<std::int32_t, kGroupPoints>;
 
 // A sweep as seen from the tool's present pose, evaluated for many of its points at once. [haptic]
-class SweepView {
+class SweepView {  // NOLINT(bugprone-reserved-identifier): clang's own name in the copy of an array
  public:
   SweepView() = default;
   // Of a sweep that is shorter than `short_mm` only the end counts. `before`: the preceding sweep, or null. Where that

@@ -46,7 +46,7 @@ class Reader {
       damaged(name);
       return {};
     }
-    const std::string value = read;
+    std::string value = read;
     H5free_memory(read);
     return value;
   }

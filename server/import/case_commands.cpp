@@ -18,11 +18,12 @@
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
 #include "server/import/found_files.hpp"
-#include "server/import/inv3_reader.hpp"
+#include "server/import/label_export.hpp"
 #include "server/import/label_import.hpp"
+#include "server/import/label_map.hpp"
 #include "server/import/phantom.hpp"
+#include "server/import/scan_arguments.hpp"
 #include "server/import/slice_images.hpp"
-#include "server/import/volume_reader.hpp"
 
 namespace osteon::import {
 namespace {
@@ -34,12 +35,13 @@ constexpr double kMeshPitch_mm = 0.5;
 constexpr const char* kSuggest = "suggest";
 
 struct CaseArguments {
+  ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::vector<std::string> bone_colours, seeds;
+  std::string labels;
+  std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
-  std::optional<int> series;
   double width_mm = 20.0, density_g_cm3 = 1.9;
   bool json = false, merge = false, hollow = false, list = false, adaptive = false;
 };
@@ -76,35 +78,20 @@ Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
 }
 
-// The kind of an input that has one scan and no series; empty for others.
-std::string_view name_of_one_scan(InputKind kind) {
-  if (kind == InputKind::inv3) return "an InVesalius project";
-  return kind == InputKind::volume_file ? "a volume in one file" : "";
-}
-
-// Reads a scan of any kind; the input's content decides which.
-Result<CtScan> read_scan(const CaseArguments& a, const KeepGoing& reading) {
-  const InputKind kind = input_kind(a.input, reading);
-  if (!reading(0.0)) return tl::unexpected(stopped());
-  if (kind == InputKind::absent)
-    return failure(ErrorCode::not_found, "there is no file or folder " + a.input +
-                                             "; give a folder, zip or ISO image with a CT series, or a NIfTI, "
-                                             "NRRD, MetaImage or .inv3 file");
-  if (const std::string_view one = name_of_one_scan(kind); a.series && !one.empty())
-    return bad_input("--series is for DICOM; leave it out, because " + a.input + " is " + std::string(one) +
-                     " with one scan");
-  if (kind == InputKind::volume_file) return read_volume(a.input, reading);
-  if (kind != InputKind::inv3 && kind != InputKind::other)
-    return read_dicom_series(a.input, {.series = a.series}, reading);
-  std::error_code error;
-  if (!fs::is_regular_file(a.input, error))
-    return failure(ErrorCode::invalid_input, a.input + " is a pipe or device; give a folder or a file");
-  return read_inv3(a.input, reading);
-}
-
 std::optional<imaging::MedianBox> median_box(const CaseArguments& a) {
   if (a.median.empty()) return {};
   return a.median == "slice" ? imaging::MedianBox::slice : imaging::MedianBox::volume;
+}
+
+// The labels of --labels on the voxels of the scan. Nothing without that option.
+Result<std::optional<PlacedLabels>> read_labels(const CaseArguments& a, const LabelNames& names, const CtScan& scan,
+                                                const KeepGoing& reading) {
+  if (a.labels.empty()) return std::optional<PlacedLabels>();
+  auto map = read_label_map(a.labels, part(reading, 0.0, 0.5));
+  if (!map) return tl::unexpected(map.error());
+  auto placed = place_labels(std::move(*map), names, scan.volume, scan.frame_of_reference, part(reading, 0.5, 1.0));
+  if (!placed) return tl::unexpected(placed.error());
+  return std::optional(std::move(*placed));
 }
 
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
@@ -129,8 +116,10 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.adaptive = a.adaptive;
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   options.margin_mm = a.margin_mm;
+  const auto names = parse_label_names(a.label_names);
+  if (!names) return tl::unexpected(names.error());
   Bar bar(stop);
-  auto scan = read_scan(a, bar.stage(0.0, 0.2));
+  auto scan = read_scan(a.scan, bar.stage(0.0, 0.2));
   if (!scan) return tl::unexpected(scan.error());
   const std::string series = report_lines(scan->report);
 
@@ -140,34 +129,31 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
-  const auto made = import_ct(std::move(*scan), options, bar.stage(0.2, 0.95));
-  if (!made) return tl::unexpected(about(a.input, made.error()));
+  auto placed = read_labels(a, *names, *scan, bar.stage(0.2, 0.35));
+  if (!placed) return tl::unexpected(placed.error());
+  const KeepGoing making = bar.stage(*placed ? 0.35 : 0.2, 0.95);
+  const bool labelled = placed->has_value();
+  const auto made = labelled ? import_ct(std::move(*scan), std::move(**placed), options, making)
+                             : import_ct(std::move(*scan), options, making);
+  if (!made) return tl::unexpected(about(a.scan.input, made.error()));
   if (a.list) {
     bar.stage(1.0, 1.0)(1.0);
     return series + segmentation_text(made->found);
   }
   if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*made->bone) + series + segmentation_text(made->found);
+  return report_text(*made->bone) + series +
+         (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found));
 }
 
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
   Bar bar(stop, "searching");
   const auto searching = bar.stage(0.0, 1.0);
-  if (const std::string_view one = name_of_one_scan(input_kind(a.input, searching)); !one.empty())
+  if (const std::string_view one = name_of_one_scan(a.input, searching); !one.empty())
     return bad_input(a.input + " is " + std::string(one) + " with one scan; give it to osteon-import ct");
   const auto report = list_dicom_series(a.input, searching);
   if (!report) return tl::unexpected(report.error());
   return a.json ? list_json(*report) : list_text(*report);
-}
-
-// "A,B", both finite.
-std::optional<std::pair<double, double>> parse_pair(const std::string& text) {
-  double first = 0, second = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf%c", &first, &second, &rest) != 2) return {};
-  if (!std::isfinite(first) || !std::isfinite(second)) return {};
-  return std::pair(first, second);
 }
 
 Result<SliceOptions> slice_options(const CaseArguments& a) {
@@ -198,7 +184,7 @@ Result<std::string> run_slices(const CaseArguments& a, const StopSignal& stop) {
   const auto options = slice_options(a);
   if (!options) return tl::unexpected(options.error());
   Bar bar(stop);
-  auto scan = read_scan(a, bar.stage(0.0, 0.4));
+  auto scan = read_scan(a.scan, bar.stage(0.0, 0.4));
   if (!scan) return tl::unexpected(scan.error());
   const std::string text = "slices     " + imaging::describe(scan->volume) + ", as PNG in " + a.out + "\n";
   const std::string series = report_lines(scan->report);
@@ -236,18 +222,6 @@ Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) 
   }
   bar.stage(1.0, 1.0)(1.0);
   return report_text(*bone);
-}
-
-Result<Vec3> parse_spacing(const std::string& text) {
-  double x = 0, y = 0, z = 0;
-  char rest = 0;
-  const int parts = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &z, &rest);
-  const Vec3 spacing = parts == 1 && text.find(',') == std::string::npos ? Vec3::Constant(x) : Vec3(x, y, z);
-  if ((parts != 3 && parts != 1) || !(spacing.minCoeff() >= 0.01) || !(spacing.maxCoeff() <= 10.0))
-    return failure(
-        ErrorCode::invalid_input,
-        "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
-  return spacing;
 }
 
 Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
@@ -349,6 +323,27 @@ Result<std::string> run_stl(const CaseArguments& a, const StopSignal& stop) {
   return report_text(*bone) + line;
 }
 
+Result<std::string> run_export_labels(const CaseArguments& a, const StopSignal& stop) {
+  if (auto known = check_label_file(a.out); !known) return tl::unexpected(known.error());
+  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  const auto bone = Case::load(a.input);
+  if (!bone) return tl::unexpected(bone.error());
+  Bar bar(stop, "exporting");
+  const auto scan = load_scan(a.input, *bone, bar.stage(0.0, 0.7));
+  if (!scan) return tl::unexpected(scan.error());
+  const std::vector<CaseLabel>& labels = bone->info().labels;
+  if (auto written = write_labels(*scan, labels, a.out, bar.stage(0.7, 1.0)); !written) {
+    const Error& error = written.error();
+    return tl::unexpected(error.code == ErrorCode::invalid_input ? about(a.input, error) : error);
+  }
+  bar.stage(1.0, 1.0)(1.0);
+  std::string text = "labels     " + std::to_string(labels.size()) + " in " + a.out + "\n";
+  for (const CaseLabel& label : labels)
+    text +=
+        "           " + std::to_string(label.value) + "=" + label.name + ":" + std::string(name_of(label.kind)) + "\n";
+  return text;
+}
+
 Result<std::string> run_info(const CaseArguments& a) {
   const auto bone = Case::load(a.input);
   if (!bone) return tl::unexpected(bone.error());
@@ -369,16 +364,6 @@ Result<void> check_free(const std::string& path) {
 
 namespace {
 
-void add_scan_options(CLI::App& command, CaseArguments& a) {
-  command
-      .add_option("INPUT", a.input,
-                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or "
-                  "a NIfTI, NRRD or MetaImage file")
-      ->required();
-  command.add_option("--series", a.series,
-                     "Number of the series, as osteon-import series lists them (default: the largest CT)");
-}
-
 void add_smoothing_options(CLI::App& command, CaseArguments& a) {
   command
       .add_option("--median", a.median,
@@ -394,7 +379,7 @@ void add_smoothing_options(CLI::App& command, CaseArguments& a) {
 void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& shared, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
   CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
-  add_scan_options(*slices, a);
+  add_scan_options(*slices, a.scan);
   slices->add_option("--out", a.out, "Folder of the images, made by this command")->required();
   add_smoothing_options(*slices, a);
   slices->add_option("--window", a.window, "CENTRE,WIDTH: the HU that become grey; without --edges")
@@ -425,25 +410,38 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
 
   CLI::App* ct = app.add_subcommand("ct", "Make a case from a CT scan");
-  add_scan_options(*ct, a);
+  add_scan_options(*ct, a.scan);
   ct->add_option("--out", a.out, "Folder of the case, made by this command");
   ct->add_option("--pitch", a.pitch_mm, "Voxel edge of the case, mm (default: the scan's smallest spacing)")
       ->check(within(0.02, 10.0));
+  CLI::Option* labels_option = ct->add_option(
+      "--labels", a.labels,
+      "Take bones and structures at risk from this label map instead: NIfTI, NRRD (.seg.nrrd), MetaImage or DICOM SEG, "
+      "or a folder with one such file for each structure");
+  ct->add_option("--label-names", a.label_names,
+                 "What the labels are: totalsegmentator, or NUMBER=NAME,... or NUMBER=NAME:KIND,... with a kind of " +
+                     kind_choice_text() + " (left out); may be given again")
+      ->expected(1)
+      ->take_all()
+      ->needs(labels_option);
   CLI::Option* threshold =
       ct->add_option("--threshold", a.threshold,
                      "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm), or "
                      "suggest: find it in the scan, and say why")
-          ->check(suggest_or_within(-1000.0, 4000.0));
+          ->check(suggest_or_within(-1000.0, 4000.0))
+          ->excludes(labels_option);
   CLI::Option* keep = ct->add_option(
       "--keep", a.keep,
       "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+  keep->excludes(labels_option);
   CLI::Option* seed =
       ct->add_option("--seed", a.seeds,
                      "X,Y,Z, mm (LPS): keep the bone that grows from there over voxels that reach the threshold and "
                      "share a face, instead of islands; may be given again")
           ->expected(1)
           ->take_all()
-          ->excludes(keep);
+          ->excludes(keep)
+          ->excludes(labels_option);
   CLI::Option* similar = ct->add_option("--similar", a.similar_hu,
                                         "Grow over voxels within this number of HU of the seed, instead of a threshold")
                              ->check(within(1.0, 4000.0))
@@ -455,9 +453,11 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->check(CLI::IsMember({"slice", "volume"}))
       ->capture_default_str()
       ->needs(seed);
-  ct->add_flag("--list", a.list, "List the islands and write nothing");
-  ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own");
-  ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone");
+  ct->add_flag("--list", a.list, "List the islands and write nothing")->excludes(labels_option);
+  ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own")
+      ->excludes(labels_option);
+  ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
+      ->excludes(labels_option);
   add_smoothing_options(*ct, a);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
       ->check(within(0.0, 200.0))
@@ -513,6 +513,12 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->capture_default_str();
   stl->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({stl, [shared](const StopSignal& stop) { return run_stl(*shared, stop); }});
+
+  CLI::App* exported = app.add_subcommand("export-labels", "Write the labels of a case as a file for other programs");
+  exported->add_option("CASE_DIR", a.input, "Folder of the case")->required();
+  exported->add_option("FILE", a.out, "File to write: .nii.gz or .nii (NIfTI), .seg.nrrd (3D Slicer) or .nrrd")
+      ->required();
+  commands.push_back({exported, [shared](const StopSignal& stop) { return run_export_labels(*shared, stop); }});
 
   CLI::App* info = app.add_subcommand("info", "Say what a case is");
   info->add_option("CASE_DIR", a.input, "Folder of the case")->required();

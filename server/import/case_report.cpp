@@ -1,5 +1,6 @@
 #include "server/import/case_report.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -9,8 +10,12 @@ namespace {
 // Segmented bones and meshes have no Hounsfield units.
 std::string density_text(const CaseInfo& info) {
   if (info.calibration == DensityCalibration{}) return "density    given with the shape\n";
+  char threshold[60] = "none; bones come from a label map";
+  const auto by_map = [](const CaseLabel& label) { return label.provenance.method.starts_with("label map"); };
+  if (std::ranges::none_of(info.labels, by_map))
+    std::snprintf(threshold, sizeof threshold, "%.6g HU", info.threshold_hu);
   char text[160];
-  std::snprintf(text, sizeof text, "threshold  %.6g HU\ndensity    %.6g + %.6g HU g/cm3\n", info.threshold_hu,
+  std::snprintf(text, sizeof text, "threshold  %s\ndensity    %.6g + %.6g HU g/cm3\n", threshold,
                 info.calibration.intercept_g_cm3, info.calibration.slope_g_cm3_per_hu);
   return text;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/imaging/resample.hpp"
+#include "server/import/scan_ends.hpp"
 
 namespace osteon::import {
 namespace {
@@ -38,30 +39,14 @@ PartKind CaseSamples::fill(const CoordBox& part, PartSamples& to) {
         for (int z = first.z; z <= part.max.z; z += kLeafSize) visit(Coord{x, y, z});
   };
   each_leaf([&](Coord origin) { surface_mm_.set_constant(origin, band_); });
-  cap_at_scan(part, to.surface_mm);
+  cap_at_scan(from_.scan, part, pitch_mm_, band_, to.surface_mm);
   if (std::ranges::all_of(to.surface_mm, [&](float s) { return s >= band_; })) return PartKind::outside;
 
   std::ranges::fill(to.density_g_cm3, 0.0f);
   if (from_.several) to.bone.assign(to.surface_mm.size(), 0);
-  if (from_.hard) to.tissue.assign(to.surface_mm.size(), Tissue::none);
+  if (from_.known_tissue) to.tissue.assign(to.surface_mm.size(), Tissue::none);
   each_leaf([&](Coord origin) { fill_leaf(origin, part, to); });
   return PartKind::samples;
-}
-
-// Bone ends where the scan ends: the intersection of two solids is the maximum of their distances.
-void CaseSamples::cap_at_scan(const CoordBox& part, std::vector<float>& surface_mm) const {
-  const auto outside_mm = [&](Coord c) { return imaging::outside_scan_mm(from_.scan, position_mm(c, pitch_mm_)); };
-  // The distance from the scan is convex, so it is largest at a corner of the part.
-  double most_mm = outside_mm(part.min);
-  for (int corner = 1; corner < 8; ++corner)
-    most_mm = std::max(
-        most_mm, outside_mm({(corner & 1) != 0 ? part.max.x : part.min.x, (corner & 2) != 0 ? part.max.y : part.min.y,
-                             (corner & 4) != 0 ? part.max.z : part.min.z}));
-  if (most_mm < -1.01 * static_cast<double>(band_)) return;
-  each_sample(part, part, [&](Coord c, std::size_t i) {
-    if (surface_mm[i] < band_)
-      surface_mm[i] = std::min(band_, std::max(surface_mm[i], static_cast<float>(outside_mm(c))));
-  });
 }
 
 void CaseSamples::fill_leaf(Coord origin, const CoordBox& part, PartSamples& to) {
@@ -82,14 +67,17 @@ void CaseSamples::fill_leaf(Coord origin, const CoordBox& part, PartSamples& to)
     const std::ptrdiff_t voxel = label_voxel(position_mm(c, pitch_mm_));
     if (voxel == kNoVoxel) return;
     const auto v = static_cast<std::size_t>(voxel);
-    if (!to.bone.empty()) to.bone[i] = from_.kept.labels[v];
+    const std::uint8_t label = from_.kept.labels[v];
+    if (!to.bone.empty()) to.bone[i] = label;
     const auto tissue = static_cast<Tissue>(from_.kept.tissue[v]);
-    if (!to.tissue.empty() && (tissue == Tissue::metal || tissue == Tissue::enamel)) to.tissue[i] = tissue;
+    // The density says as much of the others.
+    if (!to.tissue.empty() && (tissue == Tissue::metal || tissue == Tissue::enamel || from_.tissue_labels[label]))
+      to.tissue[i] = tissue;
   });
 }
 
 // The kept voxel from which a sample in bone takes its labels: the nearest one. If that is not bone, as near the
-// surface, any voxel of bone of the cell. kNoVoxel: none of them is bone.
+// surface, any voxel of bone of the cell, or else any beside the nearest. kNoVoxel: none of them is bone.
 std::ptrdiff_t CaseSamples::label_voxel(const Vec3& position_mm) const {
   const Vec3 at = from_.volume.voxel(position_mm);
   const auto clamped = [&](double c, std::size_t axis) {
@@ -98,13 +86,17 @@ std::ptrdiff_t CaseSamples::label_voxel(const Vec3& position_mm) const {
   const auto bone_at = [&](int column, int row, int slice) {
     if (!from_.kept_box.contains({{column, row, slice}, {column, row, slice}})) return kNoVoxel;
     const std::size_t i = from_.kept_box.index(column, row, slice);
-    return from_.kept.labels[i] != 0 ? static_cast<std::ptrdiff_t>(i) : kNoVoxel;
+    return from_.bone_labels[from_.kept.labels[i]] ? static_cast<std::ptrdiff_t>(i) : kNoVoxel;
   };
-  std::ptrdiff_t found =
-      bone_at(clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1), clamped(std::round(at.z()), 2));
+  const std::array<int, 3> nearest{clamped(std::round(at.x()), 0), clamped(std::round(at.y()), 1),
+                                   clamped(std::round(at.z()), 2)};
+  std::ptrdiff_t found = bone_at(nearest[0], nearest[1], nearest[2]);
   for (int corner = 0; corner < 8 && found == kNoVoxel; ++corner)
     found = bone_at(clamped(std::floor(at.x()) + (corner & 1), 0), clamped(std::floor(at.y()) + (corner >> 1 & 1), 1),
                     clamped(std::floor(at.z()) + (corner >> 2), 2));
+  // The surface of labels may lie a part of a voxel beyond the cell.
+  for (int beside = 0; beside < 27 && found == kNoVoxel; ++beside)
+    found = bone_at(nearest[0] + beside % 3 - 1, nearest[1] + beside / 3 % 3 - 1, nearest[2] + beside / 9 - 1);
   return found;
 }
 

@@ -1,5 +1,6 @@
 // Makes the samples of a case from its scan, one part at a time.
 #pragma once
+#include <bitset>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -20,8 +21,10 @@ struct SampleSource {
   std::span<const std::int16_t> hu;  // of hu_box
   imaging::VoxelBox kept_box;        // contains every voxel of bone
   const CaseScan& kept;              // labels and tissues of kept_box
+  std::bitset<256> bone_labels;      // which labels are bone
+  std::bitset<256> tissue_labels;    // which of these say the tissue, too
   bool several = false;              // samples get the numbers of their bones
-  bool hard = false;                 // there are metal and enamel
+  bool known_tissue = false;         // there is metal, enamel, or a label that says the tissue
   DensityCalibration calibration;
 };
 
@@ -34,7 +37,6 @@ class CaseSamples {
   PartKind fill(const CoordBox& part, PartSamples& to);
 
  private:
-  void cap_at_scan(const CoordBox& part, std::vector<float>& surface_mm) const;
   void fill_leaf(Coord origin, const CoordBox& part, PartSamples& to);
   [[nodiscard]] std::ptrdiff_t label_voxel(const Vec3& position_mm) const;
 

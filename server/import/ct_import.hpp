@@ -12,6 +12,7 @@
 #include "common/volume/iso_surface.hpp"
 #include "server/import/ct_scan.hpp"
 #include "server/import/grown_bones.hpp"
+#include "server/import/placed_labels.hpp"
 
 namespace osteon::import {
 
@@ -53,6 +54,7 @@ struct CtImport {
   CtSegmentation found;
   std::optional<Case> bone;  // empty only if the islands were only listed
   CaseScan scan;             // of `bone`
+  PlacedLabels labels = {};  // of a label map, without their voxels
 };
 
 // segment_bone() decides what is bone, and the options decide which islands are kept. With seeds, the grown regions
@@ -61,6 +63,13 @@ struct CtImport {
 // metal or enamel. Errors: invalid_input (no bone, no such island, voxels of an impossible size, too many samples),
 // exhausted (memory), cancelled, internal.
 [[nodiscard]] Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going);
+
+// The same with the labels of a label map, which place_labels() has put on the scan's voxels: bones become the case's
+// bone, each with the number of its label, and their surface is that of the labels, smoothed. All labels become those
+// of the case's scan, which reaches `margin_mm` beyond them. Density comes from the HU, and metal and enamel too where
+// no label says what the tissue is. Of the options, those of segmentation do not matter. Errors as above.
+[[nodiscard]] Result<CtImport> import_ct(CtScan scan, PlacedLabels labels, const CtOptions& options,
+                                         const KeepGoing& keep_going);
 
 // The islands, the volume left out, and metal, as lines for a person.
 [[nodiscard]] std::string segmentation_text(const CtSegmentation& found);

@@ -8,12 +8,12 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
-#include <cstdlib>
 #include <exception>
 #include <new>
 #include <optional>
 
+#include "server/import/dicom_frames.hpp"
+#include "server/import/dicom_text.hpp"
 #include "server/import/found_files.hpp"
 
 namespace osteon::import {
@@ -23,7 +23,6 @@ namespace fs = std::filesystem;
 
 const gdcm::Tag kPixelData(0x7fe0, 0x0010);
 constexpr std::uint32_t kLongestValue = 4096;
-constexpr double kFarthestSlice_mm = 1e6;
 constexpr std::size_t kShownLetters = 64;
 
 // SOP classes that are not images of a modality, by the beginning of their UID below 1.2.840.10008. The first match
@@ -63,6 +62,31 @@ constexpr Modality kModalities[] = {
     {"REG", FileKind::registration},    {"DOC", FileKind::document},        {"RTSTRUCT", FileKind::radiotherapy},
     {"RTPLAN", FileKind::radiotherapy}, {"RTDOSE", FileKind::radiotherapy}, {"KO", FileKind::report}};
 
+// Transfer syntaxes by the end of their UID below 1.2.840.10008.1.2.
+struct Syntax {
+  std::string_view uid;
+  Compression compression;
+};
+constexpr Syntax kSyntaxes[] = {
+    {"", Compression::lossless},       // implicit, little endian
+    {".1", Compression::lossless},     // explicit, little endian
+    {".1.99", Compression::lossless},  // deflated
+    {".2", Compression::lossless},     // explicit, big endian
+    {".4.50", Compression::lossy},     // JPEG, 8 bits
+    {".4.51", Compression::lossy},     // JPEG, 12 bits
+    {".4.57", Compression::lossless},  // JPEG lossless, any predictor
+    {".4.70", Compression::lossless},  // JPEG lossless, first predictor
+    {".4.80", Compression::lossless},  // JPEG-LS
+    {".4.81", Compression::lossy},     // JPEG-LS, nearly lossless
+    {".4.90", Compression::lossless},  // JPEG 2000
+    {".4.91", Compression::lossy},     // JPEG 2000, with or without loss
+    {".5", Compression::lossless},     // run lengths
+    {".4.53", Compression::retired},   // JPEG, spectral selection
+    {".4.55", Compression::retired},   // JPEG, progressive
+};
+constexpr std::string_view kSyntaxRoot = "1.2.840.10008.1.2";
+constexpr std::string_view kPrivateSyntaxes[] = {"1.2.840.113619.5.2", "1.3.46.670589.33.1.4.1"};  // not compressed
+
 bool is_below(std::string_view uid, std::string_view root) {
   return uid.starts_with(root) && (uid.size() == root.size() || uid[root.size()] == '.');
 }
@@ -77,40 +101,6 @@ bool has_word(std::string_view values, std::string_view word) {
     values.remove_prefix(std::min(end + 1, values.size()));
   }
   return false;
-}
-
-std::string trimmed(std::string text) {
-  const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
-  while (!text.empty() && is_padding(text.back())) text.pop_back();
-  text.erase(text.begin(), std::find_if_not(text.begin(), text.end(), is_padding));
-  return text;
-}
-
-// "1.0\0.0": values separated by backslashes. Empty if any is not a finite number.
-std::vector<double> numbers(const std::string& text) {
-  std::vector<double> values;
-  std::size_t begin = 0;
-  while (begin < text.size()) {
-    const std::size_t end = std::min(text.find('\\', begin), text.size());
-    const std::string number = trimmed(text.substr(begin, end - begin));
-    char* stop = nullptr;
-    const double value = std::strtod(number.c_str(), &stop);
-    if (number.empty() || *stop != '\0' || !std::isfinite(value)) return {};
-    values.push_back(value);
-    begin = end + 1;
-  }
-  return values;
-}
-
-// Lengths and positions within a plausible range. Values beyond it count as missing.
-std::vector<double> near(std::vector<double> values) {
-  if (std::ranges::any_of(values, [](double v) { return std::abs(v) > kFarthestSlice_mm; })) values.clear();
-  return values;
-}
-
-int integer(const std::string& text, int otherwise) {
-  const auto values = numbers(text);
-  return values.empty() ? otherwise : static_cast<int>(std::clamp(values.front(), -1e9, 1e9));
 }
 
 // Values as text. Values longer than any that is needed are omitted.
@@ -153,7 +143,9 @@ void read_slice(const Values& values, const gdcm::File& file, DicomHeader& h) {
   const auto text = [&](std::uint16_t group, std::uint16_t element) { return values.text(group, element); };
   h.series = text(0x0020, 0x000e);
   h.instance = text(0x0008, 0x0018);
+  h.frame_of_reference = text(0x0020, 0x0052);
   if (const char* syntax = file.GetHeader().GetDataSetTransferSyntax().GetString()) h.transfer_syntax = trimmed(syntax);
+  h.compression = compression_of(h.transfer_syntax, text(0x0028, 0x2110));
   const bool latin1 = text(0x0008, 0x0005).find("100") != std::string::npos;
   h.description = shown_text(text(0x0008, 0x103e), kShownLetters, latin1);
   h.kernel = shown_text(text(0x0018, 0x1210), kShownLetters, latin1);
@@ -182,7 +174,8 @@ bool is_placed(const DicomHeader& h) {
          h.intercept.size() == 1 && h.samples == 1;
 }
 
-void read_dicom(const fs::path& file, DicomHeader& h) {
+// Adds what the functional groups of an enhanced image say of each frame.
+void read_dicom(const fs::path& file, DicomHeader& h, std::vector<DicomHeader>& frames) {
   gdcm::Reader reader;
   const bool whole = read_before_pixels(reader, file, h);
   const Values values(reader.GetFile());
@@ -194,7 +187,9 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
   if (!whole) {
     // A file that is not CT is reported by its kind, whether or not it can be read.
     const bool unknown = h.kind == FileKind::ct_slice || (h.kind == FileKind::other_modality && h.modality.empty());
-    if (unknown) h.kind = FileKind::damaged;
+    const std::string syntax = meta_text(reader.GetFile(), gdcm::Tag(0x0002, 0x0010));
+    const bool known = syntax.empty() || compression_of(syntax, {}) != Compression::unknown;
+    if (unknown) h.kind = known ? FileKind::damaged : FileKind::unknown_syntax;
     return;
   }
   if (h.kind != FileKind::ct_slice && (h.kind != FileKind::secondary_capture || h.modality != "CT")) return;
@@ -211,27 +206,45 @@ void read_dicom(const fs::path& file, DicomHeader& h) {
     has_pixels = all.GetFile().GetDataSet().FindDataElement(kPixelData);
   }
   if (!has_pixels && h.kind == FileKind::ct_slice) h.kind = FileKind::no_pixels;
+  if (h.kind == FileKind::ct_slice) frames = frames_of(h, reader.GetFile());
 }
 
 }  // namespace
 
 void DicomHeader::pack(ByteWriter& to) const {
-  to.add(file), to.add(bytes), to.add(pixel_offset), to.add(kind), to.add(modality);
+  to.add(file), to.add(bytes), to.add(pixel_offset), to.add(kind), to.add(modality), to.add(compression);
   to.add(series), to.add(instance), to.add(transfer_syntax), to.add(photometric), to.add(image_type),
-      to.add(description), to.add(kernel);
-  to.add(series_number), to.add(acquisition), to.add(temporal_position), to.add(frames), to.add(columns), to.add(rows);
+      to.add(frame_of_reference), to.add(description), to.add(kernel);
+  to.add(series_number), to.add(acquisition), to.add(temporal_position), to.add(frames), to.add(frame), to.add(is_hu),
+      to.add(columns), to.add(rows);
   to.add(bits_allocated), to.add(bits_stored), to.add(samples);
   to.add(position), to.add(orientation), to.add(spacing), to.add(slope), to.add(intercept), to.add(padding);
 }
 
 bool DicomHeader::unpack(ByteReader& from) {
   return from.get(file) && from.get(bytes) && from.get(pixel_offset) && from.get(kind) && kind <= FileKind::too_deep &&
-         from.get(modality) && from.get(series) && from.get(instance) && from.get(transfer_syntax) &&
-         from.get(photometric) && from.get(image_type) && from.get(description) && from.get(kernel) &&
-         from.get(series_number) && from.get(acquisition) && from.get(temporal_position) && from.get(frames) &&
-         from.get(columns) && from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) &&
+         from.get(modality) && from.get(compression) && compression <= Compression::unknown && from.get(series) &&
+         from.get(instance) && from.get(transfer_syntax) && from.get(photometric) && from.get(image_type) &&
+         from.get(frame_of_reference) && from.get(description) && from.get(kernel) && from.get(series_number) &&
+         from.get(acquisition) && from.get(temporal_position) && from.get(frames) && from.get(frame) &&
+         from.get(is_hu) && from.get(columns) && from.get(rows) && from.get(bits_allocated) && from.get(bits_stored) &&
          from.get(samples) && from.get(position) && from.get(orientation) && from.get(spacing) && from.get(slope) &&
          from.get(intercept) && from.get(padding);
+}
+
+Compression compression_of(std::string_view transfer_syntax, std::string_view said_lossy) {
+  const bool is_standard = transfer_syntax.starts_with(kSyntaxRoot);
+  Compression compression = Compression::unknown;
+  if (is_standard) {
+    const auto found = std::ranges::find(kSyntaxes, transfer_syntax.substr(kSyntaxRoot.size()), &Syntax::uid);
+    if (found != std::end(kSyntaxes)) compression = found->compression;
+  } else if (transfer_syntax.empty() ||
+             std::ranges::find(kPrivateSyntaxes, transfer_syntax) != std::end(kPrivateSyntaxes)) {
+    compression = Compression::lossless;
+  }
+  if (compression == Compression::lossless && said_lossy == "01") return Compression::lossy;
+  const bool is_either = transfer_syntax == "1.2.840.10008.1.2.4.91";
+  return is_either && said_lossy == "00" ? Compression::lossless : compression;
 }
 
 FileKind kind_of(std::string_view sop_class, std::string_view modality, std::string_view image_type) {
@@ -250,7 +263,7 @@ FileKind kind_of(std::string_view sop_class, std::string_view modality, std::str
   return FileKind::ct_slice;
 }
 
-DicomHeader read_header(const fs::path& file) {
+std::vector<DicomHeader> read_headers(const fs::path& file) {
   DicomHeader h;
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   struct stat status {};
@@ -259,29 +272,31 @@ DicomHeader read_header(const fs::path& file) {
   const ssize_t got = opened ? ::pread(descriptor, bytes.data(), bytes.size(), 0) : -1;
   if (descriptor >= 0) ::close(descriptor);
   h.kind = FileKind::unreadable;
-  if (got < 0) return h;
+  if (got < 0) return {h};
   h.bytes = static_cast<std::uint64_t>(status.st_size);
   switch (content_of({bytes.data(), static_cast<std::size_t>(got)})) {
     case Content::empty:
       h.kind = FileKind::empty;
-      return h;
+      return {h};
     case Content::archive:
       h.kind = FileKind::archive;
-      return h;
+      return {h};
     case Content::other:
       h.kind = FileKind::not_dicom;
-      return h;
+      return {h};
     case Content::dicom:
       break;
   }
+  std::vector<DicomHeader> frames;
   try {
-    read_dicom(file, h);
+    read_dicom(file, h, frames);
   } catch (const std::bad_alloc&) {
     h.kind = FileKind::damaged;
   } catch (const std::exception&) {
     h.kind = FileKind::damaged;
   }
-  return h;
+  if (frames.empty()) frames.push_back(std::move(h));
+  return frames;
 }
 
 }  // namespace osteon::import

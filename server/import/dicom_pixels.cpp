@@ -50,47 +50,60 @@ bool pixels_are_whole(const DicomHeader& h, const fs::path& file, std::uint64_t 
 
 }  // namespace
 
-Result<void> read_pixels(const DicomHeader& h, const fs::path& file, const std::string& name,
-                         std::span<std::int16_t> out) try {
+Result<void> PixelReader::decode(const DicomHeader& h, const fs::path& file, const std::string& name) {
   const auto broken = [&](const std::string& why) {
     return failure(ErrorCode::invalid_input, name + " " + why + "; copy or export the series again");
   };
+  file_.clear();
   gdcm::ImageReader reader;
   reader.SetFileName(file.c_str());
   const bool read = reader.Read();
   if (!reader.GetFile().GetDataSet().FindDataElement(kPixels)) return broken("has no pixel data");
   if (!read) return broken("has pixel data that cannot be read");
   const gdcm::Image& image = reader.GetImage();
-  const std::size_t pixels = out.size();
-  const std::size_t width = image.GetPixelFormat().GetBitsAllocated() / 8u;
-  if ((width != 1 && width != 2) || image.GetBufferLength() != pixels * width)
+  const std::size_t pixels = static_cast<std::size_t>(h.columns) * static_cast<std::size_t>(h.rows) *
+                             static_cast<std::size_t>(h.frame < 0 ? 1 : h.frames);
+  width_ = image.GetPixelFormat().GetBitsAllocated() / 8u;
+  if ((width_ != 1 && width_ != 2) || image.GetBufferLength() != pixels * width_)
     return broken("has pixel data of another size than its header says");
-  if (!pixels_are_whole(h, file, pixels * width)) return broken("is cut off within its pixel data");
+  if (!pixels_are_whole(h, file, pixels * width_)) return broken("is cut off within its pixel data");
   // Some scanners write metal beyond the range of BitsStored. The library would cut those bits off and so turn metal
   // into air. So plain pixels are taken as they are in the file.
-  std::vector<char> buffer(image.GetBufferLength());
+  stored_.resize(image.GetBufferLength());
   const gdcm::TransferSyntax syntax = reader.GetFile().GetHeader().GetDataSetTransferSyntax();
   const gdcm::ByteValue* bytes = image.GetDataElement().GetByteValue();
   const bool plain = (syntax == gdcm::TransferSyntax::ImplicitVRLittleEndian ||
                       syntax == gdcm::TransferSyntax::ExplicitVRLittleEndian) &&
-                     image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= buffer.size();
+                     image.GetNumberOfOverlays() == 0 && bytes != nullptr && bytes->GetLength() >= stored_.size();
   if (plain)
-    std::memcpy(buffer.data(), bytes->GetPointer(), buffer.size());
-  else if (!image.GetBuffer(buffer.data()))
+    std::memcpy(stored_.data(), bytes->GetPointer(), stored_.size());
+  else if (!image.GetBuffer(stored_.data()))
     return broken("has pixel data that cannot be decompressed");
+  is_signed_ = image.GetPixelFormat().GetPixelRepresentation() == 1;
+  unused_ = is_signed_ ? std::clamp(16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()), 0, 15) : 0;
+  file_ = file;
+  return {};
+}
 
-  // Signed values may lack their sign in the bits above the stored ones.
-  const bool is_signed = image.GetPixelFormat().GetPixelRepresentation() == 1;
-  const int unused = is_signed ? std::clamp(16 - static_cast<int>(image.GetPixelFormat().GetBitsStored()), 0, 15) : 0;
+Result<void> PixelReader::read(const DicomHeader& h, const fs::path& file, const std::string& name,
+                               std::span<std::int16_t> out) try {
+  if (file_ != file)
+    if (auto decoded = decode(h, file, name); !decoded) return decoded;
+  const std::size_t first = out.size() * width_ * static_cast<std::size_t>(std::max(h.frame, 0));
+  if (first + out.size() * width_ > stored_.size())
+    return failure(ErrorCode::invalid_input, name + " has fewer frames than its header says; export it again");
+  const std::span<const char> buffer(stored_.data() + first, out.size() * width_);
   // Padding counts as air, but only if it would be bright: some files name a value that real pixels have too.
   const bool has_padding = h.padding.size() == 1 && std::abs(h.padding[0]) <= kLargestStored &&
                            h.padding[0] * h.slope[0] + h.intercept[0] > kBrightPadding_hu;
   const auto padding =
       has_padding ? static_cast<std::uint16_t>(static_cast<std::int64_t>(h.padding[0])) : std::uint16_t{0};
-  for (std::size_t i = 0; i < pixels; ++i) {
+  for (std::size_t i = 0; i < out.size(); ++i) {
     std::uint16_t raw = static_cast<std::uint8_t>(buffer[i]);
-    if (width == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
-    const int stored = is_signed ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused)) >> unused : raw;
+    if (width_ == 2) std::memcpy(&raw, buffer.data() + 2 * i, 2);
+    // Signed values may lack their sign in the bits above the stored ones.
+    const int stored =
+        is_signed_ ? static_cast<std::int16_t>(static_cast<std::uint16_t>(raw << unused_)) >> unused_ : raw;
     const double hu = stored * h.slope[0] + h.intercept[0];
     out[i] = has_padding && raw == padding ? kPadding_hu
                                            : static_cast<std::int16_t>(std::lround(std::clamp(hu, -32768.0, 32767.0)));

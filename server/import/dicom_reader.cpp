@@ -110,7 +110,7 @@ Result<Input> unpacked(const fs::path& archive, const KeepGoing& keep_going) {
 }
 
 // Reads all headers, in one process after the other. If one dies, its file is damaged, and the next continues after it.
-Result<std::vector<DicomHeader>> read_headers(const FoundFiles& found, const KeepGoing& keep_going) {
+Result<std::vector<DicomHeader>> read_all_headers(const FoundFiles& found, const KeepGoing& keep_going) {
   std::vector<DicomHeader> headers;
   const std::size_t files = found.files.size();
   std::size_t next = 0;
@@ -120,19 +120,24 @@ Result<std::vector<DicomHeader>> read_headers(const FoundFiles& found, const Kee
     for (std::size_t i = next; i < files; ++i) {
       channel.at_file(i);
       channel.progress(static_cast<double>(i) / static_cast<double>(files));
-      DicomHeader h = read_header(found.files[i].path);
-      h.file = i;
+      const std::vector<DicomHeader> of_file = read_headers(found.files[i].path);
       ByteWriter packer;
-      h.pack(packer);
+      packer.add(i), packer.add(of_file.size());
+      for (const DicomHeader& h : of_file) h.pack(packer);
       channel.send(packer.bytes());
     }
     return {};
   };
   work.on_message = [&](std::string_view message) {
     ByteReader from(message);
-    DicomHeader h;
-    if (!h.unpack(from) || h.file != next || next >= files) return false;
-    headers.push_back(std::move(h));
+    std::size_t file = 0, count = 0;
+    if (!from.get(file) || !from.get(count) || file != next || next >= files) return false;
+    for (std::size_t i = 0; i < count; ++i) {
+      DicomHeader h;
+      if (!h.unpack(from)) return false;
+      h.file = file;
+      headers.push_back(std::move(h));
+    }
     ++next;
     return true;
   };
@@ -177,7 +182,7 @@ Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
   const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
   FoundFiles alone{
       .input = path.string(), .archive = false, .files = {{path, path.filename().string()}}, .skipped = {}};
-  const auto header = read_headers(alone, keep_going);
+  const auto header = read_all_headers(alone, keep_going);
   if (!header) return tl::unexpected(header.error());
   const bool is_index = header->front().kind == FileKind::index;
   auto input = searched(folder, is_index ? kMostLevels : -1);
@@ -188,9 +193,9 @@ Result<Input> find_input(const fs::path& path, const KeepGoing& keep_going) {
   return input;
 }
 
-// Fills the series' volume slice by slice.
+// Fills the series' volume plane by plane.
 Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGoing& keep_going) {
-  imaging::HuVolume& volume = series.grid;
+  imaging::HuVolume& volume = series.grid.volume;
   try {
     volume.values.resize(volume.count());
   } catch (const std::bad_alloc&) {
@@ -198,26 +203,36 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
                                              imaging::describe(volume) + "; export thicker slices");
   }
   const std::size_t pixels = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
-  const std::size_t slices = series.slices.size();
+  const std::size_t slices = series.slices.size(), planes = static_cast<std::size_t>(volume.dims[2]);
   std::size_t next = 0;
   IsolatedWork work;
   work.memory_bytes = std::size_t{4} << 30;
   work.run = [&](ChildChannel& channel) -> Result<void> {
     silence_library();
-    std::vector<std::int16_t> slice(pixels);
+    std::vector<std::int16_t> slice(static_cast<std::size_t>(series.entry.columns) *
+                                    static_cast<std::size_t>(series.entry.rows));
+    const auto send = [&](std::span<const std::int16_t> plane) {
+      channel.send({reinterpret_cast<const char*>(plane.data()), plane.size_bytes()});
+    };
+    PixelReader reader;
+    std::optional<SliceResampler> resampler;
+    if (!series.grid.places.empty()) resampler.emplace(series.grid, series.entry.columns, series.entry.rows);
     for (std::size_t i = 0; i < slices; ++i) {
       channel.at_file(series.slices[i].file);
-      if (auto read = read_pixels(series.slices[i], found.files[series.slices[i].file].path,
+      if (auto read = reader.read(series.slices[i], found.files[series.slices[i].file].path,
                                   found.shown(series.slices[i].file), slice);
           !read)
         return read;
-      channel.send({reinterpret_cast<const char*>(slice.data()), pixels * sizeof(std::int16_t)});
+      if (resampler)
+        resampler->add(slice, send);
+      else
+        send(slice);
       channel.progress(static_cast<double>(i + 1) / static_cast<double>(slices));
     }
     return {};
   };
   work.on_message = [&](std::string_view message) {
-    if (next == slices || message.size() != pixels * sizeof(std::int16_t)) return false;
+    if (next == planes || message.size() != pixels * sizeof(std::int16_t)) return false;
     std::memcpy(volume.values.data() + pixels * next++, message.data(), message.size());
     return true;
   };
@@ -226,7 +241,7 @@ Result<void> read_volume(CtSeries& series, const FoundFiles& found, const KeepGo
     return failure(ErrorCode::invalid_input,
                    found.shown(*end.file) + " is damaged so that it cannot be read; copy or export it again");
   if (!end.result) return tl::unexpected(end.result.error());
-  if (next != slices) return failure(ErrorCode::internal, "the reader of " + found.input + " ended early");
+  if (next != planes) return failure(ErrorCode::internal, "the reader of " + found.input + " ended early");
   return {};
 }
 
@@ -245,7 +260,7 @@ Result<Survey> survey(const fs::path& path, const KeepGoing& keep_going) {
   if (!input) return tl::unexpected(input.error());
   shows = shows || input->found.files.size() > kManyFiles;
   const KeepGoing scanning = part(shown, input->folder ? kUnpackedEnd : 0.0, kHeadersEnd);
-  auto headers = read_headers(input->found, scanning);
+  auto headers = read_all_headers(input->found, scanning);
   if (!headers) return tl::unexpected(headers.error());
   Survey result{.input = std::move(*input), .series = {}, .report = {}};
   result.report.skipped = result.input.found.skipped;
@@ -274,9 +289,12 @@ Result<CtScan> read_dicom_series(const fs::path& input, const SeriesOptions& opt
   }
   const KeepGoing reading = part(keep_going, kHeadersEnd, 1.0);
   if (auto read = read_volume(series, found->input.found, reading); !read) return tl::unexpected(read.error());
-  CtScan scan{std::move(series.grid), {}, std::move(found->report)};
+  CtScan scan{.volume = std::move(series.grid.volume), .report = std::move(found->report)};
   scan.source = "DICOM CT, " + imaging::describe(scan.volume);
+  if (series.entry.resampled > 0) scan.source += ", resampled from slices " + series.entry.irregularity;
+  if (series.entry.lossy > 0) scan.source += ", compressed with loss";
   scan.report.taken = series.entry.number;
+  scan.frame_of_reference = series.slices.front().frame_of_reference;
   return scan;
 }
 

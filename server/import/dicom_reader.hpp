@@ -16,9 +16,10 @@ struct SeriesOptions {
 // or one slice, whose series is read. The content decides, never the name.
 // Files are read in other processes. A file that crashes a library costs only that file, unless it is a slice of the
 // series that is read. Slices are ordered by their position along the normal of their plane, never by file name or
-// number. Other files than CT slices are counted in the report.
-// Input is refused if it makes the volume's shape or values doubtful: several frames in a file, a tilted gantry, uneven
-// gaps, missing spacing, position, rescaling or pixels, retired compressions. Errors: not_found, invalid_input,
+// number. Other files than CT slices are counted in the report. Tilted and unevenly spaced slices are resampled to a
+// regular grid (server/import/slice_grid.hpp).
+// Input is refused if it makes the volume's shape or values doubtful: several frames in a file, missing slices,
+// spacing, position, rescaling or pixels, retired compressions. Errors: not_found, invalid_input,
 // unsupported, exhausted, cancelled, internal (temporary folder).
 [[nodiscard]] Result<CtScan> read_dicom_series(const std::filesystem::path& input, const SeriesOptions& options,
                                                const KeepGoing& keep_going);

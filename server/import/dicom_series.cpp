@@ -6,14 +6,17 @@
 #include <cstdio>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <tuple>
 
 namespace osteon::import {
 namespace {
 
 constexpr double kMostVoxels = 4e9;
-constexpr double kLeastSpacing_mm = 0.01, kMostSpacing_mm = 20.0;
-constexpr int kFewSlices = 8;                // fewer are not a volume to operate on
+constexpr double kLeastPixel_mm = 0.01, kMostPixel_mm = 20.0;
+constexpr int kFewSlices = 8;            // fewer are not a volume to operate on
+constexpr std::size_t kFewDoubled = 10;  // at most a tenth of the slices may lie where another one lies
+constexpr double kDegrees = 180.0 / std::numbers::pi;
 constexpr std::size_t kGroupsCompared = 64;  // of one UID; in hostile files every slice could differ
 
 using Slices = std::vector<DicomHeader>;
@@ -22,7 +25,7 @@ Vec3 vec(const std::vector<double>& v, std::size_t first = 0) { return {v[first]
 
 bool has_spacing(const DicomHeader& h) {
   return h.spacing.size() == 2 &&
-         std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastSpacing_mm && mm <= kMostSpacing_mm; });
+         std::ranges::all_of(h.spacing, [](double mm) { return mm >= kLeastPixel_mm && mm <= kMostPixel_mm; });
 }
 // Two unit vectors. With others, positions along the normal would not be finite numbers.
 bool has_orientation(const DicomHeader& h) {
@@ -33,7 +36,8 @@ bool has_place(const DicomHeader& h) { return has_spacing(h) && has_orientation(
 
 // How the second differs from the first; null if both may be slices of one volume.
 const char* difference(const DicomHeader& a, const DicomHeader& b) {
-  if ((a.frames > 1) != (b.frames > 1)) return b.frames > 1 ? "several frames" : "a single frame";
+  if (a.has_frames_without_position() != b.has_frames_without_position())
+    return b.has_frames_without_position() ? "several frames" : "a single frame";
   if (a.columns != b.columns || a.rows != b.rows) return "another size";
   if (a.samples != b.samples || a.photometric != b.photometric) return "other colours";
   if (has_spacing(a) != has_spacing(b) || (has_spacing(a) && (std::abs(a.spacing[0] - b.spacing[0]) >= 1e-4 ||
@@ -46,16 +50,18 @@ const char* difference(const DicomHeader& a, const DicomHeader& b) {
   return nullptr;
 }
 
-// Removes copied files: the same instance at the same position. The largest is kept, because a copy may be truncated.
+// Removes copied files: the same instance, and the same frame of it, at the same position. The largest is kept, because
+// a copy may be truncated.
 Slices without_copies(Slices slices, SkippedFiles& skipped, const FoundFiles& found) {
-  std::map<std::tuple<std::string, std::string, std::vector<double>, int>, std::size_t> seen;
+  std::map<std::tuple<std::string, std::string, std::vector<double>, int, int>, std::size_t> seen;
   Slices kept;
   for (DicomHeader& h : slices) {
     if (h.instance.empty()) {
       kept.push_back(std::move(h));
       continue;
     }
-    const auto [place, is_new] = seen.try_emplace({h.series, h.instance, h.position, h.acquisition}, kept.size());
+    const auto [place, is_new] =
+        seen.try_emplace({h.series, h.instance, h.position, h.acquisition, h.frame}, kept.size());
     if (is_new) {
       kept.push_back(std::move(h));
       continue;
@@ -88,7 +94,8 @@ std::vector<Slices> group_compatible(Slices slices) {
   for (Slices& group : groups) {
     const auto takes = [&](const Slices& g) {
       const DicomHeader &a = g.front(), &b = group.front();
-      return !is_lost(g) && a.columns == b.columns && a.rows == b.rows && a.frames == b.frames;
+      return !is_lost(g) && a.columns == b.columns && a.rows == b.rows &&
+             a.has_frames_without_position() == b.has_frames_without_position();
     };
     const auto end = kept.begin() + static_cast<std::ptrdiff_t>(std::min(compared, kept.size()));
     const auto whole = is_lost(group) ? std::find_if(kept.begin(), end, takes) : end;
@@ -109,7 +116,7 @@ bool places_repeat(const Slices& slices) {
   for (const DicomHeader& h : slices) along.push_back(normal.dot(vec(h.position)));
   std::ranges::sort(along);
   for (std::size_t i = 1; i < along.size(); ++i)
-    if (along[i] - along[i - 1] < 1e-3) return true;
+    if (along[i] - along[i - 1] < kSamePosition_mm) return true;
   return false;
 }
 
@@ -143,21 +150,17 @@ class Arranger {
     for (const DicomHeader& h : series_.slices)
       if (auto fault = check(h)) return fault;
     if (auto fault = axes()) return fault;
+    if (auto fault = sort_by_position()) return fault;
     if (series_.slices.size() < 2)
       return wrong("a single slice", subject_ + " holds a single slice; a volume needs at least two");
-    const double voxels =
-        static_cast<double>(first().columns) * first().rows * static_cast<double>(series_.slices.size());
-    if (voxels > kMostVoxels)
-      return wrong(
-          "more than 4e9 voxels",
-          subject_ + " has more than the 4e9 voxels that can be imported; export a part of it, or thicker slices");
-    return even_steps();
+    return stack();
   }
 
  private:
   [[nodiscard]] const DicomHeader& first() const { return series_.slices.front(); }
-  [[nodiscard]] std::string name(std::size_t slice) const {
-    return shown_text(found_.files[series_.slices[slice].file].name, 80);
+  [[nodiscard]] std::string name(const DicomHeader& slice) const {
+    const std::string file = shown_text(found_.files[slice.file].name, 80);
+    return slice.frame < 0 ? file : "frame " + std::to_string(slice.frame + 1) + " of " + file;
   }
   static SeriesFault wrong(const std::string& brief, const std::string& sentence,
                            ErrorCode code = ErrorCode::invalid_input) {
@@ -174,15 +177,20 @@ class Arranger {
     const auto cannot = [&](const std::string& brief, const std::string& what) {
       return wrong(brief, file + " " + what, ErrorCode::unsupported);
     };
-    if (h.frames > 1)
+    if (h.has_frames_without_position())
       return cannot("several frames in a file",
-                    "holds " + std::to_string(h.frames) + " frames; export the series with one file for each slice");
+                    "holds " + std::to_string(h.frames) +
+                        " frames without a position for each; export the series with one file for each slice");
     if (h.columns < 2 || h.rows < 2 || h.columns > imaging::kLargestScanAxis || h.rows > imaging::kLargestScanAxis)
       return lacks("Rows and Columns (0028,0010-0011)");
     if (h.samples != 1 || h.photometric != "MONOCHROME2")
       return cannot(
           "no Hounsfield units",
           "stores " + h.photometric + " pixels instead of Hounsfield units (MONOCHROME2); export original CT slices");
+    if (!h.is_hu)
+      return cannot("no Hounsfield units",
+                    "stores numbers that are not Hounsfield units, by its RescaleType (0028,1054); export original CT "
+                    "slices");
     if (h.bits_allocated != 8 && h.bits_allocated != 16)
       return cannot("neither 8 nor 16 bits",
                     "stores " + std::to_string(h.bits_allocated) + " bits for a pixel; only 8 and 16 can be read");
@@ -192,10 +200,13 @@ class Arranger {
     if (!has_orientation(h)) return lacks("ImageOrientationPatient (0020,0037)");
     if (h.intercept.size() != 1 || h.slope.size() != 1 || h.slope[0] == 0.0)
       return lacks("RescaleSlope and RescaleIntercept (0028,1052-1053)");
-    // Spectral selection and progression were retired from DICOM. Decoders return noise without an error.
-    if (h.transfer_syntax == "1.2.840.10008.1.2.4.53" || h.transfer_syntax == "1.2.840.10008.1.2.4.55")
+    if (h.compression == Compression::retired)
       return cannot("a retired compression", "uses a retired JPEG compression (" + h.transfer_syntax +
                                                  "); export the series uncompressed or lossless");
+    if (h.compression == Compression::unknown)
+      return cannot("an unknown compression", "uses a compression that cannot be read (" +
+                                                  shown_text(h.transfer_syntax, 64) +
+                                                  "); export the series uncompressed or lossless");
     return std::nullopt;
   }
 
@@ -209,71 +220,88 @@ class Arranger {
           found_.shown(first().file) +
               ": ImageOrientationPatient (0020,0037) is not two perpendicular directions; export the series again");
     down = (down - across * across.dot(down)).normalized();
-    series_.grid.directions << across, down, across.cross(down);
+    directions_ << across, down, across.cross(down);
     return std::nullopt;
   }
 
-  std::optional<SeriesFault> even_steps() {
-    const Vec3 normal = series_.grid.directions.col(2);
-    const auto along = [&](const DicomHeader& h) { return normal.dot(vec(h.position)); };
-    std::ranges::stable_sort(series_.slices, {}, along);
-    std::vector<double> places, gaps;
-    for (const DicomHeader& h : series_.slices) places.push_back(along(h));
-    for (std::size_t i = 1; i < places.size(); ++i) gaps.push_back(places[i] - places[i - 1]);
-    const double length_mm = places.back() - places.front();
-    const double step_mm = length_mm / static_cast<double>(gaps.size());
-    series_.entry.slice_mm = step_mm;
+  [[nodiscard]] double along(const DicomHeader& h) const { return directions_.col(2).dot(vec(h.position)); }
 
-    // A tilted gantry moves the slices sideways within their plane, which shears the volume.
-    const Vec3 travel = vec(series_.slices.back().position) - vec(first().position);
-    const double sideways_mm = (travel - normal * length_mm).norm();
-    char text[160];
-    if (sideways_mm > 0.5 * std::min(first().spacing[0], first().spacing[1])) {
-      std::snprintf(text, sizeof text, "sheared by %.1f degrees (tilted gantry)",
-                    std::atan2(sideways_mm, length_mm) * 180.0 / 3.14159265358979);
-      return wrong(text, subject_ + " is " + text + "; export it resampled to upright slices", ErrorCode::unsupported);
-    }
-    if (auto fault = check_gaps(places, gaps, step_mm)) return fault;
-    series_.grid.dims = {first().columns, first().rows, static_cast<int>(series_.slices.size())};
-    series_.grid.spacing_mm = {first().spacing[1], first().spacing[0], step_mm};
-    series_.grid.origin_mm = vec(first().position);
-    return std::nullopt;
-  }
-
-  // One missing slice opens a gap of two steps. A position written with one decimal must pass.
-  std::optional<SeriesFault> check_gaps(const std::vector<double>& places, const std::vector<double>& gaps,
-                                        double step_mm) {
-    std::vector<double> sorted = gaps;
-    std::ranges::nth_element(sorted, sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2));
-    const double usual_mm = sorted[sorted.size() / 2];
-    // The worst gap, or else the first slice that has drifted from the position that even steps would give.
-    std::size_t at = gaps.size();
-    double worst_mm = 0.2 * usual_mm;
-    for (std::size_t i = 0; i < gaps.size(); ++i)
-      if (std::abs(gaps[i] - usual_mm) > worst_mm || gaps[i] < 1e-3) {
-        worst_mm = std::max(worst_mm, std::abs(gaps[i] - usual_mm));
-        at = i;
+  // Of several slices at one position, the largest file is kept, because another may be truncated.
+  std::optional<SeriesFault> sort_by_position() {
+    Slices& slices = series_.slices;
+    const std::size_t all = slices.size();
+    std::ranges::stable_sort(slices, {}, [&](const DicomHeader& h) { return along(h); });
+    Slices kept;
+    std::string pair;
+    for (DicomHeader& h : slices) {
+      if (kept.empty() || along(h) - along(kept.back()) >= kSamePosition_mm) {
+        kept.push_back(std::move(h));
+        continue;
       }
-    for (std::size_t i = 0; at == gaps.size() && i < gaps.size(); ++i)
-      if (std::abs(places[i + 1] - (places.front() + static_cast<double>(i + 1) * step_mm)) > 0.1 * step_mm) at = i;
-    if (at == gaps.size()) return std::nullopt;
-    series_.entry.slice_mm = usual_mm;
+      if (pair.empty()) pair = name(kept.back()) + " and " + name(h);
+      if (h.bytes > kept.back().bytes) kept.back() = std::move(h);
+    }
+    slices = std::move(kept);
+    series_.entry.doubled = static_cast<int>(all - slices.size());
+    series_.entry.slices = static_cast<int>(slices.size());
+    if (all - slices.size() <= std::max<std::size_t>(1, all / kFewDoubled)) return std::nullopt;
+    series_.entry.slices = static_cast<int>(all);
+    return wrong("several slices at one position",
+                 subject_ + ": " + std::to_string(all - slices.size()) + " of its " + std::to_string(all) +
+                     " slices lie at the position of another one, such as " + pair + "; remove the duplicates");
+  }
+
+  std::optional<SeriesFault> stack() {
+    SliceStack stack{.columns = first().columns,
+                     .rows = first().rows,
+                     .column_mm = first().spacing[1],
+                     .row_mm = first().spacing[0],
+                     .directions = directions_,
+                     .positions_mm = {}};
+    std::vector<double> gaps_mm;
+    for (const DicomHeader& h : series_.slices) {
+      if (!stack.positions_mm.empty()) gaps_mm.push_back(along(h) - directions_.col(2).dot(stack.positions_mm.back()));
+      stack.positions_mm.push_back(vec(h.position));
+    }
+    series_.entry.slice_mm = usual_gap_mm(gaps_mm);
+    if (const auto at = gap_of_missing_slices(gaps_mm)) return missing_slices(*at, gaps_mm);
+
+    SliceGrid& grid = series_.grid;
+    grid = grid_of(stack);
+    char text[160];
+    const double slope = std::atan2(grid.sideways_mm, along(series_.slices.back()) - along(first())) * kDegrees;
+    if (slope > kMostTilt_degrees) {
+      std::snprintf(text, sizeof text, "sheared by %.1f degrees", slope);
+      return wrong(text, subject_ + " is " + text + ", more than a gantry tilts; export it resampled to upright slices",
+                   ErrorCode::unsupported);
+    }
+    const imaging::HuVolume& volume = grid.volume;
+    if (static_cast<double>(volume.dims[0]) * volume.dims[1] * volume.dims[2] > kMostVoxels ||
+        *std::ranges::max_element(volume.dims) > imaging::kLargestScanAxis)
+      return wrong(
+          "more than 4e9 voxels",
+          subject_ + " has more than the 4e9 voxels that can be imported; export a part of it, or thicker slices");
+    series_.entry.slice_mm = volume.spacing_mm.z();
+    series_.entry.lossy =
+        static_cast<int>(std::ranges::count(series_.slices, Compression::lossy, &DicomHeader::compression));
+    series_.entry.irregularity = irregularity(grid);
+    series_.entry.resampled = grid.places.empty() ? 0 : volume.dims[2];
+    return std::nullopt;
+  }
+
+  [[nodiscard]] SeriesFault missing_slices(std::size_t at, const std::vector<double>& gaps_mm) const {
     char brief[64], text[96];
-    std::snprintf(brief, sizeof brief, gaps[at] < 1e-3 ? "several slices at one position" : "a gap of %.3g mm",
-                  gaps[at]);
-    if (usual_mm < 1e-3)
-      std::snprintf(text, sizeof text, " lie at the same position, like most slices");
-    else
-      std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps[at], usual_mm);
-    return wrong(brief, subject_ + ": the slices " + name(at) + " and " + name(at + 1) + text +
-                            (gaps[at] > usual_mm ? missing_() : "") +
-                            "; add the missing slices or remove the duplicates");
+    std::snprintf(brief, sizeof brief, "a gap of %.3g mm", gaps_mm[at]);
+    std::snprintf(text, sizeof text, " are %.3g mm apart where %.3g mm is usual", gaps_mm[at], usual_gap_mm(gaps_mm));
+    return wrong(brief, subject_ + ": the slices " + name(series_.slices[at]) + " and " + name(series_.slices[at + 1]) +
+                            text + missing_() + "; add the missing slices");
   }
 
   CtSeries& series_;
   const FoundFiles& found_;
   const std::string subject_;
   const std::function<std::string()> missing_;  // files that may belong into a gap
+  Eigen::Matrix3d directions_ = Eigen::Matrix3d::Identity();
 };
 
 std::string plane_of(const DicomHeader& h) {
@@ -317,7 +345,7 @@ std::string possible_gap_causes(const std::vector<Slices>& groups, std::size_t a
     const char* what = i == at || groups[i].size() > groups[at].size() ? nullptr : difference(own, h);
     if (what == nullptr) continue;
     const std::string detail =
-        h.frames > 1 ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
+        h.has_frames_without_position() ? "holds " + std::to_string(h.frames) + " frames" : std::string("has ") + what;
     if (!add(found.files[h.file].name, detail)) return text;
   }
   for (const SkippedFiles::Count& c : skipped.counts())
@@ -340,11 +368,17 @@ Error no_series(const FoundFiles& found, const SkippedFiles& skipped) {
   const bool only_archives = !any_dicom && skipped.count(FileKind::archive) > 0;
   std::string what = skipped.text(false);
   if (what.size() > 160) what = what.substr(0, what.rfind(", ", 160)) + " and more";
+  const char* remedy = "give the folder with the CT series";
+  if (only_archives)
+    remedy = "unpack what is inside and give the folder";
+  else if (skipped.count(FileKind::unknown_syntax) > 0)
+    remedy = "export the series uncompressed";
+  else if (any_dicom)
+    remedy = "only original CT slices can be imported";
+  else if (skipped.count(FileKind::not_dicom) > 0)
+    remedy = "give the folder with the CT series, --spacing for PNG slices, or --size too for raw numbers";
   return {any_dicom ? ErrorCode::unsupported : ErrorCode::invalid_input,
-          input + (any_dicom ? " holds no CT series: " : " holds no DICOM files: ") + what +
-              (only_archives ? "; unpack what is inside and give the folder"
-               : any_dicom   ? "; only original CT slices, one in a file, can be imported"
-                             : "; give the folder with the CT series")};
+          input + (any_dicom ? " holds no CT series: " : " holds no DICOM files: ") + what + "; " + remedy};
 }
 
 }  // namespace
@@ -398,7 +432,7 @@ Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const Fou
     if (!series[i].fault && (!best || voxels(series[i]) > voxels(series[*best]))) best = i;
   }
   // A larger series with a missing or damaged slice is most likely the intended one. Importing another bone without
-  // asking would be wrong. A larger series of a kind that nobody can import, such as a tilted one, is not chosen.
+  // asking would be wrong. A larger series of a kind that nobody can import, such as one in colours, is not chosen.
   const CtSeries& most = series[largest];
   const bool is_meant =
       most.fault && most.fault->error.code != ErrorCode::unsupported && most.entry.slices >= kFewSlices;

@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "common/imaging/hu_volume.hpp"
 #include "server/import/dicom_header.hpp"
 #include "server/import/found_files.hpp"
 #include "server/import/series_report.hpp"
+#include "server/import/slice_grid.hpp"
 
 namespace osteon::import {
 
@@ -20,7 +20,7 @@ struct SeriesFault {
 struct CtSeries {
   std::vector<DicomHeader> slices;  // sorted along the normal once the series has a grid
   SeriesEntry entry;
-  imaging::HuVolume grid;  // without values
+  SliceGrid grid;
   std::optional<SeriesFault> fault;
 };
 
@@ -32,9 +32,9 @@ struct CtSeries {
                                                 SkippedFiles& skipped);
 
 // The index of the series to import: `number`, or else the series that contains `file`, or else the largest. If a
-// larger series is of a kind that cannot be imported (tilted, several frames), one that can is preferred, unless it has
-// only a few slices. A larger one with a missing or damaged slice is chosen, so that its fault is reported. Errors:
-// invalid_input and unsupported (no CT, no such number). The chosen series may still have a fault.
+// larger series is of a kind that cannot be imported (colours, several frames without positions), one that can is
+// preferred, unless it has only a few slices. A larger one with a missing or damaged slice is chosen, so that its fault
+// is reported. Errors: invalid_input and unsupported (no CT, no such number). The chosen series may still have a fault.
 [[nodiscard]] Result<std::size_t> choose_series(const std::vector<CtSeries>& series, const FoundFiles& found,
                                                 const SkippedFiles& skipped, std::optional<int> number,
                                                 std::optional<std::size_t> file);

@@ -17,14 +17,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kChunk = 1 << 20;
+constexpr std::size_t kReadBytes = 1 << 20;
 constexpr std::size_t kLargestPlist = 16 << 20;
 constexpr std::size_t kFirstValues = std::size_t{1} << 20;  // for which memory is allocated before any data has arrived
 
-struct CloseArchive {
+struct CloseProject {
   void operator()(archive* a) const { archive_read_free(a); }
 };
-using Archive = std::unique_ptr<archive, CloseArchive>;
+using ProjectArchive = std::unique_ptr<archive, CloseProject>;
 
 Error no_project(const fs::path& file) {
   return {ErrorCode::invalid_input,
@@ -56,11 +56,12 @@ Result<archive_entry*> find_entry(archive* a, const fs::path& file, const std::s
   }
 }
 
-Result<Archive> open_archive(const fs::path& file) {
-  Archive a(archive_read_new());
+Result<ProjectArchive> open_archive(const fs::path& file) {
+  ProjectArchive a(archive_read_new());
   archive_read_support_filter_gzip(a.get());
   archive_read_support_format_tar(a.get());
-  if (archive_read_open_filename(a.get(), file.c_str(), kChunk) != ARCHIVE_OK) return tl::unexpected(no_project(file));
+  if (archive_read_open_filename(a.get(), file.c_str(), kReadBytes) != ARCHIVE_OK)
+    return tl::unexpected(no_project(file));
   return a;
 }
 
@@ -189,7 +190,7 @@ Result<CtScan> read_inv3(const fs::path& file, const KeepGoing& keep_going) try 
       room = volume.values.size() * sizeof(std::int16_t);
     }
     auto* bytes = reinterpret_cast<char*>(volume.values.data());
-    const auto n = archive_read_data(a->get(), bytes + got, std::min(kChunk, room - got));
+    const auto n = archive_read_data(a->get(), bytes + got, std::min(kReadBytes, room - got));
     if (n <= 0) return tl::unexpected(damaged(file, a->get()));
     got += static_cast<std::size_t>(n);
   }

@@ -78,22 +78,21 @@ imaging::VoxelBox kept_voxels(const imaging::HuVolume& volume, const std::array<
   return box;
 }
 
-CaseScan kept_scan(imaging::HuVolume volume, imaging::VoxelMask bones, imaging::VoxelMask hard,
-                   const imaging::VoxelBox& box, const CtOptions& options) {
+CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
+                   const DensityCalibration& calibration) {
   CaseScan scan;
   for (std::size_t axis = 0; axis < 3; ++axis) scan.geometry.dims[axis] = box.dim(axis);
   scan.geometry.origin_mm = volume.position_mm(Vec3(box.first[0], box.first[1], box.first[2]));
   scan.geometry.axes_mm = volume.directions * volume.spacing_mm.asDiagonal();
   scan.hu = imaging::cropped(std::move(volume), box.first, box.last).values;
-  scan.labels = imaging::cropped(std::move(bones), box.first, box.last).values;
-  const bool any_hard = !hard.values.empty();
-  scan.tissue = any_hard ? imaging::cropped(std::move(hard), box.first, box.last).values
-                         : zeros<std::uint8_t>(scan.labels.size());
+  scan.labels = imaging::cropped(std::move(known.labels), box.first, box.last).values;
+  scan.tissue = known.tissue.values.empty() ? zeros<std::uint8_t>(scan.labels.size())
+                                            : imaging::cropped(std::move(known.tissue), box.first, box.last).values;
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
-    if (scan.labels[i] == 0)
+    if (!known.bone_labels[scan.labels[i]])
       scan.tissue[i] = 0;
     else if (scan.tissue[i] == 0)
-      scan.tissue[i] = tissue_of(options.calibration, scan.hu[i]);
+      scan.tissue[i] = tissue_of(calibration, scan.hu[i]);
   }
   return scan;
 }
@@ -106,6 +105,15 @@ void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegment
     info.labels.push_back(std::move(label));
   }
   list_tissues(scan, info);
+}
+
+void list_labels(const CaseScan& scan, const PlacedLabels& placed, CaseInfo& info) {
+  info.labels = placed.labels;
+  list_tissues(scan, info);
+  // Tissue that the label map names is not found by its density.
+  for (CaseLabel& tissue : info.tissues)
+    if (std::ranges::find(info.labels, tissue.kind, &CaseLabel::kind) != info.labels.end())
+      tissue.provenance.method += ", or as its label says";
 }
 
 CaseScan kept_scan(const imaging::LabelVolume& volume) {

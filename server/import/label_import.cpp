@@ -6,15 +6,16 @@
 
 #include "server/import/import_steps.hpp"
 #include "server/import/kept_scan.hpp"
+#include "server/import/label_surface.hpp"
 
 namespace osteon::import {
 namespace {
 
 constexpr int kMargin = 5;  // samples beyond the bone: the band and the cell around it
 // Shares of the stages in the total time.
-constexpr double kSmoothEnd = 0.35;
+constexpr double kLabelSmoothEnd = 0.35;
 constexpr double kResampleEnd = 0.4;
-constexpr double kSurfaceEnd = 0.85;
+constexpr double kLabelSurfaceEnd = 0.85;
 
 DenseVolume<std::uint8_t> cropped(const DenseVolume<std::uint8_t>& from, const CoordBox& box) {
   DenseVolume<std::uint8_t> out;
@@ -52,25 +53,6 @@ void cap_at_volume(const imaging::LabelVolume& volume, double pitch_mm, DenseVol
       }
 }
 
-// Smoothing moves the surface of convex bone inwards by some hundredths of a voxel. This moves the whole surface back
-// by one distance, so that the volume is again that of the labels: dV = A δ, with A from the samples within half a
-// pitch of the surface.
-void restore_volume(double labelled_mm3, double pitch_mm, DenseVolume<float>& surface_mm) {
-  constexpr double kMost = 0.15;  // voxels: more would be another bone
-  double inside = 0, near = 0;
-  for (const float s : surface_mm.values) {
-    const double voxels = static_cast<double>(s) / pitch_mm;
-    if (voxels > 0.5) continue;
-    inside += std::min(1.0, 0.5 - voxels);
-    near += voxels > -0.5 ? 1.0 : 0.0;
-  }
-  const double missing = labelled_mm3 / std::pow(pitch_mm, 3) - inside;
-  const auto out = static_cast<float>(pitch_mm * std::clamp(missing / std::max(1.0, near), -kMost, kMost));
-  const auto band = static_cast<float>(4.0 * pitch_mm);
-  for (float& s : surface_mm.values)
-    if (std::abs(s) < band) s = std::clamp(s - out, -band, band);
-}
-
 }  // namespace
 
 Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, const LabelOptions& options,
@@ -98,12 +80,12 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   const auto described = describe_scan(kept);
   if (!described) return tl::unexpected(described.error());
 
-  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kSmoothEnd));
+  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kLabelSmoothEnd));
   if (!smooth) return tl::unexpected(smooth.error());
-  auto field = imaging::resample(*smooth, spacing, box, pitch_mm, part(keep_going, kSmoothEnd, kResampleEnd));
+  auto field = imaging::resample(*smooth, spacing, box, pitch_mm, part(keep_going, kLabelSmoothEnd, kResampleEnd));
   if (!field) return tl::unexpected(field.error());
   smooth->values = {};
-  auto surface_mm = signed_distance_mm(*field, 0.0f, pitch_mm, part(keep_going, kResampleEnd, kSurfaceEnd));
+  auto surface_mm = signed_distance_mm(*field, 0.0f, pitch_mm, part(keep_going, kResampleEnd, kLabelSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   field->values = {};
   cap_at_volume(volume, pitch_mm, *surface_mm);
@@ -112,7 +94,7 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
 
   std::vector<float> densities{0.0f};
   for (const BoneColour& colour : legend.bones) densities.push_back(static_cast<float>(colour.density_g_cm3));
-  auto density = imaging::label_density(volume, densities, box, pitch_mm, part(keep_going, kSurfaceEnd, 0.9));
+  auto density = imaging::label_density(volume, densities, box, pitch_mm, part(keep_going, kLabelSurfaceEnd, 0.9));
   if (!density) return tl::unexpected(density.error());
   volume.labels = {};
   if (!keep_going(0.9)) return failure(ErrorCode::cancelled, "stopped before building the case");

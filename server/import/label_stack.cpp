@@ -4,13 +4,13 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <map>
 
 #include "common/core/check.hpp"
+#include "server/import/numbered_files.hpp"
 
 namespace osteon::import {
 namespace {
@@ -24,61 +24,12 @@ constexpr double kLargestVolume = 1.0e9;  // voxels
 constexpr double kLargestSlice = 6.4e7;  // pixels: a small file can claim far more, and all of them are decoded at once
 constexpr double kDensest_g_cm3 = 3.0;   // enamel
 
-struct Slice {
-  std::int64_t number = 0;
-  fs::path file;
-};
-
 using Rgba = std::array<std::uint8_t, 4>;
 
 std::string text_of(const Rgba& c) {
   char text[32];
   std::snprintf(text, sizeof text, "%d,%d,%d", c[0], c[1], c[2]);
   return text;
-}
-
-Result<std::vector<Slice>> find_slices(const fs::path& folder) {
-  std::error_code error;
-  if (!fs::is_directory(folder, error))
-    return failure(ErrorCode::not_found,
-                   "there is no folder " + folder.string() + "; give one with a label volume as PNG slices");
-  std::vector<Slice> slices;
-  std::string stem;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    std::string extension = entry.path().extension().string();
-    std::ranges::transform(extension, extension.begin(),
-                           [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-    if (extension != ".png") continue;
-    const std::string name = entry.path().stem().string();
-    std::size_t digits = name.size();
-    while (digits > 0 && std::isdigit(static_cast<unsigned char>(name[digits - 1])) != 0) --digits;
-    Slice slice{0, entry.path()};
-    const auto parsed = std::from_chars(name.data() + digits, name.data() + name.size(), slice.number);
-    if (digits == name.size() || parsed.ec != std::errc{})
-      return failure(
-          ErrorCode::invalid_input,
-          entry.path().string() + " has no slice number at the end of its name; number the slices or move it away");
-    if (!slices.empty() && name.substr(0, digits) != stem)
-      return failure(ErrorCode::invalid_input, folder.string() + " holds more than one stack (" + stem + "... and " +
-                                                   name.substr(0, digits) + "...); give a folder with one");
-    stem = name.substr(0, digits);
-    slices.push_back(std::move(slice));
-  }
-  if (error) return failure(ErrorCode::not_found, "cannot read the folder " + folder.string() + ": " + error.message());
-  if (slices.empty())
-    return failure(ErrorCode::invalid_input,
-                   folder.string() + " has no PNG files; give a folder with a label volume as PNG slices");
-  std::ranges::sort(slices, {}, &Slice::number);
-  for (std::size_t i = 1; i < slices.size(); ++i) {
-    if (slices[i].number == slices[i - 1].number)
-      return failure(ErrorCode::invalid_input, slices[i].file.string() + " has the same slice number as " +
-                                                   slices[i - 1].file.filename().string() + "; keep one of them");
-    if (slices[i].number != slices[i - 1].number + 1)
-      return failure(ErrorCode::invalid_input, folder.string() + ": slice " + std::to_string(slices[i - 1].number + 1) +
-                                                   " is missing, after " + slices[i - 1].file.filename().string() +
-                                                   "; copy the whole stack");
-  }
-  return slices;
 }
 
 // RGBA bytes of one file. libpng's simplified reader converts every kind of PNG and reports errors as text.
@@ -221,7 +172,7 @@ Result<LabelLegend> read_legend(const fs::path& file) {
 Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& legend, const Vec3& spacing_mm,
                                     const KeepGoing& keep_going) {
   OSTEON_CHECK(!legend.bones.empty() && legend.bones.size() <= kMostKinds && spacing_mm.minCoeff() > 0.0);
-  const auto slices = find_slices(folder);
+  const auto slices = numbered_files(folder, ".png", "a label volume as PNG slices");
   if (!slices) return tl::unexpected(slices.error());
 
   LabelStack stack;
@@ -235,7 +186,7 @@ Result<LabelStack> read_label_stack(const fs::path& folder, const LabelLegend& l
     batch.assign(static_cast<std::size_t>(depth), {});
     for (int i = 0; i < depth; ++i) {
       if (!keep_going(static_cast<double>(first + i) / count)) return stopped_while("reading the slices");
-      const fs::path& file = (*slices)[static_cast<std::size_t>(first + i)].file;
+      const fs::path& file = (*slices)[static_cast<std::size_t>(first + i)];
       int width = 0, height = 0;
       const auto pixels = read_png(file, width, height);
       if (!pixels) return tl::unexpected(pixels.error());

@@ -13,6 +13,24 @@ std::string problem_text(const SeriesEntry& entry) {
   return entry.problem.empty() ? "" : " (cannot be imported: " + entry.problem + ")";
 }
 
+// What the import does with the slices of the series that it takes, and what is doubtful about them.
+std::string changes(const SeriesEntry& entry) {
+  std::string text;
+  char part[160];
+  if (entry.resampled > 0) {
+    std::snprintf(part, sizeof part, "resampled  %d slices, %s, to %d slices, %.3g mm apart\n", entry.slices,
+                  entry.irregularity.c_str(), entry.resampled, entry.slice_mm);
+    text += part;
+  }
+  if (entry.doubled > 0)
+    text += "left out   " + std::to_string(entry.doubled) +
+            (entry.doubled == 1 ? " slice at the position of another one\n" : " slices at positions of other ones\n");
+  if (entry.lossy > 0)
+    text += "warning    " + std::to_string(entry.lossy) + " of " + std::to_string(entry.slices) +
+            " slices were compressed with loss: their HU differ from the scanner's\n";
+  return text;
+}
+
 std::string skipped_line(const SeriesReport& report) {
   return report.skipped.empty() ? "" : "skipped    " + report.skipped.text() + "\n";
 }
@@ -36,6 +54,7 @@ std::string describe(const SeriesEntry& entry) {
   }
   if (!entry.plane.empty()) text += ", " + entry.plane;
   if (!entry.kernel.empty()) text += ", kernel " + entry.kernel;
+  if (!entry.irregularity.empty()) text += ", " + entry.irregularity;
   return text;
 }
 
@@ -44,7 +63,7 @@ std::string report_lines(const SeriesReport& report) {
   for (const SeriesEntry& entry : report.series)
     if (entry.number == report.taken)
       text += "series     " + std::to_string(entry.number) + " of " + std::to_string(report.series.size()) + ": " +
-              describe(entry) + "\n";
+              describe(entry) + "\n" + changes(entry);
   std::size_t others = 0;
   for (const SeriesEntry& entry : report.series) {
     if (entry.number == report.taken) continue;
@@ -81,6 +100,10 @@ std::string list_json(const SeriesReport& report) {
                       {"spacing_mm", {entry.column_mm, entry.row_mm, entry.slice_mm}},
                       {"plane", entry.plane},
                       {"kernel", entry.kernel},
+                      {"irregularity", entry.irregularity},
+                      {"resampled", entry.resampled},
+                      {"doubled", entry.doubled},
+                      {"lossy", entry.lossy},
                       {"problem", entry.problem}});
   nlohmann::json skipped = nlohmann::json::array();
   for (const SkippedFiles::Count& c : report.skipped.counts())

@@ -14,7 +14,11 @@ struct SeriesEntry {
   double row_mm = 0.0, column_mm = 0.0, slice_mm = 0.0;  // between neighbours; 0 if unknown
   std::string plane;                                     // axial, coronal, sagittal, oblique
   std::string kernel;
-  std::string problem;  // why it cannot be imported
+  std::string irregularity;  // of slices that are resampled: "tilted by 18.5 degrees, 1 to 3 mm apart"
+  int resampled = 0;         // slices of the grid to which they are resampled; 0: they are its planes
+  int doubled = 0;           // slices left out, because another one lies at the same position
+  int lossy = 0;             // slices that were compressed with loss
+  std::string problem;       // why it cannot be imported
 };
 
 struct SeriesReport {

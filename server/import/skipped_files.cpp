@@ -27,6 +27,7 @@ constexpr Nouns kNouns[] = {
     {FileKind::presentation, "presentation state", "presentation states"},
     {FileKind::document, "document", "documents"},
     {FileKind::raw_data, "raw data set", "raw data sets"},
+    {FileKind::unknown_syntax, "file of an unknown transfer syntax", "files of an unknown transfer syntax"},
     {FileKind::no_pixels, "CT image with no pixel data", "CT images with no pixel data"},
     {FileKind::copy, "copy of another file", "copies of other files"},
     {FileKind::damaged, "damaged file", "damaged files"},
@@ -40,7 +41,8 @@ constexpr Nouns kNouns[] = {
 };
 
 bool keeps_names(FileKind kind) {
-  return kind == FileKind::damaged || kind == FileKind::unreadable || kind == FileKind::no_pixels;
+  return kind == FileKind::damaged || kind == FileKind::unreadable || kind == FileKind::no_pixels ||
+         kind == FileKind::unknown_syntax;
 }
 
 // The first UTF-8 character of `text`, or nothing if there is none.

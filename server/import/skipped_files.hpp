@@ -23,6 +23,7 @@ enum class FileKind : std::uint8_t {
   document,
   raw_data,
   other_modality,  // named in the count
+  unknown_syntax,  // a compression that the library does not know
   no_pixels,
   copy,
   damaged,

@@ -1,13 +1,16 @@
 #include "server/import/volume_file.hpp"
 
+#include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,9 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kAir_hu = -1024.0;
+constexpr double kAir_hu = -1024.0, kMostLabel = 65535.0;
 
-itk::ImageIOBase::Pointer reader_of(const fs::path& file, VolumeFormat format) {
+itk::ImageIOBase::Pointer format_of(VolumeFormat format) {
   itk::ImageIOBase::Pointer io;
   if (format == VolumeFormat::nifti)
     io = itk::NiftiImageIO::New();
@@ -26,6 +29,11 @@ itk::ImageIOBase::Pointer reader_of(const fs::path& file, VolumeFormat format) {
     io = itk::NrrdImageIO::New();
   else
     io = itk::MetaImageIO::New();
+  return io;
+}
+
+itk::ImageIOBase::Pointer reader_of(const fs::path& file, VolumeFormat format) {
+  itk::ImageIOBase::Pointer io = format_of(format);
   io->SetFileName(file.string());
   io->ReadImageInformation();
   return io;
@@ -37,42 +45,61 @@ std::int16_t to_hu(double value) {
 }
 
 template <class T>
-void convert(const char* from, std::span<std::int16_t> to) {
-  for (std::int16_t& hu : to) {
-    T value;
-    std::memcpy(&value, from, sizeof(T));
-    hu = to_hu(static_cast<double>(value));
-    from += sizeof(T);
-  }
+T number_at(const char* bytes, std::size_t i) {
+  T value;
+  std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
+  return value;
 }
 
+// Of voxels of one type.
+struct Converter {
+  void (*to_hu)(const char* from, std::span<std::int16_t> to);
+  // The first number that is no label, if there is one.
+  std::optional<double> (*to_labels)(const char* from, std::span<std::uint16_t> to);
+};
+
+template <class T>
+constexpr Converter kConverter{[](const char* from, std::span<std::int16_t> to) {
+                                 for (std::size_t i = 0; i < to.size(); ++i)
+                                   to[i] = to_hu(static_cast<double>(number_at<T>(from, i)));
+                               },
+                               [](const char* from, std::span<std::uint16_t> to) -> std::optional<double> {
+                                 for (std::size_t i = 0; i < to.size(); ++i) {
+                                   const auto value = static_cast<double>(number_at<T>(from, i));
+                                   if (!(value >= 0.0 && value <= kMostLabel) || value != std::floor(value))
+                                     return value;
+                                   to[i] = static_cast<std::uint16_t>(value);
+                                 }
+                                 return std::nullopt;
+                               }};
+
 // Null for a type that is no number.
-auto converter(itk::IOComponentEnum type) -> void (*)(const char*, std::span<std::int16_t>) {
+const Converter* converter(itk::IOComponentEnum type) {
   switch (type) {
     case itk::IOComponentEnum::UCHAR:
-      return convert<unsigned char>;
+      return &kConverter<unsigned char>;
     case itk::IOComponentEnum::CHAR:
-      return convert<signed char>;
+      return &kConverter<signed char>;
     case itk::IOComponentEnum::USHORT:
-      return convert<unsigned short>;
+      return &kConverter<unsigned short>;
     case itk::IOComponentEnum::SHORT:
-      return convert<short>;
+      return &kConverter<short>;
     case itk::IOComponentEnum::UINT:
-      return convert<unsigned>;
+      return &kConverter<unsigned>;
     case itk::IOComponentEnum::INT:
-      return convert<int>;
+      return &kConverter<int>;
     case itk::IOComponentEnum::ULONG:
-      return convert<unsigned long>;
+      return &kConverter<unsigned long>;
     case itk::IOComponentEnum::LONG:
-      return convert<long>;
+      return &kConverter<long>;
     case itk::IOComponentEnum::ULONGLONG:
-      return convert<unsigned long long>;
+      return &kConverter<unsigned long long>;
     case itk::IOComponentEnum::LONGLONG:
-      return convert<long long>;
+      return &kConverter<long long>;
     case itk::IOComponentEnum::FLOAT:
-      return convert<float>;
+      return &kConverter<float>;
     case itk::IOComponentEnum::DOUBLE:
-      return convert<double>;
+      return &kConverter<double>;
     default:
       return nullptr;
   }
@@ -82,9 +109,33 @@ tl::unexpected<Error> damaged(const fs::path& file) {
   return bad_input(file.string() + " is truncated or damaged; copy or export it again");
 }
 
+// Calls `on_slice` with the bytes of each slice, until it fails.
+Result<void> read_slices(const fs::path& file, VolumeFormat format,
+                         const std::function<Result<void>(const Converter&, const char* bytes)>& on_slice) {
+  const itk::ImageIOBase::Pointer io = reader_of(file, format);
+  const Converter* convert = converter(io->GetComponentType());
+  if (io->GetNumberOfDimensions() < 3 || convert == nullptr) return damaged(file);
+  itk::ImageIORegion all(io->GetNumberOfDimensions());
+  for (unsigned d = 0; d < io->GetNumberOfDimensions(); ++d) all.SetSize(d, io->GetDimensions(d));
+  io->SetIORegion(all);
+  std::vector<char> voxels(static_cast<std::size_t>(io->GetImageSizeInBytes()));
+  io->Read(voxels.data());
+  const std::size_t slice_bytes =
+      io->GetDimensions(0) * io->GetDimensions(1) * io->GetNumberOfComponents() * io->GetComponentSize();
+  for (std::size_t s = 0; s < io->GetDimensions(2); ++s)
+    if (auto taken = on_slice(*convert, voxels.data() + s * slice_bytes); !taken) return taken;
+  return {};
+}
+
+// Numbers of a slice.
+std::size_t slice_numbers(const fs::path& file, VolumeFormat format) {
+  const itk::ImageIOBase::Pointer io = reader_of(file, format);
+  return io->GetDimensions(0) * io->GetDimensions(1) * io->GetNumberOfComponents();
+}
+
 }  // namespace
 
-Result<VolumeHeader> read_volume_header(const fs::path& file, VolumeFormat format) try {
+Result<VolumeHeader> read_volume_header(const fs::path& file, VolumeFormat format, VoxelContent content) try {
   const itk::ImageIOBase::Pointer io = reader_of(file, format);
   // A dimension of one step is no obstacle.
   for (unsigned d = 3; d < io->GetNumberOfDimensions(); ++d)
@@ -92,11 +143,14 @@ Result<VolumeHeader> read_volume_header(const fs::path& file, VolumeFormat forma
       return failure(ErrorCode::unsupported, file.string() + " has " + std::to_string(io->GetDimensions(d)) +
                                                  " volumes; give a file with one of them");
   if (io->GetNumberOfDimensions() < 3) return bad_input(file.string() + " has one slice; give a scan with several");
-  if (io->GetNumberOfComponents() != 1 || converter(io->GetComponentType()) == nullptr)
-    return failure(ErrorCode::unsupported,
-                   file.string() + " has colours or vectors; give a CT, with one number for each voxel");
   VolumeHeader header;
-  header.voxel_bytes = io->GetComponentSize();
+  header.layers = io->GetNumberOfComponents();
+  const bool layered = content == VoxelContent::labels && format == VolumeFormat::nrrd;
+  if ((header.layers != 1 && !layered) || header.layers == 0 || converter(io->GetComponentType()) == nullptr)
+    return failure(ErrorCode::unsupported, file.string() + " has colours or vectors; give a " +
+                                               (content == VoxelContent::hu ? "CT" : "label map") +
+                                               ", with one number for each voxel");
+  header.voxel_bytes = io->GetComponentSize() * header.layers;
   for (unsigned d = 0; d < 3; ++d) {
     header.dims[d] = io->GetDimensions(d);
     header.spacing_mm[d] = io->GetSpacing(d);
@@ -111,25 +165,73 @@ Result<VolumeHeader> read_volume_header(const fs::path& file, VolumeFormat forma
   return damaged(file);
 }
 
-Result<void> read_volume_slices(const fs::path& file, VolumeFormat format,
-                                const std::function<void(std::span<const std::int16_t>)>& on_slice) try {
-  const itk::ImageIOBase::Pointer io = reader_of(file, format);
-  const auto to_slice = converter(io->GetComponentType());
-  if (io->GetNumberOfDimensions() < 3 || to_slice == nullptr) return damaged(file);
-  itk::ImageIORegion all(io->GetNumberOfDimensions());
-  for (unsigned d = 0; d < io->GetNumberOfDimensions(); ++d) all.SetSize(d, io->GetDimensions(d));
-  io->SetIORegion(all);
-  std::vector<char> voxels(static_cast<std::size_t>(io->GetImageSizeInBytes()));
-  io->Read(voxels.data());
-  std::vector<std::int16_t> slice(io->GetDimensions(0) * io->GetDimensions(1));
-  const std::size_t slice_bytes = slice.size() * io->GetComponentSize();
-  for (std::size_t s = 0; s < io->GetDimensions(2); ++s) {
-    to_slice(voxels.data() + s * slice_bytes, slice);
-    on_slice(slice);
+Result<HeaderFields> read_segment_fields(const fs::path& file) try {
+  const itk::ImageIOBase::Pointer io = reader_of(file, VolumeFormat::nrrd);
+  HeaderFields fields;
+  for (const std::string& key : io->GetMetaDataDictionary().GetKeys()) {
+    std::string value;
+    if (key.starts_with("Segment") && itk::ExposeMetaData<std::string>(io->GetMetaDataDictionary(), key, value))
+      fields.emplace_back(key, value);
   }
-  return {};
+  return fields;
 } catch (const itk::ExceptionObject&) {
   return damaged(file);
+}
+
+Result<void> read_volume_slices(const fs::path& file, VolumeFormat format,
+                                const std::function<void(std::span<const std::int16_t>)>& on_slice) try {
+  std::vector<std::int16_t> slice(slice_numbers(file, format));
+  return read_slices(file, format, [&](const Converter& convert, const char* bytes) -> Result<void> {
+    convert.to_hu(bytes, slice);
+    on_slice(slice);
+    return {};
+  });
+} catch (const itk::ExceptionObject&) {
+  return damaged(file);
+}
+
+Result<void> read_label_slices(const fs::path& file, VolumeFormat format,
+                               const std::function<void(std::span<const std::uint16_t>)>& on_slice) try {
+  std::vector<std::uint16_t> slice(slice_numbers(file, format));
+  return read_slices(file, format, [&](const Converter& convert, const char* bytes) -> Result<void> {
+    if (const std::optional<double> wrong = convert.to_labels(bytes, slice)) {
+      std::array<char, 32> text{};
+      std::snprintf(text.data(), text.size(), "%.6g", *wrong);
+      return bad_input(file.string() + " has a voxel of " + text.data() +
+                       ", and labels are whole numbers from 0 to 65535; export it as a label map");
+    }
+    on_slice(slice);
+    return {};
+  });
+} catch (const itk::ExceptionObject&) {
+  return damaged(file);
+}
+
+Result<void> write_label_volume(const fs::path& file, VolumeFormat format, const VolumeHeader& header,
+                                std::span<const std::uint8_t> labels, const HeaderFields& fields) try {
+  const itk::ImageIOBase::Pointer io = format_of(format);
+  io->SetFileName(file.string());
+  io->SetNumberOfDimensions(3);
+  itk::ImageIORegion all(3);
+  for (unsigned d = 0; d < 3; ++d) {
+    io->SetDimensions(d, header.dims[d]);
+    io->SetSpacing(d, header.spacing_mm[d]);
+    io->SetOrigin(d, header.origin_mm[d]);
+    io->SetDirection(d, std::vector<double>(header.axes[d].begin(), header.axes[d].end()));
+    all.SetSize(d, header.dims[d]);
+  }
+  io->SetPixelType(itk::IOPixelEnum::SCALAR);
+  io->SetComponentType(itk::IOComponentEnum::UCHAR);
+  io->SetNumberOfComponents(1);
+  for (const auto& [key, value] : fields)
+    itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
+  io->SetIORegion(all);
+  io->SetUseCompression(true);  // of NIfTI, the ending decides
+  io->WriteImageInformation();
+  io->Write(labels.data());
+  return {};
+} catch (const itk::ExceptionObject&) {
+  return failure(ErrorCode::internal, "cannot write " + file.string());
 }
 
 }  // namespace osteon::import

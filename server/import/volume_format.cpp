@@ -49,9 +49,9 @@ class OpenFile {
   OpenFile(const OpenFile&) = delete;
   OpenFile& operator=(const OpenFile&) = delete;
 
-  [[nodiscard]] std::string unpacked_head() const {
+  [[nodiscard]] std::string unpacked_head(std::size_t bytes) const {
     const Archive a = unpacking(descriptor_);
-    std::string head(kHeadLength, '\0');
+    std::string head(bytes, '\0');
     const auto n = a ? archive_read_data(a.get(), head.data(), head.size()) : 0;
     head.resize(n > 0 ? static_cast<std::size_t>(n) : 0);
     return head;
@@ -80,7 +80,7 @@ bool is_packed(const fs::path& file) {
   return mark[0] == '\x1f' && mark[1] == '\x8b';
 }
 
-std::string first_bytes(const fs::path& file) { return OpenFile(file).unpacked_head(); }
+std::string first_bytes(const fs::path& file) { return unpacked_head(file, kHeadLength); }
 
 template <class T>
 T number_at(const std::string& bytes, std::size_t at) {
@@ -217,6 +217,8 @@ Result<MaybeStored> stored_meta_image(const fs::path& file, std::uint64_t bytes)
 }
 
 }  // namespace
+
+std::string unpacked_head(const fs::path& file, std::size_t bytes) { return OpenFile(file).unpacked_head(bytes); }
 
 VolumeFormat volume_format(const fs::path& file) {
   const std::string head = first_bytes(file);

@@ -18,6 +18,9 @@ enum class VolumeFormat { none, nifti, nrrd, meta_image };
 // ITK needs the ending of the format. Errors: invalid_input (another ending), unsupported (NIfTI-2).
 [[nodiscard]] Result<void> check_kind(const std::filesystem::path& file, VolumeFormat format);
 
+// The first bytes of a file, unpacked if it is compressed; all of a shorter one.
+[[nodiscard]] std::string unpacked_head(const std::filesystem::path& file, std::size_t bytes);
+
 // False if nothing in the file says how the volume lies in the patient. Then left and right are a guess.
 [[nodiscard]] bool says_orientation(const std::filesystem::path& file, VolumeFormat format);
 

@@ -1,6 +1,7 @@
-// Target for label volumes: a PNG slice.
+// Targets for labels: a PNG slice, names that a person gives, and names in the headers of label maps.
 #include <png.h>
 
+#include <algorithm>
 #include <array>
 #include <set>
 #include <span>
@@ -9,6 +10,9 @@
 #include "common/core/check.hpp"
 #include "common/core/digest.hpp"
 #include "server/import/label_import.hpp"
+#include "server/import/nifti_names.hpp"
+#include "server/import/slicer_segments.hpp"
+#include "server/import/structure_names.hpp"
 #include "tests/fuzz/import_files.hpp"
 #include "tests/fuzz/import_targets.hpp"
 
@@ -59,7 +63,55 @@ void read_label_slice(std::span<const std::uint8_t> data) {
   OSTEON_CHECK(made->labelled_mm3 > 0.0 && made->bone.volume_mm3() > 0.0);
 }
 
+void read_names(std::span<const std::uint8_t> data) {
+  const auto names = import::parse_label_names({std::string(data.begin(), data.end())});
+  if (!names) return expect_bounded(names.error());
+  for (const auto& [from, structure] : names->given)
+    OSTEON_CHECK(!from.empty() && structure.name.size() <= 100 && (!structure.kind || !structure.name.empty()));
+}
+
+// Bytes as the header of a NIfTI file, and their lines as fields of NRRD.
+void read_headers(std::span<const std::uint8_t> data) {
+  const std::string text(data.begin(), data.end());
+  for (const auto& [number, name] : import::nifti_label_names(text)) OSTEON_CHECK(number > 0);
+  import::HeaderFields fields;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string line = text.substr(begin, end - begin);
+    if (const std::size_t at = line.find(":="); at != std::string::npos)
+      fields.emplace_back(line.substr(0, at), line.substr(at + 2));
+    begin = end + 1;
+  }
+  const auto segments = import::slicer_segments(fields);
+  if (!segments) return expect_bounded(segments.error());
+  for (const import::SlicerSegment& segment : *segments) OSTEON_CHECK(segment.layer >= 0 && segment.value > 0);
+}
+
+std::string nifti_with_names() {
+  std::string header(352, '\0');
+  header[348] = 1;
+  const std::string xml =
+      "<CaretExtension><VolumeInformation><LabelTable><Label Key=\"75\">femur_left</Label>"
+      "<Label Key=\"52\">aorta</Label></LabelTable></VolumeInformation></CaretExtension>";
+  return header + std::string{static_cast<char>(xml.size() + 8), 0, 0, 0, 0, 0, 0, 0} + xml;
+}
+
 }  // namespace
+
+Target label_names_target() {
+  return {"label_names",
+          read_names,
+          {bytes_of_text("totalsegmentator,3=my guide:metal,Segment_4=:none"),
+           bytes_of_text("1=femur_left, 2=sciatic nerve,7=Left common carotid artery")}};
+}
+
+Target label_header_target() {
+  return {"label_header",
+          read_headers,
+          {bytes_of_text(nifti_with_names()),
+           bytes_of_text("Segment0_Name:=femur\nSegment0_LabelValue:=3\nSegment0_Layer:=0\n"
+                         "Segment1_Name:=vein\nSegment1_Tags:=TerminologyEntry:a~SCT^1^b~SCT^2^Vein~^^~|\n")}};
+}
 
 Target label_slice_target() {
   Target target{"label_slice",

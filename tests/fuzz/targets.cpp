@@ -245,7 +245,12 @@ std::vector<Target> targets() {
       dicom_target(),
       inv3_target(),
       scan_archive_target(),
-      label_slice_target()};
+      label_slice_target(),
+      raw_volume_target(),
+      grey_slice_target(),
+      label_names_target(),
+      label_header_target(),
+      dicom_segments_target()};
 }
 
 }  // namespace osteon::fuzz

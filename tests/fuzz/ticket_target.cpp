@@ -10,6 +10,7 @@
 #include "common/access/access_list.hpp"
 #include "common/access/ticket.hpp"
 #include "common/core/check.hpp"
+#include "tests/fuzz/import_files.hpp"
 
 namespace osteon::fuzz {
 namespace {
@@ -21,8 +22,6 @@ TicketKey fixed_key() {
   key.seed.fill(0x5a);
   return key;
 }
-
-Bytes bytes_of(std::string_view text) { return {text.begin(), text.end()}; }
 
 std::string base64(std::span<const std::uint8_t> bytes) {
   std::string text(sodium_base64_encoded_len(bytes.size(), sodium_base64_VARIANT_URLSAFE_NO_PADDING), '\0');
@@ -55,7 +54,7 @@ SecretKey secret_key() {
 void open_signed(std::span<const std::uint8_t> contents) {
   if (contents.size() > 700) return;
   static const SecretKey secret = secret_key();
-  Bytes all = bytes_of("osteon join ticket 1\n");
+  Bytes all = bytes_of_text("osteon join ticket 1\n");
   all.insert(all.end(), contents.begin(), contents.end());
   std::array<std::uint8_t, crypto_sign_BYTES> signature{};
   crypto_sign_detached(signature.data(), nullptr, all.data(), all.size(), secret.data());
@@ -93,13 +92,13 @@ Bytes contents(const std::string& room, const std::string& user) {
 }  // namespace
 
 Target ticket_target() {
-  return {
-      .name = "ticket",
-      .run =
-          [](std::span<const std::uint8_t> data) {
-            open_text({reinterpret_cast<const char*>(data.data()), data.size()});
-          },
-      .seeds = {bytes_of(a_ticket("ward", "anna")), bytes_of(a_ticket(std::string(255, 'r'), std::string(64, 'u')))}};
+  return {.name = "ticket",
+          .run =
+              [](std::span<const std::uint8_t> data) {
+                open_text({reinterpret_cast<const char*>(data.data()), data.size()});
+              },
+          .seeds = {bytes_of_text(a_ticket("ward", "anna")),
+                    bytes_of_text(a_ticket(std::string(255, 'r'), std::string(64, 'u')))}};
 }
 
 Target ticket_contents_target() {
@@ -109,8 +108,8 @@ Target ticket_contents_target() {
 Target access_list_target() {
   return {.name = "access_list",
           .run = read_list,
-          .seeds = {bytes_of("# left\nrevoke user anna\nrevoke certificate 0A:1f\nrevoke ticket 00ff\nrole ben "
-                             "observer my room\nrole eve instructor\n")}};
+          .seeds = {bytes_of_text("# left\nrevoke user anna\nrevoke certificate 0A:1f\nrevoke ticket 00ff\nrole ben "
+                                  "observer my room\nrole eve instructor\n")}};
 }
 
 }  // namespace osteon::fuzz

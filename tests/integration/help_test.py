@@ -14,7 +14,7 @@ WIDEST = 100  # columns
 
 
 def said(*command):
-    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run([*map(str, command)], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise AssertionError(f"{command}: exit code {done.returncode}: {done.stderr}")
     return done.stdout

@@ -15,6 +15,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -82,6 +83,7 @@ def end(process):
         process.wait(10)
     except subprocess.TimeoutExpired:
         os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
 
 
 def stop_on_sigterm():
@@ -89,6 +91,21 @@ def stop_on_sigterm():
     def stop(_number, _frame):
         raise KeyboardInterrupt
     signal.signal(signal.SIGTERM, stop)
+
+
+@contextmanager
+def signals_held():
+    """Delays SIGINT and SIGTERM, so that they cannot come between the start of a process and its name."""
+    came = []
+    handlers = {number: signal.signal(number, lambda number, _: came.append(number))
+                for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for number in came:
+            signal.raise_signal(number)
 
 
 class Copy:
@@ -116,15 +133,17 @@ class Copy:
 
     def run(self, command, cwd, seconds=None):
         """The exit code, and None after a timeout. Ends the command with all that it started."""
-        with open(self.log, "ab") as log, subprocess.Popen(command, cwd=cwd, stdout=log, stderr=log,
-                                                           stdin=subprocess.DEVNULL, start_new_session=True) as process:
-            try:
-                return process.wait(seconds)
-            except subprocess.TimeoutExpired:
-                return None
-            finally:
-                if process.poll() is None:
-                    end(process)
+        process = None
+        try:
+            with open(self.log, "ab") as log, signals_held():
+                process = subprocess.Popen(command, cwd=cwd, stdout=log, stderr=log, stdin=subprocess.DEVNULL,
+                                           start_new_session=True)
+            return process.wait(seconds)
+        except subprocess.TimeoutExpired:
+            return None
+        finally:
+            if process and process.poll() is None:
+                end(process)
 
     def build(self, target):
         build = self.tree / "build/dev"

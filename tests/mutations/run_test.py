@@ -8,6 +8,7 @@ import tempfile
 import time
 import unittest
 from pathlib import Path
+from unittest import mock
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 
@@ -156,6 +157,19 @@ class Copies(unittest.TestCase):
             running.send_signal(signal.SIGTERM)
             running.wait(60)
             self.assertFalse(Path("/proc", begun.read_text().strip()).exists())
+
+    def test_a_signal_while_a_command_begins_ends_it_too(self):
+        def popen_with_signal(*args, **keywords):
+            begun.append(popen(*args, **keywords))
+            signal.raise_signal(signal.SIGINT)
+            return begun[0]
+
+        begun, popen = [], subprocess.Popen
+        with tempfile.TemporaryDirectory() as folder, mock.patch.object(subprocess, "Popen", popen_with_signal):
+            with self.assertRaises(KeyboardInterrupt):
+                run.Copy(Path(folder), Path(folder) / "tree", 1, 1.0).run(["sleep", "600"], folder)
+        self.addCleanup(begun[0].kill)
+        self.assertIsNotNone(begun[0].returncode)
 
     def test_names_the_test_that_fails_first(self):
         ended = {

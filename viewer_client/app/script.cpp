@@ -79,7 +79,7 @@ Parsed parse_number(const std::vector<std::string_view>& words, std::string_view
 std::optional<ItemPlace> parse_where(const std::vector<std::string_view>& words, std::size_t& next) {
   const auto vector_after = [&](std::string_view word) -> std::optional<Vec3> {
     if (next + 4 > words.size() || words[next] != word) return std::nullopt;
-    const auto v = vector_at(words, next + 1);
+    auto v = vector_at(words, next + 1);
     if (v) next += 4;
     return v;
   };

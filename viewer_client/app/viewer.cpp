@@ -66,7 +66,7 @@ Result<Viewer::State> Viewer::turn(bool interrupted) {
   receive();
   meet_people();
   draw_if_due(false);
-  const auto state = obey_script();
+  auto state = obey_script();
   if (options_.looked) options_.looked(window_->camera());
   return state;
 }

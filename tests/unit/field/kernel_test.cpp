@@ -11,6 +11,7 @@
 #include <random>
 
 #include "common/field/field_hash.hpp"
+#include "tests/support/trials.hpp"
 
 namespace osteon {
 namespace {
@@ -148,11 +149,11 @@ Cut cut_along(std::vector<Pose> path, int level = 2) {
   return cut;
 }
 
-std::vector<Vec3> points_around(const Vec3& centre, double reach, int count, unsigned seed) {
+std::vector<Vec3> points_around(const Vec3& centre, double reach, unsigned count, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> offset(-reach, reach);
   std::vector<Vec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(centre + Vec3{offset(random), offset(random), offset(random)});
+  for (unsigned i = 0; i < count; ++i) points.push_back(centre + Vec3{offset(random), offset(random), offset(random)});
   return points;
 }
 
@@ -240,8 +241,9 @@ TEST(Kernel, AHullSweptIsTheUnionOfItsPoses) {
       const Pose a = pose_along({0, 0, 0}, {0.3, 0.1, -1}), b = pose_along(way, {0.3, 0.1, -1});
       const SweptTool swept(cut_along({a, b}), body, kPitch);
       const Pose from = dequantise(quantise(a)), to = dequantise(quantise(b));
-      int outside = 0, inside = 0;
-      for (const Vec3& point : points_around(0.5 * (a.point({0, 0, -2}) + b.point({0, 0, -2})), 4.0, 600, 3)) {
+      unsigned outside = 0, inside = 0;
+      for (const Vec3& point :
+           points_around(0.5 * (a.point({0, 0, -2}) + b.point({0, 0, -2})), 4.0, test::trials(600), 3)) {
         const double distance = static_cast<double>(swept.distance_mm(point));
         const double nearest = nearest_pose_distance(body, from, to, point, 1000);
         if (std::abs(nearest) > kExact_mm) {
@@ -252,10 +254,10 @@ TEST(Kernel, AHullSweptIsTheUnionOfItsPoses) {
         } else {
           ASSERT_LE(distance, nearest + kExact_mm);
         }
-        (nearest > 0.0 ? outside : inside) += 1;
+        ++(nearest > 0.0 ? outside : inside);
       }
-      EXPECT_GT(outside, 50);
-      EXPECT_GT(inside, 5);
+      EXPECT_GT(outside, test::trials(50));
+      EXPECT_GT(inside, test::trials(5));
     }
 }
 
@@ -320,12 +322,13 @@ std::vector<Motion> motions() {
 // Everything that is skipped without evaluation (sweeps, leaves, edges, planes, rows) must not matter.
 // A kernel without optimisation takes ten times as long for each leaf. The optimised builds check all of them.
 #ifdef OSTEON_KERNEL_IS_SLOW
-constexpr std::int32_t kEveryLeaf = 5;
+constexpr unsigned kEveryLeaf = 5;
 #else
-constexpr std::int32_t kEveryLeaf = 1;
+constexpr unsigned kEveryLeaf = 1;
 #endif
 
 TEST(Kernel, WhatIsPassedOverChangesNothing) {
+  const auto every = static_cast<std::int32_t>(kEveryLeaf * 4 / test::trials(4));
   for (const Motion& motion : motions()) {
     const SweptTool swept(cut_along(motion.path), motion.body, kPitch);
     const float band = band_mm(kFine);
@@ -336,7 +339,7 @@ TEST(Kernel, WhatIsPassedOverChangesNothing) {
     for (std::int32_t x = -8; x < 8; ++x)
       for (std::int32_t y = -8; y < 8; ++y)
         for (std::int32_t z = -8; z < 8; ++z) {
-          if ((x + 3 * y + 9 * z + 104) % kEveryLeaf != 0) continue;
+          if ((x + 3 * y + 9 * z + 104) % every != 0) continue;
           const Coord origin{8 * x, 8 * y, 8 * z};
           std::array<float, kLeafVoxels> values, after_others;
           values.fill(band);

@@ -84,6 +84,53 @@ TEST_F(Program, WrongOptionsOfSlicesAreOneSentence) {
   refused("--edges-in", "row");
 }
 
+// A block of bone in air, as raw numbers.
+TEST_F(Program, ImportsRawNumbers) {
+  std::ofstream out(folder_ / "scan.raw", std::ios::binary);
+  for (int k = 0; k < 16; ++k)
+    for (int j = 0; j < 16; ++j)
+      for (int i = 0; i < 16; ++i) {
+        const bool bone = std::min({i, j, k}) >= 4 && std::max({i, j, k}) < 12;
+        out << std::string(bone ? "\x0b\xb8" : "\x00\x18", 2);  // 3000 and 24, the higher byte first
+      }
+  out.close();
+  const std::vector<std::string> raw{"ct",     path("scan.raw"), "--size",       "16,16,16", "--spacing",   "0.5",
+                                     "--type", "uint16",         "--byte-order", "big",      "--intercept", "-1024"};
+  const auto with = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), raw.begin(), raw.end());
+    return more;
+  };
+  const auto made = test::run(kProgram, with({"--out", path("case")}));
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto bone = Case::load(path("case"));
+  ASSERT_TRUE(bone) << bone.error().message;
+  EXPECT_NEAR(bone->volume_mm3(), 64.0, 4.0);  // 8 voxels of 0.5 mm along each axis
+  EXPECT_NE(bone->info().source.find("raw CT, 16x16x16, 0.5x0.5x0.5 mm"), std::string::npos) << bone->info().source;
+  expect_refused(with({"--out", path("b"), "--skip-bytes", "1"}), "scan.raw has 8192 bytes", folder_);
+  expect_refused(with({"--out", path("b"), "--axes", "LLS"}), "--axes LLS", folder_);
+  expect_refused(with({"--out", path("b"), "--slope", "0"}), "--slope", folder_);
+  expect_refused(with({"--out", path("b"), "--grey-window", "400,1800"}), "--grey-window is for PNG", folder_);
+  expect_refused(with({"--out", path("b"), "--series", "1"}), "--series is for DICOM", folder_);
+}
+
+TEST_F(Program, OptionsOfRawNumbersAndPngSlicesThatDoNotFitAreOneSentence) {
+  fs::create_directory(folder_ / "slices");
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    more.insert(more.begin(), {"ct", path("slices"), "--out", path("case")});
+    expect_refused(more, why, folder_);
+  };
+  refused({"--size", "16,16,16"}, "--size needs --spacing");
+  refused({"--size", "16,16", "--spacing", "1"}, "--size 16,16 is not a number of voxels");
+  refused({"--spacing", "0"}, "--spacing 0 is not a voxel size");
+  refused({"--spacing", "1"}, "has no PNG files");
+  refused({"--type", "uint8"}, "--type is for raw numbers and PNG slices; give --spacing");
+  refused({"--type", "int8", "--size", "16,16,16", "--spacing", "1"}, "--type");
+  refused({"--spacing", "1", "--type", "uint8"}, "--type is for raw numbers; give --size");
+  refused({"--spacing", "1", "--skip-bytes", "-1"}, "--skip-bytes");
+  refused({"--spacing", "1", "--grey-window", "400"}, "--grey-window 400 is not a window");
+  refused({"--spacing", "1", "--grey-window", "400,1800", "--slope", "2"}, "give either");
+}
+
 TEST_F(Program, MakesAPhantomAndReportsIt) {
   const auto made = test::run(kProgram, {"phantom", "block", "--layers", "3:1.9,4:0.5", "--width", "8", "--pitch",
                                          "0.5", "--out", path("case"), "--title", "Plate"});
@@ -123,6 +170,8 @@ TEST_F(Program, ImportsThePhantomsDicomSeries) {
 TEST_F(Program, WrongInputsAreOneSentence) {
   std::ofstream(folder_ / "letter.txt") << "Dear reader\n";
   expect_refused({"ct", path("letter.txt"), "--out", path("case")}, path("letter.txt"), folder_);
+  expect_refused({"ct", path("letter.txt"), "--out", path("case")},
+                 "--size, --spacing and --type if it holds raw numbers", folder_);
   expect_refused({"ct", path("absent"), "--out", path("case")}, path("absent"), folder_);
   fs::create_directory(folder_ / "empty");
   expect_refused({"ct", path("empty"), "--out", path("case")}, path("empty"), folder_);

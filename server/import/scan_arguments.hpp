@@ -1,0 +1,41 @@
+// The scan that a command of osteon-import reads, as its command line names it.
+#pragma once
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "common/core/keep_going.hpp"
+#include "server/import/ct_scan.hpp"
+
+namespace CLI {  // the library's
+class App;
+}
+
+namespace osteon::import {
+
+struct ScanArguments {
+  std::string input;
+  std::optional<int> series;
+  // Of raw numbers and PNG slices, which say nothing of themselves.
+  std::string size, spacing, type, byte_order, axes, grey_window;
+  std::optional<std::uint64_t> skip_bytes;
+  std::optional<double> slope, intercept;
+};
+
+// `arguments` must live as long as the app.
+void add_scan_options(CLI::App& command, ScanArguments& arguments);
+
+// Reads a scan of any kind. With --size the input is raw numbers, with --spacing alone it is PNG slices; otherwise the
+// input's content decides. Errors: those of the readers, and invalid_input for options that do not fit.
+[[nodiscard]] Result<CtScan> read_scan(const ScanArguments& arguments, const KeepGoing& reading);
+
+// What an input is that has one scan and no series; empty for others.
+[[nodiscard]] std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going);
+
+// "X,Y,Z", or one number for all, mm. Error: invalid_input.
+[[nodiscard]] Result<Vec3> parse_spacing(const std::string& text);
+// "A,B", both finite.
+[[nodiscard]] std::optional<std::pair<double, double>> parse_pair(const std::string& text);
+
+}  // namespace osteon::import
