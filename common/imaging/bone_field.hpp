@@ -14,7 +14,8 @@ namespace osteon::imaging {
 // whole HU below it. A trilinear cell with a voxel of a kept island has no voxel of another island, because they would
 // be 26-neighbours. So the kept surface does not move. Kept marrow is raised above the threshold. Where marrow meets
 // air, the surface is half way between their values. Where it meets anything else, the surface is half way between the
-// voxels. The field is worked out part by part, so it takes no memory beside the scan's. Any thread.
+// voxels. A field that is at or above the threshold in the kept voxels and nowhere else, in whole numbers, stays as it
+// is. All is worked out part by part, so it takes no memory beside the scan's. Any thread.
 class BoneField {
  public:
   // `bones`: not 0 for kept voxels. Both must outlive the field. Error: cancelled.

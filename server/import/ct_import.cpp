@@ -3,9 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <bitset>
-#include <cmath>
 #include <new>
 #include <numeric>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "common/core/freed_memory.hpp"
@@ -21,6 +22,7 @@ namespace {
 // Smallest size of parts of an island that are reported if only marrow connects them: absolute, and relative to the
 // largest.
 constexpr double kLargePiece_cm3 = 0.5, kLargePiece = 0.1;
+
 // The part around everything at or above the threshold, with what the case keeps of the scan; the whole scan if there
 // is nothing. Error: cancelled.
 Result<ScanRegion> dense_region(const imaging::HuVolume& volume, const CtOptions& options,
@@ -118,8 +120,8 @@ Result<imaging::ThresholdSuggestion> suggested_threshold(const imaging::HuVolume
 }
 
 // The part around all regions.
-ScanRegion grown_region(const std::vector<imaging::Region>& regions, const imaging::HuVolume& volume,
-                        const CtOptions& options) {
+ScanRegion region_around_all(const std::vector<imaging::Region>& regions, const imaging::HuVolume& volume,
+                             const CtOptions& options) {
   std::array<int, 3> first = volume.dims, last{-1, -1, -1};
   for (const imaging::Region& region : regions)
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -147,8 +149,8 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
 // `bones`: what grew from seeds, if there are any.
 Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std::optional<GrownBones> bones,
                           const KeepGoing& keep_going) {
-  const auto work =
-      bones ? Result<ScanRegion>(grown_region(bones->regions, scan, options)) : dense_region(scan, options, keep_going);
+  const auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
+                          : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
   Segmented s;
   s.volume = imaging::cropped(std::move(scan), work->first, work->last);

@@ -23,7 +23,7 @@ struct Labelled {
   std::array<int, 3> labels_first{}, labels_last{};  // of all labels
 };
 
-// Widens a box by a run of voxels.
+// Widens a box so that it contains a voxel.
 void widen(std::array<int, 3>& first, std::array<int, 3>& last, const std::array<int, 3>& at) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     first[axis] = std::min(first[axis], at[axis]);
