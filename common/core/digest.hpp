@@ -32,7 +32,7 @@ class Hasher {
   [[nodiscard]] Digest finish();  // call once, last
 
  private:
-  alignas(16) std::array<std::byte, 128> state_;  // crypto_hash_sha256_state
+  alignas(16) std::array<std::byte, 128> state_;  // SHA256_CTX of OpenSSL
 };
 
 }  // namespace osteon

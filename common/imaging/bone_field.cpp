@@ -12,6 +12,8 @@ constexpr double kInside_hu = 200.0;                   // above the threshold: v
 constexpr double kNearAir_hu = -200.0;                 // a neighbour below it is air, or partly air
 constexpr double kLeastPart = 0.05, kMostPart = 0.95;  // of the distance between two voxels
 
+constexpr int kBrick = 8;
+
 // Position of the surface between a marrow voxel and an outside one, as a fraction of their distance.
 double crossing(double marrow_hu, double outside_hu) {
   if (outside_hu >= kNearAir_hu) return 0.5;
@@ -21,41 +23,98 @@ double crossing(double marrow_hu, double outside_hu) {
 
 }  // namespace
 
-Result<HuVolume> bone_field(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
-                            const KeepGoing& keep_going) {
-  HuVolume field = volume;
+BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, double threshold_hu)
+    : volume_(volume),
+      bones_(bones),
+      threshold_hu_(threshold_hu),
+      below_(static_cast<std::int16_t>(std::ceil(threshold_hu) - 1)) {
+  for (std::size_t axis = 0; axis < 3; ++axis) bricks_[axis] = (volume.dims[axis] + kBrick - 1) / kBrick;
+}
+
+Result<BoneField> BoneField::make(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+                                  const KeepGoing& keep_going) {
+  BoneField field(volume, bones, threshold_hu);
   const auto [columns, rows, slices] = volume.dims;
-  const auto below = static_cast<std::int16_t>(std::ceil(threshold_hu) - 1);
-  const auto outside_value = [&](std::size_t i) { return static_cast<double>(std::min(volume.values[i], below)); };
-  const std::array<std::ptrdiff_t, 3> step{1, columns, static_cast<std::ptrdiff_t>(columns) * rows};
+  const VoxelMask places(field.bricks_);
+  std::vector<bool> any(places.values.size(), false), all(places.values.size(), true);
   for (int slice = 0; slice < slices; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("outlining the bone");
+    if (!keep_going(static_cast<double>(slice) / slices)) return stopped_while("looking for the bone's surface");
     for (int row = 0; row < rows; ++row)
-      for (int column = 0; column < columns; ++column) {
-        const std::size_t i = volume.index(column, row, slice);
-        std::int16_t& value = field.values[i];
-        if (bones.values[i] == 0) {
-          value = std::min(value, below);
-        } else if (value < threshold_hu) {
-          // The mean over the outside neighbours of the value that gives the crossing its position on the edge to each.
-          const std::array<int, 3> at{column, row, slice};
-          double sum = 0.0;
-          int neighbours = 0;
-          for (std::size_t axis = 0; axis < 3; ++axis)
-            for (const int side : {-1, 1}) {
-              if (at[axis] + side < 0 || at[axis] + side >= volume.dims[axis]) continue;
-              const auto beside = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) + side * step[axis]);
-              if (bones.values[beside] != 0) continue;
-              const double part = crossing(volume.values[i], volume.values[beside]);
-              sum += (threshold_hu - outside_value(beside)) * part / (1.0 - part);
-              ++neighbours;
-            }
-          const double above = neighbours > 0 ? std::max(1.0, sum / neighbours) : kInside_hu;
-          value = static_cast<std::int16_t>(std::lround(std::min(32767.0, threshold_hu + above)));
-        }
+      for (int first = 0; first < columns; first += kBrick) {
+        const std::uint8_t* line = bones.values.data() + bones.index(first, row, slice);
+        const int count = std::min(kBrick, columns - first);
+        const auto kept = std::count_if(line, line + count, [](std::uint8_t bone) { return bone != 0; });
+        const std::size_t brick = places.index(first / kBrick, row / kBrick, slice / kBrick);
+        any[brick] = any[brick] || kept > 0;
+        all[brick] = all[brick] && kept == count;
       }
   }
+  for (std::size_t i = 0; i < any.size(); ++i)
+    field.brick_.push_back(all[i] ? Inside::all : any[i] ? Inside::some : Inside::none);
   return field;
+}
+
+Inside BoneField::inside(const VoxelBox& part) const {
+  const auto brick = [&](int x, int y, int z) {
+    return brick_[(static_cast<std::size_t>(z) * static_cast<std::size_t>(bricks_[1]) + static_cast<std::size_t>(y)) *
+                      static_cast<std::size_t>(bricks_[0]) +
+                  static_cast<std::size_t>(x)];
+  };
+  bool any = false, all = true;
+  for (int z = part.first[2] / kBrick; z <= part.last[2] / kBrick; ++z)
+    for (int y = part.first[1] / kBrick; y <= part.last[1] / kBrick; ++y)
+      for (int x = part.first[0] / kBrick; x <= part.last[0] / kBrick; ++x) {
+        any = any || brick(x, y, z) != Inside::none;
+        all = all && brick(x, y, z) == Inside::all;
+      }
+  if (!any) return Inside::none;
+  if (all) return Inside::all;
+  // The part may still lie on one side within its bricks.
+  any = false;
+  all = true;
+  for (int slice = part.first[2]; slice <= part.last[2]; ++slice)
+    for (int row = part.first[1]; row <= part.last[1]; ++row) {
+      const std::uint8_t* line = bones_.values.data() + bones_.index(part.first[0], row, slice);
+      for (int i = 0; i < part.dim(0); ++i) {
+        any = any || line[i] != 0;
+        all = all && line[i] != 0;
+      }
+      if (any && !all) return Inside::some;
+    }
+  return all ? Inside::all : Inside::none;
+}
+
+// The mean over the outside neighbours of the value that gives the crossing its position on the edge to each.
+std::int16_t BoneField::marrow_value(const std::array<int, 3>& at, std::size_t i) const {
+  const std::array<std::ptrdiff_t, 3> step{1, volume_.dims[0],
+                                           static_cast<std::ptrdiff_t>(volume_.dims[0]) * volume_.dims[1]};
+  double sum = 0.0;
+  int neighbours = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const int side : {-1, 1}) {
+      if (at[axis] + side < 0 || at[axis] + side >= volume_.dims[axis]) continue;
+      const auto beside = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) + side * step[axis]);
+      if (bones_.values[beside] != 0) continue;
+      const double part = crossing(volume_.values[i], volume_.values[beside]);
+      const double outside = std::min(volume_.values[beside], below_);
+      sum += (threshold_hu_ - outside) * part / (1.0 - part);
+      ++neighbours;
+    }
+  const double above = neighbours > 0 ? std::max(1.0, sum / neighbours) : kInside_hu;
+  return static_cast<std::int16_t>(std::lround(std::min(32767.0, threshold_hu_ + above)));
+}
+
+void BoneField::read(const VoxelBox& part, std::span<std::int16_t> values) const {
+  std::size_t n = 0;
+  for (int slice = part.first[2]; slice <= part.last[2]; ++slice)
+    for (int row = part.first[1]; row <= part.last[1]; ++row)
+      for (int column = part.first[0]; column <= part.last[0]; ++column) {
+        const std::size_t i = volume_.index(column, row, slice);
+        const std::int16_t hu = volume_.values[i];
+        values[n++] = bones_.values[i] == 0 ? std::min(hu, below_)
+                      : hu < threshold_hu_  ? marrow_value({column, row, slice}, i)
+                                            : hu;
+      }
 }
 
 }  // namespace osteon::imaging

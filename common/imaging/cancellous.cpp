@@ -115,34 +115,41 @@ std::vector<Place> places_of(const VoxelMask& mask) {
 // Of the candidates, those from which a straight line through candidates leads to dense bone in both directions, along
 // one of the 13 directions of neighbours.
 Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& dense, const KeepGoing& keep_going) {
+  constexpr std::uint8_t kBack = 1, kFore = 2, kBetween = 4;
   const std::vector<Place> places = places_of(candidate);
-  VoxelMask between(candidate.dims), back(candidate.dims);
+  VoxelMask found(candidate.dims);
   const auto [columns, rows, slices] = candidate.dims;
   int direction = 0;
   for (int neighbour = 14; neighbour < 27; ++neighbour, ++direction) {  // later in memory than the voxel itself
     const std::array<int, 3> d{neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1};
-    VoxelMask fore(candidate.dims);
-    const auto lead = [&, columns = columns, rows = rows, slices = slices](const Place& p, int sign, VoxelMask& leads) {
+    // Along a line, every candidate is visited before it is asked, so bits of an earlier direction do not matter.
+    const auto lead = [&, columns = columns, rows = rows, slices = slices](const Place& p, int sign, std::uint8_t bit) {
+      std::uint8_t& to = found.at(p.column, p.row, p.slice);
+      to = static_cast<std::uint8_t>(to & ~bit);
       const int x = p.column + sign * d[0], y = p.row + sign * d[1], z = p.slice + sign * d[2];
-      if (x < 0 || y < 0 || z < 0 || x >= columns || y >= rows || z >= slices) return std::uint8_t{0};
+      if (x < 0 || y < 0 || z < 0 || x >= columns || y >= rows || z >= slices) return;
       const std::size_t i = candidate.index(x, y, z);
-      return static_cast<std::uint8_t>(dense.values[i] != 0 || (candidate.values[i] != 0 && leads.values[i] != 0) ? 1
-                                                                                                                  : 0);
+      if (dense.values[i] != 0 || (candidate.values[i] != 0 && (found.values[i] & bit) != 0))
+        to = static_cast<std::uint8_t>(to | bit);
     };
     std::size_t asked = 0;
     const auto stop = [&] { return (asked++ & 0xfffff) == 0 && !keep_going(direction / 13.0); };
     for (const Place& p : places) {
       if (stop()) return stopped_while("looking for cancellous bone");
-      back.at(p.column, p.row, p.slice) = lead(p, -1, back);
+      lead(p, -1, kBack);
     }
     for (auto p = places.rbegin(); p != places.rend(); ++p) {
       if (stop()) return stopped_while("looking for cancellous bone");
-      const std::uint8_t leads = lead(*p, 1, fore);
-      fore.at(p->column, p->row, p->slice) = leads;
-      if (leads != 0 && back.at(p->column, p->row, p->slice) != 0) between.at(p->column, p->row, p->slice) = 1;
+      lead(*p, 1, kFore);
+      std::uint8_t& bits = found.at(p->column, p->row, p->slice);
+      if ((bits & kFore) != 0 && (bits & kBack) != 0) bits = static_cast<std::uint8_t>(bits | kBetween);
     }
   }
-  return between;
+  for (const Place& p : places) {
+    std::uint8_t& bits = found.at(p.column, p.row, p.slice);
+    bits = (bits & kBetween) != 0 ? 1 : 0;
+  }
+  return found;
 }
 
 // Against air, the edge of cancellous bone is half way to air, far below `cancellous_hu`. Adds the voxels that are more

@@ -191,18 +191,25 @@ Result<VoxelMask> enclosed_by(const VoxelMask& solid, const Vec3& spacing_mm, co
   if (auto marked = mark_closed(*wall, spacing_mm, params, ends, cores, part(keep_going, 0.15, 0.35)); !marked)
     return tl::unexpected(marked.error());
 
-  VoxelMask closed = solid;
+  // Masks go as soon as nobody reads them any more, because each is as large as half the scan.
+  VoxelMask closed;
   if (std::ranges::any_of(cores.values, [](std::uint8_t v) { return v != 0; })) {
-    VoxelMask centres(solid.dims);  // of the ball, outside
+    VoxelMask centres = std::move(*wall);  // of the ball, outside
     for (std::size_t i = 0; i < centres.values.size(); ++i)
-      centres.values[i] = wall->values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
+      centres.values[i] = centres.values[i] == 0 && cores.values[i] == 0 ? 1 : 0;
     auto reach = within_mm(centres, spacing_mm, params.bridged_mm, part(keep_going, 0.35, 0.5));
     if (!reach) return reach;
+    centres = {};
     auto grown = grow_cores(solid, cores, *reach, spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.5, 0.8));
     if (!grown) return grown;
+    closed = std::move(*grown);
     for (std::size_t i = 0; i < closed.values.size(); ++i)
-      if (grown->values[i] != 0) closed.values[i] = 1;
+      if (solid.values[i] != 0) closed.values[i] = solid.values[i];
+  } else {
+    closed = solid;
   }
+  *wall = {};
+  cores = {};
   if (!keep_going(0.8)) return stopped_while("looking for marrow spaces");
   // The rest of narrow spaces behind them, and every other hole that no path of voxels leaves.
   VoxelMask enclosed(solid.dims);

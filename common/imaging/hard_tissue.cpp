@@ -16,7 +16,6 @@ Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bon
                                     const DensityCalibration& calibration, const KeepGoing& keep_going) {
   const double hard_hu = hounsfield(calibration, kCompactBone_g_cm3);
   HardTissue found;
-  VoxelMask metal(volume.dims);
   bool any = false, any_metal = false;
   const auto stopped = [&](double done) { return !keep_going(done); };
   const Error cancelled{ErrorCode::cancelled, "stopped while looking for metal"};
@@ -24,11 +23,13 @@ Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bon
     if (i % kOften == 0 && stopped(0.3 * static_cast<double>(i) / static_cast<double>(volume.values.size())))
       return tl::unexpected(cancelled);
     any = any || volume.values[i] > hard_hu;
-    metal.values[i] = volume.values[i] >= kMetal_hu ? 1 : 0;
-    any_metal = any_metal || metal.values[i] != 0;
+    any_metal = any_metal || volume.values[i] >= kMetal_hu;
   }
   if (!any) return found;
+  VoxelMask metal;
   if (any_metal) {
+    metal = VoxelMask(volume.dims);
+    for (std::size_t i = 0; i < volume.values.size(); ++i) metal.values[i] = volume.values[i] >= kMetal_hu ? 1 : 0;
     auto near = within_mm(metal, Vec3::Ones(), kBlur_voxels, [&](double done) { return keep_going(0.3 + 0.6 * done); });
     if (!near) return tl::unexpected(near.error());
     metal = std::move(*near);
@@ -38,7 +39,7 @@ Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bon
   for (std::size_t i = 0; i < volume.values.size(); ++i) {
     if (i % kOften == 0 && stopped(0.9)) return tl::unexpected(cancelled);
     if (volume.values[i] <= hard_hu || bones.values[i] == 0) continue;
-    const bool is_metal = metal.values[i] != 0;
+    const bool is_metal = any_metal && metal.values[i] != 0;
     found.tissue.values[i] = is_metal ? kMetal : kEnamel;
     ++(is_metal ? metal_voxels : enamel_voxels);
   }

@@ -39,6 +39,28 @@ struct HuVolume {
   }
 };
 
+// A box of voxels: columns, rows, slices; both ends included.
+struct VoxelBox {
+  std::array<int, 3> first{}, last{};
+
+  [[nodiscard]] int dim(std::size_t axis) const { return last[axis] - first[axis] + 1; }
+  [[nodiscard]] std::size_t count() const {
+    return static_cast<std::size_t>(dim(0)) * static_cast<std::size_t>(dim(1)) * static_cast<std::size_t>(dim(2));
+  }
+  // Of a voxel of the volume in an array over this box, columns fastest.
+  [[nodiscard]] std::size_t index(int column, int row, int slice) const {
+    return (static_cast<std::size_t>(slice - first[2]) * static_cast<std::size_t>(dim(1)) +
+            static_cast<std::size_t>(row - first[1])) *
+               static_cast<std::size_t>(dim(0)) +
+           static_cast<std::size_t>(column - first[0]);
+  }
+  [[nodiscard]] bool contains(const VoxelBox& other) const {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (other.first[axis] < first[axis] || other.last[axis] > last[axis]) return false;
+    return true;
+  }
+};
+
 // "256x256x108, 0.957x0.957x1.5 mm"
 [[nodiscard]] std::string describe(const HuVolume& volume);
 

@@ -12,7 +12,12 @@ namespace osteon::imaging {
 [[nodiscard]] Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box, double pitch_mm,
                                                   const KeepGoing& keep_going);
 
-// The same for one box, into memory for all its samples, z fastest.
-void resample(const HuVolume& volume, const CoordBox& box, double pitch_mm, std::span<float> out);
+// The same for one box, into memory for all its samples, z fastest. `voxels`: the HU of `part` instead of those of the
+// volume, which need not have any; the part must contain voxels_for() the box.
+void resample(const HuVolume& volume, const VoxelBox& part, std::span<const std::int16_t> voxels, const CoordBox& box,
+              double pitch_mm, std::span<float> out);
+
+// All voxels that give the samples of a box their HU, and a few beside them.
+[[nodiscard]] VoxelBox voxels_for(const HuVolume& volume, const CoordBox& box, double pitch_mm);
 
 }  // namespace osteon::imaging

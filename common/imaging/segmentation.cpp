@@ -85,11 +85,14 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const Se
   for (std::uint8_t& value : dense.values) value = value != 0 ? 1 : 0;
   if (params.hollow) return dense;
 
-  VoxelMask solid = dense;
+  VoxelMask solid;
   if (params.cancellous_hu < params.threshold_hu) {
     auto cancellous = cancellous_between(volume, dense, params, part(keep_going, kThresholdEnd, kCancellousEnd));
     if (!cancellous) return cancellous;
-    for (std::size_t i = 0; i < solid.values.size(); ++i) solid.values[i] |= cancellous->values[i];
+    solid = std::move(*cancellous);
+    for (std::size_t i = 0; i < solid.values.size(); ++i) solid.values[i] |= dense.values[i];
+  } else {
+    solid = dense;
   }
   auto enclosed = enclosed_by(solid, volume.spacing_mm, params, ends, part(keep_going, kCancellousEnd, kEnclosedEnd));
   if (!enclosed) return enclosed;

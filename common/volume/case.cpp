@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "common/core/check.hpp"
+#include "common/core/freed_memory.hpp"
 #include "common/field/kernel.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/sparse_volume.hpp"
@@ -428,6 +429,7 @@ Result<void> Case::write(const std::filesystem::path& folder, const CaseScan* sc
         !saved)
       return saved;
     if (stopped()) return failure(ErrorCode::cancelled, "stopped; nothing was written");
+    give_back_freed_memory();
     if (scan)
       if (auto saved = save_scan(partial / kScanFile, *scan, keep_going); !saved) return saved;
     std::ofstream out(partial / kInfoFile);

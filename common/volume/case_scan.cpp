@@ -2,15 +2,19 @@
 
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Dense.h>
+#include <openvdb/tools/Prune.h>
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <limits>
+#include <memory>
 #include <new>
 #include <span>
 #include <string>
 
 #include "common/core/check.hpp"
+#include "common/core/freed_memory.hpp"
 #include "common/geometry/lattice.hpp"
 #include "common/volume/case.hpp"
 #include "common/volume/openvdb_start.hpp"
@@ -20,6 +24,7 @@ namespace osteon {
 namespace {
 
 using ScanGrid = openvdb::Int32Grid;
+using ScanLeaf = ScanGrid::TreeType::LeafNodeType;
 template <class T>
 using ScanBlock = openvdb::tools::Dense<T, openvdb::tools::LayoutXYZ>;
 
@@ -48,17 +53,92 @@ bool hash_voxels(Hasher& hasher, const char* name, const std::vector<T>& voxels,
   return true;
 }
 
+// Thrown out of OpenVDB's writing if the user stops it.
+struct WritingStopped {};
+
+// A grid of the voxels of a scan that needs hardly any memory of its own. Its leaves know which voxels differ from the
+// background, and get their values only while they are written, one after the other.
 template <class T>
-ScanGrid::Ptr grid_of(const char* name, const std::vector<T>& voxels, const ScanGeometry& geometry,
-                      std::int32_t background) {
-  // Dense takes voxels that can be changed, and copyFromDense does not change them.
-  const ScanBlock<T> block(voxels_of(geometry), const_cast<T*>(voxels.data()));
-  ScanGrid::Ptr grid = ScanGrid::create(background);
-  openvdb::tools::copyFromDense(block, *grid, 0, true);
-  grid->setName(name);
-  grid->setTransform(openvdb::math::Transform::createLinearTransform(1.0));
-  return grid;
-}
+class ScanWriter : public ScanGrid {
+ public:
+  // Both must outlive the grid.
+  ScanWriter(const char* name, const std::vector<T>& voxels, const ScanGeometry& geometry, std::int32_t background,
+             const KeepGoing& keep_going)
+      : ScanGrid(background), voxels_(voxels), last_(voxels_of(geometry).max()), keep_going_(keep_going) {
+    setName(name);
+    setTransform(openvdb::math::Transform::createLinearTransform(1.0));
+    for (openvdb::Int32 x = 0; x <= last_.x(); x += kLeafSize) {
+      ask(0.0);
+      for (openvdb::Int32 y = 0; y <= last_.y(); y += kLeafSize)
+        for (openvdb::Int32 z = 0; z <= last_.z(); z += kLeafSize) add_leaf(openvdb::Coord(x, y, z));
+    }
+    openvdb::tools::pruneTiles(tree());
+  }
+
+  void writeBuffers(std::ostream& os) const override {
+    ScanLeaf leaf;
+    std::int32_t* values = leaf.buffer().data();
+    std::size_t written = 0;
+    const auto leaves = static_cast<double>(tree().leafCount());
+    for (auto at = tree().cbeginLeaf(); at; ++at) {
+      if (written++ % kOften == 0) {
+        ask(static_cast<double>(written) / leaves);
+        give_back_freed_memory();  // compressing leaves gaps in the heap
+      }
+      std::fill_n(values, kLeafVoxels, background());
+      each_voxel(at->origin(), [values](std::int32_t value, int place) { values[place] = value; });
+      leaf.setValueMask(at->getValueMask());
+      leaf.writeBuffers(os, false);
+    }
+  }
+
+ private:
+  static constexpr std::size_t kOften = 4096;  // leaves between two calls of keep_going
+
+  void ask(double done) const {
+    if (keep_going_ && !keep_going_(done)) throw WritingStopped{};
+  }
+  // Calls `visit` with every voxel of a leaf and its place there. Columns follow each other in the scan, and slices in
+  // a leaf. Returns the number of voxels: fewer at the end of the scan.
+  template <class Visit>
+  int each_voxel(const openvdb::Coord& origin, Visit visit) const {
+    const auto count = [&](int axis) { return std::min(kLeafSize, last_[axis] + 1 - origin[axis]); };
+    const int columns = count(0), rows = count(1), slices = count(2);
+    for (int z = 0; z < slices; ++z)
+      for (int y = 0; y < rows; ++y) {
+        const T* row = &voxels_[(to_index(origin.z() + z) * to_index(last_.y() + 1) + to_index(origin.y() + y)) *
+                                    to_index(last_.x() + 1) +
+                                to_index(origin.x())];
+        for (int x = 0; x < columns; ++x) visit(row[x], (x * kLeafSize + y) * kLeafSize + z);
+      }
+    return columns * rows * slices;
+  }
+  // A leaf that knows which voxels differ from the background, but no values; a constant if all have one value.
+  void add_leaf(const openvdb::Coord& origin) {
+    const std::int32_t usual = background();
+    std::int32_t least = std::numeric_limits<std::int32_t>::max(), most = std::numeric_limits<std::int32_t>::min();
+    std::array<openvdb::Index64, ScanLeaf::NodeMaskType::WORD_COUNT> bits{};
+    const int voxels = each_voxel(origin, [&](std::int32_t value, int place) {
+      least = std::min(least, value);
+      most = std::max(most, value);
+      bits[to_index(place / 64)] |= static_cast<openvdb::Index64>(value != usual ? 1 : 0) << (place % 64);
+    });
+    if (least == most && (voxels == kLeafVoxels || most == usual)) {
+      if (most != usual) tree().addTile(1, origin, most, true);
+      return;
+    }
+    ScanLeaf::NodeMaskType mask;
+    for (openvdb::Index word = 0; word < bits.size(); ++word)
+      mask.template getWord<openvdb::Index64>(word) = bits[word];
+    auto leaf = std::make_unique<ScanLeaf>(openvdb::PartialCreate(), origin, usual);
+    leaf->setValueMask(mask);
+    tree().addLeaf(leaf.release());
+  }
+
+  const std::vector<T>& voxels_;
+  openvdb::Coord last_;  // voxel of the scan
+  const KeepGoing& keep_going_;
+};
 
 template <class T>
 void read_grid(openvdb::io::File& file, const char* name, const ScanGeometry& geometry, std::vector<T>& voxels) {
@@ -131,19 +211,24 @@ Result<void> check_labels_of(const CaseScan& scan, const CaseInfo& info) {
 
 Result<void> save_scan(const std::filesystem::path& file, const CaseScan& scan, const KeepGoing& keep_going) try {
   start_openvdb();
-  const auto stopped = [&](double done) { return keep_going && !keep_going(done); };
+  const KeepGoing all = keep_going ? keep_going : [](double) { return true; };
+  const KeepGoing hu = part(all, 0.0, 0.5), labels = part(all, 0.5, 0.75), tissue = part(all, 0.75, 1.0);
+  const ScanGeometry& geometry = scan.geometry;
   openvdb::GridPtrVec grids;
-  if (!scan.hu.empty()) grids.push_back(grid_of(kHuGrid, scan.hu, scan.geometry, kUsualPadding_hu));
-  if (stopped(0.2)) return stopped_while("writing the scan");
-  if (!scan.labels.empty()) grids.push_back(grid_of(kLabelGrid, scan.labels, scan.geometry, 0));
-  if (stopped(0.3)) return stopped_while("writing the scan");
-  if (!scan.tissue.empty()) grids.push_back(grid_of(kTissueGrid, scan.tissue, scan.geometry, 0));
-  if (stopped(0.4)) return stopped_while("writing the scan");
+  if (!scan.hu.empty())
+    grids.push_back(std::make_shared<ScanWriter<std::int16_t>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu, hu));
+  const auto add = [&](const char* name, const std::vector<std::uint8_t>& voxels, const KeepGoing& stage) {
+    if (!voxels.empty()) grids.push_back(std::make_shared<ScanWriter<std::uint8_t>>(name, voxels, geometry, 0, stage));
+  };
+  add(kLabelGrid, scan.labels, labels);
+  add(kTissueGrid, scan.tissue, tissue);
   openvdb::io::File out(file.string());
   out.write(grids);
   out.close();
-  if (stopped(1.0)) return stopped_while("writing the scan");
+  if (!all(1.0)) return stopped_while("writing the scan");
   return {};
+} catch (const WritingStopped&) {
+  return stopped_while("writing the scan");
 } catch (const std::bad_alloc&) {
   return failure(ErrorCode::exhausted, "this machine has no memory to write " + file.string());
 } catch (const std::exception& e) {

@@ -33,8 +33,8 @@ inline constexpr const char* kScanFile = "scan.vdb";  // in the folder of the ca
 [[nodiscard]] Result<void> check_labels_of(const CaseScan& scan, const CaseInfo& info);
 
 // Writes the grids "hu", "labels" and "tissue", those that are not empty, as int32 with one sample for each voxel:
-// index (i, j, k) is column, row and slice. Memory beside the scan: some 4.3 bytes for each voxel of a grid, but for
-// uniform leaves. `keep_going` is called between the grids. Errors: internal (disk), exhausted (memory), cancelled.
+// index (i, j, k) is column, row and slice. Memory beside the scan: some 0.3 byte for each voxel of a grid, but for
+// uniform leaves. `keep_going` is called often. Errors: internal (disk), exhausted (memory), cancelled.
 [[nodiscard]] Result<void> save_scan(const std::filesystem::path& file, const CaseScan& scan,
                                      const KeepGoing& keep_going = {});
 

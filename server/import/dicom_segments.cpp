@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kSegmentationStorage = "1.2.840.10008.5.1.4.1.1.66.4";
 constexpr const char* kLabelMapStorage = "1.2.840.10008.5.1.4.1.1.66.7";
-constexpr std::size_t kMostFrames = 1'000'000, kMostSegments = 65535, kShownSegmentLetters = 64;
+constexpr std::size_t kMostSegmentFrames = 1'000'000, kMostSegments = 65535, kShownSegmentLetters = 64;
 constexpr double kMostTilt = 1e-3;      // of a cosine between the axes
 constexpr double kMostShift_mm = 0.01;  // of a frame within its plane, against the first
 constexpr double kMostUneven = 0.05;    // of the distance between slices, for a frame between two
@@ -177,7 +177,7 @@ class Segmentation {
     const Items per_frame = items_of(data_, 0x5200, 0x9230);
     const std::size_t count = per_frame ? per_frame->GetNumberOfItems() : 0;
     const std::vector<double> told = decimals_of(&data_, 0x0028, 0x0008);
-    if (count == 0 || count > kMostFrames || told.size() != 1 || told[0] != static_cast<double>(count))
+    if (count == 0 || count > kMostSegmentFrames || told.size() != 1 || told[0] != static_cast<double>(count))
       throw SegFault{.what = "does not say where each of its frames lies"};
     for (std::size_t i = 1; i <= count; ++i) {
       const gdcm::DataSet* own = &per_frame->GetItem(i).GetNestedDataSet();

@@ -67,33 +67,33 @@ void list_tissues(const CaseScan& scan, CaseInfo& info) {
 
 }  // namespace
 
-CaseScan kept_scan(const imaging::HuVolume& volume, const FoundVoxels& found, const std::array<int, 3>& first,
-                   const std::array<int, 3>& last, const CtOptions& options) {
-  std::array<int, 3> low{}, high{};
-  CaseScan scan;
+imaging::VoxelBox kept_voxels(const imaging::HuVolume& volume, const std::array<int, 3>& first,
+                              const std::array<int, 3>& last, double margin_mm) {
+  imaging::VoxelBox box;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const int margin = static_cast<int>(std::ceil(options.margin_mm / volume.spacing_mm[static_cast<int>(axis)]));
-    low[axis] = std::max(0, first[axis] - margin);
-    high[axis] = std::min(volume.dims[axis] - 1, last[axis] + margin);
-    scan.geometry.dims[axis] = high[axis] - low[axis] + 1;
+    const int margin = static_cast<int>(std::ceil(margin_mm / volume.spacing_mm[static_cast<int>(axis)]));
+    box.first[axis] = std::max(0, first[axis] - margin);
+    box.last[axis] = std::min(volume.dims[axis] - 1, last[axis] + margin);
   }
-  scan.geometry.origin_mm = volume.position_mm(Vec3(low[0], low[1], low[2]));
+  return box;
+}
+
+CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
+                   const DensityCalibration& calibration) {
+  CaseScan scan;
+  for (std::size_t axis = 0; axis < 3; ++axis) scan.geometry.dims[axis] = box.dim(axis);
+  scan.geometry.origin_mm = volume.position_mm(Vec3(box.first[0], box.first[1], box.first[2]));
   scan.geometry.axes_mm = volume.directions * volume.spacing_mm.asDiagonal();
-  const std::size_t count = scan.geometry.count();
-  scan.hu.reserve(count);
-  scan.labels.reserve(count);
-  scan.tissue.reserve(count);
-  for (int slice = low[2]; slice <= high[2]; ++slice)
-    for (int row = low[1]; row <= high[1]; ++row)
-      for (int column = low[0]; column <= high[0]; ++column) {
-        const std::size_t i = volume.index(column, row, slice);
-        const std::uint8_t known = found.tissue.values.empty() ? std::uint8_t{0} : found.tissue.values[i];
-        scan.hu.push_back(volume.values[i]);
-        scan.labels.push_back(found.labels.values[i]);
-        scan.tissue.push_back(found.bones.values[i] == 0 ? std::uint8_t{0}
-                              : known != 0               ? known
-                                                         : tissue_of(options.calibration, volume.values[i]));
-      }
+  scan.hu = imaging::cropped(std::move(volume), box.first, box.last).values;
+  scan.labels = imaging::cropped(std::move(known.labels), box.first, box.last).values;
+  scan.tissue = known.tissue.values.empty() ? zeros<std::uint8_t>(scan.labels.size())
+                                            : imaging::cropped(std::move(known.tissue), box.first, box.last).values;
+  for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    if (!known.bone_labels[scan.labels[i]])
+      scan.tissue[i] = 0;
+    else if (scan.tissue[i] == 0)
+      scan.tissue[i] = tissue_of(calibration, scan.hu[i]);
+  }
   return scan;
 }
 

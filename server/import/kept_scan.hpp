@@ -1,6 +1,7 @@
 // The part of a CT or label volume that a case keeps as its scan, and what the case says of its labels.
 #pragma once
 #include <array>
+#include <bitset>
 
 #include "common/imaging/hu_volume.hpp"
 #include "common/imaging/label_volume.hpp"
@@ -12,19 +13,21 @@
 
 namespace osteon::import {
 
-// What was found of each voxel of a volume.
-struct FoundVoxels {
-  const imaging::VoxelMask& labels;  // what it belongs to; 0: nothing
-  const imaging::VoxelMask& bones;   // 0: not bone
-  const imaging::VoxelMask& tissue;  // a value of Tissue, for bone; 0: by its density. May be empty
+// Voxels from `first` to `last`, and those within `margin_mm` of this box along each axis.
+[[nodiscard]] imaging::VoxelBox kept_voxels(const imaging::HuVolume& volume, const std::array<int, 3>& first,
+                                            const std::array<int, 3>& last, double margin_mm);
+
+// What is known of each voxel of a volume.
+struct KnownVoxels {
+  imaging::VoxelMask labels;     // what it belongs to; 0: nothing
+  imaging::VoxelMask tissue;     // a value of Tissue, for bone; 0: by its density. Empty: all by their density
+  std::bitset<256> bone_labels;  // which labels are bone; not 0
 };
 
-// Voxels from `first` to `last`, and those within `margin_mm` of this box along each axis. HU are those of `volume`.
-// The tissue of bone that is not known is cortical from kCorticalFrom_g_cm3 on, otherwise trabecular. Voxels without a
-// bone have none.
-[[nodiscard]] CaseScan kept_scan(const imaging::HuVolume& volume, const FoundVoxels& found,
-                                 const std::array<int, 3>& first, const std::array<int, 3>& last,
-                                 const CtOptions& options);
+// The voxels of `box`, with the HU of `volume`. The tissue of bone that is not known is cortical from
+// kCorticalFrom_g_cm3 on, otherwise trabecular. Voxels without a bone have none. Takes over the memory of both.
+[[nodiscard]] CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
+                                 const DensityCalibration& calibration);
 // Lists the labels and tissues that kept_scan() gives.
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info);
 

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "common/core/freed_memory.hpp"
 #include "common/runtime/command_line.hpp"
 #include "common/runtime/log.hpp"
 #include "server/import/command.hpp"
 
 int main(int argc, char** argv) {
   using namespace osteon;
+  keep_no_large_freed_blocks();
   static constexpr const char* kProgram = "osteon-import";
   CLI::App app("Makes a case, the bone that osteon-server loads, from a CT scan, a label volume, a mesh or a phantom.",
                kProgram);

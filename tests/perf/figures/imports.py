@@ -1,6 +1,7 @@
 """Figures of the import of CT scans: the cost for real ones, and how a known bone changes by scan and import."""
 import json
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -31,12 +32,16 @@ print(os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime, used.ru_
 """
 
 
-def cost(program, scan, out):
-    """CPU seconds and peak memory, MB, of one import and its child processes. None if it fails."""
-    measured = subprocess.run([sys.executable, "-S", "-c", MEASURE, program, "ct", scan, "--out", out],
+def cost_of(*command):
+    """CPU seconds and peak memory, MB, of a program and its child processes. None if it fails."""
+    measured = subprocess.run([sys.executable, "-S", "-c", MEASURE, *map(str, command)],
                               stdout=subprocess.PIPE, text=True, check=True)
     code, seconds, megabytes = measured.stdout.split()
     return (float(seconds), float(megabytes)) if code == "0" else None
+
+
+def cost(program, scan, out):
+    return cost_of(program, "ct", scan, "--out", out)
 
 
 def real_imports(run):
@@ -62,6 +67,52 @@ def real_imports(run):
             measured = Measured(float(np.median(now)), before, min(now), max(now)) if now else Measured(None)
             values[f"import_{name}_{what}"] = measured
     return values
+
+
+def against_itk(run, slices, turns):
+    """Costs of imports of the trunk phantom and of ITK's chain on the same series, in turns, and its int16 MB."""
+    folder = run.folder / f"import-cost-{slices}"
+    folder.mkdir(exist_ok=True)
+    run.say(f"import and ITK: {slices} slices")
+    run.output("osteon-import-cost", "phantom", slices, folder / "series")
+    ours, itk = [], []
+    for turn in range(turns):
+        found = cost(run.programs / "osteon-import", folder / "series", folder / f"case-{turn}")
+        theirs = cost_of(run.programs / "osteon-import-cost", "itk", folder / "series")
+        if found is None or theirs is None:
+            return [], [], 0.0
+        ours.append(found)
+        itk.append(theirs)
+        shutil.rmtree(folder / f"case-{turn}")
+    shutil.rmtree(folder / "series")
+    return ours, itk, slices * 512 * 512 * 2 / 2**20
+
+
+def memory_ratio(ours, itk, volume_mb):
+    ratios = [memory / volume_mb for _, memory in ours]
+    if not ratios:
+        return Measured(None)
+    return Measured(float(np.median(ratios)), float(np.median([memory / volume_mb for _, memory in itk])),
+                    min(ratios), max(ratios))
+
+
+def import_cost(run):
+    ours, itk, volume_mb = against_itk(run, 302, 9 if run.soak else 5)
+    values = {"import_peak_memory_ratio": memory_ratio(ours, itk, volume_mb),
+              "import_cpu_ratio": Measured(None), "import_trunk_cpu": Measured(None)}
+    if ours:
+        # Neighbours in time, because other work on the machine changes both.
+        ratios = [a / b for (a, _), (b, _) in zip(ours, itk)]
+        seconds = [a for a, _ in ours]
+        values["import_cpu_ratio"] = Measured(float(np.median(ratios)), None, min(ratios), max(ratios))
+        values["import_trunk_cpu"] = Measured(float(np.median(seconds)), float(np.median([b for b, _ in itk])),
+                                              min(seconds), max(seconds))
+    return values
+
+
+def import_cost_long(run):
+    ours, itk, volume_mb = against_itk(run, 1500, 3 if run.soak else 1)
+    return {"import_peak_memory_long": memory_ratio(ours, itk, volume_mb)}
 
 
 def floods():

@@ -44,6 +44,7 @@ COMPARISONS = {
 
 # What tests/perf/baselines has: written to be fast, and shown to do the same work.
 STRANGERS = "the fastest of a dense array, OpenVDB's culled leaves and csgDifference"
+ITK_CHAIN = "ITK's, which reads, applies the threshold, labels, resamples and measures distances, but saves nothing"
 FILTERS = "the fastest of SciPy, scikit-image and ITK"
 EMPTY_LOOP = "the same of an empty 1 kHz loop"
 # Target of fuzz.mutations, what is changed in it, which code takes that, and number of inputs; ten million of each with
@@ -656,6 +657,13 @@ FIGURES = [
                baseline="the earlier program named by OSTEON_EARLIER_IMPORT"),
         Figure(f"import_{name}_memory", "mb", f"peak memory of the import of {what}", "real_imports",
                baseline="the earlier program"))],
+    Figure("import_trunk_cpu", "s", "CPU time from a DICOM folder of a trunk, 512 x 512 x 302, to its saved case",
+           "import_cost", baseline=ITK_CHAIN),
+    Figure("import_cpu_ratio", "ratio", f"the same over that of {ITK_CHAIN}, in turns", "import_cost", ("<=", 1.2)),
+    Figure("import_peak_memory_ratio", "ratio", "its peak memory over the scan's int16 voxels", "import_cost",
+           ("<=", 2.5), baseline=ITK_CHAIN),
+    Figure("import_peak_memory_long", "ratio", "the same for 512 x 512 x 1500", "import_cost_long", ("<=", 2.5),
+           baseline=ITK_CHAIN, full=True),
     Figure("region_growing_cpu", "ms", "CPU time of a region of 5 million voxels in a skull of 512 x 512 x 302",
            "region_growing", baseline="the fastest of ITK, SciPy and scikit-image, as far as they are installed"),
     Figure("region_growing_speedup", "ratio", "the fastest of them over ours; no number unless all voxels are the same",

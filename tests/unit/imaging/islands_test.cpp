@@ -120,20 +120,27 @@ TEST(Islands, StopsWhenAsked) {
   EXPECT_EQ(found.error().code, ErrorCode::cancelled);
 }
 
+// The whole field as a volume.
+HuVolume field_of(const HuVolume& volume, const VoxelMask& bones) {
+  HuVolume field = volume;
+  const VoxelBox whole{{0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}};
+  BoneField::make(volume, bones, kThreshold_hu, always)->read(whole, field.values);
+  return field;
+}
+
 TEST(BoneField, OtherIslandsDoNotMoveTheKeptSurface) {
   HuVolume volume = empty_volume();
   fill(volume, {2, 2, 2}, {9, 9, 9}, 900);
   fill(volume, {11, 4, 4}, {15, 7, 7}, 1500);  // as near as another island can be
   const Islands islands = islands_of(volume);
   const std::array kept{1};
-  const auto field = bone_field(volume, number_bones(islands, kept, false, volume.dims), kThreshold_hu, always);
-  ASSERT_TRUE(field);
-  EXPECT_EQ(field->at(13, 5, 5), 225);
+  const HuVolume field = field_of(volume, number_bones(islands, kept, false, volume.dims));
+  EXPECT_EQ(field.at(13, 5, 5), 225);
   // Wherever the interpolated value matters in a cell with a kept voxel, it is the same as before.
   for (double x = 1.0; x <= 10.0; x += 0.125) {
     const CoordBox at{{static_cast<int>(x * 8), 40, 40}, {static_cast<int>(x * 8), 48, 48}};
     const auto a = resample(volume, at, 0.125, always);
-    const auto b = resample(*field, at, 0.125, always);
+    const auto b = resample(field, at, 0.125, always);
     ASSERT_TRUE(a && b);
     EXPECT_EQ(a->values, b->values) << "x " << x;
   }
@@ -154,22 +161,52 @@ TEST(BoneField, MarrowEndsHalfWayToAirAndHalfWayBetweenVoxelsElsewhere) {
         volume.values[volume.index(column, row, slice)] = column < 8 ? 100 : column == 8 ? -340 : -1000;
         bones.at(column, row, slice) = column < 8 ? 1 : 0;
       }
-  auto field = bone_field(volume, bones, kThreshold_hu, always);
-  ASSERT_TRUE(field);
+  HuVolume field = field_of(volume, bones);
   // Linear between 100 and -340, the value half way to air, -450, would lie beyond the second voxel. So the crossing is
   // as far as possible.
-  EXPECT_GT(crossing(*field, 7), 0.9);
-  EXPECT_LT(crossing(*field, 7), 1.0);
+  EXPECT_GT(crossing(field, 7), 0.9);
+  EXPECT_LT(crossing(field, 7), 1.0);
   for (int row = 0; row < 20; ++row)
     for (int slice = 0; slice < 16; ++slice) volume.values[volume.index(8, row, slice)] = -1000;
-  field = bone_field(volume, bones, kThreshold_hu, always);
-  ASSERT_TRUE(field);
-  EXPECT_NEAR(crossing(*field, 7), 0.5, 0.01);
+  field = field_of(volume, bones);
+  EXPECT_NEAR(crossing(field, 7), 0.5, 0.01);
   for (int row = 0; row < 20; ++row)
     for (int slice = 0; slice < 16; ++slice) volume.values[volume.index(8, row, slice)] = 40;
-  field = bone_field(volume, bones, kThreshold_hu, always);
+  field = field_of(volume, bones);
+  EXPECT_NEAR(crossing(field, 7), 0.5, 0.01);
+}
+
+TEST(BoneField, APartHasTheVoxelsOfTheWholeAndTheirSide) {
+  HuVolume volume = empty_volume();
+  fill(volume, {3, 2, 2}, {14, 12, 12}, 900);
+  fill(volume, {6, 5, 5}, {11, 9, 9}, 60);  // marrow
+  const Islands islands = islands_of(volume);
+  const std::array kept{1};
+  const VoxelMask bones = number_bones(islands, kept, false, volume.dims);
+  const HuVolume whole = field_of(volume, bones);
+  const auto field = BoneField::make(volume, bones, kThreshold_hu, always);
   ASSERT_TRUE(field);
-  EXPECT_NEAR(crossing(*field, 7), 0.5, 0.01);
+  std::array<int, 3> found{};
+  for (int i = 0; i < 200; ++i) {
+    VoxelBox part;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      part.first[axis] = (i * (5 + static_cast<int>(axis))) % (volume.dims[axis] - 4);
+      part.last[axis] = std::min(part.first[axis] + i % 5, volume.dims[axis] - 1);
+    }
+    std::vector<std::int16_t> values(part.count());
+    field->read(part, values);
+    std::size_t inside = 0;
+    for (int z = part.first[2]; z <= part.last[2]; ++z)
+      for (int y = part.first[1]; y <= part.last[1]; ++y)
+        for (int x = part.first[0]; x <= part.last[0]; ++x) {
+          EXPECT_EQ(values[part.index(x, y, z)], whole.at(x, y, z));
+          inside += whole.at(x, y, z) >= kThreshold_hu ? 1 : 0;
+        }
+    const Inside side = inside == 0 ? Inside::none : inside == values.size() ? Inside::all : Inside::some;
+    EXPECT_EQ(field->inside(part), side);
+    ++found[static_cast<std::size_t>(side)];
+  }
+  for (const int count : found) EXPECT_GT(count, 5);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include "tests/unit/imaging/always.hpp"
 
@@ -55,6 +57,38 @@ TEST(Resample, StopsWhenAsked) {
   const auto out = resample(volume, {{0, 0, 0}, {1, 1, 1}}, 1.0, [](double) { return false; });
   ASSERT_FALSE(out);
   EXPECT_EQ(out.error().code, ErrorCode::cancelled);
+}
+
+// With voxels of three different sizes, straight and oblique, within the scan and across its ends.
+TEST(Resample, APartWithItsVoxelsHasTheBytesOfTheWhole) {
+  std::mt19937 random(4);
+  HuVolume volume;
+  volume.dims = {17, 13, 9};
+  volume.spacing_mm = {0.7, 0.9, 2.3};
+  volume.origin_mm = {-5.31, 2.17, -8.03};
+  volume.values.resize(volume.count());
+  for (std::int16_t& hu : volume.values) hu = static_cast<std::int16_t>(random() % 4000) - 1000;
+  for (const double angle : {0.0, 0.4}) {
+    volume.directions = Eigen::AngleAxisd(angle, Vec3(0.3, 1.0, 0.2).normalized()).toRotationMatrix();
+    const double pitch_mm = 0.61;
+    const Vec3 centre = volume.position_mm(Vec3(8, 6, 4));
+    for (int trial = 0; trial < 200; ++trial) {
+      const Vec3 shift(static_cast<double>(random() % 30) - 15.0, static_cast<double>(random() % 30) - 15.0,
+                       static_cast<double>(random() % 40) - 20.0);
+      const CoordBox around = covering_samples(Box{centre + shift, centre + shift}, pitch_mm);
+      const CoordBox box = around.grown(static_cast<std::int32_t>(random() % 5));
+      const VoxelBox part = voxels_for(volume, box, pitch_mm);
+      std::vector<std::int16_t> voxels(part.count());
+      for (int k = part.first[2]; k <= part.last[2]; ++k)
+        for (int j = part.first[1]; j <= part.last[1]; ++j)
+          for (int i = part.first[0]; i <= part.last[0]; ++i) voxels[part.index(i, j, k)] = volume.at(i, j, k);
+      const auto whole = resample(volume, box, pitch_mm, always);
+      ASSERT_TRUE(whole);
+      std::vector<float> found(whole->values.size());
+      resample(volume, part, voxels, box, pitch_mm, found);
+      ASSERT_EQ(found, whole->values) << "angle " << angle << ", trial " << trial;
+    }
+  }
 }
 
 }  // namespace

@@ -119,6 +119,24 @@ TEST(LabelledCt, TheScanKeepsAllLabelsAndTheTissueThatTheyName) {
   EXPECT_EQ(metal->provenance.method, "HU, or as its label says");
 }
 
+// HU of 200 are 0.34 g/cm³, the density of cancellous bone.
+TEST(LabelledCt, SamplesHaveTheTissueThatTheirLabelNames) {
+  const TestGrid grid{.dims = {16, 12, 10}};
+  const auto halves = [](const Vec3& p) { return p.x() < 3.0 || p.x() > 12.0 ? 0 : p.x() < 8.0 ? 1 : 2; };
+  const test::TempDir folder;
+  write_bytes(folder / "labels.nii", nifti_file(grid, halves));
+  auto map = read_label_map(folder / "labels.nii", keep_going);
+  ASSERT_TRUE(map) << map.error().message;
+  CtScan scan = scan_of(grid, [](const Vec3&) { return 200; });
+  auto placed =
+      place_labels(std::move(*map), *parse_label_names({"1=shell:cortical,2=femur"}), scan.volume, "", keep_going);
+  ASSERT_TRUE(placed) << placed.error().message;
+  const auto made = import_ct(std::move(scan), std::move(*placed), {.pitch_mm = 1.0}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->bone->tissue({5, 6, 5}), Tissue::cortical);
+  EXPECT_EQ(made->bone->tissue({10, 6, 5}), Tissue::trabecular);
+}
+
 TEST(LabelledCt, BoneEndsWhereTheScanEnds) {
   const TestGrid grid{.dims = {12, 12, 10}};
   const auto all = [](const Vec3& p) { return p.x() >= 4.0 ? 1 : 0; };

@@ -1,0 +1,150 @@
+// The case of a CT whose bones a label map says.
+#include <algorithm>
+#include <array>
+#include <bitset>
+#include <new>
+
+#include "common/core/freed_memory.hpp"
+#include "common/imaging/hard_tissue.hpp"
+#include "server/import/ct_case.hpp"
+#include "server/import/label_surface.hpp"
+#include "server/import/scan_ends.hpp"
+
+namespace osteon::import {
+namespace {
+
+// The part of the scan with the labels of a map.
+struct Labelled {
+  imaging::HuVolume volume;
+  imaging::VoxelMask labels;  // of the part's voxels
+  imaging::VoxelMask bones;   // only those that are bone
+  std::bitset<256> bone_labels;
+  std::array<int, 3> first{}, last{};                // voxel box of the bones
+  std::array<int, 3> labels_first{}, labels_last{};  // of all labels
+};
+
+// Widens a box so that it contains a voxel.
+void widen(std::array<int, 3>& first, std::array<int, 3>& last, const std::array<int, 3>& at) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    first[axis] = std::min(first[axis], at[axis]);
+    last[axis] = std::max(last[axis], at[axis]);
+  }
+}
+
+Result<Labelled> take_labels(imaging::HuVolume scan, PlacedLabels& placed, const CtOptions& options,
+                             const KeepGoing& keep_going) {
+  Labelled found;
+  for (const CaseLabel& label : placed.labels)
+    found.bone_labels[static_cast<std::size_t>(label.value)] = is_carved(label.kind);
+  found.first = found.labels_first = scan.dims;
+  found.last = found.labels_last = {-1, -1, -1};
+  for (int slice = 0; slice < scan.dims[2]; ++slice) {
+    if (!keep_going(static_cast<double>(slice) / scan.dims[2])) return stopped_while("taking the labels");
+    for (int row = 0; row < scan.dims[1]; ++row)
+      for (int column = 0; column < scan.dims[0]; ++column) {
+        const std::uint8_t value = placed.values.at(column, row, slice);
+        if (value == 0) continue;
+        widen(found.labels_first, found.labels_last, {column, row, slice});
+        if (found.bone_labels[value]) widen(found.first, found.last, {column, row, slice});
+      }
+  }
+  const ScanRegion work = region_around(found.labels_first, found.labels_last, scan, options);
+  found.volume = imaging::cropped(std::move(scan), work.first, work.last);
+  found.labels = imaging::cropped(std::move(placed.values), work.first, work.last);
+  found.bones = found.labels;
+  for (std::uint8_t& value : found.bones.values) value = found.bone_labels[value] ? value : std::uint8_t{0};
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (std::array<int, 3>* end : {&found.first, &found.last, &found.labels_first, &found.labels_last})
+      (*end)[axis] -= work.first[axis];
+  return found;
+}
+
+// What each label says of the tissue, which counts more than the HU.
+std::array<Tissue, 256> said_tissues(const PlacedLabels& placed) {
+  std::array<Tissue, 256> said{};
+  for (const CaseLabel& label : placed.labels)
+    said[static_cast<std::size_t>(label.value)] = label.kind == LabelKind::cortical     ? Tissue::cortical
+                                                  : label.kind == LabelKind::cancellous ? Tissue::trabecular
+                                                  : label.kind == LabelKind::metal      ? Tissue::metal
+                                                  : label.kind == LabelKind::enamel     ? Tissue::enamel
+                                                                                        : Tissue::none;
+  return said;
+}
+
+// Writes the tissues that labels say over those of the HU. Gives these labels.
+std::bitset<256> take_tissues(const PlacedLabels& placed, const imaging::VoxelMask& labels,
+                              imaging::VoxelMask& tissue) {
+  const std::array<Tissue, 256> said = said_tissues(placed);
+  std::bitset<256> saying;
+  for (std::size_t label = 0; label < said.size(); ++label) saying[label] = said[label] != Tissue::none;
+  if (saying.none()) return saying;
+  if (tissue.values.empty()) tissue = imaging::VoxelMask(labels.dims);
+  for (std::size_t i = 0; i < labels.values.size(); ++i)
+    if (saying[labels.values[i]]) tissue.values[i] = static_cast<std::uint8_t>(said[labels.values[i]]);
+  return saying;
+}
+
+// The signed distance to labelled bones. `geometry`: of the whole scan, at whose ends they end.
+Result<SparseVolume> measure_labels(const Labelled& found, const imaging::HuVolume& geometry, const CoordBox& lattice,
+                                    double pitch_mm, const KeepGoing& keep_going) {
+  const auto field = label_field(found.bones, found.volume, found.first, found.last, part(keep_going, 0.0, 0.3));
+  if (!field) return tl::unexpected(field.error());
+  // Every voxel of the field is on the side of 0 on which its label is, so its values stay as they are.
+  auto surface_mm = measure_surface(field->field, field->bones, 0.0, lattice, pitch_mm, part(keep_going, 0.3, 0.9));
+  if (!surface_mm) return surface_mm;
+  // The volume is that of the bone within the scan.
+  if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 1.0)); !capped)
+    return tl::unexpected(capped.error());
+  const auto voxels = std::ranges::count_if(field->bones.values, [](std::uint8_t value) { return value != 0; });
+  restore_volume(static_cast<double>(voxels) * geometry.spacing_mm.prod(), pitch_mm, lattice, *surface_mm);
+  return surface_mm;
+}
+
+Result<CtImport> import_labelled(CtScan scan, PlacedLabels placed, const CtOptions& options,
+                                 const KeepGoing& keep_going) {
+  const imaging::HuVolume geometry = without_values(scan.volume);
+  const double pitch_mm = pitch_mm_of(geometry, options);
+  if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
+  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+  if (!smoothed) return tl::unexpected(smoothed.error());
+  scan.source += *smoothed + ", bones of a label map";
+  auto found = take_labels(std::move(scan.volume), placed, options, part(keep_going, kSmoothEnd, kFindEnd));
+  if (!found) return tl::unexpected(found.error());
+  give_back_freed_memory();
+  const auto lattice = lattice_around(found->volume, found->first, found->last, pitch_mm);
+  if (!lattice) return tl::unexpected(lattice.error());
+  auto surface_mm = measure_labels(*found, geometry, *lattice, pitch_mm, part(keep_going, kFindEnd, kSurfaceEnd));
+  if (!surface_mm) return tl::unexpected(surface_mm.error());
+  give_back_freed_memory();
+  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
+  auto hard = imaging::find_hard_tissue(found->volume, found->bones, options.calibration, part(building, 0.0, 0.2));
+  if (!hard) return tl::unexpected(hard.error());
+  found->bones = {};
+  const std::bitset<256> tissue_labels = take_tissues(placed, found->labels, hard->tissue);
+
+  const imaging::VoxelBox keep = kept_voxels(found->volume, found->labels_first, found->labels_last, options.margin_mm);
+  auto made = make_case(
+      {.scan = geometry,
+       .volume = std::move(found->volume),
+       .known = {std::move(found->labels), std::move(hard->tissue), found->bone_labels},
+       .tissue_labels = tissue_labels,
+       .keep = keep,
+       .several = true,
+       .lattice = *lattice,
+       .surface_mm = std::move(*surface_mm)},
+      description(scan, options, pitch_mm),
+      [&](const CaseScan& kept, CaseInfo& info) { list_labels(kept, placed, info); }, part(building, 0.2, 1.0));
+  if (made) made->labels = std::move(placed);
+  return made;
+}
+
+}  // namespace
+
+Result<CtImport> import_ct(CtScan scan, PlacedLabels labels, const CtOptions& options,
+                           const KeepGoing& keep_going) try {
+  return import_labelled(std::move(scan), std::move(labels), options, keep_going);
+} catch (const std::bad_alloc&) {
+  return failure(ErrorCode::exhausted, kNoMemory);
+}
+
+}  // namespace osteon::import
