@@ -138,6 +138,14 @@ class Budget(unittest.TestCase):
             for options in ((), ("--budget",)):
                 self.assertEqual(self.run_script(*options, build_budget=budget, ctest="exit 8").returncode, 8)
 
+    def test_counts_cases_and_names_the_skipped(self):
+        log = "build/dev/Testing/Temporary/LastTest.log"
+        suites = ("[==========] 3 tests from 2 test suites ran. (5 ms total)\n"
+                  "[  SKIPPED ] Scans.Skull (0 ms)\n[  SKIPPED ] 1 test, listed below:\n[  SKIPPED ] Scans.Skull\n"
+                  "[==========] 1 test from 1 test suite ran. (0 ms total)\n")
+        told = self.run_script(ctest=f"mkdir -p $(dirname {log}); cat >{log} <<'END'\n{suites}END")
+        self.assertIn("\n4 cases of GoogleTest, 1 skipped\n  skipped: Scans.Skull\n", told.stdout)
+
     def test_leaves_other_options_to_ctest(self):
         told = self.run_script("--budget", "-R", "unit", ctest='echo "given: $*"')
         self.assertRegex(told.stdout, "given: .* -R unit\n")
