@@ -208,3 +208,13 @@ def declaration_faults(path: str, cmake_text: str, source_text=None):
         return []
     return [f"{path}: not listed in the CMakeLists.txt of its folder" +
             (", nor the first include of its source" if name.endswith(".hpp") else "")]
+
+
+def suite_faults(path: str, text: str):
+    """osteon_test() registers the suites that begin a line of a file NAME_test.cpp. ctest would not run others."""
+    if not path.startswith("tests/"):
+        return []
+    found = re.findall(r"^(.*?)\b((?:TYPED_)?TEST(?:_F|_P)?)\(", text, re.M)
+    return [f"{path}: {before}{macro}(: ctest does not run it; begin a line of a file *_test.cpp with TEST, TEST_F or "
+            "TEST_P" for before, macro in found
+            if before or macro.startswith("TYPED") or not path.endswith("_test.cpp")]

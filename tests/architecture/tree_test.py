@@ -57,6 +57,9 @@ class TheTree(unittest.TestCase):
                                            source.read_text() if source.exists() else None)
         self.assertEqual(self.all_faults(check), [])
 
+    def test_every_suite_is_registered(self):
+        self.assertEqual(self.all_faults(tree.suite_faults), [])
+
     def test_every_source_is_listed(self):
         listed = (ROOT / references.LIST).read_text(encoding="utf-8")
         examples = (references.LIST, "tests/architecture/references.py", "tests/architecture/tree_test.py")
@@ -238,6 +241,12 @@ class TheRules(unittest.TestCase):
         first = '#include "server/cli/x.hpp"\n#include <vector>\n'
         self.assertFalse(tree.declaration_faults("server/cli/x.hpp", "", first))
         self.assertTrue(tree.declaration_faults("server/cli/x.hpp", "", "#include <vector>\n" + first))
+
+    def test_a_suite_that_is_not_registered_is_noticed(self):
+        self.assertFalse(tree.suite_faults("tests/unit/core/x_test.cpp", "TEST_P(Every,\n       Case) {"))
+        self.assertTrue(tree.suite_faults("tests/unit/core/x.cpp", "TEST(Every, Case) {"))
+        self.assertTrue(tree.suite_faults("tests/unit/core/x_test.cpp", "  TEST(Every, Case) {"))
+        self.assertTrue(tree.suite_faults("tests/unit/core/x_test.cpp", "TYPED_TEST(Every, Case) {"))
 
     def test_a_source_that_is_not_listed_is_noticed(self):
         listed = "- **Chi 2005**: X. Chi, a paper.\n| RFC 8032 | signatures |\n"
