@@ -61,14 +61,14 @@ struct WritingStopped {};
 template <class T>
 class ScanWriter : public ScanGrid {
  public:
-  // Both must outlive the grid.
+  // `voxels` and `writing` must outlive the grid. `making` is asked only here.
   ScanWriter(const char* name, const std::vector<T>& voxels, const ScanGeometry& geometry, std::int32_t background,
-             const KeepGoing& keep_going)
-      : ScanGrid(background), voxels_(voxels), last_(voxels_of(geometry).max()), keep_going_(keep_going) {
+             const KeepGoing& making, const KeepGoing& writing)
+      : ScanGrid(background), voxels_(voxels), last_(voxels_of(geometry).max()), writing_(writing) {
     setName(name);
     setTransform(openvdb::math::Transform::createLinearTransform(1.0));
     for (openvdb::Int32 x = 0; x <= last_.x(); x += kLeafSize) {
-      ask(0.0);
+      ask(making, static_cast<double>(x) / (last_.x() + 1));
       for (openvdb::Int32 y = 0; y <= last_.y(); y += kLeafSize)
         for (openvdb::Int32 z = 0; z <= last_.z(); z += kLeafSize) add_leaf(openvdb::Coord(x, y, z));
     }
@@ -82,7 +82,7 @@ class ScanWriter : public ScanGrid {
     const auto leaves = static_cast<double>(tree().leafCount());
     for (auto at = tree().cbeginLeaf(); at; ++at) {
       if (written++ % kOften == 0) {
-        ask(static_cast<double>(written) / leaves);
+        ask(writing_, static_cast<double>(written) / leaves);
         give_back_freed_memory();  // compressing leaves gaps in the heap
       }
       std::fill_n(values, kLeafVoxels, background());
@@ -95,8 +95,8 @@ class ScanWriter : public ScanGrid {
  private:
   static constexpr std::size_t kOften = 4096;  // leaves between two calls of keep_going
 
-  void ask(double done) const {
-    if (keep_going_ && !keep_going_(done)) throw WritingStopped{};
+  static void ask(const KeepGoing& keep_going, double done) {
+    if (!keep_going(done)) throw WritingStopped{};
   }
   // Calls `visit` with every voxel of a leaf and its place there. Columns follow each other in the scan, and slices in
   // a leaf. Returns the number of voxels: fewer at the end of the scan.
@@ -137,7 +137,7 @@ class ScanWriter : public ScanGrid {
 
   const std::vector<T>& voxels_;
   openvdb::Coord last_;  // voxel of the scan
-  const KeepGoing& keep_going_;
+  const KeepGoing& writing_;
 };
 
 template <class T>
@@ -212,16 +212,19 @@ Result<void> check_labels_of(const CaseScan& scan, const CaseInfo& info) {
 Result<void> save_scan(const std::filesystem::path& file, const CaseScan& scan, const KeepGoing& keep_going) try {
   start_openvdb();
   const KeepGoing all = keep_going ? keep_going : [](double) { return true; };
-  const KeepGoing hu = part(all, 0.0, 0.5), labels = part(all, 0.5, 0.75), tissue = part(all, 0.75, 1.0);
+  const KeepGoing hu = part(all, 0.3, 0.65), labels = part(all, 0.65, 0.82), tissue = part(all, 0.82, 1.0);
   const ScanGeometry& geometry = scan.geometry;
   openvdb::GridPtrVec grids;
   if (!scan.hu.empty())
-    grids.push_back(std::make_shared<ScanWriter<std::int16_t>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu, hu));
-  const auto add = [&](const char* name, const std::vector<std::uint8_t>& voxels, const KeepGoing& stage) {
-    if (!voxels.empty()) grids.push_back(std::make_shared<ScanWriter<std::uint8_t>>(name, voxels, geometry, 0, stage));
+    grids.push_back(std::make_shared<ScanWriter<std::int16_t>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu,
+                                                               part(all, 0.0, 0.1), hu));
+  const auto add = [&](const char* name, const std::vector<std::uint8_t>& voxels, const KeepGoing& making,
+                       const KeepGoing& writing) {
+    if (!voxels.empty())
+      grids.push_back(std::make_shared<ScanWriter<std::uint8_t>>(name, voxels, geometry, 0, making, writing));
   };
-  add(kLabelGrid, scan.labels, labels);
-  add(kTissueGrid, scan.tissue, tissue);
+  add(kLabelGrid, scan.labels, part(all, 0.1, 0.2), labels);
+  add(kTissueGrid, scan.tissue, part(all, 0.2, 0.3), tissue);
   openvdb::io::File out(file.string());
   out.write(grids);
   out.close();

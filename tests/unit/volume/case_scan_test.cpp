@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fstream>
+#include <vector>
 
 #include "common/volume/openvdb_start.hpp"
 #include "common/volume/sparse_volume.hpp"
@@ -204,6 +205,16 @@ TEST_F(CaseScanTest, StopsWhenAsked) {
     ASSERT_FALSE(loaded) << calls;
     EXPECT_EQ(loaded.error().code, ErrorCode::cancelled);
   }
+}
+
+TEST_F(CaseScanTest, ProgressOfWritingNeverGoesBack) {
+  std::vector<double> fractions;
+  ASSERT_TRUE(save_scan(temp_ / "again.vdb", scan_, [&](double done) {
+    fractions.push_back(done);
+    return true;
+  }));
+  EXPECT_TRUE(std::ranges::is_sorted(fractions)) << testing::PrintToString(fractions);
+  EXPECT_EQ(fractions.back(), 1.0);
 }
 
 }  // namespace
