@@ -68,6 +68,7 @@ Result<void> check_options(const imaging::HuVolume& geometry, const CtOptions& o
     return failure(ErrorCode::invalid_input, "the pitch must be a number from 0.02 to 10 mm; give another --pitch");
   if (!std::isfinite(options.threshold_hu))
     return failure(ErrorCode::invalid_input, "the threshold must be a number; give another --threshold");
+  if (!std::isfinite(options.metal_hu)) return bad_input("the HU of metal must be a number; give another --metal-hu");
   if (!(options.gaussian_mm >= 0.0 && options.gaussian_mm <= kMostGaussian_mm))
     return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
   if (!(options.margin_mm >= 0.0 && options.margin_mm <= kMostMargin_mm))
@@ -119,12 +120,14 @@ Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imag
   return narrow_band_mm(samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.02, 1.0));
 }
 
-CaseInfo description(const CtScan& scan, const CtOptions& options, double pitch_mm) {
+CaseInfo description(const CtScan& scan, const CtOptions& options, const ScanCalibration& calibration,
+                     double pitch_mm) {
   CaseInfo info;
   info.title = options.title;
   info.source = scan.source;
   info.pitch_mm = pitch_mm;
-  info.calibration = options.calibration;
+  info.calibration = calibration.line;
+  info.density_from = calibration.provenance;
   return info;
 }
 

@@ -14,7 +14,7 @@
 namespace osteon::import {
 
 // Shares of the stages in the total time, for one progress bar over all of them.
-inline constexpr double kSmoothEnd = 0.05, kFindEnd = 0.1, kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
+inline constexpr double kCalibrateEnd = 0.02, kSmoothEnd = 0.05, kFindEnd = 0.1, kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
 inline constexpr const char* kNoMemory =
     "this machine has no memory for a scan of that size; export thicker slices or a smaller region";
 
@@ -50,7 +50,8 @@ struct ScanRegion {
                                                    const KeepGoing& keep_going);
 
 // What a case says of itself, without labels and threshold.
-[[nodiscard]] CaseInfo description(const CtScan& scan, const CtOptions& options, double pitch_mm);
+[[nodiscard]] CaseInfo description(const CtScan& scan, const CtOptions& options, const ScanCalibration& calibration,
+                                   double pitch_mm);
 
 // Bones that have a surface.
 struct MeasuredBones {

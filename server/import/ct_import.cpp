@@ -147,8 +147,8 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
 }
 
 // `bones`: what grew from seeds, if there are any.
-Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std::optional<GrownBones> bones,
-                          const KeepGoing& keep_going) {
+Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const DensityCalibration& calibration,
+                          std::optional<GrownBones> bones, const KeepGoing& keep_going) {
   const auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
                           : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
@@ -163,7 +163,7 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std:
                                     params, work->ends, segmenting)
             : imaging::segment_bone(s.volume, params, work->ends, segmenting);
   if (!bone) return tl::unexpected(bone.error());
-  const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 0.9));
+  const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.8, 0.9));
   if (!islands) return tl::unexpected(islands.error());
   auto kept = options.list_only ? Result<std::vector<int>>{}
               : bones           ? Result<std::vector<int>>(islands_of(bones->regions, *islands, work->first))
@@ -186,8 +186,9 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std:
 }
 
 // Finds the bones in the scan, and adds to its source what was done. `options`: gets the threshold that was used.
-Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& keep_going) {
-  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const DensityCalibration& calibration,
+                             const KeepGoing& keep_going) {
+  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, kCalibrateEnd, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed;
   std::string reason;
@@ -206,7 +207,8 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& 
     scan.source += grown->description;
     bones = std::move(*grown);
   }
-  auto s = segment(std::move(scan.volume), options, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
+  auto s =
+      segment(std::move(scan.volume), options, calibration, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
   if (s) s->found.threshold_reason = std::move(reason);
   return s;
 }
@@ -215,12 +217,15 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   const imaging::HuVolume geometry = without_values(scan.volume);
   const double pitch_mm = pitch_mm_of(geometry, options);
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
-  auto s = find_bones(scan, options, keep_going);
+  const auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
+  if (!calibrated) return tl::unexpected(calibrated.error());
+  auto s = find_bones(scan, options, calibrated->line, keep_going);
   if (!s) return tl::unexpected(s.error());
   if (!s->found.regions.empty())
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
-  if (options.list_only) return CtImport{std::move(s->found), {}, {}};
+  if (options.list_only)
+    return CtImport{.found = std::move(s->found), .bone = {}, .scan = {}, .calibration_text = calibrated->text};
   give_back_freed_memory();
   const auto lattice = lattice_around(s->volume, s->first, s->last, pitch_mm);
   if (!lattice) return tl::unexpected(lattice.error());
@@ -229,12 +234,14 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   give_back_freed_memory();
   const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
-  auto hard = imaging::find_hard_tissue(s->volume, s->bones, options.calibration, part(building, 0.0, 0.2));
+  auto hard =
+      imaging::find_hard_tissue(s->volume, s->bones, calibrated->line, options.metal_hu, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
+  s->found.metal_hu = options.metal_hu;
 
-  CaseInfo info = description(scan, options, pitch_mm);
+  CaseInfo info = description(scan, options, *calibrated, pitch_mm);
   info.threshold_hu = options.threshold_hu;
   const imaging::VoxelBox keep = kept_voxels(s->volume, s->first, s->last, options.margin_mm);
   auto made = make_case(
@@ -251,6 +258,7 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   if (!made) return made;
   s->found.case_cm3 = made->found.case_cm3;
   made->found = std::move(s->found);
+  made->calibration_text = calibrated->text;
   return made;
 }
 

@@ -13,6 +13,7 @@
 #include "server/import/ct_scan.hpp"
 #include "server/import/grown_bones.hpp"
 #include "server/import/placed_labels.hpp"
+#include "server/import/scan_calibration.hpp"
 
 namespace osteon::import {
 
@@ -21,9 +22,10 @@ struct CtOptions {
   double threshold_hu = imaging::kBoneThreshold_hu;
   bool suggest_threshold = false;  // take suggest_threshold() instead
   GrowOptions grow;                // with seeds: the bones that grow from them are kept, instead of islands
-  DensityCalibration calibration = imaging::kRho1995;
-  std::string title = "CT";  // never taken from the scan, whose texts may name a patient
-  std::vector<int> keep;     // islands by number, from 1; empty: the largest
+  CalibrationOptions calibration;
+  double metal_hu = imaging::kMetal_hu;  // metal is at or above it
+  std::string title = "CT";              // never taken from the scan, whose texts may name a patient
+  std::vector<int> keep;                 // islands by number, from 1; empty: the largest
   bool keep_all = false;
   bool merge = false;      // the kept islands count as one bone
   bool hollow = false;     // cavities enclosed by bone are not bone
@@ -47,14 +49,16 @@ struct CtSegmentation {
   std::vector<double> joined_cm3;  // parts of dense and cancellous bone that only marrow joins, if several are large
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
+  double metal_hu = imaging::kMetal_hu;
   Box region;  // part of the scan around everything that reaches the threshold, LPS. With seeds: the whole scan
 };
 
 struct CtImport {
   CtSegmentation found;
-  std::optional<Case> bone;  // empty only if the islands were only listed
-  CaseScan scan;             // of `bone`
-  PlacedLabels labels = {};  // of a label map, without their voxels
+  std::optional<Case> bone;           // empty only if the islands were only listed
+  CaseScan scan;                      // of `bone`
+  std::string calibration_text = {};  // see ScanCalibration
+  PlacedLabels labels = {};           // of a label map, without their voxels
 };
 
 // segment_bone() decides what is bone, and the options decide which islands are kept. With seeds, the grown regions

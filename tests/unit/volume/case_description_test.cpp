@@ -113,6 +113,10 @@ TEST(CaseDescription, TheHashChangesWithEachField) {
       {"source", [](CaseInfo& i) { i.source = "Another"; }},
       {"slope", [](CaseInfo& i) { i.calibration.slope_g_cm3_per_hu = 0.002; }},
       {"intercept", [](CaseInfo& i) { i.calibration.intercept_g_cm3 = 0.2; }},
+      {"no provenance of the density", [](CaseInfo& i) { i.density_from.reset(); }},
+      {"method of the density", [](CaseInfo& i) { i.density_from->method = "given"; }},
+      {"parameter of the density", [](CaseInfo& i) { i.density_from->parameters["cortical_error_g_cm3"] = 0.2; }},
+      {"edit of the density", [](CaseInfo& i) { i.density_from->edits.clear(); }},
       {"threshold", [](CaseInfo& i) { i.threshold_hu = 227.0; }},
       {"no scan", [](CaseInfo& i) { i.scan.reset(); }},
       {"scan hash", [](CaseInfo& i) { i.scan->hash.bytes[31] ^= 1; }},
@@ -190,6 +194,10 @@ TEST_F(WrongDescription, EachFieldIsNamed) {
   expect_refused("/pitch_mm", 0, "pitch_mm", "must be above zero");
   expect_refused("/title", 3, "title", "is not a text");
   expect_refused("/calibration", 3, "calibration", "is not an object");
+  expect_refused("/calibration/provenance", 3, "calibration.provenance", "is not an object");
+  expect_refused("/calibration/provenance/method", "", "calibration.provenance.method", "is empty");
+  expect_refused("/calibration/provenance/parameters/cortical_error_g_cm3", "one",
+                 "calibration.provenance.parameters.cortical_error_g_cm3", "is not a number");
   expect_refused("/content_hash", "zz", "content_hash",
                  "is not a hash: " + digest_from_hex("zz").error().message.substr(0, 60));
   expect_refused("/scan/frame", "RAS", "scan.frame", "is not LPS");
@@ -239,6 +247,7 @@ TEST_F(WrongDescription, EachMissingFieldIsNamed) {
                               "/pitch_mm",
                               "/calibration",
                               "/calibration/intercept_g_cm3",
+                              "/calibration/provenance/edits",
                               "/segmentation/threshold_hu",
                               "/content_hash",
                               "/schema_version",
