@@ -38,7 +38,7 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::string labels, rods_of;
+  std::string labels, rods_of, between_slices = "auto", thin_cortex = "off";
   std::optional<std::string> calibration, rods;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
@@ -166,6 +166,10 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   options.margin_mm = a.margin_mm;
   options.metal_hu = a.metal_hu;
+  options.thin_cortex = a.thin_cortex == "on";
+  options.between_slices = a.between_slices == "hu"       ? BetweenSlices::hu
+                           : a.between_slices == "shapes" ? BetweenSlices::shapes
+                                                          : BetweenSlices::automatic;
   auto calibration = calibration_options(a);
   if (!calibration) return tl::unexpected(calibration.error());
   options.calibration = std::move(*calibration);
@@ -449,6 +453,12 @@ void add_density_options(CLI::App& command, CaseArguments& a) {
                 "First correct the scale of HU, so that air has -1000 and soft tissue 45 HU")
       ->excludes(line)
       ->excludes(rods);
+  command
+      .add_option("--thin-cortex", a.thin_cortex,
+                  "on: give cortex that the scan blurs its thickness and density back, by a fit along the surface's "
+                  "normals")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str();
   command.add_option("--metal-hu", a.metal_hu, "Metal is at or above it, HU")
       ->check(within(500.0, 32767.0))
       ->capture_default_str();
@@ -535,6 +545,13 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own")
       ->excludes(labels_option);
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
+      ->excludes(labels_option);
+  ct->add_option(
+        "--between-slices", a.between_slices,
+        "The surface goes on from slice to slice where HU cross the threshold (hu), or so that the shape of "
+        "one slice turns into that of the next (shapes); auto: shapes if slices are more than two pixels apart")
+      ->check(CLI::IsMember({"auto", "hu", "shapes"}))
+      ->capture_default_str()
       ->excludes(labels_option);
   add_smoothing_options(*ct, a);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")

@@ -12,7 +12,9 @@
 #include "common/core/freed_memory.hpp"
 #include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/segmentation.hpp"
+#include "common/imaging/slice_shapes.hpp"
 #include "common/imaging/threshold.hpp"
+#include "server/import/corrected_cortex.hpp"
 #include "server/import/ct_case.hpp"
 #include "server/import/kept_scan.hpp"
 
@@ -217,7 +219,7 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   const imaging::HuVolume geometry = without_values(scan.volume);
   const double pitch_mm = pitch_mm_of(geometry, options);
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
-  const auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
+  auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
   if (!calibrated) return tl::unexpected(calibrated.error());
   auto s = find_bones(scan, options, calibrated->line, keep_going);
   if (!s) return tl::unexpected(s.error());
@@ -229,11 +231,21 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   give_back_freed_memory();
   const auto lattice = lattice_around(s->volume, s->first, s->last, pitch_mm);
   if (!lattice) return tl::unexpected(lattice.error());
-  auto surface_mm = measure_surface(s->volume, s->bones, options.threshold_hu, *lattice, pitch_mm,
-                                    part(keep_going, kSegmentEnd, kSurfaceEnd));
+  const bool shapes = options.between_slices == BetweenSlices::shapes ||
+                      (options.between_slices == BetweenSlices::automatic && imaging::has_thick_slices(geometry));
+  if (shapes) scan.source += ", shapes interpolated between slices";
+  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, s->bones, options.threshold_hu, *lattice,
+                                                                pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   give_back_freed_memory();
-  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
+  std::optional<SparseVolume> change_hu;
+  if (options.thin_cortex) {
+    auto change =
+        correct_cortex(s->volume, *surface_mm, pitch_mm, *calibrated, part(keep_going, kSurfaceEnd, kCortexEnd));
+    if (!change) return tl::unexpected(change.error());
+    change_hu = std::move(*change);
+  }
+  const KeepGoing building = part(keep_going, kCortexEnd, 1.0);
   auto hard =
       imaging::find_hard_tissue(s->volume, s->bones, calibrated->line, options.metal_hu, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
@@ -252,7 +264,8 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
        .keep = keep,
        .several = s->found.kept.size() > 1 && !options.merge,
        .lattice = *lattice,
-       .surface_mm = std::move(*surface_mm)},
+       .surface_mm = std::move(*surface_mm),
+       .change_hu = std::move(change_hu)},
       std::move(info), [&](const CaseScan& kept, CaseInfo& to) { list_labels(kept, options, s->found, to); },
       part(building, 0.2, 1.0));
   if (!made) return made;

@@ -17,6 +17,13 @@
 
 namespace osteon::import {
 
+// How the surface goes on from slice to slice.
+enum class BetweenSlices {
+  automatic,  // by shapes if imaging::has_thick_slices()
+  hu,         // where the interpolated HU cross the threshold
+  shapes,     // see imaging::SliceShapes
+};
+
 struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
@@ -24,6 +31,7 @@ struct CtOptions {
   GrowOptions grow;                // with seeds: the bones that grow from them are kept, instead of islands
   CalibrationOptions calibration;
   double metal_hu = imaging::kMetal_hu;  // metal is at or above it
+  bool thin_cortex = false;              // correct the density of thin cortex, see imaging::correct_thin_cortex()
   std::string title = "CT";              // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;                 // islands by number, from 1; empty: the largest
   bool keep_all = false;
@@ -33,6 +41,7 @@ struct CtOptions {
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none
+  BetweenSlices between_slices = BetweenSlices::automatic;
   // The case keeps the scan this far around its bones. It has the HU after the filters.
   double margin_mm = 10.0;
 };

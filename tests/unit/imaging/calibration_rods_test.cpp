@@ -117,6 +117,13 @@ TEST(CalibrationRods, ThatAreNotThereAreMissed) {
   EXPECT_NE(refused.error().message.find("does not show 4 uniform rods"), std::string::npos) << refused.error().message;
 }
 
+// Two rods, a vessel and a vertebra: three of them rise with the densities, but are no rods.
+TEST(CalibrationRods, OtherRoundThingsAreNotTakenForThem) {
+  const auto refused = find_rods(Scan().rod(37.0, 0.0).rod(81.0, 0.1).noisy(), std::vector{0.0, 0.1, 0.2}, always);
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().message.find("does not show 3 uniform rods"), std::string::npos) << refused.error().message;
+}
+
 TEST(CalibrationRods, HaveSeveralDensities) {
   const HuVolume& scan = four_rods();
   for (const std::vector<double>& wrong : {std::vector<double>{}, {0.2}, {0.2, 0.2}, std::vector<double>(9, 0.1)})
