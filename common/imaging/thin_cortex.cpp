@@ -60,6 +60,8 @@ class Corrector {
   bool read_line(const SurfacePoint& point, double from_mm, double to_mm);
   [[nodiscard]] std::optional<CortexFit> sound(std::optional<CortexFit> fit) const;
   std::optional<PointFit> fit(const SurfacePoint& point);
+  std::optional<PointFit> fit_plate(const SurfacePoint& point);
+  std::optional<PointFit> fit_layer(const SurfacePoint& point);
   [[nodiscard]] double change_hu(const PointFit& fit, double depth_mm) const;
   void add_change(const SurfacePoint& point, const PointFit& fit);
   void measure_cortex(const std::vector<Coord>& samples);
@@ -141,14 +143,28 @@ std::optional<CortexFit> Corrector::sound(std::optional<CortexFit> fit) const {
 }
 
 std::optional<PointFit> Corrector::fit(const SurfacePoint& point) {
+  // A thin bone is a plate if it can be one. A thicker one is a plate if it is cortex throughout.
+  const bool thin = point.width_mm < kPlate_sigmas * point.sigma_mm;
+  if (thin)
+    if (const auto plate = fit_plate(point)) return plate;
+  if (const auto layer = fit_layer(point)) return layer;
+  return thin || point.width_mm >= kDeep_mm ? std::nullopt : fit_plate(point);
+}
+
+std::optional<PointFit> Corrector::fit_plate(const SurfacePoint& point) {
   const double outside_mm = kOutside_sigmas * point.sigma_mm;
-  if (point.width_mm < kPlate_sigmas * point.sigma_mm && read_line(point, -outside_mm, point.width_mm + outside_mm))
-    if (const auto found = sound(fit_cortex(line_, point.sigma_mm, cortex_hu_)))
-      return PointFit{found->profile, true, 0.5 * point.width_mm + pitch_mm_};
+  if (!read_line(point, -outside_mm, point.width_mm + outside_mm)) return {};
+  const auto found = sound(fit_cortex(line_, point.sigma_mm, cortex_hu_));
+  if (!found) return {};
+  return PointFit{found->profile, true, 0.5 * point.width_mm + pitch_mm_};
+}
+
+// Cortex on something else. The profile ends in the middle of the bone, before the cortex of the other side.
+std::optional<PointFit> Corrector::fit_layer(const SurfacePoint& point) {
   const double deep_mm = point.width_mm < kDeep_mm ? 0.5 * point.width_mm : kDeep_mm;
   for (const double wanted_mm : {kWindow_sigmas * point.sigma_mm + kWindow_mm, kDeep_mm}) {
     const double to_mm = std::min(deep_mm, wanted_mm);
-    if (!read_line(point, -outside_mm, to_mm)) return {};
+    if (!read_line(point, -kOutside_sigmas * point.sigma_mm, to_mm)) return {};
     const auto found = sound(fit_cortex(line_, point.sigma_mm, cortex_hu_));
     if (found && found->profile.outer_mm + found->profile.thickness_mm < kShown * to_mm) {
       const CortexProfile& p = found->profile;

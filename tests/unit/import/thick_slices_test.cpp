@@ -8,7 +8,7 @@ namespace {
 
 constexpr double kRadius_mm = 12.0, kTilt = 1.0;
 
-// A rod of bone in air, leaning by a radian from the slices' normal, on pixels of 0.75 mm.
+// A rod of bone in soft tissue, leaning by a radian from the slices' normal, on pixels of 0.75 mm.
 CtScan leaning_rod(double slice_mm) {
   CtScan scan;
   scan.source = "test";
@@ -26,7 +26,7 @@ CtScan leaning_rod(double slice_mm) {
           const double s = std::max((at - at.dot(axis) * axis).norm() - 6.0, std::abs(at.dot(axis)) - kRadius_mm);
           bone += std::clamp(0.5 - s / 0.75, 0.0, 1.0) / 8.0;
         }
-        volume.values.push_back(static_cast<std::int16_t>(std::lround(-1000.0 + 2200.0 * bone)));
+        volume.values.push_back(static_cast<std::int16_t>(std::lround(50.0 + 1200.0 * bone)));
       }
   return scan;
 }
@@ -56,8 +56,9 @@ TEST(ThickSlices, GetTheirSurfaceFromTheShapesOfSlices) {
   EXPECT_NE(usual.hash(), hu.hash());
   EXPECT_EQ(usual.info().source, "test, shapes interpolated between slices");
   EXPECT_EQ(hu.info().source, "test");
-  EXPECT_LT(mean_error_mm(usual), 0.6 * mean_error_mm(hu));
-  EXPECT_LT(mean_error_mm(usual), 0.25);
+  std::printf("mean deviation %.2f mm by HU, %.2f mm by shapes\n", mean_error_mm(hu), mean_error_mm(usual));
+  EXPECT_LT(mean_error_mm(usual), 0.7 * mean_error_mm(hu));
+  EXPECT_LT(mean_error_mm(usual), 0.6);
 }
 
 TEST(ThickSlices, ThinOnesStayAsTheyWere) {

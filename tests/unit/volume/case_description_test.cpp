@@ -103,6 +103,24 @@ TEST(CaseDescription, ACaseOfSchema1LoadsWithTheHashThatItAlwaysHad) {
   }
 }
 
+// Both digests are those of another program that follows the order of the fields. The first is the description as it
+// was hashed before a case could say how its density was found.
+TEST(CaseDescription, WithoutProvenanceOfTheDensityTheHashIsWhatItWas) {
+  CaseInfo info{.title = "Test bone",
+                .source = "closed form",
+                .pitch_mm = 0.5,
+                .calibration = {0.001, 0.1},
+                .threshold_hu = 226.0};
+  const auto digest = [&] {
+    Hasher hasher;
+    hash_description(hasher, info);
+    return to_hex(hasher.finish());
+  };
+  EXPECT_EQ(digest(), "dc64ebed08ecbcc0bf3b8276de3f1e026fbbb0e721015e38aae1fa6952069b72");
+  info.density_from = {"given", {{"air_hu", -990.0}}, {"by hand"}};
+  EXPECT_EQ(digest(), "8c9c22776e0a766ddb59d054c80e7ea85f9f5b8df864d855fc9dc30437be870d");
+}
+
 TEST(CaseDescription, TheHashChangesWithEachField) {
   const CaseScan scan = test::turned_scan();
   const CaseInfo full = test::full_description(scan);
