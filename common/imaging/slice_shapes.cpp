@@ -8,9 +8,12 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr double kThick = 2.0;            // steps between slices, in pixels
-constexpr double kFarthest_slices = 2.0;  // distances end there
-constexpr double kUnits = 30000.0;        // of that distance
+constexpr double kThick = 2.0;             // steps between slices, in pixels
+constexpr double kFarthest_slices = 20.0;  // distances end there
+constexpr double kUnits = 30000.0;         // of that distance
+// So many steps between slices may the larger of two distances exceed the smaller one, if they lie on different sides.
+constexpr double kBeyond_slices = 2.0;
+constexpr double kBeyond = kBeyond_slices / kFarthest_slices * kUnits;
 constexpr double kFar_mm = 1e9;
 constexpr int kSweeps = 8;  // each of the four directions twice
 
@@ -94,8 +97,17 @@ double limited_slope(double before, double after) {
   return before * after > 0.0 ? 2.0 * before * after / (before + after) : 0.0;
 }
 
+// Where bone ends between two slices, the next contour is far away or none. Its distance then is limited, so that the
+// bone is closed by a dome.
+void limit_beyond(double& b, double& c) {
+  if ((b >= 0.0) == (c >= 0.0)) return;
+  double &near = std::abs(b) < std::abs(c) ? b : c, &far = std::abs(b) < std::abs(c) ? c : b;
+  far = std::copysign(std::min(std::abs(far), std::abs(near) + kBeyond), far);
+}
+
 // Between b and c, at a fraction of the way.
 double cubic(double a, double b, double c, double d, double part) {
+  limit_beyond(b, c);
   const double first = limited_slope(b - a, c - b), last = limited_slope(c - b, d - c);
   const double rest = 1.0 - part;
   return rest * rest * ((1.0 + 2.0 * part) * b + part * first) + part * part * ((3.0 - 2.0 * part) * c - rest * last);

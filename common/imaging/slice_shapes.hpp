@@ -15,8 +15,8 @@ namespace osteon::imaging {
 // threshold. A pixel gets its distance to that contour, positive inside. Between slices the distances are interpolated:
 // so the contour of one slice turns into that of the next, where HU would make a step half way between them. The
 // interpolation is a cubic with limited slopes (Fritsch 1980), which stays between its two slices. So every voxel keeps
-// its side. Distances end at two steps of a slice; so bone that ends between two slices is closed by a dome. It fails
-// where a bone moves sideways by more than its own width from slice to slice: there it is parted. Any thread.
+// its side. Bone that ends between two slices is closed by a dome. It fails where a bone moves sideways by more than
+// its own width from slice to slice: there it is parted. Any thread.
 class SliceShapes {
  public:
   // As BoneField::make(), whose arguments these are. Error: cancelled.

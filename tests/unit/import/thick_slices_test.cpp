@@ -26,7 +26,7 @@ CtScan leaning_rod(double slice_mm) {
           const double s = std::max((at - at.dot(axis) * axis).norm() - 6.0, std::abs(at.dot(axis)) - kRadius_mm);
           bone += std::clamp(0.5 - s / 0.75, 0.0, 1.0) / 8.0;
         }
-        volume.values.push_back(static_cast<std::int16_t>(std::lround(50.0 + 1200.0 * bone)));
+        volume.values.push_back(static_cast<std::int16_t>(std::lround(50.0 + 950.0 * bone)));
       }
   return scan;
 }
