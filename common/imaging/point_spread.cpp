@@ -18,12 +18,12 @@ constexpr double kLeastSlope = 0.15;                    // of that, from voxel t
 constexpr double kReach_voxels = 4.0, kReach_mm = 3.5;  // to either side of an edge, the larger of both
 constexpr int kSteps = 16;                              // to either side
 constexpr double kFlat = 0.05;                          // most deviation of a plateau, as a part of the step
-constexpr double kMostRest = 0.03;                      // of the fit, as a part of the step
+constexpr double kMostEdgeRest = 0.03;                  // of the fit, as a part of the step
 constexpr double kAssumed = 0.5;                        // sigma of an axis without edges, in voxels
 // Rows of a slice are read in so many passes, so that the edges of a slice come from everywhere in it.
 constexpr int kPasses = 16;
 constexpr std::size_t kMostInSlice = 300, kLeastEdges = 20;
-constexpr double kLeastShare = 0.25;  // of n², summed over edges and divided by kLeastEdges, that show an axis
+constexpr double kLeastShown = 0.25;  // of n², summed over edges and divided by kLeastEdges, that show an axis
 
 struct Edge {
   Vec3 normal_squares;
@@ -70,7 +70,7 @@ std::optional<Edge> edge_at(const HuVolume& volume, const std::array<int, 3>& vo
   if (edge_hu < kLeastEdge_hu || std::max(low.deviation, high.deviation) > kFlat * edge_hu) return {};
   const auto fit = fit_edge({-reach_mm, step_mm, line}, 0.6 * voxel_mm);
   // The edge must be that of this voxel, so that each is measured once or twice.
-  if (!fit || fit->rest_hu > kMostRest * edge_hu || std::abs(fit->at_mm) > 0.5 * voxel_mm) return {};
+  if (!fit || fit->rest_hu > kMostEdgeRest * edge_hu || std::abs(fit->at_mm) > 0.5 * voxel_mm) return {};
   return Edge{normal.cwiseProduct(normal), fit->sigma_mm * fit->sigma_mm};
 }
 
@@ -140,7 +140,7 @@ Result<PointSpread> measure_point_spread(const HuVolume& volume, const KeepGoing
   Vec3 shares = Vec3::Zero();
   for (const Edge& e : edges) shares += e.normal_squares.cwiseProduct(e.normal_squares);
   for (int axis = 0; axis < 3; ++axis)
-    spread.measured[static_cast<std::size_t>(axis)] = shares[axis] >= kLeastShare * static_cast<double>(kLeastEdges);
+    spread.measured[static_cast<std::size_t>(axis)] = shares[axis] >= kLeastShown * static_cast<double>(kLeastEdges);
   Vec3 variances = assumed_mm2;
   if (edges.size() >= kLeastEdges)
     variances = robust_variances(std::move(edges), spread.measured, assumed_mm2);

@@ -9,7 +9,7 @@
 namespace osteon::import {
 namespace {
 
-std::string text_of(const imaging::CortexCorrection& made, const DensityCalibration& line) {
+std::string cortex_text(const imaging::CortexCorrection& made, const DensityCalibration& line) {
   const Vec3& sigma = made.spread.sigma_mm;
   std::array<char, 400> text{};
   std::snprintf(text.data(), text.size(),
@@ -34,7 +34,7 @@ Result<SparseVolume> correct_cortex(const imaging::HuVolume& volume, const Spars
                                     ScanCalibration& calibration, const KeepGoing& keep_going) {
   auto made = imaging::correct_thin_cortex(volume, surface_mm, pitch_mm, calibration.line, keep_going);
   if (!made) return tl::unexpected(made.error());
-  calibration.text += text_of(*made, calibration.line);
+  calibration.text += cortex_text(*made, calibration.line);
   calibration.provenance.method += "; thin cortex corrected";
   auto& parameters = calibration.provenance.parameters;
   parameters["point_spread_columns_mm"] = made->spread.sigma_mm.x();

@@ -12,9 +12,9 @@ namespace osteon::imaging {
 namespace {
 
 // A histogram of tissues with normal distributions.
-class Histogram {
+class TissueHistogram {
  public:
-  Histogram& add(double mean_hu, double deviation_hu, double voxels) {
+  TissueHistogram& add(double mean_hu, double deviation_hu, double voxels) {
     for (int hu = kLeastHu; hu < kLeastHu + kHuValues; ++hu) {
       const double z = (hu - mean_hu) / deviation_hu;
       if (std::abs(z) > 6.0) continue;
@@ -23,7 +23,7 @@ class Histogram {
     }
     return *this;
   }
-  Histogram& fill(int hu, std::int64_t voxels) {
+  TissueHistogram& fill(int hu, std::int64_t voxels) {
     counts_[static_cast<std::size_t>(hu - kLeastHu)] += voxels;
     return *this;
   }
@@ -34,9 +34,9 @@ class Histogram {
 };
 
 // Air, fat, muscle and bone on a scale that is 4 % too small and shifted by 30 HU.
-Histogram shifted_body() {
+TissueHistogram shifted_body() {
   const auto seen = [](double hu) { return 0.96 * hu + 30.0; };
-  return Histogram()
+  return TissueHistogram()
       .add(seen(-1000.0), 12.0, 2e6)
       .add(seen(-100.0), 18.0, 6e5)
       .add(seen(45.0), 15.0, 5e5)
@@ -59,17 +59,17 @@ TEST(HuScale, TheFillingBesideTheScannedCircleIsNoAir) {
 }
 
 TEST(HuScale, AirWithoutNoiseIsAir) {
-  const auto scale = measure_hu_scale(Histogram().fill(-990, 1'000'000).fill(50, 500'000).counts());
+  const auto scale = measure_hu_scale(TissueHistogram().fill(-990, 1'000'000).fill(50, 500'000).counts());
   ASSERT_TRUE(scale) << scale.error().message;
   EXPECT_NEAR(scale->air_hu, -990.0, 0.5);
   EXPECT_NEAR(scale->soft_tissue_hu, 50.0, 0.5);
 }
 
 TEST(HuScale, WithoutAirOrSoftTissueItIsNotKnown) {
-  const auto no_air = measure_hu_scale(Histogram().add(45.0, 15.0, 1e6).counts());
+  const auto no_air = measure_hu_scale(TissueHistogram().add(45.0, 15.0, 1e6).counts());
   ASSERT_FALSE(no_air);
   EXPECT_NE(no_air.error().message.find("no air from -1200 to -800 HU"), std::string::npos) << no_air.error().message;
-  const auto no_tissue = measure_hu_scale(Histogram().add(-1000.0, 15.0, 1e6).counts());
+  const auto no_tissue = measure_hu_scale(TissueHistogram().add(-1000.0, 15.0, 1e6).counts());
   ASSERT_FALSE(no_tissue);
   EXPECT_NE(no_tissue.error().message.find("no soft tissue"), std::string::npos) << no_tissue.error().message;
 }

@@ -12,7 +12,7 @@ namespace osteon::imaging {
 namespace {
 
 // A cube of soft tissue with turned faces in air, blurred along each axis of the voxels.
-HuVolume block(const Vec3& spacing_mm, const Vec3& sigma_mm, double noise_hu) {
+HuVolume blurred_block(const Vec3& spacing_mm, const Vec3& sigma_mm, double noise_hu) {
   HuVolume volume;
   volume.dims = {48, 48, static_cast<int>(36.0 / spacing_mm.z())};
   volume.spacing_mm = spacing_mm;
@@ -38,7 +38,7 @@ double interpolated(double sigma_mm, double spacing_mm) { return std::hypot(sigm
 
 TEST(PointSpread, IsMeasuredAlongEachAxis) {
   const Vec3 spacing(0.6, 0.6, 1.0), sigma(0.6, 0.6, 0.95);
-  const auto spread = measure_point_spread(block(spacing, sigma, 15.0), always);
+  const auto spread = measure_point_spread(blurred_block(spacing, sigma, 15.0), always);
   ASSERT_TRUE(spread);
   EXPECT_GT(spread->edges, 500);
   for (int axis = 0; axis < 3; ++axis) {
@@ -64,7 +64,8 @@ TEST(PointSpread, IsAssumedWhereNoEdgeShowsIt) {
 }
 
 TEST(PointSpread, TheMeasurementCanBeStopped) {
-  const auto stopped = measure_point_spread(block({1, 1, 1}, {0.6, 0.6, 0.6}, 0.0), [](double d) { return d < 0.3; });
+  const auto stopped =
+      measure_point_spread(blurred_block({1, 1, 1}, {0.6, 0.6, 0.6}, 0.0), [](double d) { return d < 0.3; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
 }

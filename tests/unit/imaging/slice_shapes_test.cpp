@@ -13,7 +13,7 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr double kSlice_mm = 3.0, kPitch_mm = 0.5, kSoft_hu = 50.0, kBone_hu = 1000.0, kThreshold_hu = 226.0;
+constexpr double kThickSlice_mm = 3.0, kThinPixel_mm = 0.5, kAround_hu = 50.0, kSolid_hu = 1000.0, kContour_hu = 226.0;
 
 // Signed distance, negative inside.
 using Shape = std::function<double(const Vec3&)>;
@@ -22,7 +22,7 @@ using Shape = std::function<double(const Vec3&)>;
 HuVolume scan_of(const Shape& shape) {
   HuVolume volume;
   volume.dims = {64, 64, 12};
-  volume.spacing_mm = {kPitch_mm, kPitch_mm, kSlice_mm};
+  volume.spacing_mm = {kThinPixel_mm, kThinPixel_mm, kThickSlice_mm};
   volume.origin_mm = {-15.75, -15.75, -16.3};
   for (int z = 0; z < volume.dims[2]; ++z)
     for (int y = 0; y < volume.dims[1]; ++y)
@@ -32,14 +32,14 @@ HuVolume scan_of(const Shape& shape) {
           const Vec3 part((i % 2 - 0.5) / 2.0, (i / 2 % 2 - 0.5) / 2.0, (i / 4 + 0.5) / 12.0 - 0.5);
           bone += std::clamp(0.5 - shape(volume.position_mm(Vec3(x, y, z) + part)) / 0.25, 0.0, 1.0) / 48.0;
         }
-        volume.values.push_back(static_cast<std::int16_t>(std::lround(kSoft_hu + (kBone_hu - kSoft_hu) * bone)));
+        volume.values.push_back(static_cast<std::int16_t>(std::lround(kAround_hu + (kSolid_hu - kAround_hu) * bone)));
       }
   return volume;
 }
 
 VoxelMask bones_of(const HuVolume& volume) {
   VoxelMask bones(volume.dims);
-  for (std::size_t i = 0; i < bones.values.size(); ++i) bones.values[i] = volume.values[i] >= kThreshold_hu ? 1 : 0;
+  for (std::size_t i = 0; i < bones.values.size(); ++i) bones.values[i] = volume.values[i] >= kContour_hu ? 1 : 0;
   return bones;
 }
 
@@ -50,7 +50,7 @@ class Field {
  public:
   explicit Field(std::vector<float> values) : values_(std::move(values)) {}
   [[nodiscard]] double at(const Vec3& point_mm) const {
-    const Vec3 p = point_mm / kPitch_mm - Vec3(kBox.min.x, kBox.min.y, kBox.min.z);
+    const Vec3 p = point_mm / kThinPixel_mm - Vec3(kBox.min.x, kBox.min.y, kBox.min.z);
     const Vec3 low = p.array().floor();
     double sum = 0.0;
     for (int corner = 0; corner < 8; ++corner) {
@@ -69,17 +69,17 @@ class Field {
 
 Field by_shapes(const HuVolume& volume) {
   const VoxelMask bones = bones_of(volume);
-  const auto shapes = SliceShapes::make(volume, bones, kThreshold_hu, always);
+  const auto shapes = SliceShapes::make(volume, bones, kContour_hu, always);
   EXPECT_TRUE(shapes);
   std::vector<float> values(61 * 61 * 61);
-  shapes->read(kBox, kPitch_mm, values);
+  shapes->read(kBox, kThinPixel_mm, values);
   return Field(std::move(values));
 }
 
 Field by_hu(const HuVolume& volume) {
-  auto values = resample(volume, kBox, kPitch_mm, always);
+  auto values = resample(volume, kBox, kThinPixel_mm, always);
   EXPECT_TRUE(values);
-  for (float& hu : values->values) hu -= static_cast<float>(kThreshold_hu);
+  for (float& hu : values->values) hu -= static_cast<float>(kContour_hu);
   return Field(std::move(values->values));
 }
 
@@ -168,7 +168,7 @@ TEST(SliceShapes, ATiltedCylinderHasNoSteps) {
 TEST(SliceShapes, ALeaningPlaneIsExact) {
   HuVolume volume;
   volume.dims = {40, 8, 6};
-  volume.spacing_mm = {kPitch_mm, kPitch_mm, kSlice_mm};
+  volume.spacing_mm = {kThinPixel_mm, kThinPixel_mm, kThickSlice_mm};
   for (int z = 0; z < 6; ++z)
     for (int y = 0; y < 8; ++y)
       for (int x = 0; x < 40; ++x)
@@ -179,13 +179,13 @@ TEST(SliceShapes, ALeaningPlaneIsExact) {
   ASSERT_TRUE(shapes);
   const CoordBox box{{5, 2, 0}, {30, 4, 30}};
   std::vector<float> values(26 * 3 * 31);
-  shapes->read(box, kPitch_mm, values);
+  shapes->read(box, kThinPixel_mm, values);
   // 30000 units are twenty slices.
-  const double unit_mm = 20.0 * kSlice_mm / 30000.0;
+  const double unit_mm = 20.0 * kThickSlice_mm / 30000.0;
   for (int x = 5; x <= 30; ++x)
     for (int z = 6; z <= 24; ++z) {  // where two slices are on either side
-      const double edge_mm = kPitch_mm * (16.3 + 1.4 * (z * kPitch_mm / kSlice_mm)),
-                   from_edge = x * kPitch_mm - edge_mm;
+      const double edge_mm = kThinPixel_mm * (16.3 + 1.4 * (z * kThinPixel_mm / kThickSlice_mm)),
+                   from_edge = x * kThinPixel_mm - edge_mm;
       const float value = values[static_cast<std::size_t>(((x - 5) * 3 + 1) * 31 + z)];
       EXPECT_NEAR(unit_mm * static_cast<double>(value), from_edge, 0.02) << x << " " << z;
     }
@@ -202,14 +202,14 @@ TEST(SliceShapes, EveryVoxelKeepsItsSide) {
       for (int x = 1; x < 62; ++x) {
         const Vec3 at = aligned.position_mm(Vec3(x, y, z));
         if (at.cwiseAbs().maxCoeff() >= 15.0) continue;
-        EXPECT_EQ(field.at(at) >= 0.0, aligned.at(x, y, z) >= kThreshold_hu) << at.transpose();
+        EXPECT_EQ(field.at(at) >= 0.0, aligned.at(x, y, z) >= kContour_hu) << at.transpose();
       }
 }
 
 TEST(SliceShapes, BoxesAreNeverOnOneSideOnlyBecauseTheirVoxelsAre) {
   const HuVolume scan = scan_of([](const Vec3& p) { return p.norm() - 10.0; });
   const VoxelMask bones = bones_of(scan);
-  const auto shapes = SliceShapes::make(scan, bones, kThreshold_hu, always);
+  const auto shapes = SliceShapes::make(scan, bones, kContour_hu, always);
   ASSERT_TRUE(shapes);
   std::vector<float> values(512);
   int sides[3] = {};
@@ -217,9 +217,9 @@ TEST(SliceShapes, BoxesAreNeverOnOneSideOnlyBecauseTheirVoxelsAre) {
     for (int y = -32; y < 24; y += 8)
       for (int z = -32; z < 24; z += 8) {
         const CoordBox box{{x, y, z}, {x + 7, y + 7, z + 7}};
-        shapes->read(box, kPitch_mm, values);
+        shapes->read(box, kThinPixel_mm, values);
         const auto count = std::ranges::count_if(values, [](float v) { return v >= 0.0f; });
-        const Inside inside = shapes->inside(box, kPitch_mm);
+        const Inside inside = shapes->inside(box, kThinPixel_mm);
         EXPECT_TRUE(inside != Inside::none || count == 0);
         EXPECT_TRUE(inside != Inside::all || count == 512);
         ++sides[static_cast<int>(inside)];
@@ -233,7 +233,7 @@ TEST(SliceShapes, CanBeStopped) {
   const HuVolume scan = scan_of([](const Vec3& p) { return p.norm() - 10.0; });
   const VoxelMask bones = bones_of(scan);
   for (const double at : {0.0, 0.15, 0.7}) {
-    const auto stopped = SliceShapes::make(scan, bones, kThreshold_hu, [&](double done) { return done < at; });
+    const auto stopped = SliceShapes::make(scan, bones, kContour_hu, [&](double done) { return done < at; });
     ASSERT_FALSE(stopped);
     EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
   }
