@@ -38,12 +38,13 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::string labels;
+  std::string labels, rods_of, between_slices = "auto", thin_cortex = "off";
+  std::optional<std::string> calibration, rods;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
-  double width_mm = 20.0, density_g_cm3 = 1.9;
-  bool json = false, merge = false, hollow = false, list = false, adaptive = false;
+  double width_mm = 20.0, density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
+  bool rescale_hu = false, json = false, merge = false, hollow = false, list = false, adaptive = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
@@ -71,6 +72,54 @@ Result<void> parse_keep(const std::string& text, CtOptions& options) {
     begin = end + 1;
   }
   return {};
+}
+
+// A line that no scanner has is a mistake of units or of order.
+Result<DensityCalibration> parse_calibration(const std::string& text) {
+  constexpr double kLeastSlope = 1e-4, kMostSlope = 1e-2, kMostIntercept_g_cm3 = 2.0;
+  const auto line = parse_pair(text);
+  if (!line || !(line->first >= kLeastSlope && line->first <= kMostSlope) ||
+      !(std::abs(line->second) <= kMostIntercept_g_cm3))
+    return bad_input(
+        "--calibration " + text +
+        " is not a line from HU to density; write SLOPE,INTERCEPT with a slope of 0.0001 to 0.01 g/cm3 per "
+        "HU and an intercept of -2 to 2 g/cm3, such as 0.001067,0.131");
+  return DensityCalibration{line->first, line->second};
+}
+
+// "0,0.1,0.2"
+Result<std::vector<double>> parse_rods(const std::string& text) {
+  constexpr double kMostRod_g_cm3 = 3.0;
+  std::vector<double> densities;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    double density = 0.0;
+    const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, density);
+    if (error != std::errc{} || stop != text.data() + end || !(density >= 0.0 && density <= kMostRod_g_cm3))
+      return bad_input("--rods " + text +
+                       " is not a list of densities; write those of two to eight rods in g/cm3, such as 0,0.1,0.2");
+    densities.push_back(density);
+    begin = end + 1;
+  }
+  return densities;
+}
+
+Result<CalibrationOptions> calibration_options(const CaseArguments& a) {
+  CalibrationOptions options;
+  options.rescale_hu = a.rescale_hu;
+  if (a.rods_of == "hydroxyapatite") options.rods_of = RodMaterial::hydroxyapatite;
+  if (a.calibration) {
+    const auto line = parse_calibration(*a.calibration);
+    if (!line) return tl::unexpected(line.error());
+    options.line = *line;
+  }
+  if (a.rods) {
+    auto rods = parse_rods(*a.rods);
+    if (!rods) return tl::unexpected(rods.error());
+    options.rods_g_cm3 = std::move(*rods);
+  }
+  return options;
 }
 
 // Adds the input's name to an error about its content.
@@ -116,6 +165,14 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.adaptive = a.adaptive;
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   options.margin_mm = a.margin_mm;
+  options.metal_hu = a.metal_hu;
+  options.thin_cortex = a.thin_cortex == "on";
+  options.between_slices = a.between_slices == "hu"       ? BetweenSlices::hu
+                           : a.between_slices == "shapes" ? BetweenSlices::shapes
+                                                          : BetweenSlices::automatic;
+  auto calibration = calibration_options(a);
+  if (!calibration) return tl::unexpected(calibration.error());
+  options.calibration = std::move(*calibration);
   const auto names = parse_label_names(a.label_names);
   if (!names) return tl::unexpected(names.error());
   Bar bar(stop);
@@ -138,11 +195,11 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!made) return tl::unexpected(about(a.scan.input, made.error()));
   if (a.list) {
     bar.stage(1.0, 1.0)(1.0);
-    return series + segmentation_text(made->found);
+    return series + made->calibration_text + segmentation_text(made->found);
   }
   if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*made->bone) + series +
+  return report_text(*made->bone) + series + made->calibration_text +
          (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found));
 }
 
@@ -376,6 +433,37 @@ void add_smoothing_options(CLI::App& command, CaseArguments& a) {
       ->check(within(0.0, 10.0));
 }
 
+void add_density_options(CLI::App& command, CaseArguments& a) {
+  CLI::Option* line = command.add_option("--calibration", a.calibration,
+                                         "SLOPE,INTERCEPT of the line from HU to density, g/cm3 per HU and g/cm3 "
+                                         "(default: 0.001067,0.131, of Rho 1995 for the proximal femur)");
+  CLI::Option* rods = command
+                          .add_option("--rods", a.rods,
+                                      "Find rods of these densities, g/cm3, such as 0,0.1,0.2, along the slices of the "
+                                      "scan, and take the line through their HU")
+                          ->excludes(line);
+  command
+      .add_option("--rods-of", a.rods_of,
+                  "What --rods gives the density of: apparent (wet bone that looks like the rod; default) or "
+                  "hydroxyapatite (mineral; bone has 1/0.6 of it)")
+      ->check(CLI::IsMember({"apparent", "hydroxyapatite"}))
+      ->needs(rods);
+  command
+      .add_flag("--rescale-hu", a.rescale_hu,
+                "First correct the scale of HU, so that air has -1000 and soft tissue 45 HU")
+      ->excludes(line)
+      ->excludes(rods);
+  command
+      .add_option("--thin-cortex", a.thin_cortex,
+                  "on: give cortex that the scan blurs its thickness and density back, by a fit along the surface's "
+                  "normals")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str();
+  command.add_option("--metal-hu", a.metal_hu, "Metal is at or above it, HU")
+      ->check(within(500.0, 32767.0))
+      ->capture_default_str();
+}
+
 void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& shared, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
   CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
@@ -458,10 +546,18 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->excludes(labels_option);
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
       ->excludes(labels_option);
+  ct->add_option(
+        "--between-slices", a.between_slices,
+        "The surface goes on from slice to slice where HU cross the threshold (hu), or so that the shape of "
+        "one slice turns into that of the next (shapes); auto: shapes if slices are more than two pixels apart")
+      ->check(CLI::IsMember({"auto", "hu", "shapes"}))
+      ->capture_default_str()
+      ->excludes(labels_option);
   add_smoothing_options(*ct, a);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
       ->check(within(0.0, 200.0))
       ->capture_default_str();
+  add_density_options(*ct, a);
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
 

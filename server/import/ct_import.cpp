@@ -12,7 +12,9 @@
 #include "common/core/freed_memory.hpp"
 #include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/segmentation.hpp"
+#include "common/imaging/slice_shapes.hpp"
 #include "common/imaging/threshold.hpp"
+#include "server/import/corrected_cortex.hpp"
 #include "server/import/ct_case.hpp"
 #include "server/import/kept_scan.hpp"
 
@@ -147,8 +149,8 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
 }
 
 // `bones`: what grew from seeds, if there are any.
-Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std::optional<GrownBones> bones,
-                          const KeepGoing& keep_going) {
+Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const DensityCalibration& calibration,
+                          std::optional<GrownBones> bones, const KeepGoing& keep_going) {
   const auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
                           : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
@@ -163,7 +165,7 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std:
                                     params, work->ends, segmenting)
             : imaging::segment_bone(s.volume, params, work->ends, segmenting);
   if (!bone) return tl::unexpected(bone.error());
-  const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 0.9));
+  const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.8, 0.9));
   if (!islands) return tl::unexpected(islands.error());
   auto kept = options.list_only ? Result<std::vector<int>>{}
               : bones           ? Result<std::vector<int>>(islands_of(bones->regions, *islands, work->first))
@@ -186,8 +188,9 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std:
 }
 
 // Finds the bones in the scan, and adds to its source what was done. `options`: gets the threshold that was used.
-Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& keep_going) {
-  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const DensityCalibration& calibration,
+                             const KeepGoing& keep_going) {
+  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, kCalibrateEnd, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed;
   std::string reason;
@@ -206,7 +209,8 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& 
     scan.source += grown->description;
     bones = std::move(*grown);
   }
-  auto s = segment(std::move(scan.volume), options, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
+  auto s =
+      segment(std::move(scan.volume), options, calibration, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
   if (s) s->found.threshold_reason = std::move(reason);
   return s;
 }
@@ -215,26 +219,41 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   const imaging::HuVolume geometry = without_values(scan.volume);
   const double pitch_mm = pitch_mm_of(geometry, options);
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
-  auto s = find_bones(scan, options, keep_going);
+  auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
+  if (!calibrated) return tl::unexpected(calibrated.error());
+  auto s = find_bones(scan, options, calibrated->line, keep_going);
   if (!s) return tl::unexpected(s.error());
   if (!s->found.regions.empty())
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
-  if (options.list_only) return CtImport{std::move(s->found), {}, {}};
+  if (options.list_only)
+    return CtImport{.found = std::move(s->found), .bone = {}, .scan = {}, .calibration_text = calibrated->text};
   give_back_freed_memory();
   const auto lattice = lattice_around(s->volume, s->first, s->last, pitch_mm);
   if (!lattice) return tl::unexpected(lattice.error());
-  auto surface_mm = measure_surface(s->volume, s->bones, options.threshold_hu, *lattice, pitch_mm,
-                                    part(keep_going, kSegmentEnd, kSurfaceEnd));
+  const bool shapes = options.between_slices == BetweenSlices::shapes ||
+                      (options.between_slices == BetweenSlices::automatic && imaging::has_thick_slices(geometry));
+  if (shapes) scan.source += ", shapes interpolated between slices";
+  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, s->bones, options.threshold_hu, *lattice,
+                                                                pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   give_back_freed_memory();
-  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
-  auto hard = imaging::find_hard_tissue(s->volume, s->bones, options.calibration, part(building, 0.0, 0.2));
+  std::optional<SparseVolume> change_hu;
+  if (options.thin_cortex) {
+    auto change =
+        correct_cortex(s->volume, *surface_mm, pitch_mm, *calibrated, part(keep_going, kSurfaceEnd, kCortexEnd));
+    if (!change) return tl::unexpected(change.error());
+    change_hu = std::move(*change);
+  }
+  const KeepGoing building = part(keep_going, kCortexEnd, 1.0);
+  auto hard =
+      imaging::find_hard_tissue(s->volume, s->bones, calibrated->line, options.metal_hu, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
+  s->found.metal_hu = options.metal_hu;
 
-  CaseInfo info = description(scan, options, pitch_mm);
+  CaseInfo info = description(scan, options, *calibrated, pitch_mm);
   info.threshold_hu = options.threshold_hu;
   const imaging::VoxelBox keep = kept_voxels(s->volume, s->first, s->last, options.margin_mm);
   auto made = make_case(
@@ -245,12 +264,14 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
        .keep = keep,
        .several = s->found.kept.size() > 1 && !options.merge,
        .lattice = *lattice,
-       .surface_mm = std::move(*surface_mm)},
+       .surface_mm = std::move(*surface_mm),
+       .change_hu = std::move(change_hu)},
       std::move(info), [&](const CaseScan& kept, CaseInfo& to) { list_labels(kept, options, s->found, to); },
       part(building, 0.2, 1.0));
   if (!made) return made;
   s->found.case_cm3 = made->found.case_cm3;
   made->found = std::move(s->found);
+  made->calibration_text = calibrated->text;
   return made;
 }
 

@@ -13,17 +13,27 @@
 #include "server/import/ct_scan.hpp"
 #include "server/import/grown_bones.hpp"
 #include "server/import/placed_labels.hpp"
+#include "server/import/scan_calibration.hpp"
 
 namespace osteon::import {
+
+// How the surface goes on from slice to slice.
+enum class BetweenSlices {
+  automatic,  // by shapes if imaging::has_thick_slices()
+  hu,         // where the interpolated HU cross the threshold
+  shapes,     // see imaging::SliceShapes
+};
 
 struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
   bool suggest_threshold = false;  // take suggest_threshold() instead
   GrowOptions grow;                // with seeds: the bones that grow from them are kept, instead of islands
-  DensityCalibration calibration = imaging::kRho1995;
-  std::string title = "CT";  // never taken from the scan, whose texts may name a patient
-  std::vector<int> keep;     // islands by number, from 1; empty: the largest
+  CalibrationOptions calibration;
+  double metal_hu = imaging::kMetal_hu;  // metal is at or above it
+  bool thin_cortex = false;              // correct the density of thin cortex, see imaging::correct_thin_cortex()
+  std::string title = "CT";              // never taken from the scan, whose texts may name a patient
+  std::vector<int> keep;                 // islands by number, from 1; empty: the largest
   bool keep_all = false;
   bool merge = false;      // the kept islands count as one bone
   bool hollow = false;     // cavities enclosed by bone are not bone
@@ -31,6 +41,7 @@ struct CtOptions {
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none
+  BetweenSlices between_slices = BetweenSlices::automatic;
   // The case keeps the scan this far around its bones. It has the HU after the filters.
   double margin_mm = 10.0;
 };
@@ -47,14 +58,16 @@ struct CtSegmentation {
   std::vector<double> joined_cm3;  // parts of dense and cancellous bone that only marrow joins, if several are large
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
+  double metal_hu = imaging::kMetal_hu;
   Box region;  // part of the scan around everything that reaches the threshold, LPS. With seeds: the whole scan
 };
 
 struct CtImport {
   CtSegmentation found;
-  std::optional<Case> bone;  // empty only if the islands were only listed
-  CaseScan scan;             // of `bone`
-  PlacedLabels labels = {};  // of a label map, without their voxels
+  std::optional<Case> bone;           // empty only if the islands were only listed
+  CaseScan scan;                      // of `bone`
+  std::string calibration_text = {};  // see ScanCalibration
+  PlacedLabels labels = {};           // of a label map, without their voxels
 };
 
 // segment_bone() decides what is bone, and the options decide which islands are kept. With seeds, the grown regions

@@ -44,7 +44,7 @@ LabelProvenance provenance_of(const CtOptions& options) {
   return provenance;
 }
 
-void list_tissues(const CaseScan& scan, CaseInfo& info) {
+void list_tissues(const CaseScan& scan, double metal_hu, CaseInfo& info) {
   const CaseLabel known[] = {
       {static_cast<int>(Tissue::cortical),
        "cortical",
@@ -54,7 +54,7 @@ void list_tissues(const CaseScan& scan, CaseInfo& info) {
        "cancellous",
        LabelKind::cancellous,
        {"density", {{"below_g_cm3", static_cast<double>(kCorticalFrom_g_cm3)}}, {}}},
-      {static_cast<int>(Tissue::metal), "metal", LabelKind::metal, {"HU", {{"from_hu", imaging::kMetal_hu}}, {}}},
+      {static_cast<int>(Tissue::metal), "metal", LabelKind::metal, {"HU", {{"from_hu", metal_hu}}, {}}},
       {static_cast<int>(Tissue::enamel),
        "enamel",
        LabelKind::enamel,
@@ -104,12 +104,12 @@ void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegment
     if (!found.merged) label.provenance.parameters["island"] = found.kept[static_cast<std::size_t>(bone - 1)];
     info.labels.push_back(std::move(label));
   }
-  list_tissues(scan, info);
+  list_tissues(scan, options.metal_hu, info);
 }
 
-void list_labels(const CaseScan& scan, const PlacedLabels& placed, CaseInfo& info) {
+void list_labels(const CaseScan& scan, const PlacedLabels& placed, const CtOptions& options, CaseInfo& info) {
   info.labels = placed.labels;
-  list_tissues(scan, info);
+  list_tissues(scan, options.metal_hu, info);
   // Tissue that the label map names is not found by its density.
   for (CaseLabel& tissue : info.tissues)
     if (std::ranges::find(info.labels, tissue.kind, &CaseLabel::kind) != info.labels.end())

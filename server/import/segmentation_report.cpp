@@ -103,7 +103,7 @@ std::string segmentation_text(const CtSegmentation& found) {
         found.case_cm3, 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
   if (found.metal_cm3 > 0.0)
     text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
-                 found.metal_cm3, imaging::kMetal_hu);
+                 found.metal_cm3, found.metal_hu);
   if (found.enamel_cm3 > 0.0)
     text += line("enamel     %.3f cm3, or mineral as dense: shown as enamel, cut like compact bone of %.1f g/cm3\n",
                  found.enamel_cm3, imaging::kCompactBone_g_cm3);

@@ -84,6 +84,24 @@ TEST_F(Program, WrongOptionsOfSlicesAreOneSentence) {
   refused("--edges-in", "row");
 }
 
+TEST_F(Program, WrongOptionsOfDensityAreOneSentence) {
+  write_inv3(folder_ / "scan.inv3", {});
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    more.insert(more.begin(), {"ct", path("scan.inv3"), "--out", path("case")});
+    expect_refused(more, why, folder_);
+  };
+  // In mg/cm3, in the wrong order, with a falling line, and no lines at all.
+  for (const char* line : {"1.067,131", "0.131,0.001067", "-0.001,0.1", "0.001", "0.001,0.1,2", "nan,0.1", "0.001,inf"})
+    refused({"--calibration", line}, std::string("--calibration ") + line);
+  for (const char* rods : {"", "0,x", "0,-0.1", "0,0.1,", "0,100", "nan,1"}) refused({"--rods", rods}, "--rods");
+  refused({"--rods", "0,0.1", "--calibration", "0.001,0.1"}, "--calibration");
+  refused({"--rods", "0,0.1", "--rescale-hu"}, "--rescale-hu");
+  refused({"--rods-of", "hydroxyapatite"}, "--rods");
+  refused({"--rods", "0,0.1", "--rods-of", "water"}, "--rods-of");
+  for (const char* metal : {"499", "40000", "nan"}) refused({"--metal-hu", metal}, "--metal-hu");
+  refused({"--rods", "0,0.1"}, "scan.inv3: the scan does not show 2 uniform rods");
+}
+
 // A block of bone in air, as raw numbers.
 TEST_F(Program, ImportsRawNumbers) {
   std::ofstream out(folder_ / "scan.raw", std::ios::binary);
