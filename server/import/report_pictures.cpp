@@ -1,0 +1,168 @@
+#include "server/import/report_pictures.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+namespace osteon::import {
+namespace {
+
+constexpr int kPanel = 460, kCaption = 22, kSpace = 8, kEdge = 26;  // pixels
+constexpr int kLabelPixels = 150;
+constexpr double kAround_mm = 8.0;  // of the scan around the bones in a plane
+constexpr std::size_t kMostInList = 17;
+constexpr Colour kThresholdInk{220, 40, 40}, kBoneInk{230, 159, 0}, kScanInk{170, 174, 180};
+
+std::string words(const char* format, double value) {
+  std::array<char, 64> text{};
+  std::snprintf(text.data(), text.size(), format, value);
+  return text.data();
+}
+
+// 1, 2 or 5 times a power of ten, at most `most`.
+double round_length(double most) {
+  const double ten = std::pow(10.0, std::floor(std::log10(most)));
+  for (const double factor : {5.0, 2.0})
+    if (factor * ten <= most) return factor * ten;
+  return ten;
+}
+
+// The patient's sides at the edges, and a bar of known length.
+void write_sides(Picture& picture, const Frame& frame) {
+  const bool sagittal = frame.view == View::sagittal, axial = frame.view == View::axial;
+  const int middle = frame.pixels / 2, last = frame.pixels - 18;
+  picture.text(6, middle, sagittal ? "A" : "R", kWhiteInk, 2);
+  picture.text(last, middle, sagittal ? "P" : "L", kWhiteInk, 2);
+  picture.text(middle, 6, axial ? "A" : "H", kWhiteInk, 2);
+  picture.text(middle, last - 2, axial ? "P" : "F", kWhiteInk, 2);
+  const double length_mm = round_length(0.3 * frame.pixels * frame.pixel_mm);
+  const int length = static_cast<int>(std::lround(length_mm / frame.pixel_mm));
+  picture.fill(8, frame.pixels - 8, length, 3, kWhiteInk);
+  picture.text(8, frame.pixels - 26, words("%g mm", length_mm), kWhiteInk, 2);
+}
+
+struct Colours {
+  LabelColours bones, structures, all;
+};
+Colours colours_of(const std::vector<CaseLabel>& labels) {
+  Colours colours;
+  int next = 0;
+  for (const CaseLabel& label : labels) {
+    const auto value = static_cast<std::size_t>(label.value);
+    const Colour colour = colour_of(next++);
+    (is_carved(label.kind) ? colours.bones : colours.structures)[value] = colour;
+    colours.all[value] = colour;
+  }
+  return colours;
+}
+
+Picture list_of_parts(const ReportFacts& facts) {
+  Picture list(kPanel, kPanel, kBlackInk);
+  int y = kEdge;
+  std::size_t listed = 0, others = 0;
+  for (const ReportPart& part : facts.parts) {
+    if (!part.kept) continue;
+    if (++listed > kMostInList) {
+      ++others;
+      continue;
+    }
+    list.fill(8, y, 14, 14, part.colour.value_or(kGreyInk));
+    std::string text = part.name;
+    if (text.size() > 20) text = text.substr(0, 19) + ".";
+    list.text(32, y, text, kWhiteInk, 2);
+    list.text(284, y, words("%7.1f cm3", part.volume_cm3), kWhiteInk, 2);
+    if (part.at_risk) list.text(404, y, "risk", kThresholdInk, 2);
+    y += 24;
+  }
+  if (others > 0) list.text(32, y, "and " + std::to_string(others) + " more", kGreyInk, 2);
+  return list;
+}
+
+}  // namespace
+
+Result<Picture> montage(const CaseScan& scan, const std::vector<CaseLabel>& labels, const ReportFacts& facts,
+                        const KeepGoing& keep_going) {
+  const Colours colours = colours_of(labels);
+  const LabelledVoxels voxels{scan.geometry, scan.hu, scan.labels};
+  const bool any_bone = std::ranges::any_of(colours.bones, [](const auto& colour) { return colour.has_value(); });
+  const LabelColours& main = any_bone ? colours.bones : colours.all;
+  const Box box = coloured_box(voxels, colours.all);
+  Picture whole(3 * kPanel + 2 * kSpace, 2 * (kPanel + kCaption) + kSpace, Colour{40, 44, 50});
+  const auto place = [&](Picture panel, const std::string& caption, int column, int row) {
+    const int x = column * (kPanel + kSpace), y = row * (kPanel + kCaption + kSpace);
+    whole.fill(x, y, kPanel, kCaption, kBlackInk);
+    whole.text(x + 6, y + 4, caption, kWhiteInk, 2);
+    whole.paste(panel, x, y + kCaption);
+  };
+  static constexpr const char* kNames[] = {"axial, z %.0f mm", "coronal, y %.0f mm", "sagittal, x %.0f mm"};
+  for (const View view : {View::axial, View::coronal, View::sagittal}) {
+    const int column = static_cast<int>(view);
+    if (!keep_going(0.1 * column)) return stopped_while("drawing the bone");
+    Frame frame = frame_around(box.grown(kAround_mm), view, kPanel);
+    const Vec3 across = direction_of(view).cwiseAbs();
+    const double at_mm = fullest_plane_mm(voxels, main, view);
+    frame.centre_mm += (at_mm - frame.centre_mm.dot(across)) * across;
+    Picture panel = draw_plane(voxels, colours.all, frame);
+    write_sides(panel, frame);
+    place(std::move(panel), words(kNames[column], at_mm), column, 0);
+  }
+  for (const View view : {View::coronal, View::sagittal}) {
+    const int column = view == View::coronal ? 0 : 1;
+    const Frame frame = frame_around(box, view, kPanel, kEdge);
+    auto panel = draw_surface(voxels, colours.bones, colours.structures, frame,
+                              part(keep_going, 0.3 + 0.35 * column, 0.65 + 0.35 * column));
+    if (!panel) return panel;
+    write_sides(*panel, frame);
+    place(std::move(*panel), column == 0 ? "from the front" : "from the left", column, 1);
+  }
+  place(list_of_parts(facts), "in the case", 2, 1);
+  return whole;
+}
+
+Result<Picture> label_picture(const CaseScan& scan, int label, Colour colour, const KeepGoing& keep_going) {
+  LabelColours one;
+  one[static_cast<std::size_t>(label)] = colour;
+  const LabelledVoxels voxels{scan.geometry, {}, scan.labels};
+  const Box box = coloured_box(voxels, one);
+  if (box.empty()) return Picture(kLabelPixels, kLabelPixels, kBlackInk);
+  return draw_surface(voxels, one, {}, frame_around(box, View::coronal, kLabelPixels, 6), keep_going);
+}
+
+Picture histogram_picture(const ReportFacts& facts) {
+  constexpr int kLeft = 20, kTop = 40, kHeight = 260, kBottom = 40;
+  constexpr int kWidth = 2 * HuHistogram::kBins;  // two pixels for each bin
+  Picture picture(kLeft + kWidth + 20, kTop + kHeight + kBottom, Colour{255, 255, 255});
+  const auto most = std::max<std::int64_t>(10, std::ranges::max(facts.of_scan.voxels));
+  const auto draw = [&](const HuHistogram& histogram, Colour colour) {
+    for (int bin = 0; bin < HuHistogram::kBins; ++bin) {
+      const auto count = static_cast<double>(histogram.voxels[static_cast<std::size_t>(bin)]);
+      const int height = static_cast<int>(kHeight * std::log1p(count) / std::log1p(static_cast<double>(most)));
+      picture.fill(kLeft + 2 * bin, kTop + kHeight - height, 2, height, colour);
+    }
+  };
+  const auto x_of = [&](double hu) {
+    return kLeft + static_cast<int>(std::lround(2.0 * (hu - HuHistogram::kFirst_hu) / HuHistogram::kBin_hu));
+  };
+  draw(facts.of_scan, kScanInk);
+  draw(facts.of_bone, kBoneInk);
+  picture.fill(kLeft, kTop + kHeight, kWidth, 2, kBlackInk);
+  for (int hu = -1000; hu <= 3000; hu += 500) {
+    const std::string text = std::to_string(hu);
+    picture.fill(x_of(hu), kTop + kHeight, 2, 6, kBlackInk);
+    picture.text(x_of(hu) - text_width(text, 2) / 2, kTop + kHeight + 10, text, kBlackInk, 2);
+  }
+  picture.text(kLeft + kWidth - 24, kTop + kHeight - 22, "HU", kBlackInk, 2);
+  picture.fill(kLeft, 10, 14, 14, kScanInk);
+  picture.text(kLeft + 20, 10, "scan", kBlackInk, 2);
+  picture.fill(kLeft + 90, 10, 14, 14, kBoneInk);
+  picture.text(kLeft + 110, 10, "bone of the case", kBlackInk, 2);
+  if (facts.threshold_hu) {
+    const int x = x_of(*facts.threshold_hu);
+    picture.fill(x, kTop - 8, 2, kHeight + 8, kThresholdInk);
+    picture.text(x + 8, kTop - 8, words("threshold %.0f HU", *facts.threshold_hu), kThresholdInk, 2);
+  }
+  return picture;
+}
+
+}  // namespace osteon::import
