@@ -20,7 +20,7 @@ constexpr int kLowest_hu = 110;
 // [A] The mean of what lies above the threshold. Below it, that is the end of the soft tissue and not bone.
 constexpr double kLeastBone_hu = 200.0;
 // [A] Of the voxels that count. A smaller class is a few wrong voxels, and no tissue.
-constexpr double kLeastPart = 0.001;
+constexpr double kLeastShare = 0.001;
 // A whole HU stands for values up to half a HU away. Their variance keeps a class of one value from being a point.
 constexpr double kWithinOne = 1.0 / 12.0;
 
@@ -88,7 +88,7 @@ Result<ThresholdSuggestion> suggest_threshold(std::span<const std::int64_t> hist
   int first = 0, last = 0, lowest = 0, highest = 0;
   for (int hu = kLowest_hu; hu <= most_hu(); ++hu) {
     const Sums low = sums_below(hu), high = all - low;
-    if (!(std::min(low.voxels, high.voxels) > kLeastPart * all.voxels)) continue;
+    if (!(std::min(low.voxels, high.voxels) > kLeastShare * all.voxels)) continue;
     if (lowest == 0) lowest = hu;
     highest = hu;
     const double here = criterion(low, high);

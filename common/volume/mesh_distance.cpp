@@ -19,7 +19,7 @@
 namespace osteon {
 namespace {
 
-constexpr float kFarthest_mm = 1e5f;  // from the origin; farther samples have no number
+constexpr float kFarthestSample_mm = 1e5f;  // from the origin; farther samples have no number
 
 Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_triangles, double largest_mm) {
   char text[200];
@@ -36,10 +36,10 @@ Result<void> check(const TriangleMesh& mesh, double pitch_mm, std::size_t most_t
   for (const auto& p : mesh.positions_mm)
     for (const float x : p) {
       if (!std::isfinite(x)) return failure(ErrorCode::invalid_input, "the mesh has corners that are not numbers");
-      if (std::abs(x) > kFarthest_mm) {
+      if (std::abs(x) > kFarthestSample_mm) {
         std::snprintf(text, sizeof text,
                       "the mesh has a corner %.3g mm from the origin, more than %.3g mm; move it to the origin",
-                      std::abs(static_cast<double>(x)), static_cast<double>(kFarthest_mm));
+                      std::abs(static_cast<double>(x)), static_cast<double>(kFarthestSample_mm));
         return failure(ErrorCode::invalid_input, text);
       }
     }

@@ -40,7 +40,6 @@ list(APPEND CMAKE_MODULE_PATH /usr/lib/${CMAKE_LIBRARY_ARCHITECTURE}/cmake/OpenV
 find_package(OpenVDB 10 REQUIRED)
 
 if(BUILD_TESTING)
-  include(GoogleTest)
   find_package(GTest REQUIRED)
   find_package(benchmark REQUIRED)
   pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET umockdev-1.0)

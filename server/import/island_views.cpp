@@ -1,6 +1,8 @@
 #include "server/import/island_views.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <numeric>
 #include <string>
 
@@ -9,10 +11,11 @@
 namespace osteon::import {
 namespace {
 
-constexpr int kOverviewPixels = 460, kIslandPixels = 150, kBorder = 10, kGap = 8;
-constexpr std::size_t kMostNumbered = 12;   // islands with a number in the overview
+constexpr int kOverviewPixels = 460, kIslandPixels = 150, kBorder = 28, kGap = 8;
+constexpr std::size_t kMostNumbered = 24;   // islands with a number in the overview
+constexpr std::size_t kLeastSeen = 30;      // pixels of an island with a number
 constexpr double kLeastInOverview = 0.001;  // of the largest island: smaller ones do not widen the overview
-constexpr Colour kLeftOut{120, 122, 128};
+constexpr Colour kLeftOutInk{120, 122, 128};
 
 // Around the voxel boxes of the islands that are worth a look.
 Box box_of(const imaging::HuVolume& volume, const std::vector<imaging::Island>& islands) {
@@ -28,12 +31,37 @@ Box box_of(const imaging::HuVolume& volume, const std::vector<imaging::Island>& 
   return box;
 }
 
-void write_number(Picture& picture, const Frame& frame, const Vec3& at_mm, int number) {
-  const std::string text = std::to_string(number);
-  const auto [x, y] = frame.pixel_of(at_mm);
-  const int width = text_width(text, 2), left = static_cast<int>(x) - width / 2, top = static_cast<int>(y) - 7;
-  picture.fill(left - 3, top - 3, width + 6, 20, kBlackInk);
-  picture.text(left, top, text, kWhiteInk, 2);
+// Writes numbers of islands where one sees them, the largest first. A number for which there is no room is left out.
+void write_numbers(SurfacePicture& surface, std::size_t count) {
+  const int size = surface.picture.width();
+  std::vector<std::array<int, 4>> taken;  // left, top, right, bottom
+  for (std::size_t island = 0; island < count; ++island) {
+    // The pixel of the island that is nearest to the middle of all its pixels.
+    std::vector<std::array<int, 2>> seen;
+    double sum_x = 0.0, sum_y = 0.0;
+    for (int y = 0, i = 0; y < size; ++y)
+      for (int x = 0; x < size; ++x, ++i) {
+        if (surface.labels[static_cast<std::size_t>(i)] != island + 1) continue;
+        seen.push_back({x, y});
+        sum_x += x;
+        sum_y += y;
+      }
+    if (seen.size() < kLeastSeen) continue;
+    const double middle_x = sum_x / static_cast<double>(seen.size());
+    const double middle_y = sum_y / static_cast<double>(seen.size());
+    const auto at = *std::ranges::min_element(
+        seen, {}, [&](const auto& pixel) { return std::hypot(pixel[0] - middle_x, pixel[1] - middle_y); });
+    const std::string text = std::to_string(island + 1);
+    const int width = text_width(text, 2), left = at[0] - width / 2, top = at[1] - 7;
+    const std::array<int, 4> room{left - 3, top - 3, left + width + 3, top + 17};
+    const bool free = std::ranges::none_of(taken, [&](const auto& other) {
+      return room[0] < other[2] && other[0] < room[2] && room[1] < other[3] && other[1] < room[3];
+    });
+    if (!free) continue;
+    taken.push_back(room);
+    surface.picture.fill(room[0], room[1], room[2] - room[0], room[3] - room[1], kBlackInk);
+    surface.picture.text(left, top, text, kWhiteInk, 2);
+  }
 }
 
 }  // namespace
@@ -46,9 +74,9 @@ Result<IslandViews> draw_islands(const imaging::HuVolume& volume, const imaging:
   LabelledVoxels voxels{
       {volume.dims, volume.origin_mm, volume.directions * volume.spacing_mm.asDiagonal()}, {}, numbers.values};
   LabelColours colours;
-  for (std::size_t value = 1; value < colours.size(); ++value) colours[value] = kLeftOut;
+  for (std::size_t value = 1; value < colours.size(); ++value) colours[value] = kLeftOutInk;
   for (std::size_t i = 0; i < kept.size(); ++i)
-    colours[static_cast<std::size_t>(std::min(kept[i], 255))] = colour_of(static_cast<int>(i));
+    colours[static_cast<std::size_t>(std::min(kept[i], 255))] = palette_colour(static_cast<int>(i));
 
   IslandViews views;
   const Box box = box_of(volume, islands.list);
@@ -58,9 +86,9 @@ Result<IslandViews> draw_islands(const imaging::HuVolume& volume, const imaging:
     const Frame frame = frame_around(box, view, kOverviewPixels, kBorder);
     auto surface = draw_surface(voxels, colours, {}, frame, keep_going);
     if (!surface) return tl::unexpected(surface.error());
-    for (std::size_t i = std::min(kMostNumbered, islands.list.size()); i-- > 0;)
-      write_number(*surface, frame, islands.list[i].centre_mm, static_cast<int>(i + 1));
-    views.overview.paste(*surface, left, 20);
+    write_numbers(*surface, std::min(kMostNumbered, islands.list.size()));
+    write_sides(surface->picture, frame);
+    views.overview.paste(surface->picture, left, 20);
     views.overview.text(left + 4, 2, view == View::coronal ? "from the front" : "from the left", kGreyInk, 2);
     left += kOverviewPixels + kGap;
   }
@@ -85,7 +113,7 @@ Result<IslandViews> draw_islands(const imaging::HuVolume& volume, const imaging:
     const LabelledVoxels single{{part_of.dims, volume.position_mm(first), voxels.geometry.axes_mm}, {}, part_of.values};
     auto picture = draw_surface(single, one, {}, frame_around(around, View::coronal, kIslandPixels, 6), keep_going);
     if (!picture) return tl::unexpected(picture.error());
-    views.each.push_back(std::move(*picture));
+    views.each.push_back(std::move(picture->picture));
   }
   return views;
 }

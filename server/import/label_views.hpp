@@ -23,7 +23,7 @@ struct LabelledVoxels {
 using LabelColours = std::array<std::optional<Colour>, 256>;
 
 // A colour for the Nth of several bones or structures, from 0; after eight they begin again (Okabe 2008).
-[[nodiscard]] Colour colour_of(int index);
+[[nodiscard]] Colour palette_colour(int index);
 
 // The position in the patient (LPS) of everything with a colour; empty if there is nothing.
 [[nodiscard]] Box coloured_box(const LabelledVoxels& voxels, const LabelColours& colours);
@@ -49,17 +49,28 @@ struct Frame {
 // The frame around a box. `border`: pixels left free on every side.
 [[nodiscard]] Frame frame_around(const Box& box, View view, int pixels, int border = 0);
 
-// Where the plane of a view meets most voxels with a colour, mm along x, y or z.
+// Writes the patient's sides at the edges of a picture of the frame, and a bar of known length: R and L for right and
+// left, A and P for front and back, H and F for head and feet.
+void write_sides(Picture& picture, const Frame& frame);
+
+// Where the plane of a view meets most voxels with a colour, mm along x, y or z. Of these voxels a quarter lies before
+// the plane and a quarter behind it, so that it does not graze the back of a skull.
 [[nodiscard]] double fullest_plane_mm(const LabelledVoxels& voxels, const LabelColours& colours, View view);
 
 // The plane of a frame, in the window for bone. Every label with a colour has its outline: the pixels of the label that
-// share an edge with pixels of another one or of none. HU are interpolated linearly. The label is the one that the same
-// weights of the eight voxels around give most.
+// are at most two pixels away, along x or y, from pixels of another one or of none. HU are interpolated linearly. The
+// label is the one that the same weights of the eight voxels around give most.
 [[nodiscard]] Picture draw_plane(const LabelledVoxels& voxels, const LabelColours& colours, const Frame& frame);
 
-// The surface of the labels with a colour, without perspective, lit from the eye.
+struct SurfacePicture {
+  Picture picture;
+  std::vector<std::uint8_t> labels;  // that each pixel shows; 0: none
+};
+
+// The surface of the labels with a colour, without perspective, lit from the upper left.
 // `within`: labels with a colour in this list shine through the others. Error: cancelled.
-[[nodiscard]] Result<Picture> draw_surface(const LabelledVoxels& voxels, const LabelColours& colours,
-                                           const LabelColours& within, const Frame& frame, const KeepGoing& keep_going);
+[[nodiscard]] Result<SurfacePicture> draw_surface(const LabelledVoxels& voxels, const LabelColours& colours,
+                                                  const LabelColours& within, const Frame& frame,
+                                                  const KeepGoing& keep_going);
 
 }  // namespace osteon::import

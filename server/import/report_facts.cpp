@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/field/tissue.hpp"
 #include "common/imaging/calibration.hpp"
 #include "common/imaging/threshold.hpp"
 #include "server/import/label_views.hpp"
@@ -36,6 +37,7 @@ struct LabelSums {
 
 struct ScanSums {
   std::array<LabelSums, 256> of_label;
+  std::array<std::int64_t, 256> of_tissue{};    // voxels of bone
   std::array<std::array<bool, 2>, 3> at_end{};  // bone lies in the outer voxels of the case's scan: axis, first or last
 };
 
@@ -56,6 +58,7 @@ Result<ScanSums> sums_of(const CaseScan& scan, const CaseInfo& info, HuHistogram
         ++to.voxels;
         to.at += Vec3(column, row, slice);
         if (!carved[label]) continue;
+        if (!scan.tissue.empty()) ++sums.of_tissue[scan.tissue[i]];
         if (!scan.hu.empty()) {
           to.density += imaging::bone_density_g_cm3(info.calibration, scan.hu[i]);
           of_bone.add(scan.hu[i], 1);
@@ -103,22 +106,25 @@ void list_labelled(const ImportReport& report, const ScanSums& sums, ReportFacts
     part.density_g_cm3 = density_of(label, of, scan);
     if (of.voxels > 0) part.centre_mm = scan.geometry.position_mm(of.at / static_cast<double>(of.voxels));
     part.place = place_words(part.centre_mm, whole);
-    part.colour = colour_of(colour++);
+    part.colour = palette_colour(colour++);
     facts.parts.push_back(std::move(part));
   }
 }
 
 void list_islands(const CtSegmentation& found, ReportFacts& facts) {
-  std::size_t others = 0;
-  double others_cm3 = 0.0;
+  // Islands that are not in the list: those of the case, and others.
+  std::array<std::size_t, 2> more{};
+  std::array<double, 2> more_cm3{};
+  double all_cm3 = 0.0;
   for (std::size_t i = 0; i < found.islands.size(); ++i) {
     const imaging::Island& island = found.islands[i];
     const int number = static_cast<int>(i + 1);
     const auto at = std::ranges::find(found.kept, number);
     const bool kept = at != found.kept.end();
-    if (!kept && i > 0 && (facts.parts.size() >= kMostParts || island.volume_cm3 < kLeastPart_cm3)) {
-      ++others;
-      others_cm3 += island.volume_cm3;
+    all_cm3 += island.volume_cm3;
+    if (facts.parts.size() >= kMostParts || (!kept && i > 0 && island.volume_cm3 < kLeastPart_cm3)) {
+      ++more[kept ? 0 : 1];
+      more_cm3[kept ? 0 : 1] += island.volume_cm3;
       continue;
     }
     ReportPart part;
@@ -132,24 +138,21 @@ void list_islands(const CtSegmentation& found, ReportFacts& facts) {
       const int bone = found.merged ? 1 : std::min(255, static_cast<int>(at - found.kept.begin()) + 1);
       part.name = "bone " + std::to_string(bone);
       part.kind = name_of(LabelKind::bone);
-      part.colour = colour_of(bone - 1);
+      part.colour = palette_colour(bone - 1);
     }
     if (i < found.views.each.size()) part.picture = found.views.each[i];
     facts.parts.push_back(std::move(part));
   }
+  for (const std::size_t which : {0U, 1U})
+    if (more[which] > 0)
+      facts.unlisted.push_back(sentence("%zu more %s with %.2f cm³ together%s.", more[which],
+                                        more[which] == 1 ? "island" : "islands", more_cm3[which],
+                                        which == 0 ? " are in the case" : " were found"));
   const std::size_t left_out = found.islands.size() - found.kept.size();
-  if (others > 0)
-    facts.left_out.push_back(
-        sentence("%zu islands of less than %.2f cm³ each, or beyond the first %zu, are not listed; "
-                 "together they have %.2f cm³.",
-                 others, kLeastPart_cm3, kMostParts, others_cm3));
-  if (!found.kept.empty() && left_out > 0) {
-    double all_cm3 = 0.0;
-    for (const imaging::Island& island : found.islands) all_cm3 += island.volume_cm3;
+  if (!found.kept.empty() && left_out > 0)
     facts.left_out.push_back(sentence("%zu of %zu islands, %.2f of %.2f cm³ (%.0f %%): not chosen.", left_out,
                                       found.islands.size(), found.left_out_cm3, all_cm3,
                                       100.0 * found.left_out_cm3 / all_cm3));
-  }
 }
 
 // The ends of the scan at which its bone is cut off, in words.
@@ -248,7 +251,7 @@ void add_steps(const ImportReport& report, ReportFacts& facts) {
   if (report.islands && facts.threshold_hu) {
     const std::string& reason = report.islands->threshold_reason;
     facts.steps.push_back(
-        {"threshold", reason.empty() ? "bone reaches it" : reason, {{"threshold_hu", *facts.threshold_hu}}});
+        {"threshold", reason.empty() ? "bone is at or above it" : reason, {{"threshold_hu", *facts.threshold_hu}}});
     if (report.islands->marrow_cm3 > 0.0)
       facts.steps.push_back({"marrow",
                              "below the threshold, enclosed by bone or between it, counts as bone",
@@ -335,17 +338,19 @@ Result<ReportFacts> report_facts(const ImportReport& report, const KeepGoing& ke
     if (report.histogram[i] > 0) facts.of_scan.add(static_cast<int>(i) + imaging::kLeastHu, report.histogram[i]);
   if (report.islands && !report.labels) facts.threshold_hu = report.islands->threshold_hu;
   add_scan_warnings(report, facts.warnings);
-  if (report.islands && !report.labels) {
-    facts.metal_cm3 = report.islands->metal_cm3;
-    facts.enamel_cm3 = report.islands->enamel_cm3;
-    list_islands(*report.islands, facts);
-  }
+  if (report.islands && !report.labels) list_islands(*report.islands, facts);
   if (report.bone) {
     const auto sums = sums_of(*report.scan, report.bone->info(), facts.of_bone, keep_going);
     if (!sums) return tl::unexpected(sums.error());
     facts.bone_cm3 = report.bone->volume_mm3() * 1e-3;
     facts.pitch_mm = report.bone->pitch_mm();
     facts.hash = to_hex(report.bone->hash());
+    const double voxel_cm3 = std::abs(report.scan->geometry.axes_mm.determinant()) * 1e-3;
+    const auto tissue_cm3 = [&](Tissue tissue) {
+      return static_cast<double>(sums->of_tissue[static_cast<std::size_t>(tissue)]) * voxel_cm3;
+    };
+    facts.metal_cm3 = tissue_cm3(Tissue::metal);
+    facts.enamel_cm3 = tissue_cm3(Tissue::enamel);
     double density = 0.0, voxels = 0.0;
     for (const CaseLabel& label : report.bone->info().labels) {
       const LabelSums& of = sums->of_label[static_cast<std::size_t>(label.value)];
@@ -390,6 +395,7 @@ std::string to_json(const ReportFacts& facts) {
                       {"pitch_mm", or_null(facts.pitch_mm)},
                       {"hash", facts.hash},
                       {"parts", parts},
+                      {"unlisted", facts.unlisted},
                       {"left_out", facts.left_out},
                       {"warnings", facts.warnings},
                       {"steps", steps}};

@@ -53,6 +53,7 @@ struct ReportFacts {
   std::optional<double> bone_density_g_cm3;  // mean over the voxels of all bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;
   std::vector<ReportPart> parts;
+  std::vector<std::string> unlisted;  // sentences: islands that are not among the parts
   std::vector<std::string> left_out;  // sentences: what, how much, why
   std::vector<std::string> warnings;
   std::vector<ReportStep> steps;

@@ -126,7 +126,9 @@ Result<std::string> parts_table(const ReportFacts& facts) {
             number_cell(number("%.2f", part.volume_cm3)) + number_cell(number("%.2f", part.density_g_cm3)) +
             cell(escaped(part.place)) + cell(centre.data()) + "</tr>\n";
   }
-  return text + "</table>\n<p class=\"note\">Volume of the voxels. Density of bone from its HU, with marrow.</p>\n";
+  text += "</table>\n";
+  for (const std::string& sentence : facts.unlisted) text += "<p>" + escaped(sentence) + "</p>\n";
+  return text + "<p class=\"note\">Volume of the voxels. Density of bone from its HU, with marrow.</p>\n";
 }
 
 std::string comparison_table(const LabelComparison& comparison) {

@@ -20,28 +20,6 @@ std::string words(const char* format, double value) {
   return text.data();
 }
 
-// 1, 2 or 5 times a power of ten, at most `most`.
-double round_length(double most) {
-  const double ten = std::pow(10.0, std::floor(std::log10(most)));
-  for (const double factor : {5.0, 2.0})
-    if (factor * ten <= most) return factor * ten;
-  return ten;
-}
-
-// The patient's sides at the edges, and a bar of known length.
-void write_sides(Picture& picture, const Frame& frame) {
-  const bool sagittal = frame.view == View::sagittal, axial = frame.view == View::axial;
-  const int middle = frame.pixels / 2, last = frame.pixels - 18;
-  picture.text(6, middle, sagittal ? "A" : "R", kWhiteInk, 2);
-  picture.text(last, middle, sagittal ? "P" : "L", kWhiteInk, 2);
-  picture.text(middle, 6, axial ? "A" : "H", kWhiteInk, 2);
-  picture.text(middle, last - 2, axial ? "P" : "F", kWhiteInk, 2);
-  const double length_mm = round_length(0.3 * frame.pixels * frame.pixel_mm);
-  const int length = static_cast<int>(std::lround(length_mm / frame.pixel_mm));
-  picture.fill(8, frame.pixels - 8, length, 3, kWhiteInk);
-  picture.text(8, frame.pixels - 26, words("%g mm", length_mm), kWhiteInk, 2);
-}
-
 struct Colours {
   LabelColours bones, structures, all;
 };
@@ -50,32 +28,41 @@ Colours colours_of(const std::vector<CaseLabel>& labels) {
   int next = 0;
   for (const CaseLabel& label : labels) {
     const auto value = static_cast<std::size_t>(label.value);
-    const Colour colour = colour_of(next++);
+    const Colour colour = palette_colour(next++);
     (is_carved(label.kind) ? colours.bones : colours.structures)[value] = colour;
     colours.all[value] = colour;
   }
   return colours;
 }
 
+// Two lines for each bone and structure, one if there are many, and what was left out.
 Picture list_of_parts(const ReportFacts& facts) {
   Picture list(kPanel, kPanel, kBlackInk);
-  int y = kEdge;
-  std::size_t listed = 0, others = 0;
+  const auto kept = static_cast<std::size_t>(std::ranges::count(facts.parts, true, &ReportPart::kept));
+  const bool two_lines = kept <= kMostInList / 2;
+  int y = kEdge / 2;
+  std::size_t listed = 0;
+  double left_out_cm3 = 0.0;
   for (const ReportPart& part : facts.parts) {
-    if (!part.kept) continue;
-    if (++listed > kMostInList) {
-      ++others;
-      continue;
-    }
+    if (!part.kept) left_out_cm3 += part.volume_cm3;
+    if (!part.kept || ++listed > kMostInList) continue;
     list.fill(8, y, 14, 14, part.colour.value_or(kGreyInk));
-    std::string text = part.name;
-    if (text.size() > 20) text = text.substr(0, 19) + ".";
-    list.text(32, y, text, kWhiteInk, 2);
-    list.text(284, y, words("%7.1f cm3", part.volume_cm3), kWhiteInk, 2);
-    if (part.at_risk) list.text(404, y, "risk", kThresholdInk, 2);
-    y += 24;
+    const std::string volume = words("%.1f cm3", part.volume_cm3);
+    list.text(32, y, part.name.substr(0, two_lines ? 34 : 24), kWhiteInk, 2);
+    if (two_lines) {
+      const std::string density = part.density_g_cm3 ? words(", mean %.2f g/cm3", *part.density_g_cm3) : "";
+      list.text(32, y + 22, part.at_risk ? volume + ", at risk" : volume + density,
+                part.at_risk ? kThresholdInk : kGreyInk, 2);
+      y += 46;
+    } else {
+      list.text(kPanel - 8 - text_width(volume, 2), y, volume, part.at_risk ? kThresholdInk : kGreyInk, 2);
+      y += 22;
+    }
   }
-  if (others > 0) list.text(32, y, "and " + std::to_string(others) + " more", kGreyInk, 2);
+  if (listed > kMostInList) list.text(32, y, "and " + std::to_string(listed - kMostInList) + " more", kGreyInk, 2);
+  if (left_out_cm3 > 0.0)
+    list.text(8, kPanel - 44, words("left out: %.1f cm3 of other islands", left_out_cm3), kGreyInk, 2);
+  if (facts.threshold_hu) list.text(8, kPanel - 22, words("threshold %.0f HU", *facts.threshold_hu), kGreyInk, 2);
   return list;
 }
 
@@ -112,9 +99,9 @@ Result<Picture> montage(const CaseScan& scan, const std::vector<CaseLabel>& labe
     const Frame frame = frame_around(box, view, kPanel, kEdge);
     auto panel = draw_surface(voxels, colours.bones, colours.structures, frame,
                               part(keep_going, 0.3 + 0.35 * column, 0.65 + 0.35 * column));
-    if (!panel) return panel;
-    write_sides(*panel, frame);
-    place(std::move(*panel), column == 0 ? "from the front" : "from the left", column, 1);
+    if (!panel) return tl::unexpected(panel.error());
+    write_sides(panel->picture, frame);
+    place(std::move(panel->picture), column == 0 ? "from the front" : "from the left", column, 1);
   }
   place(list_of_parts(facts), "in the case", 2, 1);
   return whole;
@@ -126,7 +113,9 @@ Result<Picture> label_picture(const CaseScan& scan, int label, Colour colour, co
   const LabelledVoxels voxels{scan.geometry, {}, scan.labels};
   const Box box = coloured_box(voxels, one);
   if (box.empty()) return Picture(kLabelPixels, kLabelPixels, kBlackInk);
-  return draw_surface(voxels, one, {}, frame_around(box, View::coronal, kLabelPixels, 6), keep_going);
+  auto drawn = draw_surface(voxels, one, {}, frame_around(box, View::coronal, kLabelPixels, 6), keep_going);
+  if (!drawn) return tl::unexpected(drawn.error());
+  return std::move(drawn->picture);
 }
 
 Picture histogram_picture(const ReportFacts& facts) {
@@ -152,7 +141,7 @@ Picture histogram_picture(const ReportFacts& facts) {
     picture.fill(x_of(hu), kTop + kHeight, 2, 6, kBlackInk);
     picture.text(x_of(hu) - text_width(text, 2) / 2, kTop + kHeight + 10, text, kBlackInk, 2);
   }
-  picture.text(kLeft + kWidth - 24, kTop + kHeight - 22, "HU", kBlackInk, 2);
+  picture.text(kLeft + kWidth - 4, kTop + kHeight + 10, "HU", kBlackInk, 2);
   picture.fill(kLeft, 10, 14, 14, kScanInk);
   picture.text(kLeft + 20, 10, "scan", kBlackInk, 2);
   picture.fill(kLeft + 90, 10, 14, 14, kBoneInk);

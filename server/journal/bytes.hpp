@@ -27,6 +27,12 @@ inline void put_integer(std::string& to, std::uint64_t value) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), digest.bytes.size()};
 }
 
+// The bytes of an array, which must outlive the view.
+template <class Array>
+[[nodiscard]] std::string_view text_of(const Array& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
 // Nothing if the bytes have another length.
 [[nodiscard]] inline std::optional<Digest> digest_of(std::string_view bytes) {
   Digest digest;

@@ -529,9 +529,6 @@ Result<void> JournalFile::add_signed_entries(const SignedEntries& entries) {
   auto statement =
       database_.prepare("INSERT OR REPLACE INTO signatures(place, since, chain, key, signature) VALUES(?, ?, ?, ?, ?)");
   if (!statement) return tl::unexpected(statement.error());
-  const auto text_of = [](const auto& bytes) {
-    return std::string_view(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  };
   return statement->integer(0, static_cast<std::int64_t>(entries.head.seq.value))
       .integer(1, static_cast<std::int64_t>(entries.since.value))
       .blob(2, as_text(entries.head.chain))

@@ -35,11 +35,6 @@ std::string checksum(std::string_view bytes) {
   return {reinterpret_cast<const char*>(digest.bytes.data()), kChecksumBytes};
 }
 
-template <class Array>
-std::string_view text_of(const Array& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 std::string encode_start(const LogStart& start, std::string_view salt, std::uint64_t length) {
   std::string bytes(kMagic);
   bytes += as_text(start.journal);

@@ -26,11 +26,6 @@ namespace fs = std::filesystem;
 constexpr std::string_view kFirstLine = "osteon signing key 1";
 constexpr std::size_t kSuccessionBytes = 2 * 32 + 2 * 64;
 
-template <class Array>
-std::string_view text_of(const Array& bytes) {
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
-}
-
 std::string hex_of(std::string_view bytes) {
   std::string text(2 * bytes.size() + 1, '\0');
   sodium_bin2hex(text.data(), text.size(), reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size());
@@ -76,7 +71,7 @@ bool holds(const Succession& one) {
   return verifies(one.before, message, one.by_before) && verifies(one.after, message, one.by_after);
 }
 
-std::string text_of(const SigningKeys& keys) {
+std::string file_text(const SigningKeys& keys) {
   std::ostringstream text;
   text << kFirstLine << "\n# Whoever has this file can sign in this server's name. Nobody else may read it.\n"
        << "secret " << keys.key().seed_as_hex() << "\n";
@@ -120,7 +115,7 @@ Result<std::shared_ptr<const SigningKeys>> parse(const fs::path& file, const std
   return std::make_shared<const SigningKeys>(std::move(*key), std::move(successions));
 }
 
-tl::unexpected<Error> cannot(const std::string& what, const fs::path& file, int reason) {
+tl::unexpected<Error> key_failure(const std::string& what, const fs::path& file, int reason) {
   return failure(ErrorCode::internal, "cannot " + what + " the signing key " + file.string() + ": " +
                                           std::generic_category().message(reason) + std::string(remedy_of(reason)));
 }
@@ -272,10 +267,10 @@ Result<std::shared_ptr<const SigningKeys>> load_or_make_signing_keys(const fs::p
   auto loaded = load_signing_keys(file);
   if (loaded || loaded.error().code != ErrorCode::not_found) return loaded;
   Draft draft(file);
-  if (const int reason = draft.write(text_of(SigningKeys(SigningKey::make()))); reason != 0)
-    return cannot("write", file, reason);
+  if (const int reason = draft.write(file_text(SigningKeys(SigningKey::make()))); reason != 0)
+    return key_failure("write", file, reason);
   // A link replaces nothing. If two servers start at once, both take the key of the first.
-  if (::link(draft.path().c_str(), file.c_str()) != 0 && errno != EEXIST) return cannot("write", file, errno);
+  if (::link(draft.path().c_str(), file.c_str()) != 0 && errno != EEXIST) return key_failure("write", file, errno);
   if (Result<void> synced = system_disk().sync_folder(folder_of(file)); !synced) return tl::unexpected(synced.error());
   return load_signing_keys(file);
 }
@@ -287,9 +282,9 @@ Result<std::shared_ptr<const SigningKeys>> rotate_signing_keys(const fs::path& f
   std::vector<Succession> successions = (*before)->successions();
   successions.push_back(succeed((*before)->key(), after));
   Draft draft(file);
-  if (const int reason = draft.write(text_of(SigningKeys(after, std::move(successions)))); reason != 0)
-    return cannot("write", file, reason);
-  if (::rename(draft.path().c_str(), file.c_str()) != 0) return cannot("replace", file, errno);
+  if (const int reason = draft.write(file_text(SigningKeys(after, std::move(successions)))); reason != 0)
+    return key_failure("write", file, reason);
+  if (::rename(draft.path().c_str(), file.c_str()) != 0) return key_failure("replace", file, errno);
   if (Result<void> synced = system_disk().sync_folder(folder_of(file)); !synced) return tl::unexpected(synced.error());
   return load_signing_keys(file);
 }

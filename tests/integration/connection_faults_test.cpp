@@ -35,7 +35,7 @@ using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
 constexpr auto kDay = 24h;
-constexpr auto kPatience = 10s;
+constexpr auto kRefusalLimit = 10s;
 
 // Makes a pattern of a text in which known words in capitals match anything.
 std::regex pattern_of(const std::string& text) {
@@ -358,7 +358,7 @@ TEST_F(ConnectionFaults, AreEachASentenceOfItsOwnAtBothEnds) {
     const std::string& log = page[fitting.front()].log;
     EXPECT_EQ(log.empty(), one.server == nullptr) << one.what;
     if (!one.server || log.empty()) continue;
-    EXPECT_TRUE(wait_until([&] { return has_refusal(one.server->err(), log); }, kPatience))
+    EXPECT_TRUE(wait_until([&] { return has_refusal(one.server->err(), log); }, kRefusalLimit))
         << one.what << ": " << log << "\n"
         << one.server->err();
     EXPECT_THAT(sentence, testing::Not(testing::HasSubstr(people_.server().string()))) << "a path of the server";

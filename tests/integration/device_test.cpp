@@ -15,7 +15,7 @@ namespace osteon::test {
 namespace {
 
 using namespace std::chrono_literals;
-constexpr auto kPatience = 60s;
+constexpr auto kStageLimit = 60s;
 constexpr int kSpindle = 1, kClutch = 2;  // the stylus' buttons
 
 class PhantomInRoom : public ::testing::Test {
@@ -64,7 +64,7 @@ class PhantomInRoom : public ::testing::Test {
 TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
   Stage stage(24.0);
   Process haptic = start(stage);
-  ASSERT_TRUE(haptic.wait_for_out("free_hand", kPatience)) << haptic.err();
+  ASSERT_TRUE(haptic.wait_for_out("free_hand", kStageLimit)) << haptic.err();
   EXPECT_EQ(arm_->scheduler_starts, 1u);
   EXPECT_EQ(arm_.force_n(), 0.0);  // the tool waits over the bone
 
@@ -134,7 +134,7 @@ TEST_F(PhantomInRoom, DrillsLosesItsCableAndDrillsOn) {
 TEST_F(PhantomInRoom, WithoutItsRoomItHasNoForceAndEndsInOrder) {
   Stage stage(16.0);
   Process haptic = start(stage);
-  ASSERT_TRUE(haptic.wait_for_out("free_hand", kPatience)) << haptic.err();
+  ASSERT_TRUE(haptic.wait_for_out("free_hand", kStageLimit)) << haptic.err();
   move_hand(0, 0, -13, 15.0);  // presses, the spindle off
   ASSERT_TRUE(wait_until([&] { return arm_.force_n() > 0.2; }, 10s));
   stage.server().signal(SIGKILL);
@@ -149,10 +149,10 @@ TEST_F(PhantomInRoom, WaitsForItsUserWhereItMustBeCalibrated) {
   arm_->style = 4;
   const Stage stage(16.0);
   Process haptic = start(stage);
-  EXPECT_TRUE(wait_until([&] { return haptic.err().find("inkwell") != std::string::npos; }, kPatience));
-  EXPECT_TRUE(haptic.wait_for_out("wait", kPatience)) << haptic.err();
+  EXPECT_TRUE(wait_until([&] { return haptic.err().find("inkwell") != std::string::npos; }, kStageLimit));
+  EXPECT_TRUE(haptic.wait_for_out("wait", kStageLimit)) << haptic.err();
   arm_->calibration = 1;
-  EXPECT_TRUE(haptic.wait_for_out("free_hand", kPatience));
+  EXPECT_TRUE(haptic.wait_for_out("free_hand", kStageLimit));
   EXPECT_THAT(haptic.err(), testing::HasSubstr("device ready"));
   ASSERT_EQ(haptic.terminate(), 0);
   EXPECT_EQ(arm_->unsafe_forces, 0u);
@@ -164,7 +164,7 @@ TEST_F(PhantomInRoom, AToolThatTheRoomHasNotIsNamed) {
   Process haptic =
       stage.start("osteon-haptic", {"--server", stage.address(), "--plain", "--device", "phantom", "--libhd",
                                     OSTEON_STAND_IN_HD, "--tool", "drill-99", "--cache", stage / "cache"});
-  ASSERT_EQ(haptic.wait(kPatience), 1) << haptic.err();
+  ASSERT_EQ(haptic.wait(kStageLimit), 1) << haptic.err();
   EXPECT_THAT(haptic.err(), testing::HasSubstr("the room has no tool \"drill-99\"; choose one of"));
   EXPECT_EQ(arm_->is_open, 0);
 }
@@ -173,7 +173,7 @@ TEST_F(PhantomInRoom, AToolThatTheRoomHasNotIsNamed) {
 TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
   const Stage stage(16.0);
   Process haptic = start(stage, {"--scale", "0.07", "--record", stage / "hand.h5"});
-  ASSERT_TRUE(haptic.wait_for_out("free_hand", kPatience)) << haptic.err();
+  ASSERT_TRUE(haptic.wait_for_out("free_hand", kStageLimit)) << haptic.err();
   move_hand(0, 0, -13, 15.0);
   ASSERT_TRUE(wait_until([&] { return arm_.force_n() > 0.1; }, 10s)) << haptic.out();
   ASSERT_EQ(haptic.terminate(), 0) << haptic.err();
@@ -183,7 +183,7 @@ TEST_F(PhantomInRoom, AHandsRecordingIsPlayedWithItsForceScale) {
   Process again = stage.start(
       "osteon-haptic", {"--server", stage.address(), "--plain", "--device", recording, "--tool", "drill-3.2", "--view",
                         "top", "--at", "2,-3,0", "--summary", stage / "again.json", "--cache", stage / "cache"});
-  ASSERT_EQ(again.wait(kPatience), 0) << again.err();
+  ASSERT_EQ(again.wait(kStageLimit), 0) << again.err();
   const auto summary = read_json(stage / "again.json");
   EXPECT_EQ(summary["device"], recording);
   EXPECT_EQ(summary["force_scale"], 0.07);

@@ -227,9 +227,9 @@ TEST_P(Pages, RunFromAnEmptyFolder) {
   std::ofstream(folder / "commands.sh") << commands << "kill $(jobs -p) 2>/dev/null || true\nwait\n";
   ProcessOptions options = screen->options();
   options.folder = folder.path();
-  options.environment.insert(options.environment.end(), {{"OSTEON_LIBHD", OSTEON_STAND_IN_HD},
-                                                         {"OSTEON_PYTHON", OSTEON_PYTHON_PROGRAM},
-                                                         {"XDG_CACHE_HOME", folder / "cache"}});
+  options.environment.insert(
+      options.environment.end(),
+      {{"OSTEON_LIBHD", OSTEON_STAND_IN_HD}, {"OSTEON_PYTHON", OSTEON_PYTHON}, {"XDG_CACHE_HOME", folder / "cache"}});
   const RunResult done = run("bash", {folder / "commands.sh"}, 240s, options);
   EXPECT_EQ(done.exit_code, 0) << done.out << done.err;
 }

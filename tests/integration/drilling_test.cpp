@@ -13,6 +13,7 @@
 #include "common/sound/levels.hpp"
 #include "common/sound/tones.hpp"
 #include "tests/integration/stage.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/wait.hpp"
 
 namespace osteon::test {
@@ -23,12 +24,6 @@ using nlohmann::json;
 
 constexpr double kThickness_mm = 30.0;
 constexpr double kCone_mm = 0.961;  // height of a 118° point of 3.2 mm
-
-// Compares the pixels of two PNG files by their bytes: the same encoder wrote both.
-std::string bytes_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 class DrillingRoom : public testing::Test {
  protected:
@@ -90,8 +85,8 @@ class DrillingRoom : public testing::Test {
     ScriptedViewer late(stage.address(), *screen, {"--plain", "--summary", stage / "late.json"});
     r.late_viewer_came = late.tell("wait surface") && late.tell("wait seq " + seq) && late.tell("tool off") &&
                          late.tell(look) && late.tell("screenshot " + (stage / "late.png").string());
-    r.pictures_equal = bytes_of(stage / "after.png") == bytes_of(stage / "late.png");
-    r.pictures_differ_from_start = bytes_of(stage / "after.png") != bytes_of(stage / "before.png");
+    r.pictures_equal = content(stage / "after.png") == content(stage / "late.png");
+    r.pictures_differ_from_start = content(stage / "after.png") != content(stage / "before.png");
 
     r.exits.emplace_back("late viewer", late.process().terminate());
     r.exits.emplace_back("viewer", viewer.process().terminate());

@@ -20,7 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 using nlohmann::json;
 
-Process start_hand(const Stage& stage, const std::string& name, const json& steps) {
+Process start_recorded_hand(const Stage& stage, const std::string& name, const json& steps) {
   std::ofstream(stage / (name + "-plan.json")) << json{{"steps", steps}};
   return stage.start("osteon-haptic", {"--server", stage.address(), "--plain", "--name", name, "--plan",
                                        stage / (name + "-plan.json"), "--summary", stage / (name + ".json"), "--record",
@@ -145,9 +145,9 @@ TEST(Hands, WhoseToolsTouchBothFeelIt) {
   Stage stage(40.0);
   // Two drills of 3.2 mm enter the same bone side by side, 2.6 mm between their axes. A third one is far from both.
   constexpr double kDiameter_mm = 3.2;
-  Process left = start_hand(stage, "left", json::array({drill_at(-1.3, 0, "rig")}));
-  Process right = start_hand(stage, "right", json::array({drill_at(1.3, 0, "rig")}));
-  Process far = start_hand(stage, "far", json::array({drill_at(0, 14, "rig")}));
+  Process left = start_recorded_hand(stage, "left", json::array({drill_at(-1.3, 0, "rig")}));
+  Process right = start_recorded_hand(stage, "right", json::array({drill_at(1.3, 0, "rig")}));
+  Process far = start_recorded_hand(stage, "far", json::array({drill_at(0, 14, "rig")}));
   for (Process* hand : {&left, &right, &far}) {
     const auto code = hand->wait(150s);
     ASSERT_TRUE(code.has_value());
@@ -197,7 +197,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
                 {"depth_mm", 1.0},
                 {"sweep_mm_per_s", sweep_mm_per_s}};
   };
-  Process expert = start_hand(stage, "expert", json::array({burr(0.0, 24.0, 10.0)}));
+  Process expert = start_recorded_hand(stage, "expert", json::array({burr(0.0, 24.0, 10.0)}));
   ASSERT_EQ(expert.wait(120s), 0) << expert.err();
 
   Process console =
@@ -218,7 +218,7 @@ TEST(Hands, AreLedAlongWhatAnExpertDid) {
 
   json softly = burr(12.0, 20.0, 0.5);
   softly["hand_stiffness_n_per_mm"] = softly["hand_across_n_per_mm"] = 0.3;
-  Process trainee = start_hand(stage, "trainee", json::array({softly}));
+  Process trainee = start_recorded_hand(stage, "trainee", json::array({softly}));
   ASSERT_TRUE(
       wait_until([&] { return std::regex_search(ask("people"), std::regex("\"trainee\"[^;]* cuts [1-9]")); }, 60s))
       << trainee.err();
@@ -293,12 +293,12 @@ TEST(Hands, WithoutANameArePersonsOfTheirOwn) {
   EXPECT_EQ(ask("people").find("#3 \"\" here haptic frozen"), std::string::npos) << "this hand is not stopped";
   ASSERT_TRUE(second.terminate(20s).has_value());
 
-  Process ben = start_hand(stage, "ben", steps);
+  Process ben = start_recorded_hand(stage, "ben", steps);
   ASSERT_TRUE(there("#4 \"ben\" here haptic")) << ben.err();
   ASSERT_TRUE(ask("freeze ben").starts_with("ok"));
   ASSERT_TRUE(ben.terminate(20s).has_value());
   std::filesystem::remove(stage / "ben.h5");
-  Process again = start_hand(stage, "ben", steps);
+  Process again = start_recorded_hand(stage, "ben", steps);
   EXPECT_TRUE(there("#5 \"ben\" here haptic frozen")) << "the same person, by the name";
   ASSERT_TRUE(again.terminate(20s).has_value());
   ASSERT_TRUE(first.terminate(20s).has_value());

@@ -15,6 +15,7 @@
 #include "server/storage/journal_entries.hpp"
 #include "tests/integration/hand.hpp"
 #include "tests/integration/stage.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/unit/rooms/members.hpp"
 
@@ -418,14 +419,9 @@ TEST(Operators, AnOlderServersRefusalEndsTheClientWithBothVersions) {
       << client.err;
 }
 
-std::string read_text(const std::filesystem::path& file) {
-  std::ifstream in(file);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
-
 // Asks systemd's own checker, if it is installed. This build's program replaces the installed one.
 TEST(Operators, TheServiceIsAsSystemdWantsIt) {
-  const std::string unit = read_text(std::filesystem::path(OSTEON_DEPLOY) / "systemd" / "osteon-server.service");
+  const std::string unit = content(std::filesystem::path(OSTEON_DEPLOY) / "systemd" / "osteon-server.service");
   for (const char* line :
        {"\nDynamicUser=yes\n", "\nProtectSystem=strict\n", "\nKillSignal=SIGTERM\n", "\nRestart=on-failure\n",
         "\nStartLimitIntervalSec=0\n", "\nRestartSec=5\n", "\nMemoryMax=80%\n", "\nOOMPolicy=continue\n",
@@ -444,7 +440,7 @@ TEST(Operators, TheServiceIsAsSystemdWantsIt) {
 }
 
 TEST(Operators, TheContainerRunsItUnprivileged) {
-  const std::string text = read_text(std::filesystem::path(OSTEON_DEPLOY) / "container" / "Containerfile");
+  const std::string text = content(std::filesystem::path(OSTEON_DEPLOY) / "container" / "Containerfile");
   ASSERT_NE(text.rfind("\nUSER "), std::string::npos);
   EXPECT_EQ(text.find("\nUSER root"), std::string::npos);
   EXPECT_GT(text.rfind("\nUSER "), text.rfind("\nRUN ")) << "the last line that decides who runs it";

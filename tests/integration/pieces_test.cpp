@@ -11,6 +11,7 @@
 
 #include "common/tools/tool_file.hpp"
 #include "tests/integration/stage.hpp"
+#include "tests/support/content.hpp"
 #include "tests/support/scenes/bones.hpp"
 #include "tests/unit/rooms/members.hpp"
 
@@ -42,11 +43,6 @@ std::vector<Cut> slot(AuthorId author, const Tool& burr, double x_mm) {
     cuts.push_back(cut);
   }
   return cuts;
-}
-
-std::string bytes_of(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 // Seen from (60, -80, 60), the shank of a tool that points down at the origin goes straight up from the picture's
@@ -85,7 +81,7 @@ TEST(Pieces, AreSawnOffTakenAwayBroughtBackSavedAndResumed) {
   ASSERT_TRUE(viewer.tell("look at 0 0 0 from 60 -80 60 up 0 0 1"));
   const auto picture = [&](const std::string& name) {
     EXPECT_TRUE(viewer.tell("screenshot " + (stage / name).string()));
-    return bytes_of(stage / name);
+    return content(stage / name);
   };
   const auto viewed = [&] {
     EXPECT_TRUE(viewer.tell("status " + (stage / "viewer.json").string()));

@@ -1,6 +1,7 @@
 // How well an imported bone agrees with the bone that was scanned: phantoms of known shape through DICOM files with
-// noise, blur, thick, tilted and uneven slices. Takes a folder for the slices. Prints JSON: for each scan, once with
-// the default threshold and once with the suggested one, Dice, distances of the surfaces and number of islands.
+// noise, blur, thick, tilted and uneven slices. Takes a folder for the slices. Prints JSON: for each scan, with the
+// default threshold, the suggested one, and the one midway between soft tissue and cortex, Dice, distances of the
+// surfaces and number of islands.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
@@ -16,10 +17,11 @@ int main(int argc, char** argv) {
   }
   nlohmann::json found = nlohmann::json::array();
   for (const test::BoneScan& scan : test::accuracy_scans())
-    for (const bool suggested : {false, true}) {
+    for (const std::string threshold : {"default", "suggested", "midway"}) {
       const std::filesystem::path folder = std::filesystem::path(argv[1]) / "slices";
       import::CtOptions options;
-      options.suggest_threshold = suggested;
+      options.suggest_threshold = threshold == "suggested";
+      if (threshold == "midway") options.threshold_hu = test::kMidway_hu;
       const auto measured = test::measure_accuracy(scan, options, folder);
       std::filesystem::remove_all(folder);
       if (!measured) {
@@ -27,7 +29,7 @@ int main(int argc, char** argv) {
         return EXIT_FAILURE;
       }
       found.push_back({{"scan", scan.name},
-                       {"suggested", suggested},
+                       {"threshold", threshold},
                        {"dice", measured->dice},
                        {"mean_mm", measured->mean_mm},
                        {"percentile95_mm", measured->percentile95_mm},

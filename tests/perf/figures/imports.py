@@ -122,17 +122,17 @@ ACCURACY_SCANS = {"fine": "fine slices", "noise": "noise", "blur": "blur", "thic
 
 
 def import_accuracy(run):
-    """Dice and distances of imported phantoms, with the default threshold beside the suggested one."""
+    """Dice and distances of imported phantoms, with the default threshold beside the best one."""
     run.say("accuracy of imports")
     folder = run.folder / "import-accuracy"
     folder.mkdir(exist_ok=True)
-    found = {(row["scan"], row["suggested"]): row for row in json.loads(run.output("osteon-import-accuracy", folder))}
+    found = {(row["scan"], row["threshold"]): row for row in json.loads(run.output("osteon-import-accuracy", folder))}
     values = {}
     for bone, bone_name in ACCURACY_BONES.items():
         for scan, scan_name in ACCURACY_SCANS.items():
-            default, suggested = (found[f"{bone_name}, {scan_name}", which] for which in (False, True))
+            default, best = (found[f"{bone_name}, {scan_name}", which] for which in ("default", "midway"))
             for figure, what in (("dice", "dice"), ("distance", "mean_mm")):
-                values[f"import_{bone}_{scan}_{figure}"] = Measured(default[what], suggested[what])
+                values[f"import_{bone}_{scan}_{figure}"] = Measured(default[what], best[what])
     return values
 
 

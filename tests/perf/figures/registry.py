@@ -666,9 +666,9 @@ FIGURES = [
                                     ("tilted", "a gantry tilted by 20 degrees", 0.35),
                                     ("uneven", "slices 1 to 3 mm apart", 0.35)) for figure in (
         Figure(f"import_{bone}_{scan}_dice", "ratio", f"Dice of {bone_name} and its import, {scan_name}",
-               "import_accuracy", (">=", least), "with the suggested threshold"),
+               "import_accuracy", (">=", least), "with a threshold midway between soft tissue and cortex"),
         Figure(f"import_{bone}_{scan}_distance", "mm", f"mean distance of their surfaces, {scan_name}",
-               "import_accuracy", ("<=", most), "with the suggested threshold"))],
+               "import_accuracy", ("<=", most), "with a threshold midway between soft tissue and cortex"))],
     Figure("import_trunk_cpu", "s", "CPU time from a DICOM folder of a trunk, 512 x 512 x 302, to its saved case",
            "import_cost", baseline=ITK_CHAIN),
     Figure("import_cpu_ratio", "ratio", f"the same over that of {ITK_CHAIN}, in turns", "import_cost", ("<=", 1.2)),

@@ -238,9 +238,11 @@ Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions&
   if (auto written = write_scan(scan, folder); !written) return tl::unexpected(written.error());
   auto read = import::read_dicom_series(folder, going);
   if (!read) return tl::unexpected(read.error());
-  import::CtOptions all = options;
-  all.keep_all = true;
-  const auto made = import::import_ct(std::move(*read), all, going);
+  // As many islands as there are bones, or fewer if bones have grown together.
+  import::CtOptions keeping = options;
+  for (int number = 1; number <= static_cast<int>(scan.shafts.size()); ++number) keeping.keep.push_back(number);
+  auto made = import::import_ct(*read, keeping, going);
+  if (!made && scan.shafts.size() > 1) made = import::import_ct(std::move(*read), options, going);
   if (!made) return tl::unexpected(made.error());
   Accuracy accuracy = accuracy_of(scan, *made->bone);
   for (const imaging::Island& island : made->found.islands)

@@ -40,6 +40,9 @@ inline constexpr double kSoftTissue_hu = 40.0, kCancellous_hu = 250.0, kCortex_h
 [[nodiscard]] std::vector<Shaft> long_bone();
 [[nodiscard]] std::vector<Shaft> two_bones(double gap_mm);
 
+// The threshold at which a blurred edge of cortex in soft tissue stays where it is.
+inline constexpr double kMidway_hu = 0.5 * (kSoftTissue_hu + kCortex_hu);
+
 // The scans of the accuracy test: each bone in fine slices; with noise; with more blur; in slices of 3 mm; tilted by 20
 // degrees; and in uneven slices.
 [[nodiscard]] std::vector<BoneScan> accuracy_scans();
@@ -57,7 +60,8 @@ struct Accuracy {
 // The bone of a case against the shape.
 [[nodiscard]] Accuracy accuracy_of(const BoneScan& scan, const Case& bone);
 
-// Writes the scan, imports it by the ordinary path with all islands kept, and compares. Errors: those of both.
+// Writes the scan, imports it by the ordinary path with as many islands as there are bones, and compares. Errors: those
+// of both.
 [[nodiscard]] Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions& options,
                                                 const std::filesystem::path& folder);
 

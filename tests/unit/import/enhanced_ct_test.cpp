@@ -9,6 +9,7 @@
 
 #include "server/import/dicom_reader.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/import/dicom_elements.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
 namespace osteon::import {
@@ -16,31 +17,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string little_endian(std::size_t value, int bytes) {
-  std::string text;
-  for (int i = 0; i < bytes; ++i) text += static_cast<char>(value >> 8 * i & 0xff);
-  return text;
-}
-
-std::string element(std::uint16_t group, std::uint16_t tag, const std::string& vr, std::string value) {
-  if (value.size() % 2 != 0) value += vr == "UI" ? '\0' : ' ';
-  const bool is_long = vr == "OW" || vr == "SQ";
-  return little_endian(group, 2) + little_endian(tag, 2) + vr + (is_long ? std::string(2, '\0') : "") +
-         little_endian(value.size(), is_long ? 4 : 2) + value;
-}
-
-std::string sequence(std::uint16_t group, std::uint16_t tag, const std::vector<std::string>& items) {
-  std::string value;
-  for (const std::string& item : items)
-    value += little_endian(0xfffe, 2) + little_endian(0xe000, 2) + little_endian(item.size(), 4) + item;
-  return element(group, tag, "SQ", value);
-}
-
-std::string decimal(double value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%.9f", value);
-  return text;
-}
 std::string decimals(const Vec3& v) { return decimal(v.x()) + "\\" + decimal(v.y()) + "\\" + decimal(v.z()); }
 
 // A frame of an enhanced image: a slice of a volume, and the numbers with which its HU are stored.
@@ -59,12 +35,12 @@ struct Enhanced {
 };
 
 std::string plane_of(const imaging::HuVolume& v) {
-  return sequence(
-             0x0020, 0x9116,
-             {element(0x0020, 0x0037, "DS", decimals(v.directions.col(0)) + "\\" + decimals(v.directions.col(1)))}) +
+  return sequence(0x0020, 0x9116,
+                  item(element(0x0020, 0x0037, "DS",
+                               decimals(v.directions.col(0)) + "\\" + decimals(v.directions.col(1))))) +
          sequence(0x0028, 0x9110,
-                  {element(0x0018, 0x0050, "DS", decimal(v.spacing_mm.z())) +
-                   element(0x0028, 0x0030, "DS", decimal(v.spacing_mm.y()) + "\\" + decimal(v.spacing_mm.x()))});
+                  item(element(0x0018, 0x0050, "DS", decimal(v.spacing_mm.z())) +
+                       element(0x0028, 0x0030, "DS", decimal(v.spacing_mm.y()) + "\\" + decimal(v.spacing_mm.x()))));
 }
 
 void write_enhanced(const fs::path& file, const imaging::HuVolume& v, const std::vector<Frame>& frames,
@@ -78,17 +54,19 @@ void write_enhanced(const fs::path& file, const imaging::HuVolume& v, const std:
       const double hu = v.values[static_cast<std::size_t>(f.slice) * pixels + i];
       stored += little_endian(static_cast<std::uint16_t>(std::lround((hu - f.intercept) / f.slope)), 2);
     }
-    groups.push_back(
-        sequence(0x0020, 0x9111, {element(0x0020, 0x9128, "UL", little_endian(static_cast<std::size_t>(f.time), 4))}) +
-        (f.has_position
-             ? sequence(0x0020, 0x9113, {element(0x0020, 0x0032, "DS", decimals(v.position_mm(Vec3(0, 0, f.slice))))})
-             : "") +
+    groups.push_back(item(
+        sequence(0x0020, 0x9111,
+                 item(element(0x0020, 0x9128, "UL", little_endian(static_cast<std::size_t>(f.time), 4)))) +
+        (f.has_position ? sequence(0x0020, 0x9113,
+                                   item(element(0x0020, 0x0032, "DS", decimals(v.position_mm(Vec3(0, 0, f.slice))))))
+                        : "") +
         (enhanced.shared ? "" : plane_of(v)) +
         sequence(0x0028, 0x9145,
-                 {element(0x0028, 0x1052, "DS", decimal(f.intercept)) +
-                  element(0x0028, 0x1053, "DS", decimal(f.slope)) + element(0x0028, 0x1054, "LO", f.unit)}));
+                 item(element(0x0028, 0x1052, "DS", decimal(f.intercept)) +
+                      element(0x0028, 0x1053, "DS", decimal(f.slope)) + element(0x0028, 0x1054, "LO", f.unit)))));
   }
-  groups.resize(groups.size() - enhanced.missing_groups);
+  std::string all;
+  for (std::size_t i = 0; i + enhanced.missing_groups < groups.size(); ++i) all += groups[i];
   const std::string meta =
       element(2, 2, "UI", ct) + element(2, 3, "UI", enhanced.instance) + element(2, 0x10, "UI", "1.2.840.10008.1.2.1");
   std::ofstream out(file, std::ios::binary);
@@ -103,8 +81,8 @@ void write_enhanced(const fs::path& file, const imaging::HuVolume& v, const std:
       << element(0x28, 0x100, "US", little_endian(16, 2)) << element(0x28, 0x101, "US", little_endian(16, 2))
       << element(0x28, 0x102, "US", little_endian(15, 2)) << element(0x28, 0x103, "US", little_endian(0, 2));
   if (enhanced.groups) {
-    if (enhanced.shared) out << sequence(0x5200, 0x9229, {plane_of(v)});
-    out << sequence(0x5200, 0x9230, groups);
+    if (enhanced.shared) out << sequence(0x5200, 0x9229, item(plane_of(v)));
+    out << sequence(0x5200, 0x9230, all);
   }
   out << element(0x7fe0, 0x10, "OW", stored);
 }

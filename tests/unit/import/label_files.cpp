@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "common/core/check.hpp"
+#include "tests/unit/import/dicom_elements.hpp"
 
 namespace osteon::import {
 namespace {
@@ -19,17 +20,11 @@ void put_at(std::string& bytes, std::size_t at, T value) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-std::string decimal(double value) {
-  std::ostringstream out;
-  out.precision(12);
-  out << value;
-  return out.str();
-}
-
 std::string numbers(const std::vector<double>& values, char between) {
-  std::string text;
-  for (const double value : values) text += (text.empty() ? "" : std::string(1, between)) + decimal(value);
-  return text;
+  std::ostringstream text;
+  text.precision(12);
+  for (std::size_t i = 0; i < values.size(); ++i) (i == 0 ? text : text << between) << values[i];
+  return text.str();
 }
 
 std::string vector_text(const Vec3& v) { return "(" + numbers({v.x(), v.y(), v.z()}, ',') + ")"; }
@@ -46,26 +41,8 @@ std::string caret_names(const std::vector<std::pair<int, std::string>>& names) {
   return bytes + xml;
 }
 
-// Elements of DICOM, explicit little endian.
-std::string little(std::size_t value, int count) {
-  std::string bytes;
-  for (int i = 0; i < count; ++i) bytes += static_cast<char>(value >> 8 * i & 0xff);
-  return bytes;
-}
-std::string element(std::uint16_t group, std::uint16_t number, const std::string& vr, std::string value) {
-  if (value.size() % 2 != 0) value += vr == "UI" || vr == "OB" ? '\0' : ' ';
-  const bool is_long = vr == "OB" || vr == "SQ";
-  return little(group, 2) + little(number, 2) + vr + (is_long ? std::string(2, '\0') : "") +
-         little(value.size(), is_long ? 4 : 2) + value;
-}
 std::string short_element(std::uint16_t group, std::uint16_t number, int value) {
-  return element(group, number, "US", little(static_cast<std::size_t>(value), 2));
-}
-std::string item(const std::string& content) {
-  return little(0xfffe, 2) + little(0xe000, 2) + little(content.size(), 4) + content;
-}
-std::string sequence(std::uint16_t group, std::uint16_t number, const std::string& items) {
-  return element(group, number, "SQ", items);
+  return element(group, number, "US", little_endian(static_cast<std::size_t>(value), 2));
 }
 std::string code(const std::string& value, const std::string& meaning) {
   return item(element(8, 0x100, "SH", value) + element(8, 0x102, "SH", "SCT") + element(8, 0x104, "LO", meaning));
@@ -230,14 +207,14 @@ std::string seg_file(const TestGrid& grid, const std::vector<SegSegment>& segmen
   const std::string axes = numbers({row.x(), row.y(), row.z(), column.x(), column.y(), column.z()}, '\\');
   const std::string spacing = numbers({grid.axes_mm.col(1).norm(), grid.axes_mm.col(0).norm()}, '\\');
   const std::string gap =
-      options.slice_gap_mm > 0.0 ? element(0x18, 0x88, "DS", decimal(options.slice_gap_mm)) : std::string();
+      options.slice_gap_mm > 0.0 ? element(0x18, 0x88, "DS", numbers({options.slice_gap_mm}, '\\')) : std::string();
   const std::string shared = item(sequence(0x20, 0x9116, item(element(0x20, 0x37, "DS", axes))) +
                                   sequence(0x28, 0x9110, item(gap + element(0x28, 0x30, "DS", spacing))));
   std::string pixels = bits_of(grid, frames);
   pixels.resize(pixels.size() - options.missing_bytes);
   const std::string meta = element(2, 2, "UI", options.sop_class) + element(2, 3, "UI", "1.2.3.4.5") +
                            element(2, 0x10, "UI", options.syntax);
-  return std::string(128, '\0') + "DICM" + element(2, 0, "UL", little(meta.size(), 4)) + meta +
+  return std::string(128, '\0') + "DICM" + element(2, 0, "UL", little_endian(meta.size(), 4)) + meta +
          element(8, 0x16, "UI", options.sop_class) + element(8, 0x18, "UI", "1.2.3.4.5") +
          element(8, 0x60, "CS", "SEG") + element(0x10, 0x10, "PN", "DOE^JANE") + element(0x10, 0x20, "LO", "PID-4711") +
          element(0x20, 0xe, "UI", "1.2.3.9") + element(0x20, 0x52, "UI", options.frame_of_reference) +

@@ -8,6 +8,7 @@
 #include "server/import/dicom_writer.hpp"
 #include "server/import/slice_grid.hpp"
 #include "tests/support/temp_dir.hpp"
+#include "tests/unit/import/dicom_elements.hpp"
 #include "tests/unit/import/fixtures.hpp"
 
 namespace osteon::import {
@@ -36,12 +37,6 @@ SliceStack gantry(double tilt_degrees, const std::vector<double>& gaps_mm) {
     if (i < gaps_mm.size()) along_mm += gaps_mm[i];
   }
   return stack;
-}
-
-std::string decimal(double value) {
-  char text[17];
-  std::snprintf(text, sizeof text, "%.9f", value);
-  return text;
 }
 
 void move_slice(const fs::path& file, const Vec3& position_mm) {

@@ -25,14 +25,14 @@ std::unique_ptr<UdpPort> a_port(const std::string& address = "127.0.0.1", std::u
   return opened ? std::move(*opened) : nullptr;
 }
 
-struct Came {
+struct Arrival {
   Endpoint from;
   Bytes bytes;
 };
 // Waits for a datagram that is under way.
-std::optional<Came> next(UdpPort& port) {
+std::optional<Arrival> next(UdpPort& port) {
   DatagramBuffer into;
-  std::optional<Came> came;
+  std::optional<Arrival> came;
   static_cast<void>(test::wait_until(
       [&] {
         if (const auto datagram = port.receive(into))

@@ -15,7 +15,7 @@
 namespace osteon {
 namespace {
 
-constexpr double kPitch_mm = 0.5;
+constexpr double kBandPitch_mm = 0.5;
 constexpr float kBand_mm = 4.0f * 0.5f;
 constexpr int kBeyond = 6;  // samples beyond the box that the surface nearest to a sample may lie in
 
@@ -123,13 +123,13 @@ TEST(NarrowBand, IsTheDistanceToTheNearestOfAllTriangles) {
     const CoordBox& box = boxes[seed % 3];
     const DenseVolume<float> field = random_field(box, seed);
     const Surface surface(field, 20.0);
-    const auto band = narrow_band_mm(parts_of(field, 20.0f), 20.0f, kPitch_mm, always);
+    const auto band = narrow_band_mm(parts_of(field, 20.0f), 20.0f, kBandPitch_mm, always);
     ASSERT_TRUE(band);
     for (int x = box.min.x; x <= box.max.x; ++x)
       for (int y = box.min.y; y <= box.max.y; ++y)
         for (int z = box.min.z; z <= box.max.z; ++z) {
           const Coord c{x, y, z};
-          const double voxels = static_cast<double>(band->value(c)) / kPitch_mm, truth = surface.distance(c);
+          const double voxels = static_cast<double>(band->value(c)) / kBandPitch_mm, truth = surface.distance(c);
           ASSERT_EQ(std::signbit(voxels), field.at(c) >= 20.0f)
               << "seed " << seed << " at " << x << " " << y << " " << z;
           ASSERT_GT(std::abs(voxels), truth - 1e-4) << "seed " << seed << " at " << x << " " << y << " " << z;
@@ -148,7 +148,7 @@ TEST(NarrowBand, NeedsNothingOfAFieldWithoutASurface) {
   for (const float value : {-100.0f, 100.0f}) {
     std::atomic<std::size_t> read{0};
     const DenseVolume<float> field(box, value);
-    const auto band = narrow_band_mm(parts_of(field, 0.0f, &read), 0.0f, kPitch_mm, always);
+    const auto band = narrow_band_mm(parts_of(field, 0.0f, &read), 0.0f, kBandPitch_mm, always);
     ASSERT_TRUE(band);
     EXPECT_EQ(read, 0u);
     EXPECT_TRUE(band->leaves().empty());
@@ -165,18 +165,19 @@ TEST(NarrowBand, ReadsAndStoresTheLeavesNearTheSurfaceOnly) {
     for (int y = 0; y < 40; ++y)
       for (int z = 0; z < 40; ++z) field.at({x, y, z}) = static_cast<float>(10.25 - x);
   std::atomic<std::size_t> read{0};
-  const auto band = narrow_band_mm(parts_of(field, 0.0f, &read), 0.0f, kPitch_mm, always);
+  const auto band = narrow_band_mm(parts_of(field, 0.0f, &read), 0.0f, kBandPitch_mm, always);
   ASSERT_TRUE(band);
   EXPECT_LT(read, field.values.size() / 10);
   for (const Coord leaf : band->leaves()) EXPECT_LT(leaf.x, 16);  // within 4 samples of 10.25
   for (int x = 0; x < 160; ++x)
-    EXPECT_NEAR(static_cast<double>(band->value({x, 20, 20})), std::clamp((x - 10.25) * kPitch_mm, -2.0, 2.0), 1e-5);
+    EXPECT_NEAR(static_cast<double>(band->value({x, 20, 20})), std::clamp((x - 10.25) * kBandPitch_mm, -2.0, 2.0),
+                1e-5);
 }
 
 TEST(NarrowBand, IsThatOfTheDenseFieldWithTheSameBytes) {
   const DenseVolume<float> field = random_field({{-7, -2, 1}, {101, 20, 19}}, 7);
-  const auto band = narrow_band_mm(parts_of(field, 0.0f), 0.0f, kPitch_mm, always);
-  const auto dense = signed_distance_mm(field, 0.0f, kPitch_mm, always);
+  const auto band = narrow_band_mm(parts_of(field, 0.0f), 0.0f, kBandPitch_mm, always);
+  const auto dense = signed_distance_mm(field, 0.0f, kBandPitch_mm, always);
   ASSERT_TRUE(band && dense);
   std::vector<float> gathered(field.values.size());
   band->gather(field.box, gathered);
@@ -185,7 +186,7 @@ TEST(NarrowBand, IsThatOfTheDenseFieldWithTheSameBytes) {
 
 TEST(NarrowBand, StopsWhenAsked) {
   const DenseVolume<float> field = random_field({{0, 0, 0}, {40, 10, 10}}, 1);
-  const auto band = narrow_band_mm(parts_of(field, 0.0f), 0.0f, kPitch_mm, [](double) { return false; });
+  const auto band = narrow_band_mm(parts_of(field, 0.0f), 0.0f, kBandPitch_mm, [](double) { return false; });
   ASSERT_FALSE(band);
   EXPECT_EQ(band.error().code, ErrorCode::cancelled);
 }
