@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "common/geometry/mesh_file.hpp"
+#include "common/imaging/threshold.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/import/case_report.hpp"
@@ -18,6 +19,7 @@
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
 #include "server/import/found_files.hpp"
+#include "server/import/import_report.hpp"
 #include "server/import/label_export.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/label_map.hpp"
@@ -40,6 +42,7 @@ struct CaseArguments {
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
   std::string labels, rods_of, between_slices = "auto", thin_cortex = "off";
   std::optional<std::string> calibration, rods;
+  std::string labels, report, truth;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
@@ -143,17 +146,96 @@ Result<std::optional<PlacedLabels>> read_labels(const CaseArguments& a, const La
   return std::optional(std::move(*placed));
 }
 
+// Both folders are new, and neither is in the other.
+Result<void> check_folders(const CaseArguments& a) {
+  for (const std::string& folder : {a.out, a.report})
+    if (!folder.empty())
+      if (auto is_free = check_free(folder); !is_free) return is_free;
+  if (a.out.empty() || a.report.empty()) return {};
+  std::error_code error;
+  const std::string out = fs::weakly_canonical(fs::path(a.out) / "", error).string();
+  const std::string report = fs::weakly_canonical(fs::path(a.report) / "", error).string();
+  if (out.starts_with(report) || report.starts_with(out))
+    return bad_input("--report " + a.report + " and --out " + a.out + " are in one another; give another folder");
+  return {};
+}
+
+// What a report and a comparison need of a scan, before the import takes its voxels.
+struct ReadScan {
+  ScanGeometry geometry;
+  std::string source;
+  SeriesReport series;
+  std::vector<std::int64_t> histogram;
+  std::optional<TruthLabels> truth;
+};
+
+Result<ReadScan> look_at(const CtScan& scan, const CaseArguments& a, const LabelNames& names,
+                         const KeepGoing& keep_going) {
+  const imaging::HuVolume& v = scan.volume;
+  ReadScan read{.geometry = {v.dims, v.origin_mm, v.directions * v.spacing_mm.asDiagonal()},
+                .source = scan.source,
+                .series = scan.report,
+                .histogram = {},
+                .truth = {}};
+  if (!a.truth.empty()) {
+    auto truth = read_truth(a.truth, names, v, scan.frame_of_reference, part(keep_going, 0.0, 0.8));
+    if (!truth) return tl::unexpected(truth.error());
+    read.truth = std::move(*truth);
+  }
+  if (a.report.empty()) return read;
+  auto histogram = imaging::hu_histogram(v, part(keep_going, 0.8, 1.0));
+  if (!histogram) return tl::unexpected(histogram.error());
+  read.histogram = std::move(*histogram);
+  return read;
+}
+
+// Compares, writes the report, and then saves the case. A case that cannot be saved has no report.
+Result<std::string> finish_ct(const CtImport& made, ReadScan read, const CtOptions& options, bool labelled,
+                              const CaseArguments& a, Bar& bar, const StopSignal& stop) {
+  std::string text;
+  std::optional<LabelComparison> comparison;
+  if (read.truth) {
+    auto compared = compare_labels(made.scan, made.bone->info().labels, *read.truth, bar.stage(0.85, 0.9));
+    if (!compared) return tl::unexpected(compared.error());
+    text = comparison_text(*compared);
+    comparison = std::move(*compared);
+  }
+  if (!a.report.empty()) {
+    const ImportReport report{.bone = made.bone ? &*made.bone : nullptr,
+                              .scan = &made.scan,
+                              .islands = &made.found,
+                              .labels = labelled ? &made.labels : nullptr,
+                              .series = &read.series,
+                              .options = &options,
+                              .read = read.geometry,
+                              .title = options.title,
+                              .source = read.source,
+                              .histogram = std::move(read.histogram),
+                              .comparison = comparison ? &*comparison : nullptr};
+    if (auto written = write_report(report, a.report, bar.stage(0.9, 0.95)); !written)
+      return tl::unexpected(written.error());
+    text += "report     " + a.report + "/report.html\n";
+  }
+  if (a.list) return text;
+  if (auto saved = save(*made.bone, made.scan, a.out, stop); !saved) {
+    std::error_code error;
+    if (!a.report.empty()) fs::remove_all(a.report, error);
+    return tl::unexpected(saved.error());
+  }
+  return text;
+}
+
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (a.out.empty() && !a.list)
     return failure(ErrorCode::invalid_input,
                    "--out is missing; name the folder of the case, or give --list to see the islands alone");
-  if (!a.out.empty())
-    if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  if (auto good = check_folders(a); !good) return tl::unexpected(good.error());
   CtOptions options;
   if (auto parsed = parse_keep(a.keep, options); !parsed) return tl::unexpected(parsed.error());
   options.merge = a.merge;
   options.hollow = a.hollow;
   options.list_only = a.list;
+  options.draw_islands = !a.report.empty();
   options.median = median_box(a);
   options.gaussian_mm = a.gaussian_mm;
   for (const std::string& seed : a.seeds) {
@@ -173,6 +255,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   auto calibration = calibration_options(a);
   if (!calibration) return tl::unexpected(calibration.error());
   options.calibration = std::move(*calibration);
+  if (!a.label_names.empty() && a.labels.empty() && a.truth.empty())
+    return bad_input("--label-names needs a label map; give --labels or --truth too");
   const auto names = parse_label_names(a.label_names);
   if (!names) return tl::unexpected(names.error());
   Bar bar(stop);
@@ -186,21 +270,20 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
-  auto placed = read_labels(a, *names, *scan, bar.stage(0.2, 0.35));
+  auto placed = read_labels(a, *names, *scan, bar.stage(0.2, 0.3));
   if (!placed) return tl::unexpected(placed.error());
-  const KeepGoing making = bar.stage(*placed ? 0.35 : 0.2, 0.95);
+  auto read = look_at(*scan, a, *names, bar.stage(*placed ? 0.3 : 0.2, *placed ? 0.35 : 0.25));
+  if (!read) return tl::unexpected(read.error());
+  const KeepGoing making = bar.stage(*placed ? 0.35 : 0.25, 0.85);
   const bool labelled = placed->has_value();
   const auto made = labelled ? import_ct(std::move(*scan), std::move(**placed), options, making)
                              : import_ct(std::move(*scan), options, making);
   if (!made) return tl::unexpected(about(a.scan.input, made.error()));
-  if (a.list) {
-    bar.stage(1.0, 1.0)(1.0);
-    return series + made->calibration_text + segmentation_text(made->found);
-  }
-  if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
+  const auto finished = finish_ct(*made, std::move(*read), options, labelled, a, bar, stop);
+  if (!finished) return finished;
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*made->bone) + series + made->calibration_text +
-         (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found));
+  return (a.list ? "" : report_text(*made->bone)) + series + made->calibration_text +
+         (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found)) + *finished;
 }
 
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
@@ -282,7 +365,7 @@ Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) 
 }
 
 Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
-  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  if (auto good = check_folders(a); !good) return tl::unexpected(good.error());
   const auto spacing = parse_spacing(a.spacing);
   if (!spacing) return tl::unexpected(spacing.error());
   LabelLegend legend;
@@ -305,9 +388,17 @@ Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
   LabelOptions options;
   options.pitch_mm = a.pitch_mm;
   if (!a.title.empty()) options.title = a.title;
-  const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.95));
+  const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.85));
   if (!made) return tl::unexpected(about(a.input, made.error()));
-  if (auto saved = save(made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
+  if (!a.report.empty())
+    if (auto written = write_report({.bone = &made->bone, .scan = &made->scan}, a.report, bar.stage(0.85, 0.95));
+        !written)
+      return tl::unexpected(written.error());
+  if (auto saved = save(made->bone, made->scan, a.out, stop); !saved) {
+    std::error_code error;
+    if (!a.report.empty()) fs::remove_all(a.report, error);
+    return tl::unexpected(saved.error());
+  }
   bar.stage(1.0, 1.0)(1.0);
 
   std::string text = report_text(made->bone);
@@ -464,6 +555,12 @@ void add_density_options(CLI::App& command, CaseArguments& a) {
       ->capture_default_str();
 }
 
+void add_report_option(CLI::App& command, CaseArguments& a) {
+  command.add_option("--report", a.report,
+                     "Folder, made by this command, of a report with pictures: report.html for people, report.json for "
+                     "programs; without a patient's name, date or path");
+}
+
 void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& shared, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
   CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
@@ -508,10 +605,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       "or a folder with one such file for each structure");
   ct->add_option("--label-names", a.label_names,
                  "What the labels are: totalsegmentator, or NUMBER=NAME,... or NUMBER=NAME:KIND,... with a kind of " +
-                     kind_choice_text() + " (left out); may be given again")
+                     kind_choice_text() + " (left out); may be given again; also those of --truth")
       ->expected(1)
-      ->take_all()
-      ->needs(labels_option);
+      ->take_all();
   CLI::Option* threshold =
       ct->add_option("--threshold", a.threshold,
                      "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm), or "
@@ -541,7 +637,11 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->check(CLI::IsMember({"slice", "volume"}))
       ->capture_default_str()
       ->needs(seed);
-  ct->add_flag("--list", a.list, "List the islands and write nothing")->excludes(labels_option);
+  CLI::Option* list = ct->add_flag("--list", a.list, "List the islands and make no case")->excludes(labels_option);
+  ct->add_option("--truth", a.truth,
+                 "Say how well the case agrees with this label map: Dice, and distances of the surfaces, mm")
+      ->excludes(list);
+  add_report_option(*ct, a);
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own")
       ->excludes(labels_option);
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
@@ -594,6 +694,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       "--bone", a.bone_colours,
       "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
   labels->add_option("--legend", a.legend, "The same from a YAML file");
+  add_report_option(*labels, a);
   labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({labels, [shared](const StopSignal& stop) { return run_labels(*shared, stop); }});
 

@@ -148,6 +148,13 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
   return numbers;
 }
 
+// If nobody has chosen yet, the first islands get a colour each, so that one sees them apart.
+std::vector<int> islands_with_colours(const std::vector<imaging::Island>& islands) {
+  std::vector<int> first(std::min(kMostIslandsDrawn, islands.size()));
+  std::iota(first.begin(), first.end(), 1);
+  return first;
+}
+
 // `bones`: what grew from seeds, if there are any.
 Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const DensityCalibration& calibration,
                           std::optional<GrownBones> bones, const KeepGoing& keep_going) {
@@ -171,6 +178,12 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
               : bones           ? Result<std::vector<int>>(islands_of(bones->regions, *islands, work->first))
                                 : islands_to_keep(options, islands->list);
   if (!kept) return tl::unexpected(kept.error());
+  if (options.draw_islands) {
+    const std::vector<int> shown = options.list_only ? islands_with_colours(islands->list) : *kept;
+    auto views = draw_islands(s.volume, *islands, shown, part(keep_going, 0.9, 0.9));
+    if (!views) return tl::unexpected(views.error());
+    s.found.views = std::move(*views);
+  }
   s.bones = imaging::number_bones(*islands, *kept, options.merge, s.volume.dims);
   s.found.merged = options.merge;
   if (bones) s.found.regions = std::move(bones->regions);
@@ -211,7 +224,10 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const DensityCali
   }
   auto s =
       segment(std::move(scan.volume), options, calibration, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
-  if (s) s->found.threshold_reason = std::move(reason);
+  if (s) {
+    s->found.threshold_hu = options.threshold_hu;
+    s->found.threshold_reason = std::move(reason);
+  }
   return s;
 }
 

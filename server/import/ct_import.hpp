@@ -12,6 +12,7 @@
 #include "common/volume/iso_surface.hpp"
 #include "server/import/ct_scan.hpp"
 #include "server/import/grown_bones.hpp"
+#include "server/import/island_views.hpp"
 #include "server/import/placed_labels.hpp"
 #include "server/import/scan_calibration.hpp"
 
@@ -35,9 +36,10 @@ struct CtOptions {
   std::string title = "CT";              // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;                 // islands by number, from 1; empty: the largest
   bool keep_all = false;
-  bool merge = false;      // the kept islands count as one bone
-  bool hollow = false;     // cavities enclosed by bone are not bone
-  bool list_only = false;  // find the islands and make no case
+  bool merge = false;         // the kept islands count as one bone
+  bool hollow = false;        // cavities enclosed by bone are not bone
+  bool list_only = false;     // find the islands and make no case
+  bool draw_islands = false;  // for a report
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none
@@ -48,6 +50,7 @@ struct CtOptions {
 
 // Result of the segmentation.
 struct CtSegmentation {
+  double threshold_hu = 0.0;             // that was used
   std::string threshold_reason;          // empty if the threshold was not suggested
   std::vector<imaging::Region> regions;  // that grew from seeds
   std::vector<imaging::Island> islands;  // largest first; number N is islands[N - 1]
@@ -59,7 +62,8 @@ struct CtSegmentation {
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
   double metal_hu = imaging::kMetal_hu;
-  Box region;  // part of the scan around everything that reaches the threshold, LPS. With seeds: the whole scan
+  Box region;         // part of the scan around everything that reaches the threshold, LPS. With seeds: the whole scan
+  IslandViews views;  // empty unless the options ask for them
 };
 
 struct CtImport {
@@ -83,6 +87,9 @@ struct CtImport {
 // no label says what the tissue is. Of the options, those of segmentation do not matter. Errors as above.
 [[nodiscard]] Result<CtImport> import_ct(CtScan scan, PlacedLabels labels, const CtOptions& options,
                                          const KeepGoing& keep_going);
+
+// The position of a point within a box, as a patient's sides: LPS. "middle" if it is in the middle third of all axes.
+[[nodiscard]] std::string place_words(const Vec3& at, const Box& box);
 
 // The islands, the volume left out, and metal, as lines for a person.
 [[nodiscard]] std::string segmentation_text(const CtSegmentation& found);

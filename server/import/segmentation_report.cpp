@@ -18,7 +18,15 @@ std::string line(const char* format, Values... values) {
   return text;
 }
 
-// The position of a point within a box, as a patient's sides: LPS. "middle" if it is in the middle third of all axes.
+// For each island, in the order of the list.
+std::vector<bool> kept_flags(const CtSegmentation& found) {
+  std::vector<bool> kept(found.islands.size(), false);
+  for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
+  return kept;
+}
+
+}  // namespace
+
 std::string place_words(const Vec3& at, const Box& box) {
   static constexpr const char* kWords[3][2] = {{"right", "left"}, {"front", "back"}, {"foot end", "head end"}};
   std::string words;
@@ -29,15 +37,6 @@ std::string place_words(const Vec3& at, const Box& box) {
   }
   return words.empty() ? "middle" : words;
 }
-
-// For each island, in the order of the list.
-std::vector<bool> kept_flags(const CtSegmentation& found) {
-  std::vector<bool> kept(found.islands.size(), false);
-  for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
-  return kept;
-}
-
-}  // namespace
 
 std::string segmentation_text(const CtSegmentation& found) {
   std::string text;
