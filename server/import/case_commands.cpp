@@ -18,6 +18,7 @@
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
+#include "server/import/edit_file.hpp"
 #include "server/import/found_files.hpp"
 #include "server/import/import_report.hpp"
 #include "server/import/label_export.hpp"
@@ -40,14 +41,14 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::string labels, rods_of, between_slices = "auto", thin_cortex = "off";
+  std::string rods_of, between_slices = "auto", thin_cortex = "off";
   std::optional<std::string> calibration, rods;
-  std::string labels, report, truth;
+  std::string labels, report, truth, edits;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
   double width_mm = 20.0, density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
-  bool rescale_hu = false, json = false, merge = false, hollow = false, list = false, adaptive = false;
+  bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false, adaptive = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
@@ -225,6 +226,28 @@ Result<std::string> finish_ct(const CtImport& made, ReadScan read, const CtOptio
   return text;
 }
 
+// Reads the edits of --edits. Seeds among them come after those of the command line, and separate the bones.
+Result<void> take_edits(const CaseArguments& a, CtOptions& options) {
+  if (a.edits.empty()) return {};
+  auto edits = read_edits(a.edits);
+  if (!edits) return tl::unexpected(edits.error());
+  options.edits = std::move(*edits);
+  options.edits_file = a.edits;
+  int next = static_cast<int>(options.grow.seeds_mm.size()) + 1;
+  for (int bone = 1; bone < next; ++bone) options.grow.bones.push_back(bone);
+  for (const LabelEdit& edit : options.edits) {
+    if (edit.kind != EditKind::seed) continue;
+    if (!a.keep.empty() || !a.labels.empty())
+      return bad_input(a.edits + " has a seed, which --keep and --labels exclude; remove it, or leave them out");
+    const int bone = edit.bone != 0 ? edit.bone : next;
+    next = std::max(next, bone + 1);
+    options.grow.seeds_mm.push_back(edit.points_mm.front());
+    options.grow.bones.push_back(bone);
+    options.separate = true;
+  }
+  return {};
+}
+
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (a.out.empty() && !a.list)
     return failure(ErrorCode::invalid_input,
@@ -257,6 +280,8 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.calibration = std::move(*calibration);
   if (!a.label_names.empty() && a.labels.empty() && a.truth.empty())
     return bad_input("--label-names needs a label map; give --labels or --truth too");
+  options.separate = a.separate;
+  if (auto taken = take_edits(a, options); !taken) return tl::unexpected(taken.error());
   const auto names = parse_label_names(a.label_names);
   if (!names) return tl::unexpected(names.error());
   Bar bar(stop);
@@ -283,7 +308,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!finished) return finished;
   bar.stage(1.0, 1.0)(1.0);
   return (a.list ? "" : report_text(*made->bone)) + series + made->calibration_text +
-         (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found)) + *finished;
+         (labelled ? labels_text(made->labels, made->found.case_cm3) + edits_text(made->found) : segmentation_text(made->found)) + *finished;
 }
 
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
@@ -638,11 +663,22 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->capture_default_str()
       ->needs(seed);
   CLI::Option* list = ct->add_flag("--list", a.list, "List the islands and make no case")->excludes(labels_option);
+  CLI::Option* separate =
+      ct->add_flag(
+            "--separate", a.separate,
+            "Separate bones that touch where the bone between them is thinnest: each --seed is a bone of its own, "
+            "or without seeds each core of a kept island")
+          ->excludes(list)
+          ->excludes(labels_option);
+  ct->add_option("--edits", a.edits,
+                 "YAML file of corrections, made in its order: paint, scribble, erase, cut, and further seeds")
+      ->excludes(list);
   ct->add_option("--truth", a.truth,
                  "Say how well the case agrees with this label map: Dice, and distances of the surfaces, mm")
       ->excludes(list);
   add_report_option(*ct, a);
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own")
+      ->excludes(separate)
       ->excludes(labels_option);
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
       ->excludes(labels_option);

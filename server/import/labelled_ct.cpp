@@ -11,6 +11,7 @@
 #include "server/import/ct_case.hpp"
 #include "server/import/label_surface.hpp"
 #include "server/import/scan_ends.hpp"
+#include "server/import/separated_bones.hpp"
 
 namespace osteon::import {
 namespace {
@@ -112,6 +113,8 @@ Result<CtImport> import_labelled(CtScan scan, PlacedLabels placed, const CtOptio
   const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, kCalibrateEnd, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed + ", bones of a label map";
+  const auto edits = edit_labels(scan.volume, options, placed, part(keep_going, kSmoothEnd, kSmoothEnd));
+  if (!edits) return tl::unexpected(edits.error());
   auto found = take_labels(std::move(scan.volume), placed, options, part(keep_going, kSmoothEnd, kFindEnd));
   if (!found) return tl::unexpected(found.error());
   give_back_freed_memory();
@@ -151,6 +154,7 @@ Result<CtImport> import_labelled(CtScan scan, PlacedLabels placed, const CtOptio
   if (made) {
     made->labels = std::move(placed);
     made->calibration_text = calibrated->text;
+    made->found.edits = *edits;
   }
   return made;
 }

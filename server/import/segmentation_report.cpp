@@ -25,6 +25,14 @@ std::vector<bool> kept_flags(const CtSegmentation& found) {
   return kept;
 }
 
+// The bones after separation and edits, and the edits.
+std::string bones_text(const CtSegmentation& found) {
+  std::string text = line("bones      %zu in the case%s\n", found.bones.size(),
+                          found.separated ? ", separated where the bone between them is thinnest" : "");
+  for (const FoundBone& bone : found.bones) text += line("           %6d  %7.2f cm3\n", bone.number, bone.volume_cm3);
+  return text + edits_text(found);
+}
+
 }  // namespace
 
 std::string place_words(const Vec3& at, const Box& box) {
@@ -36,6 +44,13 @@ std::string place_words(const Vec3& at, const Box& box) {
     words += (words.empty() ? "" : ", ") + std::string(kWords[axis][part < 0.5 ? 0 : 1]);
   }
   return words.empty() ? "middle" : words;
+}
+
+std::string edits_text(const CtSegmentation& found) {
+  std::string text;
+  for (std::size_t i = 0; i < found.edits.size(); ++i)
+    text += line("%s %6zu  %s\n", i == 0 ? "edits     " : "          ", i + 1, found.edits[i].c_str());
+  return text;
 }
 
 std::string segmentation_text(const CtSegmentation& found) {
@@ -81,7 +96,9 @@ std::string segmentation_text(const CtSegmentation& found) {
         "           --keep N,M takes islands by number, --keep all takes every one\n",
         kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
         100.0 * found.left_out_cm3 / all_cm3);
-  if (found.kept.size() > 1)
+  if (!found.bones.empty())
+    text += bones_text(found);
+  else if (found.kept.size() > 1)
     text += found.merged ? "bones      1 in the case, of all kept islands\n"
                          : line("bones      %zu in the case, one for each kept island\n", found.kept.size());
   if (found.marrow_cm3 > 0.0)
