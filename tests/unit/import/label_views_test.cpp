@@ -12,8 +12,8 @@
 namespace osteon::import {
 namespace {
 
-constexpr double kRadius_mm = 9.0;
-const Vec3 kCentre(4.0, -3.0, 60.0);
+constexpr double kBallRadius_mm = 9.0;
+const Vec3 kBallCentre(4.0, -3.0, 60.0);
 
 // Oblique voxels of 0.6 x 0.6 x 1.5 mm around a ball of label 3 with 1000 HU; a box of label 7 in its middle, if asked.
 struct BallScan {
@@ -26,12 +26,13 @@ struct BallScan {
         (Eigen::AngleAxisd(0.3, Vec3::UnitX()) * Eigen::AngleAxisd(-0.2, Vec3::UnitZ())).toRotationMatrix();
     geometry.dims = {48, 48, 22};
     geometry.axes_mm = turned * Vec3(0.6, 0.6, 1.5).asDiagonal();
-    geometry.origin_mm = kCentre - geometry.axes_mm * Vec3(23.5, 23.5, 10.5);
+    geometry.origin_mm = kBallCentre - geometry.axes_mm * Vec3(23.5, 23.5, 10.5);
     for (int k = 0; k < geometry.dims[2]; ++k)
       for (int j = 0; j < geometry.dims[1]; ++j)
         for (int i = 0; i < geometry.dims[0]; ++i) {
-          const Vec3 from = geometry.position_mm(Vec3(i, j, k)) - kCentre;
-          const bool ball = from.norm() <= kRadius_mm, core = from.cwiseAbs().maxCoeff() <= core_mm && core_mm > 0.0;
+          const Vec3 from = geometry.position_mm(Vec3(i, j, k)) - kBallCentre;
+          const bool ball = from.norm() <= kBallRadius_mm,
+                     core = from.cwiseAbs().maxCoeff() <= core_mm && core_mm > 0.0;
           labels.push_back(core ? 7 : ball ? 3 : 0);
           hu.push_back(ball ? 1000 : 0);
         }
@@ -99,10 +100,10 @@ TEST(LabelViews, TheOutlineLiesOnTheBallsEdge) {
   const BallScan scan;
   for (const View view : {View::axial, View::coronal, View::sagittal})
     for (const double off_mm : {0.0, 4.0}) {
-      Frame frame{view, kCentre + off_mm * direction_of(view), 0.15, 200};
+      Frame frame{view, kBallCentre + off_mm * direction_of(view), 0.15, 200};
       const Picture picture = draw_plane(scan.voxels(), colours(3, kRed), frame);
-      const double radius = std::sqrt(kRadius_mm * kRadius_mm - off_mm * off_mm);
-      const double bound_mm = 0.5 * Vec3(0.6, 0.6, 1.5).norm() * kRadius_mm / radius + 3.0 * 0.15;
+      const double radius = std::sqrt(kBallRadius_mm * kBallRadius_mm - off_mm * off_mm);
+      const double bound_mm = 0.5 * Vec3(0.6, 0.6, 1.5).norm() * kBallRadius_mm / radius + 3.0 * 0.15;
       std::array<int, 16> around{};
       for (int y = 0; y < frame.pixels; ++y)
         for (int x = 0; x < frame.pixels; ++x) {
@@ -119,7 +120,7 @@ TEST(LabelViews, TheOutlineLiesOnTheBallsEdge) {
 // The grey within is that of the window, 400 +- 900 HU: 1000 HU are (1000 - 400) / 1800 + 1/2 of white.
 TEST(LabelViews, APlaneShowsTheHuInTheirPlace) {
   const BallScan scan;
-  const Picture picture = draw_plane(scan.voxels(), colours(3, kRed), {View::coronal, kCentre, 0.15, 200});
+  const Picture picture = draw_plane(scan.voxels(), colours(3, kRed), {View::coronal, kBallCentre, 0.15, 200});
   const auto grey = [](double hu) { return ((hu - 400.0) / 1800.0 + 0.5) * 255.0; };
   EXPECT_NEAR(picture.at(100, 100).red, grey(1000.0), 1.0);
   EXPECT_NEAR(picture.at(100, 100 - 70).green, grey(0.0), 1.0) << "10.5 mm above the centre there is no ball";
@@ -128,11 +129,11 @@ TEST(LabelViews, APlaneShowsTheHuInTheirPlace) {
 // A patient's left is on the right of the picture, and the head at its top.
 TEST(LabelViews, APictureHasThePatientsSides) {
   for (const View view : {View::axial, View::coronal, View::sagittal}) {
-    const Frame frame{view, kCentre, 0.5, 101};
-    const auto [x, y] = frame.pixel_of(kCentre + Vec3(5.0, 7.0, 9.0));  // to the left, to the back, to the head
+    const Frame frame{view, kBallCentre, 0.5, 101};
+    const auto [x, y] = frame.pixel_of(kBallCentre + Vec3(5.0, 7.0, 9.0));  // to the left, to the back, to the head
     EXPECT_DOUBLE_EQ(x, 50.0 + (view == View::sagittal ? 14.0 : 10.0));
     EXPECT_DOUBLE_EQ(y, 50.0 + (view == View::axial ? 14.0 : -18.0));
-    EXPECT_NEAR((frame.position_mm(x, y) - kCentre).dot(direction_of(view)), 0.0, 1e-12);
+    EXPECT_NEAR((frame.position_mm(x, y) - kBallCentre).dot(direction_of(view)), 0.0, 1e-12);
   }
 }
 
@@ -140,19 +141,19 @@ TEST(LabelViews, APictureHasThePatientsSides) {
 TEST(LabelViews, ABallIsALitDisc) {
   const BallScan scan;
   for (const View view : {View::axial, View::coronal, View::sagittal}) {
-    const Frame frame{view, kCentre, 0.2, 120};
+    const Frame frame{view, kBallCentre, 0.2, 120};
     const auto picture = draw_surface(scan.voxels(), colours(3, {250, 250, 250}), {}, frame, keep_going);
     ASSERT_TRUE(picture);
     int covered = 0, wrong = 0;
     for (int y = 0; y < frame.pixels; ++y)
       for (int x = 0; x < frame.pixels; ++x) {
-        const double from = (frame.position_mm(x, y) - kCentre).norm();
+        const double from = (frame.position_mm(x, y) - kBallCentre).norm();
         const bool drawn = picture->picture.at(x, y) != kBlackInk;
         covered += drawn ? 1 : 0;
-        wrong += (drawn && from > kRadius_mm + 1.0) || (!drawn && from < kRadius_mm - 1.0) ? 1 : 0;
+        wrong += (drawn && from > kBallRadius_mm + 1.0) || (!drawn && from < kBallRadius_mm - 1.0) ? 1 : 0;
       }
     EXPECT_EQ(wrong, 0);
-    const double area = std::numbers::pi * kRadius_mm * kRadius_mm / (0.2 * 0.2);
+    const double area = std::numbers::pi * kBallRadius_mm * kBallRadius_mm / (0.2 * 0.2);
     // A silhouette shows the outermost of all voxels, which are up to 1.5 mm wide.
     EXPECT_GT(covered, area);
     EXPECT_LT(covered, 1.08 * area);
@@ -172,7 +173,7 @@ TEST(LabelViews, ABallIsALitDisc) {
 // A structure within the ball is seen through it, where it is, and nowhere else.
 TEST(LabelViews, AStructureAtRiskShinesThroughTheBone) {
   const BallScan scan(3.0);
-  const Frame frame{View::coronal, kCentre, 0.2, 120};
+  const Frame frame{View::coronal, kBallCentre, 0.2, 120};
   const auto picture = draw_surface(scan.voxels(), colours(3, {250, 250, 250}), colours(7, kBlue), frame, keep_going);
   ASSERT_TRUE(picture);
   const auto bluish = [&](double right_mm) {
@@ -205,8 +206,8 @@ TEST(LabelViews, TheFullestPlaneIsWhereTheBoxIsWidest) {
 
 TEST(LabelViews, DrawingStopsWhenAsked) {
   const BallScan scan;
-  const auto stopped =
-      draw_surface(scan.voxels(), colours(3, kRed), {}, {View::axial, kCentre, 0.2, 50}, [](double) { return false; });
+  const auto stopped = draw_surface(scan.voxels(), colours(3, kRed), {}, {View::axial, kBallCentre, 0.2, 50},
+                                    [](double) { return false; });
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
 }

@@ -23,7 +23,7 @@ bool in_block(const Vec3& p, const Vec3& centre, double half_mm) {
 int block_at(const Vec3& p) {
   return in_block(p, {-8.0, 0.0, 116.0}, 6.3) ? 1 : in_block(p, {11.0, 0.0, 116.0}, 3.3) ? 2 : 0;
 }
-int label_at(const Vec3& p) { return in_block(p, {11.0, 0.0, 116.0}, 3.3) ? 52 : block_at(p) == 1 ? 75 : 0; }
+int structure_at(const Vec3& p) { return in_block(p, {11.0, 0.0, 116.0}, 3.3) ? 52 : block_at(p) == 1 ? 75 : 0; }
 
 std::string ct_file() {
   std::vector<int> hu;
@@ -124,7 +124,7 @@ TEST_F(Report, ShowsTheIslandsBeforeOneChooses) {
 }
 
 TEST_F(Report, NamesStructuresAtRisk) {
-  write_bytes(folder_ / "labels.nii", nifti_file(kGrid, label_at));
+  write_bytes(folder_ / "labels.nii", nifti_file(kGrid, structure_at));
   const auto made = import({"--labels", path("labels.nii"), "--label-names", "75=femur_left,52=sciatic_nerve",
                             "--truth", path("labels.nii"), "--out", path("case"), "--report", path("report")});
   ASSERT_EQ(made.exit_code, 0) << made.err;
@@ -192,7 +192,7 @@ TEST_F(Report, StoppedIsNotThereAtAll) {
   }
 }
 
-struct Attribute {
+struct Secret {
   std::uint16_t group, element;
   std::string value;
 };
@@ -201,13 +201,13 @@ TEST_F(Report, NothingInItNamesThePatientTheDateOrThePath) {
   const fs::path series = folder_ / "DOEQUIST_JANELLE" / "series";
   fs::create_directory(folder_ / "DOEQUIST_JANELLE");
   ASSERT_NO_FATAL_FAILURE(write_small_series(series));
-  const std::vector<Attribute> attributes{{0x0008, 0x0020, "20200229"},          {0x0008, 0x0050, "ACC0815"},
-                                          {0x0008, 0x0080, "StElsewhere"},       {0x0008, 0x103e, "SeriesOfDoequist"},
-                                          {0x0010, 0x0010, "DOEQUIST^JANELLE"},  {0x0010, 0x0020, "PID-123456"},
-                                          {0x0010, 0x0030, "19570314"},          {0x0018, 0x1210, "KernelOfJanelle"},
-                                          {0x0020, 0x000e, "1.2.826.0.1.4711.3"}};
+  const std::vector<Secret> attributes{{0x0008, 0x0020, "20200229"},          {0x0008, 0x0050, "ACC0815"},
+                                       {0x0008, 0x0080, "StElsewhere"},       {0x0008, 0x103e, "SeriesOfDoequist"},
+                                       {0x0010, 0x0010, "DOEQUIST^JANELLE"},  {0x0010, 0x0020, "PID-123456"},
+                                       {0x0010, 0x0030, "19570314"},          {0x0018, 0x1210, "KernelOfJanelle"},
+                                       {0x0020, 0x000e, "1.2.826.0.1.4711.3"}};
   for (const fs::path& file : files_of(series))
-    for (const Attribute& a : attributes) set_tag(file, a.group, a.element, a.value);
+    for (const Secret& a : attributes) set_tag(file, a.group, a.element, a.value);
   // A file beside the slices is named after the patient, too. Secrets are long, so that no picture has one by chance.
   write_bytes(series / "Janelle_notes.txt", "nothing");
   const auto made =
@@ -217,7 +217,7 @@ TEST_F(Report, NothingInItNamesThePatientTheDateOrThePath) {
   for (const fs::path& file : files_of(folder_ / "report")) all += test::content(file);
   ASSERT_NE(all.find("DICOM CT"), std::string::npos) << "what is there is found";
   std::vector<std::string> secrets{"DOEQUIST", "JANELLE", "Doequist", "Janelle", folder_.path().string()};
-  for (const Attribute& a : attributes) secrets.push_back(a.value);
+  for (const Secret& a : attributes) secrets.push_back(a.value);
   for (const std::string& secret : secrets) EXPECT_EQ(all.find(secret), std::string::npos) << secret;
 }
 
