@@ -112,7 +112,7 @@ TEST(Agreement, StopsWhenAsked) {
 }
 
 // A scan of 20 x 20 x 10 voxels, of which the case keeps a part.
-struct Labels {
+struct TwoLabellings {
   CaseScan scan{.geometry = {{8, 8, 6}, Vec3(6.0, 6.0, 2.0), Eigen::Matrix3d::Identity()},
                 .labels = std::vector<std::uint8_t>(8 * 8 * 6, 0)};
   TruthLabels truth{.scan = {{20, 20, 10}, Vec3::Zero(), Eigen::Matrix3d::Identity()},
@@ -131,7 +131,7 @@ struct Labels {
 };
 
 TEST(CompareLabels, FindsThemByNameAndThenByNumber) {
-  Labels l;
+  TwoLabellings l;
   l.draw(7, 8, 1, 9);
   l.draw(9, 10, 2, 2);
   l.draw(11, 12, 3, 0);
@@ -155,7 +155,7 @@ TEST(CompareLabels, FindsThemByNameAndThenByNumber) {
 
 // Bone that the case left out together with its part of the scan is missing all the same.
 TEST(CompareLabels, CountsBoneBeyondTheScanThatTheCaseKeeps) {
-  Labels l;
+  TwoLabellings l;
   l.draw(7, 12, 1, 1);
   l.draw(14, 19, 0, 1);
   l.truth.labels = {{1, "femur"}};
