@@ -97,11 +97,12 @@ double mean_of(std::span<const double> values) {
 
 // Where HU first reach a value.
 double first_at(const LineOfHu& line, double hu) {
-  for (std::size_t i = 1; i < line.hu.size(); ++i)
-    if (line.hu[i] >= hu)
-      return line.first_mm +
-             line.step_mm * (static_cast<double>(i) - 1.0 +
-                             std::clamp((hu - line.hu[i - 1]) / (line.hu[i] - line.hu[i - 1]), 0.0, 1.0));
+  for (std::size_t i = 1; i < line.hu.size(); ++i) {
+    if (line.hu[i] < hu) continue;
+    const double rise = line.hu[i] - line.hu[i - 1];
+    const double part = rise > 0.0 ? std::clamp((hu - line.hu[i - 1]) / rise, 0.0, 1.0) : 0.0;
+    return line.first_mm + line.step_mm * (static_cast<double>(i) - 1.0 + part);
+  }
   return line.first_mm;
 }
 
@@ -146,8 +147,9 @@ std::optional<CortexFit> fit_profile(const LineOfHu& line, double sigma_mm, doub
     best = CortexFit{{u[0], thick ? u[kUnknowns - 1] : cortex_hu, u[1], u[2], u[3], sigma_mm}, rest};
   }
   const CortexProfile& p = best->profile;
-  if (p.thickness_mm < kThinnest * sigma_mm || p.outer_mm <= line.first_mm || p.outer_mm + p.thickness_mm >= last_mm)
-    return {};
+  const bool within =
+      p.thickness_mm >= kThinnest * sigma_mm && p.outer_mm > line.first_mm && p.outer_mm + p.thickness_mm < last_mm;
+  if (!within) return {};
   return best;
 }
 
