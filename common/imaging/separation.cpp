@@ -32,13 +32,13 @@ void number_by_size(VoxelMask& labels) {
 
 Result<VoxelMask> separate_bones(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
                                  std::span<const BoneSeed> seeds, const KeepGoing& keep_going) {
-  const auto depth = bone_depth(volume, bones, threshold_hu, part(keep_going, 0.0, 0.4));
+  auto depth = bone_depth(volume, bones, threshold_hu, part(keep_going, 0.0, 0.4));
   if (!depth) return tl::unexpected(depth.error());
   const KeepGoing marking = part(keep_going, 0.4, 0.6);
   auto markers =
       seeds.empty() ? markers_from_cores(bones, *depth, marking) : markers_from_seeds(bones, *depth, seeds, marking);
   if (!markers) return markers;
-  auto labels = watershed(bones, *depth, std::move(*markers), part(keep_going, 0.6, 1.0));
+  auto labels = watershed(bones, std::move(*depth), std::move(*markers), part(keep_going, 0.6, 1.0));
   if (labels && seeds.empty()) number_by_size(*labels);
   return labels;
 }

@@ -56,15 +56,12 @@ Result<void> flood(std::vector<std::uint16_t>& relief, VoxelMask& markers, bool 
 
 }  // namespace
 
-Result<VoxelMask> watershed(const VoxelMask& mask, const BoneDepth& depth, VoxelMask markers,
-                            const KeepGoing& keep_going) {
+Result<VoxelMask> watershed(const VoxelMask& mask, BoneDepth depth, VoxelMask markers, const KeepGoing& keep_going) {
   OSTEON_CHECK(mask.dims == markers.dims && depth.values.size() == mask.values.size());
-  std::vector<std::uint16_t> relief(depth.values.size(), kDeepest);
+  std::vector<std::uint16_t>& relief = depth.values;
   for (std::size_t i = 0; i < mask.values.size(); ++i) {
-    if (mask.values[i] != 0)
-      relief[i] = static_cast<std::uint16_t>(kDeepest - depth.values[i]);
-    else
-      markers.values[i] = kOutside;
+    relief[i] = mask.values[i] != 0 ? static_cast<std::uint16_t>(kDeepest - relief[i]) : kDeepest;
+    if (mask.values[i] == 0) markers.values[i] = kOutside;
   }
   for (const bool corners : {false, true}) {
     if (std::ranges::none_of(markers.values, [](std::uint8_t number) { return number != 0 && number != kOutside; }))

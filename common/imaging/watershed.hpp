@@ -13,7 +13,7 @@ inline constexpr int kMostMarkers = 254;
 // where the bone between their markers is shallowest. They go over faces. What only touches them at an edge or corner
 // follows when all else is done. A part of the mask without a marker stays 0. `markers`: 0, or a number up to
 // kMostMarkers; becomes the result. All have the same voxels. Errors: cancelled, exhausted (memory), internal.
-[[nodiscard]] Result<VoxelMask> watershed(const VoxelMask& mask, const BoneDepth& depth, VoxelMask markers,
+[[nodiscard]] Result<VoxelMask> watershed(const VoxelMask& mask, BoneDepth depth, VoxelMask markers,
                                           const KeepGoing& keep_going);
 
 }  // namespace osteon::imaging

@@ -104,14 +104,14 @@ Result<void> take_edits(const CaseArguments& a, CtOptions& options) {
   options.edits_file = a.edits;
   int next = static_cast<int>(options.grow.seeds_mm.size()) + 1;
   for (int bone = 1; bone < next; ++bone) options.grow.bones.push_back(bone);
-  for (const LabelEdit& edit : options.edits) {
+  for (LabelEdit& edit : options.edits) {
     if (edit.kind != EditKind::seed) continue;
     if (!a.keep.empty() || !a.labels.empty())
       return bad_input(a.edits + " has a seed, which --keep and --labels exclude; remove it, or leave them out");
-    const int bone = edit.bone != 0 ? edit.bone : next;
-    next = std::max(next, bone + 1);
+    if (edit.bone == 0) edit.bone = next;
+    next = std::max(next, edit.bone + 1);
     options.grow.seeds_mm.push_back(edit.points_mm.front());
-    options.grow.bones.push_back(bone);
+    options.grow.bones.push_back(edit.bone);
     options.separate = true;
   }
   return {};

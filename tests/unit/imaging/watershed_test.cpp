@@ -9,13 +9,13 @@
 #include <random>
 
 #include "common/imaging/bone_markers.hpp"
+#include "common/imaging/calibration.hpp"
 #include "common/imaging/components.hpp"
 #include "tests/unit/imaging/always.hpp"
 
 namespace osteon::imaging {
 namespace {
 
-constexpr double kThreshold_hu = 226.0;
 constexpr int kMuscle_hu = 50, kBone_hu = 1200;
 
 // What a scanner shows of solids: each voxel has the mean of bone and muscle over its parts, as thick slices do.
@@ -42,14 +42,14 @@ HuVolume scan_of(const std::array<int, 3>& dims, const Vec3& spacing_mm, int bon
 
 VoxelMask at_threshold(const HuVolume& volume) {
   VoxelMask mask(volume.dims);
-  for (std::size_t i = 0; i < mask.values.size(); ++i) mask.values[i] = volume.values[i] >= kThreshold_hu ? 1 : 0;
+  for (std::size_t i = 0; i < mask.values.size(); ++i) mask.values[i] = volume.values[i] >= kBoneThreshold_hu ? 1 : 0;
   return mask;
 }
 
 // Seeds get numbers in their order.
 Result<VoxelMask> separated(const HuVolume& volume, const VoxelMask& mask, const std::vector<std::array<int, 3>>& seeds,
                             const KeepGoing& keep_going = always) {
-  const auto depth = bone_depth(volume, mask, kThreshold_hu, keep_going);
+  const auto depth = bone_depth(volume, mask, kBoneThreshold_hu, keep_going);
   if (!depth) return tl::unexpected(depth.error());
   std::vector<BoneSeed> numbered;
   for (const auto& seed : seeds) numbered.push_back({seed, static_cast<int>(numbered.size()) + 1});
@@ -59,7 +59,7 @@ Result<VoxelMask> separated(const HuVolume& volume, const VoxelMask& mask, const
 }
 
 Result<VoxelMask> separated_by_cores(const HuVolume& volume, const VoxelMask& mask, std::size_t& cores) {
-  const auto depth = bone_depth(volume, mask, kThreshold_hu, always);
+  const auto depth = bone_depth(volume, mask, kBoneThreshold_hu, always);
   const auto found = bone_cores(mask, *depth, always);
   if (!found) return tl::unexpected(found.error());
   cores = found->size();
@@ -290,7 +290,7 @@ TEST(Watershed, StopsAtEveryQuestion) {
   });
   const VoxelMask mask = at_threshold(scan);
   const auto run = [&](const KeepGoing& keep_going) -> Result<VoxelMask> {
-    const auto depth = bone_depth(scan, mask, kThreshold_hu, keep_going);
+    const auto depth = bone_depth(scan, mask, kBoneThreshold_hu, keep_going);
     if (!depth) return tl::unexpected(depth.error());
     if (auto cores = bone_cores(mask, *depth, keep_going); !cores) return tl::unexpected(cores.error());
     const std::vector<BoneSeed> seeds{{{6, 6, 6}, 1}, {{13, 6, 6}, 2}};
@@ -334,7 +334,7 @@ TEST(BoneDepth, MarrowAndDarkBoneCountLess) {
   volume.values = {0, 1100, 1100, -50, -50, -50, 1100, 1100, 0};
   VoxelMask mask(volume.dims);
   for (int x = 1; x < 8; ++x) mask.at(x, 0, 0) = 1;
-  const auto depth = bone_depth(volume, mask, kThreshold_hu, always);
+  const auto depth = bone_depth(volume, mask, kBoneThreshold_hu, always);
   ASSERT_TRUE(depth);
   const auto mm = [&](int x) { return depth->values[static_cast<std::size_t>(x)] * depth->unit_mm; };
   const double error = 3.0 * depth->unit_mm;
@@ -353,7 +353,7 @@ TEST(BoneDepth, BoneThatFillsTheScanHasNoSurface) {
   volume.values.assign(125, 1000);
   VoxelMask mask(volume.dims);
   std::ranges::fill(mask.values, std::uint8_t{1});
-  const auto depth = bone_depth(volume, mask, kThreshold_hu, always);
+  const auto depth = bone_depth(volume, mask, kBoneThreshold_hu, always);
   ASSERT_TRUE(depth);
   EXPECT_TRUE(std::ranges::all_of(depth->values, [](std::uint16_t d) { return d == kDeepest; }));
 }

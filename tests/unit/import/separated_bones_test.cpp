@@ -175,6 +175,29 @@ TEST(EditedBones, TheSameFileGivesTheSameHash) {
   EXPECT_NE(first->bone->hash(), other->bone->hash());
 }
 
+TEST(EditedBones, EditsChangeTheLabelsOfALabelMap) {
+  CtScan scan = three_balls();
+  PlacedLabels placed;
+  placed.values = imaging::VoxelMask(scan.volume.dims);
+  for (std::size_t i = 0; i < placed.values.values.size(); ++i)
+    placed.values.values[i] = scan.volume.values[i] > 500 ? 5 : 0;
+  placed.labels = {{5, "femur", LabelKind::bone, {"label map, test", {}, {}}}};
+  placed.cm3 = {1.0};
+  const CtOptions options = with_edits(
+      "  - {kind: cut, bone: 5, point_mm: [17.5, 0, 0], normal: [1, 0, 0], to_bone: 6}\n"
+      "  - {kind: erase, centre_mm: [46.5, 10.5, 10.5], radius_mm: 9}\n");
+  const auto import = import_ct(std::move(scan), std::move(placed), options, keep_going);
+  ASSERT_TRUE(import) << import.error().message;
+  ASSERT_EQ(import->bone->info().labels.size(), 2u);
+  EXPECT_EQ(label_of(*import, 5)->name, "femur");
+  EXPECT_EQ(label_of(*import, 5)->provenance.edits.size(), 1u);
+  EXPECT_EQ(label_of(*import, 6)->provenance.edits.size(), 2u);
+  EXPECT_EQ(import->bone->bone_number({9, 10, 10}), 5);
+  EXPECT_EQ(import->bone->bone_number({25, 10, 10}), 6);
+  EXPECT_GT(import->bone->surface_mm({46, 10, 10}), 0.0);
+  EXPECT_NEAR(import->labels.cm3[0], import->labels.cm3[1], 1e-9) << "mirrored balls";
+}
+
 TEST(EditedBones, EditsThatCannotBeNameTheirFile) {
   const auto away = made(with_edits("  - {kind: erase, centre_mm: [900, 0, 0], radius_mm: 3}\n"));
   ASSERT_FALSE(away);
