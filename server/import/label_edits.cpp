@@ -46,7 +46,7 @@ imaging::VoxelBox voxels_around(const imaging::HuVolume& grid, const Vec3& a_mm,
   return box;
 }
 
-bool is_empty(const imaging::VoxelBox& box) {
+bool holds_no_voxel(const imaging::VoxelBox& box) {
   return box.first[0] > box.last[0] || box.first[1] > box.last[1] || box.first[2] > box.last[2];
 }
 
@@ -148,7 +148,7 @@ std::optional<imaging::VoxelBox> painted_voxels(const imaging::HuVolume& grid, s
     if (edit.kind != EditKind::paint && edit.kind != EditKind::scribble) continue;
     each_segment(edit, [&](const Vec3& from, const Vec3& to) {
       const imaging::VoxelBox box = voxels_around(grid, from, to, edit.radius_mm);
-      if (is_empty(box)) return;
+      if (holds_no_voxel(box)) return;
       if (!all) all = box;
       for (std::size_t axis = 0; axis < 3; ++axis) {
         all->first[axis] = std::min(all->first[axis], box.first[axis]);

@@ -84,7 +84,8 @@ TEST(LabelEdits, AnEraserLeavesOtherBones) {
 TEST(LabelEdits, APolylineIsARodWithRoundEnds) {
   const imaging::HuVolume grid = turned_grid();
   const Vec3 middle = middle_of(grid);
-  const Vec3 x = grid.directions.col(0), y = grid.directions.col(1);
+  // At an angle to the axes of the grid, so that its steps even out.
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY();
   imaging::VoxelMask labels(grid.dims);
   apply(grid,
         edits_of("  - {kind: scribble, bone: 9, radius_mm: 3, points_mm: [" + xyz(middle - 8.0 * x) + ", " +

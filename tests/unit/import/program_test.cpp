@@ -391,12 +391,20 @@ TEST_F(Program, WrongEditsAreOneSentence) {
   };
   const std::string seed = "edits: [{kind: seed, point_mm: [3, 3, 3]}]";
   refused("edits: [{kind: erase, centre_mm: [3, 3, 3], radius_mm: NaN}]", {}, "edit 1: radius_mm is \"NaN\"");
-  refused("edits: [{kind: erase, centre_mm: [-99, 3, 3], radius_mm: 1}]", {}, "edit 1 (erase): it covers no voxel");
-  refused("edits: [{kind: seed, point_mm: [-99, 3, 3]}]", {}, "lies outside the scan");
   refused(seed, {"--keep", "1"}, "has a seed, which --keep and --labels exclude");
   refused(seed, {"--list"}, "--list");
   refused(seed, {"--separate", "--merge"}, "--merge");
   expect_refused({"ct", path("series"), "--out", path("case"), "--edits", path("none.yaml")}, "none.yaml", folder_);
+  // These are found out when the scan is there.
+  for (const auto& [text, named] :
+       {std::pair{"edits: [{kind: erase, centre_mm: [-99, 3, 3], radius_mm: 1}]", "edit 1 (erase): it covers no voxel"},
+        std::pair{"edits: [{kind: seed, point_mm: [-99, 3, 3]}]", "lies outside the scan"}}) {
+    std::ofstream(path("edits.yaml")) << text;
+    const auto late = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--edits", path("edits.yaml")});
+    EXPECT_EQ(late.exit_code, 1);
+    EXPECT_NE(late.err.find(named), std::string::npos) << late.err;
+    EXPECT_FALSE(fs::exists(path("case")));
+  }
 }
 
 TEST_F(Program, SuggestsAThresholdAndSaysWhy) {
