@@ -48,7 +48,8 @@ struct CaseArguments {
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
   double width_mm = 20.0, density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
-  bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false, adaptive = false;
+  bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false,
+       adaptive = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
@@ -308,7 +309,9 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!finished) return finished;
   bar.stage(1.0, 1.0)(1.0);
   return (a.list ? "" : report_text(*made->bone)) + series + made->calibration_text +
-         (labelled ? labels_text(made->labels, made->found.case_cm3) + edits_text(made->found) : segmentation_text(made->found)) + *finished;
+         (labelled ? labels_text(made->labels, made->found.case_cm3) + edits_text(made->found)
+                   : segmentation_text(made->found)) +
+         *finished;
 }
 
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {

@@ -170,7 +170,7 @@ std::vector<int> islands_with_colours(const std::vector<imaging::Island>& island
 Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const DensityCalibration& calibration,
                           std::optional<GrownBones> bones, const KeepGoing& keep_going) {
   auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
-                          : dense_region(scan, options, keep_going);
+                    : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
   if (const auto painted = painted_voxels(scan, options.edits))
     widen(*work, region_around(painted->first, painted->last, scan, options));
