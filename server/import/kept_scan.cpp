@@ -129,7 +129,7 @@ CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::V
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info) {
   for (const FoundBone& bone : found.bones)
     info.labels.push_back(label_of(options, found, bone, provenance_of(options)));
-  if (!found.bones.empty()) return list_tissues(scan, info);
+  if (!found.bones.empty()) return list_tissues(scan, options.metal_hu, info);
   const int bones = found.merged ? 1 : std::min(kMostBoneNumbers, static_cast<int>(found.kept.size()));
   for (int bone = 1; bone <= bones; ++bone) {
     CaseLabel label{bone, "bone " + std::to_string(bone), LabelKind::bone, provenance_of(options)};
