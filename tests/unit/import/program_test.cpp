@@ -99,7 +99,11 @@ TEST_F(Program, WrongOptionsOfDensityAreOneSentence) {
   refused({"--rods-of", "hydroxyapatite"}, "--rods");
   refused({"--rods", "0,0.1", "--rods-of", "water"}, "--rods-of");
   for (const char* metal : {"499", "40000", "nan"}) refused({"--metal-hu", metal}, "--metal-hu");
-  refused({"--rods", "0,0.1"}, "scan.inv3: the scan does not show 2 uniform rods");
+  // This is found out when the scan is there, after lines of progress.
+  const auto late = test::run(kProgram, {"ct", path("scan.inv3"), "--out", path("case"), "--rods", "0,0.1"});
+  EXPECT_EQ(late.exit_code, 1);
+  EXPECT_NE(late.err.find("scan.inv3: the scan does not show 2 uniform rods"), std::string::npos) << late.err;
+  EXPECT_FALSE(fs::exists(path("case")));
 }
 
 // A block of bone in air, as raw numbers.
