@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/imaging/calibration.hpp"
 
@@ -104,6 +105,27 @@ std::int16_t BoneField::marrow_value(const std::array<int, 3>& at, std::size_t i
   return static_cast<std::int16_t>(std::lround(std::min(32767.0, threshold_hu_ + above)));
 }
 
+// For a dense voxel beside dense bone that is kept: as far below the threshold as the mean of these is above it.
+std::int16_t BoneField::outside_value(const std::array<int, 3>& at, std::size_t i) const {
+  const std::int16_t hu = volume_.values[i];
+  if (hu <= below_) return hu;
+  const std::array<std::ptrdiff_t, 3> step{1, volume_.dims[0],
+                                           static_cast<std::ptrdiff_t>(volume_.dims[0]) * volume_.dims[1]};
+  double above = 0.0;
+  int neighbours = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    for (const int side : {-1, 1}) {
+      if (at[axis] + side < 0 || at[axis] + side >= volume_.dims[axis]) continue;
+      const auto beside = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) + side * step[axis]);
+      if (bones_.values[beside] == 0 || volume_.values[beside] < threshold_hu_) continue;
+      above += volume_.values[beside] - threshold_hu_;
+      ++neighbours;
+    }
+  if (neighbours == 0) return below_;
+  const double value = threshold_hu_ - std::max(1.0, above / neighbours);
+  return static_cast<std::int16_t>(std::lround(std::max<double>(value, std::numeric_limits<std::int16_t>::min())));
+}
+
 void BoneField::read(const VoxelBox& part, std::span<std::int16_t> values) const {
   std::size_t n = 0;
   for (int slice = part.first[2]; slice <= part.last[2]; ++slice)
@@ -111,7 +133,7 @@ void BoneField::read(const VoxelBox& part, std::span<std::int16_t> values) const
       for (int column = part.first[0]; column <= part.last[0]; ++column) {
         const std::size_t i = volume_.index(column, row, slice);
         const std::int16_t hu = volume_.values[i];
-        values[n++] = bones_.values[i] == 0 ? std::min(hu, below_)
+        values[n++] = bones_.values[i] == 0 ? outside_value({column, row, slice}, i)
                       : hu < threshold_hu_  ? marrow_value({column, row, slice}, i)
                                             : hu;
       }

@@ -10,9 +10,10 @@
 
 namespace osteon::imaging {
 
-// Kept dense voxels keep their HU. All outside voxels end below the threshold; voxels of other islands get the last
-// whole HU below it. A trilinear cell with a voxel of a kept island has no voxel of another island, because they would
-// be 26-neighbours. So the kept surface does not move. Kept marrow is raised above the threshold. Where marrow meets
+// Kept dense voxels keep their HU. All outside voxels end below the threshold; dense ones get the last whole HU below
+// it. A trilinear cell with a voxel of a kept island has no voxel of another island, because they would be
+// 26-neighbours. So the kept surface does not move. Only an edit or a limit of HU leaves a dense voxel outside beside a
+// kept one: the surface is then half way between them. Kept marrow is raised above the threshold. Where marrow meets
 // air, the surface is half way between their values. Where it meets anything else, the surface is half way between the
 // voxels. A field that is at or above the threshold in the kept voxels and nowhere else, in whole numbers, stays as it
 // is. All is worked out part by part, so it takes no memory beside the scan's. Any thread.
@@ -30,6 +31,7 @@ class BoneField {
  private:
   BoneField(const HuVolume& volume, const VoxelMask& bones, double threshold_hu);
   [[nodiscard]] std::int16_t marrow_value(const std::array<int, 3>& at, std::size_t i) const;
+  [[nodiscard]] std::int16_t outside_value(const std::array<int, 3>& at, std::size_t i) const;
 
   const HuVolume& volume_;
   const VoxelMask& bones_;

@@ -6,12 +6,18 @@
 
 namespace osteon::imaging {
 
-// Density from Hounsfield units (Rho 1995). The authors measured human bone of many regions, and fitted one line for
-// each bone and region. Finite element studies quote ρ = 131 + 1.067 HU kg/m³ as their line for cancellous bone of
-// the proximal femur.
-// [A] It is used here for all bone, also cortex, and for every scanner, kernel and tube voltage. Cortex is outside the
-// densities of that fit: a scan of 1700 HU gives 1.94 g/cm³, while compact bone has 1.8 to 2.1.
+// Density from Hounsfield units. Rho 1995 scanned bones of eight people in water and gives one line for each bone.
+// Finite element studies quote ρ = 131 + 1.067 HU kg/m³ from it as the line for cancellous bone of the proximal
+// femur. [A] The quotation is not checked against the paper's tables; its abstract gives no coefficients. The abstract
+// says that CT numbers predict the mechanical properties of cancellous bone (r² > 0.6), but not those of cortical
+// bone (r² < 0.2). So the line is an extrapolation in cortex: a scan of 1700 HU gives 1.94 g/cm³, while compact bone
+// has 1.8 to 2.1. It also knows nothing of this scanner, its kernel and its tube voltage.
 inline constexpr DensityCalibration kRho1995{.slope_g_cm3_per_hu = 0.001067, .intercept_g_cm3 = 0.131};
+// [A] Standard errors of that line for another scanner and another bone.
+inline constexpr double kRhoCancellousError_g_cm3 = 0.1, kRhoCorticalError_g_cm3 = 0.2;
+
+// The densities at which the error of a calibration is stated: healthy cancellous bone of a femur's head, and cortex.
+inline constexpr double kCancellous_g_cm3 = 0.4, kCortical_g_cm3 = 1.85;
 
 // The usual preset for adult bone. The adult skull of invesalius-examples (1.5 mm slices) was segmented with it. The
 // value fits a skull: thin cortex of other bones and cancellous bone may be below it.
@@ -21,7 +27,7 @@ inline constexpr double kAir_hu = -1000.0;
 // Compact bone is not denser (wet, apparent). Higher values in a scan are metal, enamel, or overshoot of a sharp
 // kernel.
 inline constexpr double kCompactBone_g_cm3 = 2.1;
-// [A] Enamel is below it. Scanners with 12 bits cannot show more than 3071, and metal exceeds that.
+// [A] The usual limit. Enamel is below it. Scanners with 12 bits cannot show more than 3071, and metal exceeds that.
 inline constexpr double kMetal_hu = 3000.0;
 
 [[nodiscard]] inline double density_g_cm3(const DensityCalibration& line, double hu) {

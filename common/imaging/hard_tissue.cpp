@@ -13,8 +13,10 @@ constexpr auto kEnamel = static_cast<std::uint8_t>(Tissue::enamel);
 }  // namespace
 
 Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones,
-                                    const DensityCalibration& calibration, const KeepGoing& keep_going) {
-  const double hard_hu = hounsfield(calibration, kCompactBone_g_cm3);
+                                    const DensityCalibration& calibration, double metal_hu,
+                                    const KeepGoing& keep_going) {
+  const double compact_hu = hounsfield(calibration, kCompactBone_g_cm3);
+  const auto is_hard = [&](std::int16_t hu) { return hu > compact_hu || hu >= metal_hu; };
   HardTissue found;
   bool any = false, any_metal = false;
   const auto stopped = [&](double done) { return !keep_going(done); };
@@ -22,14 +24,14 @@ Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bon
   for (std::size_t i = 0; i < volume.values.size(); ++i) {
     if (i % kOften == 0 && stopped(0.3 * static_cast<double>(i) / static_cast<double>(volume.values.size())))
       return tl::unexpected(cancelled);
-    any = any || volume.values[i] > hard_hu;
-    any_metal = any_metal || volume.values[i] >= kMetal_hu;
+    any = any || is_hard(volume.values[i]);
+    any_metal = any_metal || volume.values[i] >= metal_hu;
   }
   if (!any) return found;
   VoxelMask metal;
   if (any_metal) {
     metal = VoxelMask(volume.dims);
-    for (std::size_t i = 0; i < volume.values.size(); ++i) metal.values[i] = volume.values[i] >= kMetal_hu ? 1 : 0;
+    for (std::size_t i = 0; i < volume.values.size(); ++i) metal.values[i] = volume.values[i] >= metal_hu ? 1 : 0;
     auto near = within_mm(metal, Vec3::Ones(), kBlur_voxels, [&](double done) { return keep_going(0.3 + 0.6 * done); });
     if (!near) return tl::unexpected(near.error());
     metal = std::move(*near);
@@ -38,7 +40,7 @@ Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bon
   std::int64_t metal_voxels = 0, enamel_voxels = 0;
   for (std::size_t i = 0; i < volume.values.size(); ++i) {
     if (i % kOften == 0 && stopped(0.9)) return tl::unexpected(cancelled);
-    if (volume.values[i] <= hard_hu || bones.values[i] == 0) continue;
+    if (!is_hard(volume.values[i]) || bones.values[i] == 0) continue;
     const bool is_metal = any_metal && metal.values[i] != 0;
     found.tissue.values[i] = is_metal ? kMetal : kEnamel;
     ++(is_metal ? metal_voxels : enamel_voxels);

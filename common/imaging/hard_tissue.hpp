@@ -12,10 +12,11 @@ struct HardTissue {
   double enamel_cm3 = 0.0;
 };
 
-// Voxels that the calibration shows as denser than kCompactBone_g_cm3. Voxels from kMetal_hu on are metal. Other dense
-// voxels within two voxels of metal are metal too, because the scanner has blurred its edge. The rest is enamel, or
-// mineral of the same density. Errors: cancelled.
+// Voxels from `metal_hu` on are metal. Voxels that the calibration shows as denser than kCompactBone_g_cm3 are metal
+// too within two voxels of metal, because the scanner has blurred its edge. The rest of these is enamel, or mineral of
+// the same density. Errors: cancelled.
 [[nodiscard]] Result<HardTissue> find_hard_tissue(const HuVolume& volume, const VoxelMask& bones,
-                                                  const DensityCalibration& calibration, const KeepGoing& keep_going);
+                                                  const DensityCalibration& calibration, double metal_hu,
+                                                  const KeepGoing& keep_going);
 
 }  // namespace osteon::imaging

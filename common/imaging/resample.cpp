@@ -103,6 +103,12 @@ Result<DenseVolume<float>> resample(const HuVolume& volume, const CoordBox& box,
   return out;
 }
 
+double hu_at(const HuVolume& volume, const Vec3& voxel) {
+  const Part whole({{0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}}, volume.values);
+  return interpolate(whole, bracket(voxel.x(), volume.dims[0]), bracket(voxel.y(), volume.dims[1]),
+                     bracket(voxel.z(), volume.dims[2]));
+}
+
 VoxelBox voxels_for(const HuVolume& volume, const CoordBox& box, double pitch_mm) {
   constexpr double kRounding = 1e-6;
   Vec3 low = Vec3::Constant(std::numeric_limits<double>::infinity()), high = -low;

@@ -17,6 +17,9 @@ namespace osteon::imaging {
 void resample(const HuVolume& volume, const VoxelBox& part, std::span<const std::int16_t> voxels, const CoordBox& box,
               double pitch_mm, std::span<float> out);
 
+// Trilinear HU at a point in voxel coordinates. Beyond the outer voxels as above.
+[[nodiscard]] double hu_at(const HuVolume& volume, const Vec3& voxel);
+
 // All voxels that give the samples of a box their HU, and a few beside them.
 [[nodiscard]] VoxelBox voxels_for(const HuVolume& volume, const CoordBox& box, double pitch_mm);
 

@@ -161,12 +161,13 @@ void check_numbers(const CaseInfo& info) {
   if (!std::isfinite(info.threshold_hu)) fault("threshold_hu", "is not a finite number");
   if (!std::isfinite(info.calibration.slope_g_cm3_per_hu) || !std::isfinite(info.calibration.intercept_g_cm3))
     fault("calibration", "has a number that is not finite");
+  if (info.density_from) check_provenance("calibration.provenance", *info.density_from);
 }
 
 // What only version 2 has.
 bool has_more_than_version_1(const CaseInfo& info) {
-  return info.scan || !info.labels.empty() || !info.tissues.empty() || !info.landmarks.empty() || !info.axes.empty() ||
-         !info.planes.empty() || !info.regions.empty();
+  return info.density_from || info.scan || !info.labels.empty() || !info.tissues.empty() || !info.landmarks.empty() ||
+         !info.axes.empty() || !info.planes.empty() || !info.regions.empty();
 }
 
 // ---- Writing.
@@ -180,16 +181,17 @@ json list_of(const std::vector<Entry>& entries, ToJson to_json) {
   return list;
 }
 
-json label_json(const CaseLabel& label) {
+json provenance_json(const LabelProvenance& provenance) {
   json parameters = json::object();
-  for (const auto& [name, value] : label.provenance.parameters) parameters[name] = value;
+  for (const auto& [name, value] : provenance.parameters) parameters[name] = value;
+  return {{"method", provenance.method}, {"parameters", std::move(parameters)}, {"edits", json(provenance.edits)}};
+}
+
+json label_json(const CaseLabel& label) {
   return {{"value", label.value},
           {"name", label.name},
           {"kind", name_of(label.kind)},
-          {"provenance",
-           {{"method", label.provenance.method},
-            {"parameters", std::move(parameters)},
-            {"edits", json(label.provenance.edits)}}}};
+          {"provenance", provenance_json(label.provenance)}};
 }
 
 json region_json(const PlannedRegion& region) {
@@ -282,14 +284,19 @@ class Field {
   std::string name_;
 };
 
+LabelProvenance read_provenance(const Field& field) {
+  LabelProvenance provenance;
+  provenance.method = field.at("method").text();
+  provenance.parameters = field.at("parameters").numbers();
+  for (const Field& edit : field.at("edits").list(kMostEdits)) provenance.edits.push_back(edit.text());
+  return provenance;
+}
+
 CaseLabel read_label(const Field& field) {
-  CaseLabel label{
-      .value = field.at("value").integer(), .name = field.at("name").text(), .kind = field.at("kind").kind()};
-  const Field provenance = field.at("provenance");
-  label.provenance.method = provenance.at("method").text();
-  label.provenance.parameters = provenance.at("parameters").numbers();
-  for (const Field& edit : provenance.at("edits").list(kMostEdits)) label.provenance.edits.push_back(edit.text());
-  return label;
+  return {.value = field.at("value").integer(),
+          .name = field.at("name").text(),
+          .kind = field.at("kind").kind(),
+          .provenance = read_provenance(field.at("provenance"))};
 }
 
 PlannedRegion read_region(const Field& field) {
@@ -325,6 +332,8 @@ void read_list(const Field& root, const char* key, std::vector<Entry>& to, Read 
 }
 
 void read_version_2(const Field& root, CaseInfo& info) {
+  if (root.at("calibration").has("provenance"))
+    info.density_from = read_provenance(root.at("calibration").at("provenance"));
   if (root.has("scan")) info.scan = read_scan(root.at("scan"));
   read_list(root, "labels", info.labels, read_label);
   read_list(root, "tissues", info.tissues, read_label);
@@ -362,20 +371,24 @@ void hash_vec3(Hasher& hasher, const Vec3& v) {
   for (const double c : v) hasher.number(c);
 }
 
+void hash_provenance(Hasher& hasher, const LabelProvenance& provenance) {
+  hasher.text(provenance.method);
+  hasher.integer(provenance.parameters.size());
+  for (const auto& [name, value] : provenance.parameters) {
+    hasher.text(name);
+    hasher.number(value);
+  }
+  hasher.integer(provenance.edits.size());
+  for (const std::string& edit : provenance.edits) hasher.text(edit);
+}
+
 void hash_labels(Hasher& hasher, const std::vector<CaseLabel>& labels) {
   hasher.integer(labels.size());
   for (const CaseLabel& label : labels) {
     hasher.integer(static_cast<std::uint64_t>(label.value));
     hasher.text(label.name);
     hasher.text(name_of(label.kind));
-    hasher.text(label.provenance.method);
-    hasher.integer(label.provenance.parameters.size());
-    for (const auto& [name, value] : label.provenance.parameters) {
-      hasher.text(name);
-      hasher.number(value);
-    }
-    hasher.integer(label.provenance.edits.size());
-    for (const std::string& edit : label.provenance.edits) hasher.text(edit);
+    hash_provenance(hasher, label.provenance);
   }
 }
 
@@ -452,6 +465,11 @@ void hash_description(Hasher& hasher, const CaseInfo& info) {
   hash_labels(hasher, info.labels);
   hash_labels(hasher, info.tissues);
   hash_plan(hasher, info);
+  // Cases without it keep the hash that they had before the field existed.
+  if (info.density_from) {
+    hasher.text("calibration.provenance");
+    hash_provenance(hasher, *info.density_from);
+  }
 }
 
 std::string to_text(const CaseDescription& description) {
@@ -466,6 +484,7 @@ std::string to_text(const CaseDescription& description) {
            {"segmentation", {{"threshold_hu", info.threshold_hu}}},
            {"content_hash", to_hex(description.content_hash)}};
   if (info.schema_version >= 2) {
+    if (info.density_from) all["calibration"]["provenance"] = provenance_json(*info.density_from);
     if (info.scan) all["scan"] = scan_json(*info.scan);
     all["labels"] = list_of(info.labels, label_json);
     all["tissues"] = list_of(info.tissues, label_json);

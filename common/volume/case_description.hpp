@@ -59,11 +59,11 @@ enum class LabelKind : std::uint8_t {
 // As in case.json, such as "soft_tissue".
 [[nodiscard]] std::string_view name_of(LabelKind kind);
 
-// How a label was made.
+// How a label, or the density, was made.
 struct LabelProvenance {
-  std::string method;                        // such as "threshold, islands"
-  std::map<std::string, double> parameters;  // names end in the unit, such as threshold_hu
-  std::vector<std::string> edits;            // corrections by hand, in order
+  std::string method;                             // such as "threshold, islands"
+  std::map<std::string, double> parameters = {};  // names end in the unit, such as threshold_hu
+  std::vector<std::string> edits = {};            // corrections by hand, in order
   friend bool operator==(const LabelProvenance&, const LabelProvenance&) = default;
 };
 
@@ -106,7 +106,8 @@ struct CaseInfo {
   std::string source;   // kind and geometry of the input, e.g. "DICOM CT, 512x512x46, 0.84x0.84x3 mm"
   double pitch_mm = 0;  // h, isotropic
   DensityCalibration calibration;
-  double threshold_hu = 0;  // bone is at or above it; 0 if bones come from labels
+  std::optional<LabelProvenance> density_from = {};  // how the calibration and the density were found
+  double threshold_hu = 0;                           // bone is at or above it; 0 if bones come from labels
   std::optional<ScanInfo> scan = {};
   std::vector<CaseLabel> labels = {};   // of the grid "labels" of the scan: what a voxel belongs to
   std::vector<CaseLabel> tissues = {};  // of its grid "tissue": what a voxel is made of

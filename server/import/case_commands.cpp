@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "common/geometry/mesh_file.hpp"
+#include "common/imaging/threshold.hpp"
 #include "common/volume/case_scan.hpp"
 #include "common/volume/mesh_distance.hpp"
 #include "server/import/case_report.hpp"
@@ -17,7 +18,9 @@
 #include "server/import/ct_import.hpp"
 #include "server/import/dicom_reader.hpp"
 #include "server/import/dicom_writer.hpp"
+#include "server/import/edit_file.hpp"
 #include "server/import/found_files.hpp"
+#include "server/import/import_report.hpp"
 #include "server/import/label_export.hpp"
 #include "server/import/label_import.hpp"
 #include "server/import/label_map.hpp"
@@ -38,12 +41,15 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::string labels;
+  std::string rods_of, between_slices = "auto", thin_cortex = "off";
+  std::optional<std::string> calibration, rods;
+  std::string labels, report, truth, edits;
   std::vector<std::string> bone_colours, seeds, label_names;
   std::optional<double> pitch_mm, similar_hu;
   double gaussian_mm = 0.0, sigma_mm = 1.0, margin_mm = CtOptions{}.margin_mm;
-  double width_mm = 20.0, density_g_cm3 = 1.9;
-  bool json = false, merge = false, hollow = false, list = false, adaptive = false;
+  double width_mm = 20.0, density_g_cm3 = 1.9, metal_hu = CtOptions{}.metal_hu;
+  bool rescale_hu = false, json = false, separate = false, merge = false, hollow = false, list = false,
+       adaptive = false;
 };
 
 Result<void> save(const Case& bone, const std::string& out, const StopSignal& stop) {
@@ -73,6 +79,54 @@ Result<void> parse_keep(const std::string& text, CtOptions& options) {
   return {};
 }
 
+// A line that no scanner has is a mistake of units or of order.
+Result<DensityCalibration> parse_calibration(const std::string& text) {
+  constexpr double kLeastSlope = 1e-4, kMostSlope = 1e-2, kMostIntercept_g_cm3 = 2.0;
+  const auto line = parse_pair(text);
+  if (!line || !(line->first >= kLeastSlope && line->first <= kMostSlope) ||
+      !(std::abs(line->second) <= kMostIntercept_g_cm3))
+    return bad_input(
+        "--calibration " + text +
+        " is not a line from HU to density; write SLOPE,INTERCEPT with a slope of 0.0001 to 0.01 g/cm3 per "
+        "HU and an intercept of -2 to 2 g/cm3, such as 0.001067,0.131");
+  return DensityCalibration{line->first, line->second};
+}
+
+// "0,0.1,0.2"
+Result<std::vector<double>> parse_rods(const std::string& text) {
+  constexpr double kMostRod_g_cm3 = 3.0;
+  std::vector<double> densities;
+  std::size_t begin = 0;
+  while (begin <= text.size()) {
+    const std::size_t end = std::min(text.find(',', begin), text.size());
+    double density = 0.0;
+    const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end, density);
+    if (error != std::errc{} || stop != text.data() + end || !(density >= 0.0 && density <= kMostRod_g_cm3))
+      return bad_input("--rods " + text +
+                       " is not a list of densities; write those of two to eight rods in g/cm3, such as 0,0.1,0.2");
+    densities.push_back(density);
+    begin = end + 1;
+  }
+  return densities;
+}
+
+Result<CalibrationOptions> calibration_options(const CaseArguments& a) {
+  CalibrationOptions options;
+  options.rescale_hu = a.rescale_hu;
+  if (a.rods_of == "hydroxyapatite") options.rods_of = RodMaterial::hydroxyapatite;
+  if (a.calibration) {
+    const auto line = parse_calibration(*a.calibration);
+    if (!line) return tl::unexpected(line.error());
+    options.line = *line;
+  }
+  if (a.rods) {
+    auto rods = parse_rods(*a.rods);
+    if (!rods) return tl::unexpected(rods.error());
+    options.rods_g_cm3 = std::move(*rods);
+  }
+  return options;
+}
+
 // Adds the input's name to an error about its content.
 Error about(const std::string& input, const Error& error) {
   return error.code == ErrorCode::cancelled ? error : Error{error.code, input + ": " + error.message};
@@ -94,17 +148,118 @@ Result<std::optional<PlacedLabels>> read_labels(const CaseArguments& a, const La
   return std::optional(std::move(*placed));
 }
 
+// Both folders are new, and neither is in the other.
+Result<void> check_folders(const CaseArguments& a) {
+  for (const std::string& folder : {a.out, a.report})
+    if (!folder.empty())
+      if (auto is_free = check_free(folder); !is_free) return is_free;
+  if (a.out.empty() || a.report.empty()) return {};
+  std::error_code error;
+  const std::string out = fs::weakly_canonical(fs::path(a.out) / "", error).string();
+  const std::string report = fs::weakly_canonical(fs::path(a.report) / "", error).string();
+  if (out.starts_with(report) || report.starts_with(out))
+    return bad_input("--report " + a.report + " and --out " + a.out + " are in one another; give another folder");
+  return {};
+}
+
+// What a report and a comparison need of a scan, before the import takes its voxels.
+struct ReadScan {
+  ScanGeometry geometry;
+  std::string source;
+  SeriesReport series;
+  std::vector<std::int64_t> histogram;
+  std::optional<TruthLabels> truth;
+};
+
+Result<ReadScan> look_at(const CtScan& scan, const CaseArguments& a, const LabelNames& names,
+                         const KeepGoing& keep_going) {
+  const imaging::HuVolume& v = scan.volume;
+  ReadScan read{.geometry = {v.dims, v.origin_mm, v.directions * v.spacing_mm.asDiagonal()},
+                .source = scan.source,
+                .series = scan.report,
+                .histogram = {},
+                .truth = {}};
+  if (!a.truth.empty()) {
+    auto truth = read_truth(a.truth, names, v, scan.frame_of_reference, part(keep_going, 0.0, 0.8));
+    if (!truth) return tl::unexpected(truth.error());
+    read.truth = std::move(*truth);
+  }
+  if (a.report.empty()) return read;
+  auto histogram = imaging::hu_histogram(v, part(keep_going, 0.8, 1.0));
+  if (!histogram) return tl::unexpected(histogram.error());
+  read.histogram = std::move(*histogram);
+  return read;
+}
+
+// Compares, writes the report, and then saves the case. A case that cannot be saved has no report.
+Result<std::string> finish_ct(const CtImport& made, ReadScan read, const CtOptions& options, bool labelled,
+                              const CaseArguments& a, Bar& bar, const StopSignal& stop) {
+  std::string text;
+  std::optional<LabelComparison> comparison;
+  if (read.truth) {
+    auto compared = compare_labels(made.scan, made.bone->info().labels, *read.truth, bar.stage(0.85, 0.9));
+    if (!compared) return tl::unexpected(compared.error());
+    text = comparison_text(*compared);
+    comparison = std::move(*compared);
+  }
+  if (!a.report.empty()) {
+    const ImportReport report{.bone = made.bone ? &*made.bone : nullptr,
+                              .scan = &made.scan,
+                              .islands = &made.found,
+                              .labels = labelled ? &made.labels : nullptr,
+                              .series = &read.series,
+                              .options = &options,
+                              .read = read.geometry,
+                              .title = options.title,
+                              .source = read.source,
+                              .histogram = std::move(read.histogram),
+                              .comparison = comparison ? &*comparison : nullptr};
+    if (auto written = write_report(report, a.report, bar.stage(0.9, 0.95)); !written)
+      return tl::unexpected(written.error());
+    text += "report     " + a.report + "/report.html\n";
+  }
+  if (a.list) return text;
+  if (auto saved = save(*made.bone, made.scan, a.out, stop); !saved) {
+    std::error_code error;
+    if (!a.report.empty()) fs::remove_all(a.report, error);
+    return tl::unexpected(saved.error());
+  }
+  return text;
+}
+
+// Reads the edits of --edits. Seeds among them come after those of the command line, and separate the bones.
+Result<void> take_edits(const CaseArguments& a, CtOptions& options) {
+  if (a.edits.empty()) return {};
+  auto edits = read_edits(a.edits);
+  if (!edits) return tl::unexpected(edits.error());
+  options.edits = std::move(*edits);
+  options.edits_file = a.edits;
+  int next = static_cast<int>(options.grow.seeds_mm.size()) + 1;
+  for (int bone = 1; bone < next; ++bone) options.grow.bones.push_back(bone);
+  for (LabelEdit& edit : options.edits) {
+    if (edit.kind != EditKind::seed) continue;
+    if (!a.keep.empty() || !a.labels.empty())
+      return bad_input(a.edits + " has a seed, which --keep and --labels exclude; remove it, or leave them out");
+    if (edit.bone == 0) edit.bone = next;
+    next = std::max(next, edit.bone + 1);
+    options.grow.seeds_mm.push_back(edit.points_mm.front());
+    options.grow.bones.push_back(edit.bone);
+    options.separate = true;
+  }
+  return {};
+}
+
 Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (a.out.empty() && !a.list)
     return failure(ErrorCode::invalid_input,
                    "--out is missing; name the folder of the case, or give --list to see the islands alone");
-  if (!a.out.empty())
-    if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  if (auto good = check_folders(a); !good) return tl::unexpected(good.error());
   CtOptions options;
   if (auto parsed = parse_keep(a.keep, options); !parsed) return tl::unexpected(parsed.error());
   options.merge = a.merge;
   options.hollow = a.hollow;
   options.list_only = a.list;
+  options.draw_islands = !a.report.empty();
   options.median = median_box(a);
   options.gaussian_mm = a.gaussian_mm;
   for (const std::string& seed : a.seeds) {
@@ -116,6 +271,18 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.grow.adaptive = a.adaptive;
   options.grow.by = a.grow_by == "slice" ? imaging::GrowBy::slice : imaging::GrowBy::volume;
   options.margin_mm = a.margin_mm;
+  options.metal_hu = a.metal_hu;
+  options.thin_cortex = a.thin_cortex == "on";
+  options.between_slices = a.between_slices == "hu"       ? BetweenSlices::hu
+                           : a.between_slices == "shapes" ? BetweenSlices::shapes
+                                                          : BetweenSlices::automatic;
+  auto calibration = calibration_options(a);
+  if (!calibration) return tl::unexpected(calibration.error());
+  options.calibration = std::move(*calibration);
+  if (!a.label_names.empty() && a.labels.empty() && a.truth.empty())
+    return bad_input("--label-names needs a label map; give --labels or --truth too");
+  options.separate = a.separate;
+  if (auto taken = take_edits(a, options); !taken) return tl::unexpected(taken.error());
   const auto names = parse_label_names(a.label_names);
   if (!names) return tl::unexpected(names.error());
   Bar bar(stop);
@@ -129,21 +296,22 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   if (!a.title.empty()) options.title = a.title;
   if (std::ranges::any_of(options.title, [](unsigned char c) { return c < 0x20 || c == 0x7f; }))
     return failure(ErrorCode::invalid_input, "--title has control characters; write it in one line of plain text");
-  auto placed = read_labels(a, *names, *scan, bar.stage(0.2, 0.35));
+  auto placed = read_labels(a, *names, *scan, bar.stage(0.2, 0.3));
   if (!placed) return tl::unexpected(placed.error());
-  const KeepGoing making = bar.stage(*placed ? 0.35 : 0.2, 0.95);
+  auto read = look_at(*scan, a, *names, bar.stage(*placed ? 0.3 : 0.2, *placed ? 0.35 : 0.25));
+  if (!read) return tl::unexpected(read.error());
+  const KeepGoing making = bar.stage(*placed ? 0.35 : 0.25, 0.85);
   const bool labelled = placed->has_value();
   const auto made = labelled ? import_ct(std::move(*scan), std::move(**placed), options, making)
                              : import_ct(std::move(*scan), options, making);
   if (!made) return tl::unexpected(about(a.scan.input, made.error()));
-  if (a.list) {
-    bar.stage(1.0, 1.0)(1.0);
-    return series + segmentation_text(made->found);
-  }
-  if (auto saved = save(*made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
+  const auto finished = finish_ct(*made, std::move(*read), options, labelled, a, bar, stop);
+  if (!finished) return finished;
   bar.stage(1.0, 1.0)(1.0);
-  return report_text(*made->bone) + series +
-         (labelled ? labels_text(made->labels, made->found.case_cm3) : segmentation_text(made->found));
+  return (a.list ? "" : report_text(*made->bone)) + series + made->calibration_text +
+         (labelled ? labels_text(made->labels, made->found.case_cm3) + edits_text(made->found)
+                   : segmentation_text(made->found)) +
+         *finished;
 }
 
 Result<std::string> run_series(const CaseArguments& a, const StopSignal& stop) {
@@ -225,7 +393,7 @@ Result<std::string> run_phantom(const CaseArguments& a, const StopSignal& stop) 
 }
 
 Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
-  if (auto is_free = check_free(a.out); !is_free) return tl::unexpected(is_free.error());
+  if (auto good = check_folders(a); !good) return tl::unexpected(good.error());
   const auto spacing = parse_spacing(a.spacing);
   if (!spacing) return tl::unexpected(spacing.error());
   LabelLegend legend;
@@ -248,9 +416,17 @@ Result<std::string> run_labels(const CaseArguments& a, const StopSignal& stop) {
   LabelOptions options;
   options.pitch_mm = a.pitch_mm;
   if (!a.title.empty()) options.title = a.title;
-  const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.95));
+  const auto made = import_labels(std::move(*stack), legend, options, bar.stage(0.1, 0.85));
   if (!made) return tl::unexpected(about(a.input, made.error()));
-  if (auto saved = save(made->bone, made->scan, a.out, stop); !saved) return tl::unexpected(saved.error());
+  if (!a.report.empty())
+    if (auto written = write_report({.bone = &made->bone, .scan = &made->scan}, a.report, bar.stage(0.85, 0.95));
+        !written)
+      return tl::unexpected(written.error());
+  if (auto saved = save(made->bone, made->scan, a.out, stop); !saved) {
+    std::error_code error;
+    if (!a.report.empty()) fs::remove_all(a.report, error);
+    return tl::unexpected(saved.error());
+  }
   bar.stage(1.0, 1.0)(1.0);
 
   std::string text = report_text(made->bone);
@@ -376,6 +552,43 @@ void add_smoothing_options(CLI::App& command, CaseArguments& a) {
       ->check(within(0.0, 10.0));
 }
 
+void add_density_options(CLI::App& command, CaseArguments& a) {
+  CLI::Option* line = command.add_option("--calibration", a.calibration,
+                                         "SLOPE,INTERCEPT of the line from HU to density, g/cm3 per HU and g/cm3 "
+                                         "(default: 0.001067,0.131, of Rho 1995 for the proximal femur)");
+  CLI::Option* rods = command
+                          .add_option("--rods", a.rods,
+                                      "Find rods of these densities, g/cm3, such as 0,0.1,0.2, along the slices of the "
+                                      "scan, and take the line through their HU")
+                          ->excludes(line);
+  command
+      .add_option("--rods-of", a.rods_of,
+                  "What --rods gives the density of: apparent (wet bone that looks like the rod; default) or "
+                  "hydroxyapatite (mineral; bone has 1/0.6 of it)")
+      ->check(CLI::IsMember({"apparent", "hydroxyapatite"}))
+      ->needs(rods);
+  command
+      .add_flag("--rescale-hu", a.rescale_hu,
+                "First correct the scale of HU, so that air has -1000 and soft tissue 45 HU")
+      ->excludes(line)
+      ->excludes(rods);
+  command
+      .add_option("--thin-cortex", a.thin_cortex,
+                  "on: give cortex that the scan blurs its thickness and density back, by a fit along the surface's "
+                  "normals")
+      ->check(CLI::IsMember({"on", "off"}))
+      ->capture_default_str();
+  command.add_option("--metal-hu", a.metal_hu, "Metal is at or above it, HU")
+      ->check(within(500.0, 32767.0))
+      ->capture_default_str();
+}
+
+void add_report_option(CLI::App& command, CaseArguments& a) {
+  command.add_option("--report", a.report,
+                     "Folder, made by this command, of a report with pictures: report.html for people, report.json for "
+                     "programs; without a patient's name, date or path");
+}
+
 void add_slices_command(CLI::App& app, const std::shared_ptr<CaseArguments>& shared, std::vector<Command>& commands) {
   CaseArguments& a = *shared;
   CLI::App* slices = app.add_subcommand("slices", "Write the slices of a CT scan, or their edges, as PNG images");
@@ -420,10 +633,9 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       "or a folder with one such file for each structure");
   ct->add_option("--label-names", a.label_names,
                  "What the labels are: totalsegmentator, or NUMBER=NAME,... or NUMBER=NAME:KIND,... with a kind of " +
-                     kind_choice_text() + " (left out); may be given again")
+                     kind_choice_text() + " (left out); may be given again; also those of --truth")
       ->expected(1)
-      ->take_all()
-      ->needs(labels_option);
+      ->take_all();
   CLI::Option* threshold =
       ct->add_option("--threshold", a.threshold,
                      "Bone is at or above it, HU (default: 226, usual for adult skulls in slices of 1.5 mm), or "
@@ -453,15 +665,38 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->check(CLI::IsMember({"slice", "volume"}))
       ->capture_default_str()
       ->needs(seed);
-  ct->add_flag("--list", a.list, "List the islands and write nothing")->excludes(labels_option);
+  CLI::Option* list = ct->add_flag("--list", a.list, "List the islands and make no case")->excludes(labels_option);
+  CLI::Option* separate =
+      ct->add_flag(
+            "--separate", a.separate,
+            "Separate bones that touch where the bone between them is thinnest: each --seed is a bone of its own, "
+            "or without seeds each core of a kept island")
+          ->excludes(list)
+          ->excludes(labels_option);
+  ct->add_option("--edits", a.edits,
+                 "YAML file of corrections, made in its order: paint, scribble, erase, cut, and further seeds")
+      ->excludes(list);
+  ct->add_option("--truth", a.truth,
+                 "Say how well the case agrees with this label map: Dice, and distances of the surfaces, mm")
+      ->excludes(list);
+  add_report_option(*ct, a);
   ct->add_flag("--merge", a.merge, "Count the kept islands as one bone; otherwise each has a bone number of its own")
+      ->excludes(separate)
       ->excludes(labels_option);
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
+      ->excludes(labels_option);
+  ct->add_option(
+        "--between-slices", a.between_slices,
+        "The surface goes on from slice to slice where HU cross the threshold (hu), or so that the shape of "
+        "one slice turns into that of the next (shapes); auto: shapes if slices are more than two pixels apart")
+      ->check(CLI::IsMember({"auto", "hu", "shapes"}))
+      ->capture_default_str()
       ->excludes(labels_option);
   add_smoothing_options(*ct, a);
   ct->add_option("--margin", a.margin_mm, "The case keeps the scan this far around its bones, mm")
       ->check(within(0.0, 200.0))
       ->capture_default_str();
+  add_density_options(*ct, a);
   ct->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({ct, [shared](const StopSignal& stop) { return run_ct(*shared, stop); }});
 
@@ -498,6 +733,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       "--bone", a.bone_colours,
       "R,G,B or R,G,B:DENSITY_G_CM3 of a colour that is bone; may be repeated (default: 255,249,219:1.9)");
   labels->add_option("--legend", a.legend, "The same from a YAML file");
+  add_report_option(*labels, a);
   labels->add_option("--title", a.title, "Name shown to people; do not use a patient's");
   commands.push_back({labels, [shared](const StopSignal& stop) { return run_labels(*shared, stop); }});
 

@@ -4,8 +4,21 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "common/imaging/calibration.hpp"
+#include "server/import/scan_calibration.hpp"
+
 namespace osteon::import {
 namespace {
+
+// How the density was found, and how exact it is.
+std::string origin_text(const LabelProvenance& from) {
+  const auto cancellous = from.parameters.find(kCancellousError), cortical = from.parameters.find(kCorticalError);
+  char errors[120] = "its error is not known";
+  if (cancellous != from.parameters.end() && cortical != from.parameters.end())
+    std::snprintf(errors, sizeof errors, "standard error %.2g g/cm3 at %.3g g/cm3, %.2g at %.4g", cancellous->second,
+                  imaging::kCancellous_g_cm3, cortical->second, imaging::kCortical_g_cm3);
+  return "           " + from.method + "; " + errors + "\n";
+}
 
 // Segmented bones and meshes have no Hounsfield units.
 std::string density_text(const CaseInfo& info) {
@@ -17,7 +30,7 @@ std::string density_text(const CaseInfo& info) {
   char text[160];
   std::snprintf(text, sizeof text, "threshold  %s\ndensity    %.6g + %.6g HU g/cm3\n", threshold,
                 info.calibration.intercept_g_cm3, info.calibration.slope_g_cm3_per_hu);
-  return text;
+  return text + (info.density_from ? origin_text(*info.density_from) : "");
 }
 
 std::string point_text(const Vec3& v) {
@@ -94,14 +107,12 @@ std::string report_json(const Case& bone) {
                         {"source", info.source},
                         {"pitch_mm", info.pitch_mm},
                         {"threshold_hu", info.threshold_hu},
-                        {"calibration",
-                         {{"slope_g_cm3_per_hu", info.calibration.slope_g_cm3_per_hu},
-                          {"intercept_g_cm3", info.calibration.intercept_g_cm3}}},
                         {"bounds_mm", {{"min", list(box.min_mm)}, {"max", list(box.max_mm)}}},
                         {"bone_volume_mm3", bone.volume_mm3()},
                         {"hash", to_hex(bone.hash())}};
   // As in case.json.
   const auto described = nlohmann::json::parse(to_text({info, bone.hash()}));
+  report["calibration"] = described["calibration"];
   for (const char* part : {"scan", "labels", "tissues", "landmarks", "axes", "planes", "regions"})
     if (described.contains(part)) report[part] = described[part];
   return report.dump(2) + "\n";

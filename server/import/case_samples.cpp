@@ -59,6 +59,11 @@ void CaseSamples::fill_leaf(Coord origin, const CoordBox& part, PartSamples& to)
   const Coord size = box.dims();
   hu_.resize(to_index(size.x) * to_index(size.y) * to_index(size.z));
   imaging::resample(from_.volume, from_.hu_box, from_.hu, box, pitch_mm_, hu_);
+  if (from_.change_hu != nullptr && from_.change_hu->any_stored(box)) {
+    change_hu_.resize(hu_.size());
+    from_.change_hu->gather(box, change_hu_);
+    for (std::size_t i = 0; i < hu_.size(); ++i) hu_[i] += change_hu_[i];
+  }
   std::size_t n = 0;
   each_sample(box, part, [&](Coord c, std::size_t i) {
     to.density_g_cm3[i] =

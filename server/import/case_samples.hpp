@@ -26,6 +26,7 @@ struct SampleSource {
   bool several = false;              // samples get the numbers of their bones
   bool known_tissue = false;         // there is metal, enamel, or a label that says the tissue
   DensityCalibration calibration;
+  const SparseVolume* change_hu = nullptr;  // added to the HU of samples
 };
 
 // Density and labels are computed only where bone is in or near a leaf.
@@ -44,7 +45,7 @@ class CaseSamples {
   SparseVolume& surface_mm_;
   double pitch_mm_;
   float band_;
-  std::vector<float> hu_;
+  std::vector<float> hu_, change_hu_;
 };
 
 }  // namespace osteon::import

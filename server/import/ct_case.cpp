@@ -9,6 +9,7 @@
 #include "common/core/freed_memory.hpp"
 #include "common/imaging/bone_field.hpp"
 #include "common/imaging/resample.hpp"
+#include "common/imaging/slice_shapes.hpp"
 #include "common/volume/narrow_band.hpp"
 #include "server/import/case_samples.hpp"
 #include "server/import/import_steps.hpp"
@@ -68,6 +69,7 @@ Result<void> check_options(const imaging::HuVolume& geometry, const CtOptions& o
     return failure(ErrorCode::invalid_input, "the pitch must be a number from 0.02 to 10 mm; give another --pitch");
   if (!std::isfinite(options.threshold_hu))
     return failure(ErrorCode::invalid_input, "the threshold must be a number; give another --threshold");
+  if (!std::isfinite(options.metal_hu)) return bad_input("the HU of metal must be a number; give another --metal-hu");
   if (!(options.gaussian_mm >= 0.0 && options.gaussian_mm <= kMostGaussian_mm))
     return bad_input("the Gaussian's sigma must be from 0 to 10 mm; give another --gaussian");
   if (!(options.margin_mm >= 0.0 && options.margin_mm <= kMostMargin_mm))
@@ -119,12 +121,26 @@ Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imag
   return narrow_band_mm(samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.02, 1.0));
 }
 
-CaseInfo description(const CtScan& scan, const CtOptions& options, double pitch_mm) {
+Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
+                                    double threshold_hu, const CoordBox& lattice, double pitch_mm,
+                                    const KeepGoing& keep_going) {
+  const auto shapes = imaging::SliceShapes::make(volume, bones, threshold_hu, part(keep_going, 0.0, 0.2));
+  if (!shapes) return tl::unexpected(shapes.error());
+  const SampledField samples{
+      .box = lattice,
+      .inside = [&](const CoordBox& part) { return shapes->inside(part, pitch_mm); },
+      .read = [&](const CoordBox& part, std::span<float> values) { shapes->read(part, pitch_mm, values); }};
+  return narrow_band_mm(samples, 0.0f, pitch_mm, part(keep_going, 0.2, 1.0));
+}
+
+CaseInfo description(const CtScan& scan, const CtOptions& options, const ScanCalibration& calibration,
+                     double pitch_mm) {
   CaseInfo info;
   info.title = options.title;
   info.source = scan.source;
   info.pitch_mm = pitch_mm;
-  info.calibration = options.calibration;
+  info.calibration = calibration.line;
+  info.density_from = calibration.provenance;
   return info;
 }
 
@@ -155,7 +171,8 @@ Result<CtImport> make_case(MeasuredBones bones, CaseInfo info,
                        .tissue_labels = bones.tissue_labels,
                        .several = bones.several,
                        .known_tissue = known_tissue,
-                       .calibration = calibration},
+                       .calibration = calibration,
+                       .change_hu = bones.change_hu ? &*bones.change_hu : nullptr},
                       bones.surface_mm, pitch_mm);
   const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
   auto built = Case::build(std::move(info), bones.lattice, fill, part(keep_going, 0.125, 1.0));

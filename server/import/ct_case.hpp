@@ -3,6 +3,7 @@
 #include <array>
 #include <bitset>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "common/imaging/hu_volume.hpp"
@@ -14,7 +15,8 @@
 namespace osteon::import {
 
 // Shares of the stages in the total time, for one progress bar over all of them.
-inline constexpr double kSmoothEnd = 0.05, kFindEnd = 0.1, kSegmentEnd = 0.35, kSurfaceEnd = 0.85;
+inline constexpr double kCalibrateEnd = 0.02, kSmoothEnd = 0.05, kFindEnd = 0.1, kSegmentEnd = 0.35, kSurfaceEnd = 0.75,
+                        kCortexEnd = 0.85;
 inline constexpr const char* kNoMemory =
     "this machine has no memory for a scan of that size; export thicker slices or a smaller region";
 
@@ -49,8 +51,14 @@ struct ScanRegion {
                                                    double threshold_hu, const CoordBox& lattice, double pitch_mm,
                                                    const KeepGoing& keep_going);
 
+// The same with the surface between slices by imaging::SliceShapes.
+[[nodiscard]] Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
+                                                  double threshold_hu, const CoordBox& lattice, double pitch_mm,
+                                                  const KeepGoing& keep_going);
+
 // What a case says of itself, without labels and threshold.
-[[nodiscard]] CaseInfo description(const CtScan& scan, const CtOptions& options, double pitch_mm);
+[[nodiscard]] CaseInfo description(const CtScan& scan, const CtOptions& options, const ScanCalibration& calibration,
+                                   double pitch_mm);
 
 // Bones that have a surface.
 struct MeasuredBones {
@@ -62,6 +70,7 @@ struct MeasuredBones {
   bool several = false;            // samples get the numbers of their bones
   CoordBox lattice;                // of the samples
   SparseVolume surface_mm;
+  std::optional<SparseVolume> change_hu;  // of thin cortex
 };
 
 // Makes the case. `list`: describes the labels of the case's scan. Errors: exhausted, cancelled, internal.

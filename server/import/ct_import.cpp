@@ -12,9 +12,12 @@
 #include "common/core/freed_memory.hpp"
 #include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/segmentation.hpp"
+#include "common/imaging/slice_shapes.hpp"
 #include "common/imaging/threshold.hpp"
+#include "server/import/corrected_cortex.hpp"
 #include "server/import/ct_case.hpp"
 #include "server/import/kept_scan.hpp"
+#include "server/import/separated_bones.hpp"
 
 namespace osteon::import {
 namespace {
@@ -65,7 +68,7 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
 struct Segmented {
   imaging::HuVolume volume;
   imaging::VoxelMask bones;
-  std::array<int, 3> first{}, last{};  // voxel box of the kept islands
+  std::array<int, 3> first{}, last{};  // voxel box of the bones
   CtSegmentation found;
 };
 
@@ -104,7 +107,7 @@ Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& i
   for (const int number : kept) found.left_out_cm3 -= islands.list[static_cast<std::size_t>(number - 1)].volume_cm3;
   if (kept.size() == islands.list.size()) found.left_out_cm3 = 0.0;
   // Several islands each have parts of their own, which nobody mistakes for a fracture.
-  if (kept.size() == 1) {
+  if (kept.size() == 1 && !s.found.separated) {
     auto pieces = pieces_without_marrow(s, bone, keep_going);
     if (!pieces) return tl::unexpected(pieces.error());
     found.joined_cm3 = std::move(*pieces);
@@ -117,6 +120,16 @@ Result<imaging::ThresholdSuggestion> suggested_threshold(const imaging::HuVolume
   const auto histogram = imaging::hu_histogram(scan, keep_going);
   if (!histogram) return tl::unexpected(histogram.error());
   return imaging::suggest_threshold(*histogram);
+}
+
+// Widens a part so that it contains another.
+void widen(ScanRegion& region, const ScanRegion& other) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    region.first[axis] = std::min(region.first[axis], other.first[axis]);
+    region.last[axis] = std::max(region.last[axis], other.last[axis]);
+    for (std::size_t side = 0; side < 2; ++side)
+      region.ends[axis][side] = region.ends[axis][side] || other.ends[axis][side];
+  }
 }
 
 // The part around all regions.
@@ -146,48 +159,69 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
   return numbers;
 }
 
+// If nobody has chosen yet, the first islands get a colour each, so that one sees them apart.
+std::vector<int> islands_with_colours(const std::vector<imaging::Island>& islands) {
+  std::vector<int> first(std::min(kMostIslandsDrawn, islands.size()));
+  std::iota(first.begin(), first.end(), 1);
+  return first;
+}
+
 // `bones`: what grew from seeds, if there are any.
-Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, std::optional<GrownBones> bones,
-                          const KeepGoing& keep_going) {
-  const auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
-                          : dense_region(scan, options, keep_going);
+Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, const DensityCalibration& calibration,
+                          std::optional<GrownBones> bones, const KeepGoing& keep_going) {
+  auto work = bones ? Result<ScanRegion>(region_around_all(bones->regions, scan, options))
+                    : dense_region(scan, options, keep_going);
   if (!work) return tl::unexpected(work.error());
+  if (const auto painted = painted_voxels(scan, options.edits))
+    widen(*work, region_around(painted->first, painted->last, scan, options));
   Segmented s;
   s.volume = imaging::cropped(std::move(scan), work->first, work->last);
   imaging::SegmentationParams params;
   params.threshold_hu = options.threshold_hu;
   params.hollow = options.hollow;
-  const KeepGoing segmenting = part(keep_going, 0.0, 0.8);
+  const KeepGoing segmenting = part(keep_going, 0.0, 0.65);
   const auto bone =
       bones ? imaging::segment_bone(s.volume, imaging::cropped(std::move(bones->labels), work->first, work->last),
                                     params, work->ends, segmenting)
             : imaging::segment_bone(s.volume, params, work->ends, segmenting);
   if (!bone) return tl::unexpected(bone.error());
-  const auto islands = imaging::find_islands(s.volume, *bone, options.calibration, part(keep_going, 0.8, 0.9));
+  const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.65, 0.72));
   if (!islands) return tl::unexpected(islands.error());
   auto kept = options.list_only ? Result<std::vector<int>>{}
               : bones           ? Result<std::vector<int>>(islands_of(bones->regions, *islands, work->first))
                                 : islands_to_keep(options, islands->list);
   if (!kept) return tl::unexpected(kept.error());
+  if (options.draw_islands) {
+    const std::vector<int> shown = options.list_only ? islands_with_colours(islands->list) : *kept;
+    auto views = draw_islands(s.volume, *islands, shown, part(keep_going, 0.72, 0.72));
+    if (!views) return tl::unexpected(views.error());
+    s.found.views = std::move(*views);
+  }
   s.bones = imaging::number_bones(*islands, *kept, options.merge, s.volume.dims);
   s.found.merged = options.merge;
-  if (bones) s.found.regions = std::move(bones->regions);
-  s.first = s.volume.dims;
-  s.last = {-1, -1, -1};
-  for (const int number : *kept)
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const imaging::Island& island = islands->list[static_cast<std::size_t>(number - 1)];
-      s.first[axis] = std::min(s.first[axis], island.first[axis]);
-      s.last[axis] = std::max(s.last[axis], island.last[axis]);
-    }
-  if (auto summarised = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.9, 1.0)); !summarised)
+  s.found.separated = options.separate;
+  std::vector<imaging::BoneSeed> seeds;
+  if (bones) {
+    s.found.regions = std::move(bones->regions);
+    seeds = std::move(bones->seeds);
+  }
+  for (imaging::BoneSeed& seed : seeds)
+    for (std::size_t axis = 0; axis < 3; ++axis) seed.voxel[axis] -= work->first[axis];
+  if (auto summarised = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.72, 0.78)); !summarised)
     return tl::unexpected(summarised.error());
+  if (options.list_only) return s;
+  if (auto done = separate_and_edit(s.volume, options, seeds, s.bones, s.found, part(keep_going, 0.78, 1.0)); !done)
+    return tl::unexpected(done.error());
+  const imaging::VoxelBox box = voxels_of(s.bones);
+  s.first = box.first;
+  s.last = box.last;
   return s;
 }
 
 // Finds the bones in the scan, and adds to its source what was done. `options`: gets the threshold that was used.
-Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& keep_going) {
-  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const DensityCalibration& calibration,
+                             const KeepGoing& keep_going) {
+  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, kCalibrateEnd, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed;
   std::string reason;
@@ -206,8 +240,12 @@ Result<Segmented> find_bones(CtScan& scan, CtOptions& options, const KeepGoing& 
     scan.source += grown->description;
     bones = std::move(*grown);
   }
-  auto s = segment(std::move(scan.volume), options, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
-  if (s) s->found.threshold_reason = std::move(reason);
+  auto s =
+      segment(std::move(scan.volume), options, calibration, std::move(bones), part(keep_going, kFindEnd, kSegmentEnd));
+  if (s) {
+    s->found.threshold_hu = options.threshold_hu;
+    s->found.threshold_reason = std::move(reason);
+  }
   return s;
 }
 
@@ -215,26 +253,41 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   const imaging::HuVolume geometry = without_values(scan.volume);
   const double pitch_mm = pitch_mm_of(geometry, options);
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
-  auto s = find_bones(scan, options, keep_going);
+  auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
+  if (!calibrated) return tl::unexpected(calibrated.error());
+  auto s = find_bones(scan, options, calibrated->line, keep_going);
   if (!s) return tl::unexpected(s.error());
   if (!s->found.regions.empty())
     s->found.region = imaging::enclosing_box(geometry, Vec3::Zero(),
                                              Vec3(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1));
-  if (options.list_only) return CtImport{std::move(s->found), {}, {}};
+  if (options.list_only)
+    return CtImport{.found = std::move(s->found), .bone = {}, .scan = {}, .calibration_text = calibrated->text};
   give_back_freed_memory();
   const auto lattice = lattice_around(s->volume, s->first, s->last, pitch_mm);
   if (!lattice) return tl::unexpected(lattice.error());
-  auto surface_mm = measure_surface(s->volume, s->bones, options.threshold_hu, *lattice, pitch_mm,
-                                    part(keep_going, kSegmentEnd, kSurfaceEnd));
+  const bool shapes = options.between_slices == BetweenSlices::shapes ||
+                      (options.between_slices == BetweenSlices::automatic && imaging::has_thick_slices(geometry));
+  if (shapes) scan.source += ", shapes interpolated between slices";
+  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, s->bones, options.threshold_hu, *lattice,
+                                                                pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   give_back_freed_memory();
-  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
-  auto hard = imaging::find_hard_tissue(s->volume, s->bones, options.calibration, part(building, 0.0, 0.2));
+  std::optional<SparseVolume> change_hu;
+  if (options.thin_cortex) {
+    auto change =
+        correct_cortex(s->volume, *surface_mm, pitch_mm, *calibrated, part(keep_going, kSurfaceEnd, kCortexEnd));
+    if (!change) return tl::unexpected(change.error());
+    change_hu = std::move(*change);
+  }
+  const KeepGoing building = part(keep_going, kCortexEnd, 1.0);
+  auto hard =
+      imaging::find_hard_tissue(s->volume, s->bones, calibrated->line, options.metal_hu, part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
+  s->found.metal_hu = options.metal_hu;
 
-  CaseInfo info = description(scan, options, pitch_mm);
+  CaseInfo info = description(scan, options, *calibrated, pitch_mm);
   info.threshold_hu = options.threshold_hu;
   const imaging::VoxelBox keep = kept_voxels(s->volume, s->first, s->last, options.margin_mm);
   auto made = make_case(
@@ -243,14 +296,17 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
        .known = {std::move(s->bones), std::move(hard->tissue), ~std::bitset<256>(1)},
        .tissue_labels = {},
        .keep = keep,
-       .several = s->found.kept.size() > 1 && !options.merge,
+       .several = s->found.bones.empty() ? s->found.kept.size() > 1 && !options.merge
+                                         : s->found.bones.size() > 1 || s->found.bones.front().number != 1,
        .lattice = *lattice,
-       .surface_mm = std::move(*surface_mm)},
+       .surface_mm = std::move(*surface_mm),
+       .change_hu = std::move(change_hu)},
       std::move(info), [&](const CaseScan& kept, CaseInfo& to) { list_labels(kept, options, s->found, to); },
       part(building, 0.2, 1.0));
   if (!made) return made;
   s->found.case_cm3 = made->found.case_cm3;
   made->found = std::move(s->found);
+  made->calibration_text = calibrated->text;
   return made;
 }
 

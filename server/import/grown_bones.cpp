@@ -52,7 +52,13 @@ Result<GrownBones> grow_bones(const imaging::HuVolume& scan, const GrowOptions& 
   }
   auto grown = imaging::grow_from_seeds(scan, seeds, params, keep_going);
   if (!grown) return tl::unexpected(grown.error());
-  GrownBones bones{std::move(grown->labels), std::move(grown->list), threshold_hu, describe(options, threshold_hu)};
+  GrownBones bones{.labels = std::move(grown->labels),
+                   .seeds = {},
+                   .regions = std::move(grown->list),
+                   .threshold_hu = threshold_hu,
+                   .description = describe(options, threshold_hu)};
+  for (std::size_t i = 0; i < seeds.size(); ++i)
+    bones.seeds.push_back({seeds[i], options.bones.empty() ? static_cast<int>(i) + 1 : options.bones[i]});
   const auto lowest = std::ranges::min_element(bones.regions, {}, &imaging::Region::low_hu);
   bones.threshold_hu = std::clamp(std::ceil(lowest->low_hu), kLeastThreshold_hu, kMostThreshold_hu);
   return bones;

@@ -8,6 +8,7 @@
 
 #include "common/core/bounded_text.hpp"
 #include "common/field/tissue.hpp"
+#include "common/imaging/bone_markers.hpp"
 #include "common/imaging/calibration.hpp"
 
 namespace osteon::import {
@@ -33,6 +34,34 @@ void add_growing(const GrowOptions& grow, LabelProvenance& provenance) {
       provenance.parameters["seed_" + std::to_string(i + 1) + "_" + "xyz"[axis] + "_mm"] = grow.seeds_mm[i][axis];
 }
 
+// The parameters of the watershed that separated the bones, and which seeds stand for a bone.
+void add_separation(const CtOptions& options, int bone, LabelProvenance& provenance) {
+  if (options.grow.seeds_mm.empty()) {
+    provenance.method += ", watershed from cores";
+    provenance.parameters["neck"] = imaging::kNeck;
+    provenance.parameters["least_core_mm"] = imaging::kLeastCore_mm;
+    return;
+  }
+  provenance.method += ", watershed from seeds";
+  int own = 0;
+  for (std::size_t i = 0; i < options.grow.seeds_mm.size(); ++i)
+    if ((options.grow.bones.empty() ? static_cast<int>(i) + 1 : options.grow.bones[i]) == bone)
+      provenance.parameters["own_seed_" + std::to_string(++own)] = static_cast<double>(i) + 1;
+}
+
+CaseLabel label_of(const CtOptions& options, const CtSegmentation& found, const FoundBone& bone,
+                   LabelProvenance provenance) {
+  CaseLabel label{bone.number, "bone " + std::to_string(bone.number), LabelKind::bone, std::move(provenance)};
+  if (!bone.segmented)
+    label.provenance = {"edits", {}, {}};
+  else if (found.separated)
+    add_separation(options, bone.number, label.provenance);
+  else if (!found.merged && bone.number < kMostBoneNumbers)
+    label.provenance.parameters["island"] = found.kept[static_cast<std::size_t>(bone.number - 1)];
+  label.provenance.edits = bone.edits;
+  return label;
+}
+
 // How every label of the scan was found.
 LabelProvenance provenance_of(const CtOptions& options) {
   LabelProvenance provenance;
@@ -44,7 +73,7 @@ LabelProvenance provenance_of(const CtOptions& options) {
   return provenance;
 }
 
-void list_tissues(const CaseScan& scan, CaseInfo& info) {
+void list_tissues(const CaseScan& scan, double metal_hu, CaseInfo& info) {
   const CaseLabel known[] = {
       {static_cast<int>(Tissue::cortical),
        "cortical",
@@ -54,7 +83,7 @@ void list_tissues(const CaseScan& scan, CaseInfo& info) {
        "cancellous",
        LabelKind::cancellous,
        {"density", {{"below_g_cm3", static_cast<double>(kCorticalFrom_g_cm3)}}, {}}},
-      {static_cast<int>(Tissue::metal), "metal", LabelKind::metal, {"HU", {{"from_hu", imaging::kMetal_hu}}, {}}},
+      {static_cast<int>(Tissue::metal), "metal", LabelKind::metal, {"HU", {{"from_hu", metal_hu}}, {}}},
       {static_cast<int>(Tissue::enamel),
        "enamel",
        LabelKind::enamel,
@@ -98,18 +127,21 @@ CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::V
 }
 
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info) {
+  for (const FoundBone& bone : found.bones)
+    info.labels.push_back(label_of(options, found, bone, provenance_of(options)));
+  if (!found.bones.empty()) return list_tissues(scan, options.metal_hu, info);
   const int bones = found.merged ? 1 : std::min(kMostBoneNumbers, static_cast<int>(found.kept.size()));
   for (int bone = 1; bone <= bones; ++bone) {
     CaseLabel label{bone, "bone " + std::to_string(bone), LabelKind::bone, provenance_of(options)};
     if (!found.merged) label.provenance.parameters["island"] = found.kept[static_cast<std::size_t>(bone - 1)];
     info.labels.push_back(std::move(label));
   }
-  list_tissues(scan, info);
+  list_tissues(scan, options.metal_hu, info);
 }
 
-void list_labels(const CaseScan& scan, const PlacedLabels& placed, CaseInfo& info) {
+void list_labels(const CaseScan& scan, const PlacedLabels& placed, const CtOptions& options, CaseInfo& info) {
   info.labels = placed.labels;
-  list_tissues(scan, info);
+  list_tissues(scan, options.metal_hu, info);
   // Tissue that the label map names is not found by its density.
   for (CaseLabel& tissue : info.tissues)
     if (std::ranges::find(info.labels, tissue.kind, &CaseLabel::kind) != info.labels.end())

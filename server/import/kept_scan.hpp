@@ -36,6 +36,6 @@ void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegment
 void list_labels(const LabelLegend& legend, CaseInfo& info);
 
 // Lists the labels of a label map, and the tissues that kept_scan() gives.
-void list_labels(const CaseScan& scan, const PlacedLabels& placed, CaseInfo& info);
+void list_labels(const CaseScan& scan, const PlacedLabels& placed, const CtOptions& options, CaseInfo& info);
 
 }  // namespace osteon::import

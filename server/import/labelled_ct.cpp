@@ -3,12 +3,15 @@
 #include <array>
 #include <bitset>
 #include <new>
+#include <optional>
 
 #include "common/core/freed_memory.hpp"
 #include "common/imaging/hard_tissue.hpp"
+#include "server/import/corrected_cortex.hpp"
 #include "server/import/ct_case.hpp"
 #include "server/import/label_surface.hpp"
 #include "server/import/scan_ends.hpp"
+#include "server/import/separated_bones.hpp"
 
 namespace osteon::import {
 namespace {
@@ -105,9 +108,13 @@ Result<CtImport> import_labelled(CtScan scan, PlacedLabels placed, const CtOptio
   const imaging::HuVolume geometry = without_values(scan.volume);
   const double pitch_mm = pitch_mm_of(geometry, options);
   if (Result<void> sound = check_options(geometry, options, pitch_mm); !sound) return tl::unexpected(sound.error());
-  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, 0.0, kSmoothEnd));
+  auto calibrated = calibrate_scan(scan.volume, options.calibration, part(keep_going, 0.0, kCalibrateEnd));
+  if (!calibrated) return tl::unexpected(calibrated.error());
+  const auto smoothed = smooth_scan(scan.volume, options, part(keep_going, kCalibrateEnd, kSmoothEnd));
   if (!smoothed) return tl::unexpected(smoothed.error());
   scan.source += *smoothed + ", bones of a label map";
+  const auto edits = edit_labels(scan.volume, options, placed, part(keep_going, kSmoothEnd, kSmoothEnd));
+  if (!edits) return tl::unexpected(edits.error());
   auto found = take_labels(std::move(scan.volume), placed, options, part(keep_going, kSmoothEnd, kFindEnd));
   if (!found) return tl::unexpected(found.error());
   give_back_freed_memory();
@@ -116,8 +123,16 @@ Result<CtImport> import_labelled(CtScan scan, PlacedLabels placed, const CtOptio
   auto surface_mm = measure_labels(*found, geometry, *lattice, pitch_mm, part(keep_going, kFindEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
   give_back_freed_memory();
-  const KeepGoing building = part(keep_going, kSurfaceEnd, 1.0);
-  auto hard = imaging::find_hard_tissue(found->volume, found->bones, options.calibration, part(building, 0.0, 0.2));
+  std::optional<SparseVolume> change_hu;
+  if (options.thin_cortex) {
+    auto change =
+        correct_cortex(found->volume, *surface_mm, pitch_mm, *calibrated, part(keep_going, kSurfaceEnd, kCortexEnd));
+    if (!change) return tl::unexpected(change.error());
+    change_hu = std::move(*change);
+  }
+  const KeepGoing building = part(keep_going, kCortexEnd, 1.0);
+  auto hard = imaging::find_hard_tissue(found->volume, found->bones, calibrated->line, options.metal_hu,
+                                        part(building, 0.0, 0.2));
   if (!hard) return tl::unexpected(hard.error());
   found->bones = {};
   const std::bitset<256> tissue_labels = take_tissues(placed, found->labels, hard->tissue);
@@ -131,10 +146,16 @@ Result<CtImport> import_labelled(CtScan scan, PlacedLabels placed, const CtOptio
        .keep = keep,
        .several = true,
        .lattice = *lattice,
-       .surface_mm = std::move(*surface_mm)},
-      description(scan, options, pitch_mm),
-      [&](const CaseScan& kept, CaseInfo& info) { list_labels(kept, placed, info); }, part(building, 0.2, 1.0));
-  if (made) made->labels = std::move(placed);
+       .surface_mm = std::move(*surface_mm),
+       .change_hu = std::move(change_hu)},
+      description(scan, options, *calibrated, pitch_mm),
+      [&](const CaseScan& kept, CaseInfo& info) { list_labels(kept, placed, options, info); },
+      part(building, 0.2, 1.0));
+  if (made) {
+    made->labels = std::move(placed);
+    made->calibration_text = calibrated->text;
+    made->found.edits = *edits;
+  }
   return made;
 }
 

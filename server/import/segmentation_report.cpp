@@ -18,7 +18,23 @@ std::string line(const char* format, Values... values) {
   return text;
 }
 
-// The position of a point within a box, as a patient's sides: LPS. "middle" if it is in the middle third of all axes.
+// For each island, in the order of the list.
+std::vector<bool> kept_flags(const CtSegmentation& found) {
+  std::vector<bool> kept(found.islands.size(), false);
+  for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
+  return kept;
+}
+
+// The bones after separation and edits, and the edits.
+std::string bones_text(const CtSegmentation& found) {
+  std::string text = line("bones      %zu in the case%s\n", found.bones.size(),
+                          found.separated ? ", separated where the bone between them is thinnest" : "");
+  for (const FoundBone& bone : found.bones) text += line("           %6d  %7.2f cm3\n", bone.number, bone.volume_cm3);
+  return text + edits_text(found);
+}
+
+}  // namespace
+
 std::string place_words(const Vec3& at, const Box& box) {
   static constexpr const char* kWords[3][2] = {{"right", "left"}, {"front", "back"}, {"foot end", "head end"}};
   std::string words;
@@ -30,14 +46,12 @@ std::string place_words(const Vec3& at, const Box& box) {
   return words.empty() ? "middle" : words;
 }
 
-// For each island, in the order of the list.
-std::vector<bool> kept_flags(const CtSegmentation& found) {
-  std::vector<bool> kept(found.islands.size(), false);
-  for (const int number : found.kept) kept[static_cast<std::size_t>(number - 1)] = true;
-  return kept;
+std::string edits_text(const CtSegmentation& found) {
+  std::string text;
+  for (std::size_t i = 0; i < found.edits.size(); ++i)
+    text += line("%s %6zu  %s\n", i == 0 ? "edits     " : "          ", i + 1, found.edits[i].c_str());
+  return text;
 }
-
-}  // namespace
 
 std::string segmentation_text(const CtSegmentation& found) {
   std::string text;
@@ -82,7 +96,9 @@ std::string segmentation_text(const CtSegmentation& found) {
         "           --keep N,M takes islands by number, --keep all takes every one\n",
         kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
         100.0 * found.left_out_cm3 / all_cm3);
-  if (found.kept.size() > 1)
+  if (!found.bones.empty())
+    text += bones_text(found);
+  else if (found.kept.size() > 1)
     text += found.merged ? "bones      1 in the case, of all kept islands\n"
                          : line("bones      %zu in the case, one for each kept island\n", found.kept.size());
   if (found.marrow_cm3 > 0.0)
@@ -103,7 +119,7 @@ std::string segmentation_text(const CtSegmentation& found) {
         found.case_cm3, 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
   if (found.metal_cm3 > 0.0)
     text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
-                 found.metal_cm3, imaging::kMetal_hu);
+                 found.metal_cm3, found.metal_hu);
   if (found.enamel_cm3 > 0.0)
     text += line("enamel     %.3f cm3, or mineral as dense: shown as enamel, cut like compact bone of %.1f g/cm3\n",
                  found.enamel_cm3, imaging::kCompactBone_g_cm3);

@@ -1,4 +1,4 @@
-// Targets for text that a person writes for the import: a tool, a list of cuts, a legend.
+// Targets for text that a person writes for the import: a tool, a list of cuts, a legend, a list of edits.
 #include <set>
 #include <string>
 #include <string_view>
@@ -6,6 +6,7 @@
 #include "common/core/check.hpp"
 #include "common/tools/tool_file.hpp"
 #include "server/import/carve_script.hpp"
+#include "server/import/edit_file.hpp"
 #include "server/import/label_stack.hpp"
 #include "tests/fuzz/import_files.hpp"
 #include "tests/fuzz/import_targets.hpp"
@@ -38,6 +39,24 @@ void read_legend(std::span<const std::uint8_t> data) {
   OSTEON_CHECK(!legend->bones.empty());
   for (const import::BoneColour& bone : legend->bones)
     OSTEON_CHECK(bone.density_g_cm3 > 0.0 && bone.density_g_cm3 <= 3.0);
+}
+
+// Accepted edits are replayed on a few voxels: none may leave them.
+void read_and_replay_edits(std::span<const std::uint8_t> data) {
+  const auto edits = import::parse_edits({reinterpret_cast<const char*>(data.data()), data.size()}, "edits.yaml");
+  if (!edits) return expect_bounded(edits.error());
+  imaging::HuVolume grid;
+  grid.dims = {7, 5, 3};
+  grid.spacing_mm = {0.5, 1.0, 20.0};
+  imaging::VoxelMask labels(grid.dims);
+  labels.values[20] = 1;
+  for (const import::LabelEdit& edit : *edits) {
+    OSTEON_CHECK(edit.bone >= 0 && edit.bone < 255 && edit.to_bone >= 0 && edit.to_bone < 255);
+    for (const Vec3& point : edit.points_mm) OSTEON_CHECK(point.allFinite());
+    OSTEON_CHECK(import::edit_text(edit).size() <= 200);
+  }
+  const auto effects = import::apply_edits(grid, *edits, labels, [](double) { return true; });
+  if (!effects) return expect_bounded(effects.error());
 }
 
 Target text_target(std::string name, void (*read)(std::span<const std::uint8_t>), std::vector<Bytes> seeds) {
@@ -74,6 +93,17 @@ Target legend_target() {
       "legend", read_legend,
       {bytes_of_text("tolerance: 4\nbones:\n  - {name: cortical, colour: [255, 249, 219], density_g_cm3: 1.9}\n"
                      "  - {name: cancellous, colour: [200, 1, 0]}\n")});
+}
+
+Target edits_target() {
+  return text_target(
+      "edits", read_and_replay_edits,
+      {bytes_of_text("edits:\n"
+                     "  - {kind: paint, bone: 1, centre_mm: [1, 2, 20], radius_mm: 1.5}\n"
+                     "  - {kind: scribble, bone: 2, points_mm: [[0, 0, 0], [3, 4, 40]], radius_mm: 0.6}\n"
+                     "  - {kind: cut, bone: 1, point_mm: [1, 2, 20], normal: [0, 0.5, 1], to_bone: 3}\n"
+                     "  - {kind: erase, bone: 2, centre_mm: [0, 0, 0], radius_mm: 2}\n"
+                     "  - {kind: seed, point_mm: [1, 2, 20], bone: 4}\n")});
 }
 
 }  // namespace osteon::fuzz

@@ -238,6 +238,7 @@ std::vector<Target> targets() {
       tool_file_target(),
       carve_script_target(),
       legend_target(),
+      edits_target(),
       case_info_target(),
       bone_volume_target(),
       scan_volume_target(),

@@ -251,6 +251,7 @@ def scan(run):
 GROUPS = {**kernels.GROUPS, **devices.GROUPS, **authentication.GROUPS, **insiders.GROUPS,
           **feel.GROUPS, **filters.GROUPS, **haptics.GROUPS, **laws.GROUPS, **rooms.GROUPS, "expert": expert,
           "novice": novice, "rig": rig, "scan": scan, "real_imports": imports.real_imports,
+          "import_accuracy": imports.import_accuracy,
           "import_cost": imports.import_cost,
           "import_cost_long": imports.import_cost_long,
           "region_growing": imports.region_growing,

@@ -115,6 +115,27 @@ def import_cost_long(run):
     return {"import_peak_memory_long": memory_ratio(ours, itk, volume_mb)}
 
 
+# The scans of osteon-import-accuracy: in the names of figures, and in its output.
+ACCURACY_BONES = {"long_bone": "long bone", "two_bones": "two bones"}
+ACCURACY_SCANS = {"fine": "fine slices", "noise": "noise", "blur": "blur", "thick": "3 mm slices", "tilted": "tilted",
+                  "uneven": "uneven"}
+
+
+def import_accuracy(run):
+    """Dice and distances of imported phantoms, with the default threshold beside the best one."""
+    run.say("accuracy of imports")
+    folder = run.folder / "import-accuracy"
+    folder.mkdir(exist_ok=True)
+    found = {(row["scan"], row["threshold"]): row for row in json.loads(run.output("osteon-import-accuracy", folder))}
+    values = {}
+    for bone, bone_name in ACCURACY_BONES.items():
+        for scan, scan_name in ACCURACY_SCANS.items():
+            default, best = (found[f"{bone_name}, {scan_name}", which] for which in ("default", "midway"))
+            for figure, what in (("dice", "dice"), ("distance", "mean_mm")):
+                values[f"import_{bone}_{scan}_{figure}"] = Measured(default[what], best[what])
+    return values
+
+
 def floods():
     """Region growing as a user of SciPy or scikit-image writes it, for those of them that are installed."""
     found = {}

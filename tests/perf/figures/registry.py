@@ -657,6 +657,18 @@ FIGURES = [
                baseline="the earlier program named by OSTEON_EARLIER_IMPORT"),
         Figure(f"import_{name}_memory", "mb", f"peak memory of the import of {what}", "real_imports",
                baseline="the earlier program"))],
+    # How well an imported bone agrees with the shape that was scanned: Dice of their samples, and the mean distance of
+    # their surfaces, both ways. Pixels are 0.7 mm.
+    *[figure for bone, bone_name, least in (("long_bone", "a long bone", 0.97),
+                                            ("two_bones", "two bones 2 mm apart", 0.95))
+      for scan, scan_name, most in (("fine", "slices 1 mm apart", 0.35), ("noise", "noise of 80 HU", 0.35),
+                                    ("blur", "a blur of 0.7 mm", 0.35), ("thick", "slices of 3 mm", 0.6),
+                                    ("tilted", "a gantry tilted by 20 degrees", 0.35),
+                                    ("uneven", "slices 1 to 3 mm apart", 0.35)) for figure in (
+        Figure(f"import_{bone}_{scan}_dice", "ratio", f"Dice of {bone_name} and its import, {scan_name}",
+               "import_accuracy", (">=", least), "with a threshold midway between soft tissue and cortex"),
+        Figure(f"import_{bone}_{scan}_distance", "mm", f"mean distance of their surfaces, {scan_name}",
+               "import_accuracy", ("<=", most), "with a threshold midway between soft tissue and cortex"))],
     Figure("import_trunk_cpu", "s", "CPU time from a DICOM folder of a trunk, 512 x 512 x 302, to its saved case",
            "import_cost", baseline=ITK_CHAIN),
     Figure("import_cpu_ratio", "ratio", f"the same over that of {ITK_CHAIN}, in turns", "import_cost", ("<=", 1.2)),

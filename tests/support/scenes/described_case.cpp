@@ -44,6 +44,7 @@ CaseInfo full_description(const CaseScan& scan) {
           .source = "closed form",
           .pitch_mm = 0.5,
           .calibration = {.slope_g_cm3_per_hu = 0.001, .intercept_g_cm3 = 0.1},
+          .density_from = {{"rods", {{"cortical_error_g_cm3", 0.1}}, {"by hand"}}},
           .threshold_hu = 226.0,
           .scan = *described,
           .labels = {{1, "bone 1", LabelKind::bone, {"threshold", {{"threshold_hu", 226.0}, {"island", 1.0}}, {}}},

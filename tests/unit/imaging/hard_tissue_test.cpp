@@ -22,8 +22,8 @@ Scene block(std::int16_t hu) {
   return s;
 }
 
-HardTissue hard_tissue(const Scene& s) {
-  auto found = find_hard_tissue(s.volume, s.bones, kRho1995, always);
+HardTissue hard_tissue(const Scene& s, double metal_hu = kMetal_hu) {
+  auto found = find_hard_tissue(s.volume, s.bones, kRho1995, metal_hu, always);
   EXPECT_TRUE(found);
   return std::move(*found);
 }
@@ -46,6 +46,19 @@ TEST(HardTissue, DenserThanCompactBoneIsEnamelAndFrom3000OnMetal) {
   EXPECT_EQ(at(found, 5, 5, 5), Tissue::none);
   EXPECT_NEAR(found.metal_cm3, 0.001, 1e-12);
   EXPECT_NEAR(found.enamel_cm3, 0.001, 1e-12);
+}
+
+TEST(HardTissue, TheLimitOfMetalMayBeLower) {
+  Scene s = block(1200);
+  s.volume.values[s.volume.index(3, 3, 3)] = 1499;
+  s.volume.values[s.volume.index(10, 10, 10)] = 1500;  // less dense than compact bone
+  s.volume.values[s.volume.index(17, 17, 17)] = 2500;
+  const HardTissue found = hard_tissue(s, 1500.0);
+  EXPECT_EQ(at(found, 3, 3, 3), Tissue::none);
+  EXPECT_EQ(at(found, 10, 10, 10), Tissue::metal);
+  EXPECT_EQ(at(found, 17, 17, 17), Tissue::metal);
+  EXPECT_NEAR(found.metal_cm3, 0.002, 1e-12);
+  EXPECT_EQ(found.enamel_cm3, 0.0);
 }
 
 TEST(HardTissue, TheBlurredEdgeOfMetalIsMetal) {

@@ -84,6 +84,28 @@ TEST_F(Program, WrongOptionsOfSlicesAreOneSentence) {
   refused("--edges-in", "row");
 }
 
+TEST_F(Program, WrongOptionsOfDensityAreOneSentence) {
+  write_inv3(folder_ / "scan.inv3", {});
+  const auto refused = [&](std::vector<std::string> more, const std::string& why) {
+    more.insert(more.begin(), {"ct", path("scan.inv3"), "--out", path("case")});
+    expect_refused(more, why, folder_);
+  };
+  // In mg/cm3, in the wrong order, with a falling line, and no lines at all.
+  for (const char* line : {"1.067,131", "0.131,0.001067", "-0.001,0.1", "0.001", "0.001,0.1,2", "nan,0.1", "0.001,inf"})
+    refused({"--calibration", line}, std::string("--calibration ") + line);
+  for (const char* rods : {"", "0,x", "0,-0.1", "0,0.1,", "0,100", "nan,1"}) refused({"--rods", rods}, "--rods");
+  refused({"--rods", "0,0.1", "--calibration", "0.001,0.1"}, "--calibration");
+  refused({"--rods", "0,0.1", "--rescale-hu"}, "--rescale-hu");
+  refused({"--rods-of", "hydroxyapatite"}, "--rods");
+  refused({"--rods", "0,0.1", "--rods-of", "water"}, "--rods-of");
+  for (const char* metal : {"499", "40000", "nan"}) refused({"--metal-hu", metal}, "--metal-hu");
+  // This is found out when the scan is there, after lines of progress.
+  const auto late = test::run(kProgram, {"ct", path("scan.inv3"), "--out", path("case"), "--rods", "0,0.1"});
+  EXPECT_EQ(late.exit_code, 1);
+  EXPECT_NE(late.err.find("scan.inv3: the scan does not show 2 uniform rods"), std::string::npos) << late.err;
+  EXPECT_FALSE(fs::exists(path("case")));
+}
+
 // A block of bone in air, as raw numbers.
 TEST_F(Program, ImportsRawNumbers) {
   std::ofstream out(folder_ / "scan.raw", std::ios::binary);
@@ -339,6 +361,54 @@ TEST_F(Program, WrongSeedsAreOneSentence) {
   for (const char* wrong : {"0", "nan"})
     expect_refused(with({"--seed", "3,3,3", "--similar", wrong}), "--similar", folder_);
   expect_refused(with({"--threshold", "Suggest"}), "nor the word suggest", folder_);
+}
+
+TEST_F(Program, EditsAndSeedsOfAFileMakeTheSameCaseAgain) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  std::ofstream(path("edits.yaml")) << "edits:\n"
+                                       "  - {kind: seed, point_mm: [17, 3, 3], bone: 6}\n"
+                                       "  - {kind: seed, point_mm: [3, 3, 3]}\n"
+                                       "  - {kind: erase, bone: 6, centre_mm: [20, 6, 6], radius_mm: 1}\n";
+  const std::string told = import_series("first", {"--edits", path("edits.yaml")});
+  EXPECT_NE(told.find("2 in the case, separated"), std::string::npos) << told;
+  EXPECT_NE(told.find("3  erase bone 6, at 20,6,6 mm, radius 1 mm: 0.000 cm3 added, 0.007 cm3 taken"),
+            std::string::npos)
+      << told;
+  import_series("again", {"--edits", path("edits.yaml")});
+  const auto first = Case::load(path("first")), again = Case::load(path("again"));
+  ASSERT_TRUE(first && again);
+  EXPECT_EQ(first->hash(), again->hash());
+  EXPECT_EQ(first->bone_number({20, 6, 4}), 6);
+  EXPECT_EQ(first->bone_number({7, 7, 4}), 7) << "the next number";
+  ASSERT_EQ(first->info().labels.size(), 2u);
+  EXPECT_EQ(first->info().labels[0].provenance.edits.size(), 2u);
+  EXPECT_EQ(first->info().labels[1].provenance.edits.size(), 1u);
+}
+
+TEST_F(Program, WrongEditsAreOneSentence) {
+  ASSERT_NO_FATAL_FAILURE(write_two_boxes(path("series")));
+  const auto refused = [&](const std::string& text, const std::vector<std::string>& more, const std::string& named) {
+    std::ofstream(path("edits.yaml")) << text;
+    std::vector<std::string> arguments{"ct", path("series"), "--out", path("case"), "--edits", path("edits.yaml")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    expect_refused(arguments, named, folder_);
+  };
+  const std::string seed = "edits: [{kind: seed, point_mm: [3, 3, 3]}]";
+  refused("edits: [{kind: erase, centre_mm: [3, 3, 3], radius_mm: NaN}]", {}, "edit 1: radius_mm is \"NaN\"");
+  refused(seed, {"--keep", "1"}, "has a seed, which --keep and --labels exclude");
+  refused(seed, {"--list"}, "--list");
+  refused(seed, {"--separate", "--merge"}, "--merge");
+  expect_refused({"ct", path("series"), "--out", path("case"), "--edits", path("none.yaml")}, "none.yaml", folder_);
+  // These are found out when the scan is there.
+  for (const auto& [text, named] :
+       {std::pair{"edits: [{kind: erase, centre_mm: [-99, 3, 3], radius_mm: 1}]", "edit 1 (erase): it covers no voxel"},
+        std::pair{"edits: [{kind: seed, point_mm: [-99, 3, 3]}]", "lies outside the scan"}}) {
+    std::ofstream(path("edits.yaml")) << text;
+    const auto late = test::run(kProgram, {"ct", path("series"), "--out", path("case"), "--edits", path("edits.yaml")});
+    EXPECT_EQ(late.exit_code, 1);
+    EXPECT_NE(late.err.find(named), std::string::npos) << late.err;
+    EXPECT_FALSE(fs::exists(path("case")));
+  }
 }
 
 TEST_F(Program, SuggestsAThresholdAndSaysWhy) {

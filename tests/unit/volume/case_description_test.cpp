@@ -103,6 +103,24 @@ TEST(CaseDescription, ACaseOfSchema1LoadsWithTheHashThatItAlwaysHad) {
   }
 }
 
+// Both digests are those of another program that follows the order of the fields. The first is the description as it
+// was hashed before a case could say how its density was found.
+TEST(CaseDescription, WithoutProvenanceOfTheDensityTheHashIsWhatItWas) {
+  CaseInfo info{.title = "Test bone",
+                .source = "closed form",
+                .pitch_mm = 0.5,
+                .calibration = {0.001, 0.1},
+                .threshold_hu = 226.0};
+  const auto digest = [&] {
+    Hasher hasher;
+    hash_description(hasher, info);
+    return to_hex(hasher.finish());
+  };
+  EXPECT_EQ(digest(), "dc64ebed08ecbcc0bf3b8276de3f1e026fbbb0e721015e38aae1fa6952069b72");
+  info.density_from = {"given", {{"air_hu", -990.0}}, {"by hand"}};
+  EXPECT_EQ(digest(), "8c9c22776e0a766ddb59d054c80e7ea85f9f5b8df864d855fc9dc30437be870d");
+}
+
 TEST(CaseDescription, TheHashChangesWithEachField) {
   const CaseScan scan = test::turned_scan();
   const CaseInfo full = test::full_description(scan);
@@ -113,6 +131,10 @@ TEST(CaseDescription, TheHashChangesWithEachField) {
       {"source", [](CaseInfo& i) { i.source = "Another"; }},
       {"slope", [](CaseInfo& i) { i.calibration.slope_g_cm3_per_hu = 0.002; }},
       {"intercept", [](CaseInfo& i) { i.calibration.intercept_g_cm3 = 0.2; }},
+      {"no provenance of the density", [](CaseInfo& i) { i.density_from.reset(); }},
+      {"method of the density", [](CaseInfo& i) { i.density_from->method = "given"; }},
+      {"parameter of the density", [](CaseInfo& i) { i.density_from->parameters["cortical_error_g_cm3"] = 0.2; }},
+      {"edit of the density", [](CaseInfo& i) { i.density_from->edits.clear(); }},
       {"threshold", [](CaseInfo& i) { i.threshold_hu = 227.0; }},
       {"no scan", [](CaseInfo& i) { i.scan.reset(); }},
       {"scan hash", [](CaseInfo& i) { i.scan->hash.bytes[31] ^= 1; }},
@@ -190,6 +212,10 @@ TEST_F(WrongDescription, EachFieldIsNamed) {
   expect_refused("/pitch_mm", 0, "pitch_mm", "must be above zero");
   expect_refused("/title", 3, "title", "is not a text");
   expect_refused("/calibration", 3, "calibration", "is not an object");
+  expect_refused("/calibration/provenance", 3, "calibration.provenance", "is not an object");
+  expect_refused("/calibration/provenance/method", "", "calibration.provenance.method", "is empty");
+  expect_refused("/calibration/provenance/parameters/cortical_error_g_cm3", "one",
+                 "calibration.provenance.parameters.cortical_error_g_cm3", "is not a number");
   expect_refused("/content_hash", "zz", "content_hash",
                  "is not a hash: " + digest_from_hex("zz").error().message.substr(0, 60));
   expect_refused("/scan/frame", "RAS", "scan.frame", "is not LPS");
@@ -239,6 +265,7 @@ TEST_F(WrongDescription, EachMissingFieldIsNamed) {
                               "/pitch_mm",
                               "/calibration",
                               "/calibration/intercept_g_cm3",
+                              "/calibration/provenance/edits",
                               "/segmentation/threshold_hu",
                               "/content_hash",
                               "/schema_version",

@@ -1,0 +1,41 @@
+// How well an imported bone agrees with the bone that was scanned: phantoms of known shape through DICOM files with
+// noise, blur, thick, tilted and uneven slices. Takes a folder for the slices. Prints JSON: for each scan, with the
+// default threshold, the suggested one, and the one midway between soft tissue and cortex, Dice, distances of the
+// surfaces and number of islands.
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "tests/support/scenes/scanned_bones.hpp"
+
+int main(int argc, char** argv) {
+  using namespace osteon;
+  if (argc != 2) {
+    std::fputs("usage: osteon-import-accuracy FOLDER\n", stderr);
+    return EXIT_FAILURE;
+  }
+  nlohmann::json found = nlohmann::json::array();
+  for (const test::BoneScan& scan : test::accuracy_scans())
+    for (const std::string threshold : {"default", "suggested", "midway"}) {
+      const std::filesystem::path folder = std::filesystem::path(argv[1]) / "slices";
+      import::CtOptions options;
+      options.suggest_threshold = threshold == "suggested";
+      if (threshold == "midway") options.threshold_hu = test::kMidway_hu;
+      const auto measured = test::measure_accuracy(scan, options, folder);
+      std::filesystem::remove_all(folder);
+      if (!measured) {
+        std::fprintf(stderr, "osteon-import-accuracy: %s: %s\n", scan.name.c_str(), measured.error().message.c_str());
+        return EXIT_FAILURE;
+      }
+      found.push_back({{"scan", scan.name},
+                       {"threshold", threshold},
+                       {"dice", measured->dice},
+                       {"mean_mm", measured->mean_mm},
+                       {"percentile95_mm", measured->percentile95_mm},
+                       {"offset_mm", measured->offset_mm},
+                       {"islands", measured->islands}});
+    }
+  std::printf("%s\n", found.dump(1).c_str());
+  return EXIT_SUCCESS;
+}

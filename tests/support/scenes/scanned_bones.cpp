@@ -1,0 +1,253 @@
+#include "tests/support/scenes/scanned_bones.hpp"
+
+#include <gdcmReader.h>
+#include <gdcmWriter.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <random>
+
+#include "common/volume/cut_field.hpp"
+#include "server/import/bone_surface.hpp"
+#include "server/import/dicom_reader.hpp"
+#include "server/import/dicom_writer.hpp"
+
+namespace osteon::test {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kField_mm = 8.0;      // of the scan around the bones
+constexpr int kPartsOfSlice = 5;       // at which the mean over its thickness is taken
+constexpr double kPointStep_mm = 0.5;  // between points on the true surface
+constexpr double kLeastIsland_cm3 = 0.05;
+
+// The part of a step's height that its blurred edge has at a distance inside it: a Gaussian's integral.
+double blurred_step(double inside_mm, double sigma_mm) {
+  return 0.5 * std::erfc(-inside_mm / (sigma_mm * std::numbers::sqrt2));
+}
+
+// Without noise. Where a surface is much less curved than the blur is wide, its blurred edge depends on the distance
+// alone.
+double hu_at(const BoneScan& scan, const Vec3& at_mm) {
+  double hu = kSoftTissue_hu;
+  for (const Shaft& shaft : scan.shafts) {
+    const double inside_mm = -shaft.surface_mm(at_mm);
+    hu += (kCortex_hu - kSoftTissue_hu) * blurred_step(inside_mm, scan.blur_mm) +
+          (kCancellous_hu - kCortex_hu) * blurred_step(inside_mm - shaft.cortex_mm, scan.blur_mm);
+  }
+  return hu;
+}
+
+Box box_of(const BoneScan& scan) {
+  Box box;
+  for (const Shaft& shaft : scan.shafts)
+    for (const Vec3& end : {shaft.from_mm, shaft.to_mm}) {
+      box.include(end.array() - shaft.radius_mm);
+      box.include(end.array() + shaft.radius_mm);
+    }
+  return box;
+}
+
+// DICOM has 16 characters for a number.
+std::string decimal(double value) {
+  char text[20];
+  std::snprintf(text, sizeof text, "%.9f", value);
+  text[16] = '\0';
+  return text;
+}
+
+bool move_slice(const fs::path& file, const Vec3& position_mm) {
+  gdcm::Reader reader;
+  reader.SetFileName(file.c_str());
+  if (!reader.Read()) return false;
+  std::string value = decimal(position_mm.x()) + "\\" + decimal(position_mm.y()) + "\\" + decimal(position_mm.z());
+  if (value.size() % 2 != 0) value += ' ';
+  gdcm::DataElement element(gdcm::Tag(0x0020, 0x0032));
+  element.SetVR(gdcm::VR::DS);
+  element.SetByteValue(value.data(), static_cast<std::uint32_t>(value.size()));
+  reader.GetFile().GetDataSet().Replace(element);
+  gdcm::Writer writer;
+  writer.SetFile(reader.GetFile());
+  writer.SetFileName(file.c_str());
+  return writer.Write();
+}
+
+// The first pixels of the slices. The table moves along z, also if the gantry is tilted.
+std::vector<Vec3> positions_of(const BoneScan& scan, const imaging::HuVolume& grid) {
+  const Vec3 normal = grid.directions.col(2);
+  const Vec3 corner =
+      -0.5 * grid.directions * Vec3((grid.dims[0] - 1) * scan.pixel_mm, (grid.dims[1] - 1) * scan.pixel_mm, 0.0);
+  double length_mm = 0.0;
+  for (const double gap_mm : scan.gaps_mm) length_mm += gap_mm;
+  std::vector<Vec3> positions;
+  double along_mm = -0.5 * length_mm;
+  for (std::size_t i = 0; i <= scan.gaps_mm.size(); ++i) {
+    positions.emplace_back(corner + Vec3::UnitZ() * along_mm / normal.z());
+    if (i < scan.gaps_mm.size()) along_mm += scan.gaps_mm[i];
+  }
+  return positions;
+}
+
+// Points spread evenly over the true surface, without those within another shaft.
+std::vector<Vec3> surface_points(const BoneScan& scan) {
+  std::vector<Vec3> points;
+  for (const Shaft& shaft : scan.shafts) {
+    const Vec3 along = (shaft.to_mm - shaft.from_mm).normalized();
+    const Vec3 u = along.unitOrthogonal(), v = along.cross(u);
+    const double length_mm = (shaft.to_mm - shaft.from_mm).norm(), r = shaft.radius_mm;
+    // Along the line and over both halves of a sphere, a step of the position along is the same area.
+    for (double t = -r + 0.5 * kPointStep_mm; t < length_mm + r; t += kPointStep_mm) {
+      const double beyond_mm = std::max({0.0, -t, t - length_mm});
+      const double ring_mm = std::sqrt(std::max(0.0, r * r - beyond_mm * beyond_mm));
+      const int count = static_cast<int>(2.0 * std::numbers::pi * r / kPointStep_mm);
+      for (int i = 0; i < count; ++i) {
+        const double angle = 2.0 * std::numbers::pi * i / count;
+        points.emplace_back(shaft.from_mm + t * along + ring_mm * (std::cos(angle) * u + std::sin(angle) * v));
+      }
+    }
+  }
+  return points;
+}
+
+double percentile95(std::vector<double> values) {
+  const auto rank = static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
+}  // namespace
+
+double Shaft::surface_mm(const Vec3& at_mm) const {
+  const Vec3 along = to_mm - from_mm;
+  const double t = std::clamp((at_mm - from_mm).dot(along) / along.squaredNorm(), 0.0, 1.0);
+  return (at_mm - from_mm - t * along).norm() - radius_mm;
+}
+
+double BoneScan::surface_mm(const Vec3& at_mm) const {
+  double nearest = shafts.front().surface_mm(at_mm);
+  for (const Shaft& shaft : shafts) nearest = std::min(nearest, shaft.surface_mm(at_mm));
+  return nearest;
+}
+
+std::vector<Shaft> long_bone() {
+  return {{.from_mm = {-2.0, 1.0, -14.0}, .to_mm = {2.0, -1.5, 14.0}, .radius_mm = 9.0, .cortex_mm = 3.0}};
+}
+
+std::vector<Shaft> two_bones(double gap_mm) {
+  const double half_mm = 0.5 * gap_mm + 6.0;
+  return {{.from_mm = {-half_mm, 0.5, -12.0}, .to_mm = {-half_mm, -0.5, 12.0}, .radius_mm = 6.0, .cortex_mm = 2.5},
+          {.from_mm = {half_mm, 0.5, -12.0}, .to_mm = {half_mm, -0.5, 12.0}, .radius_mm = 6.0, .cortex_mm = 2.5}};
+}
+
+std::vector<BoneScan> accuracy_scans() {
+  const auto even = [](double gap_mm) { return std::vector<double>(static_cast<std::size_t>(60.0 / gap_mm), gap_mm); };
+  std::vector<double> uneven;
+  for (int i = 0; i < 10; ++i)
+    for (const double gap_mm : {1.0, 2.0, 3.0}) uneven.push_back(gap_mm);
+  std::vector<BoneScan> scans;
+  for (const auto& [bone, shafts] : {std::pair{"long bone", long_bone()}, std::pair{"two bones", two_bones(2.0)}}) {
+    const BoneScan plain{.name = bone, .shafts = shafts, .gaps_mm = even(1.0)};
+    const auto add = [&](const char* what, const auto& change) {
+      BoneScan scan = plain;
+      scan.name += std::string(", ") + what;
+      change(scan);
+      scans.push_back(std::move(scan));
+    };
+    add("fine slices", [](BoneScan&) {});
+    add("noise", [](BoneScan& scan) { scan.noise_hu = 80.0; });
+    add("blur", [](BoneScan& scan) { scan.blur_mm = 0.7; });
+    add("3 mm slices", [&](BoneScan& scan) { scan.gaps_mm = even(3.0), scan.thickness_mm = 3.0; });
+    add("tilted", [](BoneScan& scan) { scan.tilt_degrees = 20.0; });
+    add("uneven", [&](BoneScan& scan) { scan.gaps_mm = uneven; });
+  }
+  return scans;
+}
+
+Result<void> write_scan(const BoneScan& scan, const fs::path& folder) {
+  imaging::HuVolume grid;
+  const Box box = box_of(scan);
+  // The tilt moves the ends of the bone within the slices.
+  const double size_mm = 2.0 * (box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff() +
+                                kField_mm + 0.5 * std::abs(scan.tilt_degrees));
+  const int pixels = static_cast<int>(std::ceil(size_mm / scan.pixel_mm));
+  grid.dims = {pixels, pixels, static_cast<int>(scan.gaps_mm.size()) + 1};
+  grid.spacing_mm = {scan.pixel_mm, scan.pixel_mm, 1.0};
+  grid.directions = Eigen::AngleAxisd(-scan.tilt_degrees * std::numbers::pi / 180.0, Vec3::UnitX()).toRotationMatrix();
+  const std::vector<Vec3> positions = positions_of(scan, grid);
+  std::mt19937 random(scan.seed);
+  std::normal_distribution<double> noise(0.0, scan.noise_hu);
+  for (const Vec3& first : positions)
+    for (int row = 0; row < pixels; ++row)
+      for (int column = 0; column < pixels; ++column) {
+        const Vec3 at = first + scan.pixel_mm * grid.directions * Vec3(column, row, 0.0);
+        double hu = 0.0;
+        for (int i = 0; i < kPartsOfSlice; ++i)
+          hu += hu_at(scan, at + scan.thickness_mm * ((i + 0.5) / kPartsOfSlice - 0.5) * grid.directions.col(2));
+        grid.values.push_back(static_cast<std::int16_t>(std::lround(hu / kPartsOfSlice + noise(random))));
+      }
+  if (auto written = import::write_dicom_series(grid, folder, [](double) { return true; }); !written) return written;
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
+  std::ranges::sort(files);
+  for (std::size_t i = 0; i < files.size(); ++i)
+    if (!move_slice(files[i], positions[i])) return failure(ErrorCode::internal, "cannot write " + files[i].string());
+  return {};
+}
+
+Accuracy accuracy_of(const BoneScan& scan, const Case& bone) {
+  Accuracy accuracy;
+  const double pitch_mm = bone.pitch_mm();
+  Box both = box_of(scan);
+  both.include(bone.bounds().min_mm);
+  both.include(bone.bounds().max_mm);
+  const CoordBox box = covering_samples(both.grown(pitch_mm), pitch_mm);
+  std::int64_t common = 0, sum = 0;
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) {
+        const Vec3 at = position_mm({x, y, z}, pitch_mm);
+        const int found = bone.surface_mm(at) < 0.0 ? 1 : 0, real = scan.surface_mm(at) < 0.0 ? 1 : 0;
+        common += found * real;
+        sum += found + real;
+      }
+  accuracy.dice = sum > 0 ? 2.0 * static_cast<double>(common) / static_cast<double>(sum) : 0.0;
+  const auto mesh = import::bone_surface(CutField(bone, BodyId{0}), [](double) { return true; });
+  if (!mesh) return accuracy;
+  std::vector<double> from_case, from_truth;
+  double signed_sum = 0.0, total = 0.0;
+  for (const auto& corner : mesh->positions_mm) {
+    const double off = scan.surface_mm(Vec3(corner[0], corner[1], corner[2]));
+    signed_sum += off;
+    from_case.push_back(std::abs(off));
+  }
+  // The case knows distances up to a few pitches; a hole is that far away at least.
+  for (const Vec3& at : surface_points(scan)) from_truth.push_back(std::abs(bone.surface_mm(at)));
+  for (const auto* distances : {&from_case, &from_truth})
+    for (const double distance : *distances) total += distance;
+  accuracy.mean_mm = total / static_cast<double>(from_case.size() + from_truth.size());
+  accuracy.percentile95_mm = std::max(percentile95(from_case), percentile95(from_truth));
+  accuracy.offset_mm = signed_sum / static_cast<double>(from_case.size());
+  return accuracy;
+}
+
+Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions& options, const fs::path& folder) {
+  const auto going = [](double) { return true; };
+  if (auto written = write_scan(scan, folder); !written) return tl::unexpected(written.error());
+  auto read = import::read_dicom_series(folder, going);
+  if (!read) return tl::unexpected(read.error());
+  // As many islands as there are bones, or fewer if bones have grown together.
+  import::CtOptions keeping = options;
+  for (int number = 1; number <= static_cast<int>(scan.shafts.size()); ++number) keeping.keep.push_back(number);
+  auto made = import::import_ct(*read, keeping, going);
+  if (!made && scan.shafts.size() > 1) made = import::import_ct(std::move(*read), options, going);
+  if (!made) return tl::unexpected(made.error());
+  Accuracy accuracy = accuracy_of(scan, *made->bone);
+  for (const imaging::Island& island : made->found.islands)
+    accuracy.islands += island.volume_cm3 >= kLeastIsland_cm3 ? 1 : 0;
+  return accuracy;
+}
+
+}  // namespace osteon::test

@@ -1,0 +1,68 @@
+// Bones of a known shape as a CT scanner sees them: blurred, noisy, in thick, tilted or uneven slices. They go through
+// DICOM files and the ordinary import; the result is compared with the shape itself.
+#pragma once
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "server/import/ct_import.hpp"
+
+namespace osteon::test {
+
+// A shaft with rounded ends: everything within `radius_mm` of a straight line. A shell of cortex around cancellous
+// bone.
+struct Shaft {
+  Vec3 from_mm = Vec3::Zero(), to_mm = Vec3::Zero();
+  double radius_mm = 9.0, cortex_mm = 3.0;
+
+  [[nodiscard]] double surface_mm(const Vec3& at_mm) const;  // exact signed distance, negative inside
+};
+
+struct BoneScan {
+  std::string name;
+  std::vector<Shaft> shafts;
+  double pixel_mm = 0.7;
+  std::vector<double> gaps_mm;  // between slices along their normal, the table's way
+  double thickness_mm = 1.0;    // of a slice: HU are its mean
+  double blur_mm = 0.4;         // sigma of the scanner's point spread function, the same along all axes
+  double noise_hu = 25.0;       // standard deviation, independent for each voxel
+  double tilt_degrees = 0.0;    // of the gantry, about x
+  std::uint32_t seed = 1;
+
+  [[nodiscard]] double surface_mm(const Vec3& at_mm) const;  // of the nearest shaft
+};
+
+// HU of what the scan consists of. Cortex and soft tissue are those of a real lower leg.
+inline constexpr double kSoftTissue_hu = 40.0, kCancellous_hu = 250.0, kCortex_hu = 1500.0;
+
+// A long bone that is oblique to the slices, and two bones `gap_mm` apart.
+[[nodiscard]] std::vector<Shaft> long_bone();
+[[nodiscard]] std::vector<Shaft> two_bones(double gap_mm);
+
+// The threshold at which a blurred edge of cortex in soft tissue stays where it is.
+inline constexpr double kMidway_hu = 0.5 * (kSoftTissue_hu + kCortex_hu);
+
+// The scans of the accuracy test: each bone in fine slices; with noise; with more blur; in slices of 3 mm; tilted by 20
+// degrees; and in uneven slices.
+[[nodiscard]] std::vector<BoneScan> accuracy_scans();
+
+// Writes the slices as DICOM files, into a new folder. Error: internal (disk).
+[[nodiscard]] Result<void> write_scan(const BoneScan& scan, const std::filesystem::path& folder);
+
+struct Accuracy {
+  double dice = 0.0;  // of the case's bone and the shape, on the case's own samples
+  double mean_mm = 0.0,
+         percentile95_mm = 0.0;  // distances of the surfaces, both ways; the percentile is the larger way's
+  double offset_mm = 0.0;        // mean of the signed distance of the case's surface from the true one
+  std::size_t islands = 0;       // that the threshold found, of at least 0.05 cm³
+};
+// The bone of a case against the shape.
+[[nodiscard]] Accuracy accuracy_of(const BoneScan& scan, const Case& bone);
+
+// Writes the scan, imports it by the ordinary path with as many islands as there are bones, and compares. Errors: those
+// of both.
+[[nodiscard]] Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions& options,
+                                                const std::filesystem::path& folder);
+
+}  // namespace osteon::test
