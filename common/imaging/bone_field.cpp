@@ -24,17 +24,17 @@ double crossing(double marrow_hu, double outside_hu) {
 
 }  // namespace
 
-BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, double threshold_hu)
+BoneField::BoneField(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level)
     : volume_(volume),
       bones_(bones),
-      threshold_hu_(threshold_hu),
-      below_(static_cast<std::int16_t>(std::ceil(threshold_hu) - 1)) {
+      level_(level),
+      below_(static_cast<std::int16_t>(std::ceil(level.threshold_hu) - 1)) {
   for (std::size_t axis = 0; axis < 3; ++axis) bricks_[axis] = (volume.dims[axis] + kBrick - 1) / kBrick;
 }
 
-Result<BoneField> BoneField::make(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+Result<BoneField> BoneField::make(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level,
                                   const KeepGoing& keep_going) {
-  BoneField field(volume, bones, threshold_hu);
+  BoneField field(volume, bones, level);
   const auto [columns, rows, slices] = volume.dims;
   const VoxelMask places(field.bricks_);
   std::vector<bool> any(places.values.size(), false), all(places.values.size(), true);
@@ -97,17 +97,17 @@ std::int16_t BoneField::marrow_value(const std::array<int, 3>& at, std::size_t i
       const auto beside = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) + side * step[axis]);
       if (bones_.values[beside] != 0) continue;
       const double part = crossing(volume_.values[i], volume_.values[beside]);
-      const double outside = std::min(volume_.values[beside], below_);
-      sum += (threshold_hu_ - outside) * part / (1.0 - part);
+      const double outside = std::min(level_.lowered(volume_, beside), below_);
+      sum += (level_.threshold_hu - outside) * part / (1.0 - part);
       ++neighbours;
     }
   const double above = neighbours > 0 ? std::max(1.0, sum / neighbours) : kInside_hu;
-  return static_cast<std::int16_t>(std::lround(std::min(32767.0, threshold_hu_ + above)));
+  return static_cast<std::int16_t>(std::lround(std::min(32767.0, level_.threshold_hu + above)));
 }
 
 // For a dense voxel beside dense bone that is kept: as far below the threshold as the mean of these is above it.
 std::int16_t BoneField::outside_value(const std::array<int, 3>& at, std::size_t i) const {
-  const std::int16_t hu = volume_.values[i];
+  const std::int16_t hu = level_.lowered(volume_, i);
   if (hu <= below_) return hu;
   const std::array<std::ptrdiff_t, 3> step{1, volume_.dims[0],
                                            static_cast<std::ptrdiff_t>(volume_.dims[0]) * volume_.dims[1]};
@@ -117,12 +117,13 @@ std::int16_t BoneField::outside_value(const std::array<int, 3>& at, std::size_t 
     for (const int side : {-1, 1}) {
       if (at[axis] + side < 0 || at[axis] + side >= volume_.dims[axis]) continue;
       const auto beside = static_cast<std::size_t>(static_cast<std::ptrdiff_t>(i) + side * step[axis]);
-      if (bones_.values[beside] == 0 || volume_.values[beside] < threshold_hu_) continue;
-      above += volume_.values[beside] - threshold_hu_;
+      const std::int16_t beside_hu = level_.lowered(volume_, beside);
+      if (bones_.values[beside] == 0 || beside_hu < level_.threshold_hu) continue;
+      above += beside_hu - level_.threshold_hu;
       ++neighbours;
     }
   if (neighbours == 0) return below_;
-  const double value = threshold_hu_ - std::max(1.0, above / neighbours);
+  const double value = level_.threshold_hu - std::max(1.0, above / neighbours);
   return static_cast<std::int16_t>(std::lround(std::max<double>(value, std::numeric_limits<std::int16_t>::min())));
 }
 
@@ -132,10 +133,10 @@ void BoneField::read(const VoxelBox& part, std::span<std::int16_t> values) const
     for (int row = part.first[1]; row <= part.last[1]; ++row)
       for (int column = part.first[0]; column <= part.last[0]; ++column) {
         const std::size_t i = volume_.index(column, row, slice);
-        const std::int16_t hu = volume_.values[i];
-        values[n++] = bones_.values[i] == 0 ? outside_value({column, row, slice}, i)
-                      : hu < threshold_hu_  ? marrow_value({column, row, slice}, i)
-                                            : hu;
+        const std::int16_t hu = level_.lowered(volume_, i);
+        values[n++] = bones_.values[i] == 0      ? outside_value({column, row, slice}, i)
+                      : hu < level_.threshold_hu ? marrow_value({column, row, slice}, i)
+                                                 : hu;
       }
 }
 

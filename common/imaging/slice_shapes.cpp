@@ -125,9 +125,9 @@ SliceShapes::SliceShapes(const HuVolume& volume, BoneField field)
       unit_mm_(kFarthest_slices * volume.spacing_mm.z() / kUnits),
       distances_(volume.count()) {}
 
-Result<SliceShapes> SliceShapes::make(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
+Result<SliceShapes> SliceShapes::make(const HuVolume& volume, const VoxelMask& bones, const SurfaceLevel& level,
                                       const KeepGoing& keep_going) {
-  auto field = BoneField::make(volume, bones, threshold_hu, part(keep_going, 0.0, 0.1));
+  auto field = BoneField::make(volume, bones, level, part(keep_going, 0.0, 0.1));
   if (!field) return tl::unexpected(field.error());
   SliceShapes shapes(volume, std::move(*field));
   const auto [columns, rows, slices] = volume.dims;
@@ -138,7 +138,7 @@ Result<SliceShapes> SliceShapes::make(const HuVolume& volume, const VoxelMask& b
   for (int slice = 0; slice < slices; ++slice) {
     if (!keep_going(0.1 + 0.9 * slice / slices)) return stopped_while("measuring the shapes of the slices");
     shapes.field_.read({{0, 0, slice}, {columns - 1, rows - 1, slice}}, hu);
-    for (std::size_t i = 0; i < area; ++i) above[i] = hu[i] - threshold_hu;
+    for (std::size_t i = 0; i < area; ++i) above[i] = hu[i] - level.threshold_hu;
     const std::vector<double>& distance_mm = distance.measure(above);
     std::int16_t* to = shapes.distances_.data() + volume.index(0, 0, slice);
     // No voxel lies on the contour, so each has a side.

@@ -20,8 +20,8 @@ namespace osteon::imaging {
 class SliceShapes {
  public:
   // As BoneField::make(), whose arguments these are. Error: cancelled.
-  [[nodiscard]] static Result<SliceShapes> make(const HuVolume& volume, const VoxelMask& bones, double threshold_hu,
-                                                const KeepGoing& keep_going);
+  [[nodiscard]] static Result<SliceShapes> make(const HuVolume& volume, const VoxelMask& bones,
+                                                const SurfaceLevel& level, const KeepGoing& keep_going);
 
   // Which samples of a box may be inside.
   [[nodiscard]] Inside inside(const CoordBox& box, double pitch_mm) const;

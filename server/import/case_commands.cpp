@@ -41,7 +41,7 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::string rods_of, between_slices = "auto", thin_cortex = "off";
+  std::string rods_of, surface = "half", between_slices = "auto", thin_cortex = "off";
   std::optional<std::string> calibration, rods;
   std::string labels, report, truth, edits;
   std::vector<std::string> bone_colours, seeds, label_names;
@@ -273,6 +273,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.margin_mm = a.margin_mm;
   options.metal_hu = a.metal_hu;
   options.thin_cortex = a.thin_cortex == "on";
+  options.surface = a.surface == "half" ? SurfaceAt::half_maximum : SurfaceAt::threshold;
   options.between_slices = a.between_slices == "hu"       ? BetweenSlices::hu
                            : a.between_slices == "shapes" ? BetweenSlices::shapes
                                                           : BetweenSlices::automatic;
@@ -685,9 +686,15 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
       ->excludes(labels_option);
   ct->add_flag("--hollow", a.hollow, "Leave out marrow: only what reaches the threshold is bone")
       ->excludes(labels_option);
+  ct->add_option("--surface", a.surface,
+                 "The surface of bone lies where HU are half way between those of the bone there and of what is beside "
+                 "it (half), or where HU cross the threshold (threshold)")
+      ->check(CLI::IsMember({"half", "threshold"}))
+      ->capture_default_str()
+      ->excludes(labels_option);
   ct->add_option(
         "--between-slices", a.between_slices,
-        "The surface goes on from slice to slice where HU cross the threshold (hu), or so that the shape of "
+        "The surface goes on from slice to slice where HU cross its level (hu), or so that the shape of "
         "one slice turns into that of the next (shapes); auto: shapes if slices are more than two pixels apart")
       ->check(CLI::IsMember({"auto", "hu", "shapes"}))
       ->capture_default_str()

@@ -104,9 +104,9 @@ Result<CoordBox> lattice_around(const imaging::HuVolume& volume, const std::arra
 }
 
 Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
-                                     double threshold_hu, const CoordBox& lattice, double pitch_mm,
+                                     const imaging::SurfaceLevel& level, const CoordBox& lattice, double pitch_mm,
                                      const KeepGoing& keep_going) {
-  const auto field = imaging::BoneField::make(volume, bones, threshold_hu, part(keep_going, 0.0, 0.02));
+  const auto field = imaging::BoneField::make(volume, bones, level, part(keep_going, 0.0, 0.02));
   if (!field) return tl::unexpected(field.error());
   const SampledField samples{
       .box = lattice,
@@ -118,13 +118,13 @@ Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imag
             field->read(voxels, hu);
             imaging::resample(volume, voxels, hu, part, pitch_mm, values);
           }};
-  return narrow_band_mm(samples, static_cast<float>(threshold_hu), pitch_mm, part(keep_going, 0.02, 1.0));
+  return narrow_band_mm(samples, static_cast<float>(level.threshold_hu), pitch_mm, part(keep_going, 0.02, 1.0));
 }
 
 Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
-                                    double threshold_hu, const CoordBox& lattice, double pitch_mm,
+                                    const imaging::SurfaceLevel& level, const CoordBox& lattice, double pitch_mm,
                                     const KeepGoing& keep_going) {
-  const auto shapes = imaging::SliceShapes::make(volume, bones, threshold_hu, part(keep_going, 0.0, 0.2));
+  const auto shapes = imaging::SliceShapes::make(volume, bones, level, part(keep_going, 0.0, 0.2));
   if (!shapes) return tl::unexpected(shapes.error());
   const SampledField samples{
       .box = lattice,

@@ -8,6 +8,7 @@
 
 #include "common/imaging/hu_volume.hpp"
 #include "common/imaging/segmentation.hpp"
+#include "common/imaging/surface_level.hpp"
 #include "common/volume/sparse_volume.hpp"
 #include "server/import/ct_import.hpp"
 #include "server/import/kept_scan.hpp"
@@ -48,13 +49,13 @@ struct ScanRegion {
 // The signed distance to the bones in the narrow band around their surface, see imaging::BoneField. Errors: cancelled,
 // internal.
 [[nodiscard]] Result<SparseVolume> measure_surface(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
-                                                   double threshold_hu, const CoordBox& lattice, double pitch_mm,
-                                                   const KeepGoing& keep_going);
+                                                   const imaging::SurfaceLevel& level, const CoordBox& lattice,
+                                                   double pitch_mm, const KeepGoing& keep_going);
 
 // The same with the surface between slices by imaging::SliceShapes.
 [[nodiscard]] Result<SparseVolume> measure_shapes(const imaging::HuVolume& volume, const imaging::VoxelMask& bones,
-                                                  double threshold_hu, const CoordBox& lattice, double pitch_mm,
-                                                  const KeepGoing& keep_going);
+                                                  const imaging::SurfaceLevel& level, const CoordBox& lattice,
+                                                  double pitch_mm, const KeepGoing& keep_going);
 
 // What a case says of itself, without labels and threshold.
 [[nodiscard]] CaseInfo description(const CtScan& scan, const CtOptions& options, const ScanCalibration& calibration,

@@ -68,6 +68,7 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
 struct Segmented {
   imaging::HuVolume volume;
   imaging::VoxelMask bones;
+  imaging::SurfaceLevel level;
   std::array<int, 3> first{}, last{};  // voxel box of the bones
   CtSegmentation found;
 };
@@ -210,8 +211,9 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
   if (auto summarised = summarise(*bone, *islands, std::move(*kept), s, part(keep_going, 0.72, 0.78)); !summarised)
     return tl::unexpected(summarised.error());
   if (options.list_only) return s;
-  if (auto done = separate_and_edit(s.volume, options, seeds, s.bones, s.found, part(keep_going, 0.78, 1.0)); !done)
-    return tl::unexpected(done.error());
+  auto level = finish_bones(s.volume, options, seeds, s.bones, s.found, part(keep_going, 0.78, 1.0));
+  if (!level) return tl::unexpected(level.error());
+  s.level = std::move(*level);
   const imaging::VoxelBox box = voxels_of(s.bones);
   s.first = box.first;
   s.last = box.last;
@@ -267,10 +269,12 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   if (!lattice) return tl::unexpected(lattice.error());
   const bool shapes = options.between_slices == BetweenSlices::shapes ||
                       (options.between_slices == BetweenSlices::automatic && imaging::has_thick_slices(geometry));
+  if (options.surface == SurfaceAt::threshold) scan.source += ", surface at the threshold";
   if (shapes) scan.source += ", shapes interpolated between slices";
-  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, s->bones, options.threshold_hu, *lattice,
-                                                                pitch_mm, part(keep_going, kSegmentEnd, kSurfaceEnd));
+  auto surface_mm = (shapes ? measure_shapes : measure_surface)(s->volume, s->bones, s->level, *lattice, pitch_mm,
+                                                                part(keep_going, kSegmentEnd, kSurfaceEnd));
   if (!surface_mm) return tl::unexpected(surface_mm.error());
+  s->level = {};
   give_back_freed_memory();
   std::optional<SparseVolume> change_hu;
   if (options.thin_cortex) {

@@ -26,6 +26,12 @@ enum class BetweenSlices {
   shapes,     // see imaging::SliceShapes
 };
 
+// Where the surface of bone lies within a segmentation.
+enum class SurfaceAt {
+  half_maximum,  // see imaging::move_to_half_maximum()
+  threshold,     // where HU cross the threshold
+};
+
 struct CtOptions {
   std::optional<double> pitch_mm;  // absent: the scan's smallest spacing
   double threshold_hu = imaging::kBoneThreshold_hu;
@@ -47,6 +53,7 @@ struct CtOptions {
   // Taken out of the scan before anything else: outliers by a median, then noise by a Gaussian.
   std::optional<imaging::MedianBox> median;
   double gaussian_mm = 0.0;  // its sigma; 0: none
+  SurfaceAt surface = SurfaceAt::half_maximum;
   BetweenSlices between_slices = BetweenSlices::automatic;
   // The case keeps the scan this far around its bones. It has the HU after the filters.
   double margin_mm = 10.0;
@@ -73,6 +80,7 @@ struct CtSegmentation {
   std::vector<std::string> edits;  // what each edit did, for a person
   double left_out_cm3 = 0.0;       // of the islands that were not kept
   double marrow_cm3 = 0.0;         // below the threshold, within the kept islands
+  double blur_cm3 = 0.0;           // between the threshold and the level of the surface, within the kept islands
   std::vector<double> joined_cm3;  // parts of dense and cancellous bone that only marrow joins, if several are large
   double case_cm3 = 0.0;           // of the case's bone
   double metal_cm3 = 0.0, enamel_cm3 = 0.0;  // within the kept islands
@@ -90,10 +98,10 @@ struct CtImport {
 };
 
 // segment_bone() decides what is bone, and the options decide which islands are kept. With seeds, the grown regions
-// take the place of the voxels at or above the threshold. Edits come last. If the scan ends within bone, the bone ends
-// with the last whole voxel. No density is above that of compact bone; denser parts of the scan are labelled metal or
-// enamel. Errors: invalid_input (no bone, no such island, an edit that cannot be replayed, voxels of an impossible
-// size, too many samples), exhausted (memory), cancelled, internal.
+// take the place of the voxels at or above the threshold. Then the surface moves to its level. Edits come last. If the
+// scan ends within bone, the bone ends with the last whole voxel. No density is above that of compact bone; denser
+// parts of the scan are labelled metal or enamel. Errors: invalid_input (no bone, no such island, an edit that cannot
+// be replayed, voxels of an impossible size, too many samples), exhausted (memory), cancelled, internal.
 [[nodiscard]] Result<CtImport> import_ct(CtScan scan, const CtOptions& options, const KeepGoing& keep_going);
 
 // The same with the labels of a label map, which place_labels() has put on the scan's voxels: bones become the case's

@@ -67,6 +67,7 @@ LabelProvenance provenance_of(const CtOptions& options) {
   LabelProvenance provenance;
   provenance.method = options.hollow ? "threshold, islands" : "threshold, enclosed marrow, islands";
   provenance.parameters["threshold_hu"] = options.threshold_hu;
+  if (options.surface == SurfaceAt::half_maximum) provenance.method += ", surface at half maximum";
   if (!options.grow.seeds_mm.empty()) add_growing(options.grow, provenance);
   if (options.median) provenance.parameters["median_voxels"] = *options.median == imaging::MedianBox::slice ? 9 : 27;
   if (options.gaussian_mm > 0.0) provenance.parameters["gaussian_mm"] = options.gaussian_mm;

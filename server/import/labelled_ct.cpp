@@ -93,7 +93,7 @@ Result<SparseVolume> measure_labels(const Labelled& found, const imaging::HuVolu
   const auto field = label_field(found.bones, found.volume, found.first, found.last, part(keep_going, 0.0, 0.3));
   if (!field) return tl::unexpected(field.error());
   // Every voxel of the field is on the side of 0 on which its label is, so its values stay as they are.
-  auto surface_mm = measure_surface(field->field, field->bones, 0.0, lattice, pitch_mm, part(keep_going, 0.3, 0.9));
+  auto surface_mm = measure_surface(field->field, field->bones, {}, lattice, pitch_mm, part(keep_going, 0.3, 0.9));
   if (!surface_mm) return surface_mm;
   // The volume is that of the bone within the scan.
   if (auto capped = cap_at_scan(geometry, pitch_mm, *surface_mm, part(keep_going, 0.9, 1.0)); !capped)

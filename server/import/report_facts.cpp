@@ -153,6 +153,9 @@ void list_islands(const CtSegmentation& found, ReportFacts& facts) {
     facts.left_out.push_back(sentence("%zu of %zu islands, %.2f of %.2f cm³ (%.0f %%): not chosen.", left_out,
                                       found.islands.size(), found.left_out_cm3, all_cm3,
                                       100.0 * found.left_out_cm3 / all_cm3));
+  if (found.blur_cm3 > 0.0)
+    facts.left_out.push_back(
+        sentence("%.2f cm³ of the kept islands: blur, outside the half maximum of their surface.", found.blur_cm3));
 }
 
 // The ends of the scan at which its bone is cut off, in words.
@@ -214,7 +217,7 @@ void add_bone_warnings(const ImportReport& report, const ScanSums& sums, ReportF
     warnings.push_back("Marrow alone joins pieces with " + pieces +
                        " cm³ of denser bone, as at a narrow fracture; --hollow separates them.");
   }
-  double kept_cm3 = 0.0;
+  double kept_cm3 = -found.blur_cm3;
   for (const int number : found.kept) kept_cm3 += found.islands[static_cast<std::size_t>(number - 1)].volume_cm3;
   if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kMostChange * kept_cm3)
     warnings.push_back(

@@ -105,6 +105,10 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += line(
         "marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
         found.marrow_cm3);
+  if (found.blur_cm3 > 0.0)
+    text += line(
+        "surface    at half maximum: %.2f cm3 of that is blur outside of it; --surface threshold takes it as bone\n",
+        found.blur_cm3);
   if (found.joined_cm3.size() > 1) {
     std::string pieces;
     for (std::size_t i = 0; i < found.joined_cm3.size(); ++i)
@@ -112,11 +116,12 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += "joined     by marrow alone: pieces with " + pieces +
             " cm3 of denser bone, as at a narrow fracture; --hollow separates them\n";
   }
-  if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - kept_cm3) > kDifference * kept_cm3)
+  const double bone_cm3 = kept_cm3 - found.blur_cm3;
+  if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - bone_cm3) > kDifference * bone_cm3)
     text += line(
         "case       %.2f cm3, %+.0f %% of the voxels kept\n"
         "           walls about as thin as a voxel, noise, or a coarse --pitch do that\n",
-        found.case_cm3, 100.0 * (found.case_cm3 - kept_cm3) / kept_cm3);
+        found.case_cm3, 100.0 * (found.case_cm3 - bone_cm3) / bone_cm3);
   if (found.metal_cm3 > 0.0)
     text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
                  found.metal_cm3, found.metal_hu);

@@ -62,19 +62,11 @@ tl::unexpected<Error> nothing_left(const CtOptions& options) {
   return bad_input(options.edits_file + " leaves no bone; remove some of its edits");
 }
 
-}  // namespace
-
-Result<void> separate_and_edit(const imaging::HuVolume& volume, const CtOptions& options,
-                               std::span<const imaging::BoneSeed> seeds, imaging::VoxelMask& bones,
-                               CtSegmentation& found, const KeepGoing& keep_going) {
-  if (!options.separate && options.edits.empty()) return {};
-  if (options.separate) {
-    auto separated = imaging::separate_bones(volume, bones, options.threshold_hu, seeds, part(keep_going, 0.0, 0.9));
-    if (!separated) return tl::unexpected(separated.error());
-    bones = std::move(*separated);
-  }
+// Replays the edits, and lists the bones in `found`. Errors: invalid_input, cancelled.
+Result<void> edit_bones(const imaging::HuVolume& volume, const CtOptions& options, imaging::VoxelMask& bones,
+                        CtSegmentation& found, const KeepGoing& keep_going) {
   const Counts before = voxels_of_each(bones);
-  const auto effects = replay(volume, options, bones, part(keep_going, 0.9, 1.0));
+  const auto effects = replay(volume, options, bones, keep_going);
   if (!effects) return tl::unexpected(effects.error());
   const Counts after = voxels_of_each(bones);
   const double voxel_cm3 = volume.spacing_mm.prod() * 1e-3;
@@ -89,6 +81,34 @@ Result<void> separate_and_edit(const imaging::HuVolume& volume, const CtOptions&
   }
   if (found.bones.empty()) return nothing_left(options);
   return {};
+}
+
+}  // namespace
+
+Result<imaging::SurfaceLevel> finish_bones(const imaging::HuVolume& volume, const CtOptions& options,
+                                           std::span<const imaging::BoneSeed> seeds, imaging::VoxelMask& bones,
+                                           CtSegmentation& found, const KeepGoing& keep_going) {
+  const double separated_at = options.separate ? 0.7 : 0.0;
+  if (options.separate) {
+    auto separated =
+        imaging::separate_bones(volume, bones, options.threshold_hu, seeds, part(keep_going, 0.0, separated_at));
+    if (!separated) return tl::unexpected(separated.error());
+    bones = std::move(*separated);
+  }
+  imaging::SurfaceLevel level{options.threshold_hu};
+  const auto bone_voxels = [&] { return std::ranges::count_if(bones.values, [](std::uint8_t b) { return b != 0; }); };
+  if (options.surface == SurfaceAt::half_maximum) {
+    const auto before = bone_voxels();
+    auto moved =
+        imaging::move_to_half_maximum(volume, options.threshold_hu, bones, part(keep_going, separated_at, 0.95));
+    if (!moved) return moved;
+    level = std::move(*moved);
+    found.blur_cm3 = static_cast<double>(before - bone_voxels()) * volume.spacing_mm.prod() * 1e-3;
+  }
+  if (options.separate || !options.edits.empty())
+    if (auto edited = edit_bones(volume, options, bones, found, part(keep_going, 0.95, 1.0)); !edited)
+      return tl::unexpected(edited.error());
+  return level;
 }
 
 Result<std::vector<std::string>> edit_labels(const imaging::HuVolume& grid, const CtOptions& options,

@@ -1,17 +1,20 @@
-// Separates the kept bones that touch, and replays a person's edits on them.
+// Finishes the kept bones: separates those that touch, finds their surface, and replays a person's edits.
 #pragma once
 #include <span>
 
+#include "common/imaging/surface_level.hpp"
 #include "server/import/ct_import.hpp"
 
 namespace osteon::import {
 
 // `bones`: the bone number of each voxel of `volume`, from 1; 0: none. Gets the numbers of the separated and edited
-// bones. `seeds`: voxels of `volume`. Lists the bones in `found`. Nothing happens without --separate and edits. Errors:
-// invalid_input (seeds or edits that cannot be, no bone left), exhausted (too many bones, memory), cancelled, internal.
-[[nodiscard]] Result<void> separate_and_edit(const imaging::HuVolume& volume, const CtOptions& options,
-                                             std::span<const imaging::BoneSeed> seeds, imaging::VoxelMask& bones,
-                                             CtSegmentation& found, const KeepGoing& keep_going);
+// bones. Their surface moves to its level, before the edits. `seeds`: voxels of `volume`. Lists the bones in `found`
+// with --separate and edits. Errors: invalid_input (seeds or edits that cannot be, no bone left), exhausted (too many
+// bones, memory), cancelled, internal.
+[[nodiscard]] Result<imaging::SurfaceLevel> finish_bones(const imaging::HuVolume& volume, const CtOptions& options,
+                                                         std::span<const imaging::BoneSeed> seeds,
+                                                         imaging::VoxelMask& bones, CtSegmentation& found,
+                                                         const KeepGoing& keep_going);
 
 // Replays the edits on the labels of a label map, and lists them there. A bone that only edits made is "bone N".
 // Returns what each did, for a person. Errors: as above.

@@ -124,7 +124,8 @@ TEST(Islands, StopsWhenAsked) {
 HuVolume field_of(const HuVolume& volume, const VoxelMask& bones) {
   HuVolume field = volume;
   const VoxelBox whole{{0, 0, 0}, {volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1}};
-  BoneField::make(volume, bones, kThreshold_hu, always)->read(whole, field.values);
+  const SurfaceLevel level{kThreshold_hu};
+  BoneField::make(volume, bones, level, always)->read(whole, field.values);
   return field;
 }
 
@@ -184,7 +185,8 @@ TEST(BoneField, APartHasTheVoxelsOfTheWholeAndTheirSide) {
   const std::array kept{1};
   const VoxelMask bones = number_bones(islands, kept, false, volume.dims);
   const HuVolume whole = field_of(volume, bones);
-  const auto field = BoneField::make(volume, bones, kThreshold_hu, always);
+  const SurfaceLevel level{kThreshold_hu};
+  const auto field = BoneField::make(volume, bones, level, always);
   ASSERT_TRUE(field);
   std::array<int, 3> found{};
   for (int i = 0; i < 200; ++i) {

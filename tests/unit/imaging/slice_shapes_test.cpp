@@ -14,6 +14,7 @@ namespace osteon::imaging {
 namespace {
 
 constexpr double kThickSlice_mm = 3.0, kThinPixel_mm = 0.5, kAround_hu = 50.0, kSolid_hu = 1000.0, kContour_hu = 226.0;
+const SurfaceLevel kContour{kContour_hu};
 
 // Signed distance, negative inside.
 using Shape = std::function<double(const Vec3&)>;
@@ -69,7 +70,7 @@ class Field {
 
 Field by_shapes(const HuVolume& volume) {
   const VoxelMask bones = bones_of(volume);
-  const auto shapes = SliceShapes::make(volume, bones, kContour_hu, always);
+  const auto shapes = SliceShapes::make(volume, bones, kContour, always);
   EXPECT_TRUE(shapes);
   std::vector<float> values(61 * 61 * 61);
   shapes->read(kBox, kThinPixel_mm, values);
@@ -175,7 +176,8 @@ TEST(SliceShapes, ALeaningPlaneIsExact) {
         volume.values.push_back(static_cast<std::int16_t>(100.0 * (x - 16.3 - 1.4 * z)));  // a ramp across the edge
   VoxelMask bones(volume.dims);
   for (std::size_t i = 0; i < bones.values.size(); ++i) bones.values[i] = volume.values[i] >= 0 ? 1 : 0;
-  const auto shapes = SliceShapes::make(volume, bones, 0.0, always);
+  const SurfaceLevel zero;
+  const auto shapes = SliceShapes::make(volume, bones, zero, always);
   ASSERT_TRUE(shapes);
   const CoordBox box{{5, 2, 0}, {30, 4, 30}};
   std::vector<float> values(26 * 3 * 31);
@@ -209,7 +211,7 @@ TEST(SliceShapes, EveryVoxelKeepsItsSide) {
 TEST(SliceShapes, BoxesAreNeverOnOneSideOnlyBecauseTheirVoxelsAre) {
   const HuVolume scan = scan_of([](const Vec3& p) { return p.norm() - 10.0; });
   const VoxelMask bones = bones_of(scan);
-  const auto shapes = SliceShapes::make(scan, bones, kContour_hu, always);
+  const auto shapes = SliceShapes::make(scan, bones, kContour, always);
   ASSERT_TRUE(shapes);
   std::vector<float> values(512);
   int sides[3] = {};
@@ -233,7 +235,7 @@ TEST(SliceShapes, CanBeStopped) {
   const HuVolume scan = scan_of([](const Vec3& p) { return p.norm() - 10.0; });
   const VoxelMask bones = bones_of(scan);
   for (const double at : {0.0, 0.15, 0.7}) {
-    const auto stopped = SliceShapes::make(scan, bones, kContour_hu, [&](double done) { return done < at; });
+    const auto stopped = SliceShapes::make(scan, bones, kContour, [&](double done) { return done < at; });
     ASSERT_FALSE(stopped);
     EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
   }

@@ -112,7 +112,7 @@ TEST(SeparatedBones, StopsAtEveryQuestion) {
     for (std::size_t i = 0; i < bones.values.size(); ++i) bones.values[i] = scan.volume.values[i] > 500 ? 1 : 0;
     CtSegmentation found;
     const std::vector<imaging::BoneSeed> seeds{{{9, 10, 10}, 1}, {{25, 10, 10}, 2}, {{46, 10, 10}, 3}};
-    return separate_and_edit(scan.volume, options, seeds, bones, found, going);
+    return finish_bones(scan.volume, options, seeds, bones, found, going);
   };
   int questions = 0;
   ASSERT_TRUE(run([&](double) { return ++questions > 0; }));
