@@ -86,7 +86,7 @@ MUTATIONS = [
       "debris becomes a piece", "unit.volume", "*"),
     M("common/volume/case.cpp", "std::round(mm * 1024.0f)", "std::floor(mm * 1024.0f)",
       "a case's distances are rounded down", "unit.volume", "*"),
-    M("common/volume/case_description.cpp", "      hasher.number(value);\n", "",
+    M("common/volume/case_description.cpp", "    hasher.number(value);\n", "",
       "the hash of a case does not cover the parameters of its labels", "unit.volume", "CaseDescription.*"),
     M("common/volume/case_scan.cpp", "if (*found != named)", "if (false)",
       "any scan is taken for that of the case", "unit.volume", "CaseScanTest.*"),
