@@ -13,6 +13,8 @@ namespace {
 constexpr double kReach_mm = 1.5, kReach_voxels = 2.0;
 constexpr double kStep_voxels = 0.5;
 constexpr double kTurn = 0.25;  // [A] A profile ends where HU go back by this part of their change. Noise is less.
+// [A] HU of the most compact bone. Metal and enamel behind bone do not raise its level beyond what such bone gives.
+constexpr double kCompact_hu = 1850.0;
 constexpr std::size_t kVoxelsAtOnce = 1 << 14;  // between two questions whether to go on
 
 class Profiles {
@@ -31,7 +33,7 @@ class Profiles {
     const int steps = static_cast<int>(std::ceil(reach_mm / step_mm));
     const std::uint8_t bone = bones_.at(at[0], at[1], at[2]);
     const Vec3 from(at[0], at[1], at[2]);
-    const double start_hu = volume_.at(at[0], at[1], at[2]);
+    const double start_hu = std::min<double>(volume_.at(at[0], at[1], at[2]), kCompact_hu);
     bool leaves = false;
     double lowest = start_hu, highest = start_hu;
     for (int i = 1; i <= steps; ++i) {
@@ -68,7 +70,7 @@ class Profiles {
     return volume_.index(static_cast<int>(std::lround(voxel.x())), static_cast<int>(std::lround(voxel.y())),
                          static_cast<int>(std::lround(voxel.z())));
   }
-  // Trilinear HU; nothing outside the scan.
+  // Trilinear HU, at most those of compact bone; nothing outside the scan.
   [[nodiscard]] std::optional<double> sample(const Vec3& voxel) const {
     std::array<std::size_t, 3> low{}, next{};
     std::array<double, 3> part{};
@@ -88,7 +90,7 @@ class Profiles {
     const auto mix = [](double a, double b, double t) { return a + (b - a) * t; };
     const auto row = [&](std::size_t i) { return mix(hu[i], hu[i + next[0]], part[0]); };
     const auto slice = [&](std::size_t i) { return mix(row(i), row(i + next[1]), part[1]); };
-    return mix(slice(0), slice(next[2]), part[2]);
+    return std::min(mix(slice(0), slice(next[2]), part[2]), kCompact_hu);
   }
 
   const HuVolume& volume_;

@@ -26,7 +26,7 @@ struct SurfaceLevel {
 // what lies beside it (Spoor 1993). A fixed threshold far below lies outside, the more so the denser the bone. So at
 // each voxel near the surface a profile along the gradient of HU gives the highest HU on the way in, and the lowest on
 // the way out. Where the mean of the two is above the threshold, it is the level. Thin bone that the scan shows as grey
-// has a low level, and stays.
+// has a low level, and stays. Metal behind bone counts as compact bone.
 //
 // `bones`: the bone number of each voxel; 0: none. Voxels below their level, between the surface and bone, lose it. No
 // voxel gets one. Two bones that touch have a surface between them. Error: cancelled.

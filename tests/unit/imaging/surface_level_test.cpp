@@ -152,6 +152,17 @@ TEST(SurfaceLevel, CancellousBoneBehindAnOpeningStays) {
   }
 }
 
+TEST(SurfaceLevel, BoneBeforeMetalStays) {
+  // 2.1 mm of bone of 1200 HU before metal of 8000 HU: half way to the metal's HU would be 4000.
+  const HuVolume volume = edges_of({24, 12, 12}, Vec3(0.7, 0.7, 0.7), [](const Vec3& p) {
+    return p.x() < -2.4 ? 40.0 : p.x() < -0.3 ? 1200.0 : 8000.0;
+  });
+  const VoxelMask before = dense_voxels(volume);
+  VoxelMask bones = before;
+  ASSERT_TRUE(move_to_half_maximum(volume, kDense_hu, bones, always));
+  EXPECT_EQ(bones.values, before.values);
+}
+
 TEST(SurfaceLevel, BonesThatTouchGetTheirGapBack) {
   // 1.6 mm apart, blurred by 0.6 mm: HU in the gap reach 400.
   const HuVolume volume = edges_of({40, 12, 12}, Vec3(0.5, 0.5, 0.5), [](const Vec3& p) {

@@ -59,7 +59,8 @@ TEST(CtImport, BlockThroughDicomIsTheBlock) {
   const auto bone = round_trip(phantom, spacing_mm, suitable_threshold_hu(phantom));
   ASSERT_TRUE(bone) << bone.error().message;
   EXPECT_LT(surface_error(*bone, phantom, spacing_mm), 0.15);
-  EXPECT_NEAR(bone->volume_mm3(), phantom.volume_mm3(), 0.01 * phantom.volume_mm3());
+  // The mean over a voxel rounds the edges of the block.
+  EXPECT_NEAR(bone->volume_mm3(), phantom.volume_mm3(), 0.015 * phantom.volume_mm3());
   // In the middle of the layers, no neighbouring layer is blurred in.
   EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -2.0}), 1.9, 0.02 * 1.9);
   EXPECT_NEAR(bone->density_g_cm3({0.1, 0.2, -7.0}), 1.4, 0.02 * 1.4);
@@ -111,9 +112,12 @@ TEST(CtImport, HollowLeavesTheMarrowOut) {
   EXPECT_GT(hollow->surface_mm({0, 0, 0}), 0.0);
   const double all = std::numbers::pi * 64.0 * 14.0, shell = std::numbers::pi * (64.0 - 25.0) * 14.0;
   EXPECT_NEAR(filled->volume_mm3(), all, 0.02 * all);
-  // At 226 HU the inner wall lies up to a voxel within the medulla, whose edge to cortex would be at 908.
-  EXPECT_GT(hollow->volume_mm3(), shell);
-  EXPECT_LT(hollow->volume_mm3(), 1.15 * shell);
+  EXPECT_NEAR(hollow->volume_mm3(), shell, 0.02 * shell);
+  // At 226 HU the inner wall lies up to a voxel within the medulla, whose edge to cortex is at 908.
+  const auto thick = import_bone(scan, {.hollow = true, .surface = SurfaceAt::threshold}, keep_going);
+  ASSERT_TRUE(thick);
+  EXPECT_GT(thick->volume_mm3(), 1.03 * shell);
+  EXPECT_LT(thick->volume_mm3(), 1.15 * shell);
 }
 
 // A shaft that is broken right through. The marrow space bridges a narrow gap, and the import reports it.

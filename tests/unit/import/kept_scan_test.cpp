@@ -167,7 +167,8 @@ TEST(KeptScan, SeedsAreParametersOfTheBonesThatGrewFromThem) {
   const CaseInfo& info = made->bone->info();
   ASSERT_EQ(info.labels.size(), 1u);
   const LabelProvenance& provenance = info.labels[0].provenance;
-  EXPECT_EQ(provenance.method, "region growing by slice, similar to the seed, enclosed marrow, islands");
+  EXPECT_EQ(provenance.method,
+            "region growing by slice, similar to the seed, enclosed marrow, islands, surface at half maximum");
   EXPECT_EQ(provenance.parameters.at("similar_hu"), 300.0);
   EXPECT_EQ(provenance.parameters.at("seed_1_x_mm"), seed_mm.x());
   EXPECT_EQ(provenance.parameters.at("seed_1_y_mm"), seed_mm.y());

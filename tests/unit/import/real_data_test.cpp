@@ -28,7 +28,8 @@ TEST(Skull, LiesInThePatientFrame) {
   auto scan = read_inv3(*file, keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   EXPECT_EQ(scan->volume.dims, (std::array<int, 3>{256, 256, 108}));
-  const auto bone = import_bone(std::move(*scan), {.pitch_mm = {}, .title = "Skull"}, keep_going);
+  const auto bone =
+      import_bone(std::move(*scan), {.pitch_mm = {}, .title = "Skull", .surface = SurfaceAt::threshold}, keep_going);
   ASSERT_TRUE(bone) << bone.error().message;
 
   // InVesalius' own mesh of everything above 226 HU encloses 657.7 cm³ (surface_0.plist), with headrest and loose

@@ -55,6 +55,7 @@ const CaseLabel* label_of(const CtImport& import, int value) {
 
 TEST(SeparatedBones, EachSeedIsABoneOfItsOwn) {
   CtOptions options;
+  options.surface = SurfaceAt::threshold;
   options.grow.seeds_mm = {{24, 10, 10}, {12, 10, 10}, {46, 10, 10}};
   const auto joined = made(options);
   options.separate = true;
