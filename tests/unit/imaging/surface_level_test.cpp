@@ -67,7 +67,7 @@ TEST(SurfaceLevel, ABlurredEdgeIsWhereItWas) {
   const Vec3 normal = Vec3(1.0, 0.3, 0.2).normalized();
   const auto plane_mm = [&](double y, double z) { return -(normal.y() * y + normal.z() * z) / normal.x(); };
   for (const auto& [outside_hu, inside_hu] :
-       {std::pair{40.0, 1500.0}, {40.0, 700.0}, {-100.0, 2200.0}, {-1000.0, 1700.0}, {150.0, 1000.0}})
+       {std::pair{40.0, 1500.0}, {40.0, 700.0}, {-100.0, 1800.0}, {-1000.0, 1700.0}, {150.0, 1000.0}})
     for (const double blur_mm : {0.3, 0.6, 1.0}) {
       const HuVolume volume = edges_of({32, 20, 20}, Vec3(0.6, 0.6, 0.6), [&](const Vec3& p) {
         return outside_hu + (inside_hu - outside_hu) * edge(-normal.dot(p), blur_mm);
