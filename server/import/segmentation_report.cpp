@@ -33,6 +33,39 @@ std::string bones_text(const CtSegmentation& found) {
   return text + edits_text(found);
 }
 
+// Marrow, blur, metal and enamel within the kept islands, of `kept_cm3`, and what became of their volume.
+std::string parts_text(const CtSegmentation& found, double kept_cm3) {
+  std::string text;
+  if (found.marrow_cm3 > 0.0)
+    text += line(
+        "marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
+        found.marrow_cm3);
+  if (found.blur_cm3 > 0.0)
+    text += line(
+        "surface    at half maximum: %.2f cm3 of that is blur outside of it; --surface threshold takes it as bone\n",
+        found.blur_cm3);
+  if (found.joined_cm3.size() > 1) {
+    std::string pieces;
+    for (std::size_t i = 0; i < found.joined_cm3.size(); ++i)
+      pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
+    text += "joined     by marrow alone: pieces with " + pieces +
+            " cm3 of denser bone, as at a narrow fracture; --hollow separates them\n";
+  }
+  const double bone_cm3 = kept_cm3 - found.blur_cm3;
+  if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - bone_cm3) > kDifference * bone_cm3)
+    text += line(
+        "case       %.2f cm3, %+.0f %% of the voxels kept\n"
+        "           walls about as thin as a voxel, noise, or a coarse --pitch do that\n",
+        found.case_cm3, 100.0 * (found.case_cm3 - bone_cm3) / bone_cm3);
+  if (found.metal_cm3 > 0.0)
+    text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
+                 found.metal_cm3, found.metal_hu);
+  if (found.enamel_cm3 > 0.0)
+    text += line("enamel     %.3f cm3, or mineral as dense: shown as enamel, cut like compact bone of %.1f g/cm3\n",
+                 found.enamel_cm3, imaging::kCompactBone_g_cm3);
+  return text;
+}
+
 }  // namespace
 
 std::string place_words(const Vec3& at, const Box& box) {
@@ -101,34 +134,7 @@ std::string segmentation_text(const CtSegmentation& found) {
   else if (found.kept.size() > 1)
     text += found.merged ? "bones      1 in the case, of all kept islands\n"
                          : line("bones      %zu in the case, one for each kept island\n", found.kept.size());
-  if (found.marrow_cm3 > 0.0)
-    text += line(
-        "marrow     %.2f cm3 of that is below the threshold, enclosed by bone or between it; --hollow leaves it out\n",
-        found.marrow_cm3);
-  if (found.blur_cm3 > 0.0)
-    text += line(
-        "surface    at half maximum: %.2f cm3 of that is blur outside of it; --surface threshold takes it as bone\n",
-        found.blur_cm3);
-  if (found.joined_cm3.size() > 1) {
-    std::string pieces;
-    for (std::size_t i = 0; i < found.joined_cm3.size(); ++i)
-      pieces += line(i == 0 ? "%.2f" : " and %.2f", found.joined_cm3[i]);
-    text += "joined     by marrow alone: pieces with " + pieces +
-            " cm3 of denser bone, as at a narrow fracture; --hollow separates them\n";
-  }
-  const double bone_cm3 = kept_cm3 - found.blur_cm3;
-  if (found.case_cm3 > 0.0 && std::abs(found.case_cm3 - bone_cm3) > kDifference * bone_cm3)
-    text += line(
-        "case       %.2f cm3, %+.0f %% of the voxels kept\n"
-        "           walls about as thin as a voxel, noise, or a coarse --pitch do that\n",
-        found.case_cm3, 100.0 * (found.case_cm3 - bone_cm3) / bone_cm3);
-  if (found.metal_cm3 > 0.0)
-    text += line("metal      %.3f cm3 at or around %.0f HU and above: it is shown as metal, and no tool cuts it\n",
-                 found.metal_cm3, found.metal_hu);
-  if (found.enamel_cm3 > 0.0)
-    text += line("enamel     %.3f cm3, or mineral as dense: shown as enamel, cut like compact bone of %.1f g/cm3\n",
-                 found.enamel_cm3, imaging::kCompactBone_g_cm3);
-  return text;
+  return text + parts_text(found, kept_cm3);
 }
 
 }  // namespace osteon::import
