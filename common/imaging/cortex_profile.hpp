@@ -7,7 +7,8 @@ namespace osteon::imaging {
 
 // Along a line into a bone, HU are those of the surroundings, of the cortex, and of what is inside it. The scan blurs
 // them with a Gaussian (Treece 2010):
-//   HU(s) = outside + (cortex − outside) Φ((s − outer) / σ) + (inside − cortex) Φ((s − outer − thickness) / σ).
+//   HU(s) = outside + (cortex − outside) Φ((s − outer) / σ)
+//           + (inside − cortex) Φ((s − outer − thickness) / σ).
 struct CortexProfile {
   double outside_hu = 0.0, cortex_hu = 0.0, inside_hu = 0.0;
   double outer_mm = 0.0;  // where the cortex begins, along the line

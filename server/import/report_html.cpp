@@ -143,8 +143,8 @@ std::string comparison_table(const LabelComparison& comparison) {
             number_cell(found ? number("%.4f", label.agreement.dice) : "–") +
             number_cell(number("%.3f", label.agreement.mean_mm)) +
             number_cell(number("%.3f", label.agreement.percentile95_mm)) +
-            number_cell(number("%.2f", label.volume_cm3)) + number_cell(found ? number("%.2f", label.truth_cm3) : "–") +
-            "</tr>\n";
+            number_cell(number("%.2f", label.volume_cm3)) +
+            number_cell(found ? number("%.2f", label.truth_cm3) : "–") + "</tr>\n";
   }
   text += "</table>\n";
   for (const std::string& name : comparison.missing) text += "<p>The case has no " + escaped(name) + ".</p>\n";
