@@ -139,12 +139,12 @@ std::string comparison_table(const LabelComparison& comparison) {
       "<th class=\"number\">Its volume, cm³</th></tr>\n";
   for (const ComparedLabel& label : comparison.labels) {
     const bool found = !label.truth.empty();
+    const std::string truth_cm3 = found ? number("%.2f", label.truth_cm3) : "–";
     text += "<tr>" + cell(escaped(label.name)) + cell(found ? escaped(label.truth) : "no such label") +
             number_cell(found ? number("%.4f", label.agreement.dice) : "–") +
             number_cell(number("%.3f", label.agreement.mean_mm)) +
             number_cell(number("%.3f", label.agreement.percentile95_mm)) +
-            number_cell(number("%.2f", label.volume_cm3)) +
-            number_cell(found ? number("%.2f", label.truth_cm3) : "–") + "</tr>\n";
+            number_cell(number("%.2f", label.volume_cm3)) + number_cell(truth_cm3) + "</tr>\n";
   }
   text += "</table>\n";
   for (const std::string& name : comparison.missing) text += "<p>The case has no " + escaped(name) + ".</p>\n";
