@@ -133,6 +133,20 @@ TEST(SurfaceLevel, AThinWallHasNoHoles) {
   EXPECT_GT(lost, 100) << "the blur at both sides of the wall is still bone";
 }
 
+TEST(SurfaceLevel, AGreyWallBeforeDenseBoneStays) {
+  // Half way to the wall's own 500 HU is 270; half way to those of the cortex 1 mm behind it would be 770.
+  const HuVolume volume = edges_of({24, 12, 12}, Vec3(0.7, 0.7, 0.7), [](const Vec3& p) {
+    const double x = p.x() + 0.1 * p.y();
+    return x < -2.2 ? 40.0 : x < -0.8 ? 500.0 : x < 0.2 ? 60.0 : 1500.0;
+  });
+  VoxelMask bones = dense_voxels(volume);
+  for (std::size_t i = 0; i < bones.values.size(); ++i)  // as a marrow space
+    if (volume.values[i] == 60) bones.values[i] = 1;
+  const VoxelMask before = bones;
+  ASSERT_TRUE(move_to_half_maximum(volume, kDense_hu, bones, always));
+  EXPECT_EQ(bones.values, before.values);
+}
+
 TEST(SurfaceLevel, CancellousBoneBehindAnOpeningStays) {
   // Cortex of 2.4 mm around cancellous bone of 300 HU. A hole of 4 mm goes through the cortex at +x.
   const auto shell = [](const Vec3& p) {
