@@ -13,7 +13,7 @@ find_package(pugixml REQUIRED)
 find_package(yaml-cpp REQUIRED)
 find_package(GDCM REQUIRED)
 find_package(ITK 5.2 REQUIRED COMPONENTS
-  ITKIOGDCM ITKIOMeta ITKIONIFTI ITKIONRRD ITKLabelMap ITKRegionGrowing ITKSmoothing)
+  ITKIOGDCM ITKIOMeta ITKIONIFTI ITKIONRRD ITKLabelMap ITKOptimizersv4 ITKRegionGrowing ITKSmoothing ITKTransform)
 # Its targets name no folder of headers.
 find_path(OSTEON_ITK_HEADERS itkNiftiImageIO.h PATH_SUFFIXES ITK-5.2 REQUIRED)
 find_package(PNG REQUIRED)

@@ -98,63 +98,7 @@ Result<CtScan> read_grey(const ScanArguments& a, const KeepGoing& reading) {
   return read_grey_stack(a.input, format, reading);
 }
 
-}  // namespace
-
-std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going) {
-  return name_of_one_scan(input_kind(input, keep_going));
-}
-
-std::optional<std::pair<double, double>> parse_pair(const std::string& text) {
-  double first = 0, second = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf,%lf%c", &first, &second, &rest) != 2) return {};
-  if (!std::isfinite(first) || !std::isfinite(second)) return {};
-  return std::pair(first, second);
-}
-
-Result<Vec3> parse_spacing(const std::string& text) {
-  double x = 0, y = 0, z = 0;
-  char rest = 0;
-  const int parts = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &z, &rest);
-  const Vec3 spacing = parts == 1 && text.find(',') == std::string::npos ? Vec3::Constant(x) : Vec3(x, y, z);
-  if ((parts != 3 && parts != 1) || !(spacing.minCoeff() >= 0.01) || !(spacing.maxCoeff() <= 10.0))
-    return failure(
-        ErrorCode::invalid_input,
-        "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
-  return spacing;
-}
-
-void add_scan_options(CLI::App& command, ScanArguments& a) {
-  command
-      .add_option("INPUT", a.input,
-                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or "
-                  "a NIfTI, NRRD or MetaImage file. With --spacing: a folder of grey PNG slices. With --size: raw "
-                  "numbers, in one file or in a folder with one for each slice")
-      ->required();
-  command.add_option("--series", a.series,
-                     "Number of the series, as osteon-import series lists them (default: the largest CT)");
-  const char* given = "Of raw numbers and PNG slices";
-  command.add_option("--spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->group(given);
-  command
-      .add_option("--axes", a.axes,
-                  "Where columns, rows and slices go: L or R, P or A, S or I (default: LPS, as a guess)")
-      ->group(given);
-  command.add_option("--slope", a.slope, "HU = slope * stored number + intercept (default: 1)")->group(given);
-  command.add_option("--intercept", a.intercept, "HU of the stored number 0 (default: 0)")->group(given);
-  command.add_option("--grey-window", a.grey_window, "CENTRE,WIDTH: the HU that PNG slices show from black to white")
-      ->group(given);
-  command.add_option("--size", a.size, "Columns, rows and slices of raw numbers: X,Y,Z")->group(given);
-  command.add_option("--type", a.type, "Of raw numbers: int16, uint16, uint8 or float32 (default: int16)")
-      ->check(CLI::IsMember({"int16", "uint16", "uint8", "float32"}))
-      ->group(given);
-  command.add_option("--byte-order", a.byte_order, "Of raw numbers: little or big endian (default: little)")
-      ->check(CLI::IsMember({"little", "big"}))
-      ->group(given);
-  command.add_option("--skip-bytes", a.skip_bytes, "Before the first raw number of each file (default: 0)")
-      ->group(given);
-}
-
-Result<CtScan> read_scan(const ScanArguments& a, const KeepGoing& reading) {
+Result<CtScan> read_any_scan(const ScanArguments& a, const KeepGoing& reading) {
   const bool is_given = !a.size.empty() || !a.spacing.empty();
   if (is_given && a.series) return bad_input("--series is for DICOM; leave it out for raw numbers and PNG slices");
   if (const std::string_view option = given_option(a); !is_given && !option.empty())
@@ -182,6 +126,84 @@ Result<CtScan> read_scan(const ScanArguments& a, const KeepGoing& reading) {
         " is no DICOM, NIfTI, NRRD, MetaImage or InVesalius file; give one, or --size, --spacing and --type "
         "if it holds raw numbers");
   return read_inv3(a.input, reading);
+}
+
+// The names of a scan's options in an error, as the command has them.
+std::string with_prefix(std::string message, const std::string& prefix) {
+  for (const char* name :
+       {"series", "spacing", "axes", "slope", "intercept", "grey-window", "size", "type", "byte-order", "skip-bytes"}) {
+    const std::string option = std::string("--") + name;
+    for (std::size_t at = 0; (at = message.find(option, at)) != std::string::npos; at += option.size() + prefix.size())
+      message.insert(at + 2, prefix);
+  }
+  return message;
+}
+
+}  // namespace
+
+std::string_view name_of_one_scan(const std::string& input, const KeepGoing& keep_going) {
+  return name_of_one_scan(input_kind(input, keep_going));
+}
+
+std::optional<std::pair<double, double>> parse_pair(const std::string& text) {
+  double first = 0, second = 0;
+  char rest = 0;
+  if (std::sscanf(text.c_str(), "%lf,%lf%c", &first, &second, &rest) != 2) return {};
+  if (!std::isfinite(first) || !std::isfinite(second)) return {};
+  return std::pair(first, second);
+}
+
+Result<Vec3> parse_spacing(const std::string& text) {
+  double x = 0, y = 0, z = 0;
+  char rest = 0;
+  const int parts = std::sscanf(text.c_str(), "%lf,%lf,%lf%c", &x, &y, &z, &rest);
+  const Vec3 spacing = parts == 1 && text.find(',') == std::string::npos ? Vec3::Constant(x) : Vec3(x, y, z);
+  if ((parts != 3 && parts != 1) || !(spacing.minCoeff() >= 0.01) || !(spacing.maxCoeff() <= 10.0))
+    return failure(
+        ErrorCode::invalid_input,
+        "--spacing " + text + " is not a voxel size; write X,Y,Z in mm from 0.01 to 10, such as 0.096,0.096,0.096");
+  return spacing;
+}
+
+void add_scan_options(CLI::App& command, ScanArguments& a, const std::string& name) {
+  const std::string dashes = "--" + a.prefix;
+  command
+      .add_option(name, a.input,
+                  "DICOM: a folder (with all its subfolders), a zip or an ISO image; an InVesalius project (.inv3), or "
+                  "a NIfTI, NRRD or MetaImage file. With " +
+                      dashes + "spacing: a folder of grey PNG slices. With " + dashes +
+                      "size: raw numbers, in one file or in a folder with one for each slice")
+      ->required();
+  command.add_option(dashes + "series", a.series,
+                     "Number of the series, as osteon-import series lists them (default: the largest CT)");
+  const std::string given = "Of raw numbers and PNG slices" + (a.prefix.empty() ? "" : ", " + name);
+  command.add_option(dashes + "spacing", a.spacing, "Size of a voxel, mm: X,Y,Z, or one number for all")->group(given);
+  command
+      .add_option(dashes + "axes", a.axes,
+                  "Where columns, rows and slices go: L or R, P or A, S or I (default: LPS, as a guess)")
+      ->group(given);
+  command.add_option(dashes + "slope", a.slope, "HU = slope * stored number + intercept (default: 1)")->group(given);
+  command.add_option(dashes + "intercept", a.intercept, "HU of the stored number 0 (default: 0)")->group(given);
+  command
+      .add_option(dashes + "grey-window", a.grey_window,
+                  "CENTRE,WIDTH: the HU that PNG slices show from black to white")
+      ->group(given);
+  command.add_option(dashes + "size", a.size, "Columns, rows and slices of raw numbers: X,Y,Z")->group(given);
+  command.add_option(dashes + "type", a.type, "Of raw numbers: int16, uint16, uint8 or float32 (default: int16)")
+      ->check(CLI::IsMember({"int16", "uint16", "uint8", "float32"}))
+      ->group(given);
+  command.add_option(dashes + "byte-order", a.byte_order, "Of raw numbers: little or big endian (default: little)")
+      ->check(CLI::IsMember({"little", "big"}))
+      ->group(given);
+  command.add_option(dashes + "skip-bytes", a.skip_bytes, "Before the first raw number of each file (default: 0)")
+      ->group(given);
+}
+
+Result<CtScan> read_scan(const ScanArguments& a, const KeepGoing& reading) {
+  auto scan = read_any_scan(a, reading);
+  if (!scan && !a.prefix.empty())
+    return failure(scan.error().code, with_prefix(std::move(scan.error().message), a.prefix));
+  return scan;
 }
 
 }  // namespace osteon::import

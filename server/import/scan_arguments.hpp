@@ -16,6 +16,7 @@ namespace osteon::import {
 
 struct ScanArguments {
   std::string input;
+  std::string prefix;  // of the options' names, such as "fixed-" for one of two scans
   std::optional<int> series;
   // Of raw numbers and PNG slices, which say nothing of themselves.
   std::string size, spacing, type, byte_order, axes, grey_window;
@@ -23,8 +24,8 @@ struct ScanArguments {
   std::optional<double> slope, intercept;
 };
 
-// `arguments` must live as long as the app.
-void add_scan_options(CLI::App& command, ScanArguments& arguments);
+// `arguments` must live as long as the app. `name`: of the input in the help.
+void add_scan_options(CLI::App& command, ScanArguments& arguments, const std::string& name = "INPUT");
 
 // Reads a scan of any kind. With --size the input is raw numbers, with --spacing alone it is PNG slices; otherwise the
 // input's content decides. Errors: those of the readers, and invalid_input for options that do not fit.

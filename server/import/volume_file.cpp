@@ -133,6 +133,34 @@ std::size_t slice_numbers(const fs::path& file, VolumeFormat format) {
   return io->GetDimensions(0) * io->GetDimensions(1) * io->GetNumberOfComponents();
 }
 
+// Writes voxels of one type, columns fastest.
+Result<void> write_voxels(const fs::path& file, VolumeFormat format, const VolumeHeader& header,
+                          itk::IOComponentEnum type, const void* voxels, const HeaderFields& fields) try {
+  const itk::ImageIOBase::Pointer io = format_of(format);
+  io->SetFileName(file.string());
+  io->SetNumberOfDimensions(3);
+  itk::ImageIORegion all(3);
+  for (unsigned d = 0; d < 3; ++d) {
+    io->SetDimensions(d, header.dims[d]);
+    io->SetSpacing(d, header.spacing_mm[d]);
+    io->SetOrigin(d, header.origin_mm[d]);
+    io->SetDirection(d, std::vector<double>(header.axes[d].begin(), header.axes[d].end()));
+    all.SetSize(d, header.dims[d]);
+  }
+  io->SetPixelType(itk::IOPixelEnum::SCALAR);
+  io->SetComponentType(type);
+  io->SetNumberOfComponents(1);
+  for (const auto& [key, value] : fields)
+    itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
+  io->SetIORegion(all);
+  io->SetUseCompression(true);  // of NIfTI, the ending decides
+  io->WriteImageInformation();
+  io->Write(voxels);
+  return {};
+} catch (const itk::ExceptionObject&) {
+  return failure(ErrorCode::internal, "cannot write " + file.string());
+}
+
 }  // namespace
 
 Result<VolumeHeader> read_volume_header(const fs::path& file, VolumeFormat format, VoxelContent content) try {
@@ -208,30 +236,18 @@ Result<void> read_label_slices(const fs::path& file, VolumeFormat format,
 }
 
 Result<void> write_label_volume(const fs::path& file, VolumeFormat format, const VolumeHeader& header,
-                                std::span<const std::uint8_t> labels, const HeaderFields& fields) try {
-  const itk::ImageIOBase::Pointer io = format_of(format);
-  io->SetFileName(file.string());
-  io->SetNumberOfDimensions(3);
-  itk::ImageIORegion all(3);
-  for (unsigned d = 0; d < 3; ++d) {
-    io->SetDimensions(d, header.dims[d]);
-    io->SetSpacing(d, header.spacing_mm[d]);
-    io->SetOrigin(d, header.origin_mm[d]);
-    io->SetDirection(d, std::vector<double>(header.axes[d].begin(), header.axes[d].end()));
-    all.SetSize(d, header.dims[d]);
-  }
-  io->SetPixelType(itk::IOPixelEnum::SCALAR);
-  io->SetComponentType(itk::IOComponentEnum::UCHAR);
-  io->SetNumberOfComponents(1);
-  for (const auto& [key, value] : fields)
-    itk::EncapsulateMetaData<std::string>(io->GetMetaDataDictionary(), key, value);
-  io->SetIORegion(all);
-  io->SetUseCompression(true);  // of NIfTI, the ending decides
-  io->WriteImageInformation();
-  io->Write(labels.data());
-  return {};
-} catch (const itk::ExceptionObject&) {
-  return failure(ErrorCode::internal, "cannot write " + file.string());
+                                std::span<const std::uint8_t> labels, const HeaderFields& fields) {
+  return write_voxels(file, format, header, itk::IOComponentEnum::UCHAR, labels.data(), fields);
+}
+
+Result<void> write_label_volume(const fs::path& file, VolumeFormat format, const VolumeHeader& header,
+                                std::span<const std::uint16_t> labels) {
+  return write_voxels(file, format, header, itk::IOComponentEnum::USHORT, labels.data(), {});
+}
+
+Result<void> write_hu_volume(const fs::path& file, VolumeFormat format, const VolumeHeader& header,
+                             std::span<const std::int16_t> hu) {
+  return write_voxels(file, format, header, itk::IOComponentEnum::SHORT, hu.data(), {});
 }
 
 }  // namespace osteon::import

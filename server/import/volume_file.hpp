@@ -49,4 +49,10 @@ struct VolumeHeader {
                                               const VolumeHeader& header, std::span<const std::uint8_t> labels,
                                               const HeaderFields& fields);
 
+// Writes whole HU, or labels from 0 to 65535, in the same way.
+[[nodiscard]] Result<void> write_hu_volume(const std::filesystem::path& file, VolumeFormat format,
+                                           const VolumeHeader& header, std::span<const std::int16_t> hu);
+[[nodiscard]] Result<void> write_label_volume(const std::filesystem::path& file, VolumeFormat format,
+                                              const VolumeHeader& header, std::span<const std::uint16_t> labels);
+
 }  // namespace osteon::import

@@ -9,6 +9,7 @@ namespace osteon::fuzz {
 [[nodiscard]] Target carve_script_target();    // YAML list of cuts
 [[nodiscard]] Target legend_target();          // YAML file with the colours of a label volume
 [[nodiscard]] Target edits_target();           // YAML list of corrections of labels
+[[nodiscard]] Target landmarks_target();       // YAML list of points in two scans
 [[nodiscard]] Target case_info_target();       // case.json beside a valid bone.vdb
 [[nodiscard]] Target bone_volume_target();     // bone.vdb beside a valid case.json
 [[nodiscard]] Target scan_volume_target();     // scan.vdb beside a valid case.json

@@ -1,4 +1,6 @@
-// Targets for text that a person writes for the import: a tool, a list of cuts, a legend, a list of edits.
+// Targets for text that a person writes for the import: a tool, a list of cuts, a legend, a list of edits, a list
+// of landmarks.
+#include <cmath>
 #include <set>
 #include <string>
 #include <string_view>
@@ -8,6 +10,7 @@
 #include "server/import/carve_script.hpp"
 #include "server/import/edit_file.hpp"
 #include "server/import/label_stack.hpp"
+#include "server/import/landmark_file.hpp"
 #include "tests/fuzz/import_files.hpp"
 #include "tests/fuzz/import_targets.hpp"
 
@@ -59,6 +62,23 @@ void read_and_replay_edits(std::span<const std::uint8_t> data) {
   if (!effects) return expect_bounded(effects.error());
 }
 
+// Accepted landmarks are fitted: a fit is rigid, and has a residual for each.
+void read_and_fit_landmarks(std::span<const std::uint8_t> data) {
+  const auto landmarks =
+      import::parse_landmarks({reinterpret_cast<const char*>(data.data()), data.size()}, "points.yaml");
+  if (!landmarks) return expect_bounded(landmarks.error());
+  std::vector<imaging::LandmarkPair> pairs;
+  for (const import::NamedLandmark& landmark : *landmarks) {
+    OSTEON_CHECK(!landmark.name.empty() && landmark.name.size() <= 60);
+    OSTEON_CHECK(landmark.at.fixed_mm.allFinite() && landmark.at.moving_mm.allFinite());
+    pairs.push_back(landmark.at);
+  }
+  const auto fit = imaging::fit_landmarks(pairs);
+  if (!fit) return expect_bounded(fit.error());
+  OSTEON_CHECK(fit->residuals_mm.size() == pairs.size() && std::isfinite(fit->rms_mm));
+  OSTEON_CHECK(std::abs(fit->pose_fixed_moving.rotation.norm() - 1.0) < 1e-9);
+}
+
 Target text_target(std::string name, void (*read)(std::span<const std::uint8_t>), std::vector<Bytes> seeds) {
   Target target{std::move(name), read, std::move(seeds)};
   target.change = change_number;
@@ -104,6 +124,15 @@ Target edits_target() {
                      "  - {kind: cut, bone: 1, point_mm: [1, 2, 20], normal: [0, 0.5, 1], to_bone: 3}\n"
                      "  - {kind: erase, bone: 2, centre_mm: [0, 0, 0], radius_mm: 2}\n"
                      "  - {kind: seed, point_mm: [1, 2, 20], bone: 4}\n")});
+}
+
+Target landmarks_target() {
+  return text_target("landmarks", read_and_fit_landmarks,
+                     {bytes_of_text("landmarks:\n"
+                                    "  - {name: apex, fixed_mm: [1, 2, 20], moving_mm: [11, -2, 25]}\n"
+                                    "  - {fixed_mm: [31, 2, 20], moving_mm: [41, -2, 25]}\n"
+                                    "  - {name: base, fixed_mm: [1, 42, 20], moving_mm: [11, 38, 25]}\n"
+                                    "  - {fixed_mm: [1, 2, 60], moving_mm: [11, -2, 64.5]}\n")});
 }
 
 }  // namespace osteon::fuzz

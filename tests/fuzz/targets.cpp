@@ -239,6 +239,7 @@ std::vector<Target> targets() {
       carve_script_target(),
       legend_target(),
       edits_target(),
+      landmarks_target(),
       case_info_target(),
       bone_volume_target(),
       scan_volume_target(),

@@ -59,7 +59,7 @@ class Program : public ::testing::Test {
 TEST_F(Program, HelpNamesTheCommands) {
   const auto result = test::run(kProgram, {"--help"});
   EXPECT_EQ(result.exit_code, 0);
-  for (const char* command : {"ct", "phantom", "info", "series", "slices"})
+  for (const char* command : {"ct", "phantom", "info", "series", "slices", "register"})
     EXPECT_NE(result.out.find(command), std::string::npos);
 }
 
