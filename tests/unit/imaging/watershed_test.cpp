@@ -16,7 +16,7 @@
 namespace osteon::imaging {
 namespace {
 
-constexpr int kAround_hu = 50, kBone_hu = 1200;
+constexpr int kBackground_hu = 50, kBone_hu = 1200;
 
 // What a scanner shows of solids: each voxel has the mean of bone and muscle over its parts, as thick slices do.
 HuVolume scan_of(const std::array<int, 3>& dims, const Vec3& spacing_mm, int bone_hu,
@@ -35,7 +35,7 @@ HuVolume scan_of(const std::array<int, 3>& dims, const Vec3& spacing_mm, int bon
           bone += is_bone((Vec3(x, y, z) + within).cwiseProduct(spacing_mm)) ? 1 : 0;
         }
         volume.values.push_back(
-            static_cast<std::int16_t>(std::lround(kAround_hu + (bone_hu - kAround_hu) * bone / double{kAll})));
+            static_cast<std::int16_t>(std::lround(kBackground_hu + (bone_hu - kBackground_hu) * bone / double{kAll})));
       }
   return volume;
 }
@@ -105,7 +105,7 @@ TEST(Watershed, TwoBallsPartInTheirPlaneOfContact) {
   VoxelMask mask = at_threshold(scan);
   // Partly filled voxels of the surface count only half, so that the volume is that of the balls.
   for (std::size_t i = 0; i < mask.values.size(); ++i)
-    mask.values[i] = scan.values[i] >= (kBone_hu + kAround_hu) / 2 ? 1 : 0;
+    mask.values[i] = scan.values[i] >= (kBone_hu + kBackground_hu) / 2 ? 1 : 0;
   std::size_t cores = 0;
   const auto by_seeds = separated(scan, mask, {{5, 15, 15}, {40, 16, 16}});
   const auto by_cores = separated_by_cores(scan, mask, cores);
