@@ -14,26 +14,6 @@ constexpr double kThresholdEnd = 0.05, kCancellousEnd = 0.35, kEnclosedEnd = 0.9
 constexpr int kFewest = 3;  // voxels needed to decide whether a space contains air; fewer are noise within bone
 constexpr double kAirEdge_voxels = 2.0;  // width over which a scanner blurs the edge between air and bone
 
-Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
-  VoxelMask dense(volume.dims);
-  const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
-  bool any = false;
-  for (int slice = 0; slice < volume.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("looking for the bone");
-    const std::size_t begin = volume.index(0, 0, slice);
-    for (std::size_t i = begin; i < begin + area; ++i) {
-      const bool is_dense = volume.values[i] >= threshold_hu;
-      dense.values[i] = is_dense ? 1 : 0;
-      any = any || is_dense;
-    }
-  }
-  if (!any)
-    return failure(ErrorCode::invalid_input, "no voxel reaches the bone threshold of " +
-                                                 std::to_string(std::lround(threshold_hu)) +
-                                                 " HU; give a lower --threshold");
-  return dense;
-}
-
 // Mean HU of a voxel and its neighbours that are not dense. The air of a sinus is darker than marrow even if it is
 // noisy.
 bool is_air(const HuVolume& volume, const VoxelMask& dense, std::array<int, 3> c, double air_hu) {
@@ -72,6 +52,26 @@ Result<void> remove_air(const HuVolume& volume, const VoxelMask& dense, double a
 }
 
 }  // namespace
+
+Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, const KeepGoing& keep_going) {
+  VoxelMask dense(volume.dims);
+  const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
+  bool any = false;
+  for (int slice = 0; slice < volume.dims[2]; ++slice) {
+    if (!keep_going(static_cast<double>(slice) / volume.dims[2])) return stopped_while("looking for the bone");
+    const std::size_t begin = volume.index(0, 0, slice);
+    for (std::size_t i = begin; i < begin + area; ++i) {
+      const bool is_dense = volume.values[i] >= threshold_hu;
+      dense.values[i] = is_dense ? 1 : 0;
+      any = any || is_dense;
+    }
+  }
+  if (!any)
+    return failure(ErrorCode::invalid_input, "no voxel reaches the bone threshold of " +
+                                                 std::to_string(std::lround(threshold_hu)) +
+                                                 " HU; give a lower --threshold");
+  return dense;
+}
 
 Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params, const ScanEnds& ends,
                                const KeepGoing& keep_going) {

@@ -34,6 +34,9 @@ struct SegmentationParams {
 using ScanEnds = std::array<std::array<bool, 2>, 3>;
 inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}}};
 
+// 1 for every voxel at or above the threshold. Errors: invalid_input (no voxel reaches it), cancelled.
+[[nodiscard]] Result<VoxelMask> dense_voxels(const HuVolume& volume, double threshold_hu, const KeepGoing& keep_going);
+
 // A marrow space is the space that a ball of `bridged_mm` cannot reach from outside the bone, if such a ball fits
 // inside it. Every hole that no path of voxels leaves is one too. So narrow clefts on the outside of a bone, such as
 // sutures and joints, stay open. Cancellous bone has `cancellous_hu` or more on most of a voxel's 27 voxels. It lies on

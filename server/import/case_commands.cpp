@@ -61,7 +61,7 @@ Result<void> save(const Case& bone, const CaseScan& scan, const std::string& out
   return bone.save(out, scan, [&](double) { return !stop.requested(); });
 }
 
-// "all", or numbers such as "1,3". Empty: the largest.
+// "all", or numbers such as "1,3". Empty: the largest that is bone.
 Result<void> parse_keep(const std::string& text, CtOptions& options) {
   options.keep_all = text == "all";
   if (text.empty() || options.keep_all) return {};
@@ -645,7 +645,8 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
           ->excludes(labels_option);
   CLI::Option* keep = ct->add_option(
       "--keep", a.keep,
-      "Islands of bone by their number in the printed list, such as 1,3, or all (default: 1, the largest)");
+      "Islands by their number in the printed list, such as 1,3, or all (default: the largest that is bone, and no "
+      "table, cast or metal)");
   keep->excludes(labels_option);
   CLI::Option* seed =
       ct->add_option("--seed", a.seeds,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bitset>
+#include <cmath>
 #include <new>
 #include <numeric>
 #include <optional>
@@ -47,11 +48,20 @@ Result<ScanRegion> dense_region(const imaging::HuVolume& volume, const CtOptions
   return region_around(first, last, volume, options);
 }
 
-Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::vector<imaging::Island>& islands) {
+Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::vector<imaging::Island>& islands,
+                                         const std::vector<imaging::IslandNature>& natures) {
   std::vector<int> all(islands.size());
   std::iota(all.begin(), all.end(), 1);
   if (options.keep_all) return all;
-  if (options.keep.empty()) return std::vector<int>{1};
+  if (options.keep.empty()) {
+    const auto bone = std::ranges::find(natures, imaging::IslandKind::bone, &imaging::IslandNature::kind);
+    if (bone == natures.end())
+      return failure(ErrorCode::invalid_input,
+                     "no island is bone: all that reaches the threshold of " +
+                         std::to_string(std::lround(options.threshold_hu)) +
+                         " HU is metal; take it with --keep, or give a lower --threshold or a higher --metal-hu");
+    return std::vector<int>{static_cast<int>(bone - natures.begin()) + 1};
+  }
   std::vector<int> kept;
   for (const int number : options.keep) {
     if (number < 1 || number > static_cast<int>(islands.size()))
@@ -62,6 +72,13 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
     if (std::ranges::find(kept, number) == kept.end()) kept.push_back(number);
   }
   return kept;
+}
+
+imaging::SegmentationParams segmentation_params(const CtOptions& options) {
+  imaging::SegmentationParams params;
+  params.threshold_hu = options.threshold_hu;
+  params.hollow = options.hollow;
+  return params;
 }
 
 // The part of the scan with dense voxels, its islands, and the bone to which each voxel belongs.
@@ -160,6 +177,41 @@ std::vector<int> islands_of(const std::vector<imaging::Region>& regions, const i
   return numbers;
 }
 
+// Dense voxels without tables and casts, which would enclose a limb as bone encloses marrow. Those go to `equipment`.
+Result<imaging::VoxelMask> take_out_equipment(const imaging::HuVolume& volume, imaging::VoxelMask dense,
+                                              const CtOptions& options, const DensityCalibration& calibration,
+                                              std::vector<imaging::VoxelRun>& equipment, const KeepGoing& keep_going) {
+  const auto islands = imaging::find_islands(volume, dense, calibration, part(keep_going, 0.0, 0.5));
+  if (!islands) return tl::unexpected(islands.error());
+  const auto natures = imaging::name_islands(volume, dense, *islands, options.metal_hu, part(keep_going, 0.5, 1.0));
+  if (!natures) return tl::unexpected(natures.error());
+  for (const imaging::VoxelRun& run : islands->components.runs) {
+    const auto island = static_cast<std::size_t>(islands->number[run.component] - 1);
+    const imaging::IslandKind kind = (*natures)[island].kind;
+    if (kind != imaging::IslandKind::table && kind != imaging::IslandKind::cast) continue;
+    imaging::fill_run(dense, run, 0);
+    equipment.push_back(run);
+  }
+  return dense;
+}
+
+// The voxels of bone, and of whatever else is as dense. Errors: invalid_input (there is none), cancelled.
+Result<imaging::VoxelMask> find_voxels(const imaging::HuVolume& volume, const CtOptions& options,
+                                       const DensityCalibration& calibration, const imaging::ScanEnds& ends,
+                                       const KeepGoing& keep_going) {
+  auto dense = imaging::dense_voxels(volume, options.threshold_hu, part(keep_going, 0.0, 0.03));
+  if (!dense) return dense;
+  std::vector<imaging::VoxelRun> equipment;
+  dense = take_out_equipment(volume, std::move(*dense), options, calibration, equipment, part(keep_going, 0.03, 0.1));
+  if (!dense) return dense;
+  auto bone =
+      imaging::segment_bone(volume, std::move(*dense), segmentation_params(options), ends, part(keep_going, 0.1, 1.0));
+  if (!bone) return bone;
+  for (const imaging::VoxelRun& run : equipment)
+    imaging::fill_run(*bone, run, static_cast<std::uint8_t>(imaging::BoneVoxel::dense));
+  return bone;
+}
+
 // If nobody has chosen yet, the first islands get a colour each, so that one sees them apart.
 std::vector<int> islands_with_colours(const std::vector<imaging::Island>& islands) {
   std::vector<int> first(std::min(kMostIslandsDrawn, islands.size()));
@@ -177,20 +229,24 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
     widen(*work, region_around(painted->first, painted->last, scan, options));
   Segmented s;
   s.volume = imaging::cropped(std::move(scan), work->first, work->last);
-  imaging::SegmentationParams params;
-  params.threshold_hu = options.threshold_hu;
-  params.hollow = options.hollow;
   const KeepGoing segmenting = part(keep_going, 0.0, 0.65);
   const auto bone =
       bones ? imaging::segment_bone(s.volume, imaging::cropped(std::move(bones->labels), work->first, work->last),
-                                    params, work->ends, segmenting)
-            : imaging::segment_bone(s.volume, params, work->ends, segmenting);
+                                    segmentation_params(options), work->ends, segmenting)
+            : find_voxels(s.volume, options, calibration, work->ends, segmenting);
   if (!bone) return tl::unexpected(bone.error());
-  const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.65, 0.72));
+  const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.65, 0.69));
   if (!islands) return tl::unexpected(islands.error());
+  s.found.metal_hu = options.metal_hu;
+  if (!bones) {
+    // What grew from seeds is what somebody has chosen.
+    auto natures = imaging::name_islands(s.volume, *bone, *islands, options.metal_hu, part(keep_going, 0.69, 0.72));
+    if (!natures) return tl::unexpected(natures.error());
+    s.found.natures = std::move(*natures);
+  }
   auto kept = options.list_only ? Result<std::vector<int>>{}
               : bones           ? Result<std::vector<int>>(islands_of(bones->regions, *islands, work->first))
-                                : islands_to_keep(options, islands->list);
+                                : islands_to_keep(options, islands->list, s.found.natures);
   if (!kept) return tl::unexpected(kept.error());
   if (options.draw_islands) {
     const std::vector<int> shown = options.list_only ? islands_with_colours(islands->list) : *kept;
@@ -289,7 +345,6 @@ Result<CtImport> import_bones(CtScan scan, CtOptions options, const KeepGoing& k
   if (!hard) return tl::unexpected(hard.error());
   s->found.metal_cm3 = hard->metal_cm3;
   s->found.enamel_cm3 = hard->enamel_cm3;
-  s->found.metal_hu = options.metal_hu;
 
   CaseInfo info = description(scan, options, *calibrated, pitch_mm);
   info.threshold_hu = options.threshold_hu;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/imaging/calibration.hpp"
+#include "common/imaging/island_kinds.hpp"
 #include "common/imaging/islands.hpp"
 #include "common/imaging/smoothing.hpp"
 #include "common/volume/case.hpp"
@@ -41,7 +42,7 @@ struct CtOptions {
   double metal_hu = imaging::kMetal_hu;  // metal is at or above it
   bool thin_cortex = false;              // correct the density of thin cortex, see imaging::correct_thin_cortex()
   std::string title = "CT";              // never taken from the scan, whose texts may name a patient
-  std::vector<int> keep;                 // islands by number, from 1; empty: the largest
+  std::vector<int> keep;                 // islands by number, from 1; empty: the largest that is bone
   bool keep_all = false;
   bool separate = false;         // bones that touch within the kept islands are bones of their own
   bool merge = false;            // the kept islands count as one bone
@@ -69,12 +70,13 @@ struct FoundBone {
 
 // Result of the segmentation.
 struct CtSegmentation {
-  double threshold_hu = 0.0;             // that was used
-  std::string threshold_reason;          // empty if the threshold was not suggested
-  std::vector<imaging::Region> regions;  // that grew from seeds
-  std::vector<imaging::Island> islands;  // largest first; number N is islands[N - 1]
-  std::vector<int> kept;                 // numbers; empty if the islands were only listed
-  bool merged = false;                   // the kept islands are one bone
+  double threshold_hu = 0.0;                   // that was used
+  std::string threshold_reason;                // empty if the threshold was not suggested
+  std::vector<imaging::Region> regions;        // that grew from seeds
+  std::vector<imaging::Island> islands;        // largest first; number N is islands[N - 1]
+  std::vector<imaging::IslandNature> natures;  // of each island; empty if the bones grew from seeds
+  std::vector<int> kept;                       // numbers; empty if the islands were only listed
+  bool merged = false;                         // the kept islands are one bone
   bool separated = false;
   std::vector<FoundBone> bones;    // only if they were separated or edited; otherwise each kept island is one
   std::vector<std::string> edits;  // what each edit did, for a person
@@ -113,6 +115,20 @@ struct CtImport {
 
 // The position of a point within a box, as a patient's sides: LPS. "middle" if it is in the middle third of all axes.
 [[nodiscard]] std::string place_words(const Vec3& at, const Box& box);
+// The kind of an island for a person, such as "table or headrest".
+[[nodiscard]] std::string words_of(imaging::IslandKind kind);
+
+// Islands of one kind that are not bone.
+struct NotBone {
+  imaging::IslandKind kind = imaging::IslandKind::table;
+  bool kept = false;         // because somebody named them
+  std::vector<int> islands;  // by number
+  double volume_cm3 = 0.0;
+  std::string text;  // for a person: what, which, how much and why
+};
+// By kind; those that are kept after the others of their kind.
+[[nodiscard]] std::vector<NotBone> not_bone(const CtSegmentation& found);
+
 // What each edit did, as lines for a person.
 [[nodiscard]] std::string edits_text(const CtSegmentation& found);
 

@@ -34,6 +34,19 @@ void add_growing(const GrowOptions& grow, LabelProvenance& provenance) {
       provenance.parameters["seed_" + std::to_string(i + 1) + "_" + "xyz"[axis] + "_mm"] = grow.seeds_mm[i][axis];
 }
 
+// Which island became the bone, what it looks like, and how much of each kind was left out as no bone.
+void add_island(const CtSegmentation& found, int bone, LabelProvenance& provenance) {
+  const int island = found.kept[static_cast<std::size_t>(bone - 1)];
+  provenance.parameters["island"] = island;
+  if (static_cast<std::size_t>(island) > found.natures.size()) return;
+  const imaging::IslandKind kind = found.natures[static_cast<std::size_t>(island - 1)].kind;
+  provenance.method += kind == imaging::IslandKind::bone ? "" : ", looks like " + std::string(name_of(kind));
+}
+void add_not_bone(const CtSegmentation& found, LabelProvenance& provenance) {
+  for (const NotBone& of : not_bone(found))
+    if (!of.kept) provenance.parameters["left_out_" + std::string(name_of(of.kind)) + "_cm3"] = of.volume_cm3;
+}
+
 // The parameters of the watershed that separated the bones, and which seeds stand for a bone.
 void add_separation(const CtOptions& options, int bone, LabelProvenance& provenance) {
   if (options.grow.seeds_mm.empty()) {
@@ -52,12 +65,13 @@ void add_separation(const CtOptions& options, int bone, LabelProvenance& provena
 CaseLabel label_of(const CtOptions& options, const CtSegmentation& found, const FoundBone& bone,
                    LabelProvenance provenance) {
   CaseLabel label{bone.number, "bone " + std::to_string(bone.number), LabelKind::bone, std::move(provenance)};
+  add_not_bone(found, label.provenance);
   if (!bone.segmented)
     label.provenance = {"edits", {}, {}};
   else if (found.separated)
     add_separation(options, bone.number, label.provenance);
   else if (!found.merged && bone.number < kMostBoneNumbers)
-    label.provenance.parameters["island"] = found.kept[static_cast<std::size_t>(bone.number - 1)];
+    add_island(found, bone.number, label.provenance);
   label.provenance.edits = bone.edits;
   return label;
 }
@@ -134,7 +148,8 @@ void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegment
   const int bones = found.merged ? 1 : std::min(kMostBoneNumbers, static_cast<int>(found.kept.size()));
   for (int bone = 1; bone <= bones; ++bone) {
     CaseLabel label{bone, "bone " + std::to_string(bone), LabelKind::bone, provenance_of(options)};
-    if (!found.merged) label.provenance.parameters["island"] = found.kept[static_cast<std::size_t>(bone - 1)];
+    add_not_bone(found, label.provenance);
+    if (!found.merged) add_island(found, bone, label.provenance);
     info.labels.push_back(std::move(label));
   }
   list_tissues(scan, options.metal_hu, info);

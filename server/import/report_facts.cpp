@@ -134,6 +134,7 @@ void list_islands(const CtSegmentation& found, ReportFacts& facts) {
     part.density_g_cm3 = island.density_g_cm3;
     part.centre_mm = island.centre_mm;
     part.place = place_words(island.centre_mm, found.region);
+    if (i < found.natures.size()) part.island = found.natures[i];
     if (kept) {
       const int bone = found.merged ? 1 : std::min(255, static_cast<int>(at - found.kept.begin()) + 1);
       part.name = "bone " + std::to_string(bone);
@@ -148,11 +149,18 @@ void list_islands(const CtSegmentation& found, ReportFacts& facts) {
       facts.unlisted.push_back(sentence("%zu more %s with %.2f cm³ together%s.", more[which],
                                         more[which] == 1 ? "island" : "islands", more_cm3[which],
                                         which == 0 ? " are in the case" : " were found"));
-  const std::size_t left_out = found.islands.size() - found.kept.size();
-  if (!found.kept.empty() && left_out > 0)
+  if (found.kept.empty()) return;
+  std::size_t left_out = found.islands.size() - found.kept.size();
+  double left_out_cm3 = found.left_out_cm3;
+  for (const NotBone& of : not_bone(found)) {
+    if (of.kept) continue;
+    facts.left_out.push_back("Not bone: " + of.text + ".");
+    left_out -= of.islands.size();
+    left_out_cm3 -= of.volume_cm3;
+  }
+  if (left_out > 0)
     facts.left_out.push_back(sentence("%zu of %zu islands, %.2f of %.2f cm³ (%.0f %%): not chosen.", left_out,
-                                      found.islands.size(), found.left_out_cm3, all_cm3,
-                                      100.0 * found.left_out_cm3 / all_cm3));
+                                      found.islands.size(), left_out_cm3, all_cm3, 100.0 * left_out_cm3 / all_cm3));
   if (found.blur_cm3 > 0.0)
     facts.left_out.push_back(
         sentence("%.2f cm³ of the kept islands: blur, outside the half maximum of their surface.", found.blur_cm3));
@@ -298,6 +306,14 @@ nlohmann::json json_of(const HuHistogram& histogram) {
           {"above", histogram.above}};
 }
 
+nlohmann::json json_of(const imaging::IslandNature& nature) {
+  return {{"kind", name_of(nature.kind)},
+          {"metal_share", nature.metal},
+          {"at_air_share", nature.at_air},
+          {"exposed_share", nature.exposed},
+          {"thickness_mm", nature.thickness_mm}};
+}
+
 nlohmann::json json_of(const LabelComparison& comparison) {
   nlohmann::json labels = nlohmann::json::array();
   for (const ComparedLabel& row : comparison.labels) {
@@ -375,7 +391,7 @@ Result<ReportFacts> report_facts(const ImportReport& report, const KeepGoing& ke
 
 std::string to_json(const ReportFacts& facts) {
   nlohmann::json parts = nlohmann::json::array();
-  for (const ReportPart& part : facts.parts)
+  for (const ReportPart& part : facts.parts) {
     parts.push_back({{"number", part.number},
                      {"name", part.name},
                      {"kind", part.kind},
@@ -385,6 +401,8 @@ std::string to_json(const ReportFacts& facts) {
                      {"density_g_cm3", or_null(part.density_g_cm3)},
                      {"centre_mm", list(part.centre_mm)},
                      {"place", part.place}});
+    if (part.island) parts.back()["island"] = json_of(*part.island);
+  }
   nlohmann::json steps = nlohmann::json::array();
   for (const ReportStep& step : facts.steps)
     steps.push_back({{"step", step.name}, {"text", step.text}, {"parameters", step.parameters}});

@@ -15,17 +15,18 @@ namespace osteon::import {
 
 // A bone, an island that was left out, or a structure at risk.
 struct ReportPart {
-  int number = 0;                       // of the island or label
-  std::string name;                     // empty for an island that was left out
-  std::string kind;                     // as in case.json; empty for islands
-  bool kept = false;                    // it is in the case
-  bool at_risk = false;                 // it is no bone; no tool cuts it
-  double volume_cm3 = 0.0;              // of its voxels
-  std::optional<double> density_g_cm3;  // mean; absent for what is no bone
-  Vec3 centre_mm = Vec3::Zero();        // LPS
-  std::string place;                    // in words
-  std::optional<Colour> colour;         // in the pictures of the case
-  Picture picture;                      // empty: there is none
+  int number = 0;                               // of the island or label
+  std::string name;                             // empty for an island that was left out
+  std::string kind;                             // as in case.json; empty for an island that was left out
+  std::optional<imaging::IslandNature> island;  // what an island is, and why
+  bool kept = false;                            // it is in the case
+  bool at_risk = false;                         // it is no bone; no tool cuts it
+  double volume_cm3 = 0.0;                      // of its voxels
+  std::optional<double> density_g_cm3;          // mean; absent for what is no bone
+  Vec3 centre_mm = Vec3::Zero();                // LPS
+  std::string place;                            // in words
+  std::optional<Colour> colour;                 // in the pictures of the case
+  Picture picture;                              // empty: there is none
 };
 
 struct ReportStep {

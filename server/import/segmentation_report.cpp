@@ -25,6 +25,52 @@ std::vector<bool> kept_flags(const CtSegmentation& found) {
   return kept;
 }
 
+// Why an island is of a kind.
+std::string why_of(imaging::IslandKind kind, double metal_hu) {
+  switch (kind) {
+    case imaging::IslandKind::table:
+      return "thin and long, in the air beside the patient";
+    case imaging::IslandKind::cast:
+      return "a thin shell in the air around bone";
+    case imaging::IslandKind::metal:
+      return line("most of it reaches %.0f HU", metal_hu);
+    case imaging::IslandKind::bone:
+      break;
+  }
+  return "";
+}
+
+// "island 3", or "islands 2, 3"; of very many the first ones.
+std::string numbers_text(const std::vector<int>& islands) {
+  constexpr std::size_t kMostNumbers = 12;
+  std::string text = islands.size() == 1 ? "island" : "islands";
+  for (std::size_t i = 0; i < std::min(islands.size(), kMostNumbers); ++i)
+    text += (i == 0 ? " " : ", ") + std::to_string(islands[i]);
+  if (islands.size() > kMostNumbers) text += line(" and %zu more", islands.size() - kMostNumbers);
+  return text;
+}
+
+// What was named as no bone, and whether it is kept.
+std::string not_bone_text(const CtSegmentation& found) {
+  std::string text;
+  for (const NotBone& of : not_bone(found)) text += (text.empty() ? "not bone   " : "           ") + of.text + "\n";
+  return text;
+}
+
+// How much was kept, and how to keep more.
+std::string kept_text(const CtSegmentation& found, double kept_cm3, double all_cm3) {
+  const std::size_t left_out = found.islands.size() - found.kept.size();
+  if (left_out == 0)
+    return line(found.regions.empty() ? "kept       all %.2f cm3; nothing was left out\n"
+                                      : "kept       all %.2f cm3 that grew from the seeds\n",
+                kept_cm3);
+  return line(
+      "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out\n"
+      "           --keep N,M takes islands by number, --keep all takes every one\n",
+      kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
+      100.0 * found.left_out_cm3 / all_cm3);
+}
+
 // The bones after separation and edits, and the edits.
 std::string bones_text(const CtSegmentation& found) {
   std::string text = line("bones      %zu in the case%s\n", found.bones.size(),
@@ -79,6 +125,32 @@ std::string place_words(const Vec3& at, const Box& box) {
   return words.empty() ? "middle" : words;
 }
 
+std::string words_of(imaging::IslandKind kind) {
+  return kind == imaging::IslandKind::table ? "table or headrest" : std::string(name_of(kind));
+}
+
+std::vector<NotBone> not_bone(const CtSegmentation& found) {
+  std::vector<NotBone> all;
+  const std::vector<bool> is_kept = kept_flags(found);
+  for (const auto kind : {imaging::IslandKind::table, imaging::IslandKind::cast, imaging::IslandKind::metal})
+    for (const bool kept : {false, true}) {
+      NotBone of{.kind = kind, .kept = kept};
+      for (std::size_t i = 0; i < found.natures.size(); ++i) {
+        if (found.natures[i].kind != kind || is_kept[i] != kept) continue;
+        of.islands.push_back(static_cast<int>(i + 1));
+        of.volume_cm3 += found.islands[i].volume_cm3;
+      }
+      if (of.islands.empty()) continue;
+      of.text = line("%s, %s, %.2f cm3%s: ", words_of(kind).c_str(), numbers_text(of.islands).c_str(), of.volume_cm3,
+                     kept                 ? ", kept"
+                     : found.kept.empty() ? ""
+                                          : ", left out") +
+                why_of(kind, found.metal_hu);
+      all.push_back(std::move(of));
+    }
+  return all;
+}
+
 std::string edits_text(const CtSegmentation& found) {
   std::string text;
   for (std::size_t i = 0; i < found.edits.size(); ++i)
@@ -96,7 +168,7 @@ std::string segmentation_text(const CtSegmentation& found) {
     text += line("%s %6zu  %lld voxels from %.0f to %.0f HU\n", i == 0 ? "grown     " : "          ", i + 1,
                  static_cast<long long>(region.voxels), region.low_hu, region.high_hu);
   }
-  text += "islands    number     cm3   g/cm3       centre, mm (LPS)\n";
+  text += "islands    number     cm3   g/cm3       centre, mm (LPS)        kind\n";
   const std::vector<bool> is_kept = kept_flags(found);
   for (std::size_t i = 0; i < found.islands.size(); ++i) {
     const imaging::Island& island = found.islands[i];
@@ -110,25 +182,16 @@ std::string segmentation_text(const CtSegmentation& found) {
       continue;
     }
     ++listed;
-    text += line("           %6zu  %7.2f  %6.2f  %8.1f %8.1f %8.1f  %-4s  %s\n", i + 1, island.volume_cm3,
+    text += line("           %6zu  %7.2f  %6.2f  %8.1f %8.1f %8.1f  %-5s  %-4s  %s\n", i + 1, island.volume_cm3,
                  island.density_g_cm3, island.centre_mm.x(), island.centre_mm.y(), island.centre_mm.z(),
-                 kept ? "kept" : "", place_words(island.centre_mm, found.region).c_str());
+                 i < found.natures.size() ? name_of(found.natures[i].kind).data() : "bone", kept ? "kept" : "",
+                 place_words(island.centre_mm, found.region).c_str());
   }
   if (others > 0)
     text += line("           and %zu more of at most %.2f cm3 each, %.2f cm3 together\n", others, largest_other_cm3,
                  others_cm3);
-  if (found.kept.empty()) return text;
-  const std::size_t left_out = found.islands.size() - found.kept.size();
-  if (left_out == 0)
-    text += line(found.regions.empty() ? "kept       all %.2f cm3; nothing was left out\n"
-                                       : "kept       all %.2f cm3 that grew from the seeds\n",
-                 kept_cm3);
-  else
-    text += line(
-        "kept       %.2f of %.2f cm3; %zu %s with %.2f cm3 (%.0f %%) left out\n"
-        "           --keep N,M takes islands by number, --keep all takes every one\n",
-        kept_cm3, all_cm3, left_out, left_out == 1 ? "island" : "islands", found.left_out_cm3,
-        100.0 * found.left_out_cm3 / all_cm3);
+  if (found.kept.empty()) return text + not_bone_text(found);
+  text += kept_text(found, kept_cm3, all_cm3) + not_bone_text(found);
   if (!found.bones.empty())
     text += bones_text(found);
   else if (found.kept.size() > 1)

@@ -334,6 +334,78 @@ TEST(CtImport, WhatIsLeftOutIsSaidWithItsVolume) {
       << text;
 }
 
+// An arm with a bone of 7 mm radius, and a screw in its flesh. A table lies below it, or a cast around it, as long as
+// the scan. Voxels of 2 mm. The threshold of 226 HU is midway between bone and flesh, and between the table and air.
+CtScan arm_with(bool table, bool cast) {
+  CtScan scan;
+  scan.source = "test";
+  scan.volume.dims = {48, 48, 40};
+  scan.volume.spacing_mm = {2.0, 2.0, 2.0};
+  for (int k = 0; k < 40; ++k)
+    for (int j = 0; j < 48; ++j)
+      for (int i = 0; i < 48; ++i) {
+        const double radius_mm = std::hypot(2.0 * i - 47.0, 2.0 * j - 40.0);
+        const bool screw = std::abs(2.0 * i - 62.0) < 3.0 && std::abs(2.0 * j - 40.0) < 3.0 && k > 10 && k < 30;
+        const bool sheet = table && j >= 42 && j < 44;
+        const bool shell = cast && radius_mm >= 26.0 && radius_mm < 30.0;
+        scan.volume.values.push_back(screw              ? 3071
+                                     : radius_mm < 7.0  ? 412
+                                     : sheet || shell   ? 1452
+                                     : radius_mm < 24.0 ? 40
+                                                        : -1000);
+      }
+  return scan;
+}
+constexpr double kArmBone_mm3 = std::numbers::pi * 49.0 * 80.0;
+
+TEST(CtImport, ATableThatIsLargerThanTheBoneIsLeftOutByName) {
+  const auto made = import_ct(arm_with(true, false), {}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->found.islands.size(), 3u);
+  EXPECT_EQ(made->found.kept, std::vector{2});
+  EXPECT_NEAR(made->bone->volume_mm3(), kArmBone_mm3, 0.1 * kArmBone_mm3);
+  const std::string text = segmentation_text(made->found);
+  // The table has 96 x 80 x 4 mm, the screw 3 x 3 x 19 voxels of 8 mm3.
+  for (const char* said : {"not bone   table or headrest, island 1, 30.72 cm3, left out: thin and long, in the air",
+                           "           metal, island 3, 1.37 cm3, left out: most of it reaches 3000 HU\n"})
+    EXPECT_NE(text.find(said), std::string::npos) << text;
+  const LabelProvenance& provenance = made->bone->info().labels.front().provenance;
+  EXPECT_NEAR(provenance.parameters.at("left_out_table_cm3"), 30.72, 1e-9);
+  EXPECT_NEAR(provenance.parameters.at("left_out_metal_cm3"), 1.368, 1e-9);
+  EXPECT_EQ(provenance.parameters.at("island"), 2.0);
+}
+
+TEST(CtImport, KeepStillTakesATable) {
+  const auto made = import_ct(arm_with(true, false), {.keep = {1}}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_NEAR(made->bone->volume_mm3(), 30720.0, 0.1 * 30720.0);
+  EXPECT_NE(segmentation_text(made->found).find("table or headrest, island 1, 30.72 cm3, kept: "), std::string::npos);
+  EXPECT_EQ(made->bone->info().labels.front().provenance.method,
+            "threshold, enclosed marrow, islands, looks like table");
+}
+
+// A cast closes around the arm as cortex does around marrow. The arm must not become its marrow.
+TEST(CtImport, ACastDoesNotEncloseTheLimbAsMarrow) {
+  const auto made = import_ct(arm_with(false, true), {}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->found.islands.size(), 3u);
+  EXPECT_EQ(made->found.natures[0].kind, imaging::IslandKind::cast);
+  EXPECT_EQ(made->found.kept, std::vector{2});
+  EXPECT_NEAR(made->bone->volume_mm3(), kArmBone_mm3, 0.1 * kArmBone_mm3);
+  EXPECT_NE(segmentation_text(made->found).find("cast, island 1, "), std::string::npos);
+}
+
+TEST(CtImport, MetalAloneIsNoBone) {
+  CtScan scan = arm_with(false, false);
+  for (std::int16_t& hu : scan.volume.values) hu = hu == 412 ? 40 : hu;
+  const auto made = import_ct(scan, {}, keep_going);
+  ASSERT_FALSE(made);
+  EXPECT_EQ(made.error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(made.error().message.find("no island is bone: all that reaches the threshold of 226 HU is metal; "), 0u)
+      << made.error().message;
+  EXPECT_TRUE(import_ct(scan, {.keep = {1}}, keep_going));
+}
+
 TEST(CtImport, AnIslandThatIsNotThereIsRefused) {
   const auto made = import_ct(three_cubes(), {.keep = {2, 4}}, keep_going);
   ASSERT_FALSE(made);

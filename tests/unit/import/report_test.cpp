@@ -96,6 +96,42 @@ TEST_F(Report, SaysWhatWasKeptAndWhatWasLeftOut) {
   EXPECT_EQ(html.find("src=\"http"), std::string::npos) << "it needs no other file";
 }
 
+// The blocks in soft tissue, with air and a sheet of a table behind them.
+TEST_F(Report, NamesTheTableAndSaysWhy) {
+  const auto hu_at = [](const Vec3& p) {
+    return block_at(p) != 0 ? 1000 : p.y() > 13.0 && p.y() < 15.0 ? 600 : p.y() < 9.0 ? 40 : -1000;
+  };
+  write_bytes(folder_ / "ct.nii",
+              nifti_file(kGrid, {.code = 4, .bits = 16, .bytes = bytes_of<std::int16_t>(labels_of(kGrid, hu_at))}));
+  const auto made = import({"--out", path("case"), "--report", path("report")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const nlohmann::json report = facts();
+  const auto& parts = report.at("parts");
+  ASSERT_EQ(parts.size(), 3u);
+  int tables = 0;
+  for (const auto& part : parts) {
+    const auto& island = part.at("island");
+    if (island.at("kind") == "bone") {
+      EXPECT_LT(island.at("exposed_share"), 0.05);
+      continue;
+    }
+    ++tables;
+    EXPECT_EQ(island.at("kind"), "table");
+    EXPECT_FALSE(part.at("kept"));
+    // Both faces of the sheet see air, and the one to the back sees outside.
+    EXPECT_GT(island.at("at_air_share"), 0.9);
+    EXPECT_GT(island.at("exposed_share"), 0.45);
+  }
+  EXPECT_EQ(tables, 1);
+  ASSERT_EQ(report.at("left_out").size(), 2u);
+  EXPECT_NE(report.at("left_out")[0].get<std::string>().find("Not bone: table or headrest, island "),
+            std::string::npos);
+  EXPECT_NE(report.at("left_out")[1].get<std::string>().find("1 of 3 islands, 0.34 of "), std::string::npos);
+  const std::string html = test::content(folder_ / "report" / "report.html");
+  expect_well_formed(html);
+  EXPECT_NE(html.find("left out: table or headrest"), std::string::npos);
+}
+
 TEST_F(Report, TheHistogramCountsEveryVoxel) {
   ASSERT_EQ(import({"--out", path("case"), "--report", path("report")}).exit_code, 0);
   const nlohmann::json histogram = facts().at("histogram");

@@ -122,7 +122,7 @@ TEST(ScanCalibration, MetalBeginsWhereTheUserSays) {
   const auto import_with = [](double metal_hu) {
     auto scan = scan_phantom(small_block(), 0.5, keep_going);
     EXPECT_TRUE(scan);
-    return import_ct({.volume = std::move(*scan), .source = "test"}, {.metal_hu = metal_hu}, keep_going);
+    return import_ct({.volume = std::move(*scan), .source = "test"}, {.metal_hu = metal_hu, .keep = {1}}, keep_going);
   };
   const auto bone = import_with(3000.0), metal = import_with(1200.0);
   ASSERT_TRUE(bone && metal);
