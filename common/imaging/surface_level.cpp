@@ -10,7 +10,7 @@ namespace osteon::imaging {
 namespace {
 
 // [A] The farthest that a profile goes each way: so many mm for the blur of the scanner, and so many voxels.
-constexpr double kReach_mm = 1.5, kReach_voxels = 2.0;
+constexpr double kProfile_mm = 1.5, kProfile_voxels = 2.0;
 constexpr double kStep_voxels = 0.5;
 constexpr double kTurn = 0.25;  // [A] A profile ends where HU go back by this part of their change. Noise is less.
 // [A] HU of the most compact bone. Metal and enamel behind bone do not raise its level beyond what such bone gives.
@@ -29,7 +29,7 @@ class Profiles {
     // Steps in voxels, so that no slice is passed over.
     const Vec3 step = direction.cwiseQuotient(volume_.spacing_mm);
     const double step_mm = kStep_voxels / step.cwiseAbs().maxCoeff();
-    const double reach_mm = kReach_mm + kReach_voxels * direction.cwiseAbs().dot(volume_.spacing_mm);
+    const double reach_mm = kProfile_mm + kProfile_voxels * direction.cwiseAbs().dot(volume_.spacing_mm);
     const int steps = static_cast<int>(std::ceil(reach_mm / step_mm));
     const std::uint8_t bone = bones_.at(at[0], at[1], at[2]);
     const Vec3 from(at[0], at[1], at[2]);

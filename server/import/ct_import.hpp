@@ -121,10 +121,10 @@ struct CtImport {
 // Islands of one kind that are not bone.
 struct NotBone {
   imaging::IslandKind kind = imaging::IslandKind::table;
-  bool kept = false;         // because somebody named them
-  std::vector<int> islands;  // by number
+  bool kept = false;              // because somebody named them
+  std::vector<int> islands = {};  // by number
   double volume_cm3 = 0.0;
-  std::string text;  // for a person: what, which, how much and why
+  std::string text = {};  // for a person: what, which, how much and why
 };
 // By kind; those that are kept after the others of their kind.
 [[nodiscard]] std::vector<NotBone> not_bone(const CtSegmentation& found);

@@ -101,8 +101,11 @@ TEST(RandomSeries, EveryImportEndsWithAClosedSurfaceOrASentence) {
     if (!made) {
       // Bone without a sample in it is so thin that none of its voxels has a neighbour on both sides.
       expect_one_sentence(made.error(), "--threshold");
-      if (any) EXPECT_NE(made.error().message.find("thinner than a sample"), std::string::npos) << made.error().message;
-      thin += any ? 1 : 0;
+      const bool metal = std::ranges::any_of(d.volume.values, [](std::int16_t hu) { return hu >= imaging::kMetal_hu; });
+      const bool no_bone = metal && made.error().message.find("is metal") != std::string::npos;
+      if (any && !no_bone)
+        EXPECT_NE(made.error().message.find("thinner than a sample"), std::string::npos) << made.error().message;
+      thin += any && !no_bone ? 1 : 0;
       ++refused;
       continue;
     }

@@ -374,6 +374,18 @@ TEST_F(SharedScans, HaveASuggestedThreshold) {
   }
 }
 
+// README: a support lies beside the legs, and a blob like metal before them.
+TEST_F(SharedScans, TheSupportOfTheLegsIsATableAndTheBlobIsMetal) {
+  auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
+  ASSERT_TRUE(scan);
+  const auto list = import_ct(std::move(*scan), {.list_only = true}, keep_going);
+  ASSERT_TRUE(list);
+  ASSERT_GT(list->found.natures.size(), 6u);
+  using enum imaging::IslandKind;
+  const std::array expected{bone, bone, bone, bone, table, metal};
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(list->found.natures[i].kind, expected[i]) << i + 1;
+}
+
 // The tibiae touch no other bone: what grows from a voxel of theirs is their island.
 TEST_F(SharedScans, ATibiaGrowsFromItsCortex) {
   const auto scan = read_dicom_series(data_ / "tibia-dicom", keep_going);
