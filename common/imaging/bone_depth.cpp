@@ -14,7 +14,7 @@ constexpr double kDenseAbove_hu = 800.0;
 constexpr int kUnitsPerVoxel = 64;                  // of dense bone, along the smallest spacing
 constexpr std::uint32_t kMeasuredAtOnce = 1 << 15;  // voxels between two questions whether to go on
 
-// A priority queue of whole levels. std::uint32_ts leave from the lowest level up, those of one level in the order in
+// A priority queue of whole levels. Items leave from the lowest level up, those of one level in the order in
 // which they came. The level that is being emptied never falls: an item that comes below it joins it.
 class BucketQueue {
  public:

@@ -1,5 +1,6 @@
 #include "common/imaging/moved_volume.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/core/check.hpp"
@@ -47,13 +48,13 @@ Result<std::vector<std::uint16_t>> moved_labels(const HuVolume& fixed, const HuV
                                                 const std::vector<std::uint16_t>& labels, const Pose& pose_fixed_moving,
                                                 const KeepGoing& keep_going) {
   OSTEON_CHECK(labels.size() == moving.count());
+  // Truncation rounds: no coordinate is below -0.5. The largest number below 0.5 and 0.5 have the sum 1.
+  const auto nearest = [&](double at, std::size_t axis) {
+    return std::min(static_cast<int>(at + 0.5), moving.dims[axis] - 1);
+  };
   return moved(
       fixed, moving, pose_fixed_moving, std::uint16_t{0},
-      // Truncation rounds: no coordinate is below -0.5.
-      [&](const Vec3& at) {
-        return labels[moving.index(static_cast<int>(at.x() + 0.5), static_cast<int>(at.y() + 0.5),
-                                   static_cast<int>(at.z() + 0.5))];
-      },
+      [&](const Vec3& at) { return labels[moving.index(nearest(at.x(), 0), nearest(at.y(), 1), nearest(at.z(), 2))]; },
       keep_going);
 }
 

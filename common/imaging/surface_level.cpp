@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "common/imaging/neighbours.hpp"
@@ -97,7 +98,7 @@ class Profiles {
   const VoxelMask& bones_;
 };
 
-constexpr std::uint8_t kNotSeen = 0, kStays = 1, kGoes = 2;
+constexpr std::uint8_t kNotSeen = 0, kStays = 1, kGoes = 2, kBeside = 3;
 
 // Goes from the surface into the bones, through the voxels below their level.
 class Front {
@@ -137,9 +138,10 @@ class Front {
         return stopped();
       neighbours.each(seen_[i], [&](std::uint32_t beside, int) {
         if (state_.values[beside] != kNotSeen) return;
+        state_.values[beside] = kBeside;
         int sum = 0, count = 0;
         neighbours.each(beside, [&](std::uint32_t known, int) {
-          if (state_.values[known] == kNotSeen) return;
+          if (state_.values[known] == kNotSeen || state_.values[known] == kBeside) return;
           sum += above.values[known];
           ++count;
         });
@@ -196,6 +198,9 @@ class Front {
 
 Result<SurfaceLevel> move_to_half_maximum(const HuVolume& volume, double threshold_hu, VoxelMask& bones,
                                           const KeepGoing& keep_going) {
+  if (volume.count() > std::numeric_limits<std::uint32_t>::max())
+    return bad_input("a scan of " + describe(volume) +
+                     " has too many voxels to find the level of its surface; export a smaller region");
   SurfaceLevel level{threshold_hu, VoxelMask(volume.dims)};
   Front front(volume, bones, level);
   if (auto done = front.start(part(keep_going, 0.0, 0.6)); !done) return tl::unexpected(done.error());

@@ -29,7 +29,8 @@ struct SurfaceLevel {
 // has a low level, and stays. Metal behind bone counts as compact bone.
 //
 // `bones`: the bone number of each voxel; 0: none. Voxels below their level, between the surface and bone, lose it. No
-// voxel gets one. Two bones that touch have a surface between them. Error: cancelled.
+// voxel gets one. Two bones that touch have a surface between them. Errors: invalid_input (too many
+// voxels), cancelled.
 [[nodiscard]] Result<SurfaceLevel> move_to_half_maximum(const HuVolume& volume, double threshold_hu, VoxelMask& bones,
                                                         const KeepGoing& keep_going);
 

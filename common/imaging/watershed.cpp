@@ -5,6 +5,7 @@
 #include <itkMorphologicalWatershedFromMarkersImageFilter.h>
 
 #include <algorithm>
+#include <new>
 
 #include "common/core/check.hpp"
 
@@ -29,6 +30,10 @@ typename Image::Pointer view_of(std::vector<Pixel>& values, const std::array<int
   return image;
 }
 
+tl::unexpected<Error> no_memory() {
+  return failure(ErrorCode::exhausted, "this machine has no memory to separate the bones; export a smaller region");
+}
+
 Result<void> flood(std::vector<std::uint16_t>& relief, VoxelMask& markers, bool corners, const KeepGoing& keep_going) {
   if (!keep_going(0.0)) return stopped_while("separating the bones");
   auto filter = Filter::New();
@@ -44,7 +49,9 @@ Result<void> flood(std::vector<std::uint16_t>& relief, VoxelMask& markers, bool 
   } catch (const itk::ProcessAborted&) {
     return stopped_while("separating the bones");
   } catch (const itk::MemoryAllocationError&) {
-    return failure(ErrorCode::exhausted, "this machine has no memory to separate the bones; export a smaller region");
+    return no_memory();
+  } catch (const std::bad_alloc&) {  // of the filter's queue
+    return no_memory();
   } catch (const itk::ExceptionObject& fault) {
     return failure(ErrorCode::internal, std::string("ITK cannot separate the bones: ") + fault.GetDescription());
   }

@@ -16,6 +16,11 @@ find_package(ITK 5.2 REQUIRED COMPONENTS
   ITKIOGDCM ITKIOMeta ITKIONIFTI ITKIONRRD ITKLabelMap ITKOptimizersv4 ITKRegionGrowing ITKSmoothing ITKTransform)
 # Its targets name no folder of headers.
 find_path(OSTEON_ITK_HEADERS itkNiftiImageIO.h PATH_SUFFIXES ITK-5.2 REQUIRED)
+# Lets the files of a target include ITK, with GCC and with clang.
+function(osteon_include_itk target)
+  target_include_directories(${target} SYSTEM PRIVATE ${OSTEON_ITK_HEADERS})
+  target_compile_options(${target} PRIVATE "SHELL:-include ${PROJECT_SOURCE_DIR}/deploy/cmake/itk_with_clang.h")
+endfunction()
 find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(OpenSSL REQUIRED)
