@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "common/core/freed_memory.hpp"
+
 namespace osteon::imaging {
 
 std::string describe(const HuVolume& volume) {
@@ -26,7 +28,7 @@ HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::ar
       to = std::copy(from, from + part.dims[0], to);
     }
   volume.values.resize(part.count());
-  volume.values.shrink_to_fit();
+  give_back_unused(volume.values);
   part.values = std::move(volume.values);
   return part;
 }

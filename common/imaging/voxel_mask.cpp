@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/core/freed_memory.hpp"
+
 namespace osteon::imaging {
 namespace {
 
@@ -64,7 +66,7 @@ VoxelMask cropped(VoxelMask mask, const std::array<int, 3>& first, const std::ar
       to = std::copy(from, from + (last[0] - first[0] + 1), to);
     }
   mask.values.resize(static_cast<std::size_t>(to - mask.values.data()));
-  mask.values.shrink_to_fit();
+  give_back_unused(mask.values);
   for (std::size_t axis = 0; axis < 3; ++axis) mask.dims[axis] = last[axis] - first[axis] + 1;
   return mask;
 }

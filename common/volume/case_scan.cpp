@@ -19,6 +19,7 @@
 #include "common/volume/case.hpp"
 #include "common/volume/openvdb_start.hpp"
 #include "common/volume/vdb_size.hpp"
+#include "common/volume/vdb_writer.hpp"
 
 namespace osteon {
 namespace {
@@ -57,32 +58,39 @@ bool hash_voxels(Hasher& hasher, const char* name, const std::vector<T>& voxels,
 struct WritingStopped {};
 
 // A grid of the voxels of a scan that needs hardly any memory of its own. Its leaves know which voxels differ from the
-// background, and get their values only while they are written, one after the other.
+// background, and get their values only while they are written, one after the other. OpenVDB 10 first compresses every
+// leaf once for its size, and gives each leaf without values a buffer for that. So the grid is empty until OpenVDB asks
+// for its topology.
 template <class T>
 class ScanWriter : public ScanGrid {
  public:
-  // `voxels` and `writing` must outlive the grid. `making` is asked only here.
+  // `voxels` and `keep_going` must outlive the grid.
   ScanWriter(const char* name, const std::vector<T>& voxels, const ScanGeometry& geometry, std::int32_t background,
-             const KeepGoing& making, const KeepGoing& writing)
-      : ScanGrid(background), voxels_(voxels), last_(voxels_of(geometry).max()), writing_(writing) {
+             const KeepGoing& keep_going)
+      : ScanGrid(background), voxels_(voxels), last_(voxels_of(geometry).max()), keep_going_(keep_going) {
     setName(name);
     setTransform(openvdb::math::Transform::createLinearTransform(1.0));
+  }
+
+  void writeTopology(std::ostream& os) const override {
+    leaves_ = std::make_unique<TreeType>(background());
     for (openvdb::Int32 x = 0; x <= last_.x(); x += kLeafSize) {
-      ask(making, static_cast<double>(x) / (last_.x() + 1));
+      ask(kMakingEnd * x / (last_.x() + 1));
       for (openvdb::Int32 y = 0; y <= last_.y(); y += kLeafSize)
         for (openvdb::Int32 z = 0; z <= last_.z(); z += kLeafSize) add_leaf(openvdb::Coord(x, y, z));
     }
-    openvdb::tools::pruneTiles(tree());
+    openvdb::tools::pruneTiles(*leaves_);
+    leaves_->writeTopology(os, false);
   }
 
   void writeBuffers(std::ostream& os) const override {
     ScanLeaf leaf;
     std::int32_t* values = leaf.buffer().data();
     std::size_t written = 0;
-    const auto leaves = static_cast<double>(tree().leafCount());
-    for (auto at = tree().cbeginLeaf(); at; ++at) {
+    const auto leaves = static_cast<double>(leaves_->leafCount());
+    for (auto at = leaves_->cbeginLeaf(); at; ++at) {
       if (written++ % kOften == 0) {
-        ask(writing_, static_cast<double>(written) / leaves);
+        ask(kMakingEnd + (1.0 - kMakingEnd) * static_cast<double>(written) / leaves);
         give_back_freed_memory();  // compressing leaves gaps in the heap
       }
       std::fill_n(values, kLeafVoxels, background());
@@ -90,13 +98,15 @@ class ScanWriter : public ScanGrid {
       leaf.setValueMask(at->getValueMask());
       leaf.writeBuffers(os, false);
     }
+    leaves_.reset();
   }
 
  private:
   static constexpr std::size_t kOften = 4096;  // leaves between two calls of keep_going
+  static constexpr double kMakingEnd = 0.3;    // of the time
 
-  static void ask(const KeepGoing& keep_going, double done) {
-    if (!keep_going(done)) throw WritingStopped{};
+  void ask(double done) const {
+    if (!keep_going_(done)) throw WritingStopped{};
   }
   // Calls `visit` with every voxel of a leaf and its place there. Columns follow each other in the scan, and slices in
   // a leaf. Returns the number of voxels: fewer at the end of the scan.
@@ -114,7 +124,7 @@ class ScanWriter : public ScanGrid {
     return columns * rows * slices;
   }
   // A leaf that knows which voxels differ from the background, but no values; a constant if all have one value.
-  void add_leaf(const openvdb::Coord& origin) {
+  void add_leaf(const openvdb::Coord& origin) const {
     const std::int32_t usual = background();
     std::int32_t least = std::numeric_limits<std::int32_t>::max(), most = std::numeric_limits<std::int32_t>::min();
     std::array<openvdb::Index64, ScanLeaf::NodeMaskType::WORD_COUNT> bits{};
@@ -124,7 +134,7 @@ class ScanWriter : public ScanGrid {
       bits[to_index(place / 64)] |= static_cast<openvdb::Index64>(value != usual ? 1 : 0) << (place % 64);
     });
     if (least == most && (voxels == kLeafVoxels || most == usual)) {
-      if (most != usual) tree().addTile(1, origin, most, true);
+      if (most != usual) leaves_->addTile(1, origin, most, true);
       return;
     }
     ScanLeaf::NodeMaskType mask;
@@ -132,12 +142,13 @@ class ScanWriter : public ScanGrid {
       mask.template getWord<openvdb::Index64>(word) = bits[word];
     auto leaf = std::make_unique<ScanLeaf>(openvdb::PartialCreate(), origin, usual);
     leaf->setValueMask(mask);
-    tree().addLeaf(leaf.release());
+    leaves_->addLeaf(leaf.release());
   }
 
   const std::vector<T>& voxels_;
   openvdb::Coord last_;  // voxel of the scan
-  const KeepGoing& writing_;
+  const KeepGoing& keep_going_;
+  mutable std::unique_ptr<TreeType> leaves_;  // while the grid is written
 };
 
 template <class T>
@@ -212,22 +223,18 @@ Result<void> check_labels_of(const CaseScan& scan, const CaseInfo& info) {
 Result<void> save_scan(const std::filesystem::path& file, const CaseScan& scan, const KeepGoing& keep_going) try {
   start_openvdb();
   const KeepGoing all = keep_going ? keep_going : [](double) { return true; };
-  const KeepGoing hu = part(all, 0.3, 0.65), labels = part(all, 0.65, 0.82), tissue = part(all, 0.82, 1.0);
+  const KeepGoing hu = part(all, 0.0, 0.5), labels = part(all, 0.5, 0.75), tissue = part(all, 0.75, 1.0);
   const ScanGeometry& geometry = scan.geometry;
-  openvdb::GridPtrVec grids;
+  openvdb::GridCPtrVec grids;
   if (!scan.hu.empty())
-    grids.push_back(std::make_shared<ScanWriter<std::int16_t>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu,
-                                                               part(all, 0.0, 0.1), hu));
-  const auto add = [&](const char* name, const std::vector<std::uint8_t>& voxels, const KeepGoing& making,
-                       const KeepGoing& writing) {
+    grids.push_back(std::make_shared<ScanWriter<std::int16_t>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu, hu));
+  const auto add = [&](const char* name, const std::vector<std::uint8_t>& voxels, const KeepGoing& keep_going) {
     if (!voxels.empty())
-      grids.push_back(std::make_shared<ScanWriter<std::uint8_t>>(name, voxels, geometry, 0, making, writing));
+      grids.push_back(std::make_shared<ScanWriter<std::uint8_t>>(name, voxels, geometry, 0, keep_going));
   };
-  add(kLabelGrid, scan.labels, part(all, 0.1, 0.2), labels);
-  add(kTissueGrid, scan.tissue, part(all, 0.2, 0.3), tissue);
-  openvdb::io::File out(file.string());
-  out.write(grids);
-  out.close();
+  add(kLabelGrid, scan.labels, labels);
+  add(kTissueGrid, scan.tissue, tissue);
+  write_vdb(file, grids, openvdb::MetaMap());
   if (!all(1.0)) return stopped_while("writing the scan");
   return {};
 } catch (const WritingStopped&) {

@@ -21,6 +21,7 @@
 #include "common/tools/tool_file.hpp"
 #include "common/volume/openvdb_start.hpp"
 #include "common/volume/vdb_size.hpp"
+#include "common/volume/vdb_writer.hpp"
 
 namespace osteon {
 namespace {
@@ -229,9 +230,7 @@ Result<void> write_grids(const fs::path& file, const SavedFields& fields) {
     meta.insertMeta(kToolsKey, openvdb::Int64Metadata(static_cast<std::int64_t>(fields.tools.size())));
     for (std::size_t i = 0; i < fields.tools.size(); ++i)
       meta.insertMeta(kToolsKey + std::to_string(i), openvdb::StringMetadata(to_yaml(fields.tools[i])));
-    openvdb::io::File out(file.string());
-    out.write(grids, meta);
-    out.close();
+    write_vdb(file, openvdb::GridCPtrVec(grids.begin(), grids.end()), meta);
     return {};
   } catch (const std::exception& e) {
     return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + e.what());

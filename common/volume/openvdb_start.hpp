@@ -3,8 +3,8 @@
 
 namespace osteon {
 
-// Call it before OpenVDB reads or writes. Any thread, any number of times. Afterwards OpenVDB neither writes nor reads
-// its hint for delayed loading. That hint may declare any number of leaves, and OpenVDB allocates memory for all of
+// Call it before OpenVDB reads or writes. Any thread, any number of times. Afterwards OpenVDB does not read a file's
+// table for delayed loading. That table may declare any number of leaves, and OpenVDB allocates memory for all of
 // them.
 void start_openvdb();
 

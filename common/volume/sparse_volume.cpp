@@ -9,6 +9,7 @@
 
 #include "common/core/check.hpp"
 #include "common/volume/openvdb_start.hpp"
+#include "common/volume/vdb_writer.hpp"
 
 namespace osteon {
 
@@ -221,16 +222,14 @@ Result<void> save_volumes(const std::filesystem::path& file, double pitch_mm,
                           const std::vector<std::pair<std::string, const SparseVolume*>>& volumes) {
   try {
     start_openvdb();
-    openvdb::GridPtrVec grids;
+    openvdb::GridCPtrVec grids;
     for (const auto& [name, volume] : volumes) {
       const Grid::Ptr grid = volume->impl_->grid->copy();  // shares the tree; has its own name and transform
       grid->setName(name);
       grid->setTransform(openvdb::math::Transform::createLinearTransform(pitch_mm));
       grids.push_back(grid);
     }
-    openvdb::io::File out(file.string());
-    out.write(grids);
-    out.close();
+    write_vdb(file, grids, openvdb::MetaMap());
     return {};
   } catch (const std::exception& e) {
     return failure(ErrorCode::internal, "cannot write " + file.string() + ": " + e.what());

@@ -2,10 +2,13 @@
 #include "common/volume/case_scan.hpp"
 
 #include <gtest/gtest.h>
+#include <openvdb/io/DelayedLoadMetadata.h>
 #include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <fstream>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "common/volume/openvdb_start.hpp"
@@ -67,6 +70,32 @@ TEST_F(CaseScanTest, SampleIjkIsColumnRowAndSlice) {
   EXPECT_EQ(labels->tree().getValue(openvdb::Coord(9, 5, 0)), 7);
   EXPECT_EQ(labels->tree().getValue(openvdb::Coord(9, 6, 0)), 0);
   EXPECT_EQ(tissue->tree().getValue(openvdb::Coord(0, 0, 3)), 2);
+}
+
+// As other programs do it by default: OpenVDB loads the values of a leaf when they are needed. It expects the table for
+// that in a file's metadata, or none.
+TEST_F(CaseScanTest, AnotherProgramLoadsVoxelsWhenItNeedsThem) {
+  start_openvdb();
+  openvdb::io::DelayedLoadMetadata::registerType();
+  for (const char* written : {"scan.vdb", "bone.vdb"}) {
+    std::map<std::string, openvdb::Index64> active[2];
+    for (const bool delayed : {false, true}) {
+      openvdb::io::File file((folder_ / written).string());
+      file.open(delayed);
+      for (auto name = file.beginName(); name != file.endName(); ++name) {
+        const auto grid = file.readGrid(name.gridName());
+        openvdb::Index64 sum = grid->activeVoxelCount();
+        if (const auto values = openvdb::gridPtrCast<openvdb::Int32Grid>(grid))
+          for (auto at = values->cbeginValueOn(); at; ++at)
+            sum += static_cast<openvdb::Index64>(at.getValue()) * at.getVoxelCount();
+        active[delayed ? 1 : 0][name.gridName()] = sum;
+      }
+    }
+    EXPECT_FALSE(active[0].empty());
+    EXPECT_EQ(active[0], active[1]) << written;
+    EXPECT_EQ(test::content(folder_ / written).find("file_delayed_load"), std::string::npos) << written;
+  }
+  openvdb::io::DelayedLoadMetadata::unregisterType();
 }
 
 // Computed with Python's hashlib and struct from the rules of deploy/docs/case.md.
