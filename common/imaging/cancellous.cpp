@@ -1,6 +1,7 @@
 #include "common/imaging/cancellous.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/imaging/components.hpp"
 
@@ -82,15 +83,21 @@ Result<VoxelMask> candidates(const HuVolume& volume, const VoxelMask& dense, con
   return out;
 }
 
-// Removes components in which the fraction of voxels in `core` is below `share`, or zero. False: none is left.
-Result<bool> keep_with_core(VoxelMask& mask, const VoxelMask& core, double share, const KeepGoing& keep_going) {
+// Removes components in which the fraction of voxels in a core is below `share`, or zero. `in_core` gets the index of a
+// voxel. False: none is left.
+template <class InCore>
+Result<bool> keep_with_core(VoxelMask& mask, InCore in_core, double share, const KeepGoing& keep_going) {
   std::bitset<256> one;
   one.set(1);
   const auto found = find_components(mask, one, Connectivity::corners, keep_going);
   if (!found) return tl::unexpected(found.error());
   const std::vector<std::int64_t> all = found->voxels();
   std::vector<std::int64_t> of_core(found->count, 0);
-  for (const VoxelRun& run : found->runs) of_core[run.component] += count_in_run(core, run);
+  for (const VoxelRun& run : found->runs) {
+    const std::size_t begin = mask.index(0, run.row, run.slice);
+    for (int x = run.first; x <= run.last; ++x)
+      of_core[run.component] += in_core(begin + static_cast<std::size_t>(x)) ? 1 : 0;
+  }
   std::vector<bool> kept(found->count, false);
   for (std::size_t i = 0; i < kept.size(); ++i)
     kept[i] = of_core[i] > 0 && static_cast<double>(of_core[i]) >= share * static_cast<double>(all[i]);
@@ -188,24 +195,24 @@ Result<VoxelMask> cancellous_between(const HuVolume& volume, const VoxelMask& de
   // A core is farther from dense bone than half the width of a joint.
   auto near = within_mm(dense, volume.spacing_mm, params.bridged_mm, part(keep_going, 0.3, 0.5));
   if (!near) return near;
-  const auto core_of = [&](const VoxelMask& mask) {
-    VoxelMask core(mask.dims);
-    for (std::size_t i = 0; i < core.values.size(); ++i)
-      core.values[i] = mask.values[i] != 0 && near->values[i] == 0 ? 1 : 0;
-    return core;
-  };
-  const auto any = keep_with_core(*candidate, core_of(*candidate), 0.0, part(keep_going, 0.5, 0.6));
+  const auto in_core = [&](std::size_t i) { return near->values[i] == 0; };
+  const auto any = keep_with_core(*candidate, in_core, 0.0, part(keep_going, 0.5, 0.6));
   if (!any) return tl::unexpected(any.error());
   if (!*any) return VoxelMask(volume.dims);
 
   auto found = between_dense(*candidate, dense, part(keep_going, 0.6, 0.85));
   if (!found) return found;
   // A vessel with contrast medium and calcified wall has a few such lines. Most cancellous bone is between dense bone.
-  if (const auto left = keep_with_core(*candidate, *found, kLeastBetween, part(keep_going, 0.85, 0.9)); !left)
+  const auto is_between = [&](std::size_t i) { return found->values[i] != 0; };
+  if (const auto left = keep_with_core(*candidate, is_between, kLeastBetween, part(keep_going, 0.85, 0.9)); !left)
     return tl::unexpected(left.error());
-  for (std::size_t i = 0; i < found->values.size(); ++i)
+  VoxelMask core = std::move(*near);  // its memory
+  for (std::size_t i = 0; i < found->values.size(); ++i) {
     if (candidate->values[i] == 0) found->values[i] = 0;
-  auto around = within_mm(core_of(*found), volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
+    core.values[i] = found->values[i] != 0 && core.values[i] == 0 ? 1 : 0;
+  }
+  *candidate = {};
+  auto around = within_mm(core, volume.spacing_mm, 2.0 * params.bridged_mm, part(keep_going, 0.9, 1.0));
   if (!around) return around;
   for (std::size_t i = 0; i < found->values.size(); ++i)
     if (around->values[i] == 0) found->values[i] = 0;
