@@ -17,6 +17,8 @@ struct Shaft {
   double radius_mm = 9.0, cortex_mm = 3.0;
 
   [[nodiscard]] double surface_mm(const Vec3& at_mm) const;  // exact signed distance, negative inside
+  [[nodiscard]] double volume_mm3() const;                   // with the cortex
+  [[nodiscard]] double cancellous_mm3() const;
 };
 
 struct BoneScan {
@@ -40,6 +42,9 @@ inline constexpr double kSoftTissue_hu = 40.0, kCancellous_hu = 250.0, kCortex_h
 [[nodiscard]] std::vector<Shaft> long_bone();
 [[nodiscard]] std::vector<Shaft> two_bones(double gap_mm);
 
+// How far the interior of a layer is from its faces: most of a face's blur is nearer.
+inline constexpr double kInterior_mm = 1.0;
+
 // The threshold at which a blurred edge of cortex in soft tissue stays where it is.
 inline constexpr double kMidway_hu = 0.5 * (kSoftTissue_hu + kCortex_hu);
 
@@ -56,12 +61,21 @@ struct Accuracy {
          percentile95_mm = 0.0;  // distances of the surfaces, both ways; the percentile is the larger way's
   double offset_mm = 0.0;        // mean of the signed distance of the case's surface from the true one
   std::size_t islands = 0;       // that the threshold found, of at least 0.05 cm³
+  double cortical_percent = 0.0, cancellous_percent = 0.0;            // errors of the mean density
+  double cortical_mass_percent = 0.0, cancellous_mass_percent = 0.0;  // errors of the mass
 };
-// The bone of a case against the shape.
+
+// The bone of a case against the shape. An error of density or mass is what the case has more than the truth, as
+// percent of the truth; the truth is what the case's calibration gives for the HU of the shape. Bone that the case
+// lacks has no density.
+// Density: the mean over the interior of the true cortex, at least kInterior_mm from both its faces, and over that of
+// the true cancellous bone.
+// Mass: the integral of density over all bone of the case that is less deep than the true cortex is thick, also outside
+// of the true surface, and over all that is deeper. The truth is density times the closed volume.
 [[nodiscard]] Accuracy accuracy_of(const BoneScan& scan, const Case& bone);
 
-// Writes the scan, imports it by the ordinary path with as many islands as there are bones, and compares. Errors: those
-// of both.
+// Writes the scan, imports it by the ordinary path with as many islands as there are bones, saves the case, loads it
+// again and compares. `folder`: a new one, for both. Errors: those of all.
 [[nodiscard]] Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions& options,
                                                 const std::filesystem::path& folder);
 
