@@ -17,11 +17,12 @@ int main(int argc, char** argv) {
     return EXIT_FAILURE;
   }
   nlohmann::json found = nlohmann::json::array();
-  for (const test::BoneScan& scan : test::accuracy_scans())
+  for (test::BoneScan scan : test::accuracy_scans())
     for (const std::string how : {"default", "thin cortex", "suggested", "midway"}) {
       const std::filesystem::path folder = std::filesystem::path(argv[1]) / "scan";
       import::CtOptions options;
       options.thin_cortex = how == "thin cortex";
+      scan.skin_mm = options.thin_cortex ? std::optional(24.0) : std::nullopt;
       options.suggest_threshold = how == "suggested";
       if (how == "midway") options.threshold_hu = test::kMidway_hu;
       const auto measured = test::measure_accuracy(scan, options, folder);

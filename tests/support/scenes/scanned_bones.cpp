@@ -35,6 +35,8 @@ double blurred_step(double inside_mm, double sigma_mm) {
 // alone.
 double hu_at(const BoneScan& scan, const Vec3& at_mm) {
   double hu = kSoftTissue_hu;
+  if (scan.skin_mm)
+    hu += (kAir_hu - kSoftTissue_hu) * blurred_step(at_mm.head<2>().norm() - *scan.skin_mm, scan.blur_mm);
   for (const Shaft& shaft : scan.shafts) {
     const double inside_mm = -shaft.surface_mm(at_mm);
     hu += (kCortex_hu - kSoftTissue_hu) * blurred_step(inside_mm, scan.blur_mm) +
@@ -220,8 +222,10 @@ Result<void> write_scan(const BoneScan& scan, const fs::path& folder) {
   imaging::HuVolume grid;
   const Box box = box_of(scan);
   // The tilt moves the ends of the bone within the slices.
-  const double size_mm = 2.0 * (box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff() +
-                                kField_mm + 0.5 * std::abs(scan.tilt_degrees));
+  const double half_mm =
+      std::max(box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff(),
+               scan.skin_mm.value_or(0.0));
+  const double size_mm = 2.0 * (half_mm + kField_mm + 0.5 * std::abs(scan.tilt_degrees));
   const int pixels = static_cast<int>(std::ceil(size_mm / scan.pixel_mm));
   grid.dims = {pixels, pixels, static_cast<int>(scan.gaps_mm.size()) + 1};
   grid.spacing_mm = {scan.pixel_mm, scan.pixel_mm, 1.0};

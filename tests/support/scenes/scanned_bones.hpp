@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,13 +31,14 @@ struct BoneScan {
   double blur_mm = 0.4;         // sigma of the scanner's point spread function, the same along all axes
   double noise_hu = 25.0;       // standard deviation, independent for each voxel
   double tilt_degrees = 0.0;    // of the gantry, about x
+  std::optional<double> skin_mm = {};  // radius of the limb, a cylinder along z in air; absent: soft tissue everywhere
   std::uint32_t seed = 1;
 
   [[nodiscard]] double surface_mm(const Vec3& at_mm) const;  // of the nearest shaft
 };
 
 // HU of what the scan consists of. Cortex and soft tissue are those of a real lower leg.
-inline constexpr double kSoftTissue_hu = 40.0, kCancellous_hu = 250.0, kCortex_hu = 1500.0;
+inline constexpr double kAir_hu = -1000.0, kSoftTissue_hu = 40.0, kCancellous_hu = 250.0, kCortex_hu = 1500.0;
 
 // A long bone that is oblique to the slices, and two bones `gap_mm` apart.
 [[nodiscard]] std::vector<Shaft> long_bone();
