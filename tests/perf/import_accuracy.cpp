@@ -1,6 +1,6 @@
 // How well an imported bone agrees with the bone that was scanned: phantoms of known shape through DICOM files with
 // noise, blur, thick, tilted and uneven slices. Takes a folder for the slices. Prints JSON: for each scan, with the
-// default options, with --thin-cortex, with the suggested threshold, and with the one midway between soft tissue and
+// default options, with --thin-cortex on, with the suggested threshold, and with the one midway between soft tissue and
 // cortex, Dice, distances of the surfaces, number of islands, and errors of density and mass as test::accuracy_of()
 // says. The case was saved and loaded again.
 #include <cstdio>
@@ -9,6 +9,12 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/support/scenes/scanned_bones.hpp"
+
+namespace {
+
+constexpr double kSkin_mm = 24.0;  // radius of the limb
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace osteon;
@@ -22,7 +28,8 @@ int main(int argc, char** argv) {
       const std::filesystem::path folder = std::filesystem::path(argv[1]) / "scan";
       import::CtOptions options;
       options.thin_cortex = how == "thin cortex";
-      scan.skin_mm = options.thin_cortex ? std::optional(24.0) : std::nullopt;
+      // The blur is measured at the skin.
+      scan.skin_mm = options.thin_cortex ? std::optional(kSkin_mm) : std::nullopt;
       options.suggest_threshold = how == "suggested";
       if (how == "midway") options.threshold_hu = test::kMidway_hu;
       const auto measured = test::measure_accuracy(scan, options, folder);
@@ -40,6 +47,7 @@ int main(int argc, char** argv) {
                        {"islands", measured->islands},
                        {"cortical_percent", measured->cortical_percent},
                        {"cancellous_percent", measured->cancellous_percent},
+                       {"mass_percent", measured->mass_percent},
                        {"cortical_mass_percent", measured->cortical_mass_percent},
                        {"cancellous_mass_percent", measured->cancellous_mass_percent}});
     }

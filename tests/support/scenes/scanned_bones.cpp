@@ -121,6 +121,10 @@ double capsule_mm3(double length_mm, double radius_mm) {
   return std::numbers::pi * radius_mm * radius_mm * (length_mm + 4.0 / 3.0 * radius_mm);
 }
 
+const Shaft& nearest_shaft(const BoneScan& scan, const Vec3& at_mm) {
+  return *std::ranges::min_element(scan.shafts, {}, [&](const Shaft& shaft) { return shaft.surface_mm(at_mm); });
+}
+
 double percent_error(double found, double truth) { return 100.0 * (found - truth) / truth; }
 
 // Sums over samples of a layer of bone, cortex or cancellous.
@@ -136,7 +140,7 @@ void measure_density(const BoneScan& scan, const Case& bone, const CoordBox& box
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int z = box.min.z; z <= box.max.z; ++z) {
         const Vec3 at = position_mm({x, y, z}, pitch_mm);
-        const Shaft& shaft = *std::ranges::min_element(scan.shafts, {}, [&](const Shaft& s) { return s.surface_mm(at); });
+        const Shaft& shaft = nearest_shaft(scan, at);
         const double depth_mm = -shaft.surface_mm(at);
         LayerSums& layer = depth_mm < shaft.cortex_mm ? cortex : cancellous;
         const double from_inner_mm = std::abs(depth_mm - shaft.cortex_mm);
@@ -148,17 +152,22 @@ void measure_density(const BoneScan& scan, const Case& bone, const CoordBox& box
         if (interior) layer.interior_g_cm3 += density;
       }
   double bone_mm3 = 0.0, cancellous_mm3 = 0.0;
-  for (const Shaft& shaft : scan.shafts) bone_mm3 += shaft.volume_mm3(), cancellous_mm3 += shaft.cancellous_mm3();
+  for (const Shaft& shaft : scan.shafts) {
+    bone_mm3 += shaft.volume_mm3();
+    cancellous_mm3 += shaft.cancellous_mm3();
+  }
   const auto density = [&](double hu) { return imaging::density_g_cm3(bone.info().calibration, hu); };
   const double sample_mm3 = pitch_mm * pitch_mm * pitch_mm;
   accuracy.cortical_percent =
       percent_error(cortex.interior_g_cm3 / static_cast<double>(cortex.interior), density(kCortex_hu));
   accuracy.cancellous_percent =
       percent_error(cancellous.interior_g_cm3 / static_cast<double>(cancellous.interior), density(kCancellous_hu));
-  accuracy.cortical_mass_percent =
-      percent_error(cortex.all_g_cm3 * sample_mm3, density(kCortex_hu) * (bone_mm3 - cancellous_mm3));
-  accuracy.cancellous_mass_percent =
-      percent_error(cancellous.all_g_cm3 * sample_mm3, density(kCancellous_hu) * cancellous_mm3);
+  const double cortical_mass = density(kCortex_hu) * (bone_mm3 - cancellous_mm3),
+               cancellous_mass = density(kCancellous_hu) * cancellous_mm3;
+  accuracy.cortical_mass_percent = percent_error(cortex.all_g_cm3 * sample_mm3, cortical_mass);
+  accuracy.cancellous_mass_percent = percent_error(cancellous.all_g_cm3 * sample_mm3, cancellous_mass);
+  accuracy.mass_percent =
+      percent_error((cortex.all_g_cm3 + cancellous.all_g_cm3) * sample_mm3, cortical_mass + cancellous_mass);
 }
 
 double percentile95(std::vector<double> values) {
@@ -178,11 +187,7 @@ double Shaft::surface_mm(const Vec3& at_mm) const {
 double Shaft::volume_mm3() const { return capsule_mm3((to_mm - from_mm).norm(), radius_mm); }
 double Shaft::cancellous_mm3() const { return capsule_mm3((to_mm - from_mm).norm(), radius_mm - cortex_mm); }
 
-double BoneScan::surface_mm(const Vec3& at_mm) const {
-  double nearest = shafts.front().surface_mm(at_mm);
-  for (const Shaft& shaft : shafts) nearest = std::min(nearest, shaft.surface_mm(at_mm));
-  return nearest;
-}
+double BoneScan::surface_mm(const Vec3& at_mm) const { return nearest_shaft(*this, at_mm).surface_mm(at_mm); }
 
 std::vector<Shaft> long_bone() {
   return {{.from_mm = {-2.0, 1.0, -14.0}, .to_mm = {2.0, -1.5, 14.0}, .radius_mm = 9.0, .cortex_mm = 3.0}};
@@ -222,9 +227,8 @@ Result<void> write_scan(const BoneScan& scan, const fs::path& folder) {
   imaging::HuVolume grid;
   const Box box = box_of(scan);
   // The tilt moves the ends of the bone within the slices.
-  const double half_mm =
-      std::max(box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff(),
-               scan.skin_mm.value_or(0.0));
+  const double half_mm = std::max(box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff(),
+                                  scan.skin_mm.value_or(0.0));
   const double size_mm = 2.0 * (half_mm + kField_mm + 0.5 * std::abs(scan.tilt_degrees));
   const int pixels = static_cast<int>(std::ceil(size_mm / scan.pixel_mm));
   grid.dims = {pixels, pixels, static_cast<int>(scan.gaps_mm.size()) + 1};

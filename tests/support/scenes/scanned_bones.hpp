@@ -26,11 +26,11 @@ struct BoneScan {
   std::string name;
   std::vector<Shaft> shafts;
   double pixel_mm = 0.7;
-  std::vector<double> gaps_mm;  // between slices along their normal, the table's way
-  double thickness_mm = 1.0;    // of a slice: HU are its mean
-  double blur_mm = 0.4;         // sigma of the scanner's point spread function, the same along all axes
-  double noise_hu = 25.0;       // standard deviation, independent for each voxel
-  double tilt_degrees = 0.0;    // of the gantry, about x
+  std::vector<double> gaps_mm;         // between slices along their normal, the table's way
+  double thickness_mm = 1.0;           // of a slice: HU are its mean
+  double blur_mm = 0.4;                // sigma of the scanner's point spread function, the same along all axes
+  double noise_hu = 25.0;              // standard deviation, independent for each voxel
+  double tilt_degrees = 0.0;           // of the gantry, about x
   std::optional<double> skin_mm = {};  // radius of the limb, a cylinder along z in air; absent: soft tissue everywhere
   std::uint32_t seed = 1;
 
@@ -63,8 +63,8 @@ struct Accuracy {
          percentile95_mm = 0.0;  // distances of the surfaces, both ways; the percentile is the larger way's
   double offset_mm = 0.0;        // mean of the signed distance of the case's surface from the true one
   std::size_t islands = 0;       // that the threshold found, of at least 0.05 cm³
-  double cortical_percent = 0.0, cancellous_percent = 0.0;            // errors of the mean density
-  double cortical_mass_percent = 0.0, cancellous_mass_percent = 0.0;  // errors of the mass
+  double cortical_percent = 0.0, cancellous_percent = 0.0;                                // errors of the mean density
+  double mass_percent = 0.0, cortical_mass_percent = 0.0, cancellous_mass_percent = 0.0;  // errors of the mass
 };
 
 // The bone of a case against the shape. An error of density or mass is what the case has more than the truth, as
@@ -73,7 +73,7 @@ struct Accuracy {
 // Density: the mean over the interior of the true cortex, at least kInterior_mm from both its faces, and over that of
 // the true cancellous bone.
 // Mass: the integral of density over all bone of the case that is less deep than the true cortex is thick, also outside
-// of the true surface, and over all that is deeper. The truth is density times the closed volume.
+// of the true surface, and over all that is deeper; and their sum. The truth is density times the closed volume.
 [[nodiscard]] Accuracy accuracy_of(const BoneScan& scan, const Case& bone);
 
 // Writes the scan, imports it by the ordinary path with as many islands as there are bones, saves the case, loads it
