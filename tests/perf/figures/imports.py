@@ -122,8 +122,8 @@ ACCURACY_SCANS = {"fine": "fine slices", "noise": "noise", "blur": "blur", "thic
 
 
 def import_accuracy(run):
-    """Dice, distances, densities and masses of imported phantoms. Beside shapes: with the best threshold; beside densities
-    and masses: with the blur of cortex taken out. All errors without their sign."""
+    """Dice, distances, densities and masses of imported phantoms. Beside shapes: with the best threshold; beside
+    densities and masses: with the blur of cortex taken out. All errors without their sign."""
     run.say("accuracy of imports")
     folder = run.folder / "import-accuracy"
     folder.mkdir(exist_ok=True)
