@@ -14,7 +14,8 @@ std::string describe(const HuVolume& volume) {
   return text;
 }
 
-HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last) {
+Result<HuVolume> cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last,
+                         const KeepGoing& keep_going) {
   HuVolume part;
   part.spacing_mm = volume.spacing_mm;
   part.directions = volume.directions;
@@ -22,11 +23,13 @@ HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::ar
   for (std::size_t axis = 0; axis < 3; ++axis) part.dims[axis] = last[axis] - first[axis] + 1;
   // Rows of voxels only move towards the beginning, so the memory can be reused.
   std::int16_t* to = volume.values.data();
-  for (int slice = first[2]; slice <= last[2]; ++slice)
+  for (int slice = first[2]; slice <= last[2]; ++slice) {
+    if (!keep_going(static_cast<double>(slice - first[2]) / part.dims[2])) return stopped_while("cropping the scan");
     for (int row = first[1]; row <= last[1]; ++row) {
       const std::int16_t* from = volume.values.data() + volume.index(first[0], row, slice);
       to = std::copy(from, from + part.dims[0], to);
     }
+  }
   volume.values.resize(part.count());
   give_back_unused(volume.values);
   part.values = std::move(volume.values);

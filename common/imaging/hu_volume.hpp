@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/core/keep_going.hpp"
+#include "common/core/result.hpp"
 #include "common/geometry/lattice.hpp"
 
 namespace osteon::imaging {
@@ -65,8 +67,9 @@ struct VoxelBox {
 [[nodiscard]] std::string describe(const HuVolume& volume);
 
 // The voxels from `first` to `last`, both included, as a separate volume at the same position. Takes over the memory of
-// `volume`.
-[[nodiscard]] HuVolume cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last);
+// `volume`. Error: cancelled.
+[[nodiscard]] Result<HuVolume> cropped(HuVolume volume, const std::array<int, 3>& first, const std::array<int, 3>& last,
+                                       const KeepGoing& keep_going);
 
 // The LPS box around voxel coordinates first .. last (both included), measured at the voxel centres.
 [[nodiscard]] Box enclosing_box(const HuVolume& volume, const Vec3& first, const Vec3& last);

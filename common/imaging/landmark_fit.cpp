@@ -105,8 +105,8 @@ std::vector<double> landmark_residuals(std::span<const LandmarkPair> pairs, cons
 
 Result<LandmarkFit> fit_landmarks(std::span<const LandmarkPair> pairs) {
   if (pairs.size() < kLeastLandmarks)
-    return bad_input("there are " + std::to_string(pairs.size()) +
-                     " landmarks; give at least 3 that do not lie on a line");
+    return bad_input("there are " + std::to_string(pairs.size()) + " landmarks; give at least " +
+                     std::to_string(kLeastLandmarks) + " that do not lie on a line");
   if (auto good = check_spread(points_of(pairs, &LandmarkPair::fixed_mm), "fixed"); !good)
     return tl::unexpected(good.error());
   if (auto good = check_spread(points_of(pairs, &LandmarkPair::moving_mm), "moving"); !good)

@@ -57,14 +57,18 @@ void across_rows(const std::vector<float>& rows, const std::vector<std::uint8_t>
 
 }  // namespace
 
-VoxelMask cropped(VoxelMask mask, const std::array<int, 3>& first, const std::array<int, 3>& last) {
+Result<VoxelMask> cropped(VoxelMask mask, const std::array<int, 3>& first, const std::array<int, 3>& last,
+                          const KeepGoing& keep_going) {
   // Rows of voxels only move towards the beginning, so the memory can be reused.
   std::uint8_t* to = mask.values.data();
-  for (int slice = first[2]; slice <= last[2]; ++slice)
+  for (int slice = first[2]; slice <= last[2]; ++slice) {
+    if (!keep_going(static_cast<double>(slice - first[2]) / (last[2] - first[2] + 1)))
+      return stopped_while("cropping the labels");
     for (int row = first[1]; row <= last[1]; ++row) {
       const std::uint8_t* from = mask.values.data() + mask.index(first[0], row, slice);
       to = std::copy(from, from + (last[0] - first[0] + 1), to);
     }
+  }
   mask.values.resize(static_cast<std::size_t>(to - mask.values.data()));
   give_back_unused(mask.values);
   for (std::size_t axis = 0; axis < 3; ++axis) mask.dims[axis] = last[axis] - first[axis] + 1;

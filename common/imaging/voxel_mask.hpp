@@ -29,8 +29,9 @@ struct VoxelMask {
   [[nodiscard]] std::uint8_t& at(int column, int row, int slice) { return values[index(column, row, slice)]; }
 };
 
-// The voxels from `first` to `last`, both included. Takes over the memory of `mask`.
-[[nodiscard]] VoxelMask cropped(VoxelMask mask, const std::array<int, 3>& first, const std::array<int, 3>& last);
+// The voxels from `first` to `last`, both included. Takes over the memory of `mask`. Error: cancelled.
+[[nodiscard]] Result<VoxelMask> cropped(VoxelMask mask, const std::array<int, 3>& first, const std::array<int, 3>& last,
+                                        const KeepGoing& keep_going);
 
 // 1 for every voxel whose centre is at most `radius_mm` from the centre of a voxel of the mask, including that voxel.
 // Exact Euclidean distances on voxels of `spacing_mm`. Error: cancelled.

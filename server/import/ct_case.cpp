@@ -156,17 +156,19 @@ Result<CtImport> make_case(MeasuredBones bones, CaseInfo info,
   if (!bones.keep.contains(needed)) beyond = hu_of(bones.volume, needed);
   const bool known_tissue = std::ranges::any_of(bones.known.tissue.values, [](std::uint8_t t) { return t != 0; });
   const std::bitset<256> bone_labels = bones.known.bone_labels;
-  CaseScan kept = kept_scan(std::move(bones.volume), std::move(bones.known), bones.keep, calibration);
-  list(kept, info);
-  const auto described = describe_scan(kept, part(keep_going, 0.0, 0.125));
+  auto kept =
+      kept_scan(std::move(bones.volume), std::move(bones.known), bones.keep, calibration, part(keep_going, 0.0, 0.03));
+  if (!kept) return tl::unexpected(kept.error());
+  list(*kept, info);
+  const auto described = describe_scan(*kept, part(keep_going, 0.03, 0.125));
   if (!described) return tl::unexpected(described.error());
   info.scan = *described;
   CaseSamples content({.scan = bones.scan,
                        .volume = volume,
                        .hu_box = beyond.empty() ? bones.keep : needed,
-                       .hu = beyond.empty() ? kept.hu : beyond,
+                       .hu = beyond.empty() ? kept->hu : beyond,
                        .kept_box = bones.keep,
-                       .kept = kept,
+                       .kept = *kept,
                        .bone_labels = bone_labels,
                        .tissue_labels = bones.tissue_labels,
                        .several = bones.several,
@@ -177,7 +179,7 @@ Result<CtImport> make_case(MeasuredBones bones, CaseInfo info,
   const FillPart fill = [&](const CoordBox& part_box, PartSamples& to) { return content.fill(part_box, to); };
   auto built = Case::build(std::move(info), bones.lattice, fill, part(keep_going, 0.125, 1.0));
   if (!built) return tl::unexpected(built.error());
-  CtImport made{.found = {}, .bone = std::move(*built), .scan = std::move(kept)};
+  CtImport made{.found = {}, .bone = std::move(*built), .scan = std::move(*kept)};
   made.found.case_cm3 = made.bone->volume_mm3() * 1e-3;
   return made;
 }

@@ -212,6 +212,15 @@ Result<imaging::VoxelMask> find_voxels(const imaging::HuVolume& volume, const Ct
   return bone;
 }
 
+// The voxels of the bones that grew from seeds. `work`: the part of the scan that `volume` is. Error: cancelled.
+Result<imaging::VoxelMask> take_grown(const imaging::HuVolume& volume, imaging::VoxelMask grown, const ScanRegion& work,
+                                      const CtOptions& options, const KeepGoing& keep_going) {
+  auto labels = imaging::cropped(std::move(grown), work.first, work.last, part(keep_going, 0.0, 0.02));
+  if (!labels) return labels;
+  return imaging::segment_bone(volume, std::move(*labels), segmentation_params(options), work.ends,
+                               part(keep_going, 0.02, 1.0));
+}
+
 // If nobody has chosen yet, the first islands get a colour each, so that one sees them apart.
 std::vector<int> islands_with_colours(const std::vector<imaging::Island>& islands) {
   std::vector<int> first(std::min(kMostIslandsDrawn, islands.size()));
@@ -228,12 +237,11 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
   if (const auto painted = painted_voxels(scan, options.edits))
     widen(*work, region_around(painted->first, painted->last, scan, options));
   Segmented s;
-  s.volume = imaging::cropped(std::move(scan), work->first, work->last);
-  const KeepGoing segmenting = part(keep_going, 0.0, 0.65);
-  const auto bone =
-      bones ? imaging::segment_bone(s.volume, imaging::cropped(std::move(bones->labels), work->first, work->last),
-                                    segmentation_params(options), work->ends, segmenting)
-            : find_voxels(s.volume, options, calibration, work->ends, segmenting);
+  auto cropped = imaging::cropped(std::move(scan), work->first, work->last, part(keep_going, 0.0, 0.02));
+  if (!cropped) return tl::unexpected(cropped.error());
+  s.volume = std::move(*cropped);
+  const auto bone = bones ? take_grown(s.volume, std::move(bones->labels), *work, options, part(keep_going, 0.02, 0.65))
+                          : find_voxels(s.volume, options, calibration, work->ends, part(keep_going, 0.02, 0.65));
   if (!bone) return tl::unexpected(bone.error());
   const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.65, 0.69));
   if (!islands) return tl::unexpected(islands.error());

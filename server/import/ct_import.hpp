@@ -117,6 +117,8 @@ struct CtImport {
 [[nodiscard]] std::string place_words(const Vec3& at, const Box& box);
 // The kind of an island for a person, such as "table or headrest".
 [[nodiscard]] std::string words_of(imaging::IslandKind kind);
+// Why an island is of a kind that is no bone, such as "its shape is that of a table or headrest".
+[[nodiscard]] std::string likeness_of(imaging::IslandKind kind);
 
 // Islands of one kind that are not bone.
 struct NotBone {

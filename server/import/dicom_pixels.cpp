@@ -16,7 +16,6 @@ namespace {
 
 constexpr double kBrightPadding_hu = 100.0;
 constexpr double kLargestStored = 65535.0;
-constexpr std::int16_t kPadding_hu = -1024;  // air
 
 namespace fs = std::filesystem;
 

@@ -11,7 +11,6 @@
 namespace osteon::import {
 namespace {
 
-constexpr double kNoNumber_hu = -1024.0;
 constexpr std::string_view kAxisLetters[] = {"LR", "PA", "SI"};  // towards more and less of x, y, z
 
 }  // namespace
@@ -55,7 +54,7 @@ Result<Eigen::Matrix3d> parse_axes(std::string_view text) {
 std::int16_t hu_of(double stored, const GivenGeometry& given) {
   constexpr double least = std::numeric_limits<std::int16_t>::min(), most = std::numeric_limits<std::int16_t>::max();
   const double hu = given.slope * stored + given.intercept;
-  return static_cast<std::int16_t>(std::lround(std::isnan(hu) ? kNoNumber_hu : std::clamp(hu, least, most)));
+  return static_cast<std::int16_t>(std::lround(std::clamp(hu, least, most)));
 }
 
 imaging::HuVolume volume_of(const std::array<int, 3>& dims, const GivenGeometry& given) {

@@ -27,7 +27,7 @@ struct GivenGeometry {
 // "LPS": a letter for columns, rows and slices each: L or R, A or P, S or I. Error: invalid_input.
 [[nodiscard]] Result<Eigen::Matrix3d> parse_axes(std::string_view text);
 
-// Whole HU: fractions are rounded, what exceeds int16 is clamped, and what is no number is air (-1024 HU).
+// Whole HU of a finite number: fractions are rounded, and what exceeds int16 is clamped.
 [[nodiscard]] std::int16_t hu_of(double stored, const GivenGeometry& given);
 
 // A volume without values; its first voxel is the origin of LPS.

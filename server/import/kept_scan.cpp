@@ -34,13 +34,13 @@ void add_growing(const GrowOptions& grow, LabelProvenance& provenance) {
       provenance.parameters["seed_" + std::to_string(i + 1) + "_" + "xyz"[axis] + "_mm"] = grow.seeds_mm[i][axis];
 }
 
-// Which island became the bone, what it looks like, and how much of each kind was left out as no bone.
+// Which island became the bone, what it is if it is no bone, and how much of each kind was left out as no bone.
 void add_island(const CtSegmentation& found, int bone, LabelProvenance& provenance) {
   const int island = found.kept[static_cast<std::size_t>(bone - 1)];
   provenance.parameters["island"] = island;
   if (static_cast<std::size_t>(island) > found.natures.size()) return;
   const imaging::IslandKind kind = found.natures[static_cast<std::size_t>(island - 1)].kind;
-  provenance.method += kind == imaging::IslandKind::bone ? "" : ", looks like " + std::string(name_of(kind));
+  provenance.method += kind == imaging::IslandKind::bone ? "" : ", " + likeness_of(kind);
 }
 void add_not_bone(const CtSegmentation& found, LabelProvenance& provenance) {
   for (const NotBone& of : not_bone(found))
@@ -122,17 +122,29 @@ imaging::VoxelBox kept_voxels(const imaging::HuVolume& volume, const std::array<
   return box;
 }
 
-CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
-                   const DensityCalibration& calibration) {
+Result<CaseScan> kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
+                           const DensityCalibration& calibration, const KeepGoing& keep_going) {
   CaseScan scan;
   for (std::size_t axis = 0; axis < 3; ++axis) scan.geometry.dims[axis] = box.dim(axis);
   scan.geometry.origin_mm = volume.position_mm(Vec3(box.first[0], box.first[1], box.first[2]));
   scan.geometry.axes_mm = volume.directions * volume.spacing_mm.asDiagonal();
-  scan.hu = imaging::cropped(std::move(volume), box.first, box.last).values;
-  scan.labels = imaging::cropped(std::move(known.labels), box.first, box.last).values;
-  scan.tissue = known.tissue.values.empty() ? zeros<std::uint8_t>(scan.labels.size())
-                                            : imaging::cropped(std::move(known.tissue), box.first, box.last).values;
+  auto hu = imaging::cropped(std::move(volume), box.first, box.last, part(keep_going, 0.0, 0.3));
+  if (!hu) return tl::unexpected(hu.error());
+  scan.hu = std::move(hu->values);
+  auto labels = imaging::cropped(std::move(known.labels), box.first, box.last, part(keep_going, 0.3, 0.5));
+  if (!labels) return tl::unexpected(labels.error());
+  scan.labels = std::move(labels->values);
+  if (known.tissue.values.empty()) {
+    scan.tissue = zeros<std::uint8_t>(scan.labels.size());
+  } else {
+    auto tissue = imaging::cropped(std::move(known.tissue), box.first, box.last, part(keep_going, 0.5, 0.7));
+    if (!tissue) return tl::unexpected(tissue.error());
+    scan.tissue = std::move(tissue->values);
+  }
+  const std::size_t area = box.count() / static_cast<std::size_t>(box.dim(2));
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
+    if (i % area == 0 && !keep_going(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scan.labels.size())))
+      return stopped_while("taking the tissues");
     if (!known.bone_labels[scan.labels[i]])
       scan.tissue[i] = 0;
     else if (scan.tissue[i] == 0)
@@ -164,16 +176,18 @@ void list_labels(const CaseScan& scan, const PlacedLabels& placed, const CtOptio
       tissue.provenance.method += ", or as its label says";
 }
 
-CaseScan kept_scan(const imaging::LabelVolume& volume) {
+Result<CaseScan> kept_scan(const imaging::LabelVolume& volume, const KeepGoing& keep_going) {
   const CoordBox& box = volume.labels.box;
   CaseScan scan;
   scan.geometry.dims = {box.dims().x, box.dims().y, box.dims().z};
   scan.geometry.origin_mm = position_mm(box.min, 1.0).cwiseProduct(volume.spacing_mm);
   scan.geometry.axes_mm = volume.spacing_mm.asDiagonal();
   scan.labels.reserve(scan.geometry.count());
-  for (int z = box.min.z; z <= box.max.z; ++z)
+  for (int z = box.min.z; z <= box.max.z; ++z) {
+    if (!keep_going(static_cast<double>(z - box.min.z) / box.dims().z)) return stopped_while("taking the labels");
     for (int y = box.min.y; y <= box.max.y; ++y)
       for (int x = box.min.x; x <= box.max.x; ++x) scan.labels.push_back(volume.labels.at({x, y, z}));
+  }
   return scan;
 }
 

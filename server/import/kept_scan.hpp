@@ -25,14 +25,15 @@ struct KnownVoxels {
 };
 
 // The voxels of `box`, with the HU of `volume`. The tissue of bone that is not known is cortical from
-// kCorticalFrom_g_cm3 on, otherwise trabecular. Voxels without a bone have none. Takes over the memory of both.
-[[nodiscard]] CaseScan kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
-                                 const DensityCalibration& calibration);
+// kCorticalFrom_g_cm3 on, otherwise trabecular. Voxels without a bone have none. Takes over the memory of both. Error:
+// cancelled.
+[[nodiscard]] Result<CaseScan> kept_scan(imaging::HuVolume volume, KnownVoxels known, const imaging::VoxelBox& box,
+                                         const DensityCalibration& calibration, const KeepGoing& keep_going);
 // Lists the labels and tissues that kept_scan() gives.
 void list_labels(const CaseScan& scan, const CtOptions& options, const CtSegmentation& found, CaseInfo& info);
 
-// The labels of a label volume without HU, as far as its box reaches.
-[[nodiscard]] CaseScan kept_scan(const imaging::LabelVolume& volume);
+// The labels of a label volume without HU, as far as its box reaches. Error: cancelled.
+[[nodiscard]] Result<CaseScan> kept_scan(const imaging::LabelVolume& volume, const KeepGoing& keep_going);
 void list_labels(const LabelLegend& legend, CaseInfo& info);
 
 // Lists the labels of a label map, and the tissues that kept_scan() gives.

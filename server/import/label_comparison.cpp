@@ -183,7 +183,7 @@ Result<TruthLabels> read_truth(const std::filesystem::path& input, const LabelNa
         (names.totalsegmentator && segment.name.empty() && known_structure(totalsegmentator_name(segment.number)));
     if (!named) known.given[number] = {"label " + number, LabelKind::bone};
   }
-  auto placed = place_labels(std::move(*map), known, ct, frame_of_reference, part(keep_going, 0.5, 1.0));
+  auto placed = place_labels(std::move(*map), known, ct, frame_of_reference, part(keep_going, 0.5, 0.95));
   if (!placed) return tl::unexpected(placed.error());
 
   TruthLabels truth;
@@ -191,7 +191,10 @@ Result<TruthLabels> read_truth(const std::filesystem::path& input, const LabelNa
   truth.labels = std::move(placed->labels);
   const Labelled all{{{0, 0, 0}, {ct.dims[0] - 1, ct.dims[1] - 1, ct.dims[2] - 1}}, placed->values.values};
   truth.box = box_of(all, ~only(0));
-  truth.values = imaging::cropped(std::move(placed->values), truth.box.first, truth.box.last).values;
+  auto values =
+      imaging::cropped(std::move(placed->values), truth.box.first, truth.box.last, part(keep_going, 0.95, 1.0));
+  if (!values) return tl::unexpected(values.error());
+  truth.values = std::move(values->values);
   return truth;
 }
 

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kMargin = 5;  // samples beyond the bone: the band and the cell around it
 // Shares of the stages in the total time.
+constexpr double kKeepEnd = 0.05;
 constexpr double kLabelSmoothEnd = 0.35;
 constexpr double kResampleEnd = 0.4;
 constexpr double kLabelSurfaceEnd = 0.85;
@@ -76,11 +77,12 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
                  position_mm(voxels.max, 1.0).cwiseProduct(spacing)};
   const CoordBox box = covering_samples(bone.grown(kMargin * pitch_mm), pitch_mm);
   if (Result<void> fits = check_lattice(box, pitch_mm); !fits) return tl::unexpected(fits.error());
-  CaseScan kept = kept_scan(volume);
-  const auto described = describe_scan(kept);
+  auto kept = kept_scan(volume, part(keep_going, 0.0, 0.5 * kKeepEnd));
+  if (!kept) return tl::unexpected(kept.error());
+  const auto described = describe_scan(*kept, part(keep_going, 0.5 * kKeepEnd, kKeepEnd));
   if (!described) return tl::unexpected(described.error());
 
-  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, 0.0, kLabelSmoothEnd));
+  auto smooth = imaging::smooth_labels(volume, options.smoothing, part(keep_going, kKeepEnd, kLabelSmoothEnd));
   if (!smooth) return tl::unexpected(smooth.error());
   auto field = imaging::resample(*smooth, spacing, box, pitch_mm, part(keep_going, kLabelSmoothEnd, kResampleEnd));
   if (!field) return tl::unexpected(field.error());
@@ -97,7 +99,6 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   auto density = imaging::label_density(volume, densities, box, pitch_mm, part(keep_going, kLabelSurfaceEnd, 0.9));
   if (!density) return tl::unexpected(density.error());
   volume.labels = {};
-  if (!keep_going(0.9)) return failure(ErrorCode::cancelled, "stopped before building the case");
 
   char source[160];
   std::snprintf(source, sizeof source, "label volume, %dx%dx%d, %.4gx%.4gx%.4g mm", volume.dims[0], volume.dims[1],
@@ -108,9 +109,9 @@ Result<LabelImport> import_labels(LabelStack stack, const LabelLegend& legend, c
   info.pitch_mm = pitch_mm;  // densities are given by label, so there is neither a calibration nor a threshold
   info.scan = *described;
   list_labels(legend, info);
-  auto built = Case::build(std::move(info), *surface_mm, *density);
+  auto built = Case::build(std::move(info), *surface_mm, *density, {}, part(keep_going, 0.9, 1.0));
   if (!built) return tl::unexpected(built.error());
-  return LabelImport{std::move(*built), labelled_mm3, std::move(kept)};
+  return LabelImport{std::move(*built), labelled_mm3, std::move(*kept)};
 }
 
 }  // namespace osteon::import

@@ -42,7 +42,7 @@ Result<Labelled> take_labels(imaging::HuVolume scan, PlacedLabels& placed, const
   found.first = found.labels_first = scan.dims;
   found.last = found.labels_last = {-1, -1, -1};
   for (int slice = 0; slice < scan.dims[2]; ++slice) {
-    if (!keep_going(static_cast<double>(slice) / scan.dims[2])) return stopped_while("taking the labels");
+    if (!keep_going(0.5 * slice / scan.dims[2])) return stopped_while("taking the labels");
     for (int row = 0; row < scan.dims[1]; ++row)
       for (int column = 0; column < scan.dims[0]; ++column) {
         const std::uint8_t value = placed.values.at(column, row, slice);
@@ -52,8 +52,12 @@ Result<Labelled> take_labels(imaging::HuVolume scan, PlacedLabels& placed, const
       }
   }
   const ScanRegion work = region_around(found.labels_first, found.labels_last, scan, options);
-  found.volume = imaging::cropped(std::move(scan), work.first, work.last);
-  found.labels = imaging::cropped(std::move(placed.values), work.first, work.last);
+  auto volume = imaging::cropped(std::move(scan), work.first, work.last, part(keep_going, 0.5, 0.8));
+  if (!volume) return tl::unexpected(volume.error());
+  found.volume = std::move(*volume);
+  auto labels = imaging::cropped(std::move(placed.values), work.first, work.last, part(keep_going, 0.8, 1.0));
+  if (!labels) return tl::unexpected(labels.error());
+  found.labels = std::move(*labels);
   found.bones = found.labels;
   for (std::uint8_t& value : found.bones.values) value = found.bone_labels[value] ? value : std::uint8_t{0};
   for (std::size_t axis = 0; axis < 3; ++axis)

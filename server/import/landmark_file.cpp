@@ -43,7 +43,8 @@ Result<std::vector<NamedLandmark>> parse_landmarks(std::string_view text, const 
   if (!parsed) return tl::unexpected(parsed.error());
   if (landmarks.size() < imaging::kLeastLandmarks)
     return bad_input(file_name + " has " + std::to_string(landmarks.size()) + " landmark" +
-                     (landmarks.size() == 1 ? "" : "s") + "; write at least 3 that do not lie on a line");
+                     (landmarks.size() == 1 ? "" : "s") + "; write at least " +
+                     std::to_string(imaging::kLeastLandmarks) + " that do not lie on a line");
   return landmarks;
 }
 

@@ -116,10 +116,10 @@ Result<imaging::VoxelMask> draw(const LabelMap& map, const Values& values, const
     }
     if (shared == 0) continue;
     const auto which = std::ranges::find(values.of_segment, other) - values.of_segment.begin();
-    return bad_input(map.file + ": " + shown_label(map.segments[static_cast<std::size_t>(which)]) + " and " +
-                     shown_label(map.segments[i]) + " are both in " + std::to_string(shared) +
-                     " voxels; let each voxel have one label, or leave one out by --label-names " +
-                     key_of(map.segments[i]) + "=NAME:none");
+    return bad_input(
+        map.file + ": " + shown_label(map.segments[static_cast<std::size_t>(which)]) + " and " +
+        shown_label(map.segments[i]) + " are both in " + std::to_string(shared) + (shared == 1 ? " voxel" : " voxels") +
+        "; let each voxel have one label, or leave one out by --label-names " + key_of(map.segments[i]) + "=NAME:none");
   }
   return mask;
 }

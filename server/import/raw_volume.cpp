@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <new>
@@ -118,8 +119,12 @@ Result<CtScan> read_raw_volume(const fs::path& input, const RawFormat& format, c
       if (!keep_going(static_cast<double>(read++) / volume.dims[2])) return stopped_while("reading " + input.string());
       if (!in.read(slice.data(), static_cast<std::streamsize>(slice.size())))
         return bad_input(file.string() + " cannot be read to its end; copy it again");
-      for (std::size_t at = 0; at < slice.size(); at += voxel_bytes)
-        volume.values.push_back(hu_of(stored_at(slice.data() + at, format.type, reversed), format.given));
+      for (std::size_t at = 0; at < slice.size(); at += voxel_bytes) {
+        const double stored = stored_at(slice.data() + at, format.type, reversed);
+        const bool number = std::isfinite(stored);
+        scan.report.without_number += number ? 0 : 1;
+        volume.values.push_back(number ? hu_of(stored, format.given) : kPadding_hu);
+      }
     }
   }
   scan.source = source_of("raw", volume, format.given);

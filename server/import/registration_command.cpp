@@ -2,6 +2,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "server/import/command.hpp"
 #include "server/import/registration_files.hpp"
@@ -36,9 +37,12 @@ Result<std::string> run_register(const RegistrationArguments& a, const StopSigna
     if (!drawn) return tl::unexpected(drawn.error());
     labels = std::move(*drawn);
   }
-  const auto found =
+  auto found =
       register_scans(fixed->volume, moving->volume, landmarks, a.landmarks, bar.stage(labels ? 0.35 : 0.3, 0.9));
   if (!found) return tl::unexpected(found.error());
+  for (const auto& [name, scan] : {std::pair{"fixed", &*fixed}, std::pair{"moving", &*moving}})
+    if (scan->report.without_number > 0)
+      found->warnings.push_back(std::string("in the ") + name + " scan, " + without_number_text(scan->report));
   if (auto written = write_registration(a.out, *found, fixed->volume, moving->volume, labels, bar.stage(0.9, 1.0));
       !written)
     return tl::unexpected(written.error());

@@ -189,6 +189,7 @@ std::string cut_ends(const ImportReport& report, const ScanSums& sums) {
 }
 
 void add_scan_warnings(const ImportReport& report, std::vector<std::string>& warnings) {
+  if (report.series && report.series->without_number > 0) warnings.push_back(without_number_text(*report.series) + ".");
   if (report.series)
     for (const SeriesEntry& entry : report.series->series)
       if (entry.number == report.series->taken && entry.lossy > 0)

@@ -96,7 +96,7 @@ std::string summary(const ReportFacts& facts) {
 std::string state_of(const ReportPart& part) {
   if (part.at_risk) return "<span class=\"risk\">structure at risk</span>";
   if (!part.island || part.island->kind == imaging::IslandKind::bone) return part.kept ? "bone" : "left out";
-  return std::string(part.kept ? "kept, looks like " : "left out: ") + words_of(part.island->kind);
+  return part.kept ? "kept: " + likeness_of(part.island->kind) : "left out: " + words_of(part.island->kind);
 }
 
 Result<std::string> parts_table(const ReportFacts& facts) {

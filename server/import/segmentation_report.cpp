@@ -129,6 +129,10 @@ std::string words_of(imaging::IslandKind kind) {
   return kind == imaging::IslandKind::table ? "table or headrest" : std::string(name_of(kind));
 }
 
+std::string likeness_of(imaging::IslandKind kind) {
+  return kind == imaging::IslandKind::metal ? "its HU are those of metal" : "its shape is that of a " + words_of(kind);
+}
+
 std::vector<NotBone> not_bone(const CtSegmentation& found) {
   std::vector<NotBone> all;
   const std::vector<bool> is_kept = kept_flags(found);

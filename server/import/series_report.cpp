@@ -58,6 +58,12 @@ std::string describe(const SeriesEntry& entry) {
   return text;
 }
 
+std::string without_number_text(const SeriesReport& report) {
+  return std::to_string(report.without_number) + (report.without_number == 1
+                                                      ? " voxel has no finite number: it counts as air"
+                                                      : " voxels have no finite number: they count as air");
+}
+
 std::string report_lines(const SeriesReport& report) {
   std::string text;
   for (const SeriesEntry& entry : report.series)
@@ -74,6 +80,7 @@ std::string report_lines(const SeriesReport& report) {
   if (others > kOthersShown)
     text += "           and " + std::to_string(others - kOthersShown) + " more; osteon-import series lists them all\n";
   if (others > 0) text += "           --series N takes another\n";
+  if (report.without_number > 0) text += "warning    " + without_number_text(report) + "\n";
   return text + skipped_line(report);
 }
 

@@ -1,11 +1,15 @@
 // The CT series of an input, the one that was taken, and the skipped files.
 #pragma once
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "server/import/skipped_files.hpp"
 
 namespace osteon::import {
+
+// Of voxels without a value, as beyond the round field of a scanner: air.
+inline constexpr std::int16_t kPadding_hu = -1024;
 
 struct SeriesEntry {
   int number = 0;           // 1 .. n, the argument of --series
@@ -25,13 +29,17 @@ struct SeriesReport {
   std::vector<SeriesEntry> series;
   int taken = 0;  // its number; 0: none
   SkippedFiles skipped;
+  std::int64_t without_number = 0;  // voxels that are NaN or infinite in the file; they have kPadding_hu
 };
+
+// "3 voxels have no finite number: they count as air"
+[[nodiscard]] std::string without_number_text(const SeriesReport& report);
 
 // "\"HEAD 1.0 H60s\", 180 slices, 512x512, 0.45x0.45x1 mm, axial, kernel H60s"
 [[nodiscard]] std::string describe(const SeriesEntry& entry);
 
-// Lines for the report of an import: the series taken, the others, the skipped files. Empty for an input without
-// series.
+// Lines for the report of an import: the series taken, the others, the skipped files, and voxels without
+// a number. Empty for an input without all of these.
 [[nodiscard]] std::string report_lines(const SeriesReport& report);
 
 // All series, one per line, with a mark at the one that would be taken; and the skipped files.

@@ -4,22 +4,26 @@
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
+#include <nifti1_io.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "server/import/series_report.hpp"
 
 namespace osteon::import {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kAir_hu = -1024.0, kMostLabel = 65535.0;
+constexpr double kMostLabel = 65535.0;
 
 itk::ImageIOBase::Pointer format_of(VolumeFormat format) {
   itk::ImageIOBase::Pointer io;
@@ -39,9 +43,11 @@ itk::ImageIOBase::Pointer reader_of(const fs::path& file, VolumeFormat format) {
   return io;
 }
 
-std::int16_t to_hu(double value) {
+// Null for a number that is not finite.
+std::optional<std::int16_t> to_hu(double value) {
   constexpr double least = std::numeric_limits<std::int16_t>::min(), most = std::numeric_limits<std::int16_t>::max();
-  return static_cast<std::int16_t>(std::lround(std::isnan(value) ? kAir_hu : std::clamp(value, least, most)));
+  if (!std::isfinite(value)) return std::nullopt;
+  return static_cast<std::int16_t>(std::lround(std::clamp(value, least, most)));
 }
 
 template <class T>
@@ -53,15 +59,21 @@ T number_at(const char* bytes, std::size_t i) {
 
 // Of voxels of one type.
 struct Converter {
-  void (*to_hu)(const char* from, std::span<std::int16_t> to);
+  // Gives how many numbers are not finite; these become kPadding_hu.
+  std::uint32_t (*to_hu)(const char* from, std::span<std::int16_t> to);
   // The first number that is no label, if there is one.
   std::optional<double> (*to_labels)(const char* from, std::span<std::uint16_t> to);
 };
 
 template <class T>
 constexpr Converter kConverter{[](const char* from, std::span<std::int16_t> to) {
-                                 for (std::size_t i = 0; i < to.size(); ++i)
-                                   to[i] = to_hu(static_cast<double>(number_at<T>(from, i)));
+                                 std::uint32_t without_number = 0;
+                                 for (std::size_t i = 0; i < to.size(); ++i) {
+                                   const auto hu = to_hu(static_cast<double>(number_at<T>(from, i)));
+                                   without_number += hu ? 0 : 1;
+                                   to[i] = hu.value_or(kPadding_hu);
+                                 }
+                                 return without_number;
                                },
                                [](const char* from, std::span<std::uint16_t> to) -> std::optional<double> {
                                  for (std::size_t i = 0; i < to.size(); ++i) {
@@ -103,6 +115,26 @@ const Converter* converter(itk::IOComponentEnum type) {
     default:
       return nullptr;
   }
+}
+
+template <class T>
+std::vector<bool> not_finite(const nifti_image& image) {
+  std::vector<bool> found(image.nvox);
+  for (std::size_t i = 0; i < found.size(); ++i)
+    found[i] = !std::isfinite(number_at<T>(static_cast<const char*>(image.data), i));
+  return found;
+}
+
+// Which voxels are NaN or infinite. The library of NIfTI, and so ITK, replaces them by 0, but only in numbers with a
+// fraction: as whole numbers of the same size they keep their bits. Empty: none is, or ITK will say what is wrong.
+std::vector<bool> not_finite_in_nifti(const fs::path& file) {
+  const std::unique_ptr<nifti_image, decltype(&nifti_image_free)> image(nifti_image_read(file.c_str(), 0),
+                                                                        nifti_image_free);
+  if (!image || (image->datatype != DT_FLOAT32 && image->datatype != DT_FLOAT64)) return {};
+  const bool single = image->datatype == DT_FLOAT32;
+  image->datatype = single ? DT_UINT32 : DT_UINT64;
+  if (nifti_image_load(image.get()) != 0) return {};
+  return single ? not_finite<float>(*image) : not_finite<double>(*image);
 }
 
 tl::unexpected<Error> damaged(const fs::path& file) {
@@ -206,12 +238,18 @@ Result<HeaderFields> read_segment_fields(const fs::path& file) try {
   return damaged(file);
 }
 
-Result<void> read_volume_slices(const fs::path& file, VolumeFormat format,
-                                const std::function<void(std::span<const std::int16_t>)>& on_slice) try {
+Result<void> read_volume_slices(const fs::path& file, VolumeFormat format, const OnHuSlice& on_slice) try {
+  const std::vector<bool> lost = format == VolumeFormat::nifti ? not_finite_in_nifti(file) : std::vector<bool>();
   std::vector<std::int16_t> slice(slice_numbers(file, format));
+  std::size_t n = 0;
   return read_slices(file, format, [&](const Converter& convert, const char* bytes) -> Result<void> {
-    convert.to_hu(bytes, slice);
-    on_slice(slice);
+    std::uint32_t without_number = convert.to_hu(bytes, slice);
+    for (std::size_t i = 0; i < slice.size() && n < lost.size(); ++i)
+      if (lost[n++]) {
+        slice[i] = kPadding_hu;
+        ++without_number;
+      }
+    on_slice(slice, without_number);
     return {};
   });
 } catch (const itk::ExceptionObject&) {

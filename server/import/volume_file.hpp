@@ -32,11 +32,12 @@ struct VolumeHeader {
 // The fields of an NRRD header whose keys begin with "Segment". Error: invalid_input (damaged).
 [[nodiscard]] Result<HeaderFields> read_segment_fields(const std::filesystem::path& file);
 
-// Calls `on_slice` with each slice: whole HU, columns fastest. Fractions are rounded, what exceeds int16 is clamped,
-// and voxels without a number are air (-1024 HU). In NIfTI these, and infinite ones, are 0 HU: its library replaces
-// them. Errors: invalid_input (truncated, damaged), unsupported.
+// Takes a slice: whole HU, columns fastest, and how many of its voxels are NaN or infinite in the file.
+using OnHuSlice = std::function<void(std::span<const std::int16_t> hu, std::uint32_t without_number)>;
+// Calls `on_slice` with each slice. Fractions are rounded, what exceeds int16 is clamped, and voxels that are NaN or
+// infinite have kPadding_hu. Errors: invalid_input (truncated, damaged), unsupported.
 [[nodiscard]] Result<void> read_volume_slices(const std::filesystem::path& file, VolumeFormat format,
-                                              const std::function<void(std::span<const std::int16_t>)>& on_slice);
+                                              const OnHuSlice& on_slice);
 
 // The same for labels: whole numbers from 0 to 65535, layers fastest, then columns. Errors: those above, and
 // invalid_input (another number; names it).

@@ -96,25 +96,34 @@ Result<imaging::HuVolume> geometry_of(const fs::path& file, const VolumeHeader& 
   return volume;
 }
 
-Result<void> read_voxels(const fs::path& file, VolumeFormat format, std::uint64_t voxel_bytes,
-                         imaging::HuVolume& volume, const KeepGoing& keep_going) {
+Result<void> read_voxels(const fs::path& file, VolumeFormat format, std::uint64_t voxel_bytes, CtScan& scan,
+                         const KeepGoing& keep_going) {
+  imaging::HuVolume& volume = scan.volume;
   const std::size_t area = static_cast<std::size_t>(volume.dims[0]) * static_cast<std::size_t>(volume.dims[1]);
   const IsolatedEnd end =
       run_isolated({.run = [&](ChildChannel& channel) -> Result<void> {
                       if (auto whole = check_voxels(file, format, volume.count(), voxel_bytes); !whole) return whole;
                       int slices = 0;
-                      return read_volume_slices(file, format, [&](std::span<const std::int16_t> slice) {
-                        channel.send({reinterpret_cast<const char*>(slice.data()), slice.size_bytes()});
-                        channel.progress(kReadShare + (1.0 - kReadShare) * ++slices / volume.dims[2]);
-                      });
+                      return read_volume_slices(
+                          file, format, [&](std::span<const std::int16_t> slice, std::uint32_t without_number) {
+                            std::string message(reinterpret_cast<const char*>(slice.data()), slice.size_bytes());
+                            message.append(reinterpret_cast<const char*>(&without_number), sizeof without_number);
+                            channel.send(message);
+                            channel.progress(kReadShare + (1.0 - kReadShare) * ++slices / volume.dims[2]);
+                          });
                     },
                     .on_message =
                         [&](std::string_view message) {
                           // Memory grows with the voxels that arrive, not with the size that the file claims.
                           const std::size_t before = volume.values.size();
-                          if (message.size() != area * sizeof(std::int16_t) || before == volume.count()) return false;
+                          const std::size_t slice_bytes = area * sizeof(std::int16_t);
+                          std::uint32_t without_number = 0;
+                          if (message.size() != slice_bytes + sizeof without_number || before == volume.count())
+                            return false;
                           volume.values.resize(before + area);
-                          std::memcpy(volume.values.data() + before, message.data(), message.size());
+                          std::memcpy(volume.values.data() + before, message.data(), slice_bytes);
+                          std::memcpy(&without_number, message.data() + slice_bytes, sizeof without_number);
+                          scan.report.without_number += without_number;
                           return true;
                         },
                     .memory_bytes = volume.count() * voxel_bytes + kBesideVoxels},
@@ -265,12 +274,12 @@ Result<CtScan> read_volume(const fs::path& file, const KeepGoing& keep_going) tr
   const auto& [format, header] = *opened;
   Result<imaging::HuVolume> volume = geometry_of(file, header);
   if (!volume) return tl::unexpected(volume.error());
-  if (auto read = read_voxels(file, format, header.voxel_bytes, *volume, keep_going); !read)
-    return tl::unexpected(read.error());
   CtScan scan;
-  scan.source = std::string(name_of(format)) + " CT, " + imaging::describe(*volume);
-  if (!says_orientation(file, format)) scan.source += ", orientation not in the file: left and right may be swapped";
   scan.volume = std::move(*volume);
+  if (auto read = read_voxels(file, format, header.voxel_bytes, scan, keep_going); !read)
+    return tl::unexpected(read.error());
+  scan.source = std::string(name_of(format)) + " CT, " + imaging::describe(scan.volume);
+  if (!says_orientation(file, format)) scan.source += ", orientation not in the file: left and right may be swapped";
   return scan;
 } catch (const std::bad_alloc&) {
   return failure(ErrorCode::exhausted,

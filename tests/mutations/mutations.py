@@ -236,4 +236,12 @@ MUTATIONS = [
       "loud sound is not limited", "unit.audio_client", "*"),
     M("server/import/volume_format.cpp", "  if (code == Z_DATA_ERROR) return Unpacked::damaged;\n", "",
       "gzip's checksum is ignored", "unit.import", "VolumeFile.RefusesACompressed*"),
+    M("server/import/case_samples.cpp", "for (int beside = 0; beside < 27 && found == kNoVoxel; ++beside)",
+      "for (int beside : {4, 10, 12, 14, 16, 22})\n    if (found == kNoVoxel)",
+      "a sample has the label of a voxel beside its own only across a face", "unit.import", "CaseSamples.*"),
+    M("server/import/volume_file.cpp", "image->datatype = single ? DT_UINT32 : DT_UINT64;", "",
+      "what is no number in NIfTI becomes 0 HU", "unit.import", "VolumeFile.WhatIsNoNumber*"),
+    M("common/imaging/hu_volume.cpp", "if (!keep_going(static_cast<double>(slice - first[2]) / part.dims[2]))",
+      "if (false)",
+      "cropping a scan cannot be stopped", "unit.imaging", "HuVolume.Cropping*"),
 ]

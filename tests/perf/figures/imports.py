@@ -122,17 +122,22 @@ ACCURACY_SCANS = {"fine": "fine slices", "noise": "noise", "blur": "blur", "thic
 
 
 def import_accuracy(run):
-    """Dice and distances of imported phantoms, with the default threshold beside the best one."""
+    """Dice, distances, densities and masses of imported phantoms. Beside shapes: with the best threshold; beside
+    densities and masses: with the blur of cortex taken out. All errors without their sign."""
     run.say("accuracy of imports")
     folder = run.folder / "import-accuracy"
     folder.mkdir(exist_ok=True)
-    found = {(row["scan"], row["threshold"]): row for row in json.loads(run.output("osteon-import-accuracy", folder))}
+    found = {(row["scan"], row["options"]): row for row in json.loads(run.output("osteon-import-accuracy", folder))}
     values = {}
     for bone, bone_name in ACCURACY_BONES.items():
         for scan, scan_name in ACCURACY_SCANS.items():
-            default, best = (found[f"{bone_name}, {scan_name}", which] for which in ("default", "midway"))
+            default, best, sharp = (found[f"{bone_name}, {scan_name}", which]
+                                    for which in ("default", "midway", "thin cortex"))
             for figure, what in (("dice", "dice"), ("distance", "mean_mm")):
                 values[f"import_{bone}_{scan}_{figure}"] = Measured(default[what], best[what])
+            for what in ("cortical", "cancellous", "mass"):
+                values[f"import_{bone}_{scan}_{what}"] = Measured(abs(default[what + "_percent"]),
+                                                                  abs(sharp[what + "_percent"]))
     return values
 
 

@@ -46,6 +46,7 @@ COMPARISONS = {
 STRANGERS = "the fastest of a dense array, OpenVDB's culled leaves and csgDifference"
 ITK_CHAIN = "ITK's, which reads, applies the threshold, labels, resamples and measures distances, but saves nothing"
 FILTERS = "the fastest of SciPy, scikit-image and ITK"
+SHARP_CORTEX = "with --thin-cortex on, and skin at which the blur is measured"
 EMPTY_LOOP = "the same of an empty 1 kHz loop"
 # Target of fuzz.mutations, what is changed in it, which code takes that, and number of inputs; ten million of each with
 # --soak.
@@ -658,7 +659,7 @@ FIGURES = [
         Figure(f"import_{name}_memory", "mb", f"peak memory of the import of {what}", "real_imports",
                baseline="the earlier program"))],
     # How well an imported bone agrees with the shape that was scanned: Dice of their samples, and the mean distance of
-    # their surfaces, both ways. Pixels are 0.7 mm.
+    # their surfaces, both ways. Pixels are 0.7 mm. Densities are means at least 1 mm from the faces of a layer.
     *[figure for bone, bone_name, least in (("long_bone", "a long bone", 0.97),
                                             ("two_bones", "two bones 2 mm apart", 0.95))
       for scan, scan_name, most in (("fine", "slices 1 mm apart", 0.35), ("noise", "noise of 80 HU", 0.35),
@@ -668,7 +669,15 @@ FIGURES = [
         Figure(f"import_{bone}_{scan}_dice", "ratio", f"Dice of {bone_name} and its import, {scan_name}",
                "import_accuracy", (">=", least), "with a threshold midway between soft tissue and cortex"),
         Figure(f"import_{bone}_{scan}_distance", "mm", f"mean distance of their surfaces, {scan_name}",
-               "import_accuracy", ("<=", most), "with a threshold midway between soft tissue and cortex"))],
+               "import_accuracy", ("<=", most), "with a threshold midway between soft tissue and cortex"),
+        Figure(f"import_{bone}_{scan}_cortical", "percent",
+               f"error of the density within the cortex of {bone_name}, {scan_name}", "import_accuracy", ("<=", 3.0),
+               SHARP_CORTEX),
+        Figure(f"import_{bone}_{scan}_cancellous", "percent",
+               f"error of the density within its cancellous bone, {scan_name}", "import_accuracy", ("<=", 5.0),
+               SHARP_CORTEX),
+        Figure(f"import_{bone}_{scan}_mass", "percent", f"error of its mass, {scan_name}", "import_accuracy",
+               baseline=SHARP_CORTEX))],
     Figure("import_trunk_cpu", "s", "CPU time from a DICOM folder of a trunk, 512 x 512 x 302, to its saved case",
            "import_cost", baseline=ITK_CHAIN),
     Figure("import_cpu_ratio", "ratio", f"the same over that of {ITK_CHAIN}, in turns", "import_cost", ("<=", 1.2)),

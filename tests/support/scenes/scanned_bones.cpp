@@ -9,6 +9,8 @@
 #include <numbers>
 #include <random>
 
+#include "common/imaging/calibration.hpp"
+#include "common/volume/case_scan.hpp"
 #include "common/volume/cut_field.hpp"
 #include "server/import/bone_surface.hpp"
 #include "server/import/dicom_reader.hpp"
@@ -33,6 +35,8 @@ double blurred_step(double inside_mm, double sigma_mm) {
 // alone.
 double hu_at(const BoneScan& scan, const Vec3& at_mm) {
   double hu = kSoftTissue_hu;
+  if (scan.skin_mm)
+    hu += (kAir_hu - kSoftTissue_hu) * blurred_step(at_mm.head<2>().norm() - *scan.skin_mm, scan.blur_mm);
   for (const Shaft& shaft : scan.shafts) {
     const double inside_mm = -shaft.surface_mm(at_mm);
     hu += (kCortex_hu - kSoftTissue_hu) * blurred_step(inside_mm, scan.blur_mm) +
@@ -112,6 +116,60 @@ std::vector<Vec3> surface_points(const BoneScan& scan) {
   return points;
 }
 
+// Everything within a radius of a line.
+double capsule_mm3(double length_mm, double radius_mm) {
+  return std::numbers::pi * radius_mm * radius_mm * (length_mm + 4.0 / 3.0 * radius_mm);
+}
+
+const Shaft& nearest_shaft(const BoneScan& scan, const Vec3& at_mm) {
+  return *std::ranges::min_element(scan.shafts, {}, [&](const Shaft& shaft) { return shaft.surface_mm(at_mm); });
+}
+
+double percent_error(double found, double truth) { return 100.0 * (found - truth) / truth; }
+
+// Sums over samples of a layer of bone, cortex or cancellous.
+struct LayerSums {
+  double interior_g_cm3 = 0.0, all_g_cm3 = 0.0;
+  std::int64_t interior = 0;
+};
+
+void measure_density(const BoneScan& scan, const Case& bone, const CoordBox& box, Accuracy& accuracy) {
+  LayerSums cortex, cancellous;
+  const double pitch_mm = bone.pitch_mm();
+  for (int x = box.min.x; x <= box.max.x; ++x)
+    for (int y = box.min.y; y <= box.max.y; ++y)
+      for (int z = box.min.z; z <= box.max.z; ++z) {
+        const Vec3 at = position_mm({x, y, z}, pitch_mm);
+        const Shaft& shaft = nearest_shaft(scan, at);
+        const double depth_mm = -shaft.surface_mm(at);
+        LayerSums& layer = depth_mm < shaft.cortex_mm ? cortex : cancellous;
+        const double from_inner_mm = std::abs(depth_mm - shaft.cortex_mm);
+        const bool interior = std::min(depth_mm, from_inner_mm) >= kInterior_mm;
+        layer.interior += interior ? 1 : 0;
+        if (bone.surface_mm(at) >= 0.0) continue;
+        const double density = bone.density_g_cm3(at);
+        layer.all_g_cm3 += density;
+        if (interior) layer.interior_g_cm3 += density;
+      }
+  double bone_mm3 = 0.0, cancellous_mm3 = 0.0;
+  for (const Shaft& shaft : scan.shafts) {
+    bone_mm3 += shaft.volume_mm3();
+    cancellous_mm3 += shaft.cancellous_mm3();
+  }
+  const auto density = [&](double hu) { return imaging::density_g_cm3(bone.info().calibration, hu); };
+  const double sample_mm3 = pitch_mm * pitch_mm * pitch_mm;
+  accuracy.cortical_percent =
+      percent_error(cortex.interior_g_cm3 / static_cast<double>(cortex.interior), density(kCortex_hu));
+  accuracy.cancellous_percent =
+      percent_error(cancellous.interior_g_cm3 / static_cast<double>(cancellous.interior), density(kCancellous_hu));
+  const double cortical_mass = density(kCortex_hu) * (bone_mm3 - cancellous_mm3),
+               cancellous_mass = density(kCancellous_hu) * cancellous_mm3;
+  accuracy.cortical_mass_percent = percent_error(cortex.all_g_cm3 * sample_mm3, cortical_mass);
+  accuracy.cancellous_mass_percent = percent_error(cancellous.all_g_cm3 * sample_mm3, cancellous_mass);
+  accuracy.mass_percent =
+      percent_error((cortex.all_g_cm3 + cancellous.all_g_cm3) * sample_mm3, cortical_mass + cancellous_mass);
+}
+
 double percentile95(std::vector<double> values) {
   const auto rank = static_cast<std::ptrdiff_t>(0.95 * static_cast<double>(values.size()));
   std::nth_element(values.begin(), values.begin() + rank, values.end());
@@ -126,11 +184,10 @@ double Shaft::surface_mm(const Vec3& at_mm) const {
   return (at_mm - from_mm - t * along).norm() - radius_mm;
 }
 
-double BoneScan::surface_mm(const Vec3& at_mm) const {
-  double nearest = shafts.front().surface_mm(at_mm);
-  for (const Shaft& shaft : shafts) nearest = std::min(nearest, shaft.surface_mm(at_mm));
-  return nearest;
-}
+double Shaft::volume_mm3() const { return capsule_mm3((to_mm - from_mm).norm(), radius_mm); }
+double Shaft::cancellous_mm3() const { return capsule_mm3((to_mm - from_mm).norm(), radius_mm - cortex_mm); }
+
+double BoneScan::surface_mm(const Vec3& at_mm) const { return nearest_shaft(*this, at_mm).surface_mm(at_mm); }
 
 std::vector<Shaft> long_bone() {
   return {{.from_mm = {-2.0, 1.0, -14.0}, .to_mm = {2.0, -1.5, 14.0}, .radius_mm = 9.0, .cortex_mm = 3.0}};
@@ -170,8 +227,9 @@ Result<void> write_scan(const BoneScan& scan, const fs::path& folder) {
   imaging::HuVolume grid;
   const Box box = box_of(scan);
   // The tilt moves the ends of the bone within the slices.
-  const double size_mm = 2.0 * (box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff() +
-                                kField_mm + 0.5 * std::abs(scan.tilt_degrees));
+  const double half_mm = std::max(box.min_mm.head<2>().cwiseAbs().cwiseMax(box.max_mm.head<2>().cwiseAbs()).maxCoeff(),
+                                  scan.skin_mm.value_or(0.0));
+  const double size_mm = 2.0 * (half_mm + kField_mm + 0.5 * std::abs(scan.tilt_degrees));
   const int pixels = static_cast<int>(std::ceil(size_mm / scan.pixel_mm));
   grid.dims = {pixels, pixels, static_cast<int>(scan.gaps_mm.size()) + 1};
   grid.spacing_mm = {scan.pixel_mm, scan.pixel_mm, 1.0};
@@ -214,6 +272,7 @@ Accuracy accuracy_of(const BoneScan& scan, const Case& bone) {
         sum += found + real;
       }
   accuracy.dice = sum > 0 ? 2.0 * static_cast<double>(common) / static_cast<double>(sum) : 0.0;
+  measure_density(scan, bone, box, accuracy);
   const auto mesh = import::bone_surface(CutField(bone, BodyId{0}), [](double) { return true; });
   if (!mesh) return accuracy;
   std::vector<double> from_case, from_truth;
@@ -235,8 +294,11 @@ Accuracy accuracy_of(const BoneScan& scan, const Case& bone) {
 
 Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions& options, const fs::path& folder) {
   const auto going = [](double) { return true; };
-  if (auto written = write_scan(scan, folder); !written) return tl::unexpected(written.error());
-  auto read = import::read_dicom_series(folder, going);
+  std::error_code error;
+  if (!fs::create_directories(folder, error))
+    return failure(ErrorCode::internal, "cannot make the folder " + folder.string());
+  if (auto written = write_scan(scan, folder / "series"); !written) return tl::unexpected(written.error());
+  auto read = import::read_dicom_series(folder / "series", going);
   if (!read) return tl::unexpected(read.error());
   // As many islands as there are bones, or fewer if bones have grown together.
   import::CtOptions keeping = options;
@@ -244,7 +306,10 @@ Result<Accuracy> measure_accuracy(const BoneScan& scan, const import::CtOptions&
   auto made = import::import_ct(*read, keeping, going);
   if (!made && scan.shafts.size() > 1) made = import::import_ct(std::move(*read), options, going);
   if (!made) return tl::unexpected(made.error());
-  Accuracy accuracy = accuracy_of(scan, *made->bone);
+  if (auto saved = made->bone->save(folder / "case", made->scan); !saved) return tl::unexpected(saved.error());
+  const auto bone = Case::load(folder / "case");
+  if (!bone) return tl::unexpected(bone.error());
+  Accuracy accuracy = accuracy_of(scan, *bone);
   for (const imaging::Island& island : made->found.islands)
     accuracy.islands += island.volume_cm3 >= kLeastIsland_cm3 ? 1 : 0;
   return accuracy;

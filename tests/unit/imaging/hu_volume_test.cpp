@@ -51,7 +51,9 @@ TEST(HuVolume, APartHasItsVoxelsAtTheirPositions) {
   volume.values.resize(volume.count());
   for (std::size_t i = 0; i < volume.values.size(); ++i) volume.values[i] = static_cast<std::int16_t>(i);
   const std::array<int, 3> first{2, 0, 7}, last{9, 4, 7};
-  const HuVolume part = cropped(volume, first, last);
+  const auto cut = cropped(volume, first, last, [](double) { return true; });
+  ASSERT_TRUE(cut);
+  const HuVolume& part = *cut;
   ASSERT_EQ(part.dims, (std::array<int, 3>{8, 5, 1})) << "both ends are included";
   ASSERT_EQ(part.values.size(), part.count());
   for (int slice = 0; slice < part.dims[2]; ++slice)
@@ -59,6 +61,23 @@ TEST(HuVolume, APartHasItsVoxelsAtTheirPositions) {
       for (int column = 0; column < part.dims[0]; ++column)
         EXPECT_EQ(part.at(column, row, slice), volume.at(column + first[0], row + first[1], slice + first[2]));
   EXPECT_LT((part.position_mm(Vec3(1, 2, 0)) - volume.position_mm(Vec3(3, 2, 7))).norm(), 1e-12);
+}
+
+// A slice of a long scan takes a millisecond, so a stop is asked for before each.
+TEST(HuVolume, CroppingCanBeStoppedBeforeEachSlice) {
+  HuVolume volume = oblique();
+  volume.values.resize(volume.count());
+  const std::array<int, 3> first{2, 0, 7}, last{9, 4, 11};
+  std::vector<double> asked;
+  ASSERT_TRUE(cropped(volume, first, last, [&](double done) { return asked.push_back(done), true; }));
+  ASSERT_EQ(asked.size(), 5u);
+  EXPECT_TRUE(std::ranges::is_sorted(asked));
+  for (int stop = 1; stop <= 5; ++stop) {
+    int questions = 0;
+    const auto part = cropped(volume, first, last, [&](double) { return ++questions < stop; });
+    ASSERT_FALSE(part) << stop;
+    EXPECT_EQ(part.error().code, ErrorCode::cancelled);
+  }
 }
 
 }  // namespace

@@ -110,5 +110,26 @@ TEST(FindComponents, CountsAsPaintingDoes) {
   }
 }
 
+TEST(VoxelMask, APartHasItsVoxelsAndCroppingCanBeStoppedBeforeEachSlice) {
+  VoxelMask mask({4, 5, 6});
+  for (std::size_t i = 0; i < mask.values.size(); ++i) mask.values[i] = static_cast<std::uint8_t>(i);
+  const std::array<int, 3> first{1, 0, 2}, last{3, 3, 4};
+  int questions = 0;
+  const auto part = cropped(mask, first, last, [&](double) { return ++questions > 0; });
+  ASSERT_TRUE(part);
+  ASSERT_EQ(part->dims, (std::array<int, 3>{3, 4, 3}));
+  for (int slice = 0; slice < 3; ++slice)
+    for (int row = 0; row < 4; ++row)
+      for (int column = 0; column < 3; ++column)
+        EXPECT_EQ(part->at(column, row, slice), mask.at(column + 1, row, slice + 2));
+  EXPECT_EQ(questions, 3);
+  for (int stop = 1; stop <= 3; ++stop) {
+    int asked = 0;
+    const auto stopped = cropped(mask, first, last, [&](double) { return ++asked < stop; });
+    ASSERT_FALSE(stopped) << stop;
+    EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+  }
+}
+
 }  // namespace
 }  // namespace osteon::imaging

@@ -381,7 +381,7 @@ TEST(CtImport, KeepStillTakesATable) {
   EXPECT_NEAR(made->bone->volume_mm3(), 30720.0, 0.1 * 30720.0);
   EXPECT_NE(segmentation_text(made->found).find("table or headrest, island 1, 30.72 cm3, kept: "), std::string::npos);
   EXPECT_EQ(made->bone->info().labels.front().provenance.method,
-            "threshold, enclosed marrow, islands, surface at half maximum, looks like table");
+            "threshold, enclosed marrow, islands, surface at half maximum, its shape is that of a table or headrest");
 }
 
 // A cast closes around the arm as cortex does around marrow. The arm must not become its marrow.

@@ -101,13 +101,15 @@ TEST_F(Given, SlopeInterceptAndSkippedBytes) {
 
 TEST_F(Given, NumbersBeyondHuAreClampedAndWhatIsNoNumberIsAir) {
   std::string bytes = stored_bytes(std::numeric_limits<float>::quiet_NaN(), false) + stored_bytes(1e9f, false) +
-                      stored_bytes(-1e9f, false) + stored_bytes(99.6f, false);
+                      stored_bytes(-1e9f, false) + stored_bytes(99.6f, false) +
+                      stored_bytes(-std::numeric_limits<float>::infinity(), false);
   bytes.resize(4 * kColumns * kRows * kSlices);
   write(file_, bytes);
   const auto scan = read_raw_volume(file_, format_of(RawType::float32), keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
-  const std::vector<std::int16_t> first(scan->volume.values.begin(), scan->volume.values.begin() + 5);
-  EXPECT_EQ(first, (std::vector<std::int16_t>{-1024, 32767, -32768, 100, 0}));
+  const std::vector<std::int16_t> first(scan->volume.values.begin(), scan->volume.values.begin() + 6);
+  EXPECT_EQ(first, (std::vector<std::int16_t>{-1024, 32767, -32768, 100, -1024, 0}));
+  EXPECT_EQ(scan->report.without_number, 2);
 }
 
 TEST_F(Given, ARawSliceInEachFile) {

@@ -175,6 +175,47 @@ TEST(KeptScan, SeedsAreParametersOfTheBonesThatGrewFromThem) {
   EXPECT_EQ(provenance.parameters.at("seed_1_z_mm"), seed_mm.z());
 }
 
+// HU, labels and tissues of 30 slices each, and the tissue of bone that nobody knows, slice by slice.
+TEST(KeptScan, CanBeStoppedBeforeEachSlice) {
+  const CtScan scan = turned_boxes();
+  const imaging::VoxelBox box{{0, 0, 0}, {59, 39, 29}};
+  const auto keep = [&](const KeepGoing& going) {
+    return kept_scan(scan.volume, {imaging::VoxelMask(kScanDims), imaging::VoxelMask(kScanDims), {}}, box,
+                     imaging::kRho1995, going);
+  };
+  std::vector<double> asked;
+  ASSERT_TRUE(keep([&](double done) { return asked.push_back(done), true; }));
+  EXPECT_EQ(asked.size(), 4u * 30u);
+  EXPECT_TRUE(std::ranges::is_sorted(asked));
+  for (std::size_t stop = 1; stop <= asked.size(); ++stop) {
+    std::size_t questions = 0;
+    const auto stopped = keep([&](double) { return ++questions < stop; });
+    ASSERT_FALSE(stopped) << stop;
+    EXPECT_EQ(stopped.error().code, ErrorCode::cancelled);
+  }
+}
+
+// From the first look at the scan to the last file of the case, at about 60 moments.
+TEST(KeptScan, AnImportThatIsStoppedAtAnyMomentLeavesNothing) {
+  const CtScan scan = turned_boxes();
+  const auto import_to = [&](const fs::path& folder, const KeepGoing& going) -> Result<void> {
+    auto made = import_ct(scan, {.pitch_mm = 2.0, .keep_all = true}, going);
+    if (!made) return tl::unexpected(made.error());
+    return made->bone->save(folder, made->scan, going);
+  };
+  const test::TempDir folder;
+  std::vector<double> asked;
+  ASSERT_TRUE(import_to(folder / "whole", [&](double done) { return asked.push_back(done), true; }));
+  const std::size_t step = std::max<std::size_t>(1, asked.size() / 60);
+  for (std::size_t stop = 1; stop <= asked.size(); stop += step) {
+    std::size_t questions = 0;
+    const auto stopped = import_to(folder / "stopped", [&](double) { return ++questions < stop; });
+    ASSERT_FALSE(stopped) << stop << " of " << asked.size();
+    EXPECT_EQ(stopped.error().code, ErrorCode::cancelled) << stopped.error().message;
+    ASSERT_EQ(files_of(folder.path()), (std::vector<fs::path>{folder / "whole"})) << stop << " of " << asked.size();
+  }
+}
+
 TEST(KeptScan, AWrongMarginIsRefused) {
   for (const double margin_mm : {-1.0, 201.0, std::nan("")}) {
     const auto made = import_ct(turned_boxes(), {.margin_mm = margin_mm}, keep_going);

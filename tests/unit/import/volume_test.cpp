@@ -264,20 +264,51 @@ TEST(VolumeFile, EveryNumberFitsInInt16) {
   const auto scan = read_volume(folder / "a.nrrd", keep_going);
   ASSERT_TRUE(scan) << scan.error().message;
   EXPECT_EQ(scan->volume.at(0, 0, 0), -1024);
-  EXPECT_EQ(scan->volume.at(1, 0, 0), 32767);
-  EXPECT_EQ(scan->volume.at(2, 0, 0), -32768);
+  EXPECT_EQ(scan->volume.at(1, 0, 0), -1024);
+  EXPECT_EQ(scan->volume.at(2, 0, 0), -1024);
+  EXPECT_EQ(scan->report.without_number, 3);
   EXPECT_EQ(scan->volume.at(0, 1, 0), 32767);
   EXPECT_EQ(scan->volume.at(1, 1, 0), 100);
   EXPECT_EQ(scan->volume.at(2, 1, 0), -100);
   EXPECT_EQ(scan->volume.at(0, 2, 0), 7);
+}
 
-  // The library of NIfTI makes 0 of what is no finite number.
-  write(folder / "a.nii", nifti_header(volume, {16, 32}) + voxels<float>(volume, value));
-  const auto nifti = read_volume(folder / "a.nii", keep_going);
-  ASSERT_TRUE(nifti) << nifti.error().message;
-  for (int i = 0; i < 3; ++i) EXPECT_EQ(nifti->volume.at(i, 0, 0), 0);
-  EXPECT_EQ(nifti->volume.at(0, 1, 0), 32767);
-  EXPECT_EQ(nifti->volume.at(1, 1, 0), 100);
+// A real 0 stays 0, so voxels without a number are not known by what the library of NIfTI makes of them.
+TEST(VolumeFile, WhatIsNoNumberInNiftiIsAirAndCounted) {
+  const test::TempDir folder;
+  const Volume volume;
+  const auto single = [](int i, int j, int k) -> float {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    if (j != 0 || k != 2) return i == 0 ? 0.0f : 99.6f;
+    return i == 0 ? std::numeric_limits<float>::quiet_NaN() : i == 1 ? kInfinity : -kInfinity;
+  };
+  const auto twice = [](int i, int j, int k) -> double {
+    if (j != 0 || k != 2) return i == 0 ? 0.0 : 99.6;
+    return i == 0 ? std::numeric_limits<double>::quiet_NaN() : i == 1 ? HUGE_VAL : -HUGE_VAL;
+  };
+  // The same with the other order of bytes: the header's fields of 16 and of 32 bits that are not 0, and the voxels.
+  std::string swapped = nifti_header(volume, {16, 32}) + voxels<float>(volume, single);
+  const auto swap = [&](std::size_t first, std::size_t end, std::ptrdiff_t bytes) {
+    for (auto at = swapped.begin() + static_cast<std::ptrdiff_t>(first);
+         at != swapped.begin() + static_cast<std::ptrdiff_t>(end); at += bytes)
+      std::reverse(at, at + bytes);
+  };
+  swap(0, 4, 4), swap(40, 56, 2), swap(70, 74, 2), swap(76, 120, 4), swap(252, 256, 2), swap(280, 328, 4);
+  swap(352, swapped.size(), 4);
+  write(folder / "single.nii", nifti_header(volume, {16, 32}) + voxels<float>(volume, single));
+  write(folder / "double.nii", nifti_header(volume, {64, 64}) + voxels<double>(volume, twice));
+  write(folder / "swapped.nii", swapped);
+  write_compressed(folder / "packed.nii.gz", nifti_header(volume, {16, 32}) + voxels<float>(volume, single));
+  for (const char* name : {"single.nii", "double.nii", "swapped.nii", "packed.nii.gz"}) {
+    const auto scan = read_volume(folder / name, keep_going);
+    ASSERT_TRUE(scan) << scan.error().message;
+    for (int k = 0; k < 5; ++k)
+      for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 3; ++i)
+          EXPECT_EQ(scan->volume.at(i, j, k), j == 0 && k == 2 ? -1024 : i == 0 ? 0 : 100) << name;
+    EXPECT_EQ(scan->report.without_number, 3) << name;
+    EXPECT_EQ(report_lines(scan->report), "warning    3 voxels have no finite number: they count as air\n");
+  }
 }
 
 TEST(VolumeFile, TheSourceSaysNothingOfThePatient) {
