@@ -4,6 +4,8 @@
 #include <array>
 #include <bitset>
 #include <cmath>
+#include <initializer_list>
+#include <utility>
 #include <vector>
 
 #include "common/imaging/components.hpp"
@@ -18,9 +20,9 @@ constexpr double kStride_mm = 2.5;             // between the centres of cubes
 constexpr double kBlood_hu = 50.0;             // without contrast medium
 constexpr double kMostSpread = 0.15;           // standard deviation over the mean above kBlood_hu
 constexpr double kLeast_hu = 100.0;            // of each voxel of a cube: above soft tissue
-constexpr double kMost_hu = 700.0;             // of a cube's mean
+constexpr double kMost_hu = 700.0;             // of a cube's mean. Lell 2017: the medium adds 357 to 478 HU
 constexpr double kLeastPool_cm3 = 2.0;         // of a scan
-constexpr double kLeastPart_cm3 = 0.2;         // of homogeneous cubes in each part of the pool
+constexpr double kLeastPart_cm3 = 0.2;         // of homogeneous cubes in each part of a pool, and in further pools
 constexpr double kSameLevel = 0.2;             // cubes of one pool are within this part of its level
 constexpr double kNoises = 4.0;                // blood is within so many standard deviations of the level
 constexpr double kCore_mm = 2.0;               // blood is farther from anything else
@@ -123,8 +125,8 @@ class CubeSearch {
   Triple half_{}, stride_{}, step_{};
 };
 
-// The level around which most cubes are, and those cubes. Nothing if they are too few.
-std::optional<Pool> pool_of(const std::vector<Cube>& cubes, double cube_cm3, double threshold_hu) {
+// Takes out the cubes around the level at which most of them are. Nothing if they are too few.
+std::optional<Pool> next_pool(std::vector<Cube>& cubes, double cube_cm3, double least_cm3, double threshold_hu) {
   constexpr double kBin_hu = 25.0;
   std::array<int, static_cast<std::size_t>(kMost_hu / kBin_hu) + 1> bins{};
   for (const Cube& cube : cubes) ++bins[static_cast<std::size_t>(cube.mean_hu / kBin_hu)];
@@ -132,15 +134,16 @@ std::optional<Pool> pool_of(const std::vector<Cube>& cubes, double cube_cm3, dou
   Pool pool;
   pool.cube_cm3 = cube_cm3;
   double sum = 0.0, variances = 0.0;
-  for (const Cube& cube : cubes) {
-    if (std::abs(cube.mean_hu - mode_hu) > kSameLevel * mode_hu) continue;
+  std::erase_if(cubes, [&](const Cube& cube) {
+    if (std::abs(cube.mean_hu - mode_hu) > kSameLevel * mode_hu) return false;
     pool.centres.push_back(cube.centre);
     sum += cube.mean_hu;
     variances += cube.variance;
-  }
+    return true;
+  });
   const auto count = static_cast<double>(pool.centres.size());
   pool.evidence.homogeneous_cm3 = count * cube_cm3;
-  if (pool.evidence.homogeneous_cm3 < kLeastPool_cm3) return std::nullopt;
+  if (pool.evidence.homogeneous_cm3 < least_cm3) return std::nullopt;
   pool.evidence.level_hu = sum / count;
   pool.evidence.noise_hu = std::sqrt(variances / count);
   const double reach_hu = kNoises * pool.evidence.noise_hu;
@@ -151,27 +154,40 @@ std::optional<Pool> pool_of(const std::vector<Cube>& cubes, double cube_cm3, dou
 
 class ContrastMarker {
  public:
-  ContrastMarker(const HuVolume& volume, double metal_hu, Pool& pool, VoxelMask& dense)
+  ContrastMarker(const HuVolume& volume, double metal_hu, VoxelMask& dense)
       : volume_(volume),
         metal_hu_(metal_hu),
-        pool_(pool),
         dense_(dense),
         core_mm_(std::max(kCore_mm, volume.spacing_mm.maxCoeff())),
         voxel_cm3_(volume.spacing_mm.prod() * 1e-3) {}
 
-  // False: there is none, and the mask is as before.
-  Result<bool> mark(const KeepGoing& keep_going) {
-    const auto any = mark_pool(part(keep_going, 0.0, 0.5));
-    if (!any || !*any) return any;
-    if (auto added = add_rest(part(keep_going, 0.5, 1.0)); !added) return tl::unexpected(added.error());
+  // Marks the pool if it is blood. The first one that is stands for the scan. Error: cancelled.
+  Result<void> mark(Pool pool, const KeepGoing& keep_going) {
+    std::swap(pool_, pool);
+    const auto any = mark_pool(keep_going);
+    if (!any) return tl::unexpected(any.error());
+    if (!*any || found_) std::swap(pool_, pool);
+    found_ = found_ || *any;
+    return {};
+  }
+
+  [[nodiscard]] bool has_found() const { return found_; }
+
+  // Adds what belongs to the pools. Nothing: there is none, and the mask is as before. Error: cancelled.
+  Result<std::optional<BloodPool>> finish(const KeepGoing& keep_going) {
+    if (!found_) return std::optional<BloodPool>();
+    if (auto added = add_rest(keep_going); !added) return tl::unexpected(added.error());
     const auto marked = std::ranges::count(dense_.values, mask_value(BoneVoxel::contrast));
     pool_.evidence.contrast_cm3 = static_cast<double>(marked) * voxel_cm3_;
-    if (brighter_bone_cm3() >= kLeastBone_cm3) return true;
+    if (brighter_bone_cm3() >= kLeastBone_cm3) return std::optional(pool_.evidence);
     std::ranges::replace(dense_.values, mask_value(BoneVoxel::contrast), mask_value(BoneVoxel::dense));
-    return false;
+    return std::optional<BloodPool>();
   }
 
  private:
+  [[nodiscard]] bool is_marked(const Triple& at) const {
+    return dense_.at(at[0], at[1], at[2]) == mask_value(BoneVoxel::contrast);
+  }
   [[nodiscard]] double hu(const Triple& at) const { return volume_.at(at[0], at[1], at[2]); }
   [[nodiscard]] bool contains(const Triple& at) const {
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -263,7 +279,7 @@ class ContrastMarker {
     bool brighter = false, tissue = false;
     for (int i = 0; i < steps; ++i, at[axis] += side) {
       if (!contains(at)) return;  // nobody knows what follows
-      brighter = brighter || hu(at) > pool_.high_hu;
+      brighter = brighter || (hu(at) > pool_.high_hu && !is_marked(at));
       tissue = tissue || (hu(at) >= kTissueFrom_hu && hu(at) < pool_.low_hu);
     }
     ++seen.faces;
@@ -318,7 +334,7 @@ class ContrastMarker {
     for (int z = std::max(0, at[2] - 1); z <= std::min(volume_.dims[2] - 1, at[2] + 1); ++z)
       for (int y = std::max(0, at[1] - 1); y <= std::min(volume_.dims[1] - 1, at[1] + 1); ++y)
         for (int x = std::max(0, at[0] - 1); x <= std::min(volume_.dims[0] - 1, at[0] + 1); ++x)
-          if (dense_.at(x, y, z) == mask_value(BoneVoxel::contrast)) return true;
+          if (is_marked({x, y, z})) return true;
     return false;
   }
   [[nodiscard]] bool is_contrast(const Rest& rest) const {
@@ -341,9 +357,10 @@ class ContrastMarker {
 
   const HuVolume& volume_;
   double metal_hu_;
-  Pool& pool_;
   VoxelMask& dense_;
   double core_mm_, voxel_cm3_;
+  Pool pool_;
+  bool found_ = false;  // pool_ is blood
 };
 
 }  // namespace
@@ -351,13 +368,19 @@ class ContrastMarker {
 Result<std::optional<BloodPool>> mark_contrast(const HuVolume& volume, double threshold_hu, double metal_hu,
                                                VoxelMask& dense, const KeepGoing& keep_going) {
   const CubeSearch search(volume, threshold_hu, dense);
-  const auto cubes = search.homogeneous(part(keep_going, 0.0, 0.2));
+  auto cubes = search.homogeneous(part(keep_going, 0.0, 0.2));
   if (!cubes) return tl::unexpected(cubes.error());
-  auto pool = pool_of(*cubes, search.cube_cm3(), threshold_hu);
-  if (!pool) return std::optional<BloodPool>();
-  const auto marked = ContrastMarker(volume, metal_hu, *pool, dense).mark(part(keep_going, 0.2, 1.0));
-  if (!marked) return tl::unexpected(marked.error());
-  return *marked ? std::optional(pool->evidence) : std::nullopt;
+  ContrastMarker marker(volume, metal_hu, dense);
+  // Arteries, veins and a false lumen may have levels of their own.
+  while (auto pool =
+             next_pool(*cubes, search.cube_cm3(), marker.has_found() ? kLeastPart_cm3 : kLeastPool_cm3, threshold_hu)) {
+    if (auto marked = marker.mark(std::move(*pool), part(keep_going, 0.2, 0.6)); !marked)
+      return tl::unexpected(marked.error());
+    std::erase_if(*cubes, [&](const Cube& cube) {
+      return dense.at(cube.centre[0], cube.centre[1], cube.centre[2]) == mask_value(BoneVoxel::contrast);
+    });
+  }
+  return marker.finish(part(keep_going, 0.6, 1.0));
 }
 
 }  // namespace osteon::imaging

@@ -56,12 +56,14 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
   if (options.keep_all) return all;
   if (options.keep.empty()) {
     const auto bone = std::ranges::find(natures, imaging::IslandKind::bone, &imaging::IslandNature::kind);
+    const bool has_contrast =
+        std::ranges::find(natures, imaging::IslandKind::contrast, &imaging::IslandNature::kind) != natures.end();
     if (bone == natures.end())
       return failure(ErrorCode::invalid_input,
                      "no island is bone: all that reaches the threshold of " +
-                         std::to_string(std::lround(options.threshold_hu)) +
-                         " HU is metal or contrast medium; take it with --keep, or give a lower "
-                         "--threshold or a higher --metal-hu");
+                         std::to_string(std::lround(options.threshold_hu)) + " HU is metal" +
+                         (has_contrast ? " or contrast medium" : "") +
+                         "; take it with --keep, or give a lower --threshold or a higher --metal-hu");
     return std::vector<int>{static_cast<int>(bone - natures.begin()) + 1};
   }
   std::vector<int> kept;
