@@ -33,8 +33,8 @@ constexpr double kTissueFrom_hu = -200.0;      // fat has more
 constexpr double kLeastBone_cm3 = 0.3;         // brighter than blood, in the rest of the scan
 constexpr double kDeep_mm = 4.0;               // cortex is not so deep
 constexpr double kMostlyDeep = 0.2;            // share of a rest that is no shell
-constexpr double kTouches = 0.05;              // share of a bright rest beside contrast
-constexpr double kEdge = 0.3, kBranch = 0.02;  // share of a dim rest beside contrast
+constexpr double kTouches = 0.05;              // share of the faces of a bright rest
+constexpr double kEdge = 0.3, kBranch = 0.02;  // share of the faces of a dim rest
 constexpr double kMostBranch_cm3 = 5.0;
 constexpr double kFewBright = 0.01;                  // share of noise in a dim rest
 constexpr int kPasses = 2;                           // a rest may touch another
@@ -289,7 +289,7 @@ class ContrastMarker {
 
   // A part of the dense voxels that are not marked.
   struct Rest {
-    std::int64_t voxels = 0, touching = 0, deep = 0, bright = 0;
+    std::int64_t voxels = 0, surface = 0, touching = 0, deep = 0, bright = 0;
     double deep_hu = 0.0;  // sum
   };
 
@@ -321,7 +321,7 @@ class ContrastMarker {
       for (int x = run.first; x <= run.last; ++x) {
         const Triple at{x, run.row, run.slice};
         ++rest.voxels;
-        rest.touching += touches_contrast(at) ? 1 : 0;
+        add_faces(at, rest);
         rest.bright += hu(at) > pool_.high_hu ? 1 : 0;
         if (deep.at(x, run.row, run.slice) == 0) continue;
         ++rest.deep;
@@ -330,15 +330,22 @@ class ContrastMarker {
     }
     return rests;
   }
-  [[nodiscard]] bool touches_contrast(const Triple& at) const {
-    for (int z = std::max(0, at[2] - 1); z <= std::min(volume_.dims[2] - 1, at[2] + 1); ++z)
-      for (int y = std::max(0, at[1] - 1); y <= std::min(volume_.dims[1] - 1, at[1] + 1); ++y)
-        for (int x = std::max(0, at[0] - 1); x <= std::min(volume_.dims[0] - 1, at[0] + 1); ++x)
-          if (is_marked({x, y, z})) return true;
-    return false;
+  // Faces with something else on their other side, and those of them with contrast there.
+  void add_faces(const Triple& at, Rest& rest) const {
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      for (const int side : {-1, 1}) {
+        Triple beside = at;
+        beside[axis] += side;
+        if (!contains(beside)) continue;
+        const std::uint8_t value = dense_.at(beside[0], beside[1], beside[2]);
+        rest.surface += value != mask_value(BoneVoxel::dense) ? 1 : 0;
+        rest.touching += value == mask_value(BoneVoxel::contrast) ? 1 : 0;
+      }
   }
   [[nodiscard]] bool is_contrast(const Rest& rest) const {
-    const auto all = static_cast<double>(rest.voxels), touching = static_cast<double>(rest.touching) / all;
+    const auto all = static_cast<double>(rest.voxels);
+    const double touching =
+        rest.surface > 0 ? static_cast<double>(rest.touching) / static_cast<double>(rest.surface) : 0.0;
     if (static_cast<double>(rest.bright) <= kFewBright * all)
       return touching >= kEdge || (touching >= kBranch && all * voxel_cm3_ <= kMostBranch_cm3);
     const auto deep = static_cast<double>(rest.deep);
