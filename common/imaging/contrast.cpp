@@ -32,8 +32,7 @@ constexpr double kLeastTissue = 0.3;           // share of the surface with soft
 constexpr double kTissueFrom_hu = -200.0;      // fat has more
 constexpr double kLeastBone_cm3 = 0.3;         // brighter than blood, in the rest of the scan
 constexpr double kDeep_mm = 4.0;               // cortex is not so deep
-constexpr double kMostlyDeep = 0.2;            // share of a rest that is no shell
-constexpr double kTouches = 0.05;              // share of the faces of a bright rest
+constexpr double kUnmixed = 0.02;              // of a bright rest: share of its faces at contrast, times its deep share
 constexpr double kEdge = 0.3, kBranch = 0.02;  // share of the faces of a dim rest
 constexpr double kMostBranch_cm3 = 5.0;
 constexpr double kFewBright = 0.01;                  // share of noise in a dim rest
@@ -349,7 +348,7 @@ class ContrastMarker {
     if (static_cast<double>(rest.bright) <= kFewBright * all)
       return touching >= kEdge || (touching >= kBranch && all * voxel_cm3_ <= kMostBranch_cm3);
     const auto deep = static_cast<double>(rest.deep);
-    return touching >= kTouches && deep >= kMostlyDeep * all && rest.deep_hu >= pool_.evidence.level_hu * deep;
+    return touching * deep >= kUnmixed * all && rest.deep_hu >= pool_.evidence.level_hu * deep;
   }
 
   [[nodiscard]] double brighter_bone_cm3() const {
