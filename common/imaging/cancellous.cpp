@@ -136,7 +136,7 @@ Result<VoxelMask> between_dense(const VoxelMask& candidate, const VoxelMask& den
       const int x = p.column + sign * d[0], y = p.row + sign * d[1], z = p.slice + sign * d[2];
       if (x < 0 || y < 0 || z < 0 || x >= columns || y >= rows || z >= slices) return;
       const std::size_t i = candidate.index(x, y, z);
-      if (dense.values[i] != 0 || (candidate.values[i] != 0 && (found.values[i] & bit) != 0))
+      if (dense.values[i] == mask_value(BoneVoxel::dense) || (candidate.values[i] != 0 && (found.values[i] & bit) != 0))
         to = static_cast<std::uint8_t>(to | bit);
     };
     std::size_t asked = 0;

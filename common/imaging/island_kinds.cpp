@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "common/imaging/segmentation.hpp"
+
 namespace osteon::imaging {
 namespace {
 
@@ -131,9 +133,17 @@ class IslandNamer {
       nature.at_air = at_air_mm2 / surface_mm2;
       nature.thickness_mm = 2.0 * voxels * volume_mm3 / surface_mm2;
     }
-    if (nature.metal >= kMostlyMetal || (nature.metal >= kSomeMetal && near_metal(island) >= kNearMetal))
+    if (is_contrast(island))
+      nature.kind = IslandKind::contrast;
+    else if (nature.metal >= kMostlyMetal || (nature.metal >= kSomeMetal && near_metal(island) >= kNearMetal))
       nature.kind = IslandKind::metal;
     return nature;
+  }
+
+  // All voxels of an island are, or none is.
+  [[nodiscard]] bool is_contrast(std::size_t island) const {
+    const VoxelRun& run = *runs_[island].front();
+    return bone_.at(run.first, run.row, run.slice) == mask_value(BoneVoxel::contrast);
   }
 
   // Share of voxels that may be metal's blurred edge, or are metal.
@@ -155,7 +165,7 @@ class IslandNamer {
   // The volume of bone that lies in soft tissue. Takes samples of it.
   [[nodiscard]] double find_patient(const std::vector<IslandNature>& natures) {
     const auto lies_in_it = [&](std::size_t i) {
-      return natures[i].kind != IslandKind::metal && natures[i].thickness_mm > 0.0 &&
+      return natures[i].kind == IslandKind::bone && natures[i].thickness_mm > 0.0 &&
              natures[i].at_air <= kMostInSoftTissue;
     };
     double volume_cm3 = 0.0;
@@ -177,7 +187,7 @@ class IslandNamer {
 
   // The rest of a patient's bone must be there to say that an island is none of it.
   [[nodiscard]] bool may_be_equipment(std::size_t island, const IslandNature& nature) const {
-    if (nature.kind == IslandKind::metal || nature.at_air < kLeastExposed || nature.thickness_mm > kMostThick_mm)
+    if (nature.kind != IslandKind::bone || nature.at_air < kLeastExposed || nature.thickness_mm > kMostThick_mm)
       return false;
     const double volume_cm3 = islands_.list[island].volume_cm3;
     const double others_cm3 = in_soft_tissue_cm3_ - (nature.at_air <= kMostInSoftTissue ? volume_cm3 : 0.0);
@@ -273,6 +283,8 @@ std::string_view name_of(IslandKind kind) {
       return "cast";
     case IslandKind::metal:
       return "metal";
+    case IslandKind::contrast:
+      return "contrast";
     case IslandKind::bone:
       break;
   }

@@ -13,8 +13,9 @@ enum class IslandKind : std::uint8_t {
   table,  // or a headrest, or other equipment beside the patient
   cast,   // a shell around a limb
   metal,
+  contrast,  // blood or another fluid with contrast medium
 };
-// "bone", "table", "cast" or "metal".
+// "bone", "table", "cast", "metal" or "contrast".
 [[nodiscard]] std::string_view name_of(IslandKind kind);
 
 // What an island is, and the facts that decide. Shares are from 0 to 1.
@@ -27,6 +28,7 @@ struct IslandNature {
 };
 
 // What each island is, in the order of the list:
+// - contrast, if its voxels are marked as contrast medium,
 // - metal, if at least half of its voxels have `metal_hu` or more, or nearly all of them touch such voxels,
 // - a cast, if it is a thin shell that one sees from outside, and it lies on all sides around bone,
 // - a table, if it is thin and long, and one sees it from outside,

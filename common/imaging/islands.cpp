@@ -4,20 +4,38 @@
 #include <numeric>
 
 #include "common/imaging/calibration.hpp"
+#include "common/imaging/segmentation.hpp"
 
 namespace osteon::imaging {
 namespace {
 
 constexpr int kMostNumbers = 255;
 
+// Components of bone, and those of contrast medium after them. Runs are in the order of memory. Error: cancelled.
+Result<Components> bone_and_contrast(const VoxelMask& mask, const KeepGoing& keep_going) {
+  const bool has_contrast = std::ranges::find(mask.values, mask_value(BoneVoxel::contrast)) != mask.values.end();
+  std::bitset<256> wanted;
+  wanted.set().reset(0).reset(mask_value(BoneVoxel::contrast));
+  auto found = find_components(mask, wanted, Connectivity::corners, part(keep_going, 0.0, has_contrast ? 0.5 : 1.0));
+  if (!found || !has_contrast) return found;
+  wanted.reset().set(mask_value(BoneVoxel::contrast));
+  auto contrast = find_components(mask, wanted, Connectivity::corners, part(keep_going, 0.5, 1.0));
+  if (!contrast) return contrast;
+  for (VoxelRun& run : contrast->runs) run.component += found->count;
+  found->count += contrast->count;
+  const auto bones = static_cast<std::ptrdiff_t>(found->runs.size());
+  found->runs.insert(found->runs.end(), contrast->runs.begin(), contrast->runs.end());
+  std::ranges::inplace_merge(found->runs, found->runs.begin() + bones, {}, [](const VoxelRun& run) {
+    return std::array{run.slice, run.row, run.first};
+  });
+  return found;
+}
+
 }  // namespace
 
 Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone, const DensityCalibration& calibration,
                              const KeepGoing& keep_going) {
-  std::bitset<256> not_zero;
-  not_zero.set().reset(0);
-  auto components =
-      find_components(bone, not_zero, Connectivity::corners, [&](double done) { return keep_going(0.6 * done); });
+  auto components = bone_and_contrast(bone, part(keep_going, 0.0, 0.6));
   if (!components) return tl::unexpected(components.error());
 
   struct Sums {

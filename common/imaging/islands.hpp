@@ -27,7 +27,8 @@ struct Islands {
   std::vector<int> number;  // of each component, from 1
 };
 
-// Islands of the voxels that are not 0. Error: cancelled.
+// Islands of the voxels that are not 0. Contrast medium and bone are islands of their own where they touch. Error:
+// cancelled.
 [[nodiscard]] Result<Islands> find_islands(const HuVolume& volume, const VoxelMask& bone,
                                            const DensityCalibration& calibration, const KeepGoing& keep_going);
 

@@ -82,7 +82,6 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams&
 
 Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const SegmentationParams& params,
                                const ScanEnds& ends, const KeepGoing& keep_going) {
-  for (std::uint8_t& value : dense.values) value = value != 0 ? 1 : 0;
   if (params.hollow) return dense;
 
   VoxelMask solid;
@@ -90,9 +89,11 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const Se
     auto cancellous = cancellous_between(volume, dense, params, part(keep_going, kThresholdEnd, kCancellousEnd));
     if (!cancellous) return cancellous;
     solid = std::move(*cancellous);
-    for (std::size_t i = 0; i < solid.values.size(); ++i) solid.values[i] |= dense.values[i];
+    for (std::size_t i = 0; i < solid.values.size(); ++i)
+      solid.values[i] |= dense.values[i] == mask_value(BoneVoxel::dense) ? 1 : 0;
   } else {
     solid = dense;
+    std::ranges::replace(solid.values, mask_value(BoneVoxel::contrast), mask_value(BoneVoxel::none));
   }
   auto enclosed = enclosed_by(solid, volume.spacing_mm, params, ends, part(keep_going, kCancellousEnd, kEnclosedEnd));
   if (!enclosed) return enclosed;
@@ -100,11 +101,14 @@ Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const Se
     return tl::unexpected(opened.error());
 
   for (std::size_t i = 0; i < solid.values.size(); ++i) {
-    if (dense.values[i] != 0) continue;
+    if (dense.values[i] != 0) {
+      solid.values[i] = dense.values[i];
+      continue;
+    }
     const BoneVoxel kind = solid.values[i] != 0       ? BoneVoxel::cancellous
                            : enclosed->values[i] != 0 ? BoneVoxel::marrow
                                                       : BoneVoxel::none;
-    solid.values[i] = static_cast<std::uint8_t>(kind);
+    solid.values[i] = mask_value(kind);
   }
   return solid;
 }

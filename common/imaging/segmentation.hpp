@@ -1,6 +1,7 @@
 // Finds the bone voxels of a scan: those at or above a threshold, and the marrow and cancellous bone within them.
 #pragma once
 #include <array>
+#include <cstdint>
 
 #include "common/imaging/calibration.hpp"
 #include "common/imaging/hu_volume.hpp"
@@ -14,7 +15,9 @@ enum class BoneVoxel : std::uint8_t {
   dense = 1,       // at or above the threshold
   cancellous = 2,  // below it, between dense bone
   marrow = 3,      // below it, enclosed by dense and cancellous bone
+  contrast = 4,    // contrast medium, no bone: see mark_contrast()
 };
+[[nodiscard]] constexpr std::uint8_t mask_value(BoneVoxel voxel) { return static_cast<std::uint8_t>(voxel); }
 
 struct SegmentationParams {
   double threshold_hu = kBoneThreshold_hu;
@@ -45,7 +48,8 @@ inline constexpr ScanEnds kAllScanEnds{{{true, true}, {true, true}, {true, true}
 [[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, const SegmentationParams& params,
                                              const ScanEnds& ends, const KeepGoing& keep_going);
 
-// The same for dense bone that was found in another way: the voxels that are not 0 in `dense`.
+// The same for dense bone that was found in another way: 1 in `dense`. Contrast medium in it stays what it is, and
+// neither encloses bone nor is enclosed by it.
 [[nodiscard]] Result<VoxelMask> segment_bone(const HuVolume& volume, VoxelMask dense, const SegmentationParams& params,
                                              const ScanEnds& ends, const KeepGoing& keep_going);
 

@@ -122,7 +122,8 @@ class Front {
     for (std::size_t next = 0; next < gone_.size(); ++next) {
       if (next % kVoxelsAtOnce == 0 && !keep_going(static_cast<double>(next) / static_cast<double>(gone_.size())))
         return stopped();
-      each_beside(gone_[next], [&](const std::array<int, 3>& beside) {
+      const std::array<int, 3> at = gone_[next];  // a copy, because look() adds to the list
+      each_beside(at, [&](const std::array<int, 3>& beside) {
         if (bones_.at(beside[0], beside[1], beside[2]) != 0) look(beside);
       });
     }

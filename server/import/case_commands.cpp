@@ -41,7 +41,7 @@ struct CaseArguments {
   ScanArguments scan;
   std::string input, out, title, layers, kind, dicom, legend, spacing, unit = "mm", median, threshold;
   std::string keep, grow_by = "volume", window = "400,1800", edges, space = "volume", limits = "100,300";
-  std::string rods_of, surface = "half", between_slices = "auto", thin_cortex = "off";
+  std::string rods_of, surface = "half", between_slices = "auto", thin_cortex = "off", contrast = "apart";
   std::optional<std::string> calibration, rods;
   std::string labels, report, truth, edits;
   std::vector<std::string> bone_colours, seeds, label_names;
@@ -273,6 +273,7 @@ Result<std::string> run_ct(const CaseArguments& a, const StopSignal& stop) {
   options.margin_mm = a.margin_mm;
   options.metal_hu = a.metal_hu;
   options.thin_cortex = a.thin_cortex == "on";
+  options.contrast_is_bone = a.contrast == "bone";
   options.surface = a.surface == "half" ? SurfaceAt::half_maximum : SurfaceAt::threshold;
   options.between_slices = a.between_slices == "hu"       ? BetweenSlices::hu
                            : a.between_slices == "shapes" ? BetweenSlices::shapes
@@ -646,7 +647,7 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
   CLI::Option* keep = ct->add_option(
       "--keep", a.keep,
       "Islands by their number in the printed list, such as 1,3, or all (default: the largest that is bone, and no "
-      "table, cast or metal)");
+      "table, cast, metal or contrast medium)");
   keep->excludes(labels_option);
   CLI::Option* seed =
       ct->add_option("--seed", a.seeds,
@@ -698,6 +699,12 @@ void add_case_commands(CLI::App& app, std::vector<Command>& commands) {
         "The surface goes on from slice to slice where HU cross its level (hu), or so that the shape of "
         "one slice turns into that of the next (shapes); auto: shapes if slices are more than two pixels apart")
       ->check(CLI::IsMember({"auto", "hu", "shapes"}))
+      ->capture_default_str()
+      ->excludes(labels_option);
+  ct->add_option("--contrast", a.contrast,
+                 "Blood with contrast medium that is as dense as bone is an island of its own and left out (apart), or "
+                 "counts as bone (bone)")
+      ->check(CLI::IsMember({"apart", "bone"}))
       ->capture_default_str()
       ->excludes(labels_option);
   add_smoothing_options(*ct, a);

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/core/freed_memory.hpp"
+#include "common/imaging/contrast.hpp"
 #include "common/imaging/hard_tissue.hpp"
 #include "common/imaging/segmentation.hpp"
 #include "common/imaging/slice_shapes.hpp"
@@ -55,11 +56,14 @@ Result<std::vector<int>> islands_to_keep(const CtOptions& options, const std::ve
   if (options.keep_all) return all;
   if (options.keep.empty()) {
     const auto bone = std::ranges::find(natures, imaging::IslandKind::bone, &imaging::IslandNature::kind);
+    const bool has_contrast =
+        std::ranges::find(natures, imaging::IslandKind::contrast, &imaging::IslandNature::kind) != natures.end();
     if (bone == natures.end())
       return failure(ErrorCode::invalid_input,
                      "no island is bone: all that reaches the threshold of " +
-                         std::to_string(std::lround(options.threshold_hu)) +
-                         " HU is metal; take it with --keep, or give a lower --threshold or a higher --metal-hu");
+                         std::to_string(std::lround(options.threshold_hu)) + " HU is metal" +
+                         (has_contrast ? " or contrast medium" : "") +
+                         "; take it with --keep, or give a lower --threshold or a higher --metal-hu");
     return std::vector<int>{static_cast<int>(bone - natures.begin()) + 1};
   }
   std::vector<int> kept;
@@ -96,7 +100,7 @@ Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imag
   imaging::VoxelMask firm(s.volume.dims);
   for (std::size_t i = 0; i < firm.values.size(); ++i)
     firm.values[i] =
-        s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::marrow) ? 1 : 0;
+        s.bones.values[i] != 0 && bone.values[i] != imaging::mask_value(imaging::BoneVoxel::marrow) ? 1 : 0;
   std::bitset<256> one;
   one.set(1);
   const auto pieces = imaging::find_components(firm, one, imaging::Connectivity::corners, keep_going);
@@ -110,13 +114,18 @@ Result<std::vector<double>> pieces_without_marrow(const Segmented& s, const imag
   return volumes_cm3;
 }
 
+bool is_below_threshold(std::uint8_t voxel) {
+  return voxel == imaging::mask_value(imaging::BoneVoxel::cancellous) ||
+         voxel == imaging::mask_value(imaging::BoneVoxel::marrow);
+}
+
 // Writes into `s.found` what was found and what was done with it. Error: cancelled.
 Result<void> summarise(const imaging::VoxelMask& bone, const imaging::Islands& islands, std::vector<int> kept,
                        Segmented& s, const KeepGoing& keep_going) {
   CtSegmentation& found = s.found;
   std::int64_t below = 0;
   for (std::size_t i = 0; i < bone.values.size(); ++i)
-    below += s.bones.values[i] != 0 && bone.values[i] != static_cast<std::uint8_t>(imaging::BoneVoxel::dense) ? 1 : 0;
+    below += s.bones.values[i] != 0 && is_below_threshold(bone.values[i]) ? 1 : 0;
   found.marrow_cm3 = static_cast<double>(below) * s.volume.spacing_mm.prod() * 1e-3;
   found.region = imaging::enclosing_box(s.volume, Vec3::Zero(),
                                         Vec3(s.volume.dims[0] - 1, s.volume.dims[1] - 1, s.volume.dims[2] - 1));
@@ -195,21 +204,35 @@ Result<imaging::VoxelMask> take_out_equipment(const imaging::HuVolume& volume, i
   return dense;
 }
 
-// The voxels of bone, and of whatever else is as dense. Errors: invalid_input (there is none), cancelled.
+// The voxels of bone, and of whatever else is as dense. `contrast`: what is known of contrast medium. Errors:
+// invalid_input (there is none), cancelled.
 Result<imaging::VoxelMask> find_voxels(const imaging::HuVolume& volume, const CtOptions& options,
                                        const DensityCalibration& calibration, const imaging::ScanEnds& ends,
-                                       const KeepGoing& keep_going) {
+                                       std::optional<imaging::BloodPool>& contrast, const KeepGoing& keep_going) {
   auto dense = imaging::dense_voxels(volume, options.threshold_hu, part(keep_going, 0.0, 0.03));
   if (!dense) return dense;
   std::vector<imaging::VoxelRun> equipment;
   dense = take_out_equipment(volume, std::move(*dense), options, calibration, equipment, part(keep_going, 0.03, 0.1));
   if (!dense) return dense;
+  if (!options.contrast_is_bone) {
+    auto found =
+        imaging::mark_contrast(volume, options.threshold_hu, options.metal_hu, *dense, part(keep_going, 0.1, 0.2));
+    if (!found) return tl::unexpected(found.error());
+    contrast = *found;
+  }
   auto bone =
-      imaging::segment_bone(volume, std::move(*dense), segmentation_params(options), ends, part(keep_going, 0.1, 1.0));
+      imaging::segment_bone(volume, std::move(*dense), segmentation_params(options), ends, part(keep_going, 0.2, 1.0));
   if (!bone) return bone;
   for (const imaging::VoxelRun& run : equipment)
-    imaging::fill_run(*bone, run, static_cast<std::uint8_t>(imaging::BoneVoxel::dense));
+    imaging::fill_run(*bone, run, imaging::mask_value(imaging::BoneVoxel::dense));
   return bone;
+}
+
+// What grew from seeds, whatever its number.
+imaging::VoxelMask dense_of(imaging::VoxelMask grown) {
+  for (std::uint8_t& value : grown.values)
+    value = imaging::mask_value(value != 0 ? imaging::BoneVoxel::dense : imaging::BoneVoxel::none);
+  return grown;
 }
 
 // The voxels of the bones that grew from seeds. `work`: the part of the scan that `volume` is. Error: cancelled.
@@ -217,7 +240,7 @@ Result<imaging::VoxelMask> take_grown(const imaging::HuVolume& volume, imaging::
                                       const CtOptions& options, const KeepGoing& keep_going) {
   auto labels = imaging::cropped(std::move(grown), work.first, work.last, part(keep_going, 0.0, 0.02));
   if (!labels) return labels;
-  return imaging::segment_bone(volume, std::move(*labels), segmentation_params(options), work.ends,
+  return imaging::segment_bone(volume, dense_of(std::move(*labels)), segmentation_params(options), work.ends,
                                part(keep_going, 0.02, 1.0));
 }
 
@@ -240,8 +263,9 @@ Result<Segmented> segment(imaging::HuVolume scan, const CtOptions& options, cons
   auto cropped = imaging::cropped(std::move(scan), work->first, work->last, part(keep_going, 0.0, 0.02));
   if (!cropped) return tl::unexpected(cropped.error());
   s.volume = std::move(*cropped);
-  const auto bone = bones ? take_grown(s.volume, std::move(bones->labels), *work, options, part(keep_going, 0.02, 0.65))
-                          : find_voxels(s.volume, options, calibration, work->ends, part(keep_going, 0.02, 0.65));
+  const auto bone =
+      bones ? take_grown(s.volume, std::move(bones->labels), *work, options, part(keep_going, 0.02, 0.65))
+            : find_voxels(s.volume, options, calibration, work->ends, s.found.contrast, part(keep_going, 0.02, 0.65));
   if (!bone) return tl::unexpected(bone.error());
   const auto islands = imaging::find_islands(s.volume, *bone, calibration, part(keep_going, 0.65, 0.69));
   if (!islands) return tl::unexpected(islands.error());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/imaging/calibration.hpp"
+#include "common/imaging/contrast.hpp"
 #include "common/imaging/island_kinds.hpp"
 #include "common/imaging/islands.hpp"
 #include "common/imaging/smoothing.hpp"
@@ -40,6 +41,7 @@ struct CtOptions {
   GrowOptions grow;                // with seeds: the bones that grow from them are kept, instead of islands
   CalibrationOptions calibration;
   double metal_hu = imaging::kMetal_hu;  // metal is at or above it
+  bool contrast_is_bone = false;         // do not look for contrast medium
   bool thin_cortex = false;              // correct the density of thin cortex, see imaging::correct_thin_cortex()
   std::string title = "CT";              // never taken from the scan, whose texts may name a patient
   std::vector<int> keep;                 // islands by number, from 1; empty: the largest that is bone
@@ -75,6 +77,7 @@ struct CtSegmentation {
   std::vector<imaging::Region> regions;        // that grew from seeds
   std::vector<imaging::Island> islands;        // largest first; number N is islands[N - 1]
   std::vector<imaging::IslandNature> natures;  // of each island; empty if the bones grew from seeds
+  std::optional<imaging::BloodPool> contrast;  // if the scan has contrast medium
   std::vector<int> kept;                       // numbers; empty if the islands were only listed
   bool merged = false;                         // the kept islands are one bone
   bool separated = false;

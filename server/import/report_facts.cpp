@@ -264,6 +264,13 @@ void add_steps(const ImportReport& report, ReportFacts& facts) {
     const std::string& reason = report.islands->threshold_reason;
     facts.steps.push_back(
         {"threshold", reason.empty() ? "bone is at or above it" : reason, {{"threshold_hu", *facts.threshold_hu}}});
+    if (const auto& contrast = report.islands->contrast)
+      facts.steps.push_back({"contrast medium",
+                             "blood as dense as bone is an island of its own",
+                             {{"level_hu", contrast->level_hu},
+                              {"noise_hu", contrast->noise_hu},
+                              {"homogeneous_cm3", contrast->homogeneous_cm3},
+                              {"contrast_cm3", contrast->contrast_cm3}}});
     if (report.islands->marrow_cm3 > 0.0)
       facts.steps.push_back({"marrow",
                              "below the threshold, enclosed by bone or between it, counts as bone",

@@ -26,14 +26,18 @@ std::vector<bool> kept_flags(const CtSegmentation& found) {
 }
 
 // Why an island is of a kind.
-std::string why_of(imaging::IslandKind kind, double metal_hu) {
+std::string why_of(imaging::IslandKind kind, const CtSegmentation& found) {
   switch (kind) {
     case imaging::IslandKind::table:
       return "thin and long, in the air beside the patient";
     case imaging::IslandKind::cast:
       return "a thin shell in the air around bone";
     case imaging::IslandKind::metal:
-      return line("most of it reaches %.0f HU", metal_hu);
+      return line("most of it reaches %.0f HU", found.metal_hu);
+    case imaging::IslandKind::contrast:
+      if (!found.contrast) break;
+      return line("blood of %.0f HU with noise of %.0f HU over %.1f cm3, and no cortex around it",
+                  found.contrast->level_hu, found.contrast->noise_hu, found.contrast->homogeneous_cm3);
     case imaging::IslandKind::bone:
       break;
   }
@@ -126,17 +130,20 @@ std::string place_words(const Vec3& at, const Box& box) {
 }
 
 std::string words_of(imaging::IslandKind kind) {
+  if (kind == imaging::IslandKind::contrast) return "contrast medium";
   return kind == imaging::IslandKind::table ? "table or headrest" : std::string(name_of(kind));
 }
 
 std::string likeness_of(imaging::IslandKind kind) {
-  return kind == imaging::IslandKind::metal ? "its HU are those of metal" : "its shape is that of a " + words_of(kind);
+  const bool by_hu = kind == imaging::IslandKind::metal || kind == imaging::IslandKind::contrast;
+  return (by_hu ? "its HU are those of " : "its shape is that of a ") + words_of(kind);
 }
 
 std::vector<NotBone> not_bone(const CtSegmentation& found) {
   std::vector<NotBone> all;
   const std::vector<bool> is_kept = kept_flags(found);
-  for (const auto kind : {imaging::IslandKind::table, imaging::IslandKind::cast, imaging::IslandKind::metal})
+  using enum imaging::IslandKind;
+  for (const auto kind : {table, cast, metal, contrast})
     for (const bool kept : {false, true}) {
       NotBone of{.kind = kind, .kept = kept};
       for (std::size_t i = 0; i < found.natures.size(); ++i) {
@@ -149,7 +156,7 @@ std::vector<NotBone> not_bone(const CtSegmentation& found) {
                      kept                 ? ", kept"
                      : found.kept.empty() ? ""
                                           : ", left out") +
-                why_of(kind, found.metal_hu);
+                why_of(kind, found);
       all.push_back(std::move(of));
     }
   return all;

@@ -395,6 +395,75 @@ TEST(CtImport, ACastDoesNotEncloseTheLimbAsMarrow) {
   EXPECT_NE(segmentation_text(made->found).find("cast, island 1, "), std::string::npos);
 }
 
+// A vertebra of 5 x 4 x 6 cm, cortex around cancellous bone, and an aorta of 14 mm radius that touches it.
+CtScan vertebra_with_aorta() {
+  CtScan scan{.volume = {}, .source = "test"};
+  scan.volume.dims = {64, 40, 30};
+  scan.volume.spacing_mm = Vec3::Constant(2.0);
+  for (int z = 0; z < 30; ++z)
+    for (int y = 0; y < 40; ++y)
+      for (int x = 0; x < 64; ++x) {
+        const int inside = std::min({x - 34, 59 - x, y - 9, 30 - y});  // voxels from the vertebra's surface
+        const int bone = inside == 1 ? 900 : (x + y + z) % 2 == 0 ? 330 : 190;
+        const bool blood = std::hypot(x - 27.0, y - 20.0) <= 7.0;
+        scan.volume.values.push_back(static_cast<std::int16_t>(inside > 0 ? bone : blood ? 300 : 40));
+      }
+  return scan;
+}
+constexpr double kVertebra_cm3 = 24 * 20 * 30 * 8e-3;
+
+TEST(CtImport, AnAortaWithContrastMediumIsLeftOutByName) {
+  const auto made = import_ct(vertebra_with_aorta(), {}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->found.islands.size(), 2u);
+  EXPECT_EQ(made->found.kept, std::vector{1});
+  EXPECT_NEAR(made->found.islands[0].volume_cm3, kVertebra_cm3, 1e-9);
+  EXPECT_EQ(made->found.natures[1].kind, imaging::IslandKind::contrast);
+  // A disc of 7 voxels has 149 of them.
+  EXPECT_NEAR(made->found.islands[1].volume_cm3, 149 * 30 * 8e-3, 1e-9);
+  const std::string text = segmentation_text(made->found);
+  EXPECT_NE(text.find("not bone   contrast medium, island 2, 35.76 cm3, left out: blood of 300 HU with noise of 0 HU"),
+            std::string::npos)
+      << text;
+  EXPECT_NEAR(made->bone->info().labels.front().provenance.parameters.at("left_out_contrast_cm3"), 35.76, 1e-9);
+}
+
+TEST(CtImport, KeepTakesContrastMediumAsAnIslandOfItsOwn) {
+  const auto made = import_ct(vertebra_with_aorta(), {.keep_all = true}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  const auto& labels = made->bone->info().labels;
+  ASSERT_EQ(labels.size(), 2u);
+  EXPECT_EQ(labels[0].provenance.method.find("its HU are"), std::string::npos);
+  EXPECT_NE(labels[1].provenance.method.find("its HU are those of contrast medium"), std::string::npos);
+}
+
+TEST(CtImport, ContrastMediumCountsAsBoneIfSomebodySaysSo) {
+  const auto made = import_ct(vertebra_with_aorta(), {.contrast_is_bone = true}, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  ASSERT_EQ(made->found.islands.size(), 1u);
+  EXPECT_GT(made->found.islands[0].volume_cm3, kVertebra_cm3 + 35.0);
+  EXPECT_FALSE(made->found.contrast);
+}
+
+// More regions than kinds of voxels: their numbers are no kinds.
+TEST(CtImport, WhatGrowsFromSeedsIsBoneWhateverItsNumber) {
+  CtScan scan{.volume = {}, .source = "test"};
+  scan.volume.dims = {60, 12, 12};
+  scan.volume.spacing_mm = Vec3::Ones();
+  for (int z = 0; z < 12; ++z)
+    for (int y = 0; y < 12; ++y)
+      for (int x = 0; x < 60; ++x)
+        scan.volume.values.push_back(x % 10 >= 3 && std::min(y, z) >= 3 && std::max(y, z) <= 8 ? 900 : 40);
+  CtOptions options;
+  for (int i = 0; i < 6; ++i) options.grow.seeds_mm.emplace_back(10.0 * i + 6.0, 6.0, 6.0);
+  const auto made = import_ct(std::move(scan), options, keep_going);
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->found.islands.size(), 6u);
+  EXPECT_EQ(made->found.kept.size(), 6u);
+  // With marrow below the threshold there is none.
+  EXPECT_EQ(made->found.marrow_cm3, 0.0);
+}
+
 TEST(CtImport, MetalAloneIsNoBone) {
   CtScan scan = arm_with(false, false);
   for (std::int16_t& hu : scan.volume.values) hu = hu == 412 ? 40 : hu;

@@ -98,6 +98,7 @@ TEST_F(Program, WrongOptionsOfDensityAreOneSentence) {
   refused({"--rods", "0,0.1", "--rescale-hu"}, "--rescale-hu");
   refused({"--rods-of", "hydroxyapatite"}, "--rods");
   refused({"--rods", "0,0.1", "--rods-of", "water"}, "--rods-of");
+  refused({"--contrast", "maybe"}, "--contrast");
   for (const char* metal : {"499", "40000", "nan"}) refused({"--metal-hu", metal}, "--metal-hu");
   // This is found out when the scan is there, after lines of progress.
   const auto late = test::run(kProgram, {"ct", path("scan.inv3"), "--out", path("case"), "--rods", "0,0.1"});

@@ -1,5 +1,7 @@
 // The report of an import: what it says, what it never says, and that it is there as a whole or not at all.
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
 #include "server/import/dicom_writer.hpp"
@@ -130,6 +132,32 @@ TEST_F(Report, NamesTheTableAndSaysWhy) {
   const std::string html = test::content(folder_ / "report" / "report.html");
   expect_well_formed(html);
   EXPECT_NE(html.find("left out: table or headrest"), std::string::npos);
+}
+
+// A block of bone beside a vessel of 11 mm radius in which nothing is seen but contrast medium.
+TEST_F(Report, NamesContrastMediumAndTheEvidence) {
+  const TestGrid grid{.dims = {60, 30, 30}};
+  const auto hu_at = [](const Vec3& p) {
+    return std::hypot(p.x() - 16.0, p.y() - 15.0) < 11.0 ? 350 : in_block(p, {38.0, 15.0, 15.0}, 9.3) ? 1000 : 40;
+  };
+  write_bytes(folder_ / "ct.nii",
+              nifti_file(grid, {.code = 4, .bits = 16, .bytes = bytes_of<std::int16_t>(labels_of(grid, hu_at))}));
+  const auto made = import({"--out", path("case"), "--report", path("report")});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const nlohmann::json report = facts();
+  ASSERT_EQ(report.at("parts").size(), 2u);
+  int contrast = 0;
+  for (const auto& part : report.at("parts")) contrast += part.at("island").at("kind") == "contrast" ? 1 : 0;
+  EXPECT_EQ(contrast, 1);
+  ASSERT_EQ(report.at("left_out").size(), 1u);
+  EXPECT_EQ(report.at("left_out")[0].get<std::string>().find("Not bone: contrast medium, island "), 0u);
+  const auto& steps = report.at("steps");
+  const auto step = std::ranges::find(steps, "contrast medium", [](const auto& of) { return of.at("step"); });
+  ASSERT_NE(step, steps.end());
+  EXPECT_EQ(step->at("parameters").at("level_hu"), 350.0);
+  EXPECT_EQ(step->at("parameters").at("noise_hu"), 0.0);
+  const double vessel_cm3 = std::numbers::pi * 121.0 * 30.0 * 1e-3;
+  EXPECT_NEAR(step->at("parameters").at("contrast_cm3"), vessel_cm3, 0.03 * vessel_cm3);
 }
 
 TEST_F(Report, TheHistogramCountsEveryVoxel) {
