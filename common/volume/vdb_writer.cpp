@@ -12,12 +12,10 @@
 namespace osteon {
 namespace {
 
-using Grids = std::span<const std::shared_ptr<const openvdb::GridBase>>;
-
 // OpenVDB's own functions write every part. Only their order is here.
 class Writer : public openvdb::io::Archive {
  public:
-  void write_file(std::ostream& os, Grids grids, const openvdb::MetaMap& metadata) const {
+  void write_file(std::ostream& os, const openvdb::GridCPtrVec& grids, const openvdb::MetaMap& metadata) const {
     namespace io = openvdb::io;
     // Grids find here how they shall be compressed.
     auto stream_metadata = std::make_shared<io::StreamMetadata>();
@@ -55,11 +53,14 @@ class Writer : public openvdb::io::Archive {
 
 }  // namespace
 
-void write_vdb(const std::filesystem::path& file, Grids grids, const openvdb::MetaMap& metadata) {
+template <class Grids, class Metadata>
+void write_vdb(const std::filesystem::path& file, const Grids& grids, const Metadata& metadata) {
   std::ofstream os(file, std::ios::binary | std::ios::trunc);
   Writer().write_file(os, grids, metadata);
   os.close();
   if (!os) OPENVDB_THROW(openvdb::IoError, "the disk may be full or the folder closed to writing");
 }
+
+template void write_vdb(const std::filesystem::path&, const openvdb::GridCPtrVec&, const openvdb::MetaMap&);
 
 }  // namespace osteon
