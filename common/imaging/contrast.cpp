@@ -377,11 +377,15 @@ Result<std::optional<BloodPool>> mark_contrast(const HuVolume& volume, double th
   auto cubes = search.homogeneous(part(keep_going, 0.0, 0.2));
   if (!cubes) return tl::unexpected(cubes.error());
   ContrastMarker marker(volume, metal_hu, dense);
-  // Arteries, veins and a false lumen may have levels of their own.
+  // Arteries, veins and a false lumen may have levels of their own. Nobody knows how many, so each gets half of the
+  // rest of the progress.
+  double done = 0.2;
   while (auto pool =
              next_pool(*cubes, search.cube_cm3(), marker.has_found() ? kLeastPart_cm3 : kLeastPool_cm3, threshold_hu)) {
-    if (auto marked = marker.mark(std::move(*pool), part(keep_going, 0.2, 0.6)); !marked)
+    const double then = 0.5 * (done + 0.6);
+    if (auto marked = marker.mark(std::move(*pool), part(keep_going, done, then)); !marked)
       return tl::unexpected(marked.error());
+    done = then;
     std::erase_if(*cubes, [&](const Cube& cube) {
       return dense.at(cube.centre[0], cube.centre[1], cube.centre[2]) == mask_value(BoneVoxel::contrast);
     });

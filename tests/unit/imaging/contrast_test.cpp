@@ -192,14 +192,16 @@ TEST(Contrast, BloodThatIsNotMixedYetBelongsToThePool) {
             0.95);
 }
 
-TEST(Contrast, StopsAtEachQuestion) {
+TEST(Contrast, StopsAtEachQuestionAndNeverGoesBack) {
   const HuVolume volume = scan_of(trunk(kEnhanced_hu), Vec3::Constant(2.0));
   const VoxelMask dense = *dense_voxels(volume, kBoneThreshold_hu, always);
   int questions = 0;
+  double last = 0.0;
   VoxelMask mask = dense;
   const auto pool = mark_contrast(volume, kBoneThreshold_hu, kMetal_hu, mask, [&](double done) {
-    EXPECT_GE(done, 0.0);
+    EXPECT_GE(done, last);
     EXPECT_LE(done, 1.0);
+    last = done;
     return ++questions > 0;
   });
   ASSERT_TRUE(pool);
