@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <numbers>
 
@@ -80,6 +83,18 @@ TEST(SurfaceLevel, ABlurredEdgeIsWhereItWas) {
       EXPECT_NEAR(after_mm, 0.0, 0.05) << outside_hu << " to " << inside_hu << " HU, blur " << blur_mm
                                        << " mm; at the threshold " << before_mm;
     }
+}
+
+// 100,000 voxels and more lie below their level, so the list of them moves in memory while it is read.
+TEST(SurfaceLevel, ALargeFaceLosesEachOfItsLayers) {
+  const HuVolume volume =
+      edges_of({12, 260, 260}, Vec3(0.6, 0.6, 0.6), [](const Vec3& p) { return 40.0 + 1460.0 * edge(-p.x(), 1.0); });
+  VoxelMask bones = dense_voxels(volume);
+  const auto voxels = [&] { return std::ranges::count(bones.values, std::uint8_t{1}); };
+  const std::ptrdiff_t before = voxels();
+  ASSERT_TRUE(move_to_half_maximum(volume, kDense_hu, bones, always));
+  EXPECT_EQ(voxels(), std::ptrdiff_t{6} * 260 * 260) << "the half with x > 0";
+  EXPECT_GT(before - voxels(), 100'000);
 }
 
 TEST(SurfaceLevel, ThickSlicesAndNoiseMoveItLittle) {
