@@ -1,12 +1,12 @@
-// Memory that was freed, but that the heap keeps for later.
+// Gives memory back to Linux that a program does not need any more.
 #pragma once
 #include <cstddef>
 #include <vector>
 
 namespace osteon {
 
-// Gives it back to Linux. For the end of a stage of long work, after which the next needs its memory elsewhere. Takes
-// milliseconds.
+// Gives back what was freed, but what the heap keeps for later. For the end of a stage of long work, after which the
+// next needs its memory elsewhere. Takes milliseconds.
 void give_back_freed_memory();
 
 // For the start of a program that works on volumes: from now on, the heap keeps no freed block of a megabyte or more.

@@ -24,15 +24,17 @@ constexpr double kMost_hu = 700.0;             // of a cube's mean. Lell 2017: t
 constexpr double kLeastPool_cm3 = 2.0;         // of a scan
 constexpr double kLeastPart_cm3 = 0.2;         // of homogeneous cubes in each part of a pool, and in further pools
 constexpr double kSameLevel = 0.2;             // cubes of one pool are within this part of its level
+constexpr double kMostUneven = 0.08;           // standard deviation of their means over the level above kBlood_hu
 constexpr double kNoises = 4.0;                // blood is within so many standard deviations of the level
 constexpr double kCore_mm = 2.0;               // blood is farther from anything else
-constexpr double kAround_mm = 6.0;             // where a shell would be, from the core on
-constexpr double kMostShell = 0.4;             // share of the surface with something brighter before it
+constexpr double kAround_mm = 6.0;             // where soft tissue would be, from the core on
 constexpr double kLeastTissue = 0.3;           // share of the surface with soft tissue before it
 constexpr double kTissueFrom_hu = -200.0;      // fat has more
 constexpr double kLeastBone_cm3 = 0.3;         // brighter than blood, in the rest of the scan
 constexpr double kDeep_mm = 4.0;               // cortex is not so deep
-constexpr double kUnmixed = 0.02;              // of a bright rest: share of its faces at contrast, times its deep share
+constexpr double kUnmixedDeep = 0.2;           // share of a bright rest
+constexpr double kUnmixedEdge = 0.1;           // share of its faces at contrast
+constexpr double kMostAtBone = 0.35;           // share of the faces of contrast
 constexpr double kEdge = 0.3, kBranch = 0.02;  // share of the faces of a dim rest
 constexpr double kMostBranch_cm3 = 5.0;
 constexpr double kFewBright = 0.01;                  // share of noise in a dim rest
@@ -51,6 +53,7 @@ struct Pool {
   std::vector<Triple> centres;
   double cube_cm3 = 0.0;  // for which a centre stands
   double low_hu = 0.0, high_hu = 0.0;
+  bool is_even = false;  // all cubes have nearly one mean
 };
 
 tl::unexpected<Error> stopped_seeking() { return stopped_while("looking for contrast medium"); }
@@ -132,11 +135,12 @@ std::optional<Pool> next_pool(std::vector<Cube>& cubes, double cube_cm3, double 
   const double mode_hu = kBin_hu * (0.5 + static_cast<double>(std::ranges::max_element(bins) - bins.begin()));
   Pool pool;
   pool.cube_cm3 = cube_cm3;
-  double sum = 0.0, variances = 0.0;
+  double sum = 0.0, squares = 0.0, variances = 0.0;
   std::erase_if(cubes, [&](const Cube& cube) {
     if (std::abs(cube.mean_hu - mode_hu) > kSameLevel * mode_hu) return false;
     pool.centres.push_back(cube.centre);
     sum += cube.mean_hu;
+    squares += cube.mean_hu * cube.mean_hu;
     variances += cube.variance;
     return true;
   });
@@ -145,6 +149,8 @@ std::optional<Pool> next_pool(std::vector<Cube>& cubes, double cube_cm3, double 
   if (pool.evidence.homogeneous_cm3 < least_cm3) return std::nullopt;
   pool.evidence.level_hu = sum / count;
   pool.evidence.noise_hu = std::sqrt(variances / count);
+  const double uneven_hu = std::sqrt(std::max(0.0, squares / count - pool.evidence.level_hu * pool.evidence.level_hu));
+  pool.is_even = uneven_hu <= kMostUneven * (pool.evidence.level_hu - kBlood_hu);
   const double reach_hu = kNoises * pool.evidence.noise_hu;
   pool.low_hu = std::max(threshold_hu, pool.evidence.level_hu - reach_hu);
   pool.high_hu = pool.evidence.level_hu + reach_hu;
@@ -175,10 +181,11 @@ class ContrastMarker {
   // Adds what belongs to the pools. Nothing: there is none, and the mask is as before. Error: cancelled.
   Result<std::optional<BloodPool>> finish(const KeepGoing& keep_going) {
     if (!found_) return std::optional<BloodPool>();
-    if (auto added = add_rest(keep_going); !added) return tl::unexpected(added.error());
+    if (auto added = add_rest(part(keep_going, 0.0, 0.8)); !added) return tl::unexpected(added.error());
+    if (auto given = give_back_enclosed(part(keep_going, 0.8, 1.0)); !given) return tl::unexpected(given.error());
     const auto marked = std::ranges::count(dense_.values, mask_value(BoneVoxel::contrast));
     pool_.evidence.contrast_cm3 = static_cast<double>(marked) * voxel_cm3_;
-    if (brighter_bone_cm3() >= kLeastBone_cm3) return std::optional(pool_.evidence);
+    if (marked > 0 && brighter_bone_cm3() >= kLeastBone_cm3) return std::optional(pool_.evidence);
     std::ranges::replace(dense_.values, mask_value(BoneVoxel::contrast), mask_value(BoneVoxel::dense));
     return std::optional<BloodPool>();
   }
@@ -205,7 +212,7 @@ class ContrastMarker {
     return near;
   }
 
-  // What has the level of blood and is no shell.
+  // What has the level of blood and lies in soft tissue.
   Result<bool> mark_pool(const KeepGoing& keep_going) {
     auto cores = deep_in(
         [&](std::size_t i) {
@@ -238,7 +245,7 @@ class ContrastMarker {
 
   // What lies before the faces of a piece.
   struct Surroundings {
-    std::int64_t homogeneous = 0, faces = 0, brighter = 0, tissue = 0;
+    std::int64_t homogeneous = 0, faces = 0, tissue = 0;
   };
 
   Result<std::vector<bool>> blood_pieces(const VoxelMask& cores, const Components& pieces,
@@ -258,9 +265,7 @@ class ContrastMarker {
     }
     std::vector<bool> blood(pieces.count, false);
     for (std::size_t i = 0; i < blood.size(); ++i) {
-      const auto faces = static_cast<double>(all[i].faces);
-      blood[i] = is_large(i) && static_cast<double>(all[i].brighter) <= kMostShell * faces &&
-                 static_cast<double>(all[i].tissue) >= kLeastTissue * faces;
+      blood[i] = is_large(i) && static_cast<double>(all[i].tissue) >= kLeastTissue * static_cast<double>(all[i].faces);
     }
     return blood;
   }
@@ -275,14 +280,12 @@ class ContrastMarker {
   }
   void look_along(Triple at, std::size_t axis, int side, Surroundings& seen) const {
     const int steps = static_cast<int>(std::ceil(kAround_mm / volume_.spacing_mm[static_cast<int>(axis)]));
-    bool brighter = false, tissue = false;
+    bool tissue = false;
     for (int i = 0; i < steps; ++i, at[axis] += side) {
       if (!contains(at)) return;  // nobody knows what follows
-      brighter = brighter || (hu(at) > pool_.high_hu && !is_marked(at));
       tissue = tissue || (hu(at) >= kTissueFrom_hu && hu(at) < pool_.low_hu);
     }
     ++seen.faces;
-    seen.brighter += brighter ? 1 : 0;
     seen.tissue += tissue ? 1 : 0;
   }
 
@@ -304,9 +307,32 @@ class ContrastMarker {
       if (!pieces) return tl::unexpected(pieces.error());
       const auto rests = measure_rests(*pieces, *deep, part(passing, 0.5, 1.0));
       if (!rests) return tl::unexpected(rests.error());
+      std::vector<bool> belongs;
+      for (const Rest& rest : *rests) belongs.push_back(is_contrast(rest));
       for (const VoxelRun& run : pieces->runs)
-        if (is_contrast((*rests)[run.component])) fill_run(dense_, run, mask_value(BoneVoxel::contrast));
+        if (belongs[run.component]) fill_run(dense_, run, mask_value(BoneVoxel::contrast));
     }
+    return {};
+  }
+  // Blood lies in soft tissue. What bone encloses is cancellous bone.
+  Result<void> give_back_enclosed(const KeepGoing& keep_going) {
+    const auto pieces = find_components(dense_, values({mask_value(BoneVoxel::contrast)}), Connectivity::corners,
+                                        part(keep_going, 0.0, 0.5));
+    if (!pieces) return tl::unexpected(pieces.error());
+    std::vector<std::int64_t> faces(pieces->count, 0), at_bone(pieces->count, 0);
+    int slice = -1;
+    for (const VoxelRun& run : pieces->runs) {
+      if (run.slice != slice && !keep_going(0.5 + 0.5 * (slice = run.slice) / volume_.dims[2]))
+        return stopped_seeking();
+      for (int x = run.first; x <= run.last; ++x)
+        each_beside({x, run.row, run.slice}, [&](std::uint8_t value) {
+          faces[run.component] += value != mask_value(BoneVoxel::contrast) ? 1 : 0;
+          at_bone[run.component] += value == mask_value(BoneVoxel::dense) ? 1 : 0;
+        });
+    }
+    for (const VoxelRun& run : pieces->runs)
+      if (static_cast<double>(at_bone[run.component]) > kMostAtBone * static_cast<double>(faces[run.component]))
+        fill_run(dense_, run, mask_value(BoneVoxel::dense));
     return {};
   }
   Result<std::vector<Rest>> measure_rests(const Components& pieces, const VoxelMask& deep,
@@ -320,7 +346,10 @@ class ContrastMarker {
       for (int x = run.first; x <= run.last; ++x) {
         const Triple at{x, run.row, run.slice};
         ++rest.voxels;
-        add_faces(at, rest);
+        each_beside(at, [&](std::uint8_t value) {
+          rest.surface += value != mask_value(BoneVoxel::dense) ? 1 : 0;
+          rest.touching += value == mask_value(BoneVoxel::contrast) ? 1 : 0;
+        });
         rest.bright += hu(at) > pool_.high_hu ? 1 : 0;
         if (deep.at(x, run.row, run.slice) == 0) continue;
         ++rest.deep;
@@ -329,16 +358,14 @@ class ContrastMarker {
     }
     return rests;
   }
-  // Faces with something else on their other side, and those of them with contrast there.
-  void add_faces(const Triple& at, Rest& rest) const {
+  // Calls `visit` with what lies on the other side of each face of a voxel.
+  template <class Visit>
+  void each_beside(const Triple& at, Visit visit) const {
     for (std::size_t axis = 0; axis < 3; ++axis)
       for (const int side : {-1, 1}) {
         Triple beside = at;
         beside[axis] += side;
-        if (!contains(beside)) continue;
-        const std::uint8_t value = dense_.at(beside[0], beside[1], beside[2]);
-        rest.surface += value != mask_value(BoneVoxel::dense) ? 1 : 0;
-        rest.touching += value == mask_value(BoneVoxel::contrast) ? 1 : 0;
+        if (contains(beside)) visit(dense_.at(beside[0], beside[1], beside[2]));
       }
   }
   [[nodiscard]] bool is_contrast(const Rest& rest) const {
@@ -348,7 +375,7 @@ class ContrastMarker {
     if (static_cast<double>(rest.bright) <= kFewBright * all)
       return touching >= kEdge || (touching >= kBranch && all * voxel_cm3_ <= kMostBranch_cm3);
     const auto deep = static_cast<double>(rest.deep);
-    return touching * deep >= kUnmixed * all && rest.deep_hu >= pool_.evidence.level_hu * deep;
+    return touching >= kUnmixedEdge && deep >= kUnmixedDeep * all && rest.deep_hu >= pool_.evidence.level_hu * deep;
   }
 
   [[nodiscard]] double brighter_bone_cm3() const {
@@ -382,6 +409,7 @@ Result<std::optional<BloodPool>> mark_contrast(const HuVolume& volume, double th
   double done = 0.2;
   while (auto pool =
              next_pool(*cubes, search.cube_cm3(), marker.has_found() ? kLeastPart_cm3 : kLeastPool_cm3, threshold_hu)) {
+    if (!pool->is_even) continue;
     const double then = 0.5 * (done + 0.6);
     if (auto marked = marker.mark(std::move(*pool), part(keep_going, done, then)); !marked)
       return tl::unexpected(marked.error());

@@ -18,8 +18,9 @@ struct BloodPool {
 // Gives the voxels of contrast medium the value BoneVoxel::contrast. `dense`: 1 for each voxel at or above the
 // threshold. Blood that mixes with contrast medium
 // - is homogeneous over a centimetre. Cancellous bone has texture there,
-// - is no shell, and has none: cortex is thinner, and brighter than what it encloses,
-// - lies in soft tissue,
+// - has one level. Cancellous bone is brighter in one place than in another,
+// - is thicker than cortex,
+// - lies in soft tissue. Bone encloses cancellous bone,
 // - is darker than the cortex of the same scan.
 // A scan without such blood keeps its mask. In doubt it is bone. Error: cancelled.
 [[nodiscard]] Result<std::optional<BloodPool>> mark_contrast(const HuVolume& volume, double threshold_hu,

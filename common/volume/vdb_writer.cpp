@@ -26,6 +26,7 @@ class Writer : public openvdb::io::Archive {
     const auto count = static_cast<std::int32_t>(grids.size());
     os.write(reinterpret_cast<const char*>(&count), sizeof count);
     for (const openvdb::GridBase::ConstPtr& grid : grids) {
+      if (!os) return;  // the caller says so; nothing more is compressed for a full disk
       write_grid(os, *grid);
       io::setDataCompression(os, compression());  // writing a grid changes it
     }

@@ -36,7 +36,7 @@ std::string why_of(imaging::IslandKind kind, const CtSegmentation& found) {
       return line("most of it reaches %.0f HU", found.metal_hu);
     case imaging::IslandKind::contrast:
       if (!found.contrast) break;
-      return line("blood of %.0f HU with noise of %.0f HU over %.1f cm3, and no cortex around it",
+      return line("blood of %.0f HU with noise of %.0f HU over %.1f cm3, with no bone around it",
                   found.contrast->level_hu, found.contrast->noise_hu, found.contrast->homogeneous_cm3);
     case imaging::IslandKind::bone:
       break;

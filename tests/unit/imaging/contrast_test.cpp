@@ -11,6 +11,7 @@
 #include <numbers>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "common/imaging/calibration.hpp"
 #include "common/imaging/island_kinds.hpp"
@@ -44,9 +45,11 @@ Trunk trunk(double blood_hu) {
   return [=](const Vec3& p) { return vertebra(p, in_aorta(p) ? blood_hu : kMuscle_hu); };
 }
 
-HuVolume scan_of(const Trunk& at, const Vec3& spacing_mm = Vec3::Ones()) {
+HuVolume scan_of(const Trunk& at, const Vec3& spacing_mm = Vec3::Ones(), const Vec3& size_mm = {64.0, 40.0, 30.0}) {
   HuVolume volume;
-  volume.dims = {64, 40, static_cast<int>(30.0 / spacing_mm.z())};
+  for (int axis = 0; axis < 3; ++axis)
+    volume.dims[static_cast<std::size_t>(axis)] =
+        static_cast<int>(axis < 2 ? size_mm[axis] : size_mm[axis] / spacing_mm[axis]);
   volume.spacing_mm = spacing_mm;
   volume.origin_mm = -0.5 * spacing_mm.cwiseProduct(Vec3(volume.dims[0] - 1, volume.dims[1] - 1, volume.dims[2] - 1));
   std::mt19937 random(68);
@@ -138,13 +141,31 @@ TEST(Contrast, ASolidBoneAsHomogeneousAsBloodIsBone) {
 }
 
 TEST(Contrast, CancellousBoneWithoutTextureIsBone) {
-  // Both have cortex around them, of which the voxel of a coarse scan shows half.
-  for (const double cortex_mm : {1.0, 3.0})
-    expect_unchanged([=](const Vec3& p) {
-      const double shaft_mm = from_axis(p, -10.0, 0.0);
-      if (shaft_mm < kAorta_mm) return shaft_mm > kAorta_mm - cortex_mm ? 900.0 : kEnhanced_hu;
+  // All have cortex around them, of which the voxel of a coarse scan shows half. The thickest is deeper than 4 mm.
+  for (const auto& [radius_mm, cortex_mm] : {std::pair{kAorta_mm, 1.0}, {kAorta_mm, 3.0}, {kAorta_mm + 6.0, 6.0}})
+    expect_unchanged([&](const Vec3& p) {
+      const double shaft_mm = from_axis(p, -12.0, 0.0);
+      if (shaft_mm < radius_mm) return shaft_mm > radius_mm - cortex_mm ? 900.0 : kEnhanced_hu;
       return vertebra(p, kMuscle_hu);
     });
+}
+
+TEST(Contrast, AFemoralHeadWithThinCortexIsBone) {
+  // Groups of trabeculae make the head brighter and darker over centimetres, not within them. The scan blurs its cortex
+  // so much that it is not brighter than the inside. The shaft has thick cortex.
+  constexpr double kHead_mm = 24.0, kThin_mm = 0.4, kBlur_mm = 0.7;
+  const Vec3 centre(-20.0, 0.0, 0.0);
+  const auto hu = [&](const Vec3& p) {
+    const double depth = (kHead_mm - (p - centre).norm()) / kBlur_mm, shaft_mm = std::hypot(p.y(), p.z());
+    if (p.x() > 2.0 && shaft_mm < 14.0) return shaft_mm > 9.0 ? 1300.0 : 20.0;
+    const double inside = 400.0 + 100.0 * std::sin(p.x() / 8.0) * std::cos(p.z() / 9.0);
+    const double share = 0.5 * std::erfc(-depth / std::numbers::sqrt2);
+    const double cortex = kThin_mm / kBlur_mm * std::exp(-0.5 * depth * depth) / std::sqrt(2.0 * std::numbers::pi);
+    return kMuscle_hu + share * (inside - kMuscle_hu) + cortex * (1300.0 - inside);
+  };
+  const Marked made = mark(scan_of(hu, Vec3::Ones(), {92.0, 54.0, 54.0}));
+  EXPECT_FALSE(made.pool) << made.pool->contrast_cm3 << " cm3";
+  EXPECT_EQ(made.mask.values, made.before.values);
 }
 
 TEST(Contrast, DryBoneInAirIsBone) {
@@ -190,6 +211,19 @@ TEST(Contrast, BloodThatIsNotMixedYetBelongsToThePool) {
   ASSERT_TRUE(made.pool);
   EXPECT_GT(compare(volume, made.mask, is_contrast, [&](const Vec3& p) { return in_aorta(p) || in_vein(p); }).dice,
             0.95);
+}
+
+TEST(Contrast, CortexThatLiesOnBloodIsBone) {
+  // A plate of 5 mm covers a sixth of the aorta. Hardly any of it is deeper than 4 mm.
+  const auto in_plate = [](const Vec3& p) {
+    const double axis_mm = from_axis(p, -10.0, 0.0);
+    return axis_mm > kAorta_mm && axis_mm < kAorta_mm + 5.0 && -p.x() - 10.0 > 0.87 * axis_mm;
+  };
+  const HuVolume volume = scan_of([&](const Vec3& p) { return in_plate(p) ? 900.0 : trunk(kEnhanced_hu)(p); });
+  Marked made = mark(volume);
+  ASSERT_TRUE(made.pool);
+  EXPECT_GT(compare(volume, made.mask, is_contrast, in_aorta).dice, 0.95);
+  EXPECT_LT(compare(volume, made.mask, is_bone, in_plate).lost, 0.1);
 }
 
 TEST(Contrast, StopsAtEachQuestionAndNeverGoesBack) {
