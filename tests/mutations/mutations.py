@@ -126,7 +126,7 @@ MUTATIONS = [
       "dry bone in air is taken for a table", "unit.imaging", "IslandKinds.DryBones*"),
     M("common/imaging/island_kinds.cpp", "if (i == 4) continue;", "if (i != 3 && i != 5) continue;",
       "a headrest is a cast", "unit.imaging", "IslandKinds.AHeadrest*"),
-    M("common/imaging/contrast.cpp", "static_cast<double>(all[i].tissue) >= kLeastTissue * static_cast<double>(all[i].faces)", "true",
+    M("common/imaging/contrast.cpp", ">= kLeastTissue * static_cast<double>(all[i].faces)", ">= 0.0",
       "dry bone in air is blood", "unit.imaging", "Contrast.DryBone*"),
     M("common/imaging/contrast.cpp", "    if (!pool->is_even) continue;\n", "",
       "a femoral head with thin cortex is blood", "unit.imaging", "Contrast.AFemoralHead*"),
