@@ -173,6 +173,7 @@ def main():
     run = groups.Run(options.build / "bin", folder, options.soak, say)
     load = os.getloadavg()[0]
     try:
+        width = simd_bits(run)  # before the long part, because it needs a program that may be missing
         values = measure(figures, run, groups.GROUPS)
     except groups.Failure as failure:
         print(f"deploy/figures: {failure}", *([failure.detail] if failure.detail else []), sep="\n", file=sys.stderr)
@@ -183,7 +184,7 @@ def main():
     decided = [f for f in figures if not skip_reason(f, run.skipped)]
     outcome = results(decided, values, options.soak,
                       {"machine": groups.record.machine(), "compiler": tables_of_results.compiler(options.build),
-                       "simd_bits": simd_bits(run), "load_before": round(load, 2)})
+                       "simd_bits": width, "load_before": round(load, 2)})
     if options.save:
         say(f"wrote {tables_of_results.save(outcome, registry.FIGURES).relative_to(ROOT)}")
     if options.json:

@@ -161,6 +161,14 @@ class Results(unittest.TestCase):
         self.assertEqual(results.results_file(self.MACHINE).name, "amd-epyc-2-cores.md")
 
 
+class Programs(unittest.TestCase):
+    def test_a_program_that_is_missing_is_named_with_its_remedy(self):
+        with tempfile.TemporaryDirectory() as folder:
+            run = groups.Run(Path(folder), Path(folder), False, print)
+            with self.assertRaisesRegex(groups.Failure, "osteon-none is not built; deploy/build perf"):
+                run.output("osteon-none")
+
+
 class SeveralSessions(unittest.TestCase):
     def test_the_worst_decides_and_the_median_informs(self):
         sessions = [{"rig_removed_volume_error": (error, None), "haptic_work_p50": (work, 1.0)}

@@ -70,9 +70,11 @@ class Run:
     def output(self, program, *arguments, progress=False):
         """Output of a program. `progress`: the user sees its messages during the run."""
         command = [self.programs / program, *map(str, arguments)]
-        result = subprocess.run(command, stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE,
-                                text=True,
-                                check=False)
+        try:
+            result = subprocess.run(command, stdout=subprocess.PIPE, stderr=None if progress else subprocess.PIPE,
+                                    text=True, check=False)
+        except FileNotFoundError as missing:
+            raise Failure(f"{program} is not built; deploy/build perf figure_programs builds it") from missing
         if result.returncode != 0:
             raise Failure(f"{program} ended with {result.returncode}: {(result.stderr or '').strip()[-400:]}")
         return result.stdout
