@@ -15,6 +15,7 @@
 #include <thread>
 #include <vector>
 
+#include "audio_client/synth/limiter.hpp"
 #include "common/runtime/files.hpp"
 #include "common/sound/levels.hpp"
 #include "common/sound/tones.hpp"
@@ -178,7 +179,9 @@ TEST_F(AudioProcess, StatesAreHeardLoggedAndRecorded) {
     if (db > loudest_db) loudest_db = db, loudest = at;
   }
   EXPECT_NEAR(sound::find_tone(std::span(heard).subspan(loudest, 24000), 48000, 940, 980).hz, 960, 0.2);
-  EXPECT_EQ(sound::peak(std::span(heard).last(2000)), 0) << "the recording ends in silence";
+  // The program stops with the first silent block. A sink that stalls shortens the idle time before it.
+  const double step = 1.0 / 32768;  // of 16 bits
+  EXPECT_LE(sound::peak(std::span(heard).last(audio::kBlockFrames)), step) << "the recording ends in silence";
 }
 
 TEST_F(AudioProcess, ServerThatGoesAwayIsOneSentenceAndAFinishedRecording) {

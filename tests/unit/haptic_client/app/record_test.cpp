@@ -545,14 +545,17 @@ class Writer {
   // The next number of rows that are certainly written.
   std::uint64_t rows() {
     std::uint64_t rows = 0;
-    return read(from_, &rows, sizeof rows) == sizeof rows ? rows : 0;
+    if (read(from_, &rows, sizeof rows) != sizeof rows) return 0;
+    written_ = rows;
+    return rows;
   }
   void kill() {
     if (pid_ <= 0) return;
     ::kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
     pid_ = -1;
-    for (std::uint64_t last; (last = rows()) != 0;) written_ = last;
+    while (rows() != 0) {
+    }
   }
   [[nodiscard]] std::uint64_t written() const { return written_; }
 
