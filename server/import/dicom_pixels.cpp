@@ -11,6 +11,8 @@
 #include <new>
 #include <vector>
 
+#include "server/import/series_report.hpp"
+
 namespace osteon::import {
 namespace {
 

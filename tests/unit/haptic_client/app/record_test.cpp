@@ -554,8 +554,7 @@ class Writer {
     ::kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
     pid_ = -1;
-    while (rows() != 0) {
-    }
+    while (rows() != 0) continue;
   }
   [[nodiscard]] std::uint64_t written() const { return written_; }
 
