@@ -103,8 +103,13 @@ constexpr std::uint8_t kNotSeen = 0, kStays = 1, kGoes = 2, kBeside = 3;
 // Goes from the surface into the bones, through the voxels below their level.
 class Front {
  public:
-  Front(const HuVolume& volume, const VoxelMask& bones, SurfaceLevel& level)
-      : volume_(volume), bones_(bones), level_(level), profiles_(volume, bones), state_(bones.dims) {}
+  Front(const HuVolume& volume, double threshold_hu, const VoxelMask& bones)
+      : volume_(volume),
+        threshold_hu_(threshold_hu),
+        bones_(bones),
+        profiles_(volume, bones),
+        above_(bones.dims),
+        state_(bones.dims) {}
 
   // Voxels beside another bone or beside none. Error: cancelled.
   Result<void> start(const KeepGoing& keep_going) {
@@ -133,7 +138,6 @@ class Front {
   Result<void> widen(const KeepGoing& keep_going) {
     const Neighbours neighbours(bones_.dims);
     std::vector<std::pair<std::uint32_t, std::uint8_t>> wider;
-    const VoxelMask& above = level_.above;
     for (std::size_t i = 0; i < seen_.size(); ++i) {
       if (i % kVoxelsAtOnce == 0 && !keep_going(static_cast<double>(i) / static_cast<double>(seen_.size())))
         return stopped();
@@ -143,16 +147,18 @@ class Front {
         int sum = 0, count = 0;
         neighbours.each(beside, [&](std::uint32_t known, int) {
           if (state_.values[known] == kNotSeen || state_.values[known] == kBeside) return;
-          sum += above.values[known];
+          sum += above_.values[known];
           ++count;
         });
         wider.emplace_back(beside, static_cast<std::uint8_t>(sum / count));
       });
     }
-    for (const auto& [voxel, steps] : wider) level_.above.values[voxel] = steps;
+    for (const auto& [voxel, steps] : wider) above_.values[voxel] = steps;
     return {};
   }
   [[nodiscard]] const std::vector<std::array<int, 3>>& gone() const { return gone_; }
+  // As in SurfaceLevel.
+  [[nodiscard]] const VoxelMask& above() const { return above_; }
 
  private:
   static tl::unexpected<Error> stopped() { return stopped_while("looking for the level of the bone's surface"); }
@@ -176,21 +182,21 @@ class Front {
   }
   void look(const std::array<int, 3>& at) {
     const std::size_t i = bones_.index(at[0], at[1], at[2]);
-    if (state_.values[i] != kNotSeen || volume_.values[i] < level_.threshold_hu) return;
+    if (state_.values[i] != kNotSeen || volume_.values[i] < threshold_hu_) return;
     const auto level_hu = profiles_.half_maximum_hu(at);
-    const double steps =
-        level_hu ? std::clamp((*level_hu - level_.threshold_hu) / SurfaceLevel::kStep_hu, 0.0, 255.0) : 0.0;
-    level_.above.values[i] = static_cast<std::uint8_t>(steps);
-    state_.values[i] = level_.lowered(volume_, i) < level_.threshold_hu ? kGoes : kStays;
+    const auto steps = static_cast<std::uint8_t>(
+        level_hu ? std::clamp((*level_hu - threshold_hu_) / SurfaceLevel::kStep_hu, 0.0, 255.0) : 0.0);
+    above_.values[i] = steps;
+    state_.values[i] = SurfaceLevel::lowered(volume_.values[i], steps) < threshold_hu_ ? kGoes : kStays;
     seen_.push_back(static_cast<std::uint32_t>(i));
     if (state_.values[i] == kGoes) gone_.push_back(at);
   }
 
   const HuVolume& volume_;
+  double threshold_hu_;
   const VoxelMask& bones_;
-  SurfaceLevel& level_;
   Profiles profiles_;
-  VoxelMask state_;
+  VoxelMask above_, state_;
   std::vector<std::uint32_t> seen_;
   std::vector<std::array<int, 3>> gone_;
 };
@@ -202,13 +208,12 @@ Result<SurfaceLevel> move_to_half_maximum(const HuVolume& volume, double thresho
   if (volume.count() > std::numeric_limits<std::uint32_t>::max())
     return bad_input("a scan of " + describe(volume) +
                      " has too many voxels to find the level of its surface; export a smaller region");
-  SurfaceLevel level{threshold_hu, VoxelMask(volume.dims)};
-  Front front(volume, bones, level);
+  Front front(volume, threshold_hu, bones);
   if (auto done = front.start(part(keep_going, 0.0, 0.6)); !done) return tl::unexpected(done.error());
   if (auto done = front.advance(part(keep_going, 0.6, 0.8)); !done) return tl::unexpected(done.error());
   if (auto done = front.widen(part(keep_going, 0.8, 1.0)); !done) return tl::unexpected(done.error());
   for (const std::array<int, 3>& at : front.gone()) bones.at(at[0], at[1], at[2]) = 0;
-  return level;
+  return SurfaceLevel{threshold_hu, SparseBytes(front.above().values)};
 }
 
 }  // namespace osteon::imaging

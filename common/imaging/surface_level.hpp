@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "common/core/sparse_bytes.hpp"
 #include "common/imaging/hu_volume.hpp"
 #include "common/imaging/voxel_mask.hpp"
 
@@ -13,12 +14,15 @@ struct SurfaceLevel {
   static constexpr int kStep_hu = 8;
 
   double threshold_hu = 0.0;
-  VoxelMask above = {};  // of the scan's voxels, in steps; empty: the threshold is the level everywhere
+  SparseBytes above = {};  // of the scan's voxels, in steps; empty: the threshold is the level everywhere
 
-  // HU of voxel `i`, lowered so that they cross the threshold where they cross the level.
+  // HU, lowered so that they cross the threshold where they cross a level that is `steps` above it.
+  [[nodiscard]] static std::int16_t lowered(std::int16_t hu, int steps) {
+    return static_cast<std::int16_t>(std::max(-32768, hu - kStep_hu * steps));
+  }
+  // The same of voxel `i`.
   [[nodiscard]] std::int16_t lowered(const HuVolume& volume, std::size_t i) const {
-    if (above.values.empty()) return volume.values[i];
-    return static_cast<std::int16_t>(std::max(-32768, volume.values[i] - kStep_hu * above.values[i]));
+    return above.empty() ? volume.values[i] : lowered(volume.values[i], above[i]);
   }
 };
 

@@ -39,17 +39,31 @@ openvdb::CoordBBox voxels_of(const ScanGeometry& geometry) {
   return {openvdb::Coord(0), openvdb::Coord(geometry.dims[0] - 1, geometry.dims[1] - 1, geometry.dims[2] - 1)};
 }
 
-// Adds the voxels of one grid to the hash, slice by slice. False: stopped.
+// The voxels of one slice, from voxel `first` on. `copy`: memory for them, if they are not stored as bytes.
 template <class T>
-bool hash_voxels(Hasher& hasher, const char* name, const std::vector<T>& voxels, const ScanGeometry& geometry,
+std::span<const std::byte> slice_bytes(const std::vector<T>& voxels, std::size_t first, std::size_t count,
+                                       std::vector<std::uint8_t>&) {
+  return std::as_bytes(std::span(voxels).subspan(first, count));
+}
+std::span<const std::byte> slice_bytes(const SparseBytes& voxels, std::size_t first, std::size_t count,
+                                       std::vector<std::uint8_t>& copy) {
+  copy.resize(count);
+  for (std::size_t i = 0; i < count; ++i) copy[i] = voxels[first + i];
+  return std::as_bytes(std::span(copy));
+}
+
+// Adds the voxels of one grid to the hash, slice by slice. False: stopped.
+template <class Voxels>
+bool hash_voxels(Hasher& hasher, const char* name, const Voxels& voxels, const ScanGeometry& geometry,
                  const KeepGoing& keep_going) {
   hasher.text(name);
   hasher.integer(voxels.size());
   if (voxels.empty()) return true;
   const auto slices = static_cast<std::size_t>(geometry.dims[2]), slice = voxels.size() / slices;
+  std::vector<std::uint8_t> copy;
   for (std::size_t k = 0; k < slices; ++k) {
     if (keep_going && !keep_going(static_cast<double>(k) / static_cast<double>(slices))) return false;
-    hasher.bytes(std::as_bytes(std::span(voxels).subspan(k * slice, slice)));
+    hasher.bytes(slice_bytes(voxels, k * slice, slice, copy));
   }
   return true;
 }
@@ -61,11 +75,11 @@ struct WritingStopped {};
 // background, and get their values only while they are written, one after the other. OpenVDB 10 first compresses every
 // leaf once for its size, and gives each leaf without values a buffer for that. So the grid is empty until OpenVDB asks
 // for its topology.
-template <class T>
+template <class Voxels>
 class ScanWriter : public ScanGrid {
  public:
   // `voxels` and `keep_going` must outlive the grid.
-  ScanWriter(const char* name, const std::vector<T>& voxels, const ScanGeometry& geometry, std::int32_t background,
+  ScanWriter(const char* name, const Voxels& voxels, const ScanGeometry& geometry, std::int32_t background,
              const KeepGoing& keep_going)
       : ScanGrid(background), voxels_(voxels), last_(voxels_of(geometry).max()), keep_going_(keep_going) {
     setName(name);
@@ -116,10 +130,10 @@ class ScanWriter : public ScanGrid {
     const int columns = count(0), rows = count(1), slices = count(2);
     for (int z = 0; z < slices; ++z)
       for (int y = 0; y < rows; ++y) {
-        const T* row = &voxels_[(to_index(origin.z() + z) * to_index(last_.y() + 1) + to_index(origin.y() + y)) *
-                                    to_index(last_.x() + 1) +
-                                to_index(origin.x())];
-        for (int x = 0; x < columns; ++x) visit(row[x], (x * kLeafSize + y) * kLeafSize + z);
+        const std::size_t first =
+            (to_index(origin.z() + z) * to_index(last_.y() + 1) + to_index(origin.y() + y)) * to_index(last_.x() + 1) +
+            to_index(origin.x());
+        for (int x = 0; x < columns; ++x) visit(voxels_[first + to_index(x)], (x * kLeafSize + y) * kLeafSize + z);
       }
     return columns * rows * slices;
   }
@@ -145,7 +159,7 @@ class ScanWriter : public ScanGrid {
     leaves_->addLeaf(leaf.release());
   }
 
-  const std::vector<T>& voxels_;
+  const Voxels& voxels_;
   openvdb::Coord last_;  // voxel of the scan
   const KeepGoing& keep_going_;
   mutable std::unique_ptr<TreeType> leaves_;  // while the grid is written
@@ -168,7 +182,7 @@ VdbLimits scan_limits(const std::filesystem::path& file, const ScanGeometry& geo
   return {.memory_bytes = most_case_memory(file), .leaves = leaves, .grids = kMostScanGrids};
 }
 
-Result<void> check_values(const std::vector<std::uint8_t>& voxels, const std::vector<CaseLabel>& listed,
+Result<void> check_values(std::span<const std::uint8_t> voxels, const std::vector<CaseLabel>& listed,
                           const std::string& list) {
   std::array<bool, 256> known{}, used{};
   known[0] = true;
@@ -191,7 +205,9 @@ Result<CaseScan> read_scan_file(const std::filesystem::path& file, const ScanGeo
   if (stopped(0.4)) return stopped_while("reading " + file.string());
   read_grid(in, kLabelGrid, geometry, scan.labels);
   if (stopped(0.6)) return stopped_while("reading " + file.string());
-  read_grid(in, kTissueGrid, geometry, scan.tissue);
+  std::vector<std::uint8_t> tissue;
+  read_grid(in, kTissueGrid, geometry, tissue);
+  scan.tissue = SparseBytes(tissue);
   return scan;
 } catch (const std::bad_alloc&) {
   return failure(ErrorCode::exhausted, file.string() + " takes more memory than there is");
@@ -217,7 +233,7 @@ Result<ScanInfo> describe_scan(const CaseScan& scan, const KeepGoing& keep_going
 
 Result<void> check_labels_of(const CaseScan& scan, const CaseInfo& info) {
   if (Result<void> known = check_values(scan.labels, info.labels, "labels"); !known) return known;
-  return check_values(scan.tissue, info.tissues, "tissues");
+  return check_values(scan.tissue.values(), info.tissues, "tissues");
 }
 
 Result<void> save_scan(const std::filesystem::path& file, const CaseScan& scan, const KeepGoing& keep_going) try {
@@ -227,10 +243,10 @@ Result<void> save_scan(const std::filesystem::path& file, const CaseScan& scan, 
   const ScanGeometry& geometry = scan.geometry;
   openvdb::GridCPtrVec grids;
   if (!scan.hu.empty())
-    grids.push_back(std::make_shared<ScanWriter<std::int16_t>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu, hu));
-  const auto add = [&](const char* name, const std::vector<std::uint8_t>& voxels, const KeepGoing& keep_going) {
-    if (!voxels.empty())
-      grids.push_back(std::make_shared<ScanWriter<std::uint8_t>>(name, voxels, geometry, 0, keep_going));
+    grids.push_back(
+        std::make_shared<ScanWriter<std::vector<std::int16_t>>>(kHuGrid, scan.hu, geometry, kUsualPadding_hu, hu));
+  const auto add = [&]<class Voxels>(const char* name, const Voxels& voxels, const KeepGoing& keep_going) {
+    if (!voxels.empty()) grids.push_back(std::make_shared<ScanWriter<Voxels>>(name, voxels, geometry, 0, keep_going));
   };
   add(kLabelGrid, scan.labels, labels);
   add(kTissueGrid, scan.tissue, tissue);

@@ -7,20 +7,21 @@
 
 #include "common/core/keep_going.hpp"
 #include "common/core/result.hpp"
+#include "common/core/sparse_bytes.hpp"
 #include "common/volume/case_description.hpp"
 
 namespace osteon {
 
 class Case;
 
-// A block of voxels: columns fastest, then rows, then slices. Each vector has one value for each voxel, or is empty if
+// A block of voxels: columns fastest, then rows, then slices. Each list has one value for each voxel, or is empty if
 // the import does not know it. The case's description lists the values: CaseInfo::labels those of `labels`,
 // CaseInfo::tissues those of `tissue`. A voxel may have both, such as "bone 2" and "cortical".
 struct CaseScan {
   ScanGeometry geometry;
   std::vector<std::int16_t> hu = {};
   std::vector<std::uint8_t> labels = {};  // which structure the voxel belongs to; 0: none
-  std::vector<std::uint8_t> tissue = {};  // what it is made of; 0: not known
+  SparseBytes tissue = {};                // what it is made of; 0: not known
 };
 
 inline constexpr const char* kScanFile = "scan.vdb";  // in the folder of the case

@@ -35,10 +35,11 @@ namespace {
 
 using Vec3f = Eigen::Vector3f;
 
-constexpr int kBand = 4;        // voxels; the distance is clipped to this
-constexpr int kMargin = 6;      // voxels around a slab that can contain the surface nearest to a sample of the slab
-constexpr int kSlab = 48;       // voxels along x that one thread processes
-constexpr int kMostSteps = 16;  // of a walk over the mesh, which usually takes one or two
+constexpr int kBand = 4;         // voxels; the distance is clipped to this
+constexpr int kMargin = 6;       // voxels around a slab that can contain the surface nearest to a sample of the slab
+constexpr int kSlab = 40;        // voxels along x that one thread processes
+constexpr int kMostThreads = 4;  // each has a slab in memory
+constexpr int kMostSteps = 16;   // of a walk over the mesh, which usually takes one or two
 constexpr std::size_t kMostTriangles = 700'000'000;  // of a slab, because three corners of each are counted in 32 bits
 constexpr float kFarthest = (kBand + 2) * (kBand + 2);  // squared distance of a surface point that matters
 constexpr std::int32_t kNone = -1;
@@ -708,7 +709,8 @@ Result<SparseVolume> narrow_band_mm(const SampledField& field, float iso, double
   };
   Slabs slabs(field, iso, pitch_mm);
   std::vector<std::thread> helpers;
-  const int threads = std::min(slabs.count(), static_cast<int>(std::max(1u, std::thread::hardware_concurrency())));
+  const int threads =
+      std::min({slabs.count(), kMostThreads, static_cast<int>(std::max(1u, std::thread::hardware_concurrency()))});
   for (int i = 0; i < threads; ++i) helpers.emplace_back([&] { slabs.work(); });
   // The caller's thread waits, so that keep_going is called from one thread only. It also fills the result.
   bool cancelled = false;

@@ -105,7 +105,7 @@ void list_tissues(const CaseScan& scan, double metal_hu, CaseInfo& info) {
        {"density", {{"above_g_cm3", imaging::kCompactBone_g_cm3}}, {}}},
   };
   for (const CaseLabel& label : known)
-    if (std::ranges::find(scan.tissue, static_cast<std::uint8_t>(label.value)) != scan.tissue.end())
+    if (std::ranges::count(scan.tissue.values(), static_cast<std::uint8_t>(label.value)) != 0)
       info.tissues.push_back(label);
 }
 
@@ -134,21 +134,19 @@ Result<CaseScan> kept_scan(imaging::HuVolume volume, KnownVoxels known, const im
   auto labels = imaging::cropped(std::move(known.labels), box.first, box.last, part(keep_going, 0.3, 0.5));
   if (!labels) return tl::unexpected(labels.error());
   scan.labels = std::move(labels->values);
-  if (known.tissue.values.empty()) {
-    scan.tissue = zeros<std::uint8_t>(scan.labels.size());
-  } else {
-    auto tissue = imaging::cropped(std::move(known.tissue), box.first, box.last, part(keep_going, 0.5, 0.7));
-    if (!tissue) return tl::unexpected(tissue.error());
-    scan.tissue = std::move(tissue->values);
+  std::vector<std::uint8_t> tissue;
+  if (!known.tissue.values.empty()) {
+    auto cropped = imaging::cropped(std::move(known.tissue), box.first, box.last, part(keep_going, 0.5, 0.7));
+    if (!cropped) return tl::unexpected(cropped.error());
+    tissue = std::move(cropped->values);
   }
   const std::size_t area = box.count() / static_cast<std::size_t>(box.dim(2));
   for (std::size_t i = 0; i < scan.labels.size(); ++i) {
     if (i % area == 0 && !keep_going(0.7 + 0.3 * static_cast<double>(i) / static_cast<double>(scan.labels.size())))
       return stopped_while("taking the tissues");
-    if (!known.bone_labels[scan.labels[i]])
-      scan.tissue[i] = 0;
-    else if (scan.tissue[i] == 0)
-      scan.tissue[i] = tissue_of(calibration, scan.hu[i]);
+    const bool is_bone = known.bone_labels[scan.labels[i]];
+    const std::uint8_t hard = tissue.empty() ? std::uint8_t{0} : tissue[i];
+    scan.tissue.push_back(!is_bone ? std::uint8_t{0} : hard != 0 ? hard : tissue_of(calibration, scan.hu[i]));
   }
   return scan;
 }

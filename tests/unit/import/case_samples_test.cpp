@@ -25,10 +25,11 @@ SampleLabel label_at(const Vec3& at_mm) {
   kept.geometry.dims = volume.dims;
   kept.hu.assign(volume.count(), 500);
   kept.labels.assign(volume.count(), 0);
-  kept.tissue.assign(volume.count(), 0);
+  std::vector<std::uint8_t> tissue(volume.count(), 0);
   const std::size_t bone = volume.index(kBone[0], kBone[1], kBone[2]);
   kept.labels[bone] = kLabel;
-  kept.tissue[bone] = static_cast<std::uint8_t>(Tissue::metal);
+  tissue[bone] = static_cast<std::uint8_t>(Tissue::metal);
+  kept.tissue = SparseBytes(tissue);
   const imaging::VoxelBox all{{0, 0, 0}, {10, 10, 10}};
   const Vec3 index = at_mm / kPitch_mm;
   const Coord sample{static_cast<std::int32_t>(std::lround(index.x())),

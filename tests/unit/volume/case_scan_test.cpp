@@ -113,7 +113,7 @@ TEST_F(CaseScanTest, AVoxelLiesWhereItsAxesSay) {
 TEST_F(CaseScanTest, GridsThatAreNotKnownStayEmpty) {
   CaseScan labels_alone = scan_;
   labels_alone.hu.clear();
-  labels_alone.tissue.clear();
+  labels_alone.tissue = {};
   CaseInfo info = test::full_description(labels_alone);
   const auto bone = test::described_ball(info);
   ASSERT_TRUE(bone && bone->save(temp_ / "labels", labels_alone));
@@ -150,7 +150,12 @@ TEST_F(CaseScanTest, OneChangedVoxelIsAnotherScan) {
     CaseScan other = scan_;
     if (grid == 0) other.hu[700] += 1;
     if (grid == 1) other.labels[700] = other.labels[700] == 1 ? 7 : 1;
-    if (grid == 2) other.tissue[700] = other.tissue[700] == 1 ? 2 : 1;
+    if (grid == 2) {
+      std::vector<std::uint8_t> tissue;
+      for (std::size_t i = 0; i < scan_.tissue.size(); ++i) tissue.push_back(scan_.tissue[i]);
+      tissue[700] = tissue[700] == 1 ? 2 : 1;
+      other.tissue = SparseBytes(tissue);
+    }
     replace_by(other);
     const Error wrong = refused();
     EXPECT_EQ(wrong.code, ErrorCode::invalid_input);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -102,8 +103,10 @@ TEST_F(ForceDimensionArm, AHundredThousandCyclesAgainstASpring) {
   arm().hand(0, 20, 0);
   ASSERT_TRUE(device_->open());
   const double hand = arm()->hand_n_per_mm, wall = 0.05;
+  double asked_n = 0.0;
   const auto turn = [&] {
     const double y_mm = device_->read().pose_device_tool.position_mm.y();
+    asked_n = std::max(asked_n, wall * std::abs(y_mm));
     device_->write({Vec3(0, -wall * y_mm, 0)});
     return y_mm;
   };
@@ -117,7 +120,9 @@ TEST_F(ForceDimensionArm, AHundredThousandCyclesAgainstASpring) {
         return std::abs(y_mm - 20.0 * hand / (hand + wall)) < 0.01;
       },
       kPatience));
-  EXPECT_LE(arm()->peak_n, 20.0 * wall + 1e-9);
+  // After a force that ended and returned, the arm swings a little beyond 20 mm.
+  EXPECT_LE(arm()->peak_n, asked_n + 1e-9);
+  EXPECT_LT(asked_n, 1.5 * 20.0 * wall);
 }
 
 TEST_F(ForceDimensionArm, ShowsTorqueWhereItCan) {
