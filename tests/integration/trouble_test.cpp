@@ -10,7 +10,6 @@
 #include <csignal>
 #include <fstream>
 #include <thread>
-#include <vector>
 
 #include "tests/integration/stage.hpp"
 #include "tests/support/wait.hpp"
@@ -372,7 +371,7 @@ TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
   EXPECT_EQ(summary["steps"][0]["completed"], true);
   EXPECT_GT(summary["held_for_room_ticks"].get<int>(), 5000);
   // The hand never went through bone: it was no farther from the tool than the expert's push stretches the coupling,
-  // with a margin. A loop that a busy machine delays lets the hand go farther for a moment.
+  // with a margin.
   std::ifstream log(stage / "silent.csv");
   std::string line;
   std::getline(log, line);
@@ -382,17 +381,17 @@ TEST(Trouble, TenSecondsOfSilenceAreSatOut) {
     return std::count(line.begin(), line.begin() + static_cast<std::ptrdiff_t>(at), ',') + 1;
   };
   const auto depth = column("depth_mm"), handle = column("device_depth_mm");
-  std::vector<double> stretch_mm;
+  double most_mm = 0.0;
+  std::string farthest;
   for (std::string entry; std::getline(log, entry);) {
     std::vector<std::string> cells;
     std::istringstream in(entry);
     for (std::string cell; std::getline(in, cell, ',');) cells.push_back(cell);
     const auto number = [&](auto i) { return std::stod(cells.at(static_cast<std::size_t>(i))); };
-    stretch_mm.push_back(number(handle) - number(depth));
+    if (const double mm = number(handle) - number(depth); mm > most_mm) most_mm = mm, farthest = entry;
   }
-  EXPECT_GT(std::ranges::max(stretch_mm), 0.1);
-  const auto far = std::ranges::count_if(stretch_mm, [](double mm) { return mm >= 3.0; });
-  EXPECT_LT(static_cast<double>(far), 0.02 * static_cast<double>(stretch_mm.size()));
+  EXPECT_GT(most_mm, 0.1);
+  EXPECT_LT(most_mm, 3.0) << line << '\n' << farthest << '\n' << haptic.err();
   EXPECT_EQ(stage.server().terminate(), 0);
   EXPECT_EQ(summary["field_hash"], read_json(stage / "server.json")["field_hash"]);
 }
